@@ -1,0 +1,114 @@
+//! Coordination strategies: what holds the copies of the shared object together.
+//!
+//! A strategy sees its own copy and the newest samples held from the others, and answers with the force FT that equation (8) subtracts. To add one,
+//! write a file here that implements [`Strategy`] and add a line to [`Coordination`].
+
+mod average_position;
+mod proportional_derivative;
+
+pub use average_position::AveragePosition;
+pub use proportional_derivative::ProportionalDerivative;
+
+use cohaptic_units::Instant;
+
+use crate::{Gains, Held, State};
+
+/// What a strategy sees at a tick.
+#[derive(Debug)]
+pub struct Context<'a, const A: usize> {
+    /// The instant of the tick.
+    pub now: Instant,
+    /// The peer's own copy of the object.
+    pub own: &'a State<A>,
+    /// The newest samples from the others.
+    pub held: &'a Held<A>,
+}
+
+/// What a strategy answers.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Command<const A: usize> {
+    /// The coordination force FT [N]; equation (8) subtracts it.
+    pub force: [f64; A],
+    /// Where the strategy wants the copy to be, (xd, vd), for the record.
+    pub target: State<A>,
+}
+
+/// A coordination strategy of one peer.
+///
+/// It must be deterministic: the answer depends on the calls made so far and on nothing else.
+pub trait Strategy<const A: usize> {
+    /// The command at a tick. Called exactly once a tick, after the samples that have arrived were taken in.
+    fn command(&mut self, context: &Context<'_, A>) -> Command<A>;
+
+    /// New gains, from the next tick on. A strategy without gains ignores them.
+    fn set_gains(&mut self, gains: Gains);
+}
+
+impl<const A: usize, S: Strategy<A> + ?Sized> Strategy<A> for alloc::boxed::Box<S> {
+    fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
+        (**self).command(context)
+    }
+
+    fn set_gains(&mut self, gains: Gains) {
+        (**self).set_gains(gains);
+    }
+}
+
+/// The strategies that a scene can name: the registry.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum Coordination {
+    /// Each copy is pulled towards the mean of the others.
+    AveragePosition,
+    /// Each copy is pulled towards each of the others.
+    ProportionalDerivative,
+}
+
+impl Coordination {
+    /// Every strategy.
+    pub const ALL: [Self; 2] = [Self::AveragePosition, Self::ProportionalDerivative];
+
+    /// The name in a scene file.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::AveragePosition => "average-position",
+            Self::ProportionalDerivative => "proportional-derivative",
+        }
+    }
+
+    /// Makes the strategy for one peer out of `peers`.
+    #[must_use]
+    pub fn strategy(self, gains: Gains, peers: usize) -> BuiltIn {
+        match self {
+            Self::AveragePosition => BuiltIn::AveragePosition(AveragePosition::new(gains)),
+            Self::ProportionalDerivative => BuiltIn::ProportionalDerivative(ProportionalDerivative::new(gains, peers)),
+        }
+    }
+}
+
+/// A strategy of this crate, without a pointer in between.
+#[derive(Clone, Debug)]
+pub enum BuiltIn {
+    /// See [`AveragePosition`].
+    AveragePosition(AveragePosition),
+    /// See [`ProportionalDerivative`].
+    ProportionalDerivative(ProportionalDerivative),
+}
+
+impl<const A: usize> Strategy<A> for BuiltIn {
+    #[inline]
+    fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
+        match self {
+            Self::AveragePosition(strategy) => strategy.command(context),
+            Self::ProportionalDerivative(strategy) => strategy.command(context),
+        }
+    }
+
+    fn set_gains(&mut self, gains: Gains) {
+        match self {
+            Self::AveragePosition(strategy) => Strategy::<A>::set_gains(strategy, gains),
+            Self::ProportionalDerivative(strategy) => Strategy::<A>::set_gains(strategy, gains),
+        }
+    }
+}

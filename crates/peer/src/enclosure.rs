@@ -1,0 +1,60 @@
+//! The enclosure that limits the object's travel: a sampled virtual wall at either end of each axis.
+
+use crate::State;
+
+/// Walls at either end of each axis: a spring and a damper that can push the object back and cannot pull it.
+///
+/// A sampled wall gives energy away: by Colgate & Schenkel (1997) a device of damping b stays passive at a wall of stiffness K and damping B sampled
+/// every T only if b > K·T/2 + |B|. For a free mass m, K·T²/m must be well below 1.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Enclosure {
+    /// The lower end of each axis [m].
+    pub min: [f64; 3],
+    /// The upper end of each axis [m], above the lower one.
+    pub max: [f64; 3],
+    /// Stiffness of the wall [N/m].
+    pub stiffness: f64,
+    /// Damping of the wall [N·s/m].
+    pub damping: f64,
+}
+
+impl Enclosure {
+    /// The force of the walls on an object in that state [N]; zero inside.
+    #[must_use]
+    pub fn force<const A: usize>(&self, object: &State<A>) -> [f64; A] {
+        core::array::from_fn(|axis| {
+            let (x, v) = (object.position[axis], object.velocity[axis]);
+            let push = |depth: f64| self.stiffness * depth + self.damping * v;
+            if x > self.max[axis] {
+                // Pushes down only.
+                -push(x - self.max[axis]).max(0.0)
+            } else if x < self.min[axis] {
+                // Pushes up only.
+                -push(x - self.min[axis]).min(0.0)
+            } else {
+                0.0
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WALLS: Enclosure = Enclosure { min: [-0.02; 3], max: [0.03; 3], stiffness: 1000.0, damping: 10.0 };
+
+    fn force(position: f64, velocity: f64) -> f64 {
+        WALLS.force(&State { position: [position], velocity: [velocity] })[0]
+    }
+
+    #[test]
+    fn a_wall_pushes_back_and_never_pulls() {
+        assert_eq!(force(0.0, 9.0).abs(), 0.0);
+        assert!((force(0.04, 0.0) + 10.0).abs() < 1e-12);
+        assert!((force(-0.04, 0.0) - 20.0).abs() < 1e-12);
+        // Leaving fast: the damper would pull, the wall does not.
+        assert_eq!(force(0.031, -5.0).abs(), 0.0);
+        assert_eq!(force(-0.021, 5.0).abs(), 0.0);
+    }
+}

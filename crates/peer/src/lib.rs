@@ -1,0 +1,50 @@
+//! One participant of a networked haptic cooperation, and nothing of how its samples travel.
+//!
+//! ```text
+//!   hand ──Fh──► device ──FC──► copy of the object ──FT──► coordination ◄── samples of the other peers
+//!                (mH, bH)  KC, BC     (mO, bO)      KT, BT
+//! ```
+//!
+//! The model is that of Rakhsha & Constantinescu (2015), equations (7) to (10). A [`Peer`] owns a [`Device`], its copy of the shared virtual object,
+//! and a coordination [`Strategy`]; both traits are open to other implementations. What happens at one tick, in which order, is written at [`Peer`].
+//!
+//! Symbols of the paper appear only in the functions that compute its equations:
+//!
+//! | symbol | here | unit |
+//! | --- | --- | --- |
+//! | mH, bH | mass and damping of [`DeviceConfig`] | kg, N·s/m |
+//! | KC, BC | stiffness and damping of the coupling [`Gains`] | N/m, N·s/m |
+//! | KT, BT | stiffness and damping of the coordination [`Gains`] | N/m, N·s/m |
+//! | mOi, bO | mass and damping of [`CopyConfig`] | kg, N·s/m |
+//! | Fh, FC, FT | hand, coupling and coordination force | N |
+//!
+//! Positions, velocities and forces are arrays `[f64; A]` over the A = 1, 2 or 3 translational axes.
+#![cfg_attr(not(test), no_std)]
+
+extern crate alloc;
+
+mod clock;
+mod config;
+pub mod coordination;
+//mod device;
+mod enclosure;
+//mod hand;
+mod held;
+//mod object;
+//mod peer;
+mod plant;
+mod signal;
+mod state;
+//pub mod wire;
+
+pub use clock::{Clock, Drift, DriftError};
+pub use config::{ArmConfig, Contact, CopyConfig, DeviceConfig, Direction, Gains, Hand};
+pub use coordination::{Command, Context, Coordination, Strategy};
+//pub use device::{Device, RestingDevice, SimulatedDevice};
+pub use enclosure::Enclosure;
+pub use held::Held;
+//pub use object::ObjectCopy;
+//pub use peer::{Forces, Peer, PeerConfig, ReceiveError, Reception};
+pub use plant::{Integrator, Plant, StepMap};
+pub use signal::{Signal, Table, TableError};
+pub use state::State;

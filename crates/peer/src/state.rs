@@ -1,0 +1,27 @@
+//! Position and velocity.
+
+/// Position and velocity of a body along A axes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct State<const A: usize> {
+    /// Position [m].
+    pub position: [f64; A],
+    /// Velocity [m/s].
+    pub velocity: [f64; A],
+}
+
+impl<const A: usize> State<A> {
+    /// At rest at the origin.
+    pub const REST: Self = Self { position: [0.0; A], velocity: [0.0; A] };
+
+    /// Whether every component is a finite number.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.position.iter().chain(&self.velocity).all(|value| value.is_finite())
+    }
+}
+
+impl<const A: usize> Default for State<A> {
+    fn default() -> Self {
+        Self::REST
+    }
+}

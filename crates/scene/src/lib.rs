@@ -1,0 +1,3 @@
+//! Scene files.
+mod model;
+pub use model::*;

@@ -1,0 +1,296 @@
+//! A checked scene: what a file says once every default is filled in and every value is known to make sense.
+
+use core::time::Duration;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator};
+use cohaptic_units::{Instant, Probability};
+use cohaptic_wan::{DropCause, LinkConfig};
+
+/// A scene, ready to be run. Every number in it has been checked; every peer it names exists.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Scene {
+    /// The file it was read from, for messages; empty for a text.
+    pub file: PathBuf,
+    /// A line for people.
+    pub title: String,
+    /// How long it lasts; above zero.
+    pub duration: Duration,
+    /// The seed of every random stream.
+    pub seed: u64,
+    /// The number of translational axes.
+    pub axes: Axes,
+    /// The shared virtual object.
+    pub object: ObjectSpec,
+    /// How the copies are held together.
+    pub coordination: CoordinationSpec,
+    /// How motion between ticks is computed.
+    pub integrator: Integrator,
+    /// The peers, at least two, in the order of the file. Their names differ.
+    pub peers: Vec<PeerSpec>,
+    /// The directed links between the peers.
+    pub links: LinkTable,
+    /// Changes while the scene runs, in order of time; equal instants in the order of the file.
+    pub timeline: Vec<Change>,
+    /// What must come out, if the scene is a test.
+    pub expect: Option<Expect>,
+}
+
+/// How many translational axes a scene has.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Axes {
+    /// x.
+    #[default]
+    One,
+    /// x and y.
+    Two,
+    /// x, y and z.
+    Three,
+}
+
+impl Axes {
+    /// 1, 2 or 3.
+    #[must_use]
+    pub const fn count(self) -> usize {
+        match self {
+            Self::One => 1,
+            Self::Two => 2,
+            Self::Three => 3,
+        }
+    }
+}
+
+/// The shared virtual object. Components beyond the scene's axes are zero.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ObjectSpec {
+    /// Mass of the whole object [kg], above zero.
+    pub mass: f64,
+    /// Viscous damping of each copy [N·s/m].
+    pub damping: f64,
+    /// Whether each of N copies has mass/N, or the whole mass.
+    pub split_mass: bool,
+    /// Where every copy and every device begins [m].
+    pub position: [f64; 3],
+    /// With which velocity every copy and every device begins [m/s].
+    pub velocity: [f64; 3],
+    /// The walls that limit its travel, if there are any.
+    pub enclosure: Option<Enclosure>,
+}
+
+/// How gains are scaled with the number of peers N.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Scaling {
+    /// As they are written.
+    #[default]
+    None,
+    /// Coordination gains times 4(N−1)/N², coupling gains times 2/N. Both leave N = 2 unchanged.
+    InverseN,
+}
+
+/// The coordination controller, the same at every peer.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct CoordinationSpec {
+    /// The strategy.
+    pub strategy: Coordination,
+    /// How its gains are scaled with the number of peers.
+    pub scaling: Scaling,
+    /// KT and BT as written, before scaling.
+    pub gains: Gains,
+    /// The period of sending, Tn; a whole multiple of every peer's tick, on its own clock.
+    pub update: Duration,
+}
+
+/// One peer.
+#[derive(Clone, PartialEq, Debug)]
+pub struct PeerSpec {
+    /// Its name, unique in the scene.
+    pub name: String,
+    /// When it ticks: tick period Tc, offset and drift.
+    pub clock: Clock,
+    /// It sends at ticks k with (k − phase) a multiple of update/tick; below update/tick.
+    pub phase: u64,
+    /// Whether forces are applied one tick after they were computed.
+    pub compute_delay: bool,
+    /// How it touches the object.
+    pub contact: Contact,
+    /// Its device, mH and bH.
+    pub device: DeviceConfig,
+    /// Its virtual coupling, KC and BC as written, before scaling.
+    pub coupling: Gains,
+    /// How the coupling is scaled with the number of peers.
+    pub coupling_scaling: Scaling,
+    /// What its hand does; `None`: nothing.
+    pub hand: Option<Hand>,
+    /// Where its copy and its device begin [m].
+    pub position: [f64; 3],
+    /// With which velocity its copy and its device begin [m/s].
+    pub velocity: [f64; 3],
+    /// The line that all it sends passes before the links, if it has one.
+    pub uplink: Option<LinkConfig>,
+    /// The line that all it receives passes after the links, if it has one.
+    pub downlink: Option<LinkConfig>,
+}
+
+/// The directed links of a full mesh. Equal links share one configuration.
+#[derive(Clone, PartialEq, Debug)]
+pub struct LinkTable {
+    /// The different configurations, in order of first use.
+    pub configs: Vec<Arc<LinkConfig>>,
+    /// For each sender, for each receiver, which configuration; the diagonal has no meaning.
+    pub index: Vec<Vec<usize>>,
+}
+
+impl LinkTable {
+    /// The link from one peer to another, by their places in [`Scene::peers`].
+    #[must_use]
+    pub fn between(&self, from: usize, to: usize) -> &LinkConfig {
+        &self.configs[self.index[from][to]]
+    }
+}
+
+/// Something that changes at an instant, before anything else happens at that instant.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Change {
+    /// When.
+    pub at: Instant,
+    /// What.
+    pub what: ChangeKind,
+}
+
+/// What changes.
+#[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum ChangeKind {
+    /// These links take these configurations; what is on the way keeps its delay.
+    Links(Vec<LinkChange>),
+    /// A peer's contact changes.
+    Contact {
+        /// Its place in [`Scene::peers`].
+        peer: usize,
+        /// From now on.
+        contact: Contact,
+    },
+    /// A peer's hand force or wanted motion changes. An arm stays the same arm; a hand without an arm does not grow one.
+    Hand {
+        /// Its place in [`Scene::peers`].
+        peer: usize,
+        /// From now on.
+        hand: Option<Hand>,
+    },
+    /// The coordination gains change, at every peer. As written, before scaling.
+    Coordination(Gains),
+}
+
+/// One link with its new configuration.
+#[derive(Clone, PartialEq, Debug)]
+pub struct LinkChange {
+    /// The sender's place in [`Scene::peers`].
+    pub from: usize,
+    /// The receiver's place in [`Scene::peers`].
+    pub to: usize,
+    /// From now on.
+    pub config: Arc<LinkConfig>,
+}
+
+/// What must come out of a run for `cohaptic check` to pass. Absent entries are not looked at.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Expect {
+    /// Whether a small disturbance of the relative motion dies out (`true`) or grows (`false`).
+    pub stable: Option<bool>,
+    /// The largest distance along an axis between two copies, over the whole run [m].
+    pub discrepancy: Option<Bounds>,
+    /// Where a copy is at an instant.
+    pub positions: Vec<ExpectPosition>,
+    /// When a copy has first moved a distance from where it began.
+    pub travel: Vec<ExpectTravel>,
+    /// Which fraction of the packets offered to links was dropped.
+    pub loss: Vec<ExpectLoss>,
+    /// The mean delay of the packets that links delivered.
+    pub delay: Vec<ExpectDelay>,
+}
+
+/// A closed interval; at least one end is given.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Bounds {
+    /// At least this.
+    pub min: Option<f64>,
+    /// At most this.
+    pub max: Option<f64>,
+}
+
+impl Bounds {
+    /// Whether the value lies within; a NaN does not.
+    #[must_use]
+    pub fn contain(&self, value: f64) -> bool {
+        self.min.is_none_or(|min| value >= min) && self.max.is_none_or(|max| value <= max) && !value.is_nan()
+    }
+}
+
+/// An expected position.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ExpectPosition {
+    /// The peer whose copy is meant, by its place in [`Scene::peers`].
+    pub peer: usize,
+    /// 0 for x, 1 for y, 2 for z.
+    pub axis: usize,
+    /// At the peer's last tick at or before this instant.
+    pub at: Instant,
+    /// Where [m].
+    pub bounds: Bounds,
+}
+
+/// An expected time of travel.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ExpectTravel {
+    /// The peer whose copy is meant, by its place in [`Scene::peers`].
+    pub peer: usize,
+    /// 0 for x, 1 for y, 2 for z.
+    pub axis: usize,
+    /// The distance from where the copy began, either way [m]; above zero.
+    pub distance: f64,
+    /// The time from the scene's beginning at which it is first reached [s].
+    pub bounds: Bounds,
+}
+
+/// An expected fraction of dropped packets.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ExpectLoss {
+    /// Over which links.
+    pub link: LinkSelector,
+    /// Dropped for which reason; `None`: any.
+    pub cause: Option<DropCause>,
+    /// The fraction of the packets offered, from 0 to 1.
+    pub min: Option<Probability>,
+    /// See `min`.
+    pub max: Option<Probability>,
+}
+
+/// An expected mean delay.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ExpectDelay {
+    /// Over which links.
+    pub link: LinkSelector,
+    /// At least this.
+    pub min: Option<Duration>,
+    /// At most this.
+    pub max: Option<Duration>,
+}
+
+/// Which links are meant, by the places of peers in [`Scene::peers`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum LinkSelector {
+    /// All links between peers.
+    All,
+    /// One directed link.
+    Between {
+        /// The sender.
+        from: usize,
+        /// The receiver.
+        to: usize,
+    },
+    /// The line that a peer sends through.
+    Uplink(usize),
+    /// The line that a peer receives through.
+    Downlink(usize),
+}

@@ -1,0 +1,35 @@
+//! Typed quantities of network and time, and the text they are written as in scenes.
+//!
+//! Everything that must be exact is an integer in a newtype: an [`Instant`] is a count of nanoseconds since the scene began, a [`Rate`] bits per
+//! second, a [`Bytes`] bytes. [`Probability`] is a checked `f64`, [`Hertz`] and [`RadPerSec`] keep the factor 2π in one place. Mechanical
+//! quantities (masses, stiffnesses, forces) are plain `f64` in SI units elsewhere, because they become matrices at once.
+//!
+//! This crate does not know what the quantities are used for. Read [`Instant`] first.
+//!
+//! ```
+//! use cohaptic_units::{Bytes, Instant, Rate, parse};
+//!
+//! let rate: Rate = parse::rate("1Mbit")?;
+//! let size: Bytes = parse::size("64B")?;
+//! let departure = Instant::ZERO + rate.serialisation_time(size);
+//! assert_eq!(departure.as_nanos(), 512_000);
+//! # Ok::<(), cohaptic_units::ParseError>(())
+//! ```
+#![cfg_attr(not(test), no_std)]
+
+extern crate alloc;
+
+mod frequency;
+mod instant;
+pub mod parse;
+pub mod print;
+mod probability;
+mod rate;
+mod size;
+
+pub use frequency::{Hertz, RadPerSec};
+pub use instant::Instant;
+pub use parse::ParseError;
+pub use probability::{Probability, ProbabilityError};
+pub use rate::Rate;
+pub use size::Bytes;

@@ -1,0 +1,175 @@
+//! From text to quantities.
+//!
+//! Decimals are read exactly, as integers, and rounded once, half up, to the unit of the quantity. What was expected is part of every error.
+
+use alloc::string::{String, ToString};
+use core::time::Duration;
+
+use crate::{Bytes, Probability, Rate};
+
+/// Why a text is not the quantity that was expected.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ParseError {
+    /// The text does not begin with a decimal number, or has a sign or an exponent.
+    #[error("\"{text}\" does not begin with a plain decimal number: expected {expected}")]
+    Number {
+        /// The text as given.
+        text: String,
+        /// What would have been right.
+        expected: &'static str,
+    },
+    /// The number has no unit, or one that this quantity does not have.
+    #[error("{} in \"{text}\": expected {expected}", if unit.is_empty() { "no unit".to_string() } else { alloc::format!("unknown unit \"{unit}\"") })]
+    Unit {
+        /// The text as given.
+        text: String,
+        /// What stood where the unit belongs; may be empty.
+        unit: String,
+        /// What would have been right.
+        expected: &'static str,
+    },
+    /// The number is too large, or zero where zero has no meaning.
+    #[error("\"{text}\" is out of range: expected {expected}")]
+    Range {
+        /// The text as given.
+        text: String,
+        /// What would have been right.
+        expected: &'static str,
+    },
+}
+
+/// Reads a duration: a decimal number and `ns`, `us`, `ms`, `s`, `min` or `h`. Rounded once, to the nearest nanosecond.
+///
+/// # Errors
+///
+/// [`ParseError`] if there is no number, no such unit, or more than 584 years.
+pub fn duration(text: &str) -> Result<Duration, ParseError> {
+    const EXPECTED: &str = "a duration such as \"8ms\", \"1.5s\" or \"250us\"";
+    let units = [("ns", 1), ("us", 1_000), ("µs", 1_000), ("ms", 1_000_000), ("s", 1_000_000_000), ("min", 60_000_000_000), ("h", 3_600_000_000_000)];
+    let nanos = quantity(text, &units, EXPECTED)?;
+    Ok(Duration::from_nanos(nanos))
+}
+
+/// Reads a rate: a decimal number and `bit`, `kbit`, `Mbit` or `Gbit`, bits per second, powers of ten.
+///
+/// # Errors
+///
+/// [`ParseError`] if there is no number, no such unit, or the rate is zero or more than 2⁶⁴ bit/s.
+pub fn rate(text: &str) -> Result<Rate, ParseError> {
+    const EXPECTED: &str = "a rate above zero such as \"10Mbit\" or \"64kbit\" (bits per second)";
+    let units = [("bit", 1), ("kbit", 1_000), ("Mbit", 1_000_000), ("Gbit", 1_000_000_000)];
+    let bits = quantity(text, &units, EXPECTED)?;
+    Rate::bits_per_sec(bits).ok_or_else(|| ParseError::Range { text: text.to_string(), expected: EXPECTED })
+}
+
+/// Reads a size: a decimal number and `B`, `kB` or `MB`, powers of ten.
+///
+/// # Errors
+///
+/// [`ParseError`] if there is no number, no such unit, or more than 2⁶⁴ bytes.
+pub fn size(text: &str) -> Result<Bytes, ParseError> {
+    const EXPECTED: &str = "a size such as \"64B\", \"1500B\" or \"64kB\"";
+    quantity(text, &[("B", 1), ("kB", 1_000), ("MB", 1_000_000)], EXPECTED).map(Bytes::new)
+}
+
+/// Reads a probability in percent: `"1.5%"`. A probability from 0 to 1 is written as a plain number, which is not text.
+///
+/// # Errors
+///
+/// [`ParseError`] if there is no number, no percent sign, or more than 100 %.
+pub fn probability(text: &str) -> Result<Probability, ParseError> {
+    const EXPECTED: &str = "a probability such as 0.015 or \"1.5%\"";
+    let (number, unit) = split(text, EXPECTED)?;
+    if unit != "%" {
+        return Err(ParseError::Unit { text: text.to_string(), unit: unit.to_string(), expected: EXPECTED });
+    }
+    let percent: f64 = number.parse().map_err(|_| ParseError::Number { text: text.to_string(), expected: EXPECTED })?;
+    Probability::new(percent / 100.0).map_err(|_| ParseError::Range { text: text.to_string(), expected: EXPECTED })
+}
+
+/// Splits `"24.5ms"` into `"24.5"` and `"ms"`; space between the two is allowed.
+fn split<'a>(text: &'a str, expected: &'static str) -> Result<(&'a str, &'a str), ParseError> {
+    let trimmed = text.trim();
+    let end = trimmed.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(trimmed.len());
+    let (number, unit) = trimmed.split_at(end);
+    let digits = number.bytes().filter(u8::is_ascii_digit).count();
+    if digits == 0 || number.len() - digits > 1 {
+        return Err(ParseError::Number { text: text.to_string(), expected });
+    }
+    Ok((number, unit.trim_start()))
+}
+
+/// The value of `text` in the base unit, exact up to one rounding, half up.
+fn quantity(text: &str, units: &[(&str, u64)], expected: &'static str) -> Result<u64, ParseError> {
+    let (number, unit) = split(text, expected)?;
+    let out_of_range = || ParseError::Range { text: text.to_string(), expected };
+    let &(_, scale) =
+        units.iter().find(|(name, _)| *name == unit).ok_or_else(|| ParseError::Unit { text: text.to_string(), unit: unit.to_string(), expected })?;
+    let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
+    let mut value: u128 = 0;
+    for digit in whole.bytes() {
+        value = value.checked_mul(10).and_then(|v| v.checked_add(u128::from(digit - b'0'))).ok_or_else(out_of_range)?;
+    }
+    let mut value = value.checked_mul(u128::from(scale)).ok_or_else(out_of_range)?;
+    // Digits beyond the 18th change nothing after rounding to the base unit: the largest scale is 3.6e12.
+    let fraction = &fraction[..fraction.len().min(18)];
+    let mut numerator: u128 = 0;
+    let mut denominator: u128 = 1;
+    for digit in fraction.bytes() {
+        numerator = numerator * 10 + u128::from(digit - b'0');
+        denominator *= 10;
+    }
+    value += (numerator * u128::from(scale) * 2 + denominator) / (2 * denominator);
+    u64::try_from(value).map_err(|_| out_of_range())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_are_exact_in_every_unit() {
+        let nanos = |text| duration(text).map(|d| d.as_nanos());
+        assert_eq!(nanos("8ms"), Ok(8_000_000));
+        assert_eq!(nanos("1.5s"), Ok(1_500_000_000));
+        assert_eq!(nanos("250us"), Ok(250_000));
+        assert_eq!(nanos("0.1 ms"), Ok(100_000));
+        assert_eq!(nanos("1h"), Ok(3_600_000_000_000));
+        assert_eq!(nanos("18446744073709551615ns"), Ok(u128::from(u64::MAX)));
+    }
+
+    #[test]
+    fn a_duration_is_rounded_once_half_up() {
+        assert_eq!(duration("0.4ns").unwrap().as_nanos(), 0);
+        assert_eq!(duration("0.5ns").unwrap().as_nanos(), 1);
+        assert_eq!(duration("0.33333333333333333333333333333333333333333s").unwrap().as_nanos(), 333_333_333);
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_what_was_expected() {
+        assert!(matches!(duration("8"), Err(ParseError::Unit { .. })));
+        assert!(matches!(duration("8 parsecs"), Err(ParseError::Unit { .. })));
+        assert!(matches!(duration("-8ms"), Err(ParseError::Number { .. })));
+        assert!(matches!(duration("ms"), Err(ParseError::Number { .. })));
+        assert!(matches!(duration("1.2.3s"), Err(ParseError::Number { .. })));
+        assert!(matches!(duration("."), Err(ParseError::Number { .. })));
+        assert!(matches!(duration(""), Err(ParseError::Number { .. })));
+        assert!(matches!(duration("18446744073709551616ns"), Err(ParseError::Range { .. })));
+        assert!(matches!(duration("999999999999999999999999999999999999999999999h"), Err(ParseError::Range { .. })));
+        assert!(matches!(rate("0bit"), Err(ParseError::Range { .. })));
+        assert!(matches!(rate("10Mb"), Err(ParseError::Unit { .. })));
+        assert!(matches!(size("64"), Err(ParseError::Unit { .. })));
+        assert!(matches!(probability("101%"), Err(ParseError::Range { .. })));
+        assert!(matches!(probability("0.5"), Err(ParseError::Unit { .. })));
+        assert_eq!(duration("8 parsecs").unwrap_err().to_string(), "unknown unit \"parsecs\" in \"8 parsecs\": expected a duration such as \"8ms\", \"1.5s\" or \"250us\"");
+    }
+
+    #[test]
+    fn rates_sizes_and_probabilities_read_as_they_print() {
+        assert_eq!(rate("10Mbit").unwrap().as_bits_per_sec(), 10_000_000);
+        assert_eq!(rate("1.5kbit").unwrap().as_bits_per_sec(), 1_500);
+        assert_eq!(size("64kB").unwrap().get(), 64_000);
+        assert!((probability("1.5%").unwrap().get() - 0.015).abs() < 1e-18);
+    }
+}

@@ -1,0 +1,82 @@
+//! Probabilities.
+
+use core::fmt;
+
+/// A probability, between 0 and 1, both included.
+#[derive(Clone, Copy, PartialEq, PartialOrd, Debug, Default)]
+pub struct Probability(f64);
+
+/// Why a number is no probability.
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[error("{value} is not a probability: expected a number from 0 to 1")]
+#[non_exhaustive]
+pub struct ProbabilityError {
+    /// The number that was given.
+    pub value: f64,
+}
+
+impl Probability {
+    /// Never.
+    pub const ZERO: Self = Self(0.0);
+    /// Always.
+    pub const ONE: Self = Self(1.0);
+
+    /// Checks that `value` lies in 0..=1.
+    ///
+    /// # Errors
+    ///
+    /// [`ProbabilityError`] for a number outside, a NaN or an infinity.
+    pub fn new(value: f64) -> Result<Self, ProbabilityError> {
+        if (0.0..=1.0).contains(&value) { Ok(Self(value)) } else { Err(ProbabilityError { value }) }
+    }
+
+    /// The number, from 0 to 1.
+    #[must_use]
+    pub const fn get(self) -> f64 {
+        self.0
+    }
+
+    /// Whether an event of this probability happens, given 64 uniform random bits.
+    ///
+    /// 0 never happens and 1 always does. In between the chance is exact for the top 53 bits of `bits`, an error of at most 2⁻⁵³.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "the top 53 bits of a u64 are exact in an f64")]
+    pub fn happens(self, bits: u64) -> bool {
+        const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
+        ((bits >> 11) as f64) < self.0 * TWO_POW_53
+    }
+}
+
+impl fmt::Display for Probability {
+    /// As a percentage: `1.5%`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}%", self.0 * 100.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_never_happens_and_one_always_does() {
+        for bits in [0, 1, u64::MAX / 2, u64::MAX] {
+            assert!(!Probability::ZERO.happens(bits));
+            assert!(Probability::ONE.happens(bits));
+        }
+    }
+
+    #[test]
+    fn a_quarter_is_the_lower_quarter_of_the_bits() {
+        let quarter = Probability::new(0.25).unwrap();
+        assert!(quarter.happens((1 << 62) - 1));
+        assert!(!quarter.happens(1 << 62));
+    }
+
+    #[test]
+    fn what_is_no_number_is_no_probability() {
+        for value in [f64::NAN, f64::INFINITY, -0.1, 1.000_1] {
+            assert!(Probability::new(value).is_err());
+        }
+    }
+}
