@@ -20,31 +20,32 @@
 //!
 //! Positions, velocities and forces are arrays `[f64; A]` over the A = 1, 2 or 3 translational axes.
 #![cfg_attr(not(test), no_std)]
+#![cfg_attr(test, allow(clippy::float_cmp, clippy::cast_precision_loss, reason = "tests compare exact values and count samples"))]
 
 extern crate alloc;
 
 mod clock;
 mod config;
 pub mod coordination;
-//mod device;
+mod device;
 mod enclosure;
-//mod hand;
 mod held;
-//mod object;
-//mod peer;
+mod object;
+mod peer;
 mod plant;
 mod signal;
 mod state;
-//pub mod wire;
+mod stepper;
+pub mod wire;
 
 pub use clock::{Clock, Drift, DriftError};
 pub use config::{ArmConfig, Contact, CopyConfig, DeviceConfig, Direction, Gains, Hand};
 pub use coordination::{Command, Context, Coordination, Strategy};
-//pub use device::{Device, RestingDevice, SimulatedDevice};
+pub use device::{Device, RestingDevice, SimulatedDevice};
 pub use enclosure::Enclosure;
 pub use held::Held;
-//pub use object::ObjectCopy;
-//pub use peer::{Forces, Peer, PeerConfig, ReceiveError, Reception};
+pub use object::ObjectCopy;
+pub use peer::{Forces, Peer, PeerConfig, ReceiveError, Reception};
 pub use plant::{Integrator, Plant, StepMap};
 pub use signal::{Signal, Table, TableError};
 pub use state::State;

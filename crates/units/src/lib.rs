@@ -16,6 +16,7 @@
 //! # Ok::<(), cohaptic_units::ParseError>(())
 //! ```
 #![cfg_attr(not(test), no_std)]
+#![cfg_attr(test, allow(clippy::float_cmp, clippy::cast_precision_loss, reason = "tests compare exact values and count samples"))]
 
 extern crate alloc;
 

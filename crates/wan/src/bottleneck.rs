@@ -76,8 +76,9 @@ pub(crate) struct Departure {
 }
 
 impl<T> BottleneckStage<T> {
-    pub(crate) fn new(config: Bottleneck) -> Self {
-        Self { config, waiting: VecDeque::new(), waiting_bytes: Bytes::ZERO, in_service: None, announced: 0 }
+    /// An idle line. Announcements count on from `announced`, so that those of a line that stood here before stay stale.
+    pub(crate) fn new(config: Bottleneck, announced: u64) -> Self {
+        Self { config, waiting: VecDeque::new(), waiting_bytes: Bytes::ZERO, in_service: None, announced }
     }
 
     /// Takes a packet. `Ok(Some)`: the line was idle and has begun to send it. `Ok(None)`: it waits. `Err`: the queue is full; the packet comes back.
@@ -119,14 +120,9 @@ impl<T> BottleneckStage<T> {
         Some(Departure { at: service.departure, ticket: self.announced })
     }
 
-    /// Everything that waits or is on the line, in order: what a link gives up when its bottleneck is taken away.
-    pub(crate) fn into_items(self) -> impl Iterator<Item = T> {
-        self.in_service.into_iter().map(|service| service.item).chain(self.waiting.into_iter().map(|(_, item)| item))
-    }
-
-    /// How many packets wait or are on the line.
-    pub(crate) fn len(&self) -> usize {
-        self.waiting.len() + usize::from(self.in_service.is_some())
+    /// The last announcement made, and everything that waits or is on the line, in order: what a link gives up with its bottleneck.
+    pub(crate) fn dismantle(self) -> (u64, impl Iterator<Item = T>) {
+        (self.announced, self.in_service.into_iter().map(|service| service.item).chain(self.waiting.into_iter().map(|(_, item)| item)))
     }
 
     fn serve_next(&mut self, now: Instant) -> Option<Departure> {
@@ -150,7 +146,7 @@ mod tests {
 
     /// 64 bytes take 512 µs.
     fn megabit(limit: Option<QueueLimit>) -> BottleneckStage<char> {
-        BottleneckStage::new(Bottleneck { rate: Rate::bits_per_sec(1_000_000).unwrap(), overhead: Bytes::ZERO, limit })
+        BottleneckStage::new(Bottleneck { rate: Rate::bits_per_sec(1_000_000).unwrap(), overhead: Bytes::ZERO, limit }, 0)
     }
 
     fn micros(t: u64) -> Instant {

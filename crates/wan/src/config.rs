@@ -29,7 +29,11 @@ impl LinkConfig {
     /// Whether all that this link does is to delay every packet by the same span.
     #[must_use]
     pub fn is_constant_delay(&self) -> bool {
-        // With one delay for all, no packet can overtake: the order policy changes nothing.
-        self.outages.is_empty() && matches!(self.loss, Loss::None) && self.bottleneck.is_none() && self.delay.jitter().is_none()
+        // The order policy counts: a live change to a shorter delay lets later packets overtake.
+        self.order == Order::AllowReordering
+            && self.outages.is_empty()
+            && matches!(self.loss, Loss::None)
+            && self.bottleneck.is_none()
+            && self.delay.jitter().is_none()
     }
 }

@@ -14,14 +14,19 @@ pub enum Order {
 
 /// The stage: the latest arrival so far.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct InOrderStage {
+pub(crate) struct OrderStage {
     latest: Instant,
 }
 
-impl InOrderStage {
-    /// Puts an arrival off until no earlier packet is overtaken.
-    pub(crate) fn arrival(&mut self, wanted: Instant) -> Instant {
+impl OrderStage {
+    /// The arrival that the policy allows for one that is wanted. The latest arrival is known even while reordering is allowed, so that a live
+    /// change to `in-order` holds for the packets already on the way.
+    #[inline]
+    pub(crate) fn arrival(&mut self, order: Order, wanted: Instant) -> Instant {
         self.latest = self.latest.max(wanted);
-        self.latest
+        match order {
+            Order::AllowReordering => wanted,
+            Order::InOrder => self.latest,
+        }
     }
 }

@@ -105,7 +105,6 @@ impl TryRng for Draws {
     type Error = Infallible;
 
     #[inline]
-    #[expect(clippy::cast_possible_truncation, reason = "the upper half of the word is what is wanted")]
     fn try_next_u32(&mut self) -> Result<u32, Infallible> {
         Ok((self.next_word() >> 32) as u32)
     }

@@ -25,9 +25,8 @@ impl<const A: usize> Strategy<A> for AveragePosition {
         let Gains { stiffness: k_t, damping: b_t } = self.gains;
         let (own, target) = (context.own, *context.held.mean());
         //= Rakhsha & Constantinescu 2015, eq. (10): FT = KT·(xO − xd) + BT·(vO − vd)
-        let force = core::array::from_fn(|axis| {
-            k_t * (own.position[axis] - target.position[axis]) + b_t * (own.velocity[axis] - target.velocity[axis])
-        });
+        let force =
+            core::array::from_fn(|axis| k_t * (own.position[axis] - target.position[axis]) + b_t * (own.velocity[axis] - target.velocity[axis]));
         Command { force, target }
     }
 

@@ -9,6 +9,8 @@ mod proportional_derivative;
 pub use average_position::AveragePosition;
 pub use proportional_derivative::ProportionalDerivative;
 
+use alloc::boxed::Box;
+
 use cohaptic_units::Instant;
 
 use crate::{Gains, Held, State};
@@ -44,7 +46,7 @@ pub trait Strategy<const A: usize> {
     fn set_gains(&mut self, gains: Gains);
 }
 
-impl<const A: usize, S: Strategy<A> + ?Sized> Strategy<A> for alloc::boxed::Box<S> {
+impl<const A: usize, S: Strategy<A> + ?Sized> Strategy<A> for Box<S> {
     fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
         (**self).command(context)
     }

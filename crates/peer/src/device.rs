@@ -1,0 +1,120 @@
+//! Haptic devices: the trait, and the simulated device with the hand that moves it.
+
+use alloc::boxed::Box;
+use core::time::Duration;
+
+use cohaptic_units::Instant;
+
+use crate::stepper::Stepper;
+use crate::{ArmConfig, Clock, DeviceConfig, Hand, Integrator, Plant, Signal, State};
+
+/// What a peer needs of a haptic device, simulated or real.
+pub trait Device<const A: usize> {
+    /// Position and velocity of the device at the present tick.
+    fn state(&self) -> State<A>;
+
+    /// Holds the coupling force FC, which the device feels with the opposite sign, from `now` until the next tick, `span` later.
+    ///
+    /// A simulated device moves there. A real one sends the force to its motors and reads its state when it is next asked.
+    fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]);
+}
+
+impl<const A: usize, D: Device<A> + ?Sized> Device<A> for Box<D> {
+    fn state(&self) -> State<A> {
+        (**self).state()
+    }
+
+    fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
+        (**self).advance(now, span, coupling_force);
+    }
+}
+
+/// A device that nobody moves and that touches nothing: it stays where it is.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct RestingDevice<const A: usize> {
+    /// Where it is.
+    pub position: [f64; A],
+}
+
+impl<const A: usize> Device<A> for RestingDevice<A> {
+    #[inline]
+    fn state(&self) -> State<A> {
+        State { position: self.position, velocity: [0.0; A] }
+    }
+
+    #[inline]
+    fn advance(&mut self, _now: Instant, _span: Duration, _coupling_force: [f64; A]) {}
+}
+
+/// A simulated device: a damped mass, moved by a hand.
+#[derive(Clone, Debug)]
+pub struct SimulatedDevice<const A: usize> {
+    state: State<A>,
+    stepper: Stepper,
+    hand: HandForce<A>,
+}
+
+/// The force of the hand that is held over a tick. The rest of an arm is part of the plant.
+#[derive(Clone, Debug)]
+enum HandForce<const A: usize> {
+    Constant([f64; A]),
+    Force(Signal),
+    Arm { arm: ArmConfig, follows: Signal },
+}
+
+impl<const A: usize> SimulatedDevice<A> {
+    /// A device in that state with that hand; `None` is no hand.
+    #[must_use]
+    pub fn new(device: DeviceConfig, hand: Option<&Hand>, state: State<A>, integrator: Integrator, clock: &Clock) -> Self {
+        let arm = match hand {
+            Some(Hand::Arm { arm, .. }) => *arm,
+            Some(Hand::Force(_)) | None => ArmConfig { mass: 0.0, damping: 0.0, stiffness: 0.0 },
+        };
+        // The arm's mass moves with the device; its spring and damper end at the wanted motion, which enters as a held force.
+        let plant = Plant { mass: device.mass + arm.mass, damping: device.damping + arm.damping, stiffness: arm.stiffness };
+        Self { state, stepper: Stepper::new(plant, integrator, clock), hand: HandForce::of(hand) }
+    }
+
+    /// Changes what the hand does. An arm stays the arm that the device was made with; only its wanted motion changes.
+    pub fn set_hand(&mut self, hand: Option<&Hand>) {
+        self.hand = HandForce::of(hand);
+    }
+}
+
+impl<const A: usize> HandForce<A> {
+    fn of(hand: Option<&Hand>) -> Self {
+        match hand {
+            None => Self::Constant([0.0; A]),
+            Some(Hand::Force(signal)) if signal.is_constant() => Self::Constant(signal.value(Instant::ZERO)),
+            Some(Hand::Force(signal)) => Self::Force(signal.clone()),
+            Some(Hand::Arm { arm, follows }) => Self::Arm { arm: *arm, follows: follows.clone() },
+        }
+    }
+
+    #[inline]
+    fn at(&self, now: Instant) -> [f64; A] {
+        match self {
+            Self::Constant(force) => *force,
+            Self::Force(signal) => signal.value(now),
+            Self::Arm { arm, follows } => {
+                let (wanted, speed) = (follows.value::<A>(now), follows.slope::<A>(now));
+                core::array::from_fn(|axis| arm.stiffness * wanted[axis] + arm.damping * speed[axis])
+            }
+        }
+    }
+}
+
+impl<const A: usize> Device<A> for SimulatedDevice<A> {
+    #[inline]
+    fn state(&self) -> State<A> {
+        self.state
+    }
+
+    #[inline]
+    fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
+        let hand = self.hand.at(now);
+        //= Rakhsha & Constantinescu 2015, eq. (7): mH·aH = Fh − FC − bH·vH
+        let force = core::array::from_fn(|axis| hand[axis] - coupling_force[axis]);
+        self.stepper.advance(&mut self.state, span, force);
+    }
+}

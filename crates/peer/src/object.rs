@@ -1,0 +1,35 @@
+//! One peer's copy of the shared virtual object.
+
+use core::time::Duration;
+
+use crate::stepper::Stepper;
+use crate::{Clock, CopyConfig, Integrator, Plant, State};
+
+/// A copy of the shared virtual object: a damped mass on each axis.
+#[derive(Clone, Debug)]
+pub struct ObjectCopy<const A: usize> {
+    state: State<A>,
+    stepper: Stepper,
+}
+
+impl<const A: usize> ObjectCopy<A> {
+    /// A copy in that state.
+    #[must_use]
+    pub fn new(copy: CopyConfig, state: State<A>, integrator: Integrator, clock: &Clock) -> Self {
+        let plant = Plant { mass: copy.mass, damping: copy.damping, stiffness: 0.0 };
+        Self { state, stepper: Stepper::new(plant, integrator, clock) }
+    }
+
+    /// Where it is and how fast it moves.
+    #[must_use]
+    #[inline]
+    pub const fn state(&self) -> &State<A> {
+        &self.state
+    }
+
+    /// Moves it over `span` under a held force.
+    #[inline]
+    pub(crate) fn advance(&mut self, span: Duration, force: [f64; A]) {
+        self.stepper.advance(&mut self.state, span, force);
+    }
+}

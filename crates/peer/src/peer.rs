@@ -1,0 +1,234 @@
+//! One participant, tick by tick.
+
+use core::time::Duration;
+
+use cohaptic_units::Instant;
+
+use crate::wire::{DecodeError, MAX_LEN, Sample};
+use crate::{Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
+
+/// What a peer is, apart from its device, its copy of the object and its strategy.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PeerConfig {
+    /// The session: samples of another one are refused.
+    pub session: u64,
+    /// The place of this peer in the session, from 0.
+    pub place: u32,
+    /// How many axes a sample has, at most the A of the peer.
+    pub axes: usize,
+    /// How the device touches the copy.
+    pub contact: Contact,
+    /// KC and BC.
+    pub coupling: Gains,
+    /// Whether forces are applied one tick after they were computed.
+    pub compute_delay: bool,
+    /// The walls around the object, if there are any.
+    pub enclosure: Option<Enclosure>,
+}
+
+/// One participant: a device, a coupling, a copy of the object, and a strategy that ties it to the others.
+///
+/// At each of its ticks the driver calls, in this order,
+///
+/// 1. [`Peer::sample`], if it is time to send,
+/// 2. [`Peer::handle_datagram`] for every packet that has arrived, in the order of arrival,
+/// 3. [`Peer::compute`], once,
+/// 4. [`Peer::advance`], once, which moves the peer to its next tick under the forces just computed.
+///
+/// A peer does not know the time but by the instants it is given, and nothing of how datagrams travel.
+#[derive(Clone, Debug)]
+pub struct Peer<const A: usize, D, S> {
+    config: PeerConfig,
+    device: D,
+    object: ObjectCopy<A>,
+    strategy: S,
+    held: Held<A>,
+    /// Whether a sample has changed since the mean was computed.
+    stale_mean: bool,
+    next_sequence: u64,
+    computed: Acting<A>,
+    applied: Acting<A>,
+}
+
+/// The forces that act over a tick: on the device, and in all on the copy.
+#[derive(Clone, Copy, Debug)]
+struct Acting<const A: usize> {
+    coupling: [f64; A],
+    on_object: [f64; A],
+}
+
+/// The forces computed at a tick, for the record.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Forces<const A: usize> {
+    /// FC, the coupling force on the copy [N].
+    pub coupling: [f64; A],
+    /// FT, the coordination force, which acts on the copy with the opposite sign [N].
+    pub coordination: [f64; A],
+    /// Where the strategy wants the copy to be.
+    pub target: State<A>,
+}
+
+/// What became of a sample that was understood.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Reception {
+    /// It is the newest from its sender and is held from now on.
+    Newest,
+    /// It is late or repeated: nothing changed.
+    Stale,
+}
+
+/// Why a datagram was refused. Nothing changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReceiveError {
+    /// It is no sample.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+    /// It belongs to another session.
+    #[error("a sample of session {found:#x}")]
+    Session {
+        /// The session it belongs to.
+        found: u64,
+    },
+    /// It is from nobody else in this session.
+    #[error("a sample from peer {sender}, which is not another peer of this session")]
+    Sender {
+        /// Who it says it is from.
+        sender: u32,
+    },
+}
+
+impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
+    /// A peer that holds the initial states of the others.
+    #[must_use]
+    pub fn new(config: PeerConfig, device: D, object: ObjectCopy<A>, strategy: S, held: Held<A>) -> Self {
+        let none = Acting { coupling: [0.0; A], on_object: [0.0; A] };
+        Self { config, device, object, strategy, held, stale_mean: false, next_sequence: 0, computed: none, applied: none }
+    }
+
+    /// Step 1: writes the sample that this peer sends now into `datagram` and gives its length. `local_time` is what the peer's own clock shows.
+    #[inline]
+    pub fn sample(&mut self, local_time: Instant, datagram: &mut [u8; MAX_LEN]) -> usize {
+        let sequence = self.next_sequence;
+        self.next_sequence = sequence.wrapping_add(1);
+        let Self { config, object, .. } = self;
+        Sample { session: config.session, sender: config.place, sequence, sent: local_time, state: *object.state() }.encode(config.axes, datagram)
+    }
+
+    /// Step 2: takes in a datagram from another peer.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
+    #[inline]
+    pub fn handle_datagram(&mut self, datagram: &[u8]) -> Result<Reception, ReceiveError> {
+        let sample = Sample::<A>::decode(datagram, self.config.axes)?;
+        if sample.session != self.config.session {
+            return Err(ReceiveError::Session { found: sample.session });
+        }
+        // The others are held in order with this peer left out.
+        let (sender, own) = (sample.sender as usize, self.config.place as usize);
+        let place = if sender < own { sender } else { sender.wrapping_sub(1) };
+        if sender == own || place >= self.held.len() {
+            return Err(ReceiveError::Sender { sender: sample.sender });
+        }
+        if self.held.accept(place, sample.sequence, sample.state) {
+            self.stale_mean = true;
+            Ok(Reception::Newest)
+        } else {
+            Ok(Reception::Stale)
+        }
+    }
+
+    /// Step 3: computes the forces of this tick.
+    #[inline]
+    pub fn compute(&mut self, now: Instant) -> Forces<A> {
+        if self.stale_mean {
+            self.held.refresh();
+            self.stale_mean = false;
+        }
+        let own = self.object.state();
+        let coupling = self.coupling_force(own);
+        let command = self.strategy.command(&Context { now, own, held: &self.held });
+        //= Rakhsha & Constantinescu 2015, eq. (8): mO·aO = FC − FT − bO·vO
+        let mut on_object: [f64; A] = core::array::from_fn(|axis| coupling[axis] - command.force[axis]);
+        if let Some(enclosure) = &self.config.enclosure {
+            let walls = enclosure.force(own);
+            for axis in 0..A {
+                on_object[axis] += walls[axis];
+            }
+        }
+        let computed = Acting { coupling, on_object };
+        self.applied = if self.config.compute_delay { self.computed } else { computed };
+        self.computed = computed;
+        Forces { coupling, coordination: command.force, target: command.target }
+    }
+
+    /// Step 4: moves to the next tick, `span` after `now`.
+    #[inline]
+    pub fn advance(&mut self, now: Instant, span: Duration) {
+        self.device.advance(now, span, self.applied.coupling);
+        self.object.advance(span, self.applied.on_object);
+    }
+
+    /// The device.
+    #[must_use]
+    pub const fn device(&self) -> &D {
+        &self.device
+    }
+
+    /// The device, to change what its hand does.
+    pub const fn device_mut(&mut self) -> &mut D {
+        &mut self.device
+    }
+
+    /// The copy of the object.
+    #[must_use]
+    #[inline]
+    pub const fn object(&self) -> &ObjectCopy<A> {
+        &self.object
+    }
+
+    /// The strategy, to change its gains.
+    pub const fn strategy_mut(&mut self) -> &mut S {
+        &mut self.strategy
+    }
+
+    /// How the device touches the copy.
+    #[must_use]
+    pub const fn contact(&self) -> Contact {
+        self.config.contact
+    }
+
+    /// Changes how the device touches the copy, from the next tick on.
+    pub const fn set_contact(&mut self, contact: Contact) {
+        self.config.contact = contact;
+    }
+
+    #[inline]
+    fn coupling_force(&self, object: &State<A>) -> [f64; A] {
+        let Gains { stiffness: k_c, damping: b_c } = self.config.coupling;
+        match self.config.contact {
+            Contact::None => [0.0; A],
+            Contact::Grasp => {
+                let device = self.device.state();
+                //= Rakhsha & Constantinescu 2015, eq. (9): FC = KC·(xH − xO) + BC·(vH − vO)
+                core::array::from_fn(|axis| {
+                    k_c * (device.position[axis] - object.position[axis]) + b_c * (device.velocity[axis] - object.velocity[axis])
+                })
+            }
+            Contact::Push(direction) => {
+                let device = self.device.state();
+                let sign = if direction.positive { 1.0 } else { -1.0 };
+                core::array::from_fn(|axis| {
+                    let depth = sign * (device.position[axis] - object.position[axis]);
+                    if axis != direction.axis || depth <= 0.0 {
+                        return 0.0;
+                    }
+                    let closing = sign * (device.velocity[axis] - object.velocity[axis]);
+                    sign * (k_c * depth + b_c * closing).max(0.0)
+                })
+            }
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! The step maps of one body, for the spans between its ticks.
+
+use core::time::Duration;
+
+use crate::{Clock, Integrator, Plant, State, StepMap};
+
+/// Advances one body along A axes by the spans that lie between two ticks of a clock: one span, or two that differ by a nanosecond if it drifts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stepper {
+    plant: Plant,
+    integrator: Integrator,
+    short: (Duration, StepMap),
+    long: (Duration, StepMap),
+    free: bool,
+}
+
+impl Stepper {
+    pub(crate) fn new(plant: Plant, integrator: Integrator, clock: &Clock) -> Self {
+        let (short, long) = clock.spans();
+        let step = |span| (span, plant.step(span, integrator));
+        let (short, long) = (step(short), step(long));
+        Self { plant, integrator, short, long, free: short.1.is_free() && long.1.is_free() }
+    }
+
+    /// Moves the body over `span` under the held force.
+    #[inline]
+    pub(crate) fn advance<const A: usize>(&self, state: &mut State<A>, span: Duration, force: [f64; A]) {
+        let map = if span == self.short.0 {
+            self.short.1
+        } else if span == self.long.0 {
+            self.long.1
+        } else {
+            // Not a span of this clock: a driver that paces by another one pays for its own map.
+            self.plant.step(span, self.integrator)
+        };
+        for ((position, velocity), force) in state.position.iter_mut().zip(&mut state.velocity).zip(force) {
+            if self.free {
+                map.advance_free(position, velocity, force);
+            } else {
+                map.advance(position, velocity, force);
+            }
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! One link without what is on the way: the chain of stages that decides what becomes of a packet.
+//!
+//! ```text
+//! offer ──► outage ──► loss ──► bottleneck ──► delay + jitter ──► order ──► arrival instant
+//!             │          │       │     │
+//!          dropped    dropped  dropped  waits, until `depart`
+//! ```
+//!
+//! A link whose only impairment is a constant delay is compiled to one addition.
+
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use cohaptic_units::{Bytes, Instant};
+
+use crate::bottleneck::{BottleneckStage, Departure};
+use crate::loss::LossStage;
+use crate::order::OrderStage;
+use crate::random::{Purpose, Stream};
+use crate::{DropCause, LinkConfig};
+
+/// The name of a link: the address of its random numbers, and what records call it.
+///
+/// It is made of the names of the nodes, not of their places in a list, so that adding a node moves nobody else's randomness.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub struct LinkName(String);
+
+impl LinkName {
+    /// The link from one node to another: `left->right`.
+    #[must_use]
+    pub fn between(from: &str, to: &str) -> Self {
+        Self(alloc::format!("{from}->{to}"))
+    }
+
+    /// The line that a node sends through: `left->*`.
+    #[must_use]
+    pub fn uplink(node: &str) -> Self {
+        Self::between(node, "*")
+    }
+
+    /// The line that a node receives through: `*->left`.
+    #[must_use]
+    pub fn downlink(node: &str) -> Self {
+        Self::between("*", node)
+    }
+
+    /// The name.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+/// Time was given that is earlier than a time given before. Nothing was changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("time went back to {now} after {was}")]
+#[non_exhaustive]
+pub struct TimeWentBack {
+    /// The time given.
+    pub now: Instant,
+    /// The latest time given before.
+    pub was: Instant,
+}
+
+/// Checks that time does not go back, and remembers it.
+pub(crate) fn check_time(clock: &mut Instant, now: Instant) -> Result<(), TimeWentBack> {
+    if now < *clock {
+        return Err(TimeWentBack { now, was: *clock });
+    }
+    *clock = now;
+    Ok(())
+}
+
+/// What becomes of an offered packet, as far as it is known at once.
+#[derive(Debug)]
+pub(crate) enum Outcome<T> {
+    Arrives(Instant, T),
+    Dropped(DropCause, T),
+    /// The line begins to send it.
+    Served(Departure),
+    Waits,
+}
+
+/// The stages of one link.
+#[derive(Clone, Debug)]
+pub(crate) enum Pipeline<T> {
+    /// Nothing but a constant delay [ns].
+    Constant(u64),
+    Chain(Box<Chain<T>>),
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Chain<T> {
+    config: LinkConfig,
+    loss: Option<LossStage>,
+    bottleneck: Option<BottleneckStage<(u64, T)>>,
+    /// The last announcement of a bottleneck that was taken away.
+    announced: u64,
+    order: OrderStage,
+    loss_draws: Stream,
+    jitter_draws: Stream,
+}
+
+impl<T> Pipeline<T> {
+    /// The least that this configuration needs, or the whole chain if `general`.
+    pub(crate) fn new(seed: u64, name: &LinkName, config: LinkConfig, general: bool) -> Self {
+        if config.is_constant_delay() && !general {
+            Self::Constant(constant_nanos(&config))
+        } else {
+            Self::Chain(Box::new(Chain::new(seed, name, config)))
+        }
+    }
+
+    /// Decides about packet number `number` of this link.
+    #[inline]
+    pub(crate) fn offer(&mut self, now: Instant, number: u64, size: Bytes, item: T) -> Outcome<T> {
+        match self {
+            Self::Constant(delay) => Outcome::Arrives(later(now, *delay), item),
+            Self::Chain(chain) => chain.offer(now, number, size, item),
+        }
+    }
+
+    /// The packet that leaves the bottleneck with this announcement, its arrival, and the announcement of the next. `None` if it is stale.
+    pub(crate) fn depart(&mut self, departure: Departure) -> Option<(T, Instant, Option<Departure>)> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Chain(chain) => chain.depart(departure),
+        }
+    }
+
+    /// Changes the configuration. What propagates keeps its delay. Gives a new announcement if a packet is on the line, and the packets that a
+    /// bottleneck gave up when it was taken away, which propagate from now on.
+    pub(crate) fn reconfigure(&mut self, now: Instant, seed: u64, name: &LinkName, config: LinkConfig) -> (Option<Departure>, Vec<(T, Instant)>) {
+        match self {
+            Self::Constant(delay) if config.is_constant_delay() => *delay = constant_nanos(&config),
+            Self::Constant(_) => *self = Self::new(seed, name, config, true),
+            Self::Chain(chain) => return chain.reconfigure(now, seed, name, config),
+        }
+        (None, Vec::new())
+    }
+}
+
+fn constant_nanos(config: &LinkConfig) -> u64 {
+    u64::try_from(config.delay.mean().as_nanos()).unwrap_or(u64::MAX)
+}
+
+#[inline]
+fn later(now: Instant, nanos: u64) -> Instant {
+    Instant::from_nanos(now.as_nanos().saturating_add(nanos))
+}
+
+impl<T> Chain<T> {
+    fn new(seed: u64, name: &LinkName, config: LinkConfig) -> Self {
+        let stream = |purpose| Stream::new(seed, name.as_str().as_bytes(), purpose);
+        Self {
+            loss: LossStage::new(config.loss, &mut stream(Purpose::LossState).at(0)),
+            bottleneck: config.bottleneck.map(|bottleneck| BottleneckStage::new(bottleneck, 0)),
+            announced: 0,
+            order: OrderStage::default(),
+            loss_draws: stream(Purpose::Loss),
+            jitter_draws: stream(Purpose::Jitter),
+            config,
+        }
+    }
+
+    fn offer(&mut self, now: Instant, number: u64, size: Bytes, item: T) -> Outcome<T> {
+        if self.config.outages.covers(now) {
+            return Outcome::Dropped(DropCause::Outage, item);
+        }
+        if let Some(loss) = &mut self.loss
+            && loss.loses(self.loss_draws.at(number))
+        {
+            return Outcome::Dropped(DropCause::Loss, item);
+        }
+        match &mut self.bottleneck {
+            None => Outcome::Arrives(self.arrival(now, number), item),
+            Some(bottleneck) => match bottleneck.offer(now, size, (number, item)) {
+                Ok(Some(departure)) => Outcome::Served(departure),
+                Ok(None) => Outcome::Waits,
+                Err((_, item)) => Outcome::Dropped(DropCause::QueueFull, item),
+            },
+        }
+    }
+
+    fn depart(&mut self, departure: Departure) -> Option<(T, Instant, Option<Departure>)> {
+        let ((number, item), next) = self.bottleneck.as_mut()?.depart(departure)?;
+        Some((item, self.arrival(departure.at, number), next))
+    }
+
+    fn reconfigure(&mut self, now: Instant, seed: u64, name: &LinkName, config: LinkConfig) -> (Option<Departure>, Vec<(T, Instant)>) {
+        let mut initial = Stream::new(seed, name.as_str().as_bytes(), Purpose::LossState).at(0);
+        self.loss = match self.loss {
+            Some(stage) => stage.reconfigured(config.loss, &mut initial),
+            None => LossStage::new(config.loss, &mut initial),
+        };
+        let bottleneck = config.bottleneck;
+        self.config = config;
+        match (self.bottleneck.take(), bottleneck) {
+            (None, None) => (None, Vec::new()),
+            (None, Some(new)) => {
+                self.bottleneck = Some(BottleneckStage::new(new, self.announced));
+                (None, Vec::new())
+            }
+            (Some(mut stage), Some(new)) => {
+                let departure = stage.reconfigure(now, new);
+                self.bottleneck = Some(stage);
+                (departure, Vec::new())
+            }
+            (Some(stage), None) => {
+                let (announced, items) = stage.dismantle();
+                self.announced = announced;
+                (None, items.map(|(number, item)| (item, self.arrival(now, number))).collect())
+            }
+        }
+    }
+
+    /// When a packet that begins to propagate now arrives.
+    #[inline]
+    fn arrival(&mut self, now: Instant, number: u64) -> Instant {
+        let delay = self.config.delay.draw_nanos(|| self.jitter_draws.at(number));
+        self.order.arrival(self.config.order, later(now, delay))
+    }
+}
