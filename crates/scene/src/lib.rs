@@ -1,3 +1,4 @@
 //! Scene files.
 mod model;
+mod scaling;
 pub use model::*;

@@ -162,7 +162,10 @@ mod tests {
         assert!(matches!(size("64"), Err(ParseError::Unit { .. })));
         assert!(matches!(probability("101%"), Err(ParseError::Range { .. })));
         assert!(matches!(probability("0.5"), Err(ParseError::Unit { .. })));
-        assert_eq!(duration("8 parsecs").unwrap_err().to_string(), "unknown unit \"parsecs\" in \"8 parsecs\": expected a duration such as \"8ms\", \"1.5s\" or \"250us\"");
+        assert_eq!(
+            duration("8 parsecs").unwrap_err().to_string(),
+            "unknown unit \"parsecs\" in \"8 parsecs\": expected a duration such as \"8ms\", \"1.5s\" or \"250us\""
+        );
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! One link and what is on the way through it.
 
+use alloc::collections::VecDeque;
+
 use cohaptic_units::{Bytes, Instant};
 
 use crate::bottleneck::Departure;
 use crate::event_queue::Event;
-use crate::pipeline::{Outcome, Pipeline, check_time};
-use crate::{EventQueue, Fate, LinkConfig, LinkName, LinkStats, TimeWentBack};
+use crate::pipeline::{Enqueued, Outcome, Pipeline, check_time};
+use crate::{DropCause, EventQueue, Fate, LinkConfig, LinkName, LinkStats, TimeWentBack};
 
 /// A directed link as a state machine: packets in with [`Link::handle_packet`], packets and their fates out with [`Link::poll_event`].
 ///
@@ -22,7 +24,7 @@ pub struct Link<P> {
     pipeline: Pipeline<InLink<P>>,
     pending: EventQueue<Pending<P>>,
     /// Drops and arrivals that have happened and were not polled yet.
-    happened: alloc::collections::VecDeque<LinkEvent<P>>,
+    happened: VecDeque<LinkEvent<P>>,
     stats: LinkStats,
 }
 
@@ -90,7 +92,7 @@ impl<P> Link<P> {
             now: Instant::ZERO,
             pipeline: Pipeline::new(seed, name, config, false),
             pending: EventQueue::new(),
-            happened: alloc::collections::VecDeque::new(),
+            happened: VecDeque::new(),
             stats: LinkStats::default(),
         }
     }
@@ -104,14 +106,15 @@ impl<P> Link<P> {
         self.handle_timeout(now)?;
         let sequence = self.stats.offered;
         self.stats.offered += 1;
-        match self.pipeline.offer(now, sequence, size, InLink { sequence, sent: now, size, payload }) {
-            Outcome::Arrives(at, packet) => self.pending.push(Pending { at, what: What::Arrives(packet) }),
-            Outcome::Dropped(cause, packet) => {
-                self.stats.dropped[cause.index()] += 1;
-                self.happened.push_back(packet.event(now, Fate::Dropped(cause)));
-            }
-            Outcome::Served(departure) => self.announce(departure),
-            Outcome::Waits => {}
+        let packet = InLink { sequence, sent: now, size, payload };
+        match self.pipeline.offer(now, sequence) {
+            Outcome::Arrives(at) => self.pending.push(Pending { at, what: What::Arrives(packet) }),
+            Outcome::Dropped(cause) => self.drop(now, cause, packet),
+            Outcome::Queues => match self.pipeline.enqueue(now, sequence, size, packet) {
+                Enqueued::Served(departure) => self.announce(departure),
+                Enqueued::Waits => {}
+                Enqueued::Dropped(cause, packet) => self.drop(now, cause, packet),
+            },
         }
         Ok(())
     }
@@ -177,6 +180,11 @@ impl<P> Link<P> {
     #[must_use]
     pub const fn stats(&self) -> &LinkStats {
         &self.stats
+    }
+
+    fn drop(&mut self, now: Instant, cause: DropCause, packet: InLink<P>) {
+        self.stats.dropped[cause.index()] += 1;
+        self.happened.push_back(packet.event(now, Fate::Dropped(cause)));
     }
 
     fn announce(&mut self, Departure { at, ticket }: Departure) {

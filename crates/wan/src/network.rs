@@ -16,8 +16,8 @@ use cohaptic_units::{Bytes, Instant};
 
 use crate::bottleneck::Departure;
 use crate::event_queue::Event;
-use crate::pipeline::{Outcome, Pipeline, check_time};
-use crate::{EventQueue, Fate, LinkConfig, LinkName, LinkStats, TimeWentBack};
+use crate::pipeline::{Enqueued, Outcome, Pipeline, check_time};
+use crate::{DropCause, EventQueue, Fate, LinkConfig, LinkName, LinkStats, TimeWentBack};
 
 /// A node of a network, by its place from 0.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -124,9 +124,16 @@ struct InNetwork<P> {
     sent: Instant,
     /// When it entered the line that it is in.
     entered: Instant,
-    path: u32,
+    path: Path,
     size: u32,
     payload: P,
+}
+
+/// From whom to whom.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+struct Path {
+    from: u16,
+    to: u16,
 }
 
 /// Something that will happen on a line.
@@ -138,7 +145,7 @@ struct Pending<P> {
     sent: Instant,
     entered: Instant,
     place: Place,
-    path: u32,
+    path: Path,
     size: u32,
     /// `None`: a departure from a bottleneck.
     payload: Option<P>,
@@ -182,7 +189,8 @@ impl Place {
 }
 
 impl<P> Event for Pending<P> {
-    type Key = (Instant, Place, u64, u32);
+    /// Instant and place in one number, which is compared faster than two; then sequence and path.
+    type Key = (u128, u64, Path);
 
     #[inline]
     fn at(&self) -> Instant {
@@ -191,7 +199,7 @@ impl<P> Event for Pending<P> {
 
     #[inline]
     fn key(&self) -> Self::Key {
-        (self.at, self.place, self.sequence, self.path)
+        (u128::from(self.at.as_nanos()) << 32 | u128::from(self.place.0), self.sequence, self.path)
     }
 }
 
@@ -200,7 +208,7 @@ impl<P> Network<P> {
     ///
     /// # Panics
     ///
-    /// With more than 23,170 nodes: links are counted in 29 bits.
+    /// With more than 23,170 nodes: links are counted in 29 bits, nodes in 16.
     #[must_use]
     pub fn new(config: NetworkConfig, mut link: impl FnMut(NodeId, NodeId) -> LinkConfig) -> Self {
         let nodes = u32::try_from(config.nodes.len()).ok().filter(|nodes| *nodes <= 23_170).expect("a network has at most 23,170 nodes");
@@ -259,9 +267,10 @@ impl<P> Network<P> {
     #[inline]
     pub fn handle_packet(&mut self, now: Instant, from: NodeId, to: NodeId, size: Bytes, payload: P) -> Result<(), NetworkError> {
         let path = self.path(from, to)?;
+        let link = self.link(path);
         self.let_pass(now)?;
-        let sequence = match self.paths.get_mut(path as usize) {
-            None => self.links[path as usize].stats.offered,
+        let sequence = match self.paths.get_mut(link as usize) {
+            None => self.links[link as usize].stats.offered,
             Some(count) => {
                 *count += 1;
                 *count - 1
@@ -272,7 +281,7 @@ impl<P> Network<P> {
         if self.uplinks[from.0 as usize].is_some() {
             self.offer(now, Hop::Uplink, from.0, packet);
         } else {
-            self.offer(now, Hop::Link, path, packet);
+            self.offer(now, Hop::Link, link, packet);
         }
         Ok(())
     }
@@ -318,16 +327,16 @@ impl<P> Network<P> {
     ///
     /// [`NetworkError`] if time went back or there is no such link; nothing was changed.
     pub fn set_link(&mut self, now: Instant, from: NodeId, to: NodeId, config: LinkConfig) -> Result<(), NetworkError> {
-        let path = self.path(from, to)?;
+        let line = self.path(from, to).map(|path| self.link(path))?;
         self.let_pass(now)?;
         self.has_inner_events |= config.bottleneck.is_some();
         let name = self.link_name(from.0, to.0);
-        let (departure, released) = self.links[path as usize].pipeline.reconfigure(now, self.config.seed, &name, config);
+        let (departure, released) = self.links[line as usize].pipeline.reconfigure(now, self.config.seed, &name, config);
         if let Some(departure) = departure {
-            self.announce(Hop::Link, path, departure);
+            self.announce(Hop::Link, line, departure);
         }
         for (packet, at) in released {
-            self.schedule(at, Hop::Link, path, packet);
+            self.schedule(at, Hop::Link, line, packet);
         }
         Ok(())
     }
@@ -336,7 +345,7 @@ impl<P> Network<P> {
     #[must_use]
     pub fn link_stats(&self, from: NodeId, to: NodeId) -> Option<&LinkStats> {
         let path = self.path(from, to).ok()?;
-        self.links.get(path as usize).map(|line| &line.stats)
+        self.links.get(self.link(path) as usize).map(|line| &line.stats)
     }
 
     /// The counters of an access line; `None` if the node has none.
@@ -358,8 +367,17 @@ impl<P> Network<P> {
     }
 
     #[inline]
-    fn path(&self, from: NodeId, to: NodeId) -> Result<u32, NetworkError> {
-        if from.0 < self.nodes && to.0 < self.nodes && from != to { Ok(from.0 * self.nodes + to.0) } else { Err(NetworkError::NoLink { from, to }) }
+    fn path(&self, from: NodeId, to: NodeId) -> Result<Path, NetworkError> {
+        match (u16::try_from(from.0), u16::try_from(to.0)) {
+            (Ok(sender), Ok(receiver)) if from.0 < self.nodes && to.0 < self.nodes && from != to => Ok(Path { from: sender, to: receiver }),
+            _ => Err(NetworkError::NoLink { from, to }),
+        }
+    }
+
+    /// The number of a path's link.
+    #[inline]
+    fn link(&self, path: Path) -> u32 {
+        u32::from(path.from) * self.nodes + u32::from(path.to)
     }
 
     /// Lets time pass. Inner events happen now, so that what they leave behind is there for the next packet; mere arrivals wait to be polled.
@@ -377,7 +395,7 @@ impl<P> Network<P> {
     }
 
     /// Lets one pending event happen, and gives the arrival if it is a packet's last.
-    #[inline]
+    #[inline(always)]
     fn happen(&mut self, pending: Pending<P>) -> Option<NetworkEvent<P>> {
         let Pending { at, sequence, sent, entered, place, path, size, payload } = pending;
         let hop = place.hop();
@@ -388,12 +406,13 @@ impl<P> Network<P> {
         let stats = &mut self.line_mut(hop, place.line()).stats;
         stats.delivered += 1;
         stats.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
-        let (from, to) = (path / self.nodes, path % self.nodes);
         let packet = InNetwork { sequence, sent, entered: at, path, size, payload };
         match hop {
-            Hop::Uplink => self.offer(at, Hop::Link, path, packet),
-            Hop::Link if self.has_inner_events && self.downlinks[to as usize].is_some() => self.offer(at, Hop::Downlink, to, packet),
-            Hop::Link | Hop::Downlink => return Some(packet.event(from, to, at, Fate::Delivered(at))),
+            Hop::Uplink => self.offer(at, Hop::Link, self.link(path), packet),
+            Hop::Link if self.has_inner_events && self.downlinks[usize::from(path.to)].is_some() => {
+                self.offer(at, Hop::Downlink, path.to.into(), packet);
+            }
+            Hop::Link | Hop::Downlink => return Some(packet.event(at, Fate::Delivered(at))),
         }
         None
     }
@@ -407,24 +426,28 @@ impl<P> Network<P> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn offer(&mut self, now: Instant, hop: Hop, line: u32, packet: InNetwork<P>) {
         let Line { stats, pipeline } = self.line_mut(hop, line);
         let number = stats.offered;
         stats.offered += 1;
-        match pipeline.offer(now, number, Bytes::new(packet.size.into()), packet) {
-            Outcome::Arrives(at, packet) => self.schedule(at, hop, line, packet),
-            Outcome::Dropped(cause, packet) => {
-                stats.dropped[cause.index()] += 1;
-                let (from, to) = (packet.path / self.nodes, packet.path % self.nodes);
-                self.happened.push_back(packet.event(from, to, now, Fate::Dropped(cause)));
-            }
-            Outcome::Served(departure) => self.announce(hop, line, departure),
-            Outcome::Waits => {}
+        match pipeline.offer(now, number) {
+            Outcome::Arrives(at) => self.schedule(at, hop, line, packet),
+            Outcome::Dropped(cause) => self.drop(now, hop, line, cause, packet),
+            Outcome::Queues => match pipeline.enqueue(now, number, Bytes::new(packet.size.into()), packet) {
+                Enqueued::Served(departure) => self.announce(hop, line, departure),
+                Enqueued::Waits => {}
+                Enqueued::Dropped(cause, packet) => self.drop(now, hop, line, cause, packet),
+            },
         }
     }
 
-    #[inline]
+    fn drop(&mut self, now: Instant, hop: Hop, line: u32, cause: DropCause, packet: InNetwork<P>) {
+        self.line_mut(hop, line).stats.dropped[cause.index()] += 1;
+        self.happened.push_back(packet.event(now, Fate::Dropped(cause)));
+    }
+
+    #[inline(always)]
     fn schedule(&mut self, at: Instant, hop: Hop, line: u32, packet: InNetwork<P>) {
         let InNetwork { sequence, sent, entered, path, size, payload } = packet;
         self.pending.push(Pending { at, sequence, sent, entered, place: Place::arrival(hop, line), path, size, payload: Some(payload) });
@@ -432,10 +455,10 @@ impl<P> Network<P> {
 
     fn announce(&mut self, hop: Hop, line: u32, Departure { at, ticket }: Departure) {
         let place = Place::departure(hop, line);
-        self.pending.push(Pending { at, sequence: ticket, sent: at, entered: at, place, path: 0, size: 0, payload: None });
+        self.pending.push(Pending { at, sequence: ticket, sent: at, entered: at, place, path: Path { from: 0, to: 0 }, size: 0, payload: None });
     }
 
-    #[inline]
+    #[inline(always)]
     fn line_mut(&mut self, hop: Hop, line: u32) -> &mut Line<P> {
         let access = match hop {
             Hop::Link => return &mut self.links[line as usize],
@@ -447,8 +470,9 @@ impl<P> Network<P> {
 }
 
 impl<P> InNetwork<P> {
-    fn event(self, from: u32, to: u32, at: Instant, fate: Fate) -> NetworkEvent<P> {
-        let Self { sequence, sent, size, payload, .. } = self;
-        NetworkEvent { from: NodeId(from), to: NodeId(to), sequence, sent, at, size: Bytes::new(size.into()), payload, fate }
+    #[inline]
+    fn event(self, at: Instant, fate: Fate) -> NetworkEvent<P> {
+        let Self { sequence, sent, path, size, payload, .. } = self;
+        NetworkEvent { from: NodeId(path.from.into()), to: NodeId(path.to.into()), sequence, sent, at, size: Bytes::new(size.into()), payload, fate }
     }
 }

@@ -73,13 +73,21 @@ pub(crate) fn check_time(clock: &mut Instant, now: Instant) -> Result<(), TimeWe
 }
 
 /// What becomes of an offered packet, as far as it is known at once.
-#[derive(Debug)]
-pub(crate) enum Outcome<T> {
-    Arrives(Instant, T),
-    Dropped(DropCause, T),
-    /// The line begins to send it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Outcome {
+    Arrives(Instant),
+    Dropped(DropCause),
+    /// It must pass the bottleneck: see [`Pipeline::enqueue`].
+    Queues,
+}
+
+/// What the bottleneck does with a packet.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Enqueued<T> {
+    /// The line was idle and begins to send it.
     Served(Departure),
     Waits,
+    Dropped(DropCause, T),
 }
 
 /// The stages of one link.
@@ -114,10 +122,23 @@ impl<T> Pipeline<T> {
 
     /// Decides about packet number `number` of this link.
     #[inline]
-    pub(crate) fn offer(&mut self, now: Instant, number: u64, size: Bytes, item: T) -> Outcome<T> {
+    pub(crate) fn offer(&mut self, now: Instant, number: u64) -> Outcome {
         match self {
-            Self::Constant(delay) => Outcome::Arrives(later(now, *delay), item),
-            Self::Chain(chain) => chain.offer(now, number, size, item),
+            Self::Constant(delay) => Outcome::Arrives(later(now, *delay)),
+            Self::Chain(chain) => chain.offer(now, number),
+        }
+    }
+
+    /// Hands the packet to the bottleneck, after [`Outcome::Queues`].
+    pub(crate) fn enqueue(&mut self, now: Instant, number: u64, size: Bytes, item: T) -> Enqueued<T> {
+        let bottleneck = match self {
+            Self::Constant(_) => None,
+            Self::Chain(chain) => chain.bottleneck.as_mut(),
+        };
+        match bottleneck.expect("only a link with a bottleneck answers that a packet queues").offer(now, size, (number, item)) {
+            Ok(Some(departure)) => Enqueued::Served(departure),
+            Ok(None) => Enqueued::Waits,
+            Err((_, item)) => Enqueued::Dropped(DropCause::QueueFull, item),
         }
     }
 
@@ -164,23 +185,20 @@ impl<T> Chain<T> {
         }
     }
 
-    fn offer(&mut self, now: Instant, number: u64, size: Bytes, item: T) -> Outcome<T> {
+    #[inline]
+    fn offer(&mut self, now: Instant, number: u64) -> Outcome {
         if self.config.outages.covers(now) {
-            return Outcome::Dropped(DropCause::Outage, item);
+            return Outcome::Dropped(DropCause::Outage);
         }
         if let Some(loss) = &mut self.loss
             && loss.loses(self.loss_draws.at(number))
         {
-            return Outcome::Dropped(DropCause::Loss, item);
+            return Outcome::Dropped(DropCause::Loss);
         }
-        match &mut self.bottleneck {
-            None => Outcome::Arrives(self.arrival(now, number), item),
-            Some(bottleneck) => match bottleneck.offer(now, size, (number, item)) {
-                Ok(Some(departure)) => Outcome::Served(departure),
-                Ok(None) => Outcome::Waits,
-                Err((_, item)) => Outcome::Dropped(DropCause::QueueFull, item),
-            },
+        if self.bottleneck.is_some() {
+            return Outcome::Queues;
         }
+        Outcome::Arrives(self.arrival(now, number))
     }
 
     fn depart(&mut self, departure: Departure) -> Option<(T, Instant, Option<Departure>)> {

@@ -1,0 +1,158 @@
+//! Expectations that a single run can answer.
+
+use std::time::Duration;
+
+use cohaptic_scene::{Bounds, Expect, ExpectDelay, ExpectLoss, LinkSelector, Scene};
+use cohaptic_units::Instant;
+use cohaptic_units::print::Span;
+use cohaptic_wan::{DropCause, LinkName, LinkStats};
+
+use crate::{Summary, TickRow};
+
+/// What was seen of the positions that expectations are about.
+#[derive(Debug)]
+pub(crate) struct Watched {
+    positions: Vec<WatchedPosition>,
+    travels: Vec<WatchedTravel>,
+}
+
+#[derive(Debug)]
+struct WatchedPosition {
+    peer: usize,
+    axis: usize,
+    at: Instant,
+    seen: Option<f64>,
+}
+
+#[derive(Debug)]
+struct WatchedTravel {
+    peer: usize,
+    axis: usize,
+    distance: f64,
+    start: f64,
+    reached: Option<Instant>,
+}
+
+impl Watched {
+    pub(crate) fn new(scene: &Scene, expect: &Expect) -> Self {
+        let position =
+            |expected: &cohaptic_scene::ExpectPosition| WatchedPosition { peer: expected.peer, axis: expected.axis, at: expected.at, seen: None };
+        let travel = |expected: &cohaptic_scene::ExpectTravel| WatchedTravel {
+            peer: expected.peer,
+            axis: expected.axis,
+            distance: expected.distance,
+            start: scene.peers[expected.peer].position[expected.axis],
+            reached: None,
+        };
+        Self { positions: expect.positions.iter().map(position).collect(), travels: expect.travel.iter().map(travel).collect() }
+    }
+
+    pub(crate) fn wants_ticks(&self) -> bool {
+        !self.positions.is_empty() || !self.travels.is_empty()
+    }
+
+    pub(crate) fn on_tick(&mut self, row: &TickRow<'_>) {
+        for watched in self.positions.iter_mut().filter(|watched| watched.peer == row.peer && row.at <= watched.at) {
+            watched.seen = Some(row.object.position[watched.axis]);
+        }
+        for watched in self.travels.iter_mut().filter(|watched| watched.peer == row.peer && watched.reached.is_none()) {
+            if (row.object.position[watched.axis] - watched.start).abs() >= watched.distance {
+                watched.reached = Some(row.at);
+            }
+        }
+    }
+
+    /// One line for each expectation that does not hold.
+    pub(crate) fn failures(&self, scene: &Scene, expect: &Expect, summary: &Summary) -> Vec<String> {
+        let name = |peer: usize| &scene.peers[peer].name;
+        let mut failures = Vec::new();
+        if let Some(bounds) = expect.discrepancy.filter(|bounds| !bounds.contain(summary.max_discrepancy)) {
+            failures.push(format!("largest discrepancy between copies: {} m, expected {}", summary.max_discrepancy, range(&bounds, "m")));
+        }
+        for (expected, watched) in expect.positions.iter().zip(&self.positions) {
+            let what = format!("position of {}'s copy along {} at {}", name(expected.peer), AXES[expected.axis], expected.at);
+            match watched.seen {
+                None => failures.push(format!("{what}: {} has not ticked by then", name(expected.peer))),
+                Some(seen) if !expected.bounds.contain(seen) => failures.push(format!("{what}: {seen} m, expected {}", range(&expected.bounds, "m"))),
+                Some(_) => {}
+            }
+        }
+        for (expected, watched) in expect.travel.iter().zip(&self.travels) {
+            let what = format!("time in which {}'s copy travels {} m along {}", name(expected.peer), expected.distance, AXES[expected.axis]);
+            let seconds = watched.reached.map(Instant::as_secs_f64);
+            match seconds {
+                None => failures.push(format!("{what}: not reached, expected {}", range(&expected.bounds, "s"))),
+                Some(seconds) if !expected.bounds.contain(seconds) => {
+                    failures.push(format!("{what}: {seconds} s, expected {}", range(&expected.bounds, "s")));
+                }
+                Some(_) => {}
+            }
+        }
+        failures.extend(expect.loss.iter().filter_map(|expected| loss_failure(scene, expected, summary)));
+        failures.extend(expect.delay.iter().filter_map(|expected| delay_failure(scene, expected, summary)));
+        failures
+    }
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+#[expect(clippy::cast_precision_loss, reason = "packet counts below 2^53")]
+fn loss_failure(scene: &Scene, expected: &ExpectLoss, summary: &Summary) -> Option<String> {
+    let stats = selected(expected.link, summary);
+    let offered: u64 = stats.iter().map(LinkStats::offered).sum();
+    let dropped: u64 = stats.iter().map(|stats| expected.cause.map_or_else(|| stats.dropped_in_all(), |cause| stats.dropped(cause))).sum();
+    let cause = expected.cause.map_or("for any reason", DropCause::name);
+    let what = format!("fraction of packets dropped on {} ({cause})", link_name(expected.link, scene));
+    if offered == 0 {
+        return Some(format!("{what}: no packet was offered"));
+    }
+    let fraction = dropped as f64 / offered as f64;
+    let bounds = Bounds { min: expected.min.map(|min| min.get()), max: expected.max.map(|max| max.get()) };
+    (!bounds.contain(fraction)).then(|| format!("{what}: {fraction} ({dropped} of {offered}), expected {}", range(&bounds, "")))
+}
+
+fn delay_failure(scene: &Scene, expected: &ExpectDelay, summary: &Summary) -> Option<String> {
+    let stats = selected(expected.link, summary);
+    let delivered: u64 = stats.iter().map(LinkStats::delivered).sum();
+    let what = format!("mean delay on {}", link_name(expected.link, scene));
+    let total: u128 = stats.iter().filter_map(|stats| stats.mean_delay().map(|mean| mean.as_nanos() * u128::from(stats.delivered()))).sum();
+    let Some(mean) = total.checked_div(u128::from(delivered)) else {
+        return Some(format!("{what}: no packet was delivered"));
+    };
+    let mean = Duration::from_nanos(u64::try_from(mean).unwrap_or(u64::MAX));
+    let low = expected.min.filter(|min| mean < *min).map(|min| format!("at least {}", Span(min)));
+    let high = expected.max.filter(|max| mean > *max).map(|max| format!("at most {}", Span(max)));
+    low.or(high).map(|bound| format!("{what}: {}, expected {bound}", Span(mean)))
+}
+
+fn selected(link: LinkSelector, summary: &Summary) -> Vec<LinkStats> {
+    let access = |peer: usize, uplink: bool| {
+        summary.access_lines.iter().filter(|line| line.peer == peer && line.uplink == uplink).map(|line| line.stats).collect()
+    };
+    match link {
+        LinkSelector::All => summary.links.iter().map(|link| link.stats).collect(),
+        LinkSelector::Between { from, to } => summary.links.iter().filter(|link| (link.from, link.to) == (from, to)).map(|link| link.stats).collect(),
+        LinkSelector::Uplink(peer) => access(peer, true),
+        LinkSelector::Downlink(peer) => access(peer, false),
+    }
+}
+
+fn link_name(link: LinkSelector, scene: &Scene) -> String {
+    let name = |peer: usize| &scene.peers[peer].name;
+    match link {
+        LinkSelector::All => "all links".into(),
+        LinkSelector::Between { from, to } => LinkName::between(name(from), name(to)).as_str().into(),
+        LinkSelector::Uplink(peer) => LinkName::uplink(name(peer)).as_str().into(),
+        LinkSelector::Downlink(peer) => LinkName::downlink(name(peer)).as_str().into(),
+    }
+}
+
+fn range(bounds: &Bounds, unit: &str) -> String {
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    match (bounds.min, bounds.max) {
+        (Some(min), Some(max)) => format!("{min} to {max}{unit}"),
+        (Some(min), None) => format!("at least {min}{unit}"),
+        (None, Some(max)) => format!("at most {max}{unit}"),
+        (None, None) => "any number".into(),
+    }
+}

@@ -1,0 +1,68 @@
+//! Whether a scene does what its `[expect]` says.
+
+mod expectations;
+mod stability;
+
+pub use stability::{Stability, stability};
+
+use std::convert::Infallible;
+
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+
+use crate::{Ending, Model, Observer, PacketRow, Simulation, TickRow};
+use expectations::Watched;
+
+/// Runs a scene and gives one line for each expectation that does not hold, in the order of the file's sections; empty if all hold.
+///
+/// `keep_going` is asked about every thousand instants; when it says `false` the check ends with a line that says so.
+#[must_use]
+pub fn check(scene: &Scene, model: Model, mut keep_going: impl FnMut() -> bool) -> Vec<String> {
+    let Some(expect) = &scene.expect else {
+        return Vec::new();
+    };
+    let mut observer = Watching { watched: Watched::new(scene, expect), keep_going: &mut keep_going };
+    let Ok(summary) = Simulation::new(scene, model).run(&mut observer);
+    let watched = observer.watched;
+    let mut failures = Vec::new();
+    if let Ending::Interrupted(at) = summary.ending {
+        failures.push(format!("interrupted at {at}"));
+        return failures;
+    }
+    if let Some(expected) = expect.stable {
+        failures.extend(stability(scene, model, &mut keep_going).failure(expected));
+    }
+    failures.extend(watched.failures(scene, expect, &summary));
+    failures
+}
+
+/// Watches what expectations are about.
+struct Watching<'a, F> {
+    watched: Watched,
+    keep_going: &'a mut F,
+}
+
+impl<F: FnMut() -> bool> Observer for Watching<'_, F> {
+    type Error = Infallible;
+
+    fn wants_ticks(&self) -> bool {
+        self.watched.wants_ticks()
+    }
+
+    fn wants_packets(&self) -> bool {
+        false
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
+        self.watched.on_tick(row);
+        Ok(())
+    }
+
+    fn on_packet(&mut self, _row: &PacketRow) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn keep_going(&mut self, _now: Instant) -> bool {
+        (self.keep_going)()
+    }
+}

@@ -1,0 +1,156 @@
+//! Whether a scene is stable, as a simulation can tell: by what becomes of a small disturbance.
+//!
+//! The scene runs twice with the same hands, links and random numbers. In the second run every device and every copy begins displaced by up to a
+//! micrometre. The difference of the two runs obeys the scene's autonomous dynamics (exactly, if the scene is linear), whatever the hands do, so it
+//! dies out where the scene is stable and grows where it is not. Only *relative* displacements count: of copies against one another, and of a device
+//! against its copy while it touches it. Where all of them are together has no meaning for stability, because space has no origin.
+
+use cohaptic_peer::Contact;
+use cohaptic_scene::{Axes, Scene};
+use cohaptic_units::Instant;
+
+use crate::disturbance::Disturbance;
+use crate::observer::NoObserver;
+use crate::plan::{Model, Plan};
+use crate::simulation::Simulation;
+use crate::world::{Step, Watch, World};
+
+/// What a disturbance did.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum Stability {
+    /// It died out.
+    Stable,
+    /// It grew.
+    Unstable,
+    /// It did neither clearly within the scene's duration.
+    Undecided {
+        /// The largest relative displacement in the last quarter of the scene over that in the second quarter.
+        ratio: f64,
+    },
+    /// The run was interrupted.
+    Interrupted,
+}
+
+impl Stability {
+    /// A line that says why this is not what was expected, `None` if it is.
+    #[must_use]
+    pub fn failure(self, stable: bool) -> Option<String> {
+        let expected = if stable { "stable" } else { "unstable" };
+        match self {
+            Self::Stable if stable => None,
+            Self::Unstable if !stable => None,
+            Self::Stable => Some(format!("expected {expected}, but a small disturbance dies out")),
+            Self::Unstable => Some(format!("expected {expected}, but a small disturbance grows")),
+            Self::Undecided { ratio } => Some(format!(
+                "expected {expected}, but that cannot be told within the scene's duration: from its second to its last quarter a small disturbance \
+                 changes by a factor of {ratio:.3}; a longer duration decides"
+            )),
+            Self::Interrupted => Some("interrupted".into()),
+        }
+    }
+}
+
+/// The size of the disturbance [m].
+const SIZE: f64 = 1e-6;
+/// A disturbance this much smaller than it was has died out, however it went.
+const DIED_OUT: f64 = 1e-3;
+/// A disturbance this much larger than it was has grown, even if walls or a one-sided contact bound it in the end.
+const GREW: f64 = 1e3;
+/// Otherwise it has died out or grown if it changed by this factor from the second to the last quarter.
+const CLEARLY: f64 = 1.1;
+
+/// What becomes of a small disturbance of the scene within its duration.
+#[must_use]
+pub fn stability(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) -> Stability {
+    let plan = Plan::new(scene, model, false);
+    match plan.axes {
+        Axes::One => follow(pair::<1>(scene, model, &plan), scene, keep_going),
+        Axes::Two => follow(pair::<2>(scene, model, &plan), scene, keep_going),
+        Axes::Three => follow(pair::<3>(scene, model, &plan), scene, keep_going),
+    }
+}
+
+fn pair<const A: usize>(scene: &Scene, model: Model, plan: &Plan) -> (World<A>, World<A>) {
+    let disturbed = Simulation::disturbed(scene, model, Disturbance { size: SIZE });
+    (Simulation::new(scene, model).world(plan), disturbed.world(plan))
+}
+
+/// Runs the two side by side.
+fn follow<const A: usize>((mut nominal, mut disturbed): (World<A>, World<A>), scene: &Scene, mut keep_going: impl FnMut() -> bool) -> Stability {
+    let nothing = Watch { ticks: false, packets: false };
+    let duration = scene.duration.as_nanos();
+    let quarter = |now: Instant| 4 * u128::from(now.as_nanos()) / duration;
+    let initial = relative_displacement(&nominal, &disturbed);
+    let (mut early, mut late) = (0.0_f64, 0.0_f64);
+    let mut steps = 0_u64;
+    loop {
+        let (Ok(one), Ok(other)) = (nominal.step(&mut NoObserver, nothing), disturbed.step(&mut NoObserver, nothing));
+        if one == Step::Ticked && other == Step::Ticked {
+            let size = relative_displacement(&nominal, &disturbed);
+            match quarter(nominal.now()) {
+                1 => early = early.max(size),
+                3 => late = late.max(size),
+                _ => {}
+            }
+            if !size.is_finite() {
+                return Stability::Unstable;
+            }
+        } else if one != other || one != Step::Ended(crate::Ending::Complete) {
+            // One of the two diverged.
+            return Stability::Unstable;
+        } else {
+            return verdict(initial, early, late);
+        }
+        steps += 1;
+        if steps.is_multiple_of(1024) && !keep_going() {
+            return Stability::Interrupted;
+        }
+    }
+}
+
+fn verdict(initial: f64, early: f64, late: f64) -> Stability {
+    if late > GREW * initial || late > CLEARLY * early && late > DIED_OUT * initial {
+        Stability::Unstable
+    } else if late < DIED_OUT * initial || CLEARLY * late < early {
+        Stability::Stable
+    } else {
+        Stability::Undecided { ratio: late / early }
+    }
+}
+
+/// The largest difference between the two runs in a relative position along an axis [m].
+fn relative_displacement<const A: usize>(nominal: &World<A>, disturbed: &World<A>) -> f64 {
+    let (mut low, mut high, mut stretch) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A], 0.0_f64);
+    for (one, other) in nominal.bodies().zip(disturbed.bodies()) {
+        for axis in 0..A {
+            let copy = other.object[axis] - one.object[axis];
+            let device = other.device[axis] - one.device[axis];
+            low[axis] = low[axis].min(copy);
+            high[axis] = high[axis].max(copy);
+            let touches = match one.contact {
+                Contact::Grasp => true,
+                Contact::None => false,
+                Contact::Push(direction) => direction.axis == axis,
+            };
+            if touches {
+                stretch = stretch.max((device - copy).abs());
+            }
+        }
+    }
+    (0..A).map(|axis| high[axis] - low[axis]).fold(stretch, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn verdicts_follow_the_stated_factors() {
+        assert_eq!(verdict(1.0, 0.5, 0.4), Stability::Stable);
+        assert_eq!(verdict(1.0, 0.4, 0.5), Stability::Unstable);
+        assert!(matches!(verdict(1.0, 0.5, 0.5), Stability::Undecided { .. }));
+        assert_eq!(verdict(1.0, 1e-9, 1e-8), Stability::Stable, "rounding noise is no growth");
+        assert_eq!(verdict(1.0, 5000.0, 5000.0), Stability::Unstable, "bounded by walls, but grown");
+    }
+}

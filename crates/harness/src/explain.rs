@@ -1,0 +1,303 @@
+//! What a scene makes the program model, what it leaves out, and why.
+
+use cohaptic_peer::{Contact, Hand, Integrator, wire};
+use cohaptic_scene::{PeerSpec, Scaling, Scene};
+use cohaptic_units::print::Span;
+use cohaptic_wan::{Distribution, LinkConfig, Loss, Order, QueueLimit};
+
+use crate::plan::{DeviceChoice, Model, Plan, Ticking};
+
+/// What `cohaptic explain` shows.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Explanation {
+    /// What is modelled how.
+    pub models: Vec<ModelRow>,
+    /// What is not modelled, and why not.
+    pub left_out: Vec<String>,
+    /// The sizes of the state.
+    pub dimensions: Dimensions,
+    /// What a run is expected to cost.
+    pub cost: Cost,
+}
+
+/// One part of the scene and its model.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct ModelRow {
+    /// Which part.
+    pub part: String,
+    /// How it is modelled.
+    pub model: String,
+    /// Why so.
+    pub reason: String,
+}
+
+/// The sizes of the state of the running scene.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Dimensions {
+    /// Positions and velocities of devices and copies.
+    pub plant: u64,
+    /// Numbers in the samples held from other peers.
+    pub held: u64,
+    /// Packets on the way at once, about: sent per second times the mean delay.
+    pub in_flight: u64,
+}
+
+/// The estimated cost of a run, from the speeds in `docs/speed.md`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Cost {
+    /// Control ticks of all peers in a simulated second.
+    pub peer_ticks_per_s: f64,
+    /// Packets sent in a simulated second.
+    pub packets_per_s: f64,
+    /// Simulated seconds per second of processor time with nothing recorded, within a factor of two on a present-day core.
+    pub realtime_factor: f64,
+}
+
+/// Nanoseconds for a control tick of one peer with one axis, for a packet over a link of constant delay, and for one over a link with more
+/// impairments: see `docs/speed.md`.
+const NANOS_A_TICK: f64 = 12.0;
+const NANOS_A_PACKET: f64 = 20.0;
+const NANOS_AN_IMPAIRED_PACKET: f64 = 50.0;
+
+/// Says what the scene makes the program model.
+#[must_use]
+pub fn explain(scene: &Scene) -> Explanation {
+    let plan = Plan::new(scene, Model::Least, false);
+    let mut rows = Rows::default();
+    rows.clock_and_motion(scene, &plan);
+    rows.peers(scene, &plan);
+    rows.coordination(scene);
+    rows.network(scene);
+    Explanation { dimensions: dimensions(scene, &plan), cost: cost(scene), models: rows.models, left_out: rows.left_out }
+}
+
+#[derive(Default)]
+struct Rows {
+    models: Vec<ModelRow>,
+    left_out: Vec<String>,
+}
+
+impl Rows {
+    fn model(&mut self, part: &str, model: impl Into<String>, reason: impl Into<String>) {
+        self.models.push(ModelRow { part: part.into(), model: model.into(), reason: reason.into() });
+    }
+
+    fn leave_out(&mut self, what: impl Into<String>) {
+        self.left_out.push(what.into());
+    }
+
+    fn clock_and_motion(&mut self, scene: &Scene, plan: &Plan) {
+        let axes = scene.axes.count();
+        self.model("axes", format!("{axes}"), format!("scene.axes = {axes}; the other axes do not exist"));
+        match plan.ticking {
+            Ticking::Lockstep => {
+                let tick = Span(scene.peers[0].clock.tick);
+                self.model("ticks", format!("lockstep, every {tick}"), "all clocks are equal, without offset or drift");
+                self.leave_out("an event for each tick: all peers tick together");
+            }
+            Ticking::EventDriven => self.model("ticks", "an event queue", "ticks, offsets or drifts differ: each peer ticks at its own instants"),
+        }
+        let integrator = match scene.integrator {
+            Integrator::Exact => "the matrix exponential of each body with its held inputs".to_owned(),
+            Integrator::SemiImplicitEuler { steps } => format!("semi-implicit Euler, {steps} steps a tick"),
+            Integrator::RungeKutta4 { steps } => format!("Runge-Kutta of order 4, {steps} steps a tick"),
+        };
+        self.model("motion", integrator, "forces are held over a tick, so a step is one linear map, computed once");
+        if scene.object.enclosure.is_none() {
+            self.leave_out("walls: the object has no enclosure");
+        } else {
+            self.model("enclosure", "sampled walls, spring and damper", "object.enclosure");
+        }
+        if scene.timeline.is_empty() {
+            self.leave_out("changes: the timeline is empty");
+        } else {
+            self.model("timeline", format!("{} changes", scene.timeline.len()), "each applied at its instant, before anything else");
+        }
+    }
+
+    fn peers(&mut self, scene: &Scene, plan: &Plan) {
+        let copy = if scene.object.split_mass { "the mass of the object is split" } else { "every copy has the whole mass" };
+        self.model("object", format!("{} copies of {} kg", scene.peers.len(), scene.copy_mass()), copy);
+        for (group, peers) in groups(scene, plan) {
+            let part = format!("peer {}", names(&peers));
+            match group {
+                DeviceChoice::Simulated => self.model(&part, describe(peers[0]), "it touches the object"),
+                DeviceChoice::Resting => self.leave_out(format!("the device of {}: it touches nothing and no hand moves it", names(&peers))),
+                DeviceChoice::Unobserved => {
+                    self.leave_out(format!("the device of {}: it touches nothing; it is simulated only where it is recorded", names(&peers)));
+                }
+            }
+        }
+        if scene.peers.iter().all(|peer| !peer.compute_delay) {
+            self.leave_out("computed forces from the last tick: no peer has a compute-delay");
+        }
+    }
+
+    fn coordination(&mut self, scene: &Scene) {
+        let spec = &scene.coordination;
+        let gains = spec.gains.scaled(spec.scaling.coordination_factor(scene.peers.len()));
+        let scaling = match spec.scaling {
+            Scaling::None => "as written",
+            Scaling::InverseN => "scaled by 4(N-1)/N^2",
+        };
+        let model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), gains.stiffness, gains.damping);
+        self.model("coordination", model, format!("gains {scaling}; the mean of the samples held is kept until one changes"));
+        let len = wire::datagram_len(scene.axes.count());
+        self.model(
+            "samples",
+            format!("{len} bytes to each other peer every {}", Span(spec.update)),
+            "encoded, sent and decoded as they would be live",
+        );
+    }
+
+    fn network(&mut self, scene: &Scene) {
+        let used = used_links(scene);
+        for (config, count) in &used {
+            let part = format!("{count} {}", if *count == 1 { "link" } else { "links" });
+            if config.is_constant_delay() {
+                self.model(&part, format!("constant delay {}", Span(config.delay.mean())), "one addition a packet: nothing else is configured");
+            } else {
+                self.model(&part, describe_link(config), "a chain of the stages that are configured");
+            }
+        }
+        let one_delay = used.len() == 1 && used.iter().all(|(config, _)| config.is_constant_delay());
+        if one_delay && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()) {
+            self.model("packets on the way", "a ring", "all delays are equal, so packets arrive in the order in which they were sent");
+            self.leave_out("sorting of arrivals");
+        } else {
+            self.model("packets on the way", "a calendar queue", "arrivals are not in the order of sending");
+        }
+        for (peer, direction, line) in access_lines(scene) {
+            self.model(&format!("{direction} of {peer}"), describe_link(line), "shared by all that passes it");
+        }
+        let timeline_is_random = scene.timeline.iter().any(|change| match &change.what {
+            cohaptic_scene::ChangeKind::Links(links) => links.iter().any(|link| link.config.is_random()),
+            _ => false,
+        });
+        let lines_are_random = access_lines(scene).iter().any(|(_, _, line)| line.is_random());
+        if used.iter().all(|(config, _)| !config.is_random()) && !lines_are_random && !timeline_is_random {
+            self.leave_out("random numbers: no link has jitter or loss");
+        }
+    }
+}
+
+/// Peers of the same kind together, in the order of their first.
+fn groups<'a>(scene: &'a Scene, plan: &Plan) -> Vec<(DeviceChoice, Vec<&'a PeerSpec>)> {
+    let mut groups: Vec<(DeviceChoice, Vec<&PeerSpec>)> = Vec::new();
+    for (peer, choice) in scene.peers.iter().zip(&plan.devices) {
+        match groups.iter_mut().find(|(other, peers)| other == choice && describe(peers[0]) == describe(peer)) {
+            Some((_, peers)) => peers.push(peer),
+            None => groups.push((*choice, vec![peer])),
+        }
+    }
+    groups
+}
+
+fn names(peers: &[&PeerSpec]) -> String {
+    match peers {
+        [first, .., last] if peers.len() > 4 => format!("{} to {} ({} peers)", first.name, last.name, peers.len()),
+        _ => peers.iter().map(|peer| peer.name.as_str()).collect::<Vec<_>>().join(", "),
+    }
+}
+
+fn describe(peer: &PeerSpec) -> String {
+    let contact = match peer.contact {
+        Contact::Grasp => "grasps the object",
+        Contact::None => "touches nothing",
+        Contact::Push(_) => "pushes the object from one side",
+    };
+    let hand = match &peer.hand {
+        None => "no hand force",
+        Some(Hand::Force(force)) if force.is_constant() => "a constant hand force",
+        Some(Hand::Force(_)) => "a hand force sampled at each tick",
+        Some(Hand::Arm { .. }) => "an arm, its spring and damper part of the plant",
+    };
+    format!("device of {} kg that {contact}, {hand}", peer.device.mass)
+}
+
+fn describe_link(config: &LinkConfig) -> String {
+    let mut stages = Vec::new();
+    if !config.outages.is_empty() {
+        stages.push(format!("{} outages", config.outages.as_slice().len()));
+    }
+    match config.loss {
+        Loss::None => {}
+        Loss::Independent(probability) => stages.push(format!("independent loss {probability}")),
+        Loss::GilbertElliott(_) => stages.push("Gilbert-Elliott loss".into()),
+        _ => stages.push("loss".into()),
+    }
+    if let Some(bottleneck) = config.bottleneck {
+        let limit = match bottleneck.limit {
+            None => "unlimited".into(),
+            Some(QueueLimit::Packets(packets)) => format!("{packets} packets"),
+            Some(QueueLimit::Bytes(bytes)) => bytes.to_string(),
+            Some(_) => "limited".into(),
+        };
+        stages.push(format!("queue ({limit}) before {}", bottleneck.rate));
+    }
+    let mean = Span(config.delay.mean());
+    match config.delay.jitter() {
+        None => stages.push(format!("delay {mean}")),
+        Some(jitter) => {
+            let law = match jitter.distribution {
+                Distribution::Normal => "normal",
+                Distribution::Uniform => "uniform",
+                _ => "random",
+            };
+            stages.push(format!("delay {mean}, {law} jitter of {}", Span(jitter.sd)));
+        }
+    }
+    if config.order == Order::InOrder {
+        stages.push("in order".into());
+    }
+    stages.join(", then ")
+}
+
+/// The configurations that links between different peers have, and how many links have each.
+fn used_links(scene: &Scene) -> Vec<(&LinkConfig, usize)> {
+    let mut counts = vec![0; scene.links.configs.len()];
+    for (from, row) in scene.links.index.iter().enumerate() {
+        for (to, config) in row.iter().enumerate() {
+            counts[*config] += usize::from(from != to);
+        }
+    }
+    scene.links.configs.iter().map(AsRef::as_ref).zip(counts).filter(|(_, count)| *count > 0).collect()
+}
+
+fn access_lines(scene: &Scene) -> Vec<(&str, &'static str, &LinkConfig)> {
+    scene
+        .peers
+        .iter()
+        .flat_map(|peer| [(peer.name.as_str(), "uplink", peer.uplink.as_ref()), (peer.name.as_str(), "downlink", peer.downlink.as_ref())])
+        .filter_map(|(peer, direction, line)| line.map(|line| (peer, direction, line)))
+        .collect()
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an estimate of a count, not negative")]
+fn dimensions(scene: &Scene, plan: &Plan) -> Dimensions {
+    let (peers, axes) = (scene.peers.len() as u64, scene.axes.count() as u64);
+    let devices = plan.devices.iter().filter(|choice| **choice == DeviceChoice::Simulated).count() as u64;
+    let links = used_links(scene).into_iter();
+    let delays: f64 = links.map(|(config, count)| config.delay.mean().as_secs_f64() * count_f64(count)).sum();
+    Dimensions {
+        plant: 2 * axes * (peers + devices),
+        held: 2 * axes * peers * (peers - 1),
+        in_flight: (delays / scene.coordination.update.as_secs_f64()).ceil() as u64,
+    }
+}
+
+fn cost(scene: &Scene) -> Cost {
+    let axes = count_f64(scene.axes.count());
+    let peer_ticks_per_s: f64 = scene.peers.iter().map(|peer| peer.clock.tick.as_secs_f64().recip()).sum();
+    let update = scene.coordination.update.as_secs_f64();
+    let packets = |constant: bool| -> f64 {
+        used_links(scene).iter().filter(|(config, _)| config.is_constant_delay() == constant).map(|(_, count)| count_f64(*count) / update).sum()
+    };
+    let nanos = peer_ticks_per_s * NANOS_A_TICK * axes + packets(true) * NANOS_A_PACKET + packets(false) * NANOS_AN_IMPAIRED_PACKET;
+    Cost { peer_ticks_per_s, packets_per_s: packets(true) + packets(false), realtime_factor: 1e9 / nanos }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts of links and axes are far below 2^53")]
+fn count_f64(count: usize) -> f64 {
+    count as f64
+}

@@ -1,0 +1,42 @@
+//! Runs a scene: compiles it to the least it needs, owns the clock and the order of events, and records what happens.
+//!
+//! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that really send their datagrams through a [`cohaptic_wan::Network`]. An
+//! [`Observer`] sees every tick and every packet; [`record`] has observers that write CSV files and plots while the scene runs. [`check`] compares a
+//! run with the scene's expectations, [`mod@explain`] says what a scene makes the program model.
+//!
+//! Nothing here reads a clock: the same scene and seed give the same bytes, whatever the machine.
+//!
+//! ```
+//! use cohaptic_harness::{Model, NoObserver, Simulation};
+//! use cohaptic_scene::Scene;
+//!
+//! let text = r#"
+//!     scene = { duration = "1s", count = 2 }
+//!     object = { mass = 0.45 }
+//!     coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+//!     peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+//!     link = { delay = "24ms" }
+//! "#;
+//! let scene = Scene::parse(text, "two.toml".as_ref(), &[])?;
+//! let mut simulation = Simulation::new(&scene, Model::Least);
+//! let summary = simulation.run(&mut NoObserver)?;
+//! assert_eq!(summary.ticks, 1000);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod check;
+mod datagrams;
+mod disturbance;
+pub mod explain;
+mod observer;
+mod plan;
+pub mod record;
+mod schedule;
+mod simulation;
+mod summary;
+mod world;
+
+pub use observer::{NoObserver, Observer, PacketRow, StateRow, TickRow};
+pub use plan::Model;
+pub use simulation::Simulation;
+pub use summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};

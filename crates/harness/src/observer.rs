@@ -1,0 +1,139 @@
+//! Who watches a run.
+
+use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::Fate;
+
+/// Sees what happens in a run, while it happens, in the order in which it happens.
+///
+/// Peers are named by their place in [`cohaptic_scene::Scene::peers`]. The rows borrow from the running scene: copy what you keep.
+pub trait Observer {
+    /// Why the run must end: a file that cannot be written, for instance. An observer that never fails has [`std::convert::Infallible`].
+    type Error;
+
+    /// Whether [`Observer::on_tick`] is to be called. Asked once, at the start.
+    fn wants_ticks(&self) -> bool;
+
+    /// Whether [`Observer::on_packet`] is to be called. Asked once, at the start.
+    fn wants_packets(&self) -> bool;
+
+    /// A peer has computed its forces at a tick.
+    ///
+    /// # Errors
+    ///
+    /// Ends the run.
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Self::Error>;
+
+    /// A packet has arrived or was dropped.
+    ///
+    /// # Errors
+    ///
+    /// Ends the run.
+    fn on_packet(&mut self, row: &PacketRow) -> Result<(), Self::Error>;
+
+    /// Called about every thousand instants, for progress and interruption; `false` ends the run early, in good order.
+    fn keep_going(&mut self, now: Instant) -> bool;
+}
+
+/// Position and velocity along the axes of the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct StateRow<'a> {
+    /// Position [m].
+    pub position: &'a [f64],
+    /// Velocity [m/s].
+    pub velocity: &'a [f64],
+}
+
+/// One peer at one tick: the state at that instant and the forces computed at it. Slices have as many entries as the scene has axes.
+#[derive(Clone, Copy, Debug)]
+pub struct TickRow<'a> {
+    /// The instant of the tick.
+    pub at: Instant,
+    /// The peer.
+    pub peer: usize,
+    /// Its device.
+    pub device: StateRow<'a>,
+    /// Its copy of the object.
+    pub object: StateRow<'a>,
+    /// Where its strategy wants the copy to be.
+    pub target: StateRow<'a>,
+    /// FC [N].
+    pub coupling_force: &'a [f64],
+    /// FT [N].
+    pub coordination_force: &'a [f64],
+}
+
+/// What became of one packet.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct PacketRow {
+    /// The sender.
+    pub from: usize,
+    /// The receiver.
+    pub to: usize,
+    /// The number of the packet on its path, from 0.
+    pub sequence: u64,
+    /// When it was sent.
+    pub sent: Instant,
+    /// When it arrived or was dropped.
+    pub at: Instant,
+    /// Its size.
+    pub size: Bytes,
+    /// What became of it.
+    pub fate: Fate,
+}
+
+/// Sees nothing, and costs nothing.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct NoObserver;
+
+impl Observer for NoObserver {
+    type Error = std::convert::Infallible;
+
+    fn wants_ticks(&self) -> bool {
+        false
+    }
+
+    fn wants_packets(&self) -> bool {
+        false
+    }
+
+    fn on_tick(&mut self, _row: &TickRow<'_>) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    fn on_packet(&mut self, _row: &PacketRow) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    fn keep_going(&mut self, _now: Instant) -> bool {
+        true
+    }
+}
+
+/// Two observers side by side; the first sees everything first, and either can end the run.
+impl<A: Observer, B: Observer<Error = A::Error>> Observer for (A, B) {
+    type Error = A::Error;
+
+    fn wants_ticks(&self) -> bool {
+        self.0.wants_ticks() || self.1.wants_ticks()
+    }
+
+    fn wants_packets(&self) -> bool {
+        self.0.wants_packets() || self.1.wants_packets()
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Self::Error> {
+        self.0.on_tick(row)?;
+        self.1.on_tick(row)
+    }
+
+    fn on_packet(&mut self, row: &PacketRow) -> Result<(), Self::Error> {
+        self.0.on_packet(row)?;
+        self.1.on_packet(row)
+    }
+
+    fn keep_going(&mut self, now: Instant) -> bool {
+        // Both are asked, so that both can show progress.
+        let first = self.0.keep_going(now);
+        self.1.keep_going(now) && first
+    }
+}

@@ -1,0 +1,88 @@
+//! The scene compiled to the least that it needs: what is simulated how, and why. Whatever is chosen, the answer is the same to the bit.
+
+use cohaptic_peer::{Contact, Drift};
+use cohaptic_scene::{Axes, ChangeKind, PeerSpec, Scene};
+
+/// How much of the machinery a run uses.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Model {
+    /// The least that the scene needs.
+    #[default]
+    Least,
+    /// Everything the program has: three axes, an event for each tick of each peer, every device, every stage of every link. Slower, with the same
+    /// answer: this is how the choices of [`Model::Least`] are tested.
+    General,
+}
+
+/// What is simulated how.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Plan {
+    pub(crate) axes: Axes,
+    pub(crate) ticking: Ticking,
+    pub(crate) devices: Vec<DeviceChoice>,
+    /// Whether links of nothing but a constant delay take the general path too.
+    pub(crate) general_links: bool,
+}
+
+/// How ticks are scheduled.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Ticking {
+    /// All peers tick at the same instants: a loop.
+    Lockstep,
+    /// Each peer has its own instants: an event queue.
+    EventDriven,
+}
+
+/// What stands for a peer's device.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum DeviceChoice {
+    /// The device is simulated.
+    Simulated,
+    /// Nobody moves it and it touches nothing.
+    Resting,
+    /// It touches nothing and nobody looks at it.
+    Unobserved,
+}
+
+impl Plan {
+    pub(crate) fn new(scene: &Scene, model: Model, ticks_are_observed: bool) -> Self {
+        match model {
+            Model::General => Self {
+                axes: Axes::Three,
+                ticking: Ticking::EventDriven,
+                devices: vec![DeviceChoice::Simulated; scene.peers.len()],
+                general_links: true,
+            },
+            Model::Least => Self {
+                axes: scene.axes,
+                ticking: ticking(&scene.peers),
+                devices: (0..scene.peers.len()).map(|peer| device(scene, peer, ticks_are_observed)).collect(),
+                general_links: false,
+            },
+        }
+    }
+}
+
+fn ticking(peers: &[PeerSpec]) -> Ticking {
+    let together = |peer: &PeerSpec| peer.clock.offset.is_zero() && peer.clock.drift == Drift::default() && peer.clock.tick == peers[0].clock.tick;
+    if peers.iter().all(together) { Ticking::Lockstep } else { Ticking::EventDriven }
+}
+
+fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice {
+    let spec = &scene.peers[peer];
+    let touches_later = scene.timeline.iter().any(|change| match &change.what {
+        ChangeKind::Contact { peer: changed, contact } => *changed == peer && *contact != Contact::None,
+        _ => false,
+    });
+    let moved_later =
+        scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Hand { peer: changed, hand: Some(_) } if *changed == peer));
+    if spec.contact != Contact::None || touches_later {
+        DeviceChoice::Simulated
+    } else if spec.hand.is_none() && !moved_later && spec.velocity.iter().all(|v| *v == 0.0) {
+        DeviceChoice::Resting
+    } else if ticks_are_observed {
+        DeviceChoice::Simulated
+    } else {
+        DeviceChoice::Unobserved
+    }
+}

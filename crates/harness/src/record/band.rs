@@ -1,0 +1,145 @@
+//! A curve in bounded memory: its lowest and highest value in each of a fixed number of spans of time.
+
+use std::time::Duration;
+
+use cohaptic_units::Instant;
+
+/// Curves over the whole of a scene, each as (lowest, highest) in every span. What a plot of that many pixels shows is exact.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Bands {
+    duration: Duration,
+    spans: usize,
+    /// By curve, then span; `None` where nothing was added.
+    extremes: Vec<Vec<Option<(f64, f64)>>>,
+}
+
+impl Bands {
+    /// That many curves over a scene of that duration, in that many spans (at least one each).
+    #[must_use]
+    pub fn new(duration: Duration, spans: usize, curves: usize) -> Self {
+        let spans = spans.max(1);
+        Self { duration: duration.max(Duration::from_nanos(1)), spans, extremes: vec![vec![None; spans]; curves] }
+    }
+
+    /// Adds a value to a curve. What is not finite or beyond the end is left out.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such curve.
+    pub fn add(&mut self, curve: usize, at: Instant, value: f64) {
+        let Some(span) = self.span(at) else { return };
+        if value.is_finite() {
+            let slot = &mut self.extremes[curve][span];
+            *slot = Some(slot.map_or((value, value), |(low, high)| (low.min(value), high.max(value))));
+        }
+    }
+
+    /// In which span an instant lies; `None` at the end of the scene and beyond.
+    #[must_use]
+    pub fn span(&self, at: Instant) -> Option<usize> {
+        let span = u128::from(at.as_nanos()) * self.spans as u128 / self.duration.as_nanos();
+        usize::try_from(span).ok().filter(|span| *span < self.spans)
+    }
+
+    /// The same scene and spans without any value.
+    #[must_use]
+    pub fn emptied(&self) -> Self {
+        Self::new(self.duration, self.spans, self.curves())
+    }
+
+    /// Sets a span of a curve to one value.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such curve or span.
+    pub fn set(&mut self, curve: usize, span: usize, value: f64) {
+        self.extremes[curve][span] = Some((value, value));
+    }
+
+    /// The curves in `parts` equal parts, in order.
+    #[must_use]
+    pub fn split(&self, parts: usize) -> Vec<Self> {
+        let size = (self.extremes.len() / parts.max(1)).max(1);
+        let part = |extremes: &[Vec<_>]| Self { duration: self.duration, spans: self.spans, extremes: extremes.to_vec() };
+        self.extremes.chunks(size).map(part).collect()
+    }
+
+    /// How many curves there are.
+    #[must_use]
+    pub fn curves(&self) -> usize {
+        self.extremes.len()
+    }
+
+    /// How many spans there are.
+    #[must_use]
+    pub const fn spans(&self) -> usize {
+        self.spans
+    }
+
+    /// How long the scene is [s].
+    #[must_use]
+    pub const fn seconds(&self) -> f64 {
+        self.duration.as_secs_f64()
+    }
+
+    /// A curve as (middle of the span [s], lowest, highest), spans without a value left out.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such curve.
+    #[expect(clippy::cast_precision_loss, reason = "the number of spans is small")]
+    pub fn curve(&self, curve: usize) -> impl Iterator<Item = (f64, f64, f64)> {
+        let width = self.seconds() / self.spans as f64;
+        self.extremes[curve]
+            .iter()
+            .enumerate()
+            .filter_map(move |(span, extremes)| extremes.map(|(low, high)| ((span as f64 + 0.5) * width, low, high)))
+    }
+
+    /// The range of values worth showing, with a margin, and whether values beyond it were left out.
+    ///
+    /// A scene that diverges ends in numbers that would flatten everything before: what lies more than eight times as far from the start as the
+    /// curves do in the median span is cut off.
+    #[must_use]
+    pub fn range(&self) -> (std::ops::Range<f64>, bool) {
+        let start = (0..self.curves()).find_map(|curve| self.curve(curve).next()).map_or(0.0, |(_, low, _)| low);
+        let reach = |span: usize| {
+            let at = self.extremes.iter().filter_map(|curve| curve[span]);
+            at.map(|(low, high)| (low - start).abs().max((high - start).abs())).reduce(f64::max)
+        };
+        let mut reaches: Vec<f64> = (0..self.spans).filter_map(reach).collect();
+        reaches.sort_by(f64::total_cmp);
+        let median = reaches.get(reaches.len() / 2).copied().unwrap_or(0.0);
+        let limit = if median > 0.0 { 8.0 * median } else { f64::INFINITY };
+        let shown = |value: f64| (value - start).abs() <= limit;
+        let values = || self.extremes.iter().flatten().flatten().flat_map(|(low, high)| [*low, *high]);
+        let (low, high) = values().filter(|value| shown(*value)).fold((start, start), |(low, high), value| (low.min(value), high.max(value)));
+        let margin = if high > low { 0.05 * (high - low) } else { start.abs().max(1e-3) };
+        (low - margin..high + margin, values().any(|value| !shown(value)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_keeps_its_extremes() {
+        let mut bands = Bands::new(Duration::from_secs(1), 2, 1);
+        for (millis, value) in [(0, 1.0), (100, 3.0), (499, -2.0), (500, 7.0), (1000, 99.0), (600, f64::NAN)] {
+            bands.add(0, Instant::from_nanos(millis * 1_000_000), value);
+        }
+        assert_eq!(bands.curve(0).collect::<Vec<_>>(), [(0.25, -2.0, 3.0), (0.75, 7.0, 7.0)]);
+    }
+
+    #[test]
+    fn what_explodes_at_the_end_is_cut_off() {
+        let mut bands = Bands::new(Duration::from_secs(10), 10, 1);
+        for second in 0..10 {
+            let value = if second == 9 { 1e30 } else { 1.0 + f64::from(u32::try_from(second % 2).unwrap()) };
+            bands.add(0, Instant::from_nanos(second * 1_000_000_000), value);
+        }
+        let (range, cut) = bands.range();
+        assert!(cut && range.end < 3.0, "{range:?}");
+    }
+}

@@ -1,0 +1,23 @@
+//! Records of a run: CSV files and plots, written while it runs, so that a long run does not grow in memory.
+//!
+//! | file | holds |
+//! | --- | --- |
+//! | `trajectory.csv` | one row a peer and tick: the state at t and the forces computed at t |
+//! | `packets.csv` | one row a packet, in the order of arrival or drop |
+//! | `links.csv` | one row a link or access line: its counters at the end |
+//! | `positions.svg`, `forces.svg`, `network.svg` | plots over time |
+//!
+//! A file is written under the name `….partial` and takes its own name when it is whole. Numbers are written with the fewest digits that read back
+//! as the same `f64`.
+
+mod band;
+mod file;
+mod links;
+mod packets;
+mod plot;
+mod recorder;
+mod trajectory;
+
+pub use band::Bands;
+pub use file::RecordError;
+pub use recorder::Recorder;

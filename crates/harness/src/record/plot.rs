@@ -1,0 +1,118 @@
+//! Plots over time as SVG.
+
+use std::path::PathBuf;
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::band::Bands;
+use super::file::PartialFile;
+use crate::record::RecordError;
+
+/// One panel of a plot: curves over time with their names, or without.
+pub(crate) struct Panel<'a> {
+    pub(crate) title: String,
+    pub(crate) unit: &'a str,
+    pub(crate) names: &'a [String],
+    pub(crate) bands: &'a Bands,
+    /// What values are multiplied by before they are shown: 100 to show metres in centimetres.
+    pub(crate) scale: f64,
+}
+
+/// More curves than this are drawn in one colour and not named.
+const MOST_NAMED: usize = 10;
+
+/// Colours that are told apart with any kind of colour vision (Okabe & Ito 2008), then their darker halves.
+const COLOURS: [RGBColor; MOST_NAMED] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(120, 120, 120),
+    RGBColor(0, 57, 89),
+    RGBColor(106, 47, 0),
+    RGBColor(0, 79, 57),
+];
+
+/// Writes the panels below one another.
+pub(crate) fn write(path: PathBuf, panels: &[Panel<'_>]) -> Result<PathBuf, RecordError> {
+    let mut svg = String::new();
+    {
+        let height = 60 + 300 * u32::try_from(panels.len()).unwrap_or(1);
+        let root = SVGBackend::with_string(&mut svg, (960, height)).into_drawing_area();
+        draw(&root, panels).expect("drawing to memory does not fail");
+    }
+    let mut file = PartialFile::create(path)?;
+    file.write(svg.as_bytes())?;
+    file.finish()
+}
+
+type Drawing<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type DrawingResult<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
+
+fn draw<'a>(root: &Drawing<'a>, panels: &[Panel<'_>]) -> DrawingResult<'a> {
+    root.fill(&WHITE)?;
+    for (area, panel) in root.split_evenly((panels.len(), 1)).iter().zip(panels) {
+        draw_panel(area, panel)?;
+    }
+    root.present()
+}
+
+fn draw_panel<'a>(area: &Drawing<'a>, panel: &Panel<'_>) -> DrawingResult<'a> {
+    let (range, cut) = panel.bands.range();
+    let range = range.start * panel.scale..range.end * panel.scale;
+    let title = if cut { format!("{} (what goes far beyond is cut off)", panel.title) } else { panel.title.clone() };
+    let mut chart = ChartBuilder::on(area)
+        .caption(title, ("sans-serif", 16))
+        .margin(12)
+        .x_label_area_size(36)
+        .y_label_area_size(64)
+        .build_cartesian_2d(0.0..panel.bands.seconds(), range.clone())?;
+    chart.configure_mesh().x_desc("t [s]").y_desc(panel.unit).light_line_style(WHITE).draw()?;
+    let named = !panel.names.is_empty() && panel.names.len() <= MOST_NAMED;
+    for curve in 0..panel.bands.curves() {
+        let colour = if named { COLOURS[curve] } else { COLOURS[0] };
+        let style = colour.mix(if named { 0.9 } else { 0.35 }).stroke_width(1);
+        for run in visible_runs(panel, curve, &range) {
+            chart.draw_series(LineSeries::new(run, style))?;
+        }
+        if let Some(name) = panel.names.get(curve).filter(|_| named) {
+            let empty = LineSeries::new(std::iter::empty::<(f64, f64)>(), style);
+            chart.draw_series(empty)?.label(name).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
+        }
+    }
+    if named {
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperLeft)
+            .background_style(WHITE.mix(0.8))
+            .border_style(BLACK.mix(0.3))
+            .draw()?;
+    }
+    Ok(())
+}
+
+/// The parts of a curve that lie in the range shown: lowest and highest value of each span, in the order that continues the line.
+fn visible_runs(panel: &Panel<'_>, curve: usize, range: &std::ops::Range<f64>) -> Vec<Vec<(f64, f64)>> {
+    let mut runs = vec![Vec::new()];
+    let mut last = f64::NAN;
+    for (t, low, high) in panel.bands.curve(curve) {
+        let (low, high) = (low * panel.scale, high * panel.scale);
+        if !range.contains(&low) || !range.contains(&high) {
+            runs.push(Vec::new());
+            continue;
+        }
+        let run = runs.last_mut().expect("there is always a run");
+        let rising = (last - low).abs() <= (last - high).abs() || last.is_nan();
+        let (first, second) = if rising { (low, high) } else { (high, low) };
+        run.push((t, first));
+        if first.to_bits() != second.to_bits() {
+            run.push((t, second));
+        }
+        last = second;
+    }
+    runs.retain(|run| !run.is_empty());
+    runs
+}

@@ -1,0 +1,149 @@
+//! The observer that writes everything down.
+
+use std::path::{Path, PathBuf};
+
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+use cohaptic_wan::Fate;
+
+use super::band::Bands;
+use super::file::{RecordError, create_folder};
+use super::links;
+use super::packets::Packets;
+use super::plot::{self, Panel};
+use super::trajectory::Trajectory;
+use crate::{Observer, PacketRow, Summary, TickRow};
+
+/// Writes `trajectory.csv` and `packets.csv` while the scene runs, and with [`Recorder::finish`] the rest.
+#[derive(Debug)]
+pub struct Recorder {
+    folder: PathBuf,
+    title: String,
+    names: Vec<String>,
+    trajectory: Trajectory,
+    packets: Packets,
+    plotted: Plotted,
+}
+
+/// What the plots show. Curves are ordered by axis, then peer.
+#[derive(Debug)]
+struct Plotted {
+    positions: Bands,
+    forces: Bands,
+    delays: Bands,
+    /// In each span: packets dropped, and all whose fate is known, by when they were sent.
+    drops: Vec<(u32, u32)>,
+}
+
+/// The spans of time of a plot, and the most numbers that all curves of a plot may hold together.
+const SPANS: usize = 1000;
+const MOST_NUMBERS: usize = 200_000;
+
+impl Recorder {
+    /// Begins to record a scene into a folder, which is made if there is none. Records of an earlier run in it are replaced when this one is whole.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if the folder or a file cannot be made.
+    pub fn create(folder: &Path, scene: &Scene) -> Result<Self, RecordError> {
+        create_folder(folder)?;
+        let names: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
+        let curves = names.len() * scene.axes.count();
+        let spans = SPANS.min(MOST_NUMBERS / curves).max(50);
+        let bands = |curves| Bands::new(scene.duration, spans, curves);
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            title: scene.title.clone(),
+            trajectory: Trajectory::create(folder, names.clone(), scene.axes)?,
+            packets: Packets::create(folder, names.clone())?,
+            plotted: Plotted { positions: bands(curves), forces: bands(curves), delays: bands(1), drops: vec![(0, 0); spans] },
+            names,
+        })
+    }
+
+    /// Writes what is left and gives every file its name; gives the files.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if a file cannot be written.
+    pub fn finish(self, summary: &Summary) -> Result<Vec<PathBuf>, RecordError> {
+        let Self { folder, title, names, trajectory, packets, plotted } = self;
+        let mut files = vec![trajectory.finish()?, packets.finish()?, links::write(&folder, summary)?];
+        for (file, bands, what, unit, scale) in [
+            ("positions.svg", &plotted.positions, "position of each copy", "position [cm]", 100.0),
+            ("forces.svg", &plotted.forces, "coordination force on each copy", "FT [N]", 1.0),
+        ] {
+            let by_axis = bands.split(bands.curves() / names.len());
+            let heading = |axis: usize| if by_axis.len() == 1 { format!("{title}: {what}") } else { format!("{title}: {what} along {}", AXES[axis]) };
+            let panel = |(axis, bands)| Panel { title: heading(axis), unit, names: &names, bands, scale };
+            let panels: Vec<Panel<'_>> = by_axis.iter().enumerate().map(panel).collect();
+            files.push(plot::write(folder.join(file), &panels)?);
+        }
+        let shares = plotted.drop_shares();
+        let of_links = |title: String, unit, bands, scale| Panel { title, unit, names: &[], bands, scale };
+        let network = [
+            of_links(format!("{title}: delay of the packets that arrived, all links"), "delay [ms]", &plotted.delays, 1e3),
+            of_links("share of the packets sent that were dropped".into(), "dropped [%]", &shares, 100.0),
+        ];
+        files.push(plot::write(folder.join("network.svg"), &network)?);
+        Ok(files)
+    }
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+impl Plotted {
+    fn on_packet(&mut self, row: &PacketRow) {
+        let arrived = match row.fate {
+            Fate::Delivered(at) => Some(at),
+            _ => None,
+        };
+        if let Some(at) = arrived {
+            self.delays.add(0, row.sent, (at - row.sent).as_secs_f64());
+        }
+        if let Some(span) = self.delays.span(row.sent) {
+            let (dropped, all) = &mut self.drops[span];
+            *dropped = dropped.saturating_add(u32::from(arrived.is_none()));
+            *all = all.saturating_add(1);
+        }
+    }
+
+    /// The share of the packets sent in each span that was dropped.
+    fn drop_shares(&self) -> Bands {
+        let mut shares = self.delays.emptied();
+        for (span, (dropped, all)) in self.drops.iter().enumerate().filter(|(_, (_, all))| *all > 0) {
+            shares.set(0, span, f64::from(*dropped) / f64::from(*all));
+        }
+        shares
+    }
+}
+
+impl Observer for Recorder {
+    type Error = RecordError;
+
+    fn wants_ticks(&self) -> bool {
+        true
+    }
+
+    fn wants_packets(&self) -> bool {
+        true
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
+        for axis in 0..row.coupling_force.len() {
+            let curve = axis * self.names.len() + row.peer;
+            self.plotted.positions.add(curve, row.at, row.object.position[axis]);
+            self.plotted.forces.add(curve, row.at, row.coordination_force[axis]);
+        }
+        self.trajectory.on_tick(row)
+    }
+
+    fn on_packet(&mut self, row: &PacketRow) -> Result<(), RecordError> {
+        self.plotted.on_packet(row);
+        self.packets.on_packet(row)
+    }
+
+    fn keep_going(&mut self, _now: Instant) -> bool {
+        true
+    }
+}

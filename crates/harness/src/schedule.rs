@@ -1,0 +1,83 @@
+//! When which peer ticks.
+
+use std::time::Duration;
+
+use cohaptic_peer::Clock;
+use cohaptic_units::Instant;
+use cohaptic_wan::{Event, EventQueue};
+
+use crate::plan::Ticking;
+
+/// The instants of the scene at which peers tick.
+#[derive(Clone, Debug)]
+pub(crate) enum Schedule {
+    /// All peers tick together, every `tick`.
+    Lockstep { tick: Duration, next: Instant },
+    /// One event for the next tick of each peer.
+    EventDriven(EventQueue<Tick>),
+}
+
+/// A peer's next tick. Simultaneous ticks come in the order of the peers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tick {
+    at: Instant,
+    peer: usize,
+}
+
+impl Event for Tick {
+    type Key = (Instant, usize);
+
+    fn at(&self) -> Instant {
+        self.at
+    }
+
+    fn key(&self) -> Self::Key {
+        (self.at, self.peer)
+    }
+}
+
+impl Schedule {
+    pub(crate) fn new<'a>(ticking: Ticking, clocks: impl IntoIterator<Item = &'a Clock>) -> Self {
+        let mut clocks = clocks.into_iter().enumerate();
+        match ticking {
+            Ticking::Lockstep => {
+                let tick = clocks.next().map_or(Duration::MAX, |(_, clock)| clock.tick);
+                Self::Lockstep { tick, next: Instant::ZERO }
+            }
+            Ticking::EventDriven => {
+                let mut queue = EventQueue::new();
+                for (peer, clock) in clocks {
+                    if let Some(at) = clock.instant(0) {
+                        queue.push(Tick { at, peer });
+                    }
+                }
+                Self::EventDriven(queue)
+            }
+        }
+    }
+
+    /// The next instant at which any peer ticks; `None` beyond the end of time.
+    #[inline]
+    pub(crate) fn next_instant(&self) -> Option<Instant> {
+        match self {
+            Self::Lockstep { next, .. } => Some(*next),
+            Self::EventDriven(queue) => queue.next_at(),
+        }
+    }
+
+    /// Writes down which peers tick at that instant, in order. Each must be put back with [`Schedule::tick_again`].
+    pub(crate) fn take(&mut self, at: Instant, peers: &mut Vec<usize>) {
+        if let Self::EventDriven(queue) = self {
+            peers.clear();
+            while let Some(tick) = queue.pop_due(at) {
+                peers.push(tick.peer);
+            }
+        }
+    }
+
+    pub(crate) fn tick_again(&mut self, peer: usize, at: Option<Instant>) {
+        if let (Self::EventDriven(queue), Some(at)) = (self, at) {
+            queue.push(Tick { at, peer });
+        }
+    }
+}

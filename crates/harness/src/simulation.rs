@@ -1,0 +1,68 @@
+//! A scene in virtual time.
+
+use cohaptic_scene::{Axes, Scene};
+
+use crate::disturbance::Disturbance;
+use crate::observer::Observer;
+use crate::plan::{Model, Plan};
+use crate::summary::{Ending, Summary};
+use crate::world::{Step, Watch, World};
+
+/// How many instants pass between two calls of [`Observer::keep_going`].
+const BREATH: u32 = 1024;
+
+/// A scene in virtual time, as fast as the processor goes.
+///
+/// At one instant, in this order: changes of the timeline; peers that tick sample and send; packets that have arrived are applied; forces are
+/// computed; everybody who ticks moves to the next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
+#[derive(Debug)]
+pub struct Simulation<'a> {
+    scene: &'a Scene,
+    model: Model,
+    disturbance: Option<Disturbance>,
+}
+
+impl<'a> Simulation<'a> {
+    /// A scene that is ready to run.
+    #[must_use]
+    pub const fn new(scene: &'a Scene, model: Model) -> Self {
+        Self { scene, model, disturbance: None }
+    }
+
+    pub(crate) const fn disturbed(scene: &'a Scene, model: Model, disturbance: Disturbance) -> Self {
+        Self { scene, model, disturbance: Some(disturbance) }
+    }
+
+    /// Runs the scene from its beginning to its end, until it diverges, or until the observer ends it.
+    ///
+    /// # Errors
+    ///
+    /// What the observer's error is.
+    pub fn run<O: Observer>(&self, observer: &mut O) -> Result<Summary, O::Error> {
+        let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
+        match plan.axes {
+            Axes::One => run_to_end(self.world::<1>(&plan), observer),
+            Axes::Two => run_to_end(self.world::<2>(&plan), observer),
+            Axes::Three => run_to_end(self.world::<3>(&plan), observer),
+        }
+    }
+
+    pub(crate) fn world<const A: usize>(&self, plan: &Plan) -> World<A> {
+        World::new(self.scene, plan, self.disturbance)
+    }
+}
+
+fn run_to_end<const A: usize, O: Observer>(mut world: World<A>, observer: &mut O) -> Result<Summary, O::Error> {
+    let watch = Watch::of(observer);
+    loop {
+        for _ in 0..BREATH {
+            if let Step::Ended(ending) = world.step(observer, watch)? {
+                return Ok(world.summary(ending));
+            }
+        }
+        if !observer.keep_going(world.now()) {
+            let next = world.now().saturating_add(std::time::Duration::from_nanos(1));
+            return Ok(world.summary(Ending::Interrupted(next)));
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! What a run comes to.
+
+use std::time::Duration;
+
+use cohaptic_units::Instant;
+use cohaptic_wan::LinkStats;
+
+/// The result of a run.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Summary {
+    /// How it ended.
+    pub ending: Ending,
+    /// How much of the scene was simulated.
+    pub duration: Duration,
+    /// The number of control ticks of the peer that made the most.
+    pub ticks: u64,
+    /// The peers, in the order of the scene.
+    pub peers: Vec<PeerSummary>,
+    /// The links between peers, by sender, then receiver.
+    pub links: Vec<LinkSummary>,
+    /// The access lines that peers have.
+    pub access_lines: Vec<AccessSummary>,
+    /// The largest distance along an axis between two copies of the object at their latest ticks, over the whole run [m].
+    pub max_discrepancy: f64,
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Ending {
+    /// The scene ran to its end.
+    Complete,
+    /// At this tick a position or a velocity was no finite number any more: the scene diverged.
+    Diverged(Instant),
+    /// The observer ended the run before this tick.
+    Interrupted(Instant),
+}
+
+/// One peer at the end of a run.
+#[derive(Clone, PartialEq, Debug)]
+pub struct PeerSummary {
+    /// Its name.
+    pub name: String,
+    /// Position of its copy along each axis [m].
+    pub position: Vec<f64>,
+    /// Velocity of its copy along each axis [m/s].
+    pub velocity: Vec<f64>,
+    /// How many samples arrived too late or repeated, and changed nothing.
+    pub stale_samples: u64,
+}
+
+/// One link at the end of a run.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct LinkSummary {
+    /// The sender's place in the scene.
+    pub from: usize,
+    /// The receiver's place in the scene.
+    pub to: usize,
+    /// Its counters.
+    pub stats: LinkStats,
+}
+
+/// One access line at the end of a run.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct AccessSummary {
+    /// The peer's place in the scene.
+    pub peer: usize,
+    /// Whether it is the line that the peer sends through.
+    pub uplink: bool,
+    /// Its counters.
+    pub stats: LinkStats,
+}

@@ -1,0 +1,399 @@
+//! The running scene: its peers, its network, its clock, with A simulated axes.
+
+use std::time::Duration;
+
+use cohaptic_peer::coordination::BuiltIn;
+use cohaptic_peer::{
+    Clock, Contact, CopyConfig, Device, Held, ObjectCopy, Peer, PeerConfig, Reception, RestingDevice, SimulatedDevice, State, Strategy,
+};
+use cohaptic_scene::{Change, ChangeKind, Scene};
+use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::{AccessLine, Fate, Network, NetworkConfig, NodeId};
+
+use crate::datagrams::{Datagrams, Handle};
+use crate::disturbance::Disturbance;
+use crate::observer::{Observer, PacketRow, StateRow, TickRow};
+use crate::plan::{DeviceChoice, Plan};
+use crate::schedule::Schedule;
+use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
+
+/// A scene in the middle of a run.
+pub(crate) struct World<const A: usize> {
+    /// The axes that the scene has, of the A that are simulated.
+    axes: usize,
+    names: Vec<String>,
+    members: Vec<Member<A>>,
+    network: Network<Handle>,
+    datagrams: Datagrams,
+    schedule: Schedule,
+    /// What is yet to change, the next change last.
+    changes: Vec<Change>,
+    coordination_factor: f64,
+    end: Instant,
+    now: Instant,
+    /// Where each copy was at its latest tick.
+    latest: Vec<[f64; A]>,
+    max_discrepancy: f64,
+    finite: bool,
+    /// Who ticks at the present instant, if not all.
+    ticking: Vec<usize>,
+}
+
+/// A peer with its clock.
+struct Member<const A: usize> {
+    peer: Peer<A, DeviceModel<A>, BuiltIn>,
+    clock: Clock,
+    tick: u64,
+    /// The tick at which it sends next, and how many ticks later again.
+    next_send: u64,
+    send_every: u64,
+    stale_samples: u64,
+}
+
+/// What stands for a peer's device.
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "most peers of most scenes are the large variant, and a box would cost a cache miss a tick")]
+enum DeviceModel<const A: usize> {
+    Resting(RestingDevice<A>),
+    Simulated(SimulatedDevice<A>),
+}
+
+impl<const A: usize> Device<A> for DeviceModel<A> {
+    #[inline]
+    fn state(&self) -> State<A> {
+        match self {
+            Self::Resting(device) => device.state(),
+            Self::Simulated(device) => device.state(),
+        }
+    }
+
+    #[inline]
+    fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
+        match self {
+            Self::Resting(device) => device.advance(now, span, coupling_force),
+            Self::Simulated(device) => device.advance(now, span, coupling_force),
+        }
+    }
+}
+
+/// The two bodies of a peer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bodies<const A: usize> {
+    pub(crate) device: [f64; A],
+    pub(crate) object: [f64; A],
+    pub(crate) contact: Contact,
+}
+
+/// What one step of a run came to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Step {
+    Ticked,
+    Ended(Ending),
+}
+
+impl<const A: usize> World<A> {
+    pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>) -> Self {
+        let initial: Vec<State<A>> = scene.peers.iter().map(|peer| state(&peer.position, &peer.velocity)).collect();
+        let members: Vec<Member<A>> = (0..scene.peers.len()).map(|place| Member::new(scene, plan, &initial, disturbance, place)).collect();
+        Self {
+            axes: scene.axes.count(),
+            names: scene.peers.iter().map(|peer| peer.name.clone()).collect(),
+            latest: members.iter().map(|member| member.peer.object().state().position).collect(),
+            members,
+            network: network(scene, plan),
+            datagrams: Datagrams::default(),
+            schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock)),
+            changes: scene.timeline.iter().rev().cloned().collect(),
+            coordination_factor: scene.coordination.scaling.coordination_factor(scene.peers.len()),
+            end: Instant::ZERO.saturating_add(scene.duration),
+            now: Instant::ZERO,
+            max_discrepancy: 0.0,
+            finite: true,
+            ticking: (0..scene.peers.len()).collect(),
+        }
+    }
+
+    /// The instant of the latest step.
+    pub(crate) fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// Everything that happens at the next instant at which a peer ticks, or the end of the scene.
+    pub(crate) fn step<O: Observer>(&mut self, observer: &mut O, watch: Watch) -> Result<Step, O::Error> {
+        let Some(now) = self.schedule.next_instant().filter(|now| *now < self.end) else {
+            return self.finish(observer, watch).map(Step::Ended);
+        };
+        if !self.finite {
+            return Ok(Step::Ended(Ending::Diverged(now)));
+        }
+        self.now = now;
+        self.change(now);
+        self.schedule.take(now, &mut self.ticking);
+        self.send(now);
+        self.deliver(now, observer, watch)?;
+        self.compute_and_move(now, observer, watch)?;
+        self.measure_discrepancy();
+        Ok(Step::Ticked)
+    }
+
+    /// What came out, up to `ending`.
+    pub(crate) fn summary(&self, ending: Ending) -> Summary {
+        let stop = match ending {
+            Ending::Complete => self.end,
+            Ending::Diverged(at) | Ending::Interrupted(at) => at,
+        };
+        let peers = self.members.iter().zip(&self.names).map(|(member, name)| {
+            let State { position, velocity } = member.peer.object().state();
+            PeerSummary {
+                name: name.clone(),
+                position: position[..self.axes].to_vec(),
+                velocity: velocity[..self.axes].to_vec(),
+                stale_samples: member.stale_samples,
+            }
+        });
+        Summary {
+            ending,
+            duration: stop - Instant::ZERO,
+            ticks: self.members.iter().map(|member| member.tick).max().unwrap_or(0),
+            peers: peers.collect(),
+            links: self.link_summaries(),
+            access_lines: self.access_summaries(),
+            max_discrepancy: self.max_discrepancy,
+        }
+    }
+
+    /// Where each peer's device and copy are, and whether they touch.
+    pub(crate) fn bodies(&self) -> impl Iterator<Item = Bodies<A>> {
+        self.members.iter().map(|member| Bodies {
+            device: member.peer.device().state().position,
+            object: member.peer.object().state().position,
+            contact: member.peer.contact(),
+        })
+    }
+
+    /// Changes of the timeline up to and including `now`, each at its own instant.
+    fn change(&mut self, now: Instant) {
+        while let Some(change) = self.changes.pop_if(|change| change.at <= now) {
+            match change.what {
+                ChangeKind::Links(links) => {
+                    for link in links {
+                        self.network
+                            .set_link(change.at, node(link.from), node(link.to), (*link.config).clone())
+                            .expect("changes are in order of time");
+                    }
+                }
+                ChangeKind::Contact { peer, contact } => self.members[peer].peer.set_contact(contact),
+                ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
+                    DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
+                    DeviceModel::Resting(_) => {}
+                },
+                ChangeKind::Coordination(gains) => {
+                    for member in &mut self.members {
+                        Strategy::<A>::set_gains(member.peer.strategy_mut(), gains.scaled(self.coordination_factor));
+                    }
+                }
+                _ => unreachable!("every kind of change of this workspace is listed"),
+            }
+        }
+    }
+
+    /// Step 1: those whose time it is send their sample to everybody else.
+    fn send(&mut self, now: Instant) {
+        let others = self.members.len() - 1;
+        for &from in &self.ticking {
+            let member = &mut self.members[from];
+            if member.tick != member.next_send {
+                continue;
+            }
+            member.next_send += member.send_every;
+            let local_time = member.clock.local_time(member.tick);
+            let (handle, len) = self.datagrams.store(others, |datagram| member.peer.sample(local_time, datagram));
+            for to in (0..=others).filter(|to| *to != from) {
+                self.network.handle_packet(now, node(from), node(to), Bytes::new(len as u64), handle).expect("instants come in order");
+            }
+        }
+    }
+
+    /// Step 2: whatever has arrived is handed to its receiver.
+    fn deliver<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
+        self.network.handle_timeout(now).expect("instants come in order");
+        while let Some(event) = self.network.poll_event() {
+            if let Fate::Delivered(_) = event.fate {
+                let receiver = &mut self.members[event.to.0 as usize];
+                match receiver.peer.handle_datagram(self.datagrams.bytes(event.payload)) {
+                    Ok(Reception::Newest) => {}
+                    Ok(Reception::Stale) => receiver.stale_samples += 1,
+                    Err(error) => unreachable!("peers of one scene understand each other: {error}"),
+                }
+            }
+            self.datagrams.release(event.payload);
+            if watch.packets {
+                let (from, to) = (event.from.0 as usize, event.to.0 as usize);
+                let (sequence, sent, at, size, fate) = (event.sequence, event.sent, event.at, event.size, event.fate);
+                observer.on_packet(&PacketRow { from, to, sequence, sent, at, size, fate })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Steps 3 and 4: everybody who ticks computes forces and moves to the next tick.
+    fn compute_and_move<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
+        let lockstep = match &mut self.schedule {
+            Schedule::Lockstep { tick, next } => {
+                *next = now.saturating_add(*tick);
+                Some(*tick)
+            }
+            Schedule::EventDriven(_) => None,
+        };
+        for &place in &self.ticking {
+            let member = &mut self.members[place];
+            let forces = member.peer.compute(now);
+            let object = member.peer.object().state();
+            self.latest[place] = object.position;
+            if watch.ticks {
+                let axes = self.axes;
+                let device = member.peer.device().state();
+                observer.on_tick(&TickRow {
+                    at: now,
+                    peer: place,
+                    device: row(&device, axes),
+                    object: row(object, axes),
+                    target: row(&forces.target, axes),
+                    coupling_force: &forces.coupling[..axes],
+                    coordination_force: &forces.coordination[..axes],
+                })?;
+            }
+            member.tick += 1;
+            let span = lockstep.unwrap_or_else(|| {
+                let next = member.clock.instant(member.tick);
+                self.schedule.tick_again(place, next);
+                next.unwrap_or(Instant::MAX) - now
+            });
+            member.peer.advance(now, span);
+            self.finite &= member.is_finite();
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn measure_discrepancy(&mut self) {
+        let (mut low, mut high) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A]);
+        for position in &self.latest {
+            for axis in 0..A {
+                low[axis] = if position[axis] < low[axis] { position[axis] } else { low[axis] };
+                high[axis] = if position[axis] > high[axis] { position[axis] } else { high[axis] };
+            }
+        }
+        for axis in 0..A {
+            self.max_discrepancy = self.max_discrepancy.max(high[axis] - low[axis]);
+        }
+    }
+
+    /// The end of the scene: what has arrived by then is delivered.
+    fn finish<O: Observer>(&mut self, observer: &mut O, watch: Watch) -> Result<Ending, O::Error> {
+        self.change(self.end);
+        self.deliver(self.end, observer, watch)?;
+        Ok(if self.finite { Ending::Complete } else { Ending::Diverged(self.end) })
+    }
+
+    fn link_summaries(&self) -> Vec<LinkSummary> {
+        let places = 0..self.members.len();
+        let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to)));
+        pairs
+            .filter(|(from, to)| from != to)
+            .filter_map(|(from, to)| self.network.link_stats(node(from), node(to)).map(|stats| LinkSummary { from, to, stats: *stats }))
+            .collect()
+    }
+
+    fn access_summaries(&self) -> Vec<AccessSummary> {
+        let lines = (0..self.members.len()).flat_map(|peer| [(peer, true), (peer, false)]);
+        lines
+            .filter_map(|(peer, uplink)| {
+                let line = if uplink { AccessLine::Uplink(node(peer)) } else { AccessLine::Downlink(node(peer)) };
+                self.network.access_stats(line).map(|stats| AccessSummary { peer, uplink, stats: *stats })
+            })
+            .collect()
+    }
+}
+
+/// What an observer wants to see.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Watch {
+    pub(crate) ticks: bool,
+    pub(crate) packets: bool,
+}
+
+impl Watch {
+    pub(crate) fn of(observer: &impl Observer) -> Self {
+        Self { ticks: observer.wants_ticks(), packets: observer.wants_packets() }
+    }
+}
+
+impl<const A: usize> Member<A> {
+    fn new(scene: &Scene, plan: &Plan, initial: &[State<A>], disturbance: Option<Disturbance>, place: usize) -> Self {
+        let spec = &scene.peers[place];
+        let peers = scene.peers.len();
+        let (clock, integrator) = (spec.clock, scene.integrator);
+        let displaced =
+            |body| disturbance.map_or(initial[place], |disturbance| disturbance.displace(initial[place], scene.axes.count(), place, body));
+        let device = match plan.devices[place] {
+            DeviceChoice::Resting | DeviceChoice::Unobserved => DeviceModel::Resting(RestingDevice { position: displaced(0).position }),
+            DeviceChoice::Simulated => {
+                DeviceModel::Simulated(SimulatedDevice::new(spec.device, spec.hand.as_ref(), displaced(0), integrator, &clock))
+            }
+        };
+        let copy = CopyConfig { mass: scene.copy_mass(), damping: scene.object.damping };
+        let object = ObjectCopy::new(copy, displaced(1), integrator, &clock);
+        let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(peers));
+        let others = initial.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
+        let config = PeerConfig {
+            session: scene.seed,
+            place: node(place).0,
+            axes: scene.axes.count(),
+            contact: spec.contact,
+            coupling: spec.coupling.scaled(spec.coupling_scaling.coupling_factor(peers)),
+            compute_delay: spec.compute_delay,
+            enclosure: scene.object.enclosure,
+        };
+        let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
+        Self {
+            peer: Peer::new(config, device, object, scene.coordination.strategy.strategy(gains, peers), Held::new(others)),
+            clock,
+            tick: 0,
+            next_send: spec.phase,
+            send_every: u64::try_from(send_every).unwrap_or(u64::MAX),
+            stale_samples: 0,
+        }
+    }
+
+    #[inline]
+    fn is_finite(&self) -> bool {
+        self.peer.object().state().is_finite() && self.peer.device().state().is_finite()
+    }
+}
+
+fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {
+    let config = NetworkConfig { seed: scene.seed, nodes: scene.peers.iter().map(|peer| peer.name.clone()).collect(), general: plan.general_links };
+    let mut network = Network::new(config, |from, to| scene.links.between(from.0 as usize, to.0 as usize).clone());
+    for (place, peer) in scene.peers.iter().enumerate() {
+        let lines = [(AccessLine::Uplink(node(place)), &peer.uplink), (AccessLine::Downlink(node(place)), &peer.downlink)];
+        for (line, config) in lines {
+            if let Some(config) = config {
+                network = network.with_access_line(line, config.clone()).expect("the network has a node for every peer");
+            }
+        }
+    }
+    network
+}
+
+fn node(place: usize) -> NodeId {
+    NodeId(u32::try_from(place).expect("a network has fewer than 2^32 nodes"))
+}
+
+fn state<const A: usize>(position: &[f64; 3], velocity: &[f64; 3]) -> State<A> {
+    State { position: std::array::from_fn(|axis| position[axis]), velocity: std::array::from_fn(|axis| velocity[axis]) }
+}
+
+fn row<const A: usize>(state: &State<A>, axes: usize) -> StateRow<'_> {
+    StateRow { position: &state.position[..axes], velocity: &state.velocity[..axes] }
+}
