@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::excerpt::{Excerpt, escape};
+use crate::tree::shorten;
 
 /// Why there is no [`Scene`](crate::Scene).
 #[derive(Debug, thiserror::Error)]
@@ -138,7 +139,7 @@ impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.origin {
             Origin::File(path) => write!(f, "{}:{}:{}: ", escape(&path.display().to_string()), self.excerpt.line, self.excerpt.column)?,
-            Origin::Override(text) => write!(f, "--set {}: ", escape(text))?,
+            Origin::Override(text) => write!(f, "--set {}: ", escape(&shorten(text)))?,
         }
         if !self.key.is_empty() {
             write!(f, "{}: ", escape(&self.key))?;

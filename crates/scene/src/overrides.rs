@@ -107,7 +107,7 @@ fn put(node: &mut Node, segments: &[Segment<'_>], value: Node, way: &Insertion) 
             Ok(())
         }
         Value::Table(table) => {
-            let list = way.path.is_empty() && matches!(first.name, "peers" | "links");
+            let list = way.path.is_empty() && matches!(first.name, "peers" | "links" | "timeline");
             let make = || {
                 let value = if list { Value::List(Vec::new()) } else { Value::Table(Table::default()) };
                 Node { value, place: first.place, path: next.path.clone() }

@@ -17,7 +17,9 @@ use crate::sections::{
 };
 use crate::source::{BEGINNING, Place, Sources};
 use crate::table_reader::TableReader;
-use crate::tree::{Node, TooDeep};
+use crate::tree::{Node, TooDeep, join};
+
+const TOO_DEEP: &str = "nested too deeply: expected at most 16 levels";
 
 impl Scene {
     /// Reads a scene from a file. `overrides` are texts `KEY=VALUE` that replace values of the file, in this order.
@@ -69,6 +71,7 @@ impl Scene {
 /// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
 fn read_document(document: &Node, context: Context<'_>) -> Option<Scene> {
     let mut root = TableReader::new(document, context, "a table")?;
+    root.know(&["scene", "object", "coordination", "simulation", "peer", "peers", "link", "links", "timeline", "expect"]);
     let header_node = root.get("scene");
     let header = root.required("scene", "a table [scene] with a duration", read_header).unwrap_or_default();
     let Header { title, duration, seed, axes, count } = header;
@@ -77,11 +80,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Scene> {
     let names = count.and_then(|count| read_names(peers_node, count, context));
     let context = Context { names: names.as_ref(), ..context };
     // From here on the readers know axes and names.
-    let object_node = root.get("object");
-    let object = object_node.and_then(|node| read_object(node, context));
-    if object_node.is_none() {
-        root.miss("object", "a table [object] with a mass");
-    }
+    let object = root.required("object", "a table [object] with a mass", |node, _| read_object(node, context));
     let coordination_node = root.get("coordination");
     let coordination = root.required("coordination", "a table [coordination] with a strategy", read_coordination);
     let integrator = root.optional("simulation", cohaptic_peer::Integrator::default(), read_integrator);
@@ -137,29 +136,33 @@ fn parse_toml(text: &str, sources: Sources<'_>) -> Result<Node, SceneError> {
     if let Some(error) = first {
         let span = error.span().unwrap_or(text.len()..text.len());
         let key = key_at(text, &span);
-        return Err(invalid(sources.diagnostic(Place::new(0, span), key, format!("not TOML: {}", error.message()))));
+        return Err(invalid(sources.diagnostic(Place::new(0, span), key, syntax_message(error.message()))));
     }
     Node::document(table.get_ref()).map_err(|TooDeep(place)| {
         let key = key_at(text, &(place.start..place.end));
-        invalid(sources.diagnostic(place, key, "nested too deeply: expected at most 16 levels".to_owned()))
+        invalid(sources.diagnostic(place, key, TOO_DEEP.to_owned()))
     })
+}
+
+/// What the TOML parser says, with what was expected where it leaves that out.
+fn syntax_message(message: &str) -> String {
+    match message {
+        "duplicate key" => "this key or table is there already: expected it once".to_owned(),
+        "recursion limit" => TOO_DEEP.to_owned(),
+        other if other.contains("expected") => format!("not TOML: {other}"),
+        other => format!("not TOML: {other}: expected a key and its value, such as delay = \"8ms\""),
+    }
 }
 
 /// The key in whose line a fault of syntax stands, as far as it can be made out.
 fn key_at(text: &str, span: &Range<usize>) -> String {
-    let is_key = |key: &str| !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.'));
-    let before = text.get(..span.start).unwrap_or(text);
-    let header = before.lines().rev().map(str::trim).find(|line| line.starts_with('['));
-    let table = header.map_or("", |line| line.trim_start_matches('[').split(']').next().unwrap_or("").trim());
-    let line = before.rfind('\n').map_or(0, |newline| newline + 1);
-    let line = text.get(line..).and_then(|rest| rest.lines().next()).unwrap_or("");
-    let key = line.split_once('=').map_or("", |(key, _)| key.trim());
-    match (is_key(table), is_key(key)) {
-        (true, true) => format!("{table}.{key}"),
-        (true, false) => table.to_owned(),
-        (false, true) => key.to_owned(),
-        (false, false) => String::new(),
-    }
+    let is_key = |key: &&str| !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.'));
+    let end = text.get(span.start..).and_then(|rest| rest.find('\n')).map_or(text.len(), |newline| span.start + newline);
+    let mut lines = text.get(..end).unwrap_or(text).lines().rev().map(str::trim).peekable();
+    let key = lines.peek().filter(|line| !line.starts_with('[')).and_then(|line| line.split_once('=')).map(|(key, _)| key.trim());
+    let header = lines.find(|line| line.starts_with('['));
+    let table = header.and_then(|line| line.trim_start_matches('[').split(']').next()).map(str::trim);
+    [table, key].into_iter().flatten().filter(is_key).fold(String::new(), |path, key| join(&path, key))
 }
 
 /// The scenes that a path means: a file means itself, a folder every file below it that ends in `.toml`, in order of their paths.

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::error::{Diagnostic, Origin};
 use crate::excerpt::Excerpt;
+use crate::tree::shorten;
 
 /// A span of bytes in one of the texts. The order is that in which they are read: the file from its beginning, then the overrides.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -40,7 +41,7 @@ impl Sources<'_> {
             Some(text) => (Origin::Override(text.clone()), text.as_str()),
             None => (Origin::File(self.file.to_path_buf()), self.text),
         };
-        Diagnostic { origin, excerpt: Excerpt::new(text, place.start..place.end), key, message, note: None }
+        Diagnostic { origin, excerpt: Excerpt::new(text, place.start..place.end), key: shorten(&key), message, note: None }
     }
 
     /// The place in words, for a note: `two.toml:6:32`.
@@ -48,7 +49,7 @@ impl Sources<'_> {
         let diagnostic = self.diagnostic(place, String::new(), String::new());
         match &diagnostic.origin {
             Origin::File(path) => format!("{}:{}:{}", path.display(), diagnostic.line(), diagnostic.column()),
-            Origin::Override(text) => format!("--set {text}"),
+            Origin::Override(text) => format!("--set {}", shorten(text)),
         }
     }
 }

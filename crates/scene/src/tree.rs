@@ -201,7 +201,7 @@ pub(crate) fn quote(text: &str) -> String {
 
 /// The beginning of a text that is too long for a message.
 pub(crate) fn shorten(text: &str) -> String {
-    const LONGEST: usize = 60;
+    const LONGEST: usize = 80;
     match text.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_owned(),
