@@ -23,7 +23,7 @@
 //! assert_eq!(scene.peers[1].name, "peer2");
 //!
 //! let error = Scene::parse(&text.replace("24ms", "24 parsecs"), Path::new("two.toml"), &[]).unwrap_err();
-//! assert!(error.to_string().starts_with("two.toml:6:32: link.delay: unknown unit \"parsecs\""));
+//! assert!(error.to_string().starts_with("two.toml:6:30: link.delay: unknown unit \"parsecs\""));
 //! # Ok::<(), cohaptic_scene::SceneError>(())
 //! ```
 

@@ -44,7 +44,7 @@ impl Sources<'_> {
         Diagnostic { origin, excerpt: Excerpt::new(text, place.start..place.end), key: shorten(&key), message, note: None }
     }
 
-    /// The place in words, for a note: `two.toml:6:32`.
+    /// The place in words, for a note: `two.toml:6:9`.
     pub(crate) fn describe(&self, place: Place) -> String {
         let diagnostic = self.diagnostic(place, String::new(), String::new());
         match &diagnostic.origin {

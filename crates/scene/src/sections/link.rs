@@ -29,7 +29,9 @@ pub(crate) fn read_link(node: &Node, context: Context<'_>, beside: &[&'static st
             .map_err(|error| {
                 // Of the two keys that do not fit together, the one that was written last is the one to look at.
                 let last = [delay_node, jitter_node].into_iter().flatten().max_by_key(|node| node.place);
-                context.fault_at(last.unwrap_or(node), error.to_string());
+                let error = error.to_string();
+                let message = if error.contains("expected") { error } else { format!("{error}: expected a shorter one") };
+                context.fault_at(last.unwrap_or(node), message);
             })
             .ok()?,
     };

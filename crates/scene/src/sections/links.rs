@@ -11,7 +11,7 @@ use cohaptic_wan::LinkConfig;
 use super::link::{is_empty, read_link};
 use super::selector::read_ends;
 use crate::context::Context;
-use crate::model::LinkTable;
+use crate::model::{LinkChange, LinkTable};
 use crate::source::BEGINNING;
 use crate::table_reader::TableReader;
 use crate::tree::Node;
@@ -121,12 +121,7 @@ impl LinkClasses {
     }
 
     /// Lays keys over those of one link, or of all (`None`), and answers what these links are now. `None` where something was refused.
-    pub(crate) fn change(
-        &mut self,
-        ends: Option<(usize, usize)>,
-        keys: &Node,
-        context: Context<'_>,
-    ) -> Option<Vec<((usize, usize), Arc<LinkConfig>)>> {
+    pub(crate) fn change(&mut self, ends: Option<(usize, usize)>, keys: &Node, context: Context<'_>) -> Option<Vec<LinkChange>> {
         let changed = match ends {
             Some(ends) => vec![ends],
             None => self.pairs(),
@@ -146,7 +141,7 @@ impl LinkClasses {
                 }
             };
             self.set(ends, class);
-            answer.push((ends, Arc::clone(&self.classes[class].config)));
+            answer.push(LinkChange { from: ends.0, to: ends.1, config: Arc::clone(&self.classes[class].config) });
         }
         Some(answer)
     }

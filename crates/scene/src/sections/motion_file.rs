@@ -40,7 +40,7 @@ pub(crate) fn read_motion_file(node: &Node, context: Context<'_>, columns: Colum
         return None;
     }
     let axes = context.axes?.count();
-    let path = context.sources.file.parent().unwrap_or(Path::new("")).join(name);
+    let path = context.sources.file.parent().unwrap_or_else(|| Path::new("")).join(name);
     // The same file with the other columns is another matter, and is refused by its header.
     let key = path.join(columns.header(axes).concat());
     if let Some(known) = context.motion_files.borrow().get(&key) {

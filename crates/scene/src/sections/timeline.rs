@@ -11,7 +11,7 @@ use super::links::LinkClasses;
 use super::peer::read_contact;
 use super::selector::{read_links_between, read_peer_name};
 use crate::context::Context;
-use crate::model::{Change, ChangeKind, LinkChange, LinkSelector, PeerSpec};
+use crate::model::{Change, ChangeKind, LinkSelector, PeerSpec};
 use crate::table_reader::TableReader;
 use crate::tree::Node;
 use crate::values::{self, DAMPING, STIFFNESS};
@@ -54,7 +54,6 @@ pub(crate) fn read_timeline(
             PlannedKind::Links { selector, set } => {
                 let ends = if let LinkSelector::Between { from, to } = selector { Some((from, to)) } else { None };
                 let changed = links.change(ends, set, context)?;
-                let changed = changed.into_iter().map(|((from, to), config)| LinkChange { from, to, config }).collect();
                 changes.push(Change { at, what: ChangeKind::Links(changed) });
             }
             PlannedKind::Peer { peer, contact, hand } => {
