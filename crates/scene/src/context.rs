@@ -10,6 +10,7 @@ use cohaptic_peer::Table as MotionTable;
 use crate::error::{Diagnostic, SceneError};
 use crate::model::Axes;
 use crate::names::Names;
+use crate::sections::Columns;
 use crate::source::{Place, Sources};
 use crate::tree::Node;
 
@@ -31,8 +32,8 @@ impl Faults {
     }
 }
 
-/// What has been learnt from files of motion, by path: each file is read once. `None`: it was refused.
-pub(crate) type MotionFiles = RefCell<BTreeMap<PathBuf, Option<Arc<MotionTable>>>>;
+/// What has been learnt from files of motion: each file is read once. `None`: it was refused.
+pub(crate) type MotionFiles = RefCell<BTreeMap<(PathBuf, Columns), Option<Arc<MotionTable>>>>;
 
 /// Where a reader stands. A reader answers `None` where it has reported a fault.
 #[derive(Clone, Copy, Debug)]

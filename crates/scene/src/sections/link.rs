@@ -8,10 +8,14 @@ use crate::table_reader::TableReader;
 use crate::tree::{Entry, Node, Value, quote};
 use crate::values;
 
+/// What may be said about a link.
+pub(crate) const LINK_KEYS: [&str; 8] = ["delay", "jitter", "order", "loss", "rate", "queue", "overhead", "outage"];
+
 /// Reads the keys of a link. `beside`: keys of the same table that somebody else reads.
 pub(crate) fn read_link(node: &Node, context: Context<'_>, beside: &[&'static str]) -> Option<LinkConfig> {
     let mut table = TableReader::new(node, context, "a table of link keys such as { delay = \"24ms\" }")?;
     table.know(beside);
+    table.know(&LINK_KEYS);
     let delay_node = table.get("delay");
     let delay = table.optional("delay", core::time::Duration::ZERO, values::duration);
     let jitter_node = table.get("jitter");

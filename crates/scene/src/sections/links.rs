@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use cohaptic_wan::LinkConfig;
 
-use super::link::{is_empty, read_link};
+use super::link::{LINK_KEYS, is_empty, read_link};
 use super::selector::read_ends;
 use crate::context::Context;
 use crate::model::{LinkChange, LinkTable};
@@ -91,9 +91,6 @@ fn read_entry(
     }
     Some((ends, class?))
 }
-
-/// The keys of [`read_link`].
-const LINK_KEYS: [&str; 8] = ["delay", "jitter", "order", "loss", "rate", "queue", "overhead", "outage"];
 
 impl LinkClasses {
     /// The table of configurations: equal ones are shared, and stand in order of first use.

@@ -14,7 +14,7 @@ use crate::tree::{Node, quote, shorten};
 use crate::values;
 
 /// What the columns after the time hold.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Columns {
     /// fx, fy, fz [N].
     Force,
@@ -42,7 +42,7 @@ pub(crate) fn read_motion_file(node: &Node, context: Context<'_>, columns: Colum
     let axes = context.axes?.count();
     let path = context.sources.file.parent().unwrap_or_else(|| Path::new("")).join(name);
     // The same file with the other columns is another matter, and is refused by its header.
-    let key = path.join(columns.header(axes).concat());
+    let key = (path.clone(), columns);
     if let Some(known) = context.motion_files.borrow().get(&key) {
         return known.clone();
     }

@@ -3,6 +3,7 @@
 use core::time::Duration;
 
 use cohaptic_peer::{Clock, Contact, DeviceConfig, Direction, Drift, Gains, Hand};
+use cohaptic_units::print::Span;
 use cohaptic_wan::LinkConfig;
 
 use super::hand::read_hand;
@@ -63,13 +64,10 @@ pub(crate) fn read_peer(node: &Node, context: Context<'_>, beside: &[&'static st
     let downlink = table.maybe("downlink", |node, context| read_link(node, context, &[]));
     table.finish();
 
-    if let (Some(tick), Some((update, update_node))) = (tick, update) {
-        let multiple = whole_multiple(update, tick);
-        let (Some(frame), false) = (multiple, context.partial) else {
-            if multiple.is_none() && !context.partial {
-                let message = format!("coordination.update, {update:?}, is not a whole multiple of the tick, {tick:?}: expected one that is");
-                context.fault_at(tick_node.unwrap_or(update_node), message);
-            }
+    if let (Some(tick), Some((update, update_node)), false) = (tick, update, context.partial) {
+        let Some(frame) = whole_multiple(update, tick) else {
+            let message = format!("coordination.update, {}, is not a whole multiple of the tick, {}: expected one that is", Span(update), Span(tick));
+            context.fault_at(tick_node.unwrap_or(update_node), message);
             return None;
         };
         if let (Some(phase), Some(node)) = (phase, phase_node)

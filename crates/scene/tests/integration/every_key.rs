@@ -165,3 +165,8 @@ fn peers_made_by_number_can_be_changed_one_by_one() {
     assert_eq!((scene.peers[2].clock.tick, scene.peers[6].contact, scene.peers[999].contact), (2 * MILLISECOND, Contact::None, Contact::Grasp));
     assert_eq!((scene.links.between(0, 1).delay.mean(), scene.links.between(1, 0).delay.mean()), (9 * MILLISECOND, 5 * MILLISECOND));
 }
+
+#[test]
+fn the_same_text_is_the_same_scene() {
+    assert_eq!(scene(), scene());
+}
