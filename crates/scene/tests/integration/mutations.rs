@@ -165,7 +165,7 @@ fn check(text: &str, overrides: &[String]) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 1_000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn a_scene_that_something_happened_to_is_read_or_refused(edits in prop::collection::vec(edit(), 1..6)) {
