@@ -1,4 +1,48 @@
-//! Scene files.
+//! Scene files: from TOML text to a checked [`Scene`].
+//!
+//! A scene file says who takes part, what they hold, how the copies of the shared object are kept together, and what lies between them on the network.
+//! This crate reads it, fills in every default, and refuses whatever makes no sense: a [`Scene`] that exists can be run. Every refusal is a
+//! [`SceneError`] that names file, line, column and key, shows the line, and says what was expected.
+//!
+//! It does not run a scene, and it does not apply the scaling of gains: what is in a [`Scene`] is what was written. Nothing here is printed.
+//!
+//! Read [`Scene::parse`] first, then [`Scene`].
+//!
+//! ```
+//! use std::path::Path;
+//! use cohaptic_scene::Scene;
+//!
+//! let text = r#"
+//!     scene        = { duration = "7s", count = 2 }
+//!     object       = { mass = 0.3 }
+//!     coordination = { strategy = "average-position", stiffness = 1000.0, update = "8ms" }
+//!     peer         = { device = { mass = 0.1 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+//!     link         = { delay = "24ms" }
+//! "#;
+//! let scene = Scene::parse(text, Path::new("two.toml"), &["peers.peer2.contact=none".to_owned()])?;
+//! assert_eq!(scene.peers[1].name, "peer2");
+//!
+//! let error = Scene::parse(&text.replace("24ms", "24 parsecs"), Path::new("two.toml"), &[]).unwrap_err();
+//! assert!(error.to_string().starts_with("two.toml:6:30: link.delay: unknown unit \"parsecs\""));
+//! # Ok::<(), cohaptic_scene::SceneError>(())
+//! ```
+
+mod context;
+mod error;
+mod excerpt;
 mod model;
+mod names;
+mod overrides;
+mod read;
 mod scaling;
+mod sections;
+mod source;
+mod table_reader;
+#[cfg(test)]
+mod tests;
+mod tree;
+mod values;
+
+pub use error::{Diagnostic, SceneError};
 pub use model::*;
+pub use read::scene_files;

@@ -1,0 +1,197 @@
+//! From files and texts to scenes.
+
+use core::cell::RefCell;
+use core::ops::Range;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use toml::de::DeTable;
+
+use crate::context::{Context, Faults};
+use crate::error::{Diagnostic, SceneError};
+use crate::model::Scene;
+use crate::overrides;
+use crate::sections::{
+    Header, LinkClasses, PeerSources, check_enough, read_coordination, read_expect, read_header, read_integrator, read_links, read_names,
+    read_object, read_peers, read_timeline,
+};
+use crate::source::{BEGINNING, Place, Sources};
+use crate::table_reader::TableReader;
+use crate::tree::{Node, TooDeep, join};
+
+const TOO_DEEP: &str = "nested too deeply: expected at most 16 levels";
+
+impl Scene {
+    /// Reads a scene from a file. `overrides` are texts `KEY=VALUE` that replace values of the file, in this order.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Read`] if the file, or one that it names, cannot be read; [`SceneError::Invalid`] for anything else.
+    pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
+        match core::str::from_utf8(&bytes) {
+            Ok(text) => Self::parse(text, path, overrides),
+            Err(error) => {
+                let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
+                // Up to the place, the text with replacements is the text itself.
+                let sources = Sources { file: path, text: &String::from_utf8_lossy(&bytes), overrides: &[] };
+                Err(invalid(sources.diagnostic(place, String::new(), "not UTF-8: expected a text file in TOML".to_owned())))
+            }
+        }
+    }
+
+    /// Reads a scene from a text. `file` stands in messages, and its folder is where files of hand motion are looked for.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::read`]. Of several faults, the one that stands first in the text; faults in overrides come after those in the text.
+    pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let sources = Sources { file, text, overrides };
+        let mut document = parse_toml(text, sources)?;
+        let faults = Faults::default();
+        let motion_files = RefCell::new(BTreeMap::new());
+        let context = Context { sources, faults: &faults, motion_files: &motion_files, axes: None, names: None, partial: false };
+        overrides::apply(&mut document, overrides, context);
+        let scene = read_document(&document, context);
+        match (faults.into_first(), scene) {
+            (Some(error), _) => Err(error),
+            (None, Some(scene)) => Ok(scene),
+            // Not reached: a reader that answers nothing has reported why. An error all the same, because text must never be able to cause a panic.
+            (None, None) => Err(invalid(sources.diagnostic(BEGINNING, String::new(), "the scene is refused: expected another one".to_owned()))),
+        }
+    }
+
+    /// The place of a peer in [`Scene::peers`], by its name.
+    #[must_use]
+    pub fn peer_index(&self, name: &str) -> Option<usize> {
+        self.peers.iter().position(|peer| peer.name == name)
+    }
+}
+
+/// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
+fn read_document(document: &Node, context: Context<'_>) -> Option<Scene> {
+    let mut root = TableReader::new(document, context, "a table")?;
+    root.know(&["scene", "object", "coordination", "simulation", "peer", "peers", "link", "links", "timeline", "expect"]);
+    let header_node = root.get("scene");
+    let header = root.required("scene", "a table [scene] with a duration", read_header).unwrap_or_default();
+    let Header { title, duration, seed, axes, count } = header;
+    let peers_node = root.get("peers");
+    let context = Context { axes, ..context };
+    let names = count.and_then(|count| read_names(peers_node, count, context));
+    let context = Context { names: names.as_ref(), ..context };
+    // From here on the readers know axes and names.
+    let object = root.required("object", "a table [object] with a mass", |node, _| read_object(node, context));
+    let coordination_node = root.get("coordination");
+    let coordination = root.required("coordination", "a table [coordination] with a strategy", read_coordination);
+    let integrator = root.optional("simulation", cohaptic_peer::Integrator::default(), read_integrator);
+    let defaults = root.get("peer");
+    let update = coordination.as_ref().zip(coordination_node).map(|(coordination, node)| {
+        let written = node.as_table().and_then(|table| table.get("update"));
+        (coordination.update, written.map_or(node, |entry| &*entry.node))
+    });
+    let count_entry = header_node.and_then(Node::as_table).and_then(|table| table.get("count"));
+    let peers = read_peers(PeerSources { defaults, entries: peers_node, count: count_entry, update }, object.as_ref(), context);
+    let (link, links) = (root.get("link"), root.get("links"));
+    let links = read_links(link, links, context);
+    let timeline_node = root.get("timeline");
+    let gains = coordination.as_ref().map(|coordination| coordination.gains);
+    let timeline = read_timeline(timeline_node, duration, links.as_ref(), peers.as_deref(), gains, context);
+    let expect = match root.get("expect") {
+        Some(node) => read_expect(node, duration, peers.as_deref(), context).map(Some),
+        None => Some(None),
+    };
+    root.finish();
+    if let Some(names) = &names {
+        check_enough(names, peers_node, context);
+    }
+    Some(Scene {
+        file: context.sources.file.to_path_buf(),
+        title: title?.unwrap_or_else(|| default_title(context.sources.file)),
+        duration: duration?,
+        seed: seed?,
+        axes: axes?,
+        object: object?,
+        coordination: coordination?,
+        integrator: integrator?,
+        peers: peers?,
+        links: links.as_ref().map(LinkClasses::table)?,
+        timeline: timeline?,
+        expect: expect?,
+    })
+}
+
+/// The name of the file without its ending.
+fn default_title(file: &Path) -> String {
+    file.file_stem().map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned())
+}
+
+fn invalid(diagnostic: Diagnostic) -> SceneError {
+    SceneError::Invalid(Box::new(diagnostic))
+}
+
+/// The document as a tree. Of several faults of syntax, the first.
+fn parse_toml(text: &str, sources: Sources<'_>) -> Result<Node, SceneError> {
+    let (table, errors) = DeTable::parse_recoverable(text);
+    let first = errors.iter().min_by_key(|error| error.span().map_or(usize::MAX, |span| span.start));
+    if let Some(error) = first {
+        let span = error.span().unwrap_or(text.len()..text.len());
+        let key = key_at(text, &span);
+        return Err(invalid(sources.diagnostic(Place::new(0, span), key, syntax_message(error.message()))));
+    }
+    Node::document(table.get_ref()).map_err(|TooDeep(place)| {
+        let key = key_at(text, &(place.start..place.end));
+        invalid(sources.diagnostic(place, key, TOO_DEEP.to_owned()))
+    })
+}
+
+/// What the TOML parser says, with what was expected where it leaves that out.
+fn syntax_message(message: &str) -> String {
+    match message {
+        "duplicate key" => "this key or table is there already: expected it once".to_owned(),
+        "recursion limit" => TOO_DEEP.to_owned(),
+        other if other.contains("expected") => format!("not TOML: {other}"),
+        other => format!("not TOML: {other}: expected a key and its value, such as delay = \"8ms\""),
+    }
+}
+
+/// The key in whose line a fault of syntax stands, as far as it can be made out.
+fn key_at(text: &str, span: &Range<usize>) -> String {
+    let is_key = |key: &&str| !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.'));
+    let end = text.get(span.start..).and_then(|rest| rest.find('\n')).map_or(text.len(), |newline| span.start + newline);
+    let mut lines = text.get(..end).unwrap_or(text).lines().rev().map(str::trim).peekable();
+    let key = lines.peek().filter(|line| !line.starts_with('[')).and_then(|line| line.split_once('=')).map(|(key, _)| key.trim());
+    let header = lines.find(|line| line.starts_with('['));
+    let table = header.and_then(|line| line.trim_start_matches('[').split(']').next()).map(str::trim);
+    [table, key].into_iter().flatten().filter(is_key).fold(String::new(), |path, key| join(&path, key))
+}
+
+/// The scenes that a path means: a file means itself, a folder every file below it that ends in `.toml`, in order of their paths.
+///
+/// Links to folders are not followed.
+///
+/// # Errors
+///
+/// [`SceneError::Read`] if the path or a folder below it cannot be read, [`SceneError::NoScene`] for a folder without a scene.
+pub fn scene_files(path: &Path) -> Result<Vec<PathBuf>, SceneError> {
+    let unreadable = |path: &Path, source| SceneError::Read { path: path.to_path_buf(), source, place: None };
+    let kind = std::fs::metadata(path).map_err(|source| unreadable(path, source))?;
+    if !kind.is_dir() {
+        return Ok(vec![path.to_path_buf()]);
+    }
+    let mut files = Vec::new();
+    let mut folders = vec![path.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).map_err(|source| unreadable(&folder, source))? {
+            let entry = entry.map_err(|source| unreadable(&folder, source))?;
+            let path = entry.path();
+            let kind = entry.file_type().map_err(|source| unreadable(&path, source))?;
+            if kind.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "toml") && path.is_file() {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    if files.is_empty() { Err(SceneError::NoScene { folder: path.to_path_buf() }) } else { Ok(files) }
+}

@@ -1,0 +1,95 @@
+//! `[scene]`, `[coordination]` and `[simulation]`.
+
+use core::time::Duration;
+
+use cohaptic_peer::{Coordination, Gains, Integrator};
+
+use crate::context::Context;
+use crate::model::{Axes, CoordinationSpec, Scaling};
+use crate::table_reader::TableReader;
+use crate::tree::Node;
+use crate::values::{self, DAMPING, STIFFNESS};
+
+/// The most peers a scene may have. The links between them take memory that grows with the square.
+const MOST_PEERS: u64 = 4096;
+
+/// `[scene]`. A field is `None` where it was refused.
+#[derive(Debug, Default)]
+pub(crate) struct Header {
+    /// `Some(None)`: not given.
+    pub(crate) title: Option<Option<String>>,
+    pub(crate) duration: Option<Duration>,
+    pub(crate) seed: Option<u64>,
+    pub(crate) axes: Option<Axes>,
+    /// `Some(None)`: not given.
+    pub(crate) count: Option<Option<u64>>,
+}
+
+pub(crate) fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
+    let mut table = TableReader::new(node, context, "a table such as [scene]")?;
+    let title = table.maybe("title", |node, context| values::text(node, context, "a text").map(str::to_owned));
+    let duration = table.required("duration", "a duration above zero such as \"7s\"", values::positive_duration);
+    let seed = table
+        .optional("seed", 0, |node, context| values::integer(node, context, 0..=i64::MAX.unsigned_abs(), "an integer from 0 to 9223372036854775807"));
+    let axes = table.optional("axes", Axes::One, read_axes);
+    let count = table.maybe("count", |node, context| {
+        values::integer(node, context, 2..=MOST_PEERS, &format!("a number of peers, an integer from 2 to {MOST_PEERS}"))
+    });
+    table.finish();
+    Some(Header { title, duration, seed, axes, count })
+}
+
+fn read_axes(node: &Node, context: Context<'_>) -> Option<Axes> {
+    match values::integer(node, context, 1..=3, "a number of axes: 1, 2 or 3")? {
+        1 => Some(Axes::One),
+        2 => Some(Axes::Two),
+        _ => Some(Axes::Three),
+    }
+}
+
+/// `[coordination]`.
+pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<CoordinationSpec> {
+    let mut table = TableReader::new(node, context, "a table such as [coordination]")?;
+    let strategies = Coordination::ALL.map(|strategy| (strategy.name(), strategy));
+    let names = strategies.map(|(name, _)| name).join(", ");
+    let strategy = table.required("strategy", &format!("one of {names}"), |node, context| values::choice(node, context, &strategies));
+    let scaling = table.optional("scaling", Scaling::None, read_scaling);
+    let stiffness = table.required("stiffness", &STIFFNESS.expected(), |node, context| STIFFNESS.read(node, context));
+    let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
+    let update = table.required("update", "a duration above zero such as \"8ms\"", values::positive_duration);
+    table.finish();
+    Some(CoordinationSpec { strategy: strategy?, scaling: scaling?, gains: Gains { stiffness: stiffness?, damping: damping? }, update: update? })
+}
+
+/// How gains follow the number of peers.
+pub(crate) fn read_scaling(node: &Node, context: Context<'_>) -> Option<Scaling> {
+    values::choice(node, context, &[("none", Scaling::None), ("inverse-n", Scaling::InverseN)])
+}
+
+/// `[simulation]`.
+pub(crate) fn read_integrator(node: &Node, context: Context<'_>) -> Option<Integrator> {
+    let mut table = TableReader::new(node, context, "a table such as [simulation]")?;
+    let names = [("exact", Method::Exact), ("semi-implicit-euler", Method::SemiImplicitEuler), ("rk4", Method::RungeKutta4)];
+    let method = table.optional("integrator", Method::Exact, |node, context| values::choice(node, context, &names));
+    let substeps = table.maybe("substeps", |node, context| {
+        if method == Some(Method::Exact) {
+            context.fault_at(node, "the integrator \"exact\" takes no substeps: expected no such key, or \"semi-implicit-euler\" or \"rk4\"");
+            return None;
+        }
+        values::integer(node, context, 1..=u64::from(u32::MAX), "a number of steps a tick, an integer from 1 to 4294967295")
+    });
+    table.finish();
+    let steps = u32::try_from(substeps?.unwrap_or(1)).ok()?;
+    Some(match method? {
+        Method::Exact => Integrator::Exact,
+        Method::SemiImplicitEuler => Integrator::SemiImplicitEuler { steps },
+        Method::RungeKutta4 => Integrator::RungeKutta4 { steps },
+    })
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Method {
+    Exact,
+    SemiImplicitEuler,
+    RungeKutta4,
+}

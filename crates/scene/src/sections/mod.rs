@@ -1,0 +1,21 @@
+//! The parts of a scene file, each read by a function of its own.
+
+mod expect;
+mod hand;
+mod header;
+mod link;
+mod links;
+mod motion_file;
+mod object;
+mod peer;
+mod peers;
+mod selector;
+mod timeline;
+
+pub(crate) use expect::read_expect;
+pub(crate) use header::{Header, read_coordination, read_header, read_integrator};
+pub(crate) use links::{LinkClasses, read_links};
+pub(crate) use motion_file::Columns;
+pub(crate) use object::read_object;
+pub(crate) use peers::{PeerSources, check_enough, read_names, read_peers};
+pub(crate) use timeline::read_timeline;

@@ -1,0 +1,251 @@
+//! Files of recorded motion or force: rows of comma-separated numbers, the time first.
+
+use core::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+use cohaptic_peer::{Table as MotionTable, TableError};
+use cohaptic_units::{Instant, parse};
+
+use crate::context::Context;
+use crate::error::{Diagnostic, Origin};
+use crate::excerpt::Excerpt;
+use crate::tree::{Node, quote, shorten};
+use crate::values;
+
+/// What the columns after the time hold.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(crate) enum Columns {
+    /// fx, fy, fz [N].
+    Force,
+    /// x, y, z [m].
+    Position,
+}
+
+impl Columns {
+    fn header(self, axes: usize) -> Vec<&'static str> {
+        let names = match self {
+            Self::Force => ["t", "fx", "fy", "fz"],
+            Self::Position => ["t", "x", "y", "z"],
+        };
+        names.into_iter().take(1 + axes).collect()
+    }
+}
+
+/// Reads the file that `node` names, relative to the folder of the scene.
+pub(crate) fn read_motion_file(node: &Node, context: Context<'_>, columns: Columns) -> Option<Arc<MotionTable>> {
+    let name = values::text(node, context, "the name of a CSV file, relative to the folder of the scene")?;
+    if name.is_empty() {
+        context.fault_at(node, "the name is empty: expected the name of a CSV file, relative to the folder of the scene");
+        return None;
+    }
+    let axes = context.axes?.count();
+    let path = context.sources.file.parent().unwrap_or_else(|| Path::new("")).join(name);
+    // The same file with the other columns is another matter, and is refused by its header.
+    let key = (path.clone(), columns);
+    if let Some(known) = context.motion_files.borrow().get(&key) {
+        return known.clone();
+    }
+    let table = load(node, context, &path, &columns.header(axes));
+    context.motion_files.borrow_mut().insert(key, table.clone());
+    table
+}
+
+fn load(node: &Node, context: Context<'_>, path: &Path, header: &[&str]) -> Option<Arc<MotionTable>> {
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) => {
+            context.unreadable(node, path.to_path_buf(), error);
+            return None;
+        }
+    };
+    let refused = |text: &str, Fault { span, message }: Fault| {
+        let origin = Origin::File(path.to_path_buf());
+        let diagnostic = Diagnostic { origin, excerpt: Excerpt::new(text, span), key: node.path.clone(), message, note: None };
+        context.fault_in_file(node, diagnostic);
+    };
+    let parsed = match core::str::from_utf8(&bytes) {
+        Ok(text) => parse_rows(text, header).map_err(|fault| refused(text, fault)),
+        Err(error) => {
+            let at = error.valid_up_to();
+            let fault = Fault { span: at..at + 1, message: "not UTF-8: expected a CSV file".to_owned() };
+            // Before the place, the text with replacements is the text itself.
+            refused(&String::from_utf8_lossy(&bytes), fault);
+            Err(())
+        }
+    };
+    parsed.ok().map(Arc::new)
+}
+
+/// What is wrong, and where in the text.
+#[derive(Debug)]
+struct Fault {
+    span: Range<usize>,
+    message: String,
+}
+
+fn parse_rows(text: &str, header: &[&str]) -> Result<MotionTable, Fault> {
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(text.as_bytes());
+    let mut lines: Vec<Range<usize>> = Vec::new();
+    let mut rows = Vec::new();
+    let columns = header.join(",");
+    for record in reader.records() {
+        let from = lines.last().map_or(0, |line| line.end);
+        let record = record.map_err(|error| Fault { span: from..from, message: format!("{error}: expected the columns {columns}") })?;
+        let at = record.position().and_then(|position| usize::try_from(position.byte()).ok()).unwrap_or(from);
+        let line = line_at(text, at);
+        if lines.is_empty() {
+            if record.iter().ne(header.iter().copied()) {
+                return Err(Fault { span: line.clone(), message: format!("the header is {}: expected {columns}", quote(text[line].trim())) });
+            }
+        } else {
+            if record.len() != header.len() {
+                let message = format!("{} columns: expected {}, {columns}", record.len(), header.len());
+                return Err(Fault { span: line, message });
+            }
+            let fault =
+                |column: usize, message| Fault { span: field_at(text, &line, column), message: format!("column {}: {message}", header[column]) };
+            let time = seconds(&record[0]).map_err(|message| fault(0, message))?;
+            let mut values = [0.0; 3];
+            for (column, value) in values.iter_mut().enumerate().take(header.len() - 1) {
+                *value = finite(&record[column + 1]).map_err(|message| fault(column + 1, message))?;
+            }
+            rows.push((time, values));
+        }
+        lines.push(line);
+    }
+    if lines.is_empty() {
+        return Err(Fault { span: 0..0, message: format!("the file is empty: expected a header, {columns}, and rows") });
+    }
+    MotionTable::new(rows).map_err(|error| table_fault(text, &lines, &error))
+}
+
+fn table_fault(text: &str, lines: &[Range<usize>], error: &TableError) -> Fault {
+    // The header is the first line.
+    let at = |row: usize| lines.get(row + 1).map_or(0..0, |line| field_at(text, line, 0));
+    match error {
+        TableError::NotLater { row, at: time, before } => {
+            let message = format!("column t: {time} is not later than the row before it, at {before}: expected times that increase from row to row");
+            Fault { span: at(*row), message }
+        }
+        TableError::NotFinite { row, .. } => Fault { span: at(*row), message: format!("{error}: expected a number") },
+        TableError::Empty => {
+            Fault { span: lines.first().cloned().unwrap_or(0..0), message: "no row after the header: expected at least one".to_owned() }
+        }
+        _ => Fault { span: 0..0, message: error.to_string() },
+    }
+}
+
+/// The line in which the record begins that is announced at that byte; empty lines before it belong to the announcement.
+fn line_at(text: &str, at: usize) -> Range<usize> {
+    let bytes = text.as_bytes();
+    let mut start = at.min(bytes.len());
+    while bytes.get(start).is_some_and(|byte| matches!(byte, b'\r' | b'\n')) {
+        start += 1;
+    }
+    let end = bytes[start..].iter().position(|byte| matches!(byte, b'\r' | b'\n')).map_or(bytes.len(), |length| start + length);
+    start..end
+}
+
+/// The field after that many commas of a line, without the space around it.
+fn field_at(text: &str, line: &Range<usize>, column: usize) -> Range<usize> {
+    let mut start = line.start;
+    let Some(content) = text.get(line.clone()) else { return line.clone() };
+    for (index, field) in content.split(',').enumerate() {
+        if index == column {
+            let trimmed = field.trim_start();
+            let start = start + field.len() - trimmed.len();
+            return start..start + trimmed.trim_end().len();
+        }
+        start += field.len() + 1;
+    }
+    line.clone()
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(_) => Err(format!("{} is not finite: expected a number", quote(text))),
+        Err(_) => Err(format!("{} is not a number: expected one such as 1.5 or -2e-3", quote(text))),
+    }
+}
+
+/// Seconds as an instant: read exactly as a decimal, also with an exponent, and rounded once.
+fn seconds(text: &str) -> Result<Instant, String> {
+    const EXPECTED: &str = "expected a time in seconds such as 0.25";
+    let value = finite(text)?;
+    if value < 0.0 {
+        return Err(format!("{} is negative: {EXPECTED}", shorten(text)));
+    }
+    let plain = without_exponent(text.trim_start_matches(['+', '-'])).ok_or_else(|| format!("{} is out of range: {EXPECTED}", shorten(text)))?;
+    let span = parse::duration(&format!("{plain}s")).map_err(|_| format!("{} is out of range: {EXPECTED}", shorten(text)))?;
+    Instant::ZERO.checked_add(span).ok_or_else(|| format!("{} is out of range: {EXPECTED}", shorten(text)))
+}
+
+/// Moves the decimal point to where the exponent says: `1.25e-1` is `0.125`. `None` beyond what any time in seconds needs.
+fn without_exponent(text: &str) -> Option<String> {
+    let Some((mantissa, exponent)) = text.split_once(['e', 'E']) else { return Some(text.to_owned()) };
+    let exponent: i64 = exponent.parse().ok().filter(|exponent| (-400..=400).contains(exponent))?;
+    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let shift = usize::try_from(exponent.unsigned_abs()).ok()?;
+    Some(if exponent >= 0 {
+        let (moved, rest) = fraction.split_at(shift.min(fraction.len()));
+        format!("{whole}{moved}{}.{rest}", "0".repeat(shift - moved.len()))
+    } else {
+        let (rest, moved) = whole.split_at(whole.len().saturating_sub(shift));
+        format!("0{rest}.{}{moved}{fraction}", "0".repeat(shift - moved.len()))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nanos(text: &str) -> Option<u64> {
+        seconds(text).ok().map(Instant::as_nanos)
+    }
+
+    #[test]
+    fn times_are_rounded_once_also_with_an_exponent() {
+        assert_eq!(nanos("0.001"), Some(1_000_000));
+        assert_eq!(nanos("1.000000000000000000e-03"), Some(1_000_000));
+        assert_eq!(nanos("1.25E1"), Some(12_500_000_000));
+        assert_eq!(nanos("12345e-4"), Some(1_234_500_000));
+        assert_eq!(nanos("0.0000000005"), Some(1));
+        assert_eq!(nanos("-0.0"), Some(0));
+        assert_eq!(nanos("+1"), Some(1_000_000_000));
+        assert_eq!(nanos(".5"), Some(500_000_000));
+    }
+
+    #[test]
+    fn what_is_no_time_is_refused() {
+        for text in ["", "nan", "inf", "-1", "-1e-9", "1e300", "1e999", "1s", "e5", "1e", "--1", "+-1", "0x10"] {
+            assert_eq!(nanos(text), None, "{text}");
+        }
+    }
+
+    fn fault(text: &str) -> (usize, usize, String) {
+        let Fault { span, message } = parse_rows(text, &["t", "fx"]).unwrap_err();
+        let excerpt = Excerpt::new(text, span);
+        (excerpt.line, excerpt.column, message)
+    }
+
+    #[test]
+    fn a_fault_in_a_row_is_found_in_its_column() {
+        assert_eq!(fault("t,fx\n0,1\n\n0.1, x\n"), (4, 6, "column fx: \"x\" is not a number: expected one such as 1.5 or -2e-3".to_owned()));
+        assert_eq!(fault("t,fx\r\n0,1\r\n0.1,nan\r\n"), (3, 5, "column fx: \"nan\" is not finite: expected a number".to_owned()));
+        assert_eq!(fault("t,fx\n-1,1\n").0, 2);
+        assert_eq!(fault("t,fx\n0,1,2\n"), (2, 1, "3 columns: expected 2, t,fx".to_owned()));
+        assert_eq!(fault("t,fy\n0,1\n"), (1, 1, "the header is \"t,fy\": expected t,fx".to_owned()));
+        assert_eq!(fault("t,fx\n"), (1, 1, "no row after the header: expected at least one".to_owned()));
+        assert_eq!(fault("").2, "the file is empty: expected a header, t,fx, and rows");
+        let (line, column, message) = fault("t,fx\n0,1\n1,1\n1,1\n");
+        assert_eq!((line, column), (4, 1));
+        assert!(message.starts_with("column t: 1s is not later than the row before it, at 1s"));
+    }
+
+    #[test]
+    fn space_around_fields_and_a_byte_order_mark_are_no_fault() {
+        assert!(parse_rows("\u{feff}t, fx\n 0 , 1\n", &["t", "fx"]).is_ok());
+    }
+}

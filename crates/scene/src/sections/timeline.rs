@@ -1,0 +1,168 @@
+//! `[[timeline]]`: what changes while the scene runs.
+
+use core::time::Duration;
+
+use cohaptic_peer::{Contact, Gains, Hand};
+use cohaptic_units::Instant;
+
+use super::hand::{only_one, read_hand};
+use super::link::{is_empty, read_link};
+use super::links::LinkClasses;
+use super::peer::read_contact;
+use super::selector::{read_links_between, read_peer_name};
+use crate::context::Context;
+use crate::model::{Change, ChangeKind, LinkSelector, PeerSpec};
+use crate::table_reader::TableReader;
+use crate::tree::Node;
+use crate::values::{self, DAMPING, STIFFNESS};
+
+/// An entry, before it is known what stands before it in time.
+#[derive(Debug)]
+struct Planned<'a> {
+    at: Instant,
+    what: PlannedKind<'a>,
+}
+
+#[derive(Debug)]
+enum PlannedKind<'a> {
+    Links { selector: LinkSelector, set: &'a Node },
+    Peer { peer: usize, contact: Option<(Contact, &'a Node)>, hand: Option<(Option<Hand>, &'a Node)> },
+    Coordination { stiffness: Option<f64>, damping: Option<f64> },
+}
+
+/// Reads the changes and puts them in order of time. The arguments say how things stand at the beginning; each is `None` if it was refused.
+pub(crate) fn read_timeline(
+    node: Option<&Node>,
+    duration: Option<Duration>,
+    links: Option<&LinkClasses>,
+    peers: Option<&[PeerSpec]>,
+    gains: Option<Gains>,
+    context: Context<'_>,
+) -> Option<Vec<Change>> {
+    let Some(node) = node else { return Some(Vec::new()) };
+    let entries = values::list(node, context, "entries [[timeline]]")?;
+    let planned: Vec<_> = entries.iter().map(|entry| read_entry(entry, duration, context)).collect();
+    let mut planned: Vec<Planned<'_>> = planned.into_iter().collect::<Option<_>>()?;
+    // Stable: equal instants stay in the order of the file.
+    planned.sort_by_key(|entry| entry.at);
+
+    let (mut links, mut gains) = (links?.clone(), gains?);
+    let mut changes = Vec::with_capacity(planned.len());
+    let mut complete = true;
+    for Planned { at, what } in planned {
+        match what {
+            PlannedKind::Links { selector, set } => {
+                let ends = if let LinkSelector::Between { from, to } = selector { Some((from, to)) } else { None };
+                let changed = links.change(ends, set, context)?;
+                changes.push(Change { at, what: ChangeKind::Links(changed) });
+            }
+            PlannedKind::Peer { peer, contact, hand } => {
+                let spec = peers?.get(peer)?;
+                complete &= contact.is_none_or(|(contact, node)| contact_is_possible(spec, contact, node, context));
+                complete &= hand.as_ref().is_none_or(|(hand, node)| hand_is_possible(spec, hand.as_ref(), node, context));
+                changes.extend(contact.map(|(contact, _)| Change { at, what: ChangeKind::Contact { peer, contact } }));
+                changes.extend(hand.map(|(hand, _)| Change { at, what: ChangeKind::Hand { peer, hand } }));
+            }
+            PlannedKind::Coordination { stiffness, damping } => {
+                gains = Gains { stiffness: stiffness.unwrap_or(gains.stiffness), damping: damping.unwrap_or(gains.damping) };
+                changes.push(Change { at, what: ChangeKind::Coordination(gains) });
+            }
+        }
+    }
+    complete.then_some(changes)
+}
+
+fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: Context<'a>) -> Option<Planned<'a>> {
+    const TARGETS: &str = "link, peer or coordination";
+    let mut table = TableReader::new(node, context, "a table with at, set and one of link and peer, or with at and coordination")?;
+    let at = table.required("at", "a time such as \"3s\"", |node, context| {
+        let at = values::instant(node, context)?;
+        let last = Instant::ZERO.saturating_add(duration?);
+        if at > last {
+            context.fault_at(node, format!("{at} is after the end of the scene: expected at most scene.duration, {last}"));
+            return None;
+        }
+        Some(at)
+    });
+    let (link, peer, coordination) = (table.entry("link"), table.entry("peer"), table.entry("coordination"));
+    let set = table.entry("set");
+    if set.is_none() && coordination.is_none() {
+        table.miss("set", "a table of the keys that change");
+    }
+    table.finish();
+    let target = only_one(node, context, &[link, peer, coordination], TARGETS)?;
+    if target.name == "coordination" {
+        if let Some(set) = set {
+            context.fault(set.key, &set.node.path, "coordination holds its own keys: expected no key set beside it");
+            return None;
+        }
+        let what = read_gains(&target.node, context);
+        return Some(Planned { at: at?, what: what? });
+    }
+    let what = if target.name == "link" {
+        let selector = read_links_between(&target.node, context);
+        let set = &*set?.node;
+        // On its own, so that a fault is found even where it is not known which links are meant.
+        read_link(set, Context { partial: true, ..context }, &[]);
+        if is_empty(set) {
+            context.fault_at(set, "nothing changes: expected keys of a link");
+            return None;
+        }
+        PlannedKind::Links { selector: selector?, set }
+    } else {
+        let peer = read_peer_name(&target.node, context);
+        let (contact, hand) = read_peer_changes(&set?.node, context)?;
+        PlannedKind::Peer { peer: peer?, contact, hand }
+    };
+    Some(Planned { at: at?, what })
+}
+
+fn read_gains<'a>(node: &'a Node, context: Context<'a>) -> Option<PlannedKind<'a>> {
+    let mut table = TableReader::new(node, context, "a table such as { stiffness = 1000.0, damping = 5.0 }")?;
+    let stiffness = table.maybe("stiffness", |node, context| STIFFNESS.read(node, context));
+    let damping = table.maybe("damping", |node, context| DAMPING.read(node, context));
+    table.finish();
+    if is_empty(node) {
+        context.fault_at(node, "nothing changes: expected stiffness, damping or both");
+        return None;
+    }
+    Some(PlannedKind::Coordination { stiffness: stiffness?, damping: damping? })
+}
+
+#[expect(clippy::type_complexity, reason = "used once, above")]
+fn read_peer_changes<'a>(node: &'a Node, context: Context<'a>) -> Option<(Option<(Contact, &'a Node)>, Option<(Option<Hand>, &'a Node)>)> {
+    let mut table = TableReader::new(node, context, "a table with contact, hand or both")?;
+    let contact = table.maybe("contact", |node, context| read_contact(node, context).map(|contact| (contact, node)));
+    let hand = table.maybe("hand", |node, context| read_hand(node, context).map(|hand| (hand, node)));
+    table.finish();
+    if is_empty(node) {
+        context.fault_at(node, "nothing changes: expected contact, hand or both");
+        return None;
+    }
+    Some((contact?, hand?))
+}
+
+/// A peer without a coupling cannot begin to touch: it would do so without force.
+fn contact_is_possible(peer: &PeerSpec, contact: Contact, node: &Node, context: Context<'_>) -> bool {
+    let touches = contact != Contact::None;
+    let coupled = peer.contact != Contact::None || peer.coupling.stiffness > 0.0 || peer.coupling.damping > 0.0;
+    if touches && !coupled {
+        context.fault_at(node, format!("peer \"{}\" has no coupling to touch with: expected \"none\", or a key coupling of this peer", peer.name));
+    }
+    !touches || coupled
+}
+
+/// An arm adds its mass to the device: it cannot appear, vanish or change while the scene runs.
+fn hand_is_possible(peer: &PeerSpec, hand: Option<&Hand>, node: &Node, context: Context<'_>) -> bool {
+    let arm = |hand: Option<&Hand>| match hand {
+        Some(Hand::Arm { arm, .. }) => Some(*arm),
+        Some(Hand::Force(_)) | None => None,
+    };
+    let same = arm(peer.hand.as_ref()) == arm(hand);
+    if !same {
+        let expected = if arm(peer.hand.as_ref()).is_some() { "a hand with the same arm" } else { "a hand without an arm" };
+        let message = format!("an arm cannot appear, vanish or change while the scene runs: expected {expected} for peer \"{}\"", peer.name);
+        context.fault_at(node, message);
+    }
+    same
+}

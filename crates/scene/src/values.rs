@@ -1,0 +1,295 @@
+//! Readers of single values. Each answers `None` after it has reported what is wrong.
+
+use core::time::Duration;
+
+use cohaptic_units::{Bytes, Instant, ParseError, Probability, Rate, parse};
+
+use crate::context::Context;
+use crate::names::one_of;
+use crate::tree::{Node, Value, quote, shorten};
+
+/// What a number of the scene means: its range and its unit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Quantity {
+    range: Range,
+    unit: &'static str,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Range {
+    Any,
+    NotNegative,
+    Positive,
+}
+
+/// Above zero [kg].
+pub(crate) const MASS: Quantity = Quantity { range: Range::Positive, unit: "kg" };
+/// At least zero [kg].
+pub(crate) const ADDED_MASS: Quantity = Quantity { range: Range::NotNegative, unit: "kg" };
+/// At least zero [N·s/m].
+pub(crate) const DAMPING: Quantity = Quantity { range: Range::NotNegative, unit: "N·s/m" };
+/// At least zero [N/m].
+pub(crate) const STIFFNESS: Quantity = Quantity { range: Range::NotNegative, unit: "N/m" };
+/// Above zero [N/m].
+pub(crate) const WALL_STIFFNESS: Quantity = Quantity { range: Range::Positive, unit: "N/m" };
+/// Any [m].
+pub(crate) const POSITION: Quantity = Quantity { range: Range::Any, unit: "m" };
+/// Above zero [m].
+pub(crate) const DISTANCE: Quantity = Quantity { range: Range::Positive, unit: "m" };
+/// Any [m/s].
+pub(crate) const VELOCITY: Quantity = Quantity { range: Range::Any, unit: "m/s" };
+/// Any [N].
+pub(crate) const FORCE: Quantity = Quantity { range: Range::Any, unit: "N" };
+/// At least zero [Hz].
+pub(crate) const FREQUENCY: Quantity = Quantity { range: Range::NotNegative, unit: "Hz" };
+/// Any [rad].
+pub(crate) const ANGLE: Quantity = Quantity { range: Range::Any, unit: "rad" };
+
+impl Quantity {
+    /// In words: `a number above zero [kg]`.
+    pub(crate) fn expected(self) -> String {
+        let range = match self.range {
+            Range::Any => "a number",
+            Range::NotNegative => "a number of at least zero",
+            Range::Positive => "a number above zero",
+        };
+        format!("{range} [{}]", self.unit)
+    }
+
+    /// Reads a number in that range.
+    pub(crate) fn read(self, node: &Node, context: Context<'_>) -> Option<f64> {
+        let value = number(node, context, &self.expected())?;
+        let within = match self.range {
+            Range::Any => true,
+            Range::NotNegative => value >= 0.0,
+            Range::Positive => value > 0.0,
+        };
+        if !within {
+            context.fault_at(node, format!("{} is out of range: expected {}", written(node), self.expected()));
+            return None;
+        }
+        // A negative zero becomes an ordinary one.
+        Some(value + 0.0)
+    }
+
+    /// Reads one number for each axis. A plain number stands for a list of one or, where `spread` allows it, for the same number on every axis.
+    pub(crate) fn read_vector(self, node: &Node, context: Context<'_>, spread: Spread) -> Option<[f64; 3]> {
+        let count = context.axes.map(crate::Axes::count);
+        let mut vector = [0.0; 3];
+        if let Value::List(elements) = &node.value {
+            if elements.len() > 3 || elements.is_empty() || count.is_some_and(|count| count != elements.len()) {
+                let expected = count.map_or_else(|| "1, 2 or 3".to_owned(), |count| count.to_string());
+                let message = format!("found a list of {} numbers: expected as many as the scene has axes, {expected}", elements.len());
+                context.fault_at(node, message);
+                return None;
+            }
+            let numbers: Vec<Option<f64>> = elements.iter().map(|element| self.read(element, context)).collect();
+            for (component, number) in vector.iter_mut().zip(numbers) {
+                *component = number?;
+            }
+            return Some(vector);
+        }
+        let value = self.read(node, context)?;
+        match (count, spread) {
+            (Some(2..), Spread::Refused) => {
+                let axes = count.unwrap_or(1);
+                context.fault_at(node, format!("{} has one component: expected a list of {axes} numbers [{}]", written(node), self.unit));
+                None
+            }
+            (_, Spread::Refused) => Some([value, 0.0, 0.0]),
+            (_, Spread::EveryAxis) => {
+                vector[..count.unwrap_or(1).min(3)].fill(value);
+                Some(vector)
+            }
+        }
+    }
+}
+
+/// What a plain number means where there is more than one axis.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Spread {
+    /// Nothing: a list must be written.
+    Refused,
+    /// The same number on every axis.
+    EveryAxis,
+}
+
+/// A finite number.
+pub(crate) fn number(node: &Node, context: Context<'_>, expected: &str) -> Option<f64> {
+    let value = match &node.value {
+        Value::Integer(integer) => {
+            let exact = integer.and_then(exact_f64);
+            if exact.is_none() {
+                context.fault_at(node, format!("{} has no exact 64-bit floating-point value: expected {expected}", node.describe()));
+            }
+            exact?
+        }
+        // The text of a TOML float is one that Rust reads; what is not becomes a NaN, which is refused.
+        Value::Float(text) => text.parse().unwrap_or(f64::NAN),
+        Value::Text(_) | Value::Boolean(_) | Value::Date | Value::List(_) | Value::Table(_) => {
+            context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
+            return None;
+        }
+    };
+    if !value.is_finite() {
+        context.fault_at(node, format!("{} is not finite: expected {expected}", written(node)));
+        return None;
+    }
+    Some(value)
+}
+
+/// The number as a double, if it is one exactly.
+fn exact_f64(integer: i128) -> Option<f64> {
+    let decimal = integer.to_string();
+    let value: f64 = decimal.parse().ok()?;
+    (format!("{value:.0}") == decimal).then_some(value)
+}
+
+/// A number as it is written.
+fn written(node: &Node) -> String {
+    match &node.value {
+        Value::Integer(Some(integer)) => integer.to_string(),
+        Value::Float(text) => shorten(text),
+        Value::Integer(None) | Value::Text(_) | Value::Boolean(_) | Value::Date | Value::List(_) | Value::Table(_) => node.describe(),
+    }
+}
+
+/// An integer in a range, both ends included.
+pub(crate) fn integer(node: &Node, context: Context<'_>, range: core::ops::RangeInclusive<u64>, expected: &str) -> Option<u64> {
+    let Value::Integer(integer) = &node.value else {
+        context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
+        return None;
+    };
+    let value = integer.and_then(|integer| u64::try_from(integer).ok()).filter(|value| range.contains(value));
+    if value.is_none() {
+        context.fault_at(node, format!("{} is out of range: expected {expected}", written(node)));
+    }
+    value
+}
+
+/// `true` or `false`.
+pub(crate) fn boolean(node: &Node, context: Context<'_>) -> Option<bool> {
+    let Value::Boolean(value) = node.value else {
+        context.fault_at(node, format!("found {}: expected true or false", node.describe()));
+        return None;
+    };
+    Some(value)
+}
+
+/// A text.
+pub(crate) fn text<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<&'a str> {
+    let text = node.as_text();
+    if text.is_none() {
+        context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
+    }
+    text
+}
+
+/// One of a few words.
+pub(crate) fn choice<T: Copy>(node: &Node, context: Context<'_>, choices: &[(&str, T)]) -> Option<T> {
+    let words = || choices.iter().map(|(word, _)| *word);
+    let given = text(node, context, &one_of(words(), ""))?;
+    let chosen = choices.iter().find(|(word, _)| *word == given).map(|(_, value)| *value);
+    if chosen.is_none() {
+        context.fault_at(node, format!("unknown name {}: expected {}", quote(given), one_of(words(), given)));
+    }
+    chosen
+}
+
+/// A list, as its elements.
+pub(crate) fn list<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<Vec<&'a Node>> {
+    let Value::List(elements) = &node.value else {
+        context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
+        return None;
+    };
+    Some(elements.iter().map(|element| &**element).collect())
+}
+
+/// A duration such as "8ms".
+pub(crate) fn duration(node: &Node, context: Context<'_>) -> Option<Duration> {
+    quantity(node, context, parse::duration)
+}
+
+/// A duration above zero.
+pub(crate) fn positive_duration(node: &Node, context: Context<'_>) -> Option<Duration> {
+    let value = duration(node, context)?;
+    if value.is_zero() {
+        context.fault_at(node, "zero is out of range: expected a duration above zero such as \"8ms\"");
+        return None;
+    }
+    Some(value)
+}
+
+/// An instant, as the time since the scene began.
+pub(crate) fn instant(node: &Node, context: Context<'_>) -> Option<Instant> {
+    let since_beginning = duration(node, context)?;
+    let instant = Instant::ZERO.checked_add(since_beginning);
+    if instant.is_none() {
+        context.fault_at(node, "beyond 584 years: expected a duration such as \"8ms\"");
+    }
+    instant
+}
+
+/// A rate such as "10Mbit".
+pub(crate) fn rate(node: &Node, context: Context<'_>) -> Option<Rate> {
+    quantity(node, context, parse::rate)
+}
+
+/// A size such as "1500B".
+pub(crate) fn size(node: &Node, context: Context<'_>) -> Option<Bytes> {
+    quantity(node, context, parse::size)
+}
+
+/// A probability: a number from 0 to 1, or a text such as "1.5%".
+pub(crate) fn probability(node: &Node, context: Context<'_>) -> Option<Probability> {
+    const EXPECTED: &str = "a probability: a number from 0 to 1 or a text such as \"1.5%\"";
+    if node.as_text().is_some() {
+        return quantity(node, context, parse::probability);
+    }
+    let value = number(node, context, EXPECTED)? + 0.0;
+    let probability = Probability::new(value).ok();
+    if probability.is_none() {
+        context.fault_at(node, format!("{} is out of range: expected {EXPECTED}", written(node)));
+    }
+    probability
+}
+
+/// A text that one of the parsers of `cohaptic-units` reads.
+fn quantity<T>(node: &Node, context: Context<'_>, parse: fn(&str) -> Result<T, ParseError>) -> Option<T> {
+    let Some(text) = node.as_text() else {
+        let expected = parse("").err().map_or("", |error| expected(&error));
+        context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
+        return None;
+    };
+    match parse(text) {
+        Ok(value) => Some(value),
+        Err(error) => {
+            // The beginning of a text that is too long to be shown is wrong too: it ends in an ellipsis, which no unit does.
+            let error = parse(&shorten(text)).err().unwrap_or(error);
+            context.fault_at(node, error.to_string());
+            None
+        }
+    }
+}
+
+fn expected(error: &ParseError) -> &'static str {
+    match error {
+        ParseError::Number { expected, .. } | ParseError::Unit { expected, .. } | ParseError::Range { expected, .. } => expected,
+        _ => "a number with a unit",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_become_doubles_only_where_that_is_exact() {
+        assert_eq!(exact_f64(-3), Some(-3.0));
+        assert_eq!(exact_f64(0), Some(0.0));
+        assert_eq!(exact_f64(1 << 53), Some(9_007_199_254_740_992.0));
+        assert_eq!(exact_f64((1 << 53) + 1), None);
+        assert_eq!(exact_f64((1 << 53) + 2), Some(9_007_199_254_740_994.0));
+        assert_eq!(exact_f64(i128::MAX), None);
+    }
+}

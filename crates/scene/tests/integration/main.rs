@@ -1,0 +1,8 @@
+//! Scenes as other crates read them: whole files, and files that something happened to.
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
+#![expect(clippy::float_cmp, reason = "what is written is what is read, to the bit")]
+
+mod every_key;
+mod files;
+mod manual;
+mod mutations;
