@@ -9,6 +9,8 @@ use cohaptic_units::Instant;
 pub struct Bands {
     duration: Duration,
     spans: usize,
+    /// The width of a span [ns]; the last one may be cut short by the end.
+    width: u64,
     /// By curve, then span; `None` where nothing was added.
     extremes: Vec<Vec<Option<(f64, f64)>>>,
 }
@@ -18,7 +20,8 @@ impl Bands {
     #[must_use]
     pub fn new(duration: Duration, spans: usize, curves: usize) -> Self {
         let spans = spans.max(1);
-        Self { duration: duration.max(Duration::from_nanos(1)), spans, extremes: vec![vec![None; spans]; curves] }
+        let width = duration.as_nanos().div_ceil(spans as u128).max(1);
+        Self { duration, spans, width: u64::try_from(width).unwrap_or(u64::MAX), extremes: vec![vec![None; spans]; curves] }
     }
 
     /// Adds a value to a curve. What is not finite or beyond the end is left out.
@@ -37,8 +40,10 @@ impl Bands {
     /// In which span an instant lies; `None` at the end of the scene and beyond.
     #[must_use]
     pub fn span(&self, at: Instant) -> Option<usize> {
-        let span = u128::from(at.as_nanos()) * self.spans as u128 / self.duration.as_nanos();
-        usize::try_from(span).ok().filter(|span| *span < self.spans)
+        if at >= Instant::ZERO.saturating_add(self.duration) {
+            return None;
+        }
+        usize::try_from(at.as_nanos() / self.width).ok().filter(|span| *span < self.spans)
     }
 
     /// The same scene and spans without any value.
@@ -60,7 +65,7 @@ impl Bands {
     #[must_use]
     pub fn split(&self, parts: usize) -> Vec<Self> {
         let size = (self.extremes.len() / parts.max(1)).max(1);
-        let part = |extremes: &[Vec<_>]| Self { duration: self.duration, spans: self.spans, extremes: extremes.to_vec() };
+        let part = |extremes: &[Vec<_>]| Self { extremes: extremes.to_vec(), ..*self };
         self.extremes.chunks(size).map(part).collect()
     }
 
@@ -89,33 +94,32 @@ impl Bands {
     /// If there is no such curve.
     #[expect(clippy::cast_precision_loss, reason = "the number of spans is small")]
     pub fn curve(&self, curve: usize) -> impl Iterator<Item = (f64, f64, f64)> {
-        let width = self.seconds() / self.spans as f64;
+        let width = self.width as f64 / 1e9;
         self.extremes[curve]
             .iter()
             .enumerate()
             .filter_map(move |(span, extremes)| extremes.map(|(low, high)| ((span as f64 + 0.5) * width, low, high)))
     }
 
-    /// The range of values worth showing, with a margin, and whether values beyond it were left out.
+    /// The range of values worth showing, with a margin, and whether values beyond it are left out.
     ///
-    /// A scene that diverges ends in numbers that would flatten everything before: what lies more than eight times as far from the start as the
-    /// curves do in the median span is cut off.
+    /// A scene that diverges ends in numbers that would flatten everything before. So where curves go beyond `sane` from where they began, and a
+    /// thousand times as far as they went in the first tenth, which no motion does that ends well, only three times that first tenth, and at least
+    /// a tenth of `sane`, is shown.
     #[must_use]
-    pub fn range(&self) -> (std::ops::Range<f64>, bool) {
+    pub fn range(&self, sane: f64) -> (std::ops::Range<f64>, bool) {
         let start = (0..self.curves()).find_map(|curve| self.curve(curve).next()).map_or(0.0, |(_, low, _)| low);
-        let reach = |span: usize| {
-            let at = self.extremes.iter().filter_map(|curve| curve[span]);
-            at.map(|(low, high)| (low - start).abs().max((high - start).abs())).reduce(f64::max)
+        let reach_until = |span: usize| {
+            let values = self.extremes.iter().flat_map(|curve| &curve[..span]).flatten();
+            values.map(|(low, high)| (low - start).abs().max((high - start).abs())).fold(0.0, f64::max)
         };
-        let mut reaches: Vec<f64> = (0..self.spans).filter_map(reach).collect();
-        reaches.sort_by(f64::total_cmp);
-        let median = reaches.get(reaches.len() / 2).copied().unwrap_or(0.0);
-        let limit = if median > 0.0 { 8.0 * median } else { f64::INFINITY };
-        let shown = |value: f64| (value - start).abs() <= limit;
+        let (first, whole) = (reach_until(self.spans.div_ceil(10)), reach_until(self.spans));
+        let limit = if whole > sane && whole > 1000.0 * first { (3.0 * first).max(0.1 * sane) } else { f64::INFINITY };
+        let shown = |value: &f64| (value - start).abs() <= limit;
         let values = || self.extremes.iter().flatten().flatten().flat_map(|(low, high)| [*low, *high]);
-        let (low, high) = values().filter(|value| shown(*value)).fold((start, start), |(low, high), value| (low.min(value), high.max(value)));
+        let (low, high) = values().filter(shown).fold((start, start), |(low, high), value| (low.min(value), high.max(value)));
         let margin = if high > low { 0.05 * (high - low) } else { start.abs().max(1e-3) };
-        (low - margin..high + margin, values().any(|value| !shown(value)))
+        (low - margin..high + margin, values().any(|value| !shown(&value)))
     }
 }
 
@@ -133,13 +137,17 @@ mod tests {
     }
 
     #[test]
-    fn what_explodes_at_the_end_is_cut_off() {
-        let mut bands = Bands::new(Duration::from_secs(10), 10, 1);
-        for second in 0..10 {
-            let value = if second == 9 { 1e30 } else { 1.0 + f64::from(u32::try_from(second % 2).unwrap()) };
-            bands.add(0, Instant::from_nanos(second * 1_000_000_000), value);
-        }
-        let (range, cut) = bands.range();
-        assert!(cut && range.end < 3.0, "{range:?}");
+    fn what_explodes_at_the_end_is_cut_off_and_what_travels_is_not() {
+        let range = |motion: fn(f64) -> f64| {
+            let mut bands = Bands::new(Duration::from_secs(100), 100, 1);
+            for second in 0..100_u32 {
+                bands.add(0, Instant::from_nanos(u64::from(second) * 1_000_000_000), motion(f64::from(second)));
+            }
+            bands.range(1.0)
+        };
+        let (explosion, cut) = range(|t| 0.01 * t.exp());
+        assert!(cut && explosion.end < 1e4, "{explosion:?}");
+        let (acceleration, cut) = range(|t| 0.1 * t * t);
+        assert!(!cut && acceleration.end > 980.0, "{acceleration:?}");
     }
 }

@@ -20,4 +20,4 @@ mod trajectory;
 
 pub use band::Bands;
 pub use file::RecordError;
-pub use recorder::Recorder;
+pub use recorder::{Recorder, SANE_POSITION};

@@ -17,6 +17,10 @@ pub(crate) struct Panel<'a> {
     pub(crate) bands: &'a Bands,
     /// What values are multiplied by before they are shown: 100 to show metres in centimetres.
     pub(crate) scale: f64,
+    /// What curves do not exceed in a scene that does not diverge: see [`Bands::range`].
+    pub(crate) sane: f64,
+    /// Whether values below zero have no meaning, so that the axis begins there.
+    pub(crate) not_negative: bool,
 }
 
 /// More curves than this are drawn in one colour and not named.
@@ -61,8 +65,9 @@ fn draw<'a>(root: &Drawing<'a>, panels: &[Panel<'_>]) -> DrawingResult<'a> {
 }
 
 fn draw_panel<'a>(area: &Drawing<'a>, panel: &Panel<'_>) -> DrawingResult<'a> {
-    let (range, cut) = panel.bands.range();
-    let range = range.start * panel.scale..range.end * panel.scale;
+    let (range, cut) = panel.bands.range(panel.sane);
+    let lowest = if panel.not_negative { 0.0 } else { f64::NEG_INFINITY };
+    let range = (range.start * panel.scale).max(lowest)..range.end * panel.scale;
     let title = if cut { format!("{} (what goes far beyond is cut off)", panel.title) } else { panel.title.clone() };
     let mut chart = ChartBuilder::on(area)
         .caption(title, ("sans-serif", 16))
@@ -71,19 +76,19 @@ fn draw_panel<'a>(area: &Drawing<'a>, panel: &Panel<'_>) -> DrawingResult<'a> {
         .y_label_area_size(64)
         .build_cartesian_2d(0.0..panel.bands.seconds(), range.clone())?;
     chart.configure_mesh().x_desc("t [s]").y_desc(panel.unit).light_line_style(WHITE).draw()?;
-    let named = !panel.names.is_empty() && panel.names.len() <= MOST_NAMED;
+    let few = panel.bands.curves() <= MOST_NAMED;
     for curve in 0..panel.bands.curves() {
-        let colour = if named { COLOURS[curve] } else { COLOURS[0] };
-        let style = colour.mix(if named { 0.9 } else { 0.35 }).stroke_width(1);
+        let colour = if few { COLOURS[curve] } else { COLOURS[0] };
+        let style = colour.mix(if few { 0.9 } else { 0.35 }).stroke_width(1);
         for run in visible_runs(panel, curve, &range) {
             chart.draw_series(LineSeries::new(run, style))?;
         }
-        if let Some(name) = panel.names.get(curve).filter(|_| named) {
+        if let Some(name) = panel.names.get(curve).filter(|_| few) {
             let empty = LineSeries::new(std::iter::empty::<(f64, f64)>(), style);
             chart.draw_series(empty)?.label(name).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
         }
     }
-    if named {
+    if few && !panel.names.is_empty() {
         chart
             .configure_series_labels()
             .position(SeriesLabelPosition::UpperLeft)

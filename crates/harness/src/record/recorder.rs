@@ -39,6 +39,11 @@ struct Plotted {
 const SPANS: usize = 1000;
 const MOST_NUMBERS: usize = 200_000;
 
+/// Farther from where it began no copy is moved by people at desktop devices [m].
+pub const SANE_POSITION: f64 = 1.0;
+/// No desktop device and no person at it gives more force [N].
+const SANE_FORCE: f64 = 1000.0;
+
 impl Recorder {
     /// Begins to record a scene into a folder, which is made if there is none. Records of an earlier run in it are replaced when this one is whole.
     ///
@@ -69,18 +74,18 @@ impl Recorder {
     pub fn finish(self, summary: &Summary) -> Result<Vec<PathBuf>, RecordError> {
         let Self { folder, title, names, trajectory, packets, plotted } = self;
         let mut files = vec![trajectory.finish()?, packets.finish()?, links::write(&folder, summary)?];
-        for (file, bands, what, unit, scale) in [
-            ("positions.svg", &plotted.positions, "position of each copy", "position [cm]", 100.0),
-            ("forces.svg", &plotted.forces, "coordination force on each copy", "FT [N]", 1.0),
+        for (file, bands, what, unit, scale, sane) in [
+            ("positions.svg", &plotted.positions, "position of each copy", "position [cm]", 100.0, SANE_POSITION),
+            ("forces.svg", &plotted.forces, "coordination force on each copy", "FT [N]", 1.0, SANE_FORCE),
         ] {
             let by_axis = bands.split(bands.curves() / names.len());
             let heading = |axis: usize| if by_axis.len() == 1 { format!("{title}: {what}") } else { format!("{title}: {what} along {}", AXES[axis]) };
-            let panel = |(axis, bands)| Panel { title: heading(axis), unit, names: &names, bands, scale };
+            let panel = |(axis, bands)| Panel { title: heading(axis), unit, names: &names, bands, scale, sane, not_negative: false };
             let panels: Vec<Panel<'_>> = by_axis.iter().enumerate().map(panel).collect();
             files.push(plot::write(folder.join(file), &panels)?);
         }
         let shares = plotted.drop_shares();
-        let of_links = |title: String, unit, bands, scale| Panel { title, unit, names: &[], bands, scale };
+        let of_links = |title: String, unit, bands, scale| Panel { title, unit, names: &[], bands, scale, sane: f64::INFINITY, not_negative: true };
         let network = [
             of_links(format!("{title}: delay of the packets that arrived, all links"), "delay [ms]", &plotted.delays, 1e3),
             of_links("share of the packets sent that were dropped".into(), "dropped [%]", &shares, 100.0),

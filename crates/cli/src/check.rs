@@ -1,0 +1,91 @@
+//! `cohaptic check`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use cohaptic_harness::{Model, check as harness};
+use cohaptic_scene::{Scene, scene_files};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::arguments::CheckArguments;
+use crate::failure::{EXPECTATION, Failure, INTERRUPTED, scene_status};
+use crate::progress::Progress;
+use crate::{interrupt, output};
+
+#[derive(Serialize)]
+struct Document {
+    scenes: Vec<Checked>,
+}
+
+#[derive(Serialize)]
+struct Checked {
+    file: PathBuf,
+    passed: bool,
+    failures: Vec<String>,
+    #[serde(skip)]
+    status: u8,
+    #[serde(skip)]
+    expects_nothing: bool,
+}
+
+/// Checks every scene, says one line each, and goes on after a scene that fails or cannot be read.
+pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
+    let mut files = Vec::new();
+    for path in &arguments.scenes {
+        files.extend(scene_files(path)?);
+    }
+    let progress = Progress::through_scenes(files.len());
+    let model = if arguments.general { Model::General } else { Model::Least };
+    let check = |file: &PathBuf| {
+        let checked = check_one(file, &arguments.overrides.set, model);
+        progress.one_more();
+        checked
+    };
+    let jobs = arguments.jobs.map_or(0, std::num::NonZeroUsize::get);
+    let scenes: Vec<Checked> = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
+        Ok(pool) => pool.install(|| files.par_iter().map(check).collect()),
+        // Without threads it takes longer.
+        Err(_) => files.iter().map(check).collect(),
+    };
+    progress.clear();
+    let status = scenes.iter().map(|scene| scene.status).max().unwrap_or(0);
+    if arguments.json {
+        output::json(&Document { scenes })?;
+    } else {
+        output::text(&describe(&scenes))?;
+    }
+    Ok(ExitCode::from(if interrupt::asked() { INTERRUPTED } else { status }))
+}
+
+fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
+    let (failures, status, expects_nothing) = match Scene::read(file, overrides) {
+        Err(error) => (vec![error.to_string()], scene_status(&error), false),
+        Ok(scene) => {
+            let failures = harness::check(&scene, model, || !interrupt::asked());
+            let status = if failures.is_empty() { 0 } else { EXPECTATION };
+            (failures, status, scene.expect.is_none())
+        }
+    };
+    Checked { file: file.to_path_buf(), passed: failures.is_empty(), failures, status, expects_nothing }
+}
+
+fn describe(scenes: &[Checked]) -> String {
+    let mut text = String::new();
+    for scene in scenes {
+        let file = scene.file.display();
+        if scene.expects_nothing {
+            text.push_str(&format!("ok    {file} (it has no [expect]: nothing was compared)\n"));
+        } else if scene.passed {
+            text.push_str(&format!("ok    {file}\n"));
+        } else {
+            text.push_str(&format!("FAIL  {file}\n"));
+            for line in scene.failures.iter().flat_map(|failure| failure.lines()) {
+                text.push_str(&format!("      {line}\n"));
+            }
+        }
+    }
+    let failed = scenes.iter().filter(|scene| !scene.passed).count();
+    text.push_str(&format!("{} passed, {failed} failed\n", scenes.len() - failed));
+    text
+}

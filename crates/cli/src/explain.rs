@@ -1,0 +1,89 @@
+//! `cohaptic explain`.
+
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+use cohaptic_harness::explain::{self as harness, Explanation};
+use cohaptic_scene::Scene;
+use serde::Serialize;
+
+use crate::arguments::ExplainArguments;
+use crate::failure::Failure;
+use crate::output;
+
+#[derive(Serialize)]
+struct Document<'a> {
+    title: &'a str,
+    models: Vec<Model<'a>>,
+    left_out: &'a [String],
+    dimensions: Dimensions,
+    cost: Cost,
+}
+
+#[derive(Serialize)]
+struct Model<'a> {
+    part: &'a str,
+    model: &'a str,
+    reason: &'a str,
+}
+
+#[derive(Serialize)]
+struct Dimensions {
+    plant: u64,
+    held: u64,
+    in_flight: u64,
+}
+
+#[derive(Serialize)]
+struct Cost {
+    peer_ticks_per_s: f64,
+    packets_per_s: f64,
+    realtime_factor: f64,
+}
+
+/// Says what a scene makes the program model.
+pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure> {
+    let scene = Scene::read(&arguments.scene.scene, &arguments.scene.overrides.set)?;
+    let explanation = harness::explain(&scene);
+    if arguments.scene.json {
+        output::json(&document(&scene, &explanation))?;
+    } else {
+        output::text(&describe(&scene, &explanation))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn document<'a>(scene: &'a Scene, explanation: &'a Explanation) -> Document<'a> {
+    let Explanation { models, left_out, dimensions, cost } = explanation;
+    Document {
+        title: &scene.title,
+        models: models.iter().map(|row| Model { part: &row.part, model: &row.model, reason: &row.reason }).collect(),
+        left_out,
+        dimensions: Dimensions { plant: dimensions.plant, held: dimensions.held, in_flight: dimensions.in_flight },
+        cost: Cost { peer_ticks_per_s: cost.peer_ticks_per_s, packets_per_s: cost.packets_per_s, realtime_factor: cost.realtime_factor },
+    }
+}
+
+fn describe(scene: &Scene, explanation: &Explanation) -> String {
+    let Explanation { models, left_out, dimensions, cost } = explanation;
+    let mut text = format!("{}\n\nModelled\n", scene.title);
+    for row in models {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "  {}: {}\n      because: {}", row.part, row.model, row.reason);
+    }
+    let _ = writeln!(text, "\nLeft out");
+    for what in left_out {
+        let _ = writeln!(text, "  {what}");
+    }
+    let _ = writeln!(
+        text,
+        "\nState\n  {} numbers in devices and copies, {} in samples held, about {} packets on the way",
+        dimensions.plant, dimensions.held, dimensions.in_flight
+    );
+    let _ = writeln!(
+        text,
+        "\nCost\n  {:.0} control ticks and {:.0} packets a simulated second: about {:.0} times real time with nothing recorded",
+        cost.peer_ticks_per_s, cost.packets_per_s, cost.realtime_factor
+    );
+    text
+}

@@ -1,0 +1,54 @@
+//! Why a command ended without its result, and with which exit status.
+
+use std::io;
+use std::process::ExitCode;
+
+use cohaptic_harness::record::RecordError;
+use cohaptic_scene::SceneError;
+
+/// An expectation failed.
+pub(crate) const EXPECTATION: u8 = 1;
+/// A bad argument or scene.
+pub(crate) const BAD_INPUT: u8 = 2;
+/// An input or output error.
+pub(crate) const INPUT_OUTPUT: u8 = 3;
+/// Interrupted, as shells say it: 128 and the number of SIGINT.
+pub(crate) const INTERRUPTED: u8 = 130;
+
+#[derive(Debug)]
+pub(crate) enum Failure {
+    Scene(SceneError),
+    Record(RecordError),
+    StandardOutput(io::Error),
+}
+
+impl Failure {
+    /// Says on standard error what went wrong, and gives the exit status.
+    pub(crate) fn report(&self) -> ExitCode {
+        let (message, status) = match self {
+            Self::Scene(error) => (error.to_string(), scene_status(error)),
+            Self::Record(error) => (error.to_string(), INPUT_OUTPUT),
+            Self::StandardOutput(error) => (format!("cannot write to standard output: {error}"), INPUT_OUTPUT),
+        };
+        // If standard error cannot be written to either, the exit status is all that is left to say it with.
+        let _ = io::Write::write_all(&mut io::stderr(), format!("error: {message}\n").as_bytes());
+        ExitCode::from(status)
+    }
+}
+
+/// The exit status for a scene that could not be had.
+pub(crate) fn scene_status(error: &SceneError) -> u8 {
+    if error.is_io() { INPUT_OUTPUT } else { BAD_INPUT }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        Self::Scene(error)
+    }
+}
+
+impl From<RecordError> for Failure {
+    fn from(error: RecordError) -> Self {
+        Self::Record(error)
+    }
+}

@@ -1,0 +1,34 @@
+//! `cohaptic`: runs, checks and explains scenes of people who move one object together over a bad network.
+//!
+//! This is the only crate that prints. Results go to standard output, everything else to standard error. Exit status: 0 done, 1 an expectation
+//! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted.
+
+mod arguments;
+mod check;
+mod explain;
+mod failure;
+mod interrupt;
+mod output;
+mod progress;
+mod run;
+mod terminal_plot;
+
+use std::process::ExitCode;
+
+use clap::Parser as _;
+
+use arguments::{Arguments, Command};
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    interrupt::listen();
+    let done = match arguments.command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Check(arguments) => check::check(&arguments),
+        Command::Explain(arguments) => explain::explain(&arguments),
+    };
+    match done {
+        Ok(code) => code,
+        Err(failure) => failure.report(),
+    }
+}

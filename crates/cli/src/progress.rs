@@ -1,0 +1,47 @@
+//! A progress bar on standard error, only when that is a terminal.
+
+use std::io::IsTerminal as _;
+use std::time::Duration;
+
+use cohaptic_units::Instant;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+pub(crate) struct Progress(ProgressBar);
+
+impl Progress {
+    /// Progress through a scene, in simulated time.
+    pub(crate) fn through_scene(title: &str, duration: Duration) -> Self {
+        let bar = bar(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX));
+        bar.set_style(style("{prefix} {bar:30} {percent:>3} %  {elapsed} passed, {eta} left"));
+        bar.set_prefix(title.to_owned());
+        Self(bar)
+    }
+
+    /// Progress through a number of scenes.
+    pub(crate) fn through_scenes(count: usize) -> Self {
+        let bar = bar(count as u64);
+        bar.set_style(style("checking scenes {bar:30} {pos}/{len}"));
+        Self(bar)
+    }
+
+    pub(crate) fn reach(&self, now: Instant) {
+        self.0.set_position(now.as_nanos() / 1_000_000);
+    }
+
+    pub(crate) fn one_more(&self) {
+        self.0.inc(1);
+    }
+
+    pub(crate) fn clear(&self) {
+        self.0.finish_and_clear();
+    }
+}
+
+fn bar(length: u64) -> ProgressBar {
+    let target = if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    ProgressBar::with_draw_target(Some(length), target)
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}

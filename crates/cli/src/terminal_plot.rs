@@ -1,0 +1,58 @@
+//! Curves over time as text, with the dots of Unicode's braille patterns: two dots wide and four high in each character.
+
+use cohaptic_harness::record::{Bands, SANE_POSITION};
+
+const WIDTH: usize = 72;
+const HEIGHT: usize = 12;
+
+/// Draws curves of positions into one frame, with the ends of both axes, and says if values far beyond were cut off. `scale` turns values into `unit`.
+pub(crate) fn draw(bands: &Bands, scale: f64, unit: &str) -> String {
+    let (range, cut) = bands.range(SANE_POSITION);
+    let mut dots = [[0_u8; WIDTH]; HEIGHT];
+    for curve in 0..bands.curves() {
+        let mut last: Option<usize> = None;
+        for (t, low, high) in bands.curve(curve) {
+            if !range.contains(&low) || !range.contains(&high) {
+                last = None;
+                continue;
+            }
+            let column = place(t / bands.seconds(), 2 * WIDTH);
+            let row = |value: f64| 4 * HEIGHT - 1 - place((value - range.start) / (range.end - range.start), 4 * HEIGHT);
+            // A column is filled from where the curve was, so that steep parts hang together.
+            let (mut top, mut bottom) = (row(high), row(low));
+            if let Some(last) = last {
+                top = top.min(last);
+                bottom = bottom.max(last);
+            }
+            for row in top..=bottom {
+                dots[row / 4][column / 2] |= BRAILLE[row % 4][column % 2];
+            }
+            last = Some(row((low + high) / 2.0));
+        }
+    }
+    let mut text = String::new();
+    for (row, line) in dots.iter().enumerate() {
+        let label = match row {
+            0 => format!("{:9.3}", range.end * scale),
+            _ if row == HEIGHT - 1 => format!("{:9.3}", range.start * scale),
+            _ if row == HEIGHT / 2 => format!("{unit:>9}"),
+            _ => " ".repeat(9),
+        };
+        let line: String = line.iter().filter_map(|dots| char::from_u32(0x2800 + u32::from(*dots))).collect();
+        text.push_str(&format!("{label} |{}\n", line.trim_end_matches('\u{2800}')));
+    }
+    let end = format!("{} s", bands.seconds());
+    text.push_str(&format!("{:9} 0{end:>width$}\n", "", width = WIDTH));
+    if cut {
+        text.push_str("          what goes far beyond is cut off\n");
+    }
+    text
+}
+
+/// The bit of each dot, by row and column, in a braille pattern.
+const BRAILLE: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "a share of a small number of dots")]
+fn place(share: f64, dots: usize) -> usize {
+    ((share * dots as f64).max(0.0) as usize).min(dots - 1)
+}
