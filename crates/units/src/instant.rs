@@ -18,12 +18,14 @@ impl Instant {
 
     /// The instant that many nanoseconds after the beginning.
     #[must_use]
+    #[inline]
     pub const fn from_nanos(nanos: u64) -> Self {
         Self(nanos)
     }
 
     /// Nanoseconds since the beginning.
     #[must_use]
+    #[inline]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
@@ -38,6 +40,7 @@ impl Instant {
 
     /// The instant `span` later, or `None` beyond [`Instant::MAX`].
     #[must_use]
+    #[inline]
     pub fn checked_add(self, span: Duration) -> Option<Self> {
         let nanos = u64::try_from(span.as_nanos()).ok()?;
         self.0.checked_add(nanos).map(Self)
@@ -45,12 +48,14 @@ impl Instant {
 
     /// The instant `span` later, or [`Instant::MAX`] if that cannot be counted.
     #[must_use]
+    #[inline]
     pub fn saturating_add(self, span: Duration) -> Self {
         self.checked_add(span).unwrap_or(Self::MAX)
     }
 
     /// The span since `earlier`, or `None` if `earlier` is later than `self`.
     #[must_use]
+    #[inline]
     pub const fn checked_duration_since(self, earlier: Self) -> Option<Duration> {
         match self.0.checked_sub(earlier.0) {
             Some(nanos) => Some(Duration::from_nanos(nanos)),
@@ -60,6 +65,7 @@ impl Instant {
 
     /// The span since `earlier`, zero if `earlier` is later than `self`.
     #[must_use]
+    #[inline]
     pub const fn saturating_duration_since(self, earlier: Self) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
     }
@@ -71,6 +77,7 @@ impl Add<Duration> for Instant {
     /// # Panics
     ///
     /// Beyond [`Instant::MAX`], 584 years after the beginning.
+    #[inline]
     fn add(self, span: Duration) -> Self {
         self.checked_add(span).expect("an instant is within 584 years of the beginning")
     }
@@ -88,6 +95,7 @@ impl Sub for Instant {
     /// # Panics
     ///
     /// If `earlier` is later than `self`: negative spans do not exist.
+    #[inline]
     fn sub(self, earlier: Self) -> Duration {
         self.checked_duration_since(earlier).expect("the subtrahend is not later than the minuend")
     }

@@ -40,6 +40,7 @@ impl Probability {
     ///
     /// 0 never happens and 1 always does. In between the chance is exact for the top 53 bits of `bits`, an error of at most 2⁻⁵³.
     #[must_use]
+    #[inline]
     #[expect(clippy::cast_precision_loss, reason = "the top 53 bits of a u64 are exact in an f64")]
     pub fn happens(self, bits: u64) -> bool {
         const TWO_POW_53: f64 = 9_007_199_254_740_992.0;

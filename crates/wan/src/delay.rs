@@ -102,28 +102,48 @@ impl Delay {
             Some(Jitter { distribution: Distribution::Normal, .. }) => Duration::ZERO,
         }
     }
+}
+
+/// The delay stage: draws the delay of each packet.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DelayStage {
+    mean_nanos: u64,
+    jitter: Option<Law>,
+}
+
+/// Spans as numbers, converted once.
+#[derive(Clone, Copy, Debug)]
+enum Law {
+    Normal { sd_nanos: f64 },
+    Uniform { reach_nanos: f64 },
+}
+
+impl DelayStage {
+    pub(crate) fn new(delay: Delay) -> Self {
+        let law = |Jitter { sd, distribution }| match distribution {
+            Distribution::Normal => Law::Normal { sd_nanos: nanos(sd) },
+            Distribution::Uniform => Law::Uniform { reach_nanos: SQRT_3 * nanos(sd) },
+        };
+        Self { mean_nanos: u64::try_from(delay.mean.as_nanos()).unwrap_or(u64::MAX), jitter: delay.jitter.map(law) }
+    }
 
     /// The delay of one packet [ns]; the draws are used only if there is jitter. Rounded to the nearest nanosecond.
     #[inline]
     pub(crate) fn draw_nanos(&self, draws: impl FnOnce() -> Draws) -> u64 {
-        let mean = u64::try_from(self.mean.as_nanos()).unwrap_or(u64::MAX);
-        let Some(Jitter { sd, distribution }) = self.jitter else { return mean };
-        let mut draws = draws();
-        let deviation = match distribution {
-            Distribution::Normal => nanos(sd) * Distribution::normal(&mut draws),
-            Distribution::Uniform => SQRT_3 * nanos(sd) * (2.0 * draws.next_unit() - 1.0),
+        let deviation = match self.jitter {
+            None => return self.mean_nanos,
+            Some(Law::Normal { sd_nanos }) => sd_nanos * standard_normal(&mut draws()),
+            Some(Law::Uniform { reach_nanos }) => reach_nanos * (2.0 * draws().next_unit() - 1.0),
         };
         #[expect(clippy::cast_possible_truncation, reason = "saturates, beyond 292 years")]
         let deviation = libm::rint(deviation) as i64;
-        mean.saturating_add_signed(deviation)
+        self.mean_nanos.saturating_add_signed(deviation)
     }
 }
 
-impl Distribution {
-    /// A standard normal number by the ziggurat method, the same on every platform.
-    fn normal(draws: &mut Draws) -> f64 {
-        StandardNormal.sample(draws)
-    }
+/// A standard normal number by the ziggurat method, the same on every platform.
+fn standard_normal(draws: &mut Draws) -> f64 {
+    StandardNormal.sample(draws)
 }
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
@@ -148,7 +168,8 @@ mod tests {
 
     fn draws(delay: Delay, count: u64) -> Vec<f64> {
         let stream = Stream::new(1, b"delay", Purpose::Jitter);
-        (0..count).map(|packet| delay.draw_nanos(|| stream.at(packet)) as f64 / 1e6).collect()
+        let stage = DelayStage::new(delay);
+        (0..count).map(|packet| stage.draw_nanos(|| stream.at(packet)) as f64 / 1e6).collect()
     }
 
     fn jitter(distribution: Distribution, sd: Duration) -> Jitter {

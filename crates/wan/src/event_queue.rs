@@ -53,8 +53,8 @@ pub struct EventQueue<E> {
 }
 
 /// Buckets are 2¹⁶ ns wide.
-const WIDTH_BITS: u32 = 16;
-const RING: usize = 4096;
+const WIDTH_BITS: u32 = 15;
+const RING: usize = 8192;
 
 impl<E: Event> Default for EventQueue<E> {
     fn default() -> Self {

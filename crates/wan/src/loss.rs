@@ -57,6 +57,7 @@ impl LossStage {
     }
 
     /// Whether the packet whose draws these are is lost.
+    #[inline]
     pub(crate) fn loses(&mut self, mut draws: Draws) -> bool {
         match self {
             Self::Independent(probability) => probability.happens(draws.next_word()),

@@ -12,19 +12,28 @@ pub enum Order {
     InOrder,
 }
 
-/// The stage: the latest arrival so far.
-#[derive(Clone, Copy, Debug, Default)]
+/// The stage: the policy and the latest arrival so far.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct OrderStage {
+    policy: Order,
+    /// Known even while reordering is allowed, so that a live change to `in-order` holds for the packets already on the way.
     latest: Instant,
 }
 
 impl OrderStage {
-    /// The arrival that the policy allows for one that is wanted. The latest arrival is known even while reordering is allowed, so that a live
-    /// change to `in-order` holds for the packets already on the way.
+    pub(crate) const fn new(policy: Order) -> Self {
+        Self { policy, latest: Instant::ZERO }
+    }
+
+    pub(crate) const fn set_policy(&mut self, policy: Order) {
+        self.policy = policy;
+    }
+
+    /// The arrival that the policy allows for one that is wanted.
     #[inline]
-    pub(crate) fn arrival(&mut self, order: Order, wanted: Instant) -> Instant {
+    pub(crate) fn arrival(&mut self, wanted: Instant) -> Instant {
         self.latest = self.latest.max(wanted);
-        match order {
+        match self.policy {
             Order::AllowReordering => wanted,
             Order::InOrder => self.latest,
         }

@@ -71,7 +71,11 @@ impl Outages {
 
     /// Whether the link is down at `now`. Down at the first instant of an outage, up at its end.
     #[must_use]
+    #[inline]
     pub fn covers(&self, now: Instant) -> bool {
+        if self.0.is_empty() {
+            return false;
+        }
         let next = self.0.partition_point(|outage| outage.to <= now);
         self.0.get(next).is_some_and(|outage| outage.from <= now)
     }

@@ -15,10 +15,11 @@ use alloc::vec::Vec;
 use cohaptic_units::{Bytes, Instant};
 
 use crate::bottleneck::{BottleneckStage, Departure};
+use crate::delay::DelayStage;
 use crate::loss::LossStage;
 use crate::order::OrderStage;
 use crate::random::{Purpose, Stream};
-use crate::{DropCause, LinkConfig};
+use crate::{DropCause, LinkConfig, Outages};
 
 /// The name of a link: the address of its random numbers, and what records call it.
 ///
@@ -100,14 +101,16 @@ pub(crate) enum Pipeline<T> {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Chain<T> {
-    config: LinkConfig,
+    outages: Outages,
     loss: Option<LossStage>,
-    bottleneck: Option<BottleneckStage<(u64, T)>>,
+    loss_draws: Stream,
+    /// In a box, so that a link without one is small: the links of a large mesh fill the cache.
+    bottleneck: Option<Box<BottleneckStage<(u64, T)>>>,
     /// The last announcement of a bottleneck that was taken away.
     announced: u64,
-    order: OrderStage,
-    loss_draws: Stream,
+    delay: DelayStage,
     jitter_draws: Stream,
+    order: OrderStage,
 }
 
 impl<T> Pipeline<T> {
@@ -175,19 +178,20 @@ impl<T> Chain<T> {
     fn new(seed: u64, name: &LinkName, config: LinkConfig) -> Self {
         let stream = |purpose| Stream::new(seed, name.as_str().as_bytes(), purpose);
         Self {
+            outages: config.outages,
             loss: LossStage::new(config.loss, &mut stream(Purpose::LossState).at(0)),
-            bottleneck: config.bottleneck.map(|bottleneck| BottleneckStage::new(bottleneck, 0)),
-            announced: 0,
-            order: OrderStage::default(),
             loss_draws: stream(Purpose::Loss),
+            bottleneck: config.bottleneck.map(|bottleneck| Box::new(BottleneckStage::new(bottleneck, 0))),
+            announced: 0,
+            delay: DelayStage::new(config.delay),
             jitter_draws: stream(Purpose::Jitter),
-            config,
+            order: OrderStage::new(config.order),
         }
     }
 
     #[inline]
     fn offer(&mut self, now: Instant, number: u64) -> Outcome {
-        if self.config.outages.covers(now) {
+        if self.outages.covers(now) {
             return Outcome::Dropped(DropCause::Outage);
         }
         if let Some(loss) = &mut self.loss
@@ -212,12 +216,13 @@ impl<T> Chain<T> {
             Some(stage) => stage.reconfigured(config.loss, &mut initial),
             None => LossStage::new(config.loss, &mut initial),
         };
-        let bottleneck = config.bottleneck;
-        self.config = config;
-        match (self.bottleneck.take(), bottleneck) {
+        self.outages = config.outages;
+        self.delay = DelayStage::new(config.delay);
+        self.order.set_policy(config.order);
+        match (self.bottleneck.take(), config.bottleneck) {
             (None, None) => (None, Vec::new()),
             (None, Some(new)) => {
-                self.bottleneck = Some(BottleneckStage::new(new, self.announced));
+                self.bottleneck = Some(Box::new(BottleneckStage::new(new, self.announced)));
                 (None, Vec::new())
             }
             (Some(mut stage), Some(new)) => {
@@ -236,7 +241,7 @@ impl<T> Chain<T> {
     /// When a packet that begins to propagate now arrives.
     #[inline]
     fn arrival(&mut self, now: Instant, number: u64) -> Instant {
-        let delay = self.config.delay.draw_nanos(|| self.jitter_draws.at(number));
-        self.order.arrival(self.config.order, later(now, delay))
+        let delay = self.delay.draw_nanos(|| self.jitter_draws.at(number));
+        self.order.arrival(later(now, delay))
     }
 }
