@@ -37,6 +37,8 @@ pub(crate) struct World<const A: usize> {
     finite: bool,
     /// Who ticks at the present instant, if not all.
     ticking: Vec<usize>,
+    /// In lockstep, the next tick at which anybody sends.
+    earliest_send: u64,
 }
 
 /// A peer with its clock.
@@ -110,6 +112,7 @@ impl<const A: usize> World<A> {
             max_discrepancy: 0.0,
             finite: true,
             ticking: (0..scene.peers.len()).collect(),
+            earliest_send: 0,
         }
     }
 
@@ -199,6 +202,9 @@ impl<const A: usize> World<A> {
 
     /// Step 1: those whose time it is send their sample to everybody else.
     fn send(&mut self, now: Instant) {
+        if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[0].tick < self.earliest_send {
+            return;
+        }
         let others = self.members.len() - 1;
         for &from in &self.ticking {
             let member = &mut self.members[from];
@@ -210,6 +216,7 @@ impl<const A: usize> World<A> {
             let (handle, len) = self.datagrams.store(others, |datagram| member.peer.sample(local_time, datagram));
             self.network.handle_broadcast(now, node(from), Bytes::new(len as u64), handle).expect("instants come in order");
         }
+        self.earliest_send = self.members.iter().map(|member| member.next_send).min().unwrap_or(0);
     }
 
     /// Step 2: whatever has arrived is handed to its receiver.

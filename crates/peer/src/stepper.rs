@@ -25,13 +25,15 @@ impl Stepper {
     /// Moves the body over `span` under the held force.
     #[inline]
     pub(crate) fn advance<const A: usize>(&self, state: &mut State<A>, span: Duration, force: [f64; A]) {
+        let other;
         let map = if span == self.short.0 {
-            self.short.1
+            &self.short.1
         } else if span == self.long.0 {
-            self.long.1
+            &self.long.1
         } else {
             // Not a span of this clock: a driver that paces by another one pays for its own map.
-            self.plant.step(span, self.integrator)
+            other = self.plant.step(span, self.integrator);
+            &other
         };
         for ((position, velocity), force) in state.position.iter_mut().zip(&mut state.velocity).zip(force) {
             if self.free {

@@ -189,8 +189,7 @@ impl Place {
 }
 
 impl<P> Event for Pending<P> {
-    /// Instant and place in one number, which is compared faster than two; then sequence and path.
-    type Key = (u128, u64, Path);
+    type Key = (Instant, Place, u64, Path);
 
     #[inline]
     fn at(&self) -> Instant {
@@ -199,7 +198,7 @@ impl<P> Event for Pending<P> {
 
     #[inline]
     fn key(&self) -> Self::Key {
-        (u128::from(self.at.as_nanos()) << 32 | u128::from(self.place.0), self.sequence, self.path)
+        (self.at, self.place, self.sequence, self.path)
     }
 }
 

@@ -189,7 +189,7 @@ impl<T> Chain<T> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn offer(&mut self, now: Instant, number: u64) -> Outcome {
         if self.outages.covers(now) {
             return Outcome::Dropped(DropCause::Outage);
@@ -239,7 +239,7 @@ impl<T> Chain<T> {
     }
 
     /// When a packet that begins to propagate now arrives.
-    #[inline]
+    #[inline(always)]
     fn arrival(&mut self, now: Instant, number: u64) -> Instant {
         let delay = self.delay.draw_nanos(|| self.jitter_draws.at(number));
         self.order.arrival(later(now, delay))
