@@ -16,11 +16,11 @@ use crate::{COPY_DAMPING, COUPLING, DELAY_NANOS, DEVICE, LOSS, Mesh, OBJECT_MASS
 /// What the loop ends with.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Outcome {
-    /// Position of each copy [m].
+    /// Position of each copy \[m\].
     pub positions: Vec<f64>,
     /// Packets delivered over all links.
     pub delivered: u64,
-    /// The largest distance between two copies [m].
+    /// The largest distance between two copies \[m\].
     pub max_discrepancy: f64,
 }
 

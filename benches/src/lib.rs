@@ -27,11 +27,11 @@ pub const LOSS: f64 = 0.01;
 pub const DEVICE: DeviceConfig = DeviceConfig { mass: 0.1, damping: 5.0 };
 /// The coupling of every peer.
 pub const COUPLING: Gains = Gains { stiffness: 3500.0, damping: 5.0 };
-/// The mass of the whole object [kg]; every copy has its share.
+/// The mass of the whole object \[kg\]; every copy has its share.
 pub const OBJECT_MASS: f64 = 0.45;
 /// The damping of every copy [N·s/m].
 pub const COPY_DAMPING: f64 = 0.0;
-/// The force of the first peer's hand [N].
+/// The force of the first peer's hand \[N\].
 pub const HAND_FORCE: f64 = 1.5;
 
 /// One cell of the table: so many peers, with or without jitter and loss.

@@ -20,7 +20,7 @@ const EXIT_STATUS: &str = "Exit status: 0 done, 1 an expectation failed, 2 a bad
 pub(crate) enum Command {
     /// Simulates a scene in virtual time and says what happened
     Run(RunArguments),
-    /// Runs scenes as tests: each against its own [expect]
+    /// Runs scenes as tests: each against its own \[expect\]
     Check(CheckArguments),
     /// Says what a scene makes the program model, what it leaves out and why, and what it costs
     Explain(ExplainArguments),

@@ -135,7 +135,7 @@ struct Document {
     max_discrepancy_m: f64,
     files: Vec<PathBuf>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    against: Option<Box<Document>>,
+    against: Option<Box<Self>>,
 }
 
 #[derive(Serialize)]

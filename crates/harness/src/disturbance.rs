@@ -5,7 +5,7 @@ use cohaptic_peer::State;
 /// Displaces each device and each copy by up to `size`, each differently, so that every mode of the relative motion is excited.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Disturbance {
-    /// [m]
+    /// \[m\]
     pub(crate) size: f64,
 }
 

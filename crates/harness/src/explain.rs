@@ -1,7 +1,7 @@
 //! What a scene makes the program model, what it leaves out, and why.
 
 use cohaptic_peer::{Contact, Hand, Integrator, wire};
-use cohaptic_scene::{PeerSpec, Scaling, Scene};
+use cohaptic_scene::{ChangeKind, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::Span;
 use cohaptic_wan::{Distribution, LinkConfig, Loss, Order, QueueLimit};
 
@@ -170,10 +170,8 @@ impl Rows {
         for (peer, direction, line) in access_lines(scene) {
             self.model(&format!("{direction} of {peer}"), describe_link(line), "shared by all that passes it");
         }
-        let timeline_is_random = scene.timeline.iter().any(|change| match &change.what {
-            cohaptic_scene::ChangeKind::Links(links) => links.iter().any(|link| link.config.is_random()),
-            _ => false,
-        });
+        let timeline_is_random =
+            scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Links(links) if links.iter().any(|link| link.config.is_random())));
         let lines_are_random = access_lines(scene).iter().any(|(_, _, line)| line.is_random());
         if used.iter().all(|(config, _)| !config.is_random()) && !lines_are_random && !timeline_is_random {
             self.leave_out("random numbers: no link has jitter or loss");

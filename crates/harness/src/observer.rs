@@ -37,7 +37,7 @@ pub trait Observer {
 /// Position and velocity along the axes of the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct StateRow<'a> {
-    /// Position [m].
+    /// Position \[m\].
     pub position: &'a [f64],
     /// Velocity [m/s].
     pub velocity: &'a [f64],
@@ -56,9 +56,9 @@ pub struct TickRow<'a> {
     pub object: StateRow<'a>,
     /// Where its strategy wants the copy to be.
     pub target: StateRow<'a>,
-    /// FC [N].
+    /// FC \[N\].
     pub coupling_force: &'a [f64],
-    /// FT [N].
+    /// FT \[N\].
     pub coordination_force: &'a [f64],
 }
 

@@ -70,10 +70,10 @@ fn ticking(peers: &[PeerSpec]) -> Ticking {
 
 fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice {
     let spec = &scene.peers[peer];
-    let touches_later = scene.timeline.iter().any(|change| match &change.what {
-        ChangeKind::Contact { peer: changed, contact } => *changed == peer && *contact != Contact::None,
-        _ => false,
-    });
+    let touches_later = scene
+        .timeline
+        .iter()
+        .any(|change| matches!(&change.what, ChangeKind::Contact { peer: changed, contact } if *changed == peer && *contact != Contact::None));
     let moved_later =
         scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Hand { peer: changed, hand: Some(_) } if *changed == peer));
     if spec.contact != Contact::None || touches_later {

@@ -14,7 +14,7 @@ pub(crate) enum Schedule {
     /// All peers tick together, every `tick`.
     Lockstep { tick: Duration, next: Instant },
     /// One event for the next tick of each peer.
-    EventDriven(EventQueue<Tick>),
+    EventDriven(Box<EventQueue<Tick>>),
 }
 
 /// A peer's next tick. Simultaneous ticks come in the order of the peers.
@@ -51,7 +51,7 @@ impl Schedule {
                         queue.push(Tick { at, peer });
                     }
                 }
-                Self::EventDriven(queue)
+                Self::EventDriven(Box::new(queue))
             }
         }
     }

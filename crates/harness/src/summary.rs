@@ -20,7 +20,7 @@ pub struct Summary {
     pub links: Vec<LinkSummary>,
     /// The access lines that peers have.
     pub access_lines: Vec<AccessSummary>,
-    /// The largest distance along an axis between two copies of the object at their latest ticks, over the whole run [m].
+    /// The largest distance along an axis between two copies of the object at their latest ticks, over the whole run \[m\].
     pub max_discrepancy: f64,
 }
 
@@ -40,7 +40,7 @@ pub enum Ending {
 pub struct PeerSummary {
     /// Its name.
     pub name: String,
-    /// Position of its copy along each axis [m].
+    /// Position of its copy along each axis \[m\].
     pub position: Vec<f64>,
     /// Velocity of its copy along each axis [m/s].
     pub velocity: Vec<f64>,

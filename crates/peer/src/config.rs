@@ -5,7 +5,7 @@ use crate::Signal;
 /// A haptic device: a mass with viscous damping.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct DeviceConfig {
-    /// Mass mH [kg], above zero.
+    /// Mass mH \[kg\], above zero.
     pub mass: f64,
     /// Viscous damping bH [N·s/m].
     pub damping: f64,
@@ -31,7 +31,7 @@ impl Gains {
 /// One peer's copy of the shared virtual object.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct CopyConfig {
-    /// Mass of this copy, mO/N where the object's mass is split [kg], above zero.
+    /// Mass of this copy, mO/N where the object's mass is split \[kg\], above zero.
     pub mass: f64,
     /// Viscous damping bO of this copy [N·s/m].
     pub damping: f64,
@@ -40,7 +40,7 @@ pub struct CopyConfig {
 /// The impedance of an arm that holds the device.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ArmConfig {
-    /// Mass that the arm adds to the device [kg].
+    /// Mass that the arm adds to the device \[kg\].
     pub mass: f64,
     /// Damping towards the wanted motion [N·s/m].
     pub damping: f64,
@@ -51,13 +51,13 @@ pub struct ArmConfig {
 /// What the user's hand does to the device.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Hand {
-    /// A force on the device [N], sampled at each tick and held.
+    /// A force on the device \[N\], sampled at each tick and held.
     Force(Signal),
-    /// An arm of that impedance around a wanted motion [m], itself sampled at each tick and held.
+    /// An arm of that impedance around a wanted motion \[m\], itself sampled at each tick and held.
     Arm {
         /// The impedance.
         arm: ArmConfig,
-        /// The wanted motion [m].
+        /// The wanted motion \[m\].
         follows: Signal,
     },
 }

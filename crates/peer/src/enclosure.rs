@@ -8,9 +8,9 @@ use crate::State;
 /// every T only if b > K·T/2 + |B|. For a free mass m, K·T²/m must be well below 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Enclosure {
-    /// The lower end of each axis [m].
+    /// The lower end of each axis \[m\].
     pub min: [f64; 3],
-    /// The upper end of each axis [m], above the lower one.
+    /// The upper end of each axis \[m\], above the lower one.
     pub max: [f64; 3],
     /// Stiffness of the wall [N/m].
     pub stiffness: f64,
@@ -19,7 +19,7 @@ pub struct Enclosure {
 }
 
 impl Enclosure {
-    /// The force of the walls on an object in that state [N]; zero inside.
+    /// The force of the walls on an object in that state \[N\]; zero inside.
     #[must_use]
     pub fn force<const A: usize>(&self, object: &State<A>) -> [f64; A] {
         core::array::from_fn(|axis| {

@@ -60,9 +60,9 @@ struct Acting<const A: usize> {
 /// The forces computed at a tick, for the record.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Forces<const A: usize> {
-    /// FC, the coupling force on the copy [N].
+    /// FC, the coupling force on the copy \[N\].
     pub coupling: [f64; A],
-    /// FT, the coordination force, which acts on the copy with the opposite sign [N].
+    /// FT, the coordination force, which acts on the copy with the opposite sign \[N\].
     pub coordination: [f64; A],
     /// Where the strategy wants the copy to be.
     pub target: State<A>,

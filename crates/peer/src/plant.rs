@@ -34,7 +34,7 @@ pub enum Integrator {
 /// One body on one axis: m·a = f − b·v − k·x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Plant {
-    /// Mass m [kg], above zero.
+    /// Mass m \[kg\], above zero.
     pub mass: f64,
     /// Viscous damping b towards ground [N·s/m].
     pub damping: f64,

@@ -18,7 +18,7 @@ pub enum Signal {
         amplitude: [f64; 3],
         /// Frequency, the same for all.
         frequency: Hertz,
-        /// Phase [rad], the same for all.
+        /// Phase \[rad\], the same for all.
         phase: f64,
     },
     /// Measured rows, linear in between.
@@ -39,7 +39,7 @@ impl Signal {
         }
     }
 
-    /// The derivative with respect to time at `t` [per s]; for a table, the slope of the segment that begins at or before `t`.
+    /// The derivative with respect to time at `t` \[per s\]; for a table, the slope of the segment that begins at or before `t`.
     #[must_use]
     pub fn slope<const A: usize>(&self, t: Instant) -> [f64; A] {
         match self {

@@ -3,7 +3,7 @@
 /// Position and velocity of a body along A axes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct State<const A: usize> {
-    /// Position [m].
+    /// Position \[m\].
     pub position: [f64; A],
     /// Velocity [m/s].
     pub velocity: [f64; A],

@@ -10,9 +10,9 @@
 //!     16     4  sender: the place of the peer in the session
 //!     20     4  zero
 //!     24     8  sequence number of the sample, from 0
-//!     32     8  send time [ns] on the sender's clock
+//!     32     8  send time \[ns\] on the sender's clock
 //!     40     8  zero
-//!     48    16  position [m] and velocity [m/s] on the first axis, then on the others
+//!     48    16  position \[m\] and velocity [m/s] on the first axis, then on the others
 //! ```
 //!
 //! A datagram is taken only if every byte of it has a meaning: whatever decodes encodes to the same bytes again. The zeros are room for what a
@@ -26,13 +26,13 @@ use crate::State;
 pub const MAGIC: [u8; 4] = *b"CHPT";
 /// The version that this module reads and writes.
 pub const VERSION: u16 = 1;
-/// The length of the largest datagram, with three axes [byte].
+/// The length of the largest datagram, with three axes \[byte\].
 pub const MAX_LEN: usize = datagram_len(3);
 
 const HEADER_LEN: usize = 48;
 const AXIS_LEN: usize = 16;
 
-/// The length of a datagram [byte].
+/// The length of a datagram \[byte\].
 #[must_use]
 pub const fn datagram_len(axes: usize) -> usize {
     HEADER_LEN + AXIS_LEN * axes

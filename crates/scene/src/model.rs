@@ -64,13 +64,13 @@ impl Axes {
 /// The shared virtual object. Components beyond the scene's axes are zero.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ObjectSpec {
-    /// Mass of the whole object [kg], above zero.
+    /// Mass of the whole object \[kg\], above zero.
     pub mass: f64,
     /// Viscous damping of each copy [N·s/m].
     pub damping: f64,
     /// Whether each of N copies has mass/N, or the whole mass.
     pub split_mass: bool,
-    /// Where every copy and every device begins [m].
+    /// Where every copy and every device begins \[m\].
     pub position: [f64; 3],
     /// With which velocity every copy and every device begins [m/s].
     pub velocity: [f64; 3],
@@ -122,7 +122,7 @@ pub struct PeerSpec {
     pub coupling_scaling: Scaling,
     /// What its hand does; `None`: nothing.
     pub hand: Option<Hand>,
-    /// Where its copy and its device begin [m].
+    /// Where its copy and its device begin \[m\].
     pub position: [f64; 3],
     /// With which velocity its copy and its device begin [m/s].
     pub velocity: [f64; 3],
@@ -198,7 +198,7 @@ pub struct LinkChange {
 pub struct Expect {
     /// Whether a small disturbance of the relative motion dies out (`true`) or grows (`false`).
     pub stable: Option<bool>,
-    /// The largest distance along an axis between two copies, over the whole run [m].
+    /// The largest distance along an axis between two copies, over the whole run \[m\].
     pub discrepancy: Option<Bounds>,
     /// Where a copy is at an instant.
     pub positions: Vec<ExpectPosition>,
@@ -236,7 +236,7 @@ pub struct ExpectPosition {
     pub axis: usize,
     /// At the peer's last tick at or before this instant.
     pub at: Instant,
-    /// Where [m].
+    /// Where \[m\].
     pub bounds: Bounds,
 }
 
@@ -247,9 +247,9 @@ pub struct ExpectTravel {
     pub peer: usize,
     /// 0 for x, 1 for y, 2 for z.
     pub axis: usize,
-    /// The distance from where the copy began, either way [m]; above zero.
+    /// The distance from where the copy began, either way \[m\]; above zero.
     pub distance: f64,
-    /// The time from the scene's beginning at which it is first reached [s].
+    /// The time from the scene's beginning at which it is first reached \[s\].
     pub bounds: Bounds,
 }
 

@@ -27,7 +27,7 @@ impl Scaling {
 }
 
 impl Scene {
-    /// The mass of each copy of the object [kg].
+    /// The mass of each copy of the object \[kg\].
     #[must_use]
     pub fn copy_mass(&self) -> f64 {
         if self.object.split_mass { self.object.mass / count(self.peers.len()) } else { self.object.mass }

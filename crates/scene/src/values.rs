@@ -22,9 +22,9 @@ enum Range {
     Positive,
 }
 
-/// Above zero [kg].
+/// Above zero \[kg\].
 pub(crate) const MASS: Quantity = Quantity { range: Range::Positive, unit: "kg" };
-/// At least zero [kg].
+/// At least zero \[kg\].
 pub(crate) const ADDED_MASS: Quantity = Quantity { range: Range::NotNegative, unit: "kg" };
 /// At least zero [N·s/m].
 pub(crate) const DAMPING: Quantity = Quantity { range: Range::NotNegative, unit: "N·s/m" };
@@ -32,21 +32,21 @@ pub(crate) const DAMPING: Quantity = Quantity { range: Range::NotNegative, unit:
 pub(crate) const STIFFNESS: Quantity = Quantity { range: Range::NotNegative, unit: "N/m" };
 /// Above zero [N/m].
 pub(crate) const WALL_STIFFNESS: Quantity = Quantity { range: Range::Positive, unit: "N/m" };
-/// Any [m].
+/// Any \[m\].
 pub(crate) const POSITION: Quantity = Quantity { range: Range::Any, unit: "m" };
-/// Above zero [m].
+/// Above zero \[m\].
 pub(crate) const DISTANCE: Quantity = Quantity { range: Range::Positive, unit: "m" };
 /// Any [m/s].
 pub(crate) const VELOCITY: Quantity = Quantity { range: Range::Any, unit: "m/s" };
-/// Any [N].
+/// Any \[N\].
 pub(crate) const FORCE: Quantity = Quantity { range: Range::Any, unit: "N" };
-/// At least zero [Hz].
+/// At least zero \[Hz\].
 pub(crate) const FREQUENCY: Quantity = Quantity { range: Range::NotNegative, unit: "Hz" };
-/// Any [rad].
+/// Any \[rad\].
 pub(crate) const ANGLE: Quantity = Quantity { range: Range::Any, unit: "rad" };
 
 impl Quantity {
-    /// In words: `a number above zero [kg]`.
+    /// In words: `a number above zero \[kg\]`.
     pub(crate) fn expected(self) -> String {
         let range = match self.range {
             Range::Any => "a number",

@@ -1,6 +1,6 @@
 //! Frequencies: hertz at interfaces, radians per second in formulas.
 
-/// A frequency [Hz].
+/// A frequency \[Hz\].
 #[derive(Clone, Copy, PartialEq, PartialOrd, Debug, Default)]
 pub struct Hertz(pub f64);
 

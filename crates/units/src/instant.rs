@@ -30,7 +30,7 @@ impl Instant {
         self.0
     }
 
-    /// Seconds since the beginning, rounded to the nearest `f64` [s].
+    /// Seconds since the beginning, rounded to the nearest `f64` \[s\].
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a reading for people and for sampling hand forces: rounded to the nearest f64 on purpose")]
     pub const fn as_secs_f64(self) -> f64 {

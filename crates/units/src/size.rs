@@ -3,7 +3,7 @@
 use core::fmt;
 use core::ops::{Add, AddAssign, Sub, SubAssign};
 
-/// A size [byte]. Sums saturate: no queue holds 2⁶⁴ bytes.
+/// A size \[byte\]. Sums saturate: no queue holds 2⁶⁴ bytes.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 pub struct Bytes(u64);
 

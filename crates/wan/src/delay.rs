@@ -127,7 +127,7 @@ impl DelayStage {
         Self { mean_nanos: u64::try_from(delay.mean.as_nanos()).unwrap_or(u64::MAX), jitter: delay.jitter.map(law) }
     }
 
-    /// The delay of one packet [ns]; the draws are used only if there is jitter. Rounded to the nearest nanosecond.
+    /// The delay of one packet \[ns\]; the draws are used only if there is jitter. Rounded to the nearest nanosecond.
     #[inline]
     pub(crate) fn draw_nanos(&self, draws: impl FnOnce() -> Draws) -> u64 {
         let deviation = match self.jitter {

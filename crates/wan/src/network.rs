@@ -96,7 +96,7 @@ pub struct NetworkEvent<P> {
 #[derive(Clone, Debug)]
 pub struct Network<P> {
     config: NetworkConfig,
-    nodes: u32,
+    nodes: u16,
     now: Instant,
     /// By sender, then receiver; the diagonal is never used.
     links: Vec<Line<P>>,
@@ -210,7 +210,7 @@ impl<P> Network<P> {
     /// With more than 23,170 nodes: links are counted in 29 bits, nodes in 16.
     #[must_use]
     pub fn new(config: NetworkConfig, mut link: impl FnMut(NodeId, NodeId) -> LinkConfig) -> Self {
-        let nodes = u32::try_from(config.nodes.len()).ok().filter(|nodes| *nodes <= 23_170).expect("a network has at most 23,170 nodes");
+        let nodes = u16::try_from(config.nodes.len()).ok().filter(|nodes| *nodes <= 23_170).expect("a network has at most 23,170 nodes");
         let mut network = Self {
             nodes,
             now: Instant::ZERO,
@@ -225,9 +225,9 @@ impl<P> Network<P> {
         };
         for from in 0..nodes {
             for to in 0..nodes {
-                let config = if from == to { LinkConfig::default() } else { link(NodeId(from), NodeId(to)) };
+                let config = if from == to { LinkConfig::default() } else { link(NodeId(from.into()), NodeId(to.into())) };
                 network.has_inner_events |= config.bottleneck.is_some();
-                let line = network.line(&network.link_name(from, to), config);
+                let line = network.line(&network.link_name(Path { from, to }), config);
                 network.links.push(line);
             }
         }
@@ -295,17 +295,16 @@ impl<P> Network<P> {
     where
         P: Clone,
     {
-        let nodes = u16::try_from(self.nodes).expect("there are at most 23,170 nodes");
-        let sender = u16::try_from(from.0).ok().filter(|sender| *sender < nodes).ok_or(NetworkError::NoLink { from, to: from })?;
+        let sender = self.place(from).ok_or(NetworkError::NoLink { from, to: from })?;
         if !self.paths.is_empty() {
-            for to in (0..self.nodes).filter(|to| *to != from.0) {
-                self.handle_packet(now, from, NodeId(to), size, payload.clone())?;
+            for to in (0..self.nodes).filter(|to| *to != sender) {
+                self.handle_packet(now, from, NodeId(to.into()), size, payload.clone())?;
             }
             return Ok(());
         }
         self.let_pass(now)?;
         let size = u32::try_from(size.get()).unwrap_or(u32::MAX);
-        for to in (0..nodes).filter(|to| *to != sender) {
+        for to in (0..self.nodes).filter(|to| *to != sender) {
             let path = Path { from: sender, to };
             let link = self.link(path);
             let sequence = self.links[link as usize].stats.offered;
@@ -355,10 +354,11 @@ impl<P> Network<P> {
     ///
     /// [`NetworkError`] if time went back or there is no such link; nothing was changed.
     pub fn set_link(&mut self, now: Instant, from: NodeId, to: NodeId, config: LinkConfig) -> Result<(), NetworkError> {
-        let line = self.path(from, to).map(|path| self.link(path))?;
+        let path = self.path(from, to)?;
+        let line = self.link(path);
         self.let_pass(now)?;
         self.has_inner_events |= config.bottleneck.is_some();
-        let name = self.link_name(from.0, to.0);
+        let name = self.link_name(path);
         let (departure, released) = self.links[line as usize].pipeline.reconfigure(now, self.config.seed, &name, config);
         if let Some(departure) = departure {
             self.announce(Hop::Link, line, departure);
@@ -390,14 +390,19 @@ impl<P> Network<P> {
         Line { stats: LinkStats::default(), pipeline: Pipeline::new(self.config.seed, name, config, self.config.general) }
     }
 
-    fn link_name(&self, from: u32, to: u32) -> LinkName {
-        LinkName::between(&self.config.nodes[from as usize], &self.config.nodes[to as usize])
+    fn link_name(&self, path: Path) -> LinkName {
+        LinkName::between(&self.config.nodes[usize::from(path.from)], &self.config.nodes[usize::from(path.to)])
+    }
+
+    #[inline]
+    fn place(&self, node: NodeId) -> Option<u16> {
+        u16::try_from(node.0).ok().filter(|place| *place < self.nodes)
     }
 
     #[inline]
     fn path(&self, from: NodeId, to: NodeId) -> Result<Path, NetworkError> {
-        match (u16::try_from(from.0), u16::try_from(to.0)) {
-            (Ok(sender), Ok(receiver)) if from.0 < self.nodes && to.0 < self.nodes && from != to => Ok(Path { from: sender, to: receiver }),
+        match (self.place(from), self.place(to)) {
+            (Some(sender), Some(receiver)) if sender != receiver => Ok(Path { from: sender, to: receiver }),
             _ => Err(NetworkError::NoLink { from, to }),
         }
     }
@@ -405,7 +410,7 @@ impl<P> Network<P> {
     /// The number of a path's link.
     #[inline]
     fn link(&self, path: Path) -> u32 {
-        u32::from(path.from) * self.nodes + u32::from(path.to)
+        u32::from(path.from) * u32::from(self.nodes) + u32::from(path.to)
     }
 
     /// Lets time pass. Inner events happen now, so that what they leave behind is there for the next packet; mere arrivals wait to be polled.

@@ -94,7 +94,7 @@ pub(crate) enum Enqueued<T> {
 /// The stages of one link.
 #[derive(Clone, Debug)]
 pub(crate) enum Pipeline<T> {
-    /// Nothing but a constant delay [ns].
+    /// Nothing but a constant delay \[ns\].
     Constant(u64),
     Chain(Box<Chain<T>>),
 }

@@ -51,7 +51,7 @@ impl Stability {
     }
 }
 
-/// The size of the disturbance [m].
+/// The size of the disturbance \[m\].
 const SIZE: f64 = 1e-6;
 /// A disturbance this much smaller than it was has died out, however it went.
 const DIED_OUT: f64 = 1e-3;
@@ -119,7 +119,7 @@ fn verdict(initial: f64, early: f64, late: f64) -> Stability {
     }
 }
 
-/// The largest difference between the two runs in a relative position along an axis [m].
+/// The largest difference between the two runs in a relative position along an axis \[m\].
 fn relative_displacement<const A: usize>(nominal: &World<A>, disturbed: &World<A>) -> f64 {
     let (mut low, mut high, mut stretch) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A], 0.0_f64);
     for (one, other) in nominal.bodies().zip(disturbed.bodies()) {

@@ -9,7 +9,7 @@ use cohaptic_units::Instant;
 pub struct Bands {
     duration: Duration,
     spans: usize,
-    /// The width of a span [ns]; the last one may be cut short by the end.
+    /// The width of a span \[ns\]; the last one may be cut short by the end.
     width: u64,
     /// By curve, then span; `None` where nothing was added.
     extremes: Vec<Vec<Option<(f64, f64)>>>,
@@ -81,13 +81,13 @@ impl Bands {
         self.spans
     }
 
-    /// How long the scene is [s].
+    /// How long the scene is \[s\].
     #[must_use]
     pub const fn seconds(&self) -> f64 {
         self.duration.as_secs_f64()
     }
 
-    /// A curve as (middle of the span [s], lowest, highest), spans without a value left out.
+    /// A curve as (middle of the span \[s\], lowest, highest), spans without a value left out.
     ///
     /// # Panics
     ///

@@ -78,7 +78,7 @@ fn draw_panel<'a>(area: &Drawing<'a>, panel: &Panel<'_>) -> DrawingResult<'a> {
     chart.configure_mesh().x_desc("t [s]").y_desc(panel.unit).light_line_style(WHITE).draw()?;
     let few = panel.bands.curves() <= MOST_NAMED;
     for curve in 0..panel.bands.curves() {
-        let colour = if few { COLOURS[curve] } else { COLOURS[0] };
+        let colour = COLOURS.get(curve).copied().filter(|_| few).unwrap_or(COLOURS[0]);
         let style = colour.mix(if few { 0.9 } else { 0.35 }).stroke_width(1);
         for run in visible_runs(panel, curve, &range) {
             chart.draw_series(LineSeries::new(run, style))?;

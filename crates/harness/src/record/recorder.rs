@@ -39,9 +39,9 @@ struct Plotted {
 const SPANS: usize = 1000;
 const MOST_NUMBERS: usize = 200_000;
 
-/// Farther from where it began no copy is moved by people at desktop devices [m].
+/// Farther from where it began no copy is moved by people at desktop devices \[m\].
 pub const SANE_POSITION: f64 = 1.0;
-/// No desktop device and no person at it gives more force [N].
+/// No desktop device and no person at it gives more force \[N\].
 const SANE_FORCE: f64 = 1000.0;
 
 impl Recorder {
@@ -99,16 +99,13 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl Plotted {
     fn on_packet(&mut self, row: &PacketRow) {
-        let arrived = match row.fate {
-            Fate::Delivered(at) => Some(at),
-            _ => None,
-        };
-        if let Some(at) = arrived {
-            self.delays.add(0, row.sent, (at - row.sent).as_secs_f64());
+        let arrived = matches!(row.fate, Fate::Delivered(_));
+        if arrived {
+            self.delays.add(0, row.sent, (row.at - row.sent).as_secs_f64());
         }
         if let Some(span) = self.delays.span(row.sent) {
             let (dropped, all) = &mut self.drops[span];
-            *dropped = dropped.saturating_add(u32::from(arrived.is_none()));
+            *dropped = dropped.saturating_add(u32::from(!arrived));
             *all = all.saturating_add(1);
         }
     }

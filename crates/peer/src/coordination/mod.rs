@@ -29,7 +29,7 @@ pub struct Context<'a, const A: usize> {
 /// What a strategy answers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Command<const A: usize> {
-    /// The coordination force FT [N]; equation (8) subtracts it.
+    /// The coordination force FT \[N\]; equation (8) subtracts it.
     pub force: [f64; A],
     /// Where the strategy wants the copy to be, (xd, vd), for the record.
     pub target: State<A>,

@@ -1,4 +1,4 @@
-//! The keys of a link: of `[link]`, of an entry of `[[links]]`, of an access line, and of a change in the timeline.
+//! The keys of a link: of `[link]`, of an entry of `[\[links\]]`, of an access line, and of a change in the timeline.
 
 use cohaptic_units::{Bytes, Probability, Rate};
 use cohaptic_wan::{Bottleneck, Delay, Distribution, GilbertElliott, Jitter, LinkConfig, Loss, Order, Outage, Outages, QueueLimit};

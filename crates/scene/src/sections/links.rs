@@ -1,4 +1,4 @@
-//! `[link]` and `[[links]]`: what lies between the peers.
+//! `[link]` and `[\[links\]]`: what lies between the peers.
 //!
 //! A full mesh of N peers has N·(N−1) links, nearly all of them alike. Links are therefore sorted into *classes*: one for `[link]` and one for each
 //! entry that says something else. Only classes are read; a change in the timeline makes new ones.
@@ -32,7 +32,7 @@ struct Class {
     config: Arc<LinkConfig>,
 }
 
-/// Reads `[link]` and `[[links]]`. `None` where something was refused.
+/// Reads `[link]` and `[\[links\]]`. `None` where something was refused.
 pub(crate) fn read_links(defaults: Option<&Node>, entries: Option<&Node>, context: Context<'_>) -> Option<LinkClasses> {
     let nothing = Node::empty_table(BEGINNING, "link".to_owned());
     let defaults = defaults.unwrap_or(&nothing);

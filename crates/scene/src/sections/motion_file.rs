@@ -16,9 +16,9 @@ use crate::values;
 /// What the columns after the time hold.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Columns {
-    /// fx, fy, fz [N].
+    /// fx, fy, fz \[N\].
     Force,
-    /// x, y, z [m].
+    /// x, y, z \[m\].
     Position,
 }
 

@@ -1,4 +1,4 @@
-//! `[[peers]]` and `count`: who takes part.
+//! `[\[peers\]]` and `count`: who takes part.
 
 use core::time::Duration;
 
@@ -74,7 +74,7 @@ fn entry_name<'a>(entry: &'a Node, context: Context<'a>) -> Option<(&'a str, &'a
 pub(crate) struct PeerSources<'a> {
     /// `[peer]`.
     pub(crate) defaults: Option<&'a Node>,
-    /// `[[peers]]`.
+    /// `[\[peers\]]`.
     pub(crate) entries: Option<&'a Node>,
     /// `count` under `[scene]`.
     pub(crate) count: Option<&'a Entry>,

@@ -1,4 +1,4 @@
-//! `[[timeline]]`: what changes while the scene runs.
+//! `[\[timeline\]]`: what changes while the scene runs.
 
 use core::time::Duration;
 
