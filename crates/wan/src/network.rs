@@ -90,9 +90,11 @@ pub struct NetworkEvent<P> {
 /// The driver hands packets in with [`Network::handle_packet`], asks with [`Network::poll_timeout`] when to come back, calls
 /// [`Network::handle_timeout`] then, and drains [`Network::poll_event`] until it gives `None`. Being late costs nothing but lateness.
 ///
-/// Events come in the order of (instant, stage, link, sequence): at equal instants what leaves an uplink enters its link before arrivals are reported,
-/// a departure makes room before a packet is offered, and links come in the order of (sender, receiver). With a delay of zero a packet is there
-/// at the instant at which it was sent.
+/// Events come in the order of their instants. At equal instants what leaves an uplink enters its link before arrivals are reported, a departure
+/// makes room before a packet is offered, arrivals come in the order of (sender, receiver, sequence), and packets that were dropped when they were
+/// offered come after the arrivals that were due. With a delay of zero a packet is there at the instant at which it was sent.
+///
+/// Drain [`Network::poll_event`] after every call: a packet may be dropped at once, and that is not announced by [`Network::poll_timeout`].
 #[derive(Clone, Debug)]
 pub struct Network<P> {
     config: NetworkConfig,
@@ -333,19 +335,16 @@ impl<P> Network<P> {
     #[must_use]
     #[inline(always)]
     pub fn poll_event(&mut self) -> Option<NetworkEvent<P>> {
-        if let Some(event) = self.happened.pop_front() {
-            return Some(event);
-        }
-        while let Some(pending) = self.pending.pop_due(self.now) {
+        loop {
+            // What was dropped when it was offered waits until every arrival that was due by then has been reported.
+            let due = self.happened.front().map_or(self.now, |event| event.at);
+            let Some(pending) = self.pending.pop_due(due) else {
+                return self.happened.pop_front();
+            };
             if let Some(event) = self.happen(pending) {
                 return Some(event);
             }
-            // A packet that was dropped between two lines is waiting there.
-            if let Some(event) = self.happened.pop_front() {
-                return Some(event);
-            }
         }
-        None
     }
 
     /// Changes the configuration of a link from `now` on: see [`crate::Link::set_config`].
