@@ -151,7 +151,8 @@ struct Pending<P> {
     payload: Option<P>,
 }
 
-/// Stage and line in one number: what breaks ties between simultaneous events.
+/// Stage and line in one number: what breaks ties between simultaneous events. All departures come before all arrivals, so that what leaves one
+/// line finds the room that a departure from the next line makes at the same instant.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Place(u32);
 
@@ -168,17 +169,17 @@ const LINE_BITS: u32 = 29;
 
 impl Place {
     fn departure(hop: Hop, line: u32) -> Self {
-        Self(((hop as u32) * 2) << LINE_BITS | line)
+        Self((hop as u32) << LINE_BITS | line)
     }
 
     fn arrival(hop: Hop, line: u32) -> Self {
-        Self(((hop as u32) * 2 + 1) << LINE_BITS | line)
+        Self((hop as u32 + 3) << LINE_BITS | line)
     }
 
     fn hop(self) -> Hop {
-        match self.0 >> (LINE_BITS + 1) {
-            0 => Hop::Uplink,
-            1 => Hop::Link,
+        match self.0 >> LINE_BITS {
+            0 | 3 => Hop::Uplink,
+            1 | 4 => Hop::Link,
             _ => Hop::Downlink,
         }
     }
