@@ -386,13 +386,19 @@ impl<P> Network<P> {
     fn let_pass(&mut self, now: Instant) -> Result<(), TimeWentBack> {
         check_time(&mut self.now, now)?;
         if self.has_inner_events {
-            while let Some(pending) = self.pending.pop_due(now) {
-                if let Some(event) = self.happen(pending) {
-                    self.happened.push_back(event);
-                }
-            }
+            self.let_happen(now);
         }
         Ok(())
+    }
+
+    /// Lets all that is due happen, and keeps the arrivals until they are polled.
+    #[inline]
+    fn let_happen(&mut self, now: Instant) {
+        while let Some(pending) = self.pending.pop_due(now) {
+            if let Some(event) = self.happen(pending) {
+                self.happened.push_back(event);
+            }
+        }
     }
 
     /// Lets one pending event happen, and gives the arrival if it is a packet's last.
@@ -444,6 +450,10 @@ impl<P> Network<P> {
     }
 
     fn drop(&mut self, now: Instant, hop: Hop, line: u32, cause: DropCause, packet: InNetwork<P>) {
+        if !self.has_inner_events {
+            // Arrivals that wait to be polled came before this drop.
+            self.let_happen(now);
+        }
         self.line_mut(hop, line).stats.dropped[cause.index()] += 1;
         self.happened.push_back(packet.event(now, Fate::Dropped(cause)));
     }
