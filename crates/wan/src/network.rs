@@ -297,7 +297,8 @@ impl<P> Network<P> {
         self.let_pass(now)
     }
 
-    /// When [`Network::handle_timeout`] must be called next; `None` if nothing is on the way.
+    /// When [`Network::handle_timeout`] must be called next; `None` if nothing is on the way. Never before the last instant given, once all events are
+    /// polled. After a change of rate it may name an instant at which nothing happens.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.pending.next_at()

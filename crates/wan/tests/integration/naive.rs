@@ -2,7 +2,6 @@
 //! computed again. Only the addresses of the random numbers are shared with the subject.
 
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::random::{Purpose, Stream};
@@ -99,21 +98,23 @@ fn losses(name: &LinkName, configs: &[(Instant, LinkConfig)], offered: &[Offered
     let stationary_bad = |chain: GilbertElliott| first < chain.p.get() / (chain.p.get() + chain.r.get());
     // A chain that never moves is good: 0/0 is less than nothing.
     let mut chain_is_bad: Option<bool> = None;
-    let mut applied = None;
+    let mut applied = 0;
     let mut lost = Vec::new();
     for (number, packet) in offered.iter().enumerate() {
-        for index in applied.map_or(0, |index: usize| index + 1)..=packet.moment.1 {
-            chain_is_bad = match configs[index].1.loss {
+        while applied < packet.moment.1 + 1 {
+            chain_is_bad = match configs[applied].1.loss {
                 Loss::GilbertElliott(chain) => Some(chain_is_bad.unwrap_or_else(|| stationary_bad(chain))),
-                _ => None,
+                Loss::None | Loss::Independent(_) => None,
+                other => unreachable!("no model for {other:?}"),
             };
-            applied = Some(index);
+            applied += 1;
         }
         let config = &configs[packet.moment.1].1;
         let down = config.outages.as_slice().iter().any(|outage| outage.from <= packet.moment.0 && packet.moment.0 < outage.to);
         let mut draws = draws.at(number as u64);
         lost.push(match config.loss {
             _ if down => false,
+            Loss::None => false,
             Loss::Independent(p) => draws.next_unit() < p.get(),
             Loss::GilbertElliott(chain) => {
                 let was_bad = chain_is_bad.unwrap();
@@ -121,7 +122,7 @@ fn losses(name: &LinkName, configs: &[(Instant, LinkConfig)], offered: &[Offered
                 chain_is_bad = Some(was_bad != moves);
                 draws.next_unit() >= if was_bad { chain.h.get() } else { chain.k.get() }
             }
-            _ => false,
+            other => unreachable!("no model for {other:?}"),
         });
     }
     lost
@@ -139,7 +140,8 @@ fn delay(name: &LinkName, config: &LinkConfig, number: u64) -> u64 {
             sd * standard
         }
         // Uniform over ±√3·σ.
-        _ => 3f64.sqrt() * sd * (2.0 * draws.next_unit() - 1.0),
+        Distribution::Uniform => 3f64.sqrt() * sd * (2.0 * draws.next_unit() - 1.0),
+        other => unreachable!("no model for {other:?}"),
     };
     #[expect(clippy::cast_possible_truncation, reason = "the tests draw at most seconds")]
     let deviation = deviation.round_ties_even() as i128;
@@ -211,10 +213,4 @@ pub(crate) fn network_fates(plan: &Plan, sendings: &[Sending]) -> BTreeMap<(Node
         }
     }
     fates
-}
-
-/// A random gap for those who need many.
-pub(crate) fn exponential(mean: Duration, number: u64) -> Duration {
-    let standard: f64 = rand_distr::Exp1.sample(&mut Stream::new(SEED, b"arrivals", Purpose::Jitter).at(number));
-    mean.mul_f64(standard)
 }

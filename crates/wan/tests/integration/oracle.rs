@@ -60,7 +60,7 @@ fn moderate(script: &[Operation]) -> Vec<Operation> {
         .iter()
         .map(|operation| match operation {
             Operation::Offer { gap, size } => Operation::Offer { gap: *gap, size: small(*size) },
-            other => other.clone(),
+            Operation::Pass { .. } | Operation::Poll | Operation::Configure { .. } => operation.clone(),
         })
         .collect()
 }
