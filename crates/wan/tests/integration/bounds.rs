@@ -3,15 +3,18 @@
 use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{Bottleneck, Delay, DropCause, Fate, LinkConfig, LinkName, Network, NetworkError, NodeId, Order, TimeWentBack};
+use cohaptic_wan::{
+    AccessLine, Bottleneck, Delay, DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName, Network, NetworkConfig, NetworkError, NodeId, Order,
+    QueueLimit, TimeWentBack,
+};
 use proptest::prelude::*;
 
 use crate::random_links::{
-    Operation, Payload, any_config, at, bottleneck, cases, config, drain, drain_network, link, nanos, offers, operations, plan, sendings,
+    Operation, Payload, any_config, at, bottleneck, cases, config, drain, drain_network, link, nanos, offers, operations, plan, rate, sendings,
 };
 
 /// All that becomes of packets offered with those gaps, in the order in which it is polled at the end.
-fn run(config: &LinkConfig, offered: &[(Duration, Bytes)]) -> Vec<cohaptic_wan::LinkEvent<Payload>> {
+fn run(config: &LinkConfig, offered: &[(Duration, Bytes)]) -> Vec<LinkEvent<Payload>> {
     let mut subject = link(config.clone());
     let mut now = Instant::ZERO;
     for ((gap, size), number) in offered.iter().zip(0..) {
@@ -161,7 +164,7 @@ proptest! {
         if let NetworkError::TimeWentBack(TimeWentBack { now: given, was, .. }) = error {
             prop_assert!(which < 3 && (given, was) == (past, now));
         } else {
-            prop_assert!(which >= 3 && matches!(error, NetworkError::NoLink { .. }));
+            prop_assert!(which >= 3 && matches!(error, NetworkError::NoLink { .. }), "{}", error);
         }
         prop_assert_eq!(format!("{subject:?}"), before);
     }
@@ -169,20 +172,17 @@ proptest! {
 
 #[test]
 fn an_access_line_of_nobody_is_refused() {
-    let plan_of_two = cohaptic_wan::NetworkConfig { seed: 1, nodes: vec!["a".into(), "b".into()], general: false };
+    let plan_of_two = NetworkConfig { seed: 1, nodes: vec!["a".into(), "b".into()], general: false };
     let network: Network<Payload> = Network::new(plan_of_two, |_, _| LinkConfig::default());
-    let line = cohaptic_wan::AccessLine::Uplink(NodeId(2));
+    let line = AccessLine::Uplink(NodeId(2));
     assert!(matches!(network.with_access_line(line, LinkConfig::default()), Err(NetworkError::NoLine(refused)) if refused == line));
 }
 
 #[test]
 fn a_change_to_in_order_holds_for_what_is_on_the_way() {
     // Sent at 0 with 10 ms; at 1 ms the delay becomes 1 ms and the order kept: what is sent at 2 ms would arrive at 3 ms, and waits for the first.
-    let mut subject = cohaptic_wan::Link::new(
-        1,
-        &LinkName::between("a", "b"),
-        LinkConfig { delay: Delay::constant(Duration::from_millis(10)), ..LinkConfig::default() },
-    );
+    let mut subject =
+        Link::new(1, &LinkName::between("a", "b"), LinkConfig { delay: Delay::constant(Duration::from_millis(10)), ..LinkConfig::default() });
     let millis = |millis: u64| at(millis * 1_000_000);
     subject.handle_packet(millis(0), Bytes::new(1), 'a').unwrap();
     let shorter = LinkConfig { delay: Delay::constant(Duration::from_millis(1)), order: Order::InOrder, ..LinkConfig::default() };
@@ -196,8 +196,8 @@ fn a_change_to_in_order_holds_for_what_is_on_the_way() {
 #[test]
 fn a_limit_in_bytes_does_not_wrap_for_packets_beyond_counting() {
     // The first is on the line. The second fills a queue of 2⁶⁴−1 bytes; the third finds it full.
-    let limit = Some(cohaptic_wan::QueueLimit::Bytes(Bytes::new(u64::MAX)));
-    let bottleneck = Bottleneck { rate: crate::random_links::rate(u64::MAX), overhead: Bytes::ZERO, limit };
+    let limit = Some(QueueLimit::Bytes(Bytes::new(u64::MAX)));
+    let bottleneck = Bottleneck { rate: rate(u64::MAX), overhead: Bytes::ZERO, limit };
     let mut subject = link(LinkConfig { bottleneck: Some(bottleneck), ..LinkConfig::default() });
     for number in 0..3 {
         subject.handle_packet(Instant::ZERO, Bytes::new(u64::MAX), number).unwrap();

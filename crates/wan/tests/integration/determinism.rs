@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{Distribution, DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName, Loss, NetworkEvent, NodeId, Order};
+use cohaptic_wan::{Distribution, DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName, Loss, Network, NetworkConfig, NetworkEvent, NodeId, Order};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -161,8 +161,8 @@ proptest! {
     #[test]
     fn a_node_more_moves_no_other_paths_fates(small in plan(3, 0.01), extra in vec(any_config(), 16), script in sendings(3), more in sendings(4), place in 0..4usize) {
         let build = |names: &[usize], link: &dyn Fn(usize, usize) -> LinkConfig| {
-            let config = cohaptic_wan::NetworkConfig { seed: SEED, nodes: names.iter().copied().map(name).collect(), general: false };
-            cohaptic_wan::Network::<Payload>::new(config, |from, to| link(names[from.0 as usize], names[to.0 as usize]))
+            let config = NetworkConfig { seed: SEED, nodes: names.iter().copied().map(name).collect(), general: false };
+            Network::<Payload>::new(config, |from, to| link(names[from.0 as usize], names[to.0 as usize]))
         };
         let mut names = vec![0, 1, 2];
         let among_three = |from: usize, to: usize| small.links[from * 3 + to].clone();
@@ -180,7 +180,7 @@ proptest! {
                 four.handle_packet(now, number(other.from), number(other.to), other.size, 0).unwrap();
             }
         }
-        let by_path = |network: &mut cohaptic_wan::Network<Payload>, names: &[usize]| {
+        let by_path = |network: &mut Network<Payload>, names: &[usize]| {
             network.handle_timeout(Instant::MAX).unwrap();
             let node = |id: NodeId| names[id.0 as usize];
             drain_network(network).into_iter().map(|event| ((node(event.from), node(event.to), event.sequence), (event.at, event.fate))).collect::<BTreeMap<_, _>>()

@@ -1,14 +1,14 @@
 //! Links and networks against the naive model: every fate and every instant, to the nanosecond.
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{Fate, LinkConfig, LinkName, Order};
+use cohaptic_wan::{Bottleneck, Delay, DropCause, Fate, LinkConfig, LinkName, Loss, NodeId, Order, Outages, QueueLimit};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
 use crate::naive::{Offered, fates, network_fates};
 use crate::random_links::{
-    Operation, Sending, any_config, at, bottleneck, cases, config_with, drain, drain_network, gap, link, nanos, offers, operations, plan, sendings,
-    size,
+    BYTE_A_MICROSECOND, Operation, Plan, Sending, any_config, at, bottleneck, cases, config_with, drain, drain_network, gap, link, nanos, offers,
+    operations, plan, rate, sendings, size,
 };
 
 /// The fates by sequence.
@@ -100,7 +100,7 @@ proptest! {
         mut bottleneck in bottleneck(),
     ) {
         bottleneck.limit = None;
-        let config = |bits| LinkConfig { bottleneck: Some(cohaptic_wan::Bottleneck { rate: crate::random_links::rate(bits), ..bottleneck }), ..LinkConfig::default() };
+        let config = |bits| LinkConfig { bottleneck: Some(Bottleneck { rate: rate(bits), ..bottleneck }), ..LinkConfig::default() };
         let script: Vec<Operation> = sizes.iter().map(|size| Operation::Offer { gap: nanos(0), size: Bytes::new(*size) })
             .chain(rates.iter().map(|(gap, bits)| Operation::Configure { gap: nanos(*gap), config: Box::new(config(*bits)) }))
             .collect();
@@ -123,12 +123,12 @@ proptest! {
     fn lines_that_meet_at_one_instant_do_what_the_naive_model_says(mut plan in plan(3, 0.95), script in sendings(3)) {
         let lines = plan.links.iter_mut().chain(plan.uplinks.iter_mut().flatten()).chain(plan.downlinks.iter_mut().flatten());
         for line in lines {
-            line.loss = cohaptic_wan::Loss::None;
-            line.outages = cohaptic_wan::Outages::default();
+            line.loss = Loss::None;
+            line.outages = Outages::default();
             let micros = line.delay.mean().as_micros() % 3;
-            line.delay = cohaptic_wan::Delay::constant(nanos(u64::try_from(micros).unwrap() * 1_000));
+            line.delay = Delay::constant(nanos(u64::try_from(micros).unwrap() * 1_000));
             if let Some(bottleneck) = &mut line.bottleneck {
-                bottleneck.rate = crate::random_links::rate(crate::random_links::BYTE_A_MICROSECOND);
+                bottleneck.rate = rate(BYTE_A_MICROSECOND);
                 bottleneck.overhead = Bytes::ZERO;
             }
         }
@@ -136,7 +136,7 @@ proptest! {
     }
 }
 
-fn compare_network(plan: &crate::random_links::Plan, general: bool, script: &[Sending]) -> Result<(), TestCaseError> {
+fn compare_network(plan: &Plan, general: bool, script: &[Sending]) -> Result<(), TestCaseError> {
     let mut subject = plan.build(general);
     let mut now = Instant::ZERO;
     let mut events = Vec::new();
@@ -162,18 +162,17 @@ fn compare_network(plan: &crate::random_links::Plan, general: bool, script: &[Se
 
 #[test]
 fn a_departure_from_a_link_makes_room_for_what_leaves_the_uplink_at_that_instant() {
-    use cohaptic_wan::{Bottleneck, Delay, NodeId, QueueLimit};
     // The uplink sends a byte in a microsecond, the link in two, with room for one that waits. Packets are offered in one burst at 0: they leave the
     // uplink at 1, 2, 3, 4 µs. The link serves the first over [1, 3], and the second waits from 2 to 3; at 3 the third comes and finds room.
     // The link then serves the second until 5; the fourth comes at 4 and is dropped.
     let line = |bits, limit| LinkConfig {
-        bottleneck: Some(Bottleneck { rate: crate::random_links::rate(bits), overhead: Bytes::ZERO, limit }),
+        bottleneck: Some(Bottleneck { rate: rate(bits), overhead: Bytes::ZERO, limit }),
         delay: Delay::default(),
         order: Order::AllowReordering,
         ..LinkConfig::default()
     };
-    let byte = crate::random_links::BYTE_A_MICROSECOND;
-    let plan = crate::random_links::Plan {
+    let byte = BYTE_A_MICROSECOND;
+    let plan = Plan {
         nodes: 2,
         links: vec![line(byte / 2, Some(QueueLimit::Packets(1))); 4],
         uplinks: vec![Some(line(byte, None)), None],
@@ -187,7 +186,7 @@ fn a_departure_from_a_link_makes_room_for_what_leaves_the_uplink_at_that_instant
     let mut fates: Vec<(u64, Fate)> = drain_network(&mut network).into_iter().map(|event| (event.payload, event.fate)).collect();
     fates.sort_by_key(|(number, _)| *number);
     let delivered = |micros: u64| Fate::Delivered(at(micros * 1_000));
-    assert_eq!(fates, [(0, delivered(3)), (1, delivered(5)), (2, delivered(7)), (3, Fate::Dropped(cohaptic_wan::DropCause::QueueFull))]);
+    assert_eq!(fates, [(0, delivered(3)), (1, delivered(5)), (2, delivered(7)), (3, Fate::Dropped(DropCause::QueueFull))]);
 }
 
 proptest! {
@@ -196,7 +195,7 @@ proptest! {
     /// What waits when the bottleneck is taken away leaves at once, in order.
     #[test]
     fn a_bottleneck_that_is_taken_away_releases_what_it_held(offered in offers(), bottleneck in bottleneck(), change in 0..200_000u64) {
-        let narrow = LinkConfig { bottleneck: Some(cohaptic_wan::Bottleneck { limit: None, ..bottleneck }), ..LinkConfig::default() };
+        let narrow = LinkConfig { bottleneck: Some(Bottleneck { limit: None, ..bottleneck }), ..LinkConfig::default() };
         let mut now = Instant::ZERO;
         let mut subject = link(narrow.clone());
         let mut packets = Vec::new();
