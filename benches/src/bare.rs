@@ -7,9 +7,8 @@
 
 use std::collections::VecDeque;
 
-use cohaptic_wan::LinkName;
 use cohaptic_wan::random::{Purpose, Stream};
-use rand_distr::{Distribution as _, StandardNormal};
+use cohaptic_wan::{LinkName, standard_normal};
 
 use crate::{COPY_DAMPING, COUPLING, DELAY_NANOS, DEVICE, LOSS, Mesh, OBJECT_MASS, SD_NANOS, TICK_NANOS, TICKS_A_FRAME};
 
@@ -113,7 +112,7 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
                             counters[link].lost += 1;
                             continue;
                         }
-                        let z: f64 = StandardNormal.sample(&mut jitter_draws[link].at(sequence));
+                        let z = standard_normal(&mut jitter_draws[link].at(sequence));
                         packet.arrival = packet.arrival.saturating_add_signed((z * SD_NANOS).round_ties_even() as i64);
                         wheel[packet.arrival.div_ceil(TICK_NANOS).max(tick) as usize % 64].push(packet);
                     } else {

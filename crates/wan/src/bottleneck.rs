@@ -52,7 +52,8 @@ impl Bottleneck {
 pub(crate) struct BottleneckStage<T> {
     config: Bottleneck,
     waiting: VecDeque<(Bytes, T)>,
-    waiting_bytes: Bytes,
+    /// Wider than [`Bytes`], whose sum would saturate and then count wrongly.
+    waiting_bytes: u128,
     in_service: Option<InService<T>>,
     /// Counts departures that were announced, so that one that a change of rate made stale is known.
     announced: u64,
@@ -78,7 +79,7 @@ pub(crate) struct Departure {
 impl<T> BottleneckStage<T> {
     /// An idle line. Announcements count on from `announced`, so that those of a line that stood here before stay stale.
     pub(crate) fn new(config: Bottleneck, announced: u64) -> Self {
-        Self { config, waiting: VecDeque::new(), waiting_bytes: Bytes::ZERO, in_service: None, announced }
+        Self { config, waiting: VecDeque::new(), waiting_bytes: 0, in_service: None, announced }
     }
 
     /// Takes a packet. `Ok(Some)`: the line was idle and has begun to send it. `Ok(None)`: it waits. `Err`: the queue is full; the packet comes back.
@@ -89,13 +90,13 @@ impl<T> BottleneckStage<T> {
         let full = match self.config.limit {
             None => false,
             Some(QueueLimit::Packets(limit)) => self.waiting.len() as u64 >= limit,
-            Some(QueueLimit::Bytes(limit)) => self.waiting_bytes + size > limit,
+            Some(QueueLimit::Bytes(limit)) => self.waiting_bytes + u128::from(size.get()) > u128::from(limit.get()),
         };
         if full {
             return Err(item);
         }
         self.waiting.push_back((size, item));
-        self.waiting_bytes += size;
+        self.waiting_bytes += u128::from(size.get());
         Ok(None)
     }
 
@@ -127,7 +128,7 @@ impl<T> BottleneckStage<T> {
 
     fn serve_next(&mut self, now: Instant) -> Option<Departure> {
         let (size, item) = self.waiting.pop_front()?;
-        self.waiting_bytes -= size;
+        self.waiting_bytes -= u128::from(size.get());
         Some(self.serve(now, size, item))
     }
 

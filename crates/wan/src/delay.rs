@@ -2,11 +2,10 @@
 
 use core::time::Duration;
 
-use rand_distr::{Distribution as _, StandardNormal};
-
+use crate::normal::standard_normal;
 use crate::random::Draws;
 
-/// The law of the jitter. Its standard deviation is always the one asked for.
+/// The law of the jitter. Its standard deviation is the one asked for, but for what the normal law loses below zero delay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[non_exhaustive]
 pub enum Distribution {
@@ -139,11 +138,6 @@ impl DelayStage {
         let deviation = libm::rint(deviation) as i64;
         self.mean_nanos.saturating_add_signed(deviation)
     }
-}
-
-/// A standard normal number by the ziggurat method, the same on every platform.
-fn standard_normal(draws: &mut Draws) -> f64 {
-    StandardNormal.sample(draws)
 }
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;

@@ -146,7 +146,8 @@ impl<P> Link<P> {
         Ok(())
     }
 
-    /// When [`Link::handle_timeout`] must be called next; `None` if nothing is on the way. Never before the last instant given.
+    /// When [`Link::handle_timeout`] must be called next; `None` if nothing is on the way. Never before the last instant given. After a
+    /// change of rate it may name an instant at which nothing happens.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.pending.next_at()

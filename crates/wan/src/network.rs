@@ -153,7 +153,8 @@ struct Pending<P> {
     payload: Option<P>,
 }
 
-/// Stage and line in one number: what breaks ties between simultaneous events.
+/// Stage and line in one number: what breaks ties between simultaneous events. All departures come before all arrivals, so that what leaves one
+/// line finds the room that a departure from the next line makes at the same instant.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Place(u32);
 
@@ -170,17 +171,17 @@ const LINE_BITS: u32 = 29;
 
 impl Place {
     fn departure(hop: Hop, line: u32) -> Self {
-        Self(((hop as u32) * 2) << LINE_BITS | line)
+        Self((hop as u32) << LINE_BITS | line)
     }
 
     fn arrival(hop: Hop, line: u32) -> Self {
-        Self(((hop as u32) * 2 + 1) << LINE_BITS | line)
+        Self((hop as u32 + 3) << LINE_BITS | line)
     }
 
     fn hop(self) -> Hop {
-        match self.0 >> (LINE_BITS + 1) {
-            0 => Hop::Uplink,
-            1 => Hop::Link,
+        match self.0 >> LINE_BITS {
+            0 | 3 => Hop::Uplink,
+            1 | 4 => Hop::Link,
             _ => Hop::Downlink,
         }
     }
@@ -325,7 +326,8 @@ impl<P> Network<P> {
         self.let_pass(now)
     }
 
-    /// When [`Network::handle_timeout`] must be called next; `None` if nothing is on the way.
+    /// When [`Network::handle_timeout`] must be called next; `None` if nothing is on the way. Never before the last instant given, once all events are
+    /// polled. After a change of rate it may name an instant at which nothing happens.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.pending.next_at()
@@ -335,16 +337,19 @@ impl<P> Network<P> {
     #[must_use]
     #[inline(always)]
     pub fn poll_event(&mut self) -> Option<NetworkEvent<P>> {
-        loop {
-            // What was dropped when it was offered waits until every arrival that was due by then has been reported.
-            let due = self.happened.front().map_or(self.now, |event| event.at);
-            let Some(pending) = self.pending.pop_due(due) else {
-                return self.happened.pop_front();
-            };
+        if let Some(event) = self.happened.pop_front() {
+            return Some(event);
+        }
+        while let Some(pending) = self.pending.pop_due(self.now) {
             if let Some(event) = self.happen(pending) {
                 return Some(event);
             }
+            // A packet that was dropped between two lines is waiting there.
+            if let Some(event) = self.happened.pop_front() {
+                return Some(event);
+            }
         }
+        None
     }
 
     /// Changes the configuration of a link from `now` on: see [`crate::Link::set_config`].
@@ -417,13 +422,19 @@ impl<P> Network<P> {
     fn let_pass(&mut self, now: Instant) -> Result<(), TimeWentBack> {
         check_time(&mut self.now, now)?;
         if self.has_inner_events {
-            while let Some(pending) = self.pending.pop_due(now) {
-                if let Some(event) = self.happen(pending) {
-                    self.happened.push_back(event);
-                }
-            }
+            self.let_happen(now);
         }
         Ok(())
+    }
+
+    /// Lets all that is due happen, and keeps the arrivals until they are polled.
+    #[inline]
+    fn let_happen(&mut self, now: Instant) {
+        while let Some(pending) = self.pending.pop_due(now) {
+            if let Some(event) = self.happen(pending) {
+                self.happened.push_back(event);
+            }
+        }
     }
 
     /// Lets one pending event happen, and gives the arrival if it is a packet's last.
@@ -475,6 +486,10 @@ impl<P> Network<P> {
     }
 
     fn drop(&mut self, now: Instant, hop: Hop, line: u32, cause: DropCause, packet: InNetwork<P>) {
+        if !self.has_inner_events {
+            // Arrivals that wait to be polled came before this drop.
+            self.let_happen(now);
+        }
         self.line_mut(hop, line).stats.dropped[cause.index()] += 1;
         self.happened.push_back(packet.event(now, Fate::Dropped(cause)));
     }

@@ -1,0 +1,111 @@
+//! Standard normal numbers by the ziggurat method (Marsaglia & Tsang 2000).
+//!
+//! The density exp(−x²/2) is covered with 256 layers of equal area. A layer and a point in it take one word; in 98.8 % of the cases the point lies
+//! under the density for certain. Only `libm` is called, so a draw is the same on every platform. (Inverting the distribution function, by Wichura's
+//! AS 241, made a packet with jitter 20 % slower.)
+
+mod tables;
+
+use crate::random::Draws;
+use tables::{F, R, X};
+
+/// A standard normal number. It takes one word of the draws, seldom more.
+#[must_use]
+#[inline]
+pub fn standard_normal(draws: &mut Draws) -> f64 {
+    loop {
+        let word = draws.next_word();
+        // The layer, the sign and the place in the layer are different bits of the word.
+        let layer = usize::from(word.to_le_bytes()[0]);
+        let size = unit(word) * X[layer];
+        let found = if size < X[layer + 1] { Some(size) } else { outside_the_core(layer, size, draws) };
+        if let Some(size) = found {
+            return if word & 0x100 == 0 { size } else { -size };
+        }
+    }
+}
+
+/// The point lies in a layer's wedge or in the tail: decides with more draws. `None`: it lies above the density.
+#[cold]
+fn outside_the_core(layer: usize, size: f64, draws: &mut Draws) -> Option<f64> {
+    if layer == 0 {
+        return Some(tail(draws));
+    }
+    let height = F[layer] + (F[layer + 1] - F[layer]) * draws.next_unit();
+    (height < libm::exp(-0.5 * size * size)).then_some(size)
+}
+
+/// A draw from the tail beyond R, by Marsaglia (1964).
+fn tail(draws: &mut Draws) -> f64 {
+    loop {
+        // 1 − u lies in (0, 1]: its logarithm is finite.
+        let beyond = -libm::log(1.0 - draws.next_unit()) / R;
+        let height = -libm::log(1.0 - draws.next_unit());
+        if 2.0 * height > beyond * beyond {
+            return R + beyond;
+        }
+    }
+}
+
+/// The top 53 bits as a number in [0, 1).
+#[inline]
+#[expect(clippy::cast_precision_loss, reason = "53 bits are exact in an f64")]
+fn unit(word: u64) -> f64 {
+    const TWO_POW_MINUS_53: f64 = 1.0 / 9_007_199_254_740_992.0;
+    (word >> 11) as f64 * TWO_POW_MINUS_53
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Purpose, Stream};
+
+    /// Every layer has the same area, that of the lowest with its tail: R·F(R) + √(π/2)·erfc(R/√2). Tables of 16 digits are consistent to 1e-14.
+    #[test]
+    fn all_layers_have_one_area() {
+        let density = |x: f64| libm::exp(-0.5 * x * x);
+        let area = R * density(R) + libm::sqrt(core::f64::consts::FRAC_PI_2) * libm::erfc(R / core::f64::consts::SQRT_2);
+        assert!((X[0] * density(R) - area).abs() < 1e-14);
+        assert_eq!((X[1], X[256], F[256]), (R, 0.0, 1.0));
+        for i in 1..256 {
+            assert!((X[i] * (F[i + 1] - F[i]) - area).abs() < 1e-14, "layer {i}");
+            assert!((F[i] - density(X[i])).abs() < 1e-15, "edge {i}");
+        }
+    }
+
+    /// Moments of 2·10⁶ draws: the standard errors of mean, variance, skewness and kurtosis are √(1/n), √(2/n), √(15/n) and √(96/n) for Σz^k/n with
+    /// k = 1, 2, 3, 4; 4.5 of them are exceeded by chance once in 150 000.
+    #[test]
+    fn moments_are_those_of_the_normal_law() {
+        let stream = Stream::new(3, b"normal", Purpose::Jitter);
+        let count = 2_000_000_u32;
+        let mut sums = [0.0; 4];
+        for packet in 0..u64::from(count) {
+            let z = standard_normal(&mut stream.at(packet));
+            let square = z * z;
+            for (sum, power) in sums.iter_mut().zip([z, square, square * z, square * square]) {
+                *sum += power;
+            }
+        }
+        let n = f64::from(count);
+        for ((sum, mean), variance) in sums.iter().zip([0.0, 1.0, 0.0, 3.0]).zip([1.0, 2.0, 15.0, 96.0]) {
+            assert!((sum / n - mean).abs() < 4.5 * libm::sqrt(variance / n), "{sums:?}");
+        }
+    }
+
+    /// Of 2·10⁶ draws about 2·10⁶·erfc(3.8/√2) = 289.4 lie beyond 3.8, all of them from the tail; Poisson, 4.5 standard deviations of 17.
+    #[test]
+    fn the_tail_has_its_share() {
+        let stream = Stream::new(4, b"normal", Purpose::Jitter);
+        let beyond = (0..2_000_000).filter(|&packet| standard_normal(&mut stream.at(packet)).abs() > 3.8).count();
+        assert!((213..=366).contains(&beyond), "{beyond}");
+    }
+
+    /// A draw is part of every recorded result with jitter: if this fails, the change breaks them.
+    #[test]
+    fn draws_never_change() {
+        let stream = Stream::new(1, b"left->right", Purpose::Jitter);
+        let drawn: [u64; 3] = core::array::from_fn(|packet| standard_normal(&mut stream.at(packet as u64)).to_bits());
+        assert_eq!(drawn, [13_805_245_113_503_555_042, 4_609_251_688_676_149_596, 4_597_926_677_260_238_969]);
+    }
+}
