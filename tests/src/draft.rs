@@ -1,6 +1,6 @@
 //! A scene as a test thinks of it, and the TOML text of it.
 
-use std::fmt::Write;
+use std::fmt::{self, Write};
 
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Enclosure, Gains};
 use cohaptic_scene::Scene;
@@ -8,8 +8,8 @@ use cohaptic_scene::Scene;
 /// A component for each of up to three axes; those beyond the scene's are not written.
 pub type Place = [f64; 3];
 
-/// A scene to order.
-#[derive(Clone, PartialEq, Debug)]
+/// A scene to order. It is shown as its TOML text.
+#[derive(Clone, PartialEq)]
 pub struct Draft {
     /// How long it lasts [ms].
     pub duration: u64,
@@ -114,6 +114,12 @@ pub struct DraftLink {
     pub to: String,
     /// Its keys, as TOML.
     pub keys: String,
+}
+
+impl fmt::Debug for Draft {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "\n{}", self.to_toml())
+    }
 }
 
 impl Draft {

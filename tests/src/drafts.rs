@@ -114,6 +114,9 @@ pub fn link() -> impl Strategy<Value = String> + Clone {
                 let distribution = if normal { "normal" } else { "uniform" };
                 keys.push(format!("jitter = {{ sd = \"{}ns\", distribution = \"{distribution}\" }}", us * part));
                 keys.push(format!("order = \"{}\"", if in_order { "in-order" } else { "allow-reordering" }));
+            } else {
+                // Laid over another link, a shorter delay must not be left with its jitter.
+                keys.push("jitter = \"0s\"".to_owned());
             }
         }
         keys.extend(loss);
@@ -210,7 +213,7 @@ enum Change {
 
 fn change(count: usize, axes: usize) -> impl Strategy<Value = Change> {
     prop_oneof![
-        link().prop_map(Change::Link),
+        link().prop_filter("a change changes something", |keys| !keys.is_empty()).prop_map(Change::Link),
         (0..count, contact(axes)).prop_map(|(peer, contact)| Change::Contact(peer, contact)),
         (0..count, prop_oneof![Just(DraftHand::None), force()]).prop_map(|(peer, hand)| Change::Hand(peer, hand)),
         gains(2000.0, 20.0).prop_map(Change::Gains),

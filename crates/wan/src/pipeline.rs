@@ -18,7 +18,7 @@ use crate::bottleneck::{BottleneckStage, Departure};
 use crate::loss::LossStage;
 use crate::order::OrderStage;
 use crate::random::{Purpose, Stream};
-use crate::{DropCause, LinkConfig};
+use crate::{DropCause, LinkConfig, Order};
 
 /// The name of a link: the address of its random numbers, and what records call it.
 ///
@@ -93,8 +93,8 @@ pub(crate) enum Enqueued<T> {
 /// The stages of one link.
 #[derive(Clone, Debug)]
 pub(crate) enum Pipeline<T> {
-    /// Nothing but a constant delay [ns].
-    Constant(u64),
+    /// Nothing but a constant delay [ns]. The latest arrival is kept for a live change to `in-order`.
+    Constant(u64, OrderStage),
     Chain(Box<Chain<T>>),
 }
 
@@ -114,7 +114,7 @@ impl<T> Pipeline<T> {
     /// The least that this configuration needs, or the whole chain if `general`.
     pub(crate) fn new(seed: u64, name: &LinkName, config: LinkConfig, general: bool) -> Self {
         if config.is_constant_delay() && !general {
-            Self::Constant(constant_nanos(&config))
+            Self::Constant(constant_nanos(&config), OrderStage::default())
         } else {
             Self::Chain(Box::new(Chain::new(seed, name, config)))
         }
@@ -124,7 +124,7 @@ impl<T> Pipeline<T> {
     #[inline]
     pub(crate) fn offer(&mut self, now: Instant, number: u64) -> Outcome {
         match self {
-            Self::Constant(delay) => Outcome::Arrives(later(now, *delay)),
+            Self::Constant(delay, order) => Outcome::Arrives(order.arrival(Order::AllowReordering, later(now, *delay))),
             Self::Chain(chain) => chain.offer(now, number),
         }
     }
@@ -132,7 +132,7 @@ impl<T> Pipeline<T> {
     /// Hands the packet to the bottleneck, after [`Outcome::Queues`].
     pub(crate) fn enqueue(&mut self, now: Instant, number: u64, size: Bytes, item: T) -> Enqueued<T> {
         let bottleneck = match self {
-            Self::Constant(_) => None,
+            Self::Constant(..) => None,
             Self::Chain(chain) => chain.bottleneck.as_mut(),
         };
         match bottleneck.expect("only a link with a bottleneck answers that a packet queues").offer(now, size, (number, item)) {
@@ -145,7 +145,7 @@ impl<T> Pipeline<T> {
     /// The packet that leaves the bottleneck with this announcement, its arrival, and the announcement of the next. `None` if it is stale.
     pub(crate) fn depart(&mut self, departure: Departure) -> Option<(T, Instant, Option<Departure>)> {
         match self {
-            Self::Constant(_) => None,
+            Self::Constant(..) => None,
             Self::Chain(chain) => chain.depart(departure),
         }
     }
@@ -154,8 +154,8 @@ impl<T> Pipeline<T> {
     /// bottleneck gave up when it was taken away, which propagate from now on.
     pub(crate) fn reconfigure(&mut self, now: Instant, seed: u64, name: &LinkName, config: LinkConfig) -> (Option<Departure>, Vec<(T, Instant)>) {
         match self {
-            Self::Constant(delay) if config.is_constant_delay() => *delay = constant_nanos(&config),
-            Self::Constant(_) => *self = Self::new(seed, name, config, true),
+            Self::Constant(delay, _) if config.is_constant_delay() => *delay = constant_nanos(&config),
+            Self::Constant(_, order) => *self = Self::Chain(Box::new(Chain { order: *order, ..Chain::new(seed, name, config) })),
             Self::Chain(chain) => return chain.reconfigure(now, seed, name, config),
         }
         (None, Vec::new())
