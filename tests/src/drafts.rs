@@ -10,7 +10,12 @@ use crate::{Draft, DraftHand, DraftLink, DraftPeer, Place};
 
 /// Anything that a scene can hold: 2 to 5 peers, every kind of link, contact, hand and clock, up to three axes, changes on the way. It may be unstable.
 pub fn anything() -> impl Strategy<Value = Draft> {
-    (2..=5_usize, 1..=3_usize).prop_flat_map(|(count, axes)| {
+    anything_among(2..=5_usize)
+}
+
+/// [`anything`] with that many peers.
+pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Value = Draft> {
+    (peers, 1..=3_usize).prop_flat_map(|(count, axes)| {
         let header = (30..200_u64, any::<u32>(), 0.05..2.0, 0.0..2.0, any::<bool>(), option::weighted(0.3, walls()));
         let bodies = (place(0.02), place(0.2), select(&Coordination::ALL[..]), gains(2000.0, 20.0), prop_oneof![Just(2000_u64), Just(8000)]);
         let peers = (vec(any_peer(axes), count), any_clocks(count));

@@ -22,7 +22,7 @@ fn fates(draft: &Draft) -> Fates {
 }
 
 proptest! {
-    #![proptest_config(cases(150))]
+    #![proptest_config(cases(500))]
 
     #[test]
     fn a_bystander_changes_no_fate_on_other_links(mut draft in drafts::anything(), place in 0..6_usize) {

@@ -9,7 +9,7 @@ use cohaptic_units::Instant;
 use proptest::prelude::*;
 
 proptest! {
-    #![proptest_config(cases(250))]
+    #![proptest_config(cases(1500))]
 
     #[test]
     fn both_models_give_the_same_rows(draft in drafts::anything()) {
@@ -34,7 +34,7 @@ proptest! {
 
 proptest! {
     // Each case writes twelve files.
-    #![proptest_config(cases(40))]
+    #![proptest_config(cases(100))]
 
     #[test]
     fn both_models_write_the_same_bytes(draft in drafts::anything()) {

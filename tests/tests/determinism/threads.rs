@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 proptest! {
     // Each case writes thirty files.
-    #![proptest_config(cases(12))]
+    #![proptest_config(cases(40))]
 
     #[test]
     fn a_scene_gives_the_same_bytes_again_and_on_other_threads(draft in drafts::anything()) {
