@@ -116,7 +116,7 @@ fn closed_form(m: f64, b: f64, h: f64) -> [f64; 3] {
     let z = b * h / m;
     // (1 − e^{−z})/z and (z − 1 + e^{−z})/z²; the second cancels for small z, where its series 1/2 − z/6 + z²/24 − … converges at once.
     let first = if z == 0.0 { 1.0 } else { -libm::expm1(-z) / z };
-    let second = if z < 0.5 { (0..20).rev().fold(0.0, |rest, n| (1.0 - z * rest) / f64::from(n + 2)) / 1.0 } else { (z + libm::expm1(-z)) / (z * z) };
+    let second = if z < 0.5 { (0..20).rev().fold(0.0, |rest, n| (1.0 - z * rest) / f64::from(n + 2)) } else { (z + libm::expm1(-z)) / (z * z) };
     [first * h, second * h * h, first * h]
 }
 
