@@ -74,10 +74,8 @@ pub fn well_behaved(peers: impl Strategy<Value = usize>, link: impl Strategy<Val
         (header, vec(peer, count), link.clone()).prop_map(move |(header, peers, link)| {
             let (seed, mass, damping, strategy, stiffness, gain, multiple) = header;
             let mut draft = Draft { seed, mass, damping, split_mass: false, strategy, link, update: multiple * 2000, ..Draft::calm(count) };
-            let share = match strategy {
-                Coordination::ProportionalDerivative => f64::from(u32::try_from(count - 1).unwrap()),
-                _ => 1.0,
-            };
+            let several = strategy == Coordination::ProportionalDerivative;
+            let share = if several { f64::from(u32::try_from(count - 1).unwrap()) } else { 1.0 };
             draft.gains = Gains { stiffness: stiffness / share, damping: gain / share };
             for (peer, drawn) in draft.peers.iter_mut().zip(peers) {
                 let (grasps, late, phase, mass, damping, coupling, force, position) = drawn;

@@ -42,8 +42,8 @@ impl Records {
         let differing = names.into_iter().find(|name| self.0[*name] != other.0[*name])?;
         let lines = |records: &Self| String::from_utf8_lossy(&records.0[differing]).lines().map(str::to_owned).collect::<Vec<_>>();
         let (one, two) = (lines(self), lines(other));
-        let number = one.iter().zip(&two).position(|(a, b)| a != b).unwrap_or(one.len().min(two.len()));
-        let line = |lines: &[String]| lines.get(number).map_or("(no such line)".to_owned(), |line| line.chars().take(400).collect());
+        let number = one.iter().zip(&two).position(|(a, b)| a != b).unwrap_or_else(|| one.len().min(two.len()));
+        let line = |lines: &[String]| lines.get(number).map_or_else(|| "(no such line)".to_owned(), |line| line.chars().take(400).collect());
         Some(format!("{differing}, line {}:\n  {}\n  {}", number + 1, line(&one), line(&two)))
     }
 }

@@ -44,10 +44,7 @@ proptest! {
     fn difference_modes_have_the_stiffness_of_equations_3_and_6(draft in untouched()) {
         let log = run(&draft.scene(), Model::Least);
         let n = super::count(draft.peers.len());
-        let factor = match draft.strategy {
-            Coordination::AveragePosition => n / (n - 1.0),
-            _ => n,
-        };
+        let factor = if draft.strategy == Coordination::AveragePosition { n / (n - 1.0) } else { n };
         let (stiffness, damping, mass) = (factor * draft.gains.stiffness, factor * draft.gains.damping, copy_mass(&draft));
         let (x, v) = sizes(&log);
         let (first, last) = (log.of(0), log.of(draft.peers.len() - 1));
@@ -91,10 +88,7 @@ fn copy_mass(draft: &Draft) -> f64 {
 
 /// KT and BT towards the mean.
 fn effective_gains(draft: &Draft) -> (f64, f64) {
-    let factor = match draft.strategy {
-        Coordination::AveragePosition => 1.0,
-        _ => super::count(draft.peers.len() - 1),
-    };
+    let factor = if draft.strategy == Coordination::AveragePosition { 1.0 } else { super::count(draft.peers.len() - 1) };
     (factor * draft.gains.stiffness, factor * draft.gains.damping)
 }
 
