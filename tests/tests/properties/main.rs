@@ -1,4 +1,5 @@
 //! What must hold for every scene: equivalences, symmetries, conservation, and the meaning of a tick, each against an oracle of its own.
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail as tests do")]
 #![allow(clippy::float_cmp, clippy::cast_precision_loss, reason = "oracles that must agree to the bit, and counts far below 2^53")]
 
 mod convergence;

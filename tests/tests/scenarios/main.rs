@@ -1,4 +1,5 @@
 //! Every shipped scene does what its `[expect]` says.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 
 use std::path::PathBuf;
 use std::sync::Mutex;

@@ -1,4 +1,5 @@
 //! Properties of a peer and its parts, against independent oracles.
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail as tests do")]
 #![allow(clippy::float_cmp, reason = "what must agree to the bit is compared so")]
 
 mod late_samples;

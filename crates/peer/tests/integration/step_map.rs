@@ -36,6 +36,38 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(crate::cases(200))]
+
+    /// One step of each method is what its textbook says, not merely something of its order: velocity first and the position with the new velocity;
+    /// four slopes, weighted 1, 2, 2, 1. In doubles of moderate size, so a few roundings of the terms.
+    #[test]
+    fn one_step_of_each_other_method_is_that_method(
+        mass in 0.1..2.0, damping in 0.0..20.0, stiffness in 0.0..2000.0, x in -1.0..1.0, v in -1.0..1.0, f in -5.0..5.0,
+    ) {
+        let span = Duration::from_millis(10);
+        let h = span.as_secs_f64();
+        let plant = Plant { mass, damping, stiffness };
+        let slope = |x: f64, v: f64| (v, (f - damping * v - stiffness * x) / mass);
+        let one_step = |integrator| {
+            let (mut x, mut v) = (x, v);
+            plant.step(span, integrator).advance(&mut x, &mut v, f);
+            (x, v)
+        };
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-11;
+        let (position, velocity) = one_step(Integrator::SemiImplicitEuler { steps: 1 });
+        let new = v + h * slope(x, v).1;
+        prop_assert!(close(velocity, new) && close(position, x + h * new), "Euler: {position}, {velocity}");
+        let (position, velocity) = one_step(Integrator::RungeKutta4 { steps: 1 });
+        let (x1, v1) = slope(x, v);
+        let (x2, v2) = slope(x + h / 2.0 * x1, v + h / 2.0 * v1);
+        let (x3, v3) = slope(x + h / 2.0 * x2, v + h / 2.0 * v2);
+        let (x4, v4) = slope(x + h * x3, v + h * v3);
+        let expected = (x + h / 6.0 * (x1 + 2.0 * x2 + 2.0 * x3 + x4), v + h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4));
+        prop_assert!(close(position, expected.0) && close(velocity, expected.1), "Runge and Kutta: {position}, {velocity}, expected {expected:?}");
+    }
+}
+
 /// The upper rows of exp(X) − I for X = [0 1 0; −w −z 1; 0 0 0].
 fn reference(z: f64, w: f64) -> [[f64; 3]; 2] {
     let mut halvings = 0;
