@@ -37,15 +37,10 @@ proptest! {
     }
 }
 
-/// Without what the oracle does not know: arms, walls, other integrators, and changes of anything but links.
+/// Without what the oracle does not know: walls, other integrators, and changes of anything but links.
 fn replayable(mut draft: Draft) -> Draft {
     (draft.enclosure, draft.integrator) = (None, None);
     draft.timeline.retain(|entry| entry.contains("link = "));
-    for peer in &mut draft.peers {
-        if let DraftHand::Arm { wanted, .. } = peer.hand {
-            peer.hand = DraftHand::Force(wanted);
-        }
-    }
     draft
 }
 
@@ -93,11 +88,20 @@ fn moves_follow(draft: &Draft, row: &Tick, next: &Tick, applied: Option<&Tick>) 
     for axis in 0..draft.axes {
         let (fc, ft) = applied.map_or((0.0, 0.0), |forces| (forces.coupling_force[axis], forces.coordination_force[axis]));
         let hand = hand(&peer.hand, row.at)[axis];
+        if let DraftHand::Arm { arm, .. } = peer.hand {
+            // The arm's mass, damper and spring belong to the device.
+            let plant = [peer.device.mass + arm.mass, peer.device.damping + arm.damping, arm.stiffness];
+            let from = [row.device.position[axis], row.device.velocity[axis]];
+            let ([x, v], [x_size, v_size]) = series(plant, h, from, hand, -fc);
+            close(next.device.position[axis], x, 1e-12 * x_size + 1e-15 * x.abs(), "device in an arm", row)?;
+            close(next.device.velocity[axis], v, 1e-12 * v_size + 1e-15 * v.abs(), "device in an arm", row)?;
+        }
         let bodies = [
             (peer.device.mass, peer.device.damping, hand, -fc, row.device, next.device, "device"),
             (draft.mass / copies, draft.damping, fc, -ft, row.object, next.object, "copy"),
         ];
-        for (m, b, push, pull, from, to, what) in bodies {
+        let free = usize::from(matches!(peer.hand, DraftHand::Arm { .. }));
+        for (m, b, push, pull, from, to, what) in bodies.into_iter().skip(free) {
             let (x, v, f) = (from.position[axis], from.velocity[axis], push + pull);
             let [along, reached, kick] = closed_form(m, b, h);
             // The increments have a relative error of at most 1e-13 in either computation; adding them rounds to the precision of x and v.
@@ -109,6 +113,26 @@ fn moves_follow(draft: &Draft, row: &Tick, next: &Tick, applied: Option<&Tick>) 
         }
     }
     Ok(())
+}
+
+/// The state after h of m·a = push + pull − b·v − k·x by its Taylor series in time, and the sum of the sizes of its terms but the first: each
+/// derivative of x and v follows from the one before it. With b·h/m and k·h²/m below 5, 60 terms leave less than 1e-30.
+fn series([m, b, k]: [f64; 3], h: f64, [x, v]: [f64; 2], push: f64, pull: f64) -> ([f64; 2], [f64; 2]) {
+    let (mut term, mut sum) = ([x, v], [x, v]);
+    let forces = (push + pull) / m;
+    let mut size = [0.0, h * (push.abs() + pull.abs()) / m];
+    for n in 1..60 {
+        let scale = h / f64::from(n);
+        let force = if n == 1 { forces } else { 0.0 };
+        term = [scale * term[1], scale * (force - (b * term[1] + k * term[0]) / m)];
+        for component in 0..2 {
+            sum[component] += term[component];
+            size[component] += term[component].abs();
+        }
+    }
+    size[0] += h * size[1];
+    size[1] += h * k / m * x.abs();
+    (sum, size)
 }
 
 /// ∫φ: how far a unit velocity goes [s], how far a unit acceleration goes [s²], and what velocity it gives [s].
@@ -124,13 +148,15 @@ fn hand(hand: &DraftHand, at: Instant) -> [f64; 3] {
     match hand {
         DraftHand::Force(force) => *force,
         DraftHand::Sine { amplitude, frequency, phase } => amplitude.map(|a| a * libm::sin(TAU * frequency * at.as_secs_f64() + phase)),
-        DraftHand::None | DraftHand::Arm { .. } => [0.0; 3],
+        // The far end of the arm's spring.
+        DraftHand::Arm { arm, wanted } => wanted.map(|x| arm.stiffness * x),
+        DraftHand::None => [0.0; 3],
     }
 }
 
 fn close(actual: f64, expected: f64, tolerance: f64, what: &str, row: &Tick) -> Result<(), TestCaseError> {
     // Beyond 1e140 products of the oracle overflow; the scene diverges.
-    let ok = (actual - expected).abs() <= tolerance || !(expected.abs() < 1e140);
+    let ok = (actual - expected).abs() <= tolerance || expected.is_nan() || expected.abs() > 1e140;
     prop_assert!(ok, "{what}: {actual:e}, expected {expected:e} ± {tolerance:e}, from {row:?}");
     Ok(())
 }
