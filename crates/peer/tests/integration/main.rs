@@ -1,0 +1,15 @@
+//! Properties of a peer and its parts, against independent oracles.
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail as tests do")]
+#![allow(clippy::float_cmp, reason = "what must agree to the bit is compared so")]
+
+mod late_samples;
+mod own_parts;
+mod step_map;
+mod wire;
+
+use proptest::prelude::ProptestConfig;
+
+/// A property test of that many cases that leaves no files behind.
+fn cases(count: u32) -> ProptestConfig {
+    ProptestConfig { cases: count, failure_persistence: None, ..ProptestConfig::default() }
+}

@@ -1,0 +1,269 @@
+//! A scene as a test thinks of it, and the TOML text of it.
+
+use std::fmt::{self, Write};
+
+use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Enclosure, Gains};
+use cohaptic_scene::Scene;
+
+/// A component for each of up to three axes; those beyond the scene's are not written.
+pub type Place = [f64; 3];
+
+/// A scene to order. It is shown as its TOML text.
+#[derive(Clone, PartialEq)]
+pub struct Draft {
+    /// How long it lasts [ms].
+    pub duration: u64,
+    /// The seed of all random numbers.
+    pub seed: u32,
+    /// 1 to 3.
+    pub axes: usize,
+    /// Mass of the whole object [kg].
+    pub mass: f64,
+    /// Damping of each copy [N·s/m].
+    pub damping: f64,
+    /// Whether the mass is shared out.
+    pub split_mass: bool,
+    /// Where bodies begin [m].
+    pub position: Place,
+    /// How fast they begin [m/s].
+    pub velocity: Place,
+    /// Walls.
+    pub enclosure: Option<Enclosure>,
+    /// The strategy.
+    pub strategy: Coordination,
+    /// KT and BT.
+    pub gains: Gains,
+    /// The period of sending [µs].
+    pub update: u64,
+    /// Which integrator with how many steps; `None` is the exact one.
+    pub integrator: Option<(&'static str, u32)>,
+    /// Who takes part.
+    pub peers: Vec<DraftPeer>,
+    /// Keys of all links, as TOML: `delay = "8ms", loss = 0.1`.
+    pub link: String,
+    /// Keys of single links.
+    pub links: Vec<DraftLink>,
+    /// Entries of the timeline, as TOML without braces.
+    pub timeline: Vec<String>,
+}
+
+/// A peer of a draft.
+#[derive(Clone, PartialEq, Debug)]
+pub struct DraftPeer {
+    /// Its name.
+    pub name: String,
+    /// Its tick [µs].
+    pub tick: u64,
+    /// Whether forces act a tick late.
+    pub compute_delay: bool,
+    /// At which tick it first sends.
+    pub phase: u64,
+    /// How it touches the object.
+    pub contact: Contact,
+    /// mH and bH.
+    pub device: DeviceConfig,
+    /// KC and BC.
+    pub coupling: Gains,
+    /// What the hand does.
+    pub hand: DraftHand,
+    /// By how much its clock is late [ns].
+    pub offset: u64,
+    /// How fast its clock runs [parts per billion].
+    pub drift: i32,
+    /// Where it begins, if not with the object [m].
+    pub position: Option<Place>,
+    /// How fast it begins, if not with the object [m/s].
+    pub velocity: Option<Place>,
+    /// Keys of its uplink, as TOML.
+    pub uplink: Option<String>,
+    /// Keys of its downlink, as TOML.
+    pub downlink: Option<String>,
+}
+
+/// A hand of a draft.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum DraftHand {
+    /// Nothing.
+    None,
+    /// A constant force [N].
+    Force(Place),
+    /// amplitude·sin(2π·frequency·t + phase) [N].
+    Sine {
+        /// Amplitude [N].
+        amplitude: Place,
+        /// Frequency [Hz].
+        frequency: f64,
+        /// Phase [rad].
+        phase: f64,
+    },
+    /// An arm around a place.
+    Arm {
+        /// Its impedance.
+        arm: ArmConfig,
+        /// Where it wants to be [m].
+        wanted: Place,
+    },
+}
+
+/// One directed link of a draft.
+#[derive(Clone, PartialEq, Debug)]
+pub struct DraftLink {
+    /// The sender's name.
+    pub from: String,
+    /// The receiver's name.
+    pub to: String,
+    /// Its keys, as TOML.
+    pub keys: String,
+}
+
+impl fmt::Debug for Draft {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "\n{}", self.to_toml())
+    }
+}
+
+impl Draft {
+    /// A calm scene: average-position coordination over an ideal network with a sample a tick of 1 ms, an object of 0.45 kg that nobody touches.
+    #[must_use]
+    pub fn calm(peers: usize) -> Self {
+        Self {
+            duration: 300,
+            seed: 0,
+            axes: 1,
+            mass: 0.45,
+            damping: 0.0,
+            split_mass: true,
+            position: [0.0; 3],
+            velocity: [0.0; 3],
+            enclosure: None,
+            strategy: Coordination::AveragePosition,
+            gains: Gains { stiffness: 1000.0, damping: 5.0 },
+            update: 1000,
+            integrator: None,
+            peers: (1..=peers).map(|number| DraftPeer::calm(&format!("peer{number}"))).collect(),
+            link: String::new(),
+            links: Vec::new(),
+            timeline: Vec::new(),
+        }
+    }
+
+    /// Reads the draft as a scene file is read.
+    #[must_use]
+    pub fn scene(&self) -> Scene {
+        let text = self.to_toml();
+        Scene::parse(&text, "draft.toml".as_ref(), &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
+    }
+
+    /// The scene file.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let mut text = String::new();
+        let Self { duration, seed, axes, mass, damping, split_mass, gains, update, .. } = self;
+        let mut line = |content: String| writeln!(text, "{content}").unwrap();
+        line(format!("scene = {{ duration = \"{duration}ms\", seed = {seed}, axes = {axes} }}"));
+        let (position, velocity) = (self.vector(&self.position), self.vector(&self.velocity));
+        let walls = self.enclosure.map_or_else(String::new, |walls| {
+            let (min, max) = (self.vector(&walls.min), self.vector(&walls.max));
+            format!(", enclosure = {{ min = {min}, max = {max}, stiffness = {:?}, damping = {:?} }}", walls.stiffness, walls.damping)
+        });
+        line(format!(
+            "object = {{ mass = {mass:?}, damping = {damping:?}, split-mass = {split_mass}, position = {position}, velocity = {velocity}{walls} }}"
+        ));
+        let Gains { stiffness: k, damping: b } = gains;
+        let name = self.strategy.name();
+        line(format!("coordination = {{ strategy = \"{name}\", stiffness = {k:?}, damping = {b:?}, update = \"{update}us\" }}"));
+        if let Some((integrator, substeps)) = self.integrator {
+            line(format!("simulation = {{ integrator = \"{integrator}\", substeps = {substeps} }}"));
+        }
+        line(format!("link = {{ {} }}", self.link));
+        for DraftLink { from, to, keys } in &self.links {
+            line(format!("[[links]]\nfrom = \"{from}\"\nto = \"{to}\"\n{}", on_lines(keys)));
+        }
+        for entry in &self.timeline {
+            line(format!("[[timeline]]\n{entry}"));
+        }
+        for peer in &self.peers {
+            line(format!("[[peers]]\n{}", self.peer(peer)));
+        }
+        text
+    }
+
+    fn peer(&self, peer: &DraftPeer) -> String {
+        let DraftPeer { name, tick, phase, device, coupling, offset, .. } = peer;
+        let contact = crate::drafts::contact_to_toml(peer.contact);
+        let hand = match peer.hand {
+            DraftHand::None => "\"none\"".to_owned(),
+            DraftHand::Force(force) => format!("{{ force = {} }}", self.vector(&force)),
+            DraftHand::Sine { amplitude, frequency, phase } => {
+                format!("{{ sine = {{ amplitude = {}, frequency = {frequency:?}, phase = {phase:?} }} }}", self.vector(&amplitude))
+            }
+            DraftHand::Arm { arm: ArmConfig { mass, damping, stiffness }, wanted } => format!(
+                "{{ arm = {{ mass = {mass:?}, damping = {damping:?}, stiffness = {stiffness:?} }}, follows = {{ position = {} }} }}",
+                self.vector(&wanted)
+            ),
+        };
+        let drift = f64::from(peer.drift) * 1e-9;
+        let mut text = format!(
+            "name = \"{name}\"\ntick = \"{tick}us\"\ncompute-delay = {}\nphase = {phase}\ncontact = {contact}\nhand = {hand}\n\
+             device = {{ mass = {:?}, damping = {:?} }}\ncoupling = {{ stiffness = {:?}, damping = {:?} }}\n\
+             clock = {{ offset = \"{offset}ns\", drift = {drift:?} }}\n",
+            u8::from(peer.compute_delay),
+            device.mass,
+            device.damping,
+            coupling.stiffness,
+            coupling.damping
+        );
+        for (key, value) in [("position", &peer.position), ("velocity", &peer.velocity)] {
+            if let Some(value) = value {
+                writeln!(text, "{key} = {}", self.vector(value)).unwrap();
+            }
+        }
+        for (key, value) in [("uplink", &peer.uplink), ("downlink", &peer.downlink)] {
+            if let Some(value) = value {
+                writeln!(text, "{key} = {{ {value} }}").unwrap();
+            }
+        }
+        text
+    }
+
+    fn vector(&self, place: &Place) -> String {
+        format!("{:?}", &place[..self.axes])
+    }
+}
+
+/// `a = 1, b = { c = 2, d = 3 }` with each key on a line of its own.
+fn on_lines(keys: &str) -> String {
+    let mut depth = 0;
+    let split = keys.chars().map(|c| {
+        match c {
+            '{' | '[' => depth += 1,
+            '}' | ']' => depth -= 1,
+            _ => {}
+        }
+        if c == ',' && depth == 0 { '\n' } else { c }
+    });
+    split.collect()
+}
+
+impl DraftPeer {
+    /// A peer that does nothing.
+    #[must_use]
+    pub fn calm(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            tick: 1000,
+            compute_delay: false,
+            phase: 0,
+            contact: Contact::None,
+            device: DeviceConfig { mass: 0.1, damping: 5.0 },
+            coupling: Gains { stiffness: 3500.0, damping: 5.0 },
+            hand: DraftHand::None,
+            offset: 0,
+            drift: 0,
+            position: None,
+            velocity: None,
+            uplink: None,
+            downlink: None,
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! Scenes at random.
+
+use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
+use proptest::collection::vec;
+use proptest::option;
+use proptest::prelude::*;
+use proptest::sample::select;
+
+use crate::{Draft, DraftHand, DraftLink, DraftPeer, Place};
+
+/// Anything that a scene can hold: 2 to 5 peers, every kind of link, contact, hand and clock, up to three axes, changes on the way. It may be unstable.
+pub fn anything() -> impl Strategy<Value = Draft> {
+    anything_among(2..=5_usize)
+}
+
+/// [`anything`] with that many peers.
+pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Value = Draft> {
+    (peers, 1..=3_usize).prop_flat_map(|(count, axes)| {
+        let header = (30..200_u64, any::<u32>(), 0.05..2.0, 0.0..2.0, any::<bool>(), option::weighted(0.3, walls()));
+        let bodies = (place(0.02), place(0.2), select(&Coordination::ALL[..]), gains(2000.0, 20.0), prop_oneof![Just(2000_u64), Just(8000)]);
+        let peers = (vec(any_peer(axes), count), any_clocks(count));
+        let network = (link(), vec((0..count, 1..count, link()), 0..3), vec(option::weighted(0.2, link()), 2 * count));
+        let rest = (integrator(), vec((1..30_u64, change(count, axes)), 0..4));
+        (header, bodies, peers, network, rest).prop_map(move |(header, bodies, (mut peers, clocks), network, (integrator, changes))| {
+            let (duration, seed, mass, damping, split_mass, enclosure) = header;
+            let (position, velocity, strategy, gains, update) = bodies;
+            let (link, links, mut lines) = network;
+            for (number, (peer, clock)) in peers.iter_mut().zip(clocks).enumerate() {
+                peer.name = format!("p{number}");
+                (peer.tick, peer.offset, peer.drift) = clock;
+                peer.phase %= update / peer.tick;
+                (peer.uplink, peer.downlink) = (lines.pop().flatten(), lines.pop().flatten());
+            }
+            let name = |peer: usize| peers[peer % count].name.clone();
+            let mut links: Vec<DraftLink> =
+                links.into_iter().map(|(from, step, keys)| DraftLink { from: name(from), to: name(from + step), keys }).collect();
+            links.sort_by(|a, b| (&a.from, &a.to).cmp(&(&b.from, &b.to)));
+            links.dedup_by(|a, b| (&a.from, &a.to) == (&b.from, &b.to));
+            let timeline = changes
+                .into_iter()
+                .filter(|(_, change)| !matches!(change, Change::Hand(peer, _) if matches!(peers[*peer].hand, DraftHand::Arm { .. })))
+                .map(|(at, change)| format!("at = \"{at}ms\"\n{}", change.to_toml(axes)))
+                .collect();
+            Draft {
+                duration,
+                seed,
+                axes,
+                mass,
+                damping,
+                split_mass,
+                position,
+                velocity,
+                enclosure,
+                strategy,
+                gains,
+                update,
+                integrator,
+                peers,
+                link,
+                links,
+                timeline,
+            }
+        })
+    })
+}
+
+/// A scene whose motions stay bounded and depend continuously on where bodies begin: gains far from the edge of stability at the ages that `link` and
+/// update make, grasps but no pushes, no walls, constant forces, equal clocks, one axis. The gains of the proportional-derivative strategy are the
+/// smaller, the more peers there are.
+pub fn well_behaved(peers: impl Strategy<Value = usize>, link: impl Strategy<Value = String> + Clone) -> impl Strategy<Value = Draft> {
+    peers.prop_flat_map(move |count| {
+        let peer = (any::<bool>(), any::<bool>(), 0..2_u64, 0.1..0.3, 1.0..5.0, gains(1500.0, 8.0), -1.0..1.0, -0.01..0.01);
+        let header = (any::<u32>(), 0.5..1.0, 0.5..2.0, select(&Coordination::ALL[..]), 50.0..300.0, 5.0..15.0, 1..=4_u64);
+        (header, vec(peer, count), link.clone()).prop_map(move |(header, peers, link)| {
+            let (seed, mass, damping, strategy, stiffness, gain, multiple) = header;
+            let mut draft = Draft { seed, mass, damping, split_mass: false, strategy, link, update: multiple * 2000, ..Draft::calm(count) };
+            let several = strategy == Coordination::ProportionalDerivative;
+            let share = if several { f64::from(u32::try_from(count - 1).unwrap()) } else { 1.0 };
+            draft.gains = Gains { stiffness: stiffness / share, damping: gain / share };
+            for (peer, drawn) in draft.peers.iter_mut().zip(peers) {
+                let (grasps, late, phase, mass, damping, coupling, force, position) = drawn;
+                peer.contact = if grasps { Contact::Grasp } else { Contact::None };
+                (peer.compute_delay, peer.phase, peer.coupling) = (late, phase, coupling);
+                peer.device = DeviceConfig { mass, damping };
+                peer.hand = DraftHand::Force([force, 0.0, 0.0]);
+                peer.position = Some([position, 0.0, 0.0]);
+            }
+            draft
+        })
+    })
+}
+
+/// Keys of a link without chance.
+pub fn fixed_link() -> impl Strategy<Value = String> + Clone {
+    prop_oneof![Just(String::new()), (0..6000_u32).prop_map(|us| format!("delay = \"{us}us\""))]
+}
+
+/// Keys of a link of any kind.
+pub fn link() -> impl Strategy<Value = String> + Clone {
+    let delay = prop_oneof![Just(None), (0..40_000_u32).prop_map(Some)];
+    // In parts per thousand of the delay: a uniform law reaches √3 of it.
+    let jitter = option::of((1..550_u32, any::<bool>(), any::<bool>()));
+    let loss = prop_oneof![
+        2 => Just(None),
+        1 => (0.0..0.5).prop_map(|p: f64| Some(format!("loss = {p:?}"))),
+        1 => (0.0..0.3, 0.1..1.0, 0.0..0.3, 0.7..1.0).prop_map(|(p, r, h, k): (f64, f64, f64, f64)| {
+            Some(format!("loss = {{ gilbert-elliott = {{ p = {p:?}, r = {r:?}, h = {h:?}, k = {k:?} }} }}"))
+        }),
+    ];
+    let rate = option::of((30..1000_u32, 0..60_u32, option::of((1..6_u32, any::<bool>()))));
+    let outage = option::weighted(0.3, (0..60_u32, 1..60_u32));
+    (delay, jitter, loss, rate, outage).prop_map(|(delay, jitter, loss, rate, outage)| {
+        let mut keys = Vec::new();
+        if let Some(us) = delay {
+            keys.push(format!("delay = \"{us}us\""));
+            if let Some((part, normal, in_order)) = jitter {
+                let distribution = if normal { "normal" } else { "uniform" };
+                keys.push(format!("jitter = {{ sd = \"{}ns\", distribution = \"{distribution}\" }}", us * part));
+                keys.push(format!("order = \"{}\"", if in_order { "in-order" } else { "allow-reordering" }));
+            } else {
+                // Laid over another link, a shorter delay must not be left with its jitter.
+                keys.push("jitter = \"0s\"".to_owned());
+            }
+        }
+        keys.extend(loss);
+        if let Some((kbit, overhead, queue)) = rate {
+            keys.push(format!("rate = \"{kbit}kbit\", overhead = \"{overhead}B\""));
+            if let Some((limit, packets)) = queue {
+                let limit = if packets { format!("{limit} packets") } else { format!("{}B", 150 * limit) };
+                keys.push(format!("queue = {{ limit = \"{limit}\" }}"));
+            }
+        }
+        if let Some((from, length)) = outage {
+            keys.push(format!("outage = [{{ from = \"{from}ms\", to = \"{}ms\" }}]", from + length));
+        }
+        keys.join(", ")
+    })
+}
+
+fn any_peer(axes: usize) -> impl Strategy<Value = DraftPeer> {
+    let basics = (any::<bool>(), 0..16_u64, contact(axes), 0.02..0.5, 0.0..10.0, gains(4000.0, 10.0), hand());
+    let start = (option::weighted(0.4, place(0.02)), option::weighted(0.4, place(0.3)));
+    (basics, start).prop_map(|((compute_delay, phase, contact, mass, damping, coupling, hand), (position, velocity))| DraftPeer {
+        compute_delay,
+        phase,
+        contact,
+        device: DeviceConfig { mass, damping },
+        coupling,
+        hand,
+        position,
+        velocity,
+        ..DraftPeer::calm("")
+    })
+}
+
+/// Tick [µs], offset [ns] and drift [ppb] of each peer: all the same in half of the scenes.
+fn any_clocks(count: usize) -> impl Strategy<Value = Vec<(u64, u64, i32)>> {
+    let tick = || select(&[500_u64, 1000, 2000][..]);
+    let offset = prop_oneof![Just(0), Just(1_000_000), 0..3_000_000_u64];
+    let drift = prop_oneof![Just(0), -100_000..100_000_i32, Just(100_000_000), Just(-100_000_000)];
+    prop_oneof![tick().prop_map(move |tick| vec![(tick, 0, 0); count]), vec((tick(), offset, drift), count)]
+}
+
+fn contact(axes: usize) -> impl Strategy<Value = Contact> + Clone {
+    let push = (0..axes, any::<bool>()).prop_map(|(axis, positive)| Contact::Push(Direction { axis, positive }));
+    prop_oneof![Just(Contact::Grasp), Just(Contact::None), push]
+}
+
+fn hand() -> impl Strategy<Value = DraftHand> + Clone {
+    prop_oneof![
+        Just(DraftHand::None),
+        force(),
+        (0.0..0.5, 0.0..20.0, 0.0..200.0, place(0.02))
+            .prop_map(|(mass, damping, stiffness, wanted)| DraftHand::Arm { arm: ArmConfig { mass, damping, stiffness }, wanted }),
+    ]
+}
+
+fn force() -> impl Strategy<Value = DraftHand> + Clone {
+    prop_oneof![
+        place(2.0).prop_map(DraftHand::Force),
+        (place(2.0), 0.0..50.0, -4.0..4.0).prop_map(|(amplitude, frequency, phase)| DraftHand::Sine { amplitude, frequency, phase }),
+    ]
+}
+
+fn walls() -> impl Strategy<Value = Enclosure> {
+    // They need not hold the origin: then the object is thrown back at once.
+    (place(0.03), 0.001..0.05, 1.0..1000.0, 0.0..20.0).prop_map(|(min, size, stiffness, damping)| Enclosure {
+        min,
+        max: min.map(|end| end + size),
+        stiffness,
+        damping,
+    })
+}
+
+fn integrator() -> impl Strategy<Value = Option<(&'static str, u32)>> {
+    prop_oneof![3 => Just(None), 1 => (select(&["semi-implicit-euler", "rk4"][..]), 1..5_u32).prop_map(Some)]
+}
+
+fn gains(stiffness: f64, damping: f64) -> impl Strategy<Value = Gains> + Clone {
+    (0.0..stiffness, 0.0..damping).prop_map(|(stiffness, damping)| Gains { stiffness, damping })
+}
+
+/// Components up to `size`, and now and then a zero of either sign.
+fn place(size: f64) -> impl Strategy<Value = Place> + Clone {
+    let component = prop_oneof![4 => -size..size, 1 => Just(0.0), 1 => Just(-0.0)];
+    [component.clone(), component.clone(), component]
+}
+
+#[derive(Clone, Debug)]
+enum Change {
+    Link(String),
+    Contact(usize, Contact),
+    Hand(usize, DraftHand),
+    Gains(Gains),
+}
+
+fn change(count: usize, axes: usize) -> impl Strategy<Value = Change> {
+    prop_oneof![
+        link().prop_filter("a change changes something", |keys| !keys.is_empty()).prop_map(Change::Link),
+        (0..count, contact(axes)).prop_map(|(peer, contact)| Change::Contact(peer, contact)),
+        (0..count, prop_oneof![Just(DraftHand::None), force()]).prop_map(|(peer, hand)| Change::Hand(peer, hand)),
+        gains(2000.0, 20.0).prop_map(Change::Gains),
+    ]
+}
+
+impl Change {
+    fn to_toml(&self, axes: usize) -> String {
+        let vector = |place: &Place| format!("{:?}", &place[..axes]);
+        match self {
+            Self::Link(keys) => format!("link = \"all\"\nset = {{ {keys} }}"),
+            Self::Contact(peer, contact) => format!("peer = \"p{peer}\"\nset = {{ contact = {} }}", contact_to_toml(*contact)),
+            Self::Hand(peer, hand) => {
+                let hand = match hand {
+                    DraftHand::Force(force) => format!("{{ force = {} }}", vector(force)),
+                    DraftHand::Sine { amplitude, frequency, phase } => {
+                        format!("{{ sine = {{ amplitude = {}, frequency = {frequency:?}, phase = {phase:?} }} }}", vector(amplitude))
+                    }
+                    DraftHand::None | DraftHand::Arm { .. } => "\"none\"".to_owned(),
+                };
+                format!("peer = \"p{peer}\"\nset = {{ hand = {hand} }}")
+            }
+            Self::Gains(Gains { stiffness, damping }) => format!("coordination = {{ stiffness = {stiffness:?}, damping = {damping:?} }}"),
+        }
+    }
+}
+
+pub(crate) fn contact_to_toml(contact: Contact) -> String {
+    match contact {
+        Contact::Grasp => "\"grasp\"".to_owned(),
+        Contact::None => "\"none\"".to_owned(),
+        Contact::Push(Direction { axis, positive }) => format!("{{ push = \"{}{}\" }}", if positive { '+' } else { '-' }, ["x", "y", "z"][axis]),
+    }
+}

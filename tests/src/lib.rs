@@ -1,0 +1,35 @@
+//! What the tests of whole scenes share: scenes to order, a log of all that happened, and where two runs first differ.
+//!
+//! A [`Draft`] is a scene as a test thinks of it; it becomes TOML text and is read like any scene file, so the reader is tested too. [`drafts`] draws
+//! them at random. [`Log`] holds every row of a run, [`Records`] every byte that a recorder writes.
+//!
+//! Nothing here knows what the right answer is: the oracles stand in the tests.
+#![allow(clippy::panic, clippy::unwrap_used, clippy::missing_panics_doc, reason = "this crate is nothing but test support")]
+
+mod draft;
+pub mod drafts;
+mod log;
+mod records;
+
+pub use draft::{Draft, DraftHand, DraftLink, DraftPeer, Place};
+pub use log::{Body, Log, Tick, first_difference, run};
+pub use records::{Records, record};
+
+use std::path::{Path, PathBuf};
+
+use proptest::prelude::ProptestConfig;
+
+/// A property test of that many cases that leaves no files behind.
+#[must_use]
+pub fn cases(count: u32) -> ProptestConfig {
+    ProptestConfig { cases: count, failure_persistence: None, max_shrink_iters: 400, ..ProptestConfig::default() }
+}
+
+/// The shipped scenes, in order of their paths.
+#[must_use]
+pub fn shipped_scenes() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios");
+    let scenes = cohaptic_scene::scene_files(&folder).unwrap();
+    assert!(scenes.len() >= 30, "only {} scenes in {}", scenes.len(), folder.display());
+    scenes
+}

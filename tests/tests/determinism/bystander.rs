@@ -1,0 +1,46 @@
+//! A peer more changes no random number of the links that were there before.
+
+use std::collections::BTreeMap;
+
+use cohaptic_harness::Model;
+use cohaptic_tests::{Draft, DraftPeer, cases, drafts, run};
+use cohaptic_units::Instant;
+use cohaptic_wan::Fate;
+use proptest::prelude::*;
+
+/// What became of each packet: for each link by name, by sequence number, when it was sent and its fate.
+type Fates = BTreeMap<(String, String), BTreeMap<u64, (Instant, Fate)>>;
+
+fn fates(draft: &Draft) -> Fates {
+    let mut fates = Fates::new();
+    for row in run(&draft.scene(), Model::Least).packets {
+        let name = |peer: usize| draft.peers[peer].name.clone();
+        let again = fates.entry((name(row.from), name(row.to))).or_default().insert(row.sequence, (row.sent, row.fate));
+        assert!(again.is_none(), "two fates of one packet: {row:?}");
+    }
+    fates
+}
+
+proptest! {
+    #![proptest_config(cases(500))]
+
+    #[test]
+    fn a_bystander_changes_no_fate_on_other_links(mut draft in drafts::anything(), place in 0..6_usize) {
+        for peer in &mut draft.peers {
+            // What shares a line with the bystander's packets may well change.
+            (peer.uplink, peer.downlink) = (None, None);
+            // A scene that diverges ends early, and how early depends on who takes part.
+            peer.contact = cohaptic_peer::Contact::None;
+        }
+        draft.gains.stiffness /= 100.0;
+        draft.gains.damping /= 100.0;
+        draft.enclosure = None;
+        draft.timeline.retain(|entry| entry.contains("link = "));
+        let before = fates(&draft);
+        draft.peers.insert(place % (draft.peers.len() + 1), DraftPeer { tick: draft.peers[0].tick, ..DraftPeer::calm("bystander") });
+        let after = fates(&draft);
+        for (link, fates) in &before {
+            prop_assert_eq!(Some(fates), after.get(link), "{:?}", link);
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! Average-position and proportional-derivative coordination are one law with different gains: Σⱼ K(x − xⱼ) over the N−1 others is (N−1)·K·(x − x̄).
+
+use cohaptic_harness::Model;
+use cohaptic_peer::{Coordination, Gains};
+use cohaptic_tests::{cases, drafts, first_difference, run};
+use proptest::prelude::*;
+
+proptest! {
+    #![proptest_config(cases(300))]
+
+    #[test]
+    fn two_peers_cannot_tell_the_strategies_apart(mut draft in drafts::anything_among(Just(2))) {
+        draft.strategy = Coordination::AveragePosition;
+        let average_position = run(&draft.scene(), Model::Least);
+        draft.strategy = Coordination::ProportionalDerivative;
+        let difference = first_difference(&average_position, &run(&draft.scene(), Model::Least));
+        prop_assert!(difference.is_none(), "{}", difference.unwrap());
+    }
+
+    /// (N−1)·K is rounded once, here and in the program, so the two agree to the bit.
+    #[test]
+    fn proportional_derivative_is_average_position_with_more_gain(mut draft in drafts::anything_among(2..=6_usize)) {
+        draft.timeline.retain(|entry| !entry.contains("coordination"));
+        let others = super::count(draft.peers.len() - 1);
+        let Gains { stiffness, damping } = draft.gains;
+        draft.strategy = Coordination::ProportionalDerivative;
+        let proportional_derivative = run(&draft.scene(), Model::Least);
+        draft.strategy = Coordination::AveragePosition;
+        draft.gains = Gains { stiffness: others * stiffness, damping: others * damping };
+        let difference = first_difference(&proportional_derivative, &run(&draft.scene(), Model::Least));
+        prop_assert!(difference.is_none(), "{}", difference.unwrap());
+    }
+
+    /// And they are not the same with the same gains: otherwise the tests above would pass for a program that ignores the strategy.
+    #[test]
+    fn three_peers_can_tell_the_strategies_apart(mut draft in drafts::well_behaved(Just(3_usize), drafts::fixed_link())) {
+        draft.strategy = Coordination::AveragePosition;
+        let average_position = run(&draft.scene(), Model::Least);
+        draft.strategy = Coordination::ProportionalDerivative;
+        prop_assert!(first_difference(&average_position, &run(&draft.scene(), Model::Least)).is_some());
+    }
+}

@@ -1,0 +1,18 @@
+//! What must hold for every scene: equivalences, symmetries, conservation, and the meaning of a tick, each against an oracle of its own.
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail as tests do")]
+#![allow(clippy::float_cmp, clippy::cast_precision_loss, reason = "oracles that must agree to the bit, and counts far below 2^53")]
+
+mod convergence;
+mod equivalence;
+mod held_samples;
+mod ideal_network;
+mod replay;
+mod symmetry;
+
+/// Half the distance from 1 to the next double: the largest relative error of one rounding.
+const ROUNDING: f64 = f64::EPSILON / 2.0;
+
+/// A count as a number.
+fn count(items: usize) -> f64 {
+    items as f64
+}
