@@ -4,13 +4,14 @@ use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{
-    AccessLine, Bottleneck, Delay, DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName, Network, NetworkConfig, NetworkError, NodeId, Order,
-    QueueLimit, TimeWentBack,
+    AccessLine, Bottleneck, Delay, Distribution, DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName, Network, NetworkConfig, NetworkError,
+    NodeId, Order, QueueLimit, TimeWentBack,
 };
 use proptest::prelude::*;
 
 use crate::random_links::{
-    Operation, Payload, any_config, at, bottleneck, cases, config, drain, drain_network, link, nanos, offers, operations, plan, rate, sendings,
+    Operation, Payload, any_config, at, bottleneck, cases, config, drain, drain_network, jittery, link, nanos, offers, operations, plan, rate,
+    sendings,
 };
 
 /// All that becomes of packets offered with those gaps, in the order in which it is polled at the end.
@@ -204,4 +205,20 @@ fn a_limit_in_bytes_does_not_wrap_for_packets_beyond_counting() {
     }
     let events = drain(&mut subject);
     assert_eq!(events.iter().map(|event| (event.sequence, event.fate)).collect::<Vec<_>>(), [(2, Fate::Dropped(DropCause::QueueFull))]);
+}
+
+#[test]
+fn the_least_delay_is_kept_and_nearly_reached() {
+    // Of n draws uniform over [least, least + 2·√3·sd], none is below least, and the smallest is within a fraction 6.91/n of the width with probability
+    // 1 − (1 − 6.91/n)ⁿ ≈ 0.999. Rounding to a nanosecond is far finer: the width is 34.6 ms.
+    const COUNT: u16 = 50_000;
+    let mean = Duration::from_millis(24);
+    let sd = Duration::from_millis(10);
+    let delay = jittery(mean, sd, Distribution::Uniform);
+    let offered = vec![(nanos(1_000), Bytes::new(64)); usize::from(COUNT)];
+    let events = run(&LinkConfig { delay, ..LinkConfig::default() }, &offered);
+    let smallest = events.into_iter().map(|event| event.at - event.sent).min().unwrap();
+    let width = sd.mul_f64(2.0 * 3f64.sqrt());
+    assert!(smallest >= delay.least(), "{smallest:?} is below {:?}", delay.least());
+    assert!(smallest < delay.least() + width.mul_f64(6.91 / f64::from(COUNT)), "{smallest:?} is far above {:?}", delay.least());
 }
