@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::arguments::RunArguments;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::{interrupt, output, terminal_plot};
+use crate::{failure, interrupt, output, terminal_plot};
 
 /// Runs a scene, or a scene and a variant of it, and says what happened.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         None
     } else {
         let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
-        let mut variant = Scene::read(&arguments.scene.scene, &both)?;
+        let mut variant = Scene::read(&arguments.scene.scene, &both).map_err(|error| failure::of_variant(error, &arguments.against))?;
         variant.title = format!("{}, with {}", variant.title, arguments.against.join(", "));
         Some(variant)
     };
