@@ -133,9 +133,9 @@ struct Document {
     links: Vec<LinkDocument>,
     access_lines: Vec<AccessDocument>,
     max_discrepancy_m: f64,
-    files: Vec<PathBuf>,
+    files: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    against: Option<Box<Document>>,
+    against: Option<Box<Self>>,
 }
 
 #[derive(Serialize)]
@@ -209,7 +209,7 @@ impl Document {
             links: summary.links.iter().map(link).collect(),
             access_lines: summary.access_lines.iter().map(line).collect(),
             max_discrepancy_m: summary.max_discrepancy,
-            files: run.files.clone(),
+            files: run.files.iter().map(|file| output::path(file)).collect(),
             against: None,
         }
     }

@@ -2,7 +2,7 @@
 
 use std::process::Stdio;
 
-use crate::desk::{Desk, Outcome};
+use crate::desk::{Desk, Outcome, parse};
 use crate::scenes::TWO;
 
 const COMMANDS: [&str; 5] = ["run two.toml", "run two.toml --json", "explain two.toml", "check two.toml", "check two.toml --json"];
@@ -71,4 +71,34 @@ fn without_anywhere_to_complain_the_exit_status_still_tells() {
         let code = desk.command(line).stdout(full()).stderr(full()).status().unwrap().code();
         assert_eq!(code, Some(status), "{line}");
     }
+}
+
+#[test]
+fn what_could_disturb_a_terminal_is_escaped() {
+    let desk = Desk::with("two.toml", &TWO.replace("Two users", "Two \\u001b[31musers\\u0007"));
+    for line in ["run two.toml", "explain two.toml"] {
+        let text = desk.text(line);
+        assert!(text.starts_with("Two \\u{1b}[31musers\\u{7}\n"), "{text:?}");
+    }
+    // JSON has escapes of its own.
+    assert_eq!(desk.json("run two.toml --json")["title"], "Two \u{1b}[31musers\u{7}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_path_that_is_no_unicode_does_not_spoil_the_document() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let desk = Desk::with("two.toml", TWO);
+    let name = std::ffi::OsStr::from_bytes(b"\xff");
+    let document = |command: &mut std::process::Command| {
+        let outcome = Outcome::of(command.output().unwrap());
+        assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+        parse(&outcome.stdout)
+    };
+    let run = document(desk.command("run two.toml --json --out").arg(name));
+    assert_eq!(run["files"][0], "\u{fffd}/trajectory.csv");
+    assert!(desk.path("").join(name).join("trajectory.csv").exists());
+    let other = std::ffi::OsStr::from_bytes(b"\xfe.toml");
+    std::fs::copy(desk.path("two.toml"), desk.path("").join(other)).unwrap();
+    assert_eq!(document(desk.command("check --json").arg(other))["scenes"][0]["file"], "\u{fffd}.toml");
 }

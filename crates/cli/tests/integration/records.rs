@@ -234,7 +234,7 @@ fn links_agree_with_the_document() {
     let links = links_of(&document);
     let mut agreed = 0;
     for row in &table.rows {
-        let counters = links.get(table.get(row, "link")).unwrap_or(&document["access_lines"][0]);
+        let counters = links.get(table.get(row, "link")).unwrap_or_else(|| &document["access_lines"][0]);
         for (column, value) in table.columns.iter().zip(row).skip(1) {
             let expected = match column.as_str() {
                 "in-flight" => &counters["in_flight"],
@@ -260,7 +260,7 @@ fn a_link_that_delivered_nothing_has_no_mean_delay() {
 
 #[test]
 fn plots_are_well_formed_and_name_the_peers() {
-    let odd = TWO.replace("\"left\"", "\"R&D<1\"").replace("Two users", "A & B: \\\"x\\\" < y");
+    let odd = TWO.replace("\"left\"", "\"R&D<1\"").replace("Two users", "A & B: \\\"x\\\" < y\\u0007");
     for (scene, names) in [(TWO, ["left", "right"]), (PLANE, ["left", "right"]), (odd.as_str(), ["R&D<1", "right"])] {
         let desk = Desk::with("scene.toml", scene);
         desk.text("run scene.toml --out out");

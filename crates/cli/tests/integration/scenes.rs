@@ -12,7 +12,7 @@ mass = 0.3
 [coordination]
 strategy  = "average-position"
 stiffness = 1000.0
-damping   = 5.0
+damping   = 20.0
 update    = "8ms"
 
 [peer]

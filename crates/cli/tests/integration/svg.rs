@@ -2,6 +2,7 @@
 
 /// The texts between tags, without white space around them.
 pub(crate) fn words(svg: &str) -> Vec<String> {
+    assert!(!svg.contains(|letter: char| letter.is_control() && letter != '\n'), "a control character");
     let (mut open, mut words, mut rest) = (Vec::new(), Vec::new(), svg.trim());
     while let Some(start) = rest.find('<') {
         let text = rest[..start].trim();
