@@ -2,7 +2,7 @@
 
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::desk::{Desk, Outcome, parse};
 use crate::scenes::TWO;
@@ -15,7 +15,22 @@ fn interrupted(desk: &Desk, line: &str, begun: impl Fn(u32) -> bool) -> Outcome 
         sleep(Duration::from_millis(5));
     }
     send_interrupt(&child);
+    end_within(&mut child, PATIENCE);
     Outcome::of(child.wait_with_output().unwrap())
+}
+
+/// Far more than an interrupted run needs on a slow machine. One that does not stop must not go on filling the disk.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn end_within(child: &mut Child, patience: Duration) {
+    let asked = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if asked.elapsed() > patience {
+            child.kill().unwrap();
+            panic!("it did not end when it was interrupted");
+        }
+        sleep(Duration::from_millis(5));
+    }
 }
 
 fn send_interrupt(child: &Child) {
