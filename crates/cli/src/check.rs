@@ -20,7 +20,7 @@ struct Document {
 
 #[derive(Serialize)]
 struct Checked {
-    file: PathBuf,
+    file: String,
     passed: bool,
     failures: Vec<String>,
     #[serde(skip)]
@@ -67,13 +67,13 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
             (failures, status, scene.expect.is_none())
         }
     };
-    Checked { file: file.to_path_buf(), passed: failures.is_empty(), failures, status, expects_nothing }
+    Checked { file: output::path(file), passed: failures.is_empty(), failures, status, expects_nothing }
 }
 
 fn describe(scenes: &[Checked]) -> String {
     let mut text = String::new();
     for scene in scenes {
-        let file = scene.file.display();
+        let file = &scene.file;
         if scene.expects_nothing {
             text.push_str(&format!("ok    {file} (it has no [expect]: nothing was compared)\n"));
         } else if scene.passed {

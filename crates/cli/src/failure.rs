@@ -18,6 +18,8 @@ pub(crate) const INTERRUPTED: u8 = 130;
 #[derive(Debug)]
 pub(crate) enum Failure {
     Scene(SceneError),
+    /// A fault in what `--against` says.
+    Against(SceneError),
     Record(RecordError),
     StandardOutput(io::Error),
 }
@@ -27,6 +29,8 @@ impl Failure {
     pub(crate) fn report(&self) -> ExitCode {
         let (message, status) = match self {
             Self::Scene(error) => (error.to_string(), scene_status(error)),
+            // The scene knows of overrides, and not which option they came from.
+            Self::Against(error) => (error.to_string().replacen("--set ", "--against ", 1), scene_status(error)),
             Self::Record(error) => (error.to_string(), INPUT_OUTPUT),
             Self::StandardOutput(error) => (format!("cannot write to standard output: {error}"), INPUT_OUTPUT),
         };
@@ -34,6 +38,12 @@ impl Failure {
         let _ = io::Write::write_all(&mut io::stderr(), format!("error: {message}\n").as_bytes());
         ExitCode::from(status)
     }
+}
+
+/// Why the variant of a scene that can be read cannot be had.
+pub(crate) fn of_variant(error: SceneError, against: &[String]) -> Failure {
+    let text = error.diagnostic().and_then(cohaptic_scene::Diagnostic::override_text);
+    if text.is_some_and(|text| against.iter().any(|given| given == text)) { Failure::Against(error) } else { Failure::Scene(error) }
 }
 
 /// The exit status for a scene that could not be had.

@@ -1,14 +1,17 @@
 //! Standard output: text for people or one JSON document.
 
 use std::io::{self, Write as _};
+use std::path::Path;
 
 use serde::Serialize;
 
 use crate::failure::Failure;
 
-/// Prints text, which ends with a line break.
+/// Prints text, which ends with a line break. Titles and names of files may hold control characters, which are escaped before they disturb a
+/// terminal.
 pub(crate) fn text(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
+    let text = escape(text);
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(Failure::StandardOutput)
 }
 
@@ -17,4 +20,21 @@ pub(crate) fn json(document: &impl Serialize) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     serde_json::to_writer_pretty(&mut out, document).map_err(io::Error::from).map_err(Failure::StandardOutput)?;
     out.write_all(b"\n").and_then(|()| out.flush()).map_err(Failure::StandardOutput)
+}
+
+/// A path as text. What is not Unicode in it is replaced: JSON cannot hold it.
+pub(crate) fn path(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}
+
+fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for letter in text.chars() {
+        if letter.is_control() && letter != '\n' {
+            escaped.extend(letter.escape_default());
+        } else {
+            escaped.push(letter);
+        }
+    }
+    escaped
 }

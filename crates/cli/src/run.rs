@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::arguments::RunArguments;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::{interrupt, output, terminal_plot};
+use crate::{failure, interrupt, output, terminal_plot};
 
 /// Runs a scene, or a scene and a variant of it, and says what happened.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         None
     } else {
         let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
-        let mut variant = Scene::read(&arguments.scene.scene, &both)?;
+        let mut variant = Scene::read(&arguments.scene.scene, &both).map_err(|error| failure::of_variant(error, &arguments.against))?;
         variant.title = format!("{}, with {}", variant.title, arguments.against.join(", "));
         Some(variant)
     };
@@ -133,7 +133,7 @@ struct Document {
     links: Vec<LinkDocument>,
     access_lines: Vec<AccessDocument>,
     max_discrepancy_m: f64,
-    files: Vec<PathBuf>,
+    files: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     against: Option<Box<Self>>,
 }
@@ -209,7 +209,7 @@ impl Document {
             links: summary.links.iter().map(link).collect(),
             access_lines: summary.access_lines.iter().map(line).collect(),
             max_discrepancy_m: summary.max_discrepancy,
-            files: run.files.clone(),
+            files: run.files.iter().map(|file| output::path(file)).collect(),
             against: None,
         }
     }

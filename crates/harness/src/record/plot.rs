@@ -49,8 +49,14 @@ pub(crate) fn write(path: PathBuf, panels: &[Panel<'_>]) -> Result<PathBuf, Reco
         draw(&root, panels).expect("drawing to memory does not fail");
     }
     let mut file = PartialFile::create(path)?;
+    let svg: String = svg.chars().map(|letter| if is_xml(letter) { letter } else { char::REPLACEMENT_CHARACTER }).collect();
     file.write(svg.as_bytes())?;
     file.finish()
+}
+
+/// Whether XML 1.0 can hold a character, escaped or not: see its production `Char`. A title may have others.
+fn is_xml(letter: char) -> bool {
+    matches!(letter, '\t' | '\n' | '\r' | '\u{20}'..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..)
 }
 
 type Drawing<'a> = DrawingArea<SVGBackend<'a>, Shift>;

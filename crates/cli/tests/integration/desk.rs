@@ -1,0 +1,133 @@
+//! Where a user sits: a folder with scenes in it, and a shell.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A folder of its own for one test, removed at the end.
+pub(crate) struct Desk(TempDir);
+
+/// What came of a command.
+#[derive(Debug)]
+pub(crate) struct Outcome {
+    pub(crate) status: Option<i32>,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
+}
+
+impl Desk {
+    pub(crate) fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    /// A desk with one scene on it.
+    pub(crate) fn with(name: &str, scene: &str) -> Self {
+        let desk = Self::new();
+        desk.write(name, scene);
+        desk
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, content).unwrap();
+    }
+
+    pub(crate) fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    /// The files of a folder, sorted; those of folders within are left out.
+    pub(crate) fn files(&self, folder: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.path(folder)).unwrap().map(Result::unwrap);
+        let mut files: Vec<String> = entries.filter(|entry| !entry.path().is_dir()).map(|entry| entry.file_name().into_string().unwrap()).collect();
+        files.sort();
+        files
+    }
+
+    /// `cohaptic` with these words, as they would be typed; single quotes keep spaces and double quotes, as in a shell.
+    pub(crate) fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_cohaptic"));
+        command.args(words(line)).current_dir(self.0.path()).stdin(Stdio::null());
+        command
+    }
+
+    pub(crate) fn cohaptic(&self, line: &str) -> Outcome {
+        Outcome::of(assert_cmd::Command::from_std(self.command(line)).output().unwrap())
+    }
+
+    /// What a command prints that succeeds.
+    pub(crate) fn text(&self, line: &str) -> String {
+        let outcome = self.cohaptic(line);
+        assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""), "{line}");
+        outcome.stdout
+    }
+
+    /// The document that a command prints that succeeds.
+    pub(crate) fn json(&self, line: &str) -> Value {
+        parse(&self.text(line))
+    }
+}
+
+impl Outcome {
+    /// Standard error is a terminal of nobody here, so it holds messages only, and never the marks of a panic.
+    pub(crate) fn of(output: std::process::Output) -> Self {
+        let text = |bytes| String::from_utf8(bytes).expect("all output is UTF-8");
+        let outcome = Self { status: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) };
+        assert!(!outcome.stderr.contains("panicked") && outcome.status != Some(101), "{outcome:#?}");
+        outcome
+    }
+
+    /// That the command was refused with this status and a message that has all of these parts, and printed nothing else.
+    pub(crate) fn assert_refused(&self, status: i32, parts: &[&str]) {
+        assert_eq!((self.status, self.stdout.as_str()), (Some(status), ""), "{}", self.stderr);
+        for part in parts {
+            assert!(self.stderr.contains(part), "no {part:?} in:\n{}", self.stderr);
+        }
+    }
+}
+
+/// One JSON document, and nothing behind it but a line break.
+pub(crate) fn parse(text: &str) -> Value {
+    assert!(text.ends_with("}\n"), "{text:?}");
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error} in {text}"))
+}
+
+/// The document as text, but for how long the run took.
+pub(crate) fn timeless(mut document: Value) -> String {
+    let mut runs = vec![&mut document];
+    while let Some(run) = runs.pop() {
+        let run = run.as_object_mut().unwrap();
+        assert!(run.remove("wall_s").is_some() && run.remove("realtime_factor").is_some());
+        runs.extend(run.get_mut("against"));
+    }
+    serde_json::to_string_pretty(&document).unwrap()
+}
+
+fn words(line: &str) -> Vec<String> {
+    let (mut words, mut word, mut quoted) = (Vec::new(), None, false);
+    for letter in line.chars() {
+        match letter {
+            '\'' => {
+                quoted = !quoted;
+                word.get_or_insert_with(String::new);
+            }
+            ' ' if !quoted => words.extend(word.take()),
+            letter => word.get_or_insert_with(String::new).push(letter),
+        }
+    }
+    words.extend(word);
+    words
+}
+
+/// A scene that ships with the program.
+pub(crate) fn shipped(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios").join(name)
+}

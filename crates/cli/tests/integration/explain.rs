@@ -1,0 +1,106 @@
+//! `cohaptic explain`: what is modelled, what is left out, and why.
+
+use serde_json::Value;
+
+use crate::desk::Desk;
+use crate::scenes::{PLANE, RANDOM, TWO};
+
+fn left_out(document: &Value) -> Vec<&str> {
+    document["left_out"].as_array().unwrap().iter().map(|what| what.as_str().unwrap()).collect()
+}
+
+/// The model of the first part whose name contains this.
+fn model<'a>(document: &'a Value, part: &str) -> &'a str {
+    let mut rows = document["models"].as_array().unwrap().iter();
+    rows.find(|row| row["part"].as_str().unwrap().contains(part)).unwrap_or_else(|| panic!("no {part} in {document:#}"))["model"].as_str().unwrap()
+}
+
+#[test]
+fn every_part_has_a_model_and_a_reason() {
+    for scene in [TWO, RANDOM, PLANE] {
+        let document = Desk::with("scene.toml", scene).json("explain scene.toml --json");
+        let rows = document["models"].as_array().unwrap();
+        assert!(rows.len() > 5);
+        for row in rows {
+            assert!(["part", "model", "reason"].iter().all(|key| row[key].as_str().is_some_and(|text| !text.is_empty())), "{row}");
+        }
+        assert!(left_out(&document).iter().all(|what| !what.is_empty()));
+    }
+}
+
+#[test]
+fn what_the_scene_has_not_is_left_out() {
+    let document = Desk::with("two.toml", TWO).json("explain two.toml --json");
+    let left_out = left_out(&document).join("\n");
+    for part in ["random numbers", "walls: the object has no enclosure", "changes: the timeline is empty", "an event for each tick"] {
+        assert!(left_out.contains(part), "no {part:?} in {left_out}");
+    }
+    assert_eq!(model(&document, "2 links"), "constant delay 24ms");
+    assert_eq!(model(&document, "axes"), "1");
+    assert!(!left_out.contains("the device of"), "both touch: {left_out}");
+}
+
+#[test]
+fn what_the_scene_has_is_not_left_out() {
+    let document = Desk::with("three.toml", RANDOM).json("explain three.toml --json");
+    let left_out = left_out(&document).join("\n");
+    assert!(!left_out.contains("random"), "{left_out}");
+    assert!(left_out.contains("the device of third: it touches nothing and no hand moves it"), "{left_out}");
+    let links = model(&document, "6 links");
+    for part in ["outage", "independent loss", "24ms", "jitter of 4ms"] {
+        assert!(links.contains(part), "no {part} in {links}");
+    }
+    assert!(model(&document, "uplink of left").contains("2 packets"));
+    assert!(model(&document, "peer left").contains("grasps the object"));
+}
+
+#[test]
+fn a_timeline_that_loses_packets_draws_random_numbers() {
+    let timeline = "[[timeline]]\nat = \"100ms\"\nlink = \"all\"\nset = { loss = \"10%\" }\n";
+    let document = Desk::with("two.toml", &format!("{TWO}\n{timeline}")).json("explain two.toml --json");
+    assert!(!left_out(&document).join("\n").contains("random"), "{document:#}");
+    assert!(model(&document, "timeline").contains('1'));
+}
+
+#[test]
+fn clocks_that_differ_need_an_event_queue() {
+    let desk = Desk::with("two.toml", TWO);
+    let ticks = |set: &str| model(&desk.json(&format!("explain two.toml --json {set}")), "ticks").to_owned();
+    assert_eq!(ticks(""), "lockstep, every 1ms");
+    assert_eq!(ticks("--set peers.left.clock.drift=20ppm"), "an event queue");
+}
+
+#[test]
+fn dimensions_are_those_of_the_state() {
+    let document = Desk::with("three.toml", RANDOM).json("explain three.toml --json");
+    // Three copies and two devices, a position and a velocity each; three peers hold two samples of two numbers.
+    assert_eq!((document["dimensions"]["plant"].as_u64(), document["dimensions"]["held"].as_u64()), (Some(10), Some(12)));
+    // 6 links with 24 ms of 8 ms each.
+    assert_eq!(document["dimensions"]["in_flight"], 18);
+    assert_eq!((document["cost"]["peer_ticks_per_s"].as_f64(), document["cost"]["packets_per_s"].as_f64()), (Some(3000.0), Some(750.0)));
+    let plane = Desk::with("plane.toml", PLANE).json("explain plane.toml --json");
+    assert_eq!((plane["dimensions"]["plant"].as_u64(), plane["dimensions"]["held"].as_u64()), (Some(16), Some(8)));
+}
+
+#[test]
+fn people_get_the_same_in_words() {
+    let desk = Desk::with("three.toml", RANDOM);
+    let (text, document) = (desk.text("explain three.toml"), desk.json("explain three.toml --json"));
+    for part in ["Three users, far apart\n", "\nModelled\n", "\nLeft out\n", "\nState\n", "\nCost\n", "  10 numbers in devices and copies"] {
+        assert!(text.contains(part), "no {part:?} in {text}");
+    }
+    for row in document["models"].as_array().unwrap() {
+        let line =
+            format!("  {}: {}\n      because: {}\n", row["part"].as_str().unwrap(), row["model"].as_str().unwrap(), row["reason"].as_str().unwrap());
+        assert!(text.contains(&line), "no {line} in {text}");
+    }
+    assert!(left_out(&document).iter().all(|what| text.contains(&format!("  {what}\n"))), "{text}");
+}
+
+#[test]
+fn nothing_is_run() {
+    let desk = Desk::with("two.toml", TWO);
+    // 584 years are all there is.
+    desk.json("explain two.toml --json --set scene.duration=5000000h");
+    assert_eq!(desk.files(""), ["two.toml"]);
+}

@@ -1,0 +1,45 @@
+//! `--help` and wrong usage.
+
+use crate::desk::Desk;
+use crate::scenes::TWO;
+
+#[test]
+fn help_names_the_commands() {
+    let text = Desk::new().text("--help");
+    assert!(["run", "check", "explain", "Exit status: 0 done", "130 interrupted"].iter().all(|word| text.contains(word)), "{text}");
+    assert!(Desk::new().text("--version").starts_with("cohaptic "));
+}
+
+#[test]
+fn help_of_a_command_names_its_options_and_the_exit_status() {
+    for (command, options) in [
+        ("run", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--against <KEY=VALUE>", "--out <DIR>", "--no-plot", "--general"][..]),
+        ("check", &["<SCENE>...", "--set <KEY=VALUE>", "--json", "--jobs <N>", "--general"]),
+        ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json"]),
+    ] {
+        let text = Desk::new().text(&format!("{command} --help"));
+        for part in options.iter().chain(&["Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output"]) {
+            let words: Vec<&str> = text.split_whitespace().collect();
+            assert!(words.join(" ").contains(part), "no {part:?} in {text}");
+        }
+    }
+}
+
+#[test]
+fn wrong_usage_is_refused() {
+    let desk = Desk::with("two.toml", TWO);
+    for (line, part) in [
+        ("", "Usage"),
+        ("fly two.toml", "'fly'"),
+        ("run", "<SCENE>"),
+        ("run two.toml another.toml", "another.toml"),
+        ("run two.toml --set", "--set"),
+        ("run two.toml --out", "--out"),
+        ("run two.toml --fast", "--fast"),
+        ("explain", "<SCENE>"),
+        ("explain two.toml --general", "--general"),
+        ("check --jobs many two.toml", "many"),
+    ] {
+        desk.cohaptic(line).assert_refused(2, &[part]);
+    }
+}

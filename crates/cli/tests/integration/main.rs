@@ -1,0 +1,19 @@
+//! The command line as its users meet it. Every test types a command in a folder of its own and looks at what comes back: the exit status, standard
+//! output, standard error and files. Expected numbers come from counting, from a closed form or from another record of the same run.
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
+#![expect(clippy::float_cmp, reason = "what is printed is what was computed, to the bit")]
+
+mod against;
+mod check;
+mod desk;
+mod errors;
+mod explain;
+mod help;
+#[cfg(unix)]
+mod interrupt;
+mod output;
+mod overrides;
+mod records;
+mod run;
+mod scenes;
+mod svg;
