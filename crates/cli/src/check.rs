@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use cohaptic_harness::{Model, check as harness};
-use cohaptic_scene::{Scene, scene_files};
+use cohaptic_scene::{Scene, SceneError, scene_files};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -23,30 +23,40 @@ struct Checked {
     file: String,
     passed: bool,
     failures: Vec<String>,
+    /// Whether the scene has an `[expect]` at all.
+    expects: bool,
     #[serde(skip)]
     status: u8,
-    #[serde(skip)]
-    expects_nothing: bool,
 }
 
 /// Checks every scene, says one line each, and goes on after a scene that fails or cannot be read.
 pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
-    let mut files = Vec::new();
+    let mut files: Vec<Result<PathBuf, Checked>> = Vec::new();
+    let mut first_error = None;
     for path in &arguments.scenes {
-        files.extend(scene_files(path)?);
+        match scene_files(path) {
+            Ok(found) => files.extend(found.into_iter().map(Ok)),
+            Err(error) => {
+                files.push(Err(Checked::unreadable(path, &error)));
+                first_error.get_or_insert(error);
+            }
+        }
+    }
+    if let Some(error) = first_error.filter(|_| files.iter().all(Result::is_err)) {
+        return Err(error.into());
     }
     let progress = Progress::through_scenes(files.len());
     let model = if arguments.general { Model::General } else { Model::Least };
-    let check = |file: &PathBuf| {
-        let checked = check_one(file, &arguments.overrides.set, model);
+    let check = |file: Result<PathBuf, Checked>| {
+        let checked = file.map_or_else(|unreadable| unreadable, |file| check_one(&file, &arguments.overrides.set, model));
         progress.one_more();
         checked
     };
     let jobs = arguments.jobs.map_or(0, std::num::NonZeroUsize::get);
     let scenes: Vec<Checked> = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
-        Ok(pool) => pool.install(|| files.par_iter().map(check).collect()),
+        Ok(pool) => pool.install(|| files.into_par_iter().map(check).collect()),
         // Without threads it takes longer.
-        Err(_) => files.iter().map(check).collect(),
+        Err(_) => files.into_iter().map(check).collect(),
     };
     progress.clear();
     let status = scenes.iter().map(|scene| scene.status).max().unwrap_or(0);
@@ -59,22 +69,27 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
 }
 
 fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
-    let (failures, status, expects_nothing) = match Scene::read(file, overrides) {
-        Err(error) => (vec![error.to_string()], scene_status(&error), false),
+    match Scene::read(file, overrides) {
+        Err(error) => Checked::unreadable(file, &error),
         Ok(scene) => {
             let failures = harness::check(&scene, model, || !interrupt::asked());
             let status = if failures.is_empty() { 0 } else { EXPECTATION };
-            (failures, status, scene.expect.is_none())
+            Checked { file: output::path(file), passed: failures.is_empty(), failures, expects: scene.expect.is_some(), status }
         }
-    };
-    Checked { file: output::path(file), passed: failures.is_empty(), failures, status, expects_nothing }
+    }
+}
+
+impl Checked {
+    fn unreadable(path: &Path, error: &SceneError) -> Self {
+        Self { file: output::path(path), passed: false, failures: vec![error.to_string()], expects: false, status: scene_status(error) }
+    }
 }
 
 fn describe(scenes: &[Checked]) -> String {
     let mut text = String::new();
     for scene in scenes {
         let file = &scene.file;
-        if scene.expects_nothing {
+        if scene.passed && !scene.expects {
             text.push_str(&format!("ok    {file} (it has no [expect]: nothing was compared)\n"));
         } else if scene.passed {
             text.push_str(&format!("ok    {file}\n"));

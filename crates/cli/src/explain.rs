@@ -39,6 +39,7 @@ struct Cost {
     peer_ticks_per_s: f64,
     packets_per_s: f64,
     realtime_factor: f64,
+    record_bytes_per_s: f64,
 }
 
 /// Says what a scene makes the program model.
@@ -60,7 +61,12 @@ fn document<'a>(scene: &'a Scene, explanation: &'a Explanation) -> Document<'a> 
         models: models.iter().map(|row| Model { part: &row.part, model: &row.model, reason: &row.reason }).collect(),
         left_out,
         dimensions: Dimensions { plant: dimensions.plant, held: dimensions.held, in_flight: dimensions.in_flight },
-        cost: Cost { peer_ticks_per_s: cost.peer_ticks_per_s, packets_per_s: cost.packets_per_s, realtime_factor: cost.realtime_factor },
+        cost: Cost {
+            peer_ticks_per_s: cost.peer_ticks_per_s,
+            packets_per_s: cost.packets_per_s,
+            realtime_factor: cost.realtime_factor,
+            record_bytes_per_s: cost.record_bytes_per_s,
+        },
     }
 }
 
@@ -82,8 +88,12 @@ fn describe(scene: &Scene, explanation: &Explanation) -> String {
     );
     let _ = writeln!(
         text,
-        "\nCost\n  {:.0} control ticks and {:.0} packets a simulated second: about {:.0} times real time with nothing recorded",
-        cost.peer_ticks_per_s, cost.packets_per_s, cost.realtime_factor
+        "\nCost\n  {:.0} control ticks and {:.0} packets a simulated second: about {:.0} times real time with nothing recorded\n  \
+         records (--out): about {:.1} MB a simulated second",
+        cost.peer_ticks_per_s,
+        cost.packets_per_s,
+        cost.realtime_factor,
+        cost.record_bytes_per_s / 1e6
     );
     text
 }

@@ -49,8 +49,11 @@ pub struct Cost {
     pub peer_ticks_per_s: f64,
     /// Packets sent in a simulated second.
     pub packets_per_s: f64,
-    /// Simulated seconds per second of processor time with nothing recorded, within a factor of two on a present-day core.
+    /// Simulated seconds per second of processor time with nothing recorded, within a factor of two on a present-day core. Access lines are not
+    /// counted.
     pub realtime_factor: f64,
+    /// What `--out` writes in a simulated second, about \[byte\].
+    pub record_bytes_per_s: f64,
 }
 
 /// Nanoseconds for a control tick of one peer with one axis, for a packet over a link of constant delay, and for one over a link with more
@@ -58,6 +61,11 @@ pub struct Cost {
 const NANOS_A_TICK: f64 = 12.0;
 const NANOS_A_PACKET: f64 = 20.0;
 const NANOS_AN_IMPAIRED_PACKET: f64 = 50.0;
+
+/// Bytes of a row of `trajectory.csv` (for its first axis and for each further one) and of `packets.csv`, in scenes of ordinary size.
+const BYTES_A_TICK: f64 = 20.0;
+const BYTES_AN_AXIS: f64 = 145.0;
+const BYTES_A_PACKET: f64 = 40.0;
 
 /// Says what the scene makes the program model.
 #[must_use]
@@ -160,8 +168,9 @@ impl Rows {
                 self.model(&part, describe_link(config), "a chain of the stages that are configured");
             }
         }
+        let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Links(_)));
         let one_delay = used.len() == 1 && used.iter().all(|(config, _)| config.is_constant_delay());
-        if one_delay && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()) {
+        if one_delay && !links_change && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()) {
             self.model("packets on the way", "a ring", "all delays are equal, so packets arrive in the order in which they were sent");
             self.leave_out("sorting of arrivals");
         } else {
@@ -292,7 +301,9 @@ fn cost(scene: &Scene) -> Cost {
         used_links(scene).iter().filter(|(config, _)| config.is_constant_delay() == constant).map(|(_, count)| count_f64(*count) / update).sum()
     };
     let nanos = peer_ticks_per_s * NANOS_A_TICK * axes + packets(true) * NANOS_A_PACKET + packets(false) * NANOS_AN_IMPAIRED_PACKET;
-    Cost { peer_ticks_per_s, packets_per_s: packets(true) + packets(false), realtime_factor: 1e9 / nanos }
+    let packets_per_s = packets(true) + packets(false);
+    let record_bytes_per_s = peer_ticks_per_s * (BYTES_A_TICK + BYTES_AN_AXIS * axes) + packets_per_s * BYTES_A_PACKET;
+    Cost { peer_ticks_per_s, packets_per_s, realtime_factor: 1e9 / nanos, record_bytes_per_s }
 }
 
 #[expect(clippy::cast_precision_loss, reason = "counts of links and axes are far below 2^53")]

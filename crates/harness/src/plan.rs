@@ -9,8 +9,8 @@ pub enum Model {
     /// The least that the scene needs.
     #[default]
     Least,
-    /// Everything the program has: three axes, an event for each tick of each peer, every device, every stage of every link. Slower, with the same
-    /// answer: this is how the choices of [`Model::Least`] are tested.
+    /// Everything the program has: three axes, an event for each tick of each peer, every device, and the chain of stages for every link, however
+    /// few it has. Slower, with the same answer: this is how the choices of [`Model::Least`] are tested.
     General,
 }
 

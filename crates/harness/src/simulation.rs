@@ -61,8 +61,7 @@ fn run_to_end<const A: usize, O: Observer>(mut world: World<A>, observer: &mut O
             }
         }
         if !observer.keep_going(world.now()) {
-            let next = world.now().saturating_add(std::time::Duration::from_nanos(1));
-            return Ok(world.summary(Ending::Interrupted(next)));
+            return Ok(world.summary(Ending::Interrupted(world.now())));
         }
     }
 }

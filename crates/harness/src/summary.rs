@@ -31,11 +31,11 @@ pub enum Ending {
     Complete,
     /// At this tick a position or a velocity was no finite number any more: the scene diverged.
     Diverged(Instant),
-    /// The observer ended the run before this tick.
+    /// The observer ended the run after this tick.
     Interrupted(Instant),
 }
 
-/// One peer at the end of a run.
+/// One peer at the end of a run: at its first tick at or after the end, which is the state that its last tick leads to.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PeerSummary {
     /// Its name.

@@ -10,7 +10,7 @@ use crate::{ArmConfig, Clock, DeviceConfig, Hand, Integrator, Plant, Signal, Sta
 
 /// What a peer needs of a haptic device, simulated or real.
 pub trait Device<const A: usize> {
-    /// Position and velocity of the device at the present tick.
+    /// Position and velocity of the device at the present tick. It is asked several times a tick and must give the same answer each time.
     fn state(&self) -> State<A>;
 
     /// Holds the coupling force FC, which the device feels with the opposite sign, from `now` until the next tick, `span` later.

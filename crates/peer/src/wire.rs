@@ -15,6 +15,8 @@
 //!     48    16  position \[m\] and velocity [m/s] on the first axis, then on the others
 //! ```
 //!
+//! The send time is for those who record or measure; a receiver goes by the sequence number alone.
+//!
 //! A datagram is taken only if every byte of it has a meaning: whatever decodes encodes to the same bytes again. The zeros are room for what a
 //! later version may send (the energy of a passivity controller, for instance).
 

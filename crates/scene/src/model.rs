@@ -234,7 +234,7 @@ pub struct ExpectPosition {
     pub peer: usize,
     /// 0 for x, 1 for y, 2 for z.
     pub axis: usize,
-    /// At the peer's last tick at or before this instant.
+    /// At the peer's last tick at or before this instant; at the end of the scene, where its last tick leads to.
     pub at: Instant,
     /// Where \[m\].
     pub bounds: Bounds,

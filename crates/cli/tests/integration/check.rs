@@ -129,6 +129,15 @@ fn what_is_not_there_cannot_be_checked() {
 }
 
 #[test]
+fn a_path_that_is_not_there_does_not_keep_the_others_from_being_checked() {
+    let desk = folder();
+    let outcome = desk.cohaptic("check nowhere scenes");
+    assert_eq!(outcome.status, Some(3));
+    assert!(outcome.stdout.starts_with("FAIL  nowhere\n      nowhere: cannot be read: "), "{}", outcome.stdout);
+    assert!(outcome.stdout.contains("\nok    scenes"), "{}", outcome.stdout);
+}
+
+#[test]
 fn a_scene_whose_hand_is_missing_is_an_input_error() {
     let desk = folder();
     desk.write("scenes/b.toml", TWO.replace("{ force = 1.5 }", "{ file = \"gone.csv\" }"));

@@ -118,7 +118,7 @@ fn the_summary_says_what_happened() {
         "largest discrepancy between two copies: ",
         "left ends at ",
         "right ends at ",
-        "50 packets offered to 2 links, 46 delivered\n",
+        "50 packets sent over 2 links, 46 delivered, 4 on the way at the end\n",
     ] {
         assert!(text.contains(part), "no {part:?} in:\n{text}");
     }

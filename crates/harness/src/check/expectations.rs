@@ -71,7 +71,9 @@ impl Watched {
         }
         for (expected, watched) in expect.positions.iter().zip(&self.positions) {
             let what = format!("position of {}'s copy along {} at {}", name(expected.peer), AXES[expected.axis], expected.at);
-            match watched.seen {
+            let at_the_end = expected.at >= Instant::ZERO.saturating_add(scene.duration);
+            let seen = if at_the_end { Some(summary.peers[expected.peer].position[expected.axis]) } else { watched.seen };
+            match seen {
                 None => failures.push(format!("{what}: {} has not ticked by then", name(expected.peer))),
                 Some(seen) if !expected.bounds.contain(seen) => failures.push(format!("{what}: {seen} m, expected {}", range(&expected.bounds, "m"))),
                 Some(_) => {}

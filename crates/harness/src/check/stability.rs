@@ -4,6 +4,9 @@
 //! micrometre. The difference of the two runs obeys the scene's autonomous dynamics (exactly, if the scene is linear), whatever the hands do, so it
 //! dies out where the scene is stable and grows where it is not. Only *relative* displacements count: of copies against one another, and of a device
 //! against its copy while it touches it. Where all of them are together has no meaning for stability, because space has no origin.
+//!
+//! Limits: with random links the answer holds for the scene's seed, which is almost-sure, not mean-square stability. And the difference of two runs
+//! is only as exact as positions are: with copies that travel beyond 10⁶ m, rounding (10⁻¹⁰ m there) comes near what counts as died out.
 
 use cohaptic_peer::Contact;
 use cohaptic_scene::{Axes, Scene};

@@ -1,0 +1,123 @@
+//! `cohaptic run`.
+
+mod document;
+mod words;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant as Clock;
+
+use cohaptic_harness::record::{Bands, RecordError, Recorder};
+use cohaptic_harness::{Model, Observer, PacketRow, Simulation, Summary, TickRow};
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+
+use crate::arguments::RunArguments;
+use crate::failure::{Failure, INTERRUPTED};
+use crate::progress::Progress;
+use crate::{failure, interrupt, output};
+use document::Document;
+use words::describe;
+
+/// Runs a scene, or a scene and a variant of it, and says what happened.
+pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
+    let overrides = &arguments.scene.overrides.set;
+    let scene = Scene::read(&arguments.scene.scene, overrides)?;
+    // Both scenes are read before either runs: a mistake in the second is not found after a long first run.
+    let variant = if arguments.against.is_empty() {
+        None
+    } else {
+        let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
+        let mut variant = Scene::read(&arguments.scene.scene, &both).map_err(|error| failure::of_variant(error, &arguments.against))?;
+        variant.title = format!("{}, with {}", variant.title, arguments.against.join(", "));
+        Some(variant)
+    };
+    let first = run_one(arguments, &scene, arguments.out.clone())?;
+    let second = match &variant {
+        Some(variant) if !interrupt::asked() => Some(run_one(arguments, variant, arguments.out.as_ref().map(|out| out.join("against")))?),
+        _ => None,
+    };
+    if arguments.scene.json {
+        let mut document = Document::new(&scene, &first);
+        document.against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| Box::new(Document::new(variant, run)));
+        output::json(&document)?;
+    } else {
+        let mut text = format!("{}\n{}", scene.title, describe(&scene, &first));
+        if let Some((variant, run)) = variant.as_ref().zip(second.as_ref()) {
+            let _ = write!(text, "\nAgainst {}:\n{}", arguments.against.join(", "), describe(variant, run));
+        }
+        output::text(&text)?;
+    }
+    Ok(if interrupt::asked() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// A run and what it left behind.
+struct Run {
+    summary: Summary,
+    wall_s: f64,
+    positions: Option<Bands>,
+    files: Vec<PathBuf>,
+}
+
+fn run_one(arguments: &RunArguments, scene: &Scene, out: Option<PathBuf>) -> Result<Run, Failure> {
+    let model = if arguments.general { Model::General } else { Model::Least };
+    let simulation = Simulation::new(scene, model);
+    let shown = !arguments.scene.json && !arguments.no_plot;
+    let mut watch = Watch {
+        progress: Progress::through_scene(&scene.title, scene.duration),
+        positions: shown.then(|| Bands::new(scene.duration, PLOT_SPANS, scene.peers.len())),
+    };
+    let start = Clock::now();
+    let (summary, files) = match out.as_deref() {
+        None => (simulation.run(&mut &mut watch)?, Vec::new()),
+        Some(folder) => record(&simulation, scene, folder, &mut watch)?,
+    };
+    let wall_s = start.elapsed().as_secs_f64();
+    watch.progress.clear();
+    Ok(Run { summary, wall_s, positions: watch.positions, files })
+}
+
+fn record(simulation: &Simulation<'_>, scene: &Scene, folder: &Path, watch: &mut Watch) -> Result<(Summary, Vec<PathBuf>), Failure> {
+    let mut observer = (Recorder::create(folder, scene)?, watch);
+    let summary = simulation.run(&mut observer)?;
+    let files = observer.0.finish(&summary)?;
+    Ok((summary, files))
+}
+
+/// Twice the columns of the plot in the terminal: two dots a column.
+const PLOT_SPANS: usize = 144;
+
+/// Shows progress, collects what the terminal shows, and ends the run when the user asks for it.
+struct Watch {
+    progress: Progress,
+    positions: Option<Bands>,
+}
+
+impl Observer for &mut Watch {
+    type Error = RecordError;
+
+    fn wants_ticks(&self) -> bool {
+        self.positions.is_some()
+    }
+
+    fn wants_packets(&self) -> bool {
+        false
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
+        if let Some(positions) = &mut self.positions {
+            positions.add(row.peer, row.at, row.object.position[0]);
+        }
+        Ok(())
+    }
+
+    fn on_packet(&mut self, _row: &PacketRow) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn keep_going(&mut self, now: Instant) -> bool {
+        self.progress.reach(now);
+        !interrupt::asked()
+    }
+}

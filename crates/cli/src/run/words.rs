@@ -1,0 +1,79 @@
+//! A run in words, with a plot.
+
+use std::fmt::Write as _;
+
+use cohaptic_harness::{Ending, Summary};
+use cohaptic_scene::Scene;
+use cohaptic_units::print::Span;
+use cohaptic_wan::DropCause;
+
+use super::Run;
+use crate::terminal_plot;
+
+/// A run in words.
+pub(super) fn describe(scene: &Scene, run: &Run) -> String {
+    let mut text = String::new();
+    let summary = &run.summary;
+    // Writing to a string does not fail.
+    let mut line = |line: String| {
+        let _ = writeln!(text, "{line}");
+    };
+    if let Some(positions) = &run.positions {
+        line(format!("position of each copy of the object{}", if scene.axes.count() > 1 { ", along x" } else { "" }));
+        line(terminal_plot::draw(positions, 100.0, "cm").trim_end().to_owned());
+    }
+    let simulated = Span(summary.duration);
+    match summary.ending {
+        Ending::Complete => {}
+        Ending::Diverged(at) => line(format!("  DIVERGED: at {at} a position or a velocity is no finite number any more")),
+        Ending::Interrupted(_) => line(format!("  INTERRUPTED after {simulated} of {}", Span(scene.duration))),
+    }
+    let factor = summary.duration.as_secs_f64() / run.wall_s;
+    line(format!("  {simulated} simulated, {} ticks, in {:.3} s: {factor:.0} times real time", summary.ticks, run.wall_s));
+    line(format!("  largest discrepancy between two copies: {}", length(summary.max_discrepancy)));
+    for peer in summary.peers.iter().take(MOST_PEERS) {
+        let position: Vec<String> = peer.position.iter().map(|x| length(*x)).collect();
+        line(format!("  {} ends at {}", peer.name, position.join(", ")));
+    }
+    if summary.peers.len() > MOST_PEERS {
+        line(format!("  ... and {} more peers", summary.peers.len() - MOST_PEERS));
+    }
+    line(format!("  {}", packets(summary)));
+    for file in run.files.iter().filter(|file| file.extension().is_some_and(|extension| extension == "svg")) {
+        line(format!("  plot: {}", file.display()));
+    }
+    text
+}
+
+/// The summary for people names this many peers at most.
+const MOST_PEERS: usize = 8;
+
+fn length(metres: f64) -> String {
+    if metres.abs() < 1e4 { format!("{:.3} mm", metres * 1e3) } else { format!("{metres:.3e} m") }
+}
+
+/// What became of all packets, end to end.
+fn packets(summary: &Summary) -> String {
+    let has_line = |peer: usize, uplink: bool| summary.access_lines.iter().any(|line| line.peer == peer && line.uplink == uplink);
+    let lines = |uplink: bool| summary.access_lines.iter().filter(move |line| line.uplink == uplink).map(|line| line.stats);
+    // A packet enters at the uplink of its sender, or at the link, and leaves at the downlink of its receiver, or at the link.
+    let sent: u64 = lines(true).map(|stats| stats.offered()).sum::<u64>()
+        + summary.links.iter().filter(|link| !has_line(link.from, true)).map(|link| link.stats.offered()).sum::<u64>();
+    let delivered: u64 = lines(false).map(|stats| stats.delivered()).sum::<u64>()
+        + summary.links.iter().filter(|link| !has_line(link.to, false)).map(|link| link.stats.delivered()).sum::<u64>();
+    let stats = || summary.links.iter().map(|link| link.stats).chain(summary.access_lines.iter().map(|line| line.stats));
+    let mut parts = vec![format!("{sent} packets sent over {} links", summary.links.len()), format!("{delivered} delivered")];
+    for cause in DropCause::ALL {
+        let dropped: u64 = stats().map(|stats| stats.dropped(cause)).sum();
+        if dropped > 0 {
+            parts.push(format!("{dropped} dropped ({})", cause.name()));
+        }
+    }
+    let on_the_way: u64 = stats().map(|stats| stats.in_flight()).sum();
+    parts.push(format!("{on_the_way} on the way at the end"));
+    let stale: u64 = summary.peers.iter().map(|peer| peer.stale_samples).sum();
+    if stale > 0 {
+        parts.push(format!("{stale} of those delivered too late to be used"));
+    }
+    parts.join(", ")
+}
