@@ -3,6 +3,7 @@
 #![allow(clippy::float_cmp, clippy::cast_precision_loss, reason = "oracles that must agree to the bit, and counts far below 2^53")]
 
 mod convergence;
+mod edited_scenes;
 mod equivalence;
 mod held_samples;
 mod ideal_network;

@@ -1,6 +1,8 @@
 //! Whatever happens to a file, reading it ends in a scene or in an error that can be shown.
 
-use cohaptic_scene::Scene;
+use std::path::{Path, PathBuf};
+
+use cohaptic_scene::{Scene, scene_files};
 use proptest::prelude::*;
 
 use crate::every_key::path;
@@ -149,6 +151,11 @@ fn replaced(text: &str, at: usize, new: &str, belongs: impl Fn(u8) -> bool) -> S
     String::from_utf8_lossy(&[&bytes[..start], new.as_bytes(), &bytes[start + length..]].concat()).into_owned()
 }
 
+/// The scenes of the repository.
+fn shipped() -> Vec<PathBuf> {
+    scene_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios")).unwrap()
+}
+
 /// Every error can be shown, says where it is, and holds no control characters but the ends of its lines.
 fn check(text: &str, overrides: &[String]) -> Result<(), TestCaseError> {
     let Err(error) = Scene::parse(text, &path(), overrides) else { return Ok(()) };
@@ -170,6 +177,17 @@ proptest! {
     #[test]
     fn a_scene_that_something_happened_to_is_read_or_refused(edits in prop::collection::vec(edit(), 1..6)) {
         let original = std::fs::read_to_string(path()).unwrap();
+        let text = edits.iter().fold(original, |text, edit| apply(&text, edit));
+        check(&text, &[])?;
+    }
+
+    #[test]
+    fn a_shipped_scene_that_something_happened_to_is_read_or_refused(
+        scene in any::<prop::sample::Index>(),
+        edits in prop::collection::vec(edit(), 1..6),
+    ) {
+        let shipped = shipped();
+        let original = std::fs::read_to_string(&shipped[scene.index(shipped.len())]).unwrap();
         let text = edits.iter().fold(original, |text, edit| apply(&text, edit));
         check(&text, &[])?;
     }
