@@ -11,21 +11,21 @@ pub type Place = [f64; 3];
 /// A scene to order. It is shown as its TOML text.
 #[derive(Clone, PartialEq)]
 pub struct Draft {
-    /// How long it lasts [ms].
+    /// How long it lasts \[ms\].
     pub duration: u64,
     /// The seed of all random numbers.
     pub seed: u32,
     /// 1 to 3.
     pub axes: usize,
-    /// Mass of the whole object [kg].
+    /// Mass of the whole object \[kg\].
     pub mass: f64,
     /// Damping of each copy [N·s/m].
     pub damping: f64,
     /// Whether the mass is shared out.
     pub split_mass: bool,
-    /// Where bodies begin [m].
+    /// Where bodies begin \[m\].
     pub position: Place,
-    /// How fast they begin [m/s].
+    /// How fast they begin \[m/s\].
     pub velocity: Place,
     /// Walls.
     pub enclosure: Option<Enclosure>,
@@ -33,7 +33,7 @@ pub struct Draft {
     pub strategy: Coordination,
     /// KT and BT.
     pub gains: Gains,
-    /// The period of sending [µs].
+    /// The period of sending \[µs\].
     pub update: u64,
     /// Which integrator with how many steps; `None` is the exact one.
     pub integrator: Option<(&'static str, u32)>,
@@ -52,7 +52,7 @@ pub struct Draft {
 pub struct DraftPeer {
     /// Its name.
     pub name: String,
-    /// Its tick [µs].
+    /// Its tick \[µs\].
     pub tick: u64,
     /// Whether forces act a tick late.
     pub compute_delay: bool,
@@ -66,13 +66,13 @@ pub struct DraftPeer {
     pub coupling: Gains,
     /// What the hand does.
     pub hand: DraftHand,
-    /// By how much its clock is late [ns].
+    /// By how much its clock is late \[ns\].
     pub offset: u64,
     /// How fast its clock runs [parts per billion].
     pub drift: i32,
-    /// Where it begins, if not with the object [m].
+    /// Where it begins, if not with the object \[m\].
     pub position: Option<Place>,
-    /// How fast it begins, if not with the object [m/s].
+    /// How fast it begins, if not with the object \[m/s\].
     pub velocity: Option<Place>,
     /// Keys of its uplink, as TOML.
     pub uplink: Option<String>,
@@ -85,22 +85,22 @@ pub struct DraftPeer {
 pub enum DraftHand {
     /// Nothing.
     None,
-    /// A constant force [N].
+    /// A constant force \[N\].
     Force(Place),
-    /// amplitude·sin(2π·frequency·t + phase) [N].
+    /// amplitude·sin(2π·frequency·t + phase) \[N\].
     Sine {
-        /// Amplitude [N].
+        /// Amplitude \[N\].
         amplitude: Place,
-        /// Frequency [Hz].
+        /// Frequency \[Hz\].
         frequency: f64,
-        /// Phase [rad].
+        /// Phase \[rad\].
         phase: f64,
     },
     /// An arm around a place.
     Arm {
         /// Its impedance.
         arm: ArmConfig,
-        /// Where it wants to be [m].
+        /// Where it wants to be \[m\].
         wanted: Place,
     },
 }

@@ -153,7 +153,7 @@ fn any_peer(axes: usize) -> impl Strategy<Value = DraftPeer> {
     })
 }
 
-/// Tick [µs], offset [ns] and drift [ppb] of each peer: all the same in half of the scenes.
+/// Tick [µs], offset \[ns\] and drift [ppb] of each peer: all the same in half of the scenes.
 fn any_clocks(count: usize) -> impl Strategy<Value = Vec<(u64, u64, i32)>> {
     let tick = || select(&[500_u64, 1000, 2000][..]);
     let offset = prop_oneof![Just(0), Just(1_000_000), 0..3_000_000_u64];

@@ -11,9 +11,9 @@ use crate::Place;
 /// Position and velocity; components beyond the scene's axes are zero.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Body {
-    /// [m]
+    /// \[m\]
     pub position: Place,
-    /// [m/s]
+    /// \[m/s\]
     pub velocity: Place,
 }
 
@@ -30,9 +30,9 @@ pub struct Tick {
     pub object: Body,
     /// Where its strategy wants the copy to be.
     pub target: Body,
-    /// FC [N].
+    /// FC \[N\].
     pub coupling_force: Place,
-    /// FT [N].
+    /// FT \[N\].
     pub coordination_force: Place,
 }
 

@@ -135,7 +135,7 @@ fn series([m, b, k]: [f64; 3], h: f64, [x, v]: [f64; 2], push: f64, pull: f64) -
     (sum, size)
 }
 
-/// ∫φ: how far a unit velocity goes [s], how far a unit acceleration goes [s²], and what velocity it gives [s].
+/// ∫φ: how far a unit velocity goes \[s\], how far a unit acceleration goes [s²], and what velocity it gives \[s\].
 fn closed_form(m: f64, b: f64, h: f64) -> [f64; 3] {
     let z = b * h / m;
     // (1 − e^{−z})/z and (z − 1 + e^{−z})/z²; the second cancels for small z, where its series 1/2 − z/6 + z²/24 − … converges at once.

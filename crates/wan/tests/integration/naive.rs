@@ -127,7 +127,7 @@ fn losses(name: &LinkName, configs: &[(Instant, LinkConfig)], offered: &[Offered
     lost
 }
 
-/// The propagation delay of packet `number` [ns].
+/// The propagation delay of packet `number` \[ns\].
 fn delay(name: &LinkName, config: &LinkConfig, number: u64) -> u64 {
     let mean = i128::try_from(config.delay.mean().as_nanos()).unwrap();
     let Some(jitter) = config.delay.jitter() else { return u64::try_from(mean).unwrap() };
