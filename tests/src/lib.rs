@@ -6,6 +6,15 @@
 //! Nothing here knows what the right answer is: the oracles stand in the tests.
 #![allow(clippy::panic, clippy::unwrap_used, clippy::missing_panics_doc, reason = "this crate is nothing but test support")]
 
+/// The programs in the book are compiled and run.
+#[cfg(doctest)]
+mod book {
+    #[doc = include_str!("../../docs/emulator.md")]
+    mod emulator {}
+    #[doc = include_str!("../../docs/extending.md")]
+    mod extending {}
+}
+
 mod draft;
 pub mod drafts;
 mod log;

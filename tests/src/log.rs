@@ -103,10 +103,6 @@ impl Observer for Keeper {
         self.packets.push(*row);
         Ok(())
     }
-
-    fn keep_going(&mut self, _now: Instant) -> bool {
-        true
-    }
 }
 
 fn place(components: &[f64]) -> Place {

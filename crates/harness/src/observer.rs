@@ -5,33 +5,44 @@ use cohaptic_wan::Fate;
 
 /// Sees what happens in a run, while it happens, in the order in which it happens.
 ///
-/// Peers are named by their place in [`cohaptic_scene::Scene::peers`]. The rows borrow from the running scene: copy what you keep.
+/// Peers are named by their place in [`cohaptic_scene::Scene::peers`]. The rows borrow from the running scene: copy what you keep. By default an
+/// observer wants to see nothing; what it does not want costs nothing.
 pub trait Observer {
     /// Why the run must end: a file that cannot be written, for instance. An observer that never fails has [`std::convert::Infallible`].
     type Error;
 
     /// Whether [`Observer::on_tick`] is to be called. Asked once, at the start.
-    fn wants_ticks(&self) -> bool;
+    fn wants_ticks(&self) -> bool {
+        false
+    }
 
     /// Whether [`Observer::on_packet`] is to be called. Asked once, at the start.
-    fn wants_packets(&self) -> bool;
+    fn wants_packets(&self) -> bool {
+        false
+    }
 
     /// A peer has computed its forces at a tick.
     ///
     /// # Errors
     ///
     /// Ends the run.
-    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Self::Error>;
+    fn on_tick(&mut self, _row: &TickRow<'_>) -> Result<(), Self::Error> {
+        Ok(())
+    }
 
     /// A packet has arrived or was dropped.
     ///
     /// # Errors
     ///
     /// Ends the run.
-    fn on_packet(&mut self, row: &PacketRow) -> Result<(), Self::Error>;
+    fn on_packet(&mut self, _row: &PacketRow) -> Result<(), Self::Error> {
+        Ok(())
+    }
 
     /// Called about every thousand instants, for progress and interruption; `false` ends the run early, in good order.
-    fn keep_going(&mut self, now: Instant) -> bool;
+    fn keep_going(&mut self, _now: Instant) -> bool {
+        true
+    }
 }
 
 /// Position and velocity along the axes of the scene.
@@ -87,26 +98,6 @@ pub struct NoObserver;
 
 impl Observer for NoObserver {
     type Error = std::convert::Infallible;
-
-    fn wants_ticks(&self) -> bool {
-        false
-    }
-
-    fn wants_packets(&self) -> bool {
-        false
-    }
-
-    fn on_tick(&mut self, _row: &TickRow<'_>) -> Result<(), Self::Error> {
-        Ok(())
-    }
-
-    fn on_packet(&mut self, _row: &PacketRow) -> Result<(), Self::Error> {
-        Ok(())
-    }
-
-    fn keep_going(&mut self, _now: Instant) -> bool {
-        true
-    }
 }
 
 /// Two observers side by side; the first sees everything first, and either can end the run.

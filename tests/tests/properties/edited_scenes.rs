@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use cohaptic_harness::{Model, Observer, PacketRow, Simulation, TickRow};
+use cohaptic_harness::{Model, Observer, Simulation};
 use cohaptic_scene::Scene;
 use cohaptic_tests::{cases, shipped_scenes};
 use cohaptic_units::Instant;
@@ -24,14 +24,6 @@ impl Observer for Brief {
 
     fn wants_packets(&self) -> bool {
         true
-    }
-
-    fn on_tick(&mut self, _row: &TickRow<'_>) -> Result<(), Infallible> {
-        Ok(())
-    }
-
-    fn on_packet(&mut self, _row: &PacketRow) -> Result<(), Infallible> {
-        Ok(())
     }
 
     fn keep_going(&mut self, _now: Instant) -> bool {

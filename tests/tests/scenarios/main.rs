@@ -31,6 +31,15 @@ fn every_shipped_scene_meets_its_expectations() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
+#[test]
+fn the_scene_in_the_readme_is_what_it_says() {
+    let readme = include_str!("../../../README.md");
+    let (_, rest) = readme.split_once("```toml\n").expect("the README shows a scene");
+    let (text, _) = rest.split_once("```").expect("the scene ends");
+    let scene = Scene::parse(text, "README.md".as_ref(), &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(check(&scene, Model::Least, || true), Vec::<String>::new());
+}
+
 fn next(left: &Mutex<Vec<PathBuf>>) -> Option<PathBuf> {
     left.lock().unwrap().pop()
 }

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use std::time::Instant as Clock;
 
 use cohaptic_harness::record::{Bands, RecordError, Recorder};
-use cohaptic_harness::{Model, Observer, PacketRow, Simulation, Summary, TickRow};
+use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -101,18 +101,10 @@ impl Observer for &mut Watch {
         self.positions.is_some()
     }
 
-    fn wants_packets(&self) -> bool {
-        false
-    }
-
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
         if let Some(positions) = &mut self.positions {
             positions.add(row.peer, row.at, row.object.position[0]);
         }
-        Ok(())
-    }
-
-    fn on_packet(&mut self, _row: &PacketRow) -> Result<(), RecordError> {
         Ok(())
     }
 

@@ -10,7 +10,7 @@ use std::convert::Infallible;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use crate::{Ending, Model, Observer, PacketRow, Simulation, TickRow};
+use crate::{Ending, Model, Observer, Simulation, TickRow};
 use expectations::Watched;
 
 /// Runs a scene and gives one line for each expectation that does not hold, in the order of the file's sections; empty if all hold.
@@ -49,16 +49,8 @@ impl<F: FnMut() -> bool> Observer for Watching<'_, F> {
         self.watched.wants_ticks()
     }
 
-    fn wants_packets(&self) -> bool {
-        false
-    }
-
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
         self.watched.on_tick(row);
-        Ok(())
-    }
-
-    fn on_packet(&mut self, _row: &PacketRow) -> Result<(), Infallible> {
         Ok(())
     }
 

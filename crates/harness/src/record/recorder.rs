@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use cohaptic_scene::Scene;
-use cohaptic_units::Instant;
 use cohaptic_wan::Fate;
 
 use super::band::Bands;
@@ -143,9 +142,5 @@ impl Observer for Recorder {
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), RecordError> {
         self.plotted.on_packet(row);
         self.packets.on_packet(row)
-    }
-
-    fn keep_going(&mut self, _now: Instant) -> bool {
-        true
     }
 }
