@@ -46,6 +46,13 @@ impl Bands {
         usize::try_from(at.as_nanos() / self.width).ok().filter(|span| *span < self.spans)
     }
 
+    /// When a span ends \[s\].
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "the number of spans is small")]
+    pub fn end_of(&self, span: usize) -> f64 {
+        (span + 1) as f64 * (self.width as f64 / 1e9)
+    }
+
     /// The same scene and spans without any value.
     #[must_use]
     pub fn emptied(&self) -> Self {

@@ -109,10 +109,14 @@ impl Plotted {
         }
     }
 
-    /// The share of the packets sent in each span that was dropped.
+    /// The share of the packets sent in each span that was dropped. What was sent so late that it may still be on the way at the end is left out:
+    /// there only the drops are known.
     fn drop_shares(&self) -> Bands {
         let mut shares = self.delays.emptied();
-        for (span, (dropped, all)) in self.drops.iter().enumerate().filter(|(_, (_, all))| *all > 0) {
+        let longest = self.delays.curve(0).map(|(_, _, high)| high).fold(0.0, f64::max);
+        let known = self.delays.seconds() - longest;
+        let spans = self.drops.iter().enumerate().filter(|(span, (_, all))| *all > 0 && self.delays.end_of(*span) <= known);
+        for (span, (dropped, all)) in spans {
             shares.set(0, span, f64::from(*dropped) / f64::from(*all));
         }
         shares
@@ -142,5 +146,33 @@ impl Observer for Recorder {
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), RecordError> {
         self.plotted.on_packet(row);
         self.packets.on_packet(row)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use cohaptic_units::{Bytes, Instant};
+    use cohaptic_wan::DropCause;
+
+    use super::*;
+
+    /// Packets at 0, 100, … 900 ms of a second, every second one lost, the others 150 ms on the way: those sent from 850 ms on are unknown.
+    #[test]
+    fn the_share_dropped_is_shown_only_where_all_fates_are_known() {
+        let bands = Bands::new(Duration::from_secs(1), 5, 1);
+        let mut plotted = Plotted { positions: bands.clone(), forces: bands.clone(), delays: bands, drops: vec![(0, 0); 5] };
+        let at = |millis: u64| Instant::from_nanos(millis * 1_000_000);
+        for (sequence, sent) in (0..1000).step_by(100).enumerate() {
+            let lost = sequence % 2 == 1;
+            let fate = if lost { Fate::Dropped(DropCause::Loss) } else { Fate::Delivered(at(sent + 150)) };
+            if lost || sent + 150 <= 1000 {
+                let arrival = if lost { at(sent) } else { at(sent + 150) };
+                plotted.on_packet(&PacketRow { from: 0, to: 1, sequence: sequence as u64, sent: at(sent), at: arrival, size: Bytes::new(64), fate });
+            }
+        }
+        let shown: Vec<f64> = plotted.drop_shares().curve(0).map(|(_, low, _)| low).collect();
+        assert_eq!(shown, [0.5; 4]);
     }
 }
