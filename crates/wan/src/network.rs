@@ -237,7 +237,7 @@ impl<P> Network<P> {
         network
     }
 
-    /// Gives a node an access line.
+    /// Gives a node an access line, before the first packet is sent.
     ///
     /// # Errors
     ///
@@ -261,7 +261,7 @@ impl<P> Network<P> {
         Ok(self)
     }
 
-    /// Takes a packet of `size` (at most 4 GB) from one node to another.
+    /// Takes a packet from one node to another. A size beyond 4,294,967,295 bytes counts as that.
     ///
     /// # Errors
     ///
@@ -289,7 +289,7 @@ impl<P> Network<P> {
     }
 
     /// Takes a packet from one node to each of the others, in their order: the same as [`Network::handle_packet`] for each, with what they share
-    /// done once. A node without an uplink makes it a third faster.
+    /// done once. Where no node has an uplink this took a third off the time of a packet.
     ///
     /// # Errors
     ///
