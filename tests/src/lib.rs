@@ -21,7 +21,7 @@ mod log;
 mod records;
 
 pub use draft::{Draft, DraftHand, DraftLink, DraftPeer, Place};
-pub use log::{Body, Log, Tick, first_difference, run};
+pub use log::{Body, Log, Tick, first_difference, keep, run};
 pub use records::{Records, record};
 
 use std::path::{Path, PathBuf};

@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use cohaptic_harness::{Model, Observer, PacketRow, Simulation, StateRow, Summary, TickRow};
+use cohaptic_harness::{Model, Observer, PacketRow, Simulation, StateRow, Strategies, Summary, TickRow};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -64,8 +64,14 @@ impl Log {
 /// Runs a scene and keeps everything.
 #[must_use]
 pub fn run(scene: &Scene, model: Model) -> Log {
+    keep(&Simulation::new(scene, model))
+}
+
+/// Runs a simulation and keeps everything.
+#[must_use]
+pub fn keep<S: Strategies>(simulation: &Simulation<'_, S>) -> Log {
     let mut keeper = Keeper { ticks: Vec::new(), packets: Vec::new() };
-    let Ok(summary) = Simulation::new(scene, model).run(&mut keeper);
+    let Ok(summary) = simulation.run(&mut keeper);
     Log { ticks: keeper.ticks, packets: keeper.packets, summary }
 }
 

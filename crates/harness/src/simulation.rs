@@ -1,10 +1,12 @@
 //! A scene in virtual time.
 
+use cohaptic_peer::Strategy;
 use cohaptic_scene::{Axes, Scene};
 
 use crate::disturbance::Disturbance;
 use crate::observer::Observer;
 use crate::plan::{Model, Plan};
+use crate::strategies::{FromScene, Strategies};
 use crate::summary::{Ending, Summary};
 use crate::world::{Step, Watch, World};
 
@@ -16,21 +18,30 @@ const BREATH: u32 = 1024;
 /// At one instant, in this order: changes of the timeline; peers that tick sample and send; packets that have arrived are applied; forces are
 /// computed; everybody who ticks moves to the next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
 #[derive(Debug)]
-pub struct Simulation<'a> {
+pub struct Simulation<'a, S = FromScene> {
     scene: &'a Scene,
     model: Model,
     disturbance: Option<Disturbance>,
+    strategies: S,
 }
 
 impl<'a> Simulation<'a> {
-    /// A scene that is ready to run.
+    /// A scene that is ready to run with the strategy that it names.
     #[must_use]
     pub const fn new(scene: &'a Scene, model: Model) -> Self {
-        Self { scene, model, disturbance: None }
+        Self { scene, model, disturbance: None, strategies: FromScene }
     }
 
     pub(crate) const fn disturbed(scene: &'a Scene, model: Model, disturbance: Disturbance) -> Self {
-        Self { scene, model, disturbance: Some(disturbance) }
+        Self { scene, model, disturbance: Some(disturbance), strategies: FromScene }
+    }
+}
+
+impl<'a, S: Strategies> Simulation<'a, S> {
+    /// A scene that is ready to run with strategies of the caller's own in place of the one that it names.
+    #[must_use]
+    pub const fn with_strategies(scene: &'a Scene, model: Model, strategies: S) -> Self {
+        Self { scene, model, disturbance: None, strategies }
     }
 
     /// Runs the scene from its beginning to its end, until it diverges, or until the observer ends it.
@@ -47,12 +58,12 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    pub(crate) fn world<const A: usize>(&self, plan: &Plan) -> World<A> {
-        World::new(self.scene, plan, self.disturbance)
+    pub(crate) fn world<const A: usize>(&self, plan: &Plan) -> World<A, S::Strategy<A>> {
+        World::new(self.scene, plan, self.disturbance, |peer| self.strategies.strategy(self.scene, peer))
     }
 }
 
-fn run_to_end<const A: usize, O: Observer>(mut world: World<A>, observer: &mut O) -> Result<Summary, O::Error> {
+fn run_to_end<const A: usize, S: Strategy<A>, O: Observer>(mut world: World<A, S>, observer: &mut O) -> Result<Summary, O::Error> {
     let watch = Watch::of(observer);
     loop {
         for _ in 0..BREATH {

@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::{
     Clock, Contact, CopyConfig, Device, Held, ObjectCopy, Peer, PeerConfig, Reception, RestingDevice, SimulatedDevice, State, Strategy,
 };
@@ -18,11 +17,11 @@ use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
 
 /// A scene in the middle of a run.
-pub(crate) struct World<const A: usize> {
+pub(crate) struct World<const A: usize, S> {
     /// The axes that the scene has, of the A that are simulated.
     axes: usize,
     names: Vec<String>,
-    members: Vec<Member<A>>,
+    members: Vec<Member<A, S>>,
     network: Network<Handle>,
     datagrams: Datagrams,
     schedule: Schedule,
@@ -42,8 +41,8 @@ pub(crate) struct World<const A: usize> {
 }
 
 /// A peer with its clock.
-struct Member<const A: usize> {
-    peer: Peer<A, DeviceModel<A>, BuiltIn>,
+struct Member<const A: usize, S> {
+    peer: Peer<A, DeviceModel<A>, S>,
     clock: Clock,
     tick: u64,
     /// The tick at which it sends next, and how many ticks later again.
@@ -93,10 +92,12 @@ pub(crate) enum Step {
     Ended(Ending),
 }
 
-impl<const A: usize> World<A> {
-    pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>) -> Self {
+impl<const A: usize, S: Strategy<A>> World<A, S> {
+    /// The scene at its beginning, with the strategies that `strategy` makes for the places of the peers.
+    pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>, strategy: impl Fn(usize) -> S) -> Self {
         let initial: Vec<State<A>> = scene.peers.iter().map(|peer| state(&peer.position, &peer.velocity)).collect();
-        let members: Vec<Member<A>> = (0..scene.peers.len()).map(|place| Member::new(scene, plan, &initial, disturbance, place)).collect();
+        let member = |place| Member::new(scene, plan, &initial, disturbance, place, strategy(place));
+        let members: Vec<Member<A, S>> = (0..scene.peers.len()).map(member).collect();
         Self {
             axes: scene.axes.count(),
             names: scene.peers.iter().map(|peer| peer.name.clone()).collect(),
@@ -192,7 +193,7 @@ impl<const A: usize> World<A> {
                 },
                 ChangeKind::Coordination(gains) => {
                     for member in &mut self.members {
-                        Strategy::<A>::set_gains(member.peer.strategy_mut(), gains.scaled(self.coordination_factor));
+                        member.peer.strategy_mut().set_gains(gains.scaled(self.coordination_factor));
                     }
                 }
                 _ => unreachable!("every kind of change of this workspace is listed"),
@@ -334,8 +335,8 @@ impl Watch {
     }
 }
 
-impl<const A: usize> Member<A> {
-    fn new(scene: &Scene, plan: &Plan, initial: &[State<A>], disturbance: Option<Disturbance>, place: usize) -> Self {
+impl<const A: usize, S: Strategy<A>> Member<A, S> {
+    fn new(scene: &Scene, plan: &Plan, initial: &[State<A>], disturbance: Option<Disturbance>, place: usize, strategy: S) -> Self {
         let spec = &scene.peers[place];
         let peers = scene.peers.len();
         let (clock, integrator) = (spec.clock, scene.integrator);
@@ -349,7 +350,6 @@ impl<const A: usize> Member<A> {
         };
         let copy = CopyConfig { mass: scene.copy_mass(), damping: scene.object.damping };
         let object = ObjectCopy::new(copy, displaced(1), integrator, &clock);
-        let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(peers));
         let others = initial.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
         let config = PeerConfig {
             session: scene.seed,
@@ -362,7 +362,7 @@ impl<const A: usize> Member<A> {
         };
         let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
         Self {
-            peer: Peer::new(config, device, object, scene.coordination.strategy.strategy(gains, peers), Held::new(others)),
+            peer: Peer::new(config, device, object, strategy, Held::new(others)),
             clock,
             tick: 0,
             next_send: spec.phase,

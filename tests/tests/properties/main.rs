@@ -7,6 +7,7 @@ mod edited_scenes;
 mod equivalence;
 mod held_samples;
 mod ideal_network;
+mod own_strategies;
 mod replay;
 mod symmetry;
 

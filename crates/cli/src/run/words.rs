@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use cohaptic_harness::record::SANE_POSITION;
 use cohaptic_harness::{Ending, Summary};
 use cohaptic_scene::Scene;
 use cohaptic_units::print::Span;
@@ -30,7 +31,8 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
     }
     let factor = summary.duration.as_secs_f64() / run.wall_s;
     line(format!("  {simulated} simulated, {} ticks, in {:.3} s: {factor:.0} times real time", summary.ticks, run.wall_s));
-    line(format!("  largest discrepancy between two copies: {}", length(summary.max_discrepancy)));
+    let apart = if summary.max_discrepancy > SANE_POSITION { ": they came apart" } else { "" };
+    line(format!("  largest discrepancy between two copies: {}{apart}", length(summary.max_discrepancy)));
     for peer in summary.peers.iter().take(MOST_PEERS) {
         let position: Vec<String> = peer.position.iter().map(|x| length(*x)).collect();
         line(format!("  {} ends at {}", peer.name, position.join(", ")));

@@ -9,6 +9,7 @@
 //! is only as exact as positions are: with copies that travel beyond 10⁶ m, rounding (10⁻¹⁰ m there) comes near what counts as died out.
 
 use cohaptic_peer::Contact;
+use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_scene::{Axes, Scene};
 use cohaptic_units::Instant;
 
@@ -74,13 +75,17 @@ pub fn stability(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) 
     }
 }
 
-fn pair<const A: usize>(scene: &Scene, model: Model, plan: &Plan) -> (World<A>, World<A>) {
+fn pair<const A: usize>(scene: &Scene, model: Model, plan: &Plan) -> (World<A, BuiltIn>, World<A, BuiltIn>) {
     let disturbed = Simulation::disturbed(scene, model, Disturbance { size: SIZE });
     (Simulation::new(scene, model).world(plan), disturbed.world(plan))
 }
 
 /// Runs the two side by side.
-fn follow<const A: usize>((mut nominal, mut disturbed): (World<A>, World<A>), scene: &Scene, mut keep_going: impl FnMut() -> bool) -> Stability {
+fn follow<const A: usize>(
+    (mut nominal, mut disturbed): (World<A, BuiltIn>, World<A, BuiltIn>),
+    scene: &Scene,
+    mut keep_going: impl FnMut() -> bool,
+) -> Stability {
     let nothing = Watch { ticks: false, packets: false };
     let duration = scene.duration.as_nanos();
     let quarter = |now: Instant| 4 * u128::from(now.as_nanos()) / duration;
@@ -123,7 +128,7 @@ fn verdict(initial: f64, early: f64, late: f64) -> Stability {
 }
 
 /// The largest difference between the two runs in a relative position along an axis \[m\].
-fn relative_displacement<const A: usize>(nominal: &World<A>, disturbed: &World<A>) -> f64 {
+fn relative_displacement<const A: usize>(nominal: &World<A, BuiltIn>, disturbed: &World<A, BuiltIn>) -> f64 {
     let (mut low, mut high, mut stretch) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A], 0.0_f64);
     for (one, other) in nominal.bodies().zip(disturbed.bodies()) {
         for axis in 0..A {

@@ -1,0 +1,31 @@
+//! Which strategy each peer runs: the scene's, or one of the caller's own.
+
+use cohaptic_peer::Strategy;
+use cohaptic_peer::coordination::BuiltIn;
+use cohaptic_scene::Scene;
+
+/// Makes the coordination strategy of each peer, for as many axes as are simulated.
+///
+/// [`FromScene`] makes what the scene names. Implement this to run a strategy of your own over a scene's network: see
+/// [`crate::Simulation::with_strategies`].
+pub trait Strategies {
+    /// The strategy for A axes.
+    type Strategy<const A: usize>: Strategy<A>;
+
+    /// Makes the strategy of the peer in that place of [`Scene::peers`].
+    fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> Self::Strategy<A>;
+}
+
+/// The strategy that the scene names, with its gains scaled by the number of peers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct FromScene;
+
+impl Strategies for FromScene {
+    type Strategy<const A: usize> = BuiltIn;
+
+    fn strategy<const A: usize>(&self, scene: &Scene, _peer: usize) -> BuiltIn {
+        let peers = scene.peers.len();
+        let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(peers));
+        scene.coordination.strategy.strategy(gains, peers)
+    }
+}
