@@ -108,11 +108,11 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
                     counters[link].offered += 1;
                     let mut packet = Packet { arrival: now + DELAY_NANOS, sent: now, sequence, from, to, x: xo[from], v: vo[from] };
                     if mesh.impaired {
-                        if ((loss_draws[link].at(sequence).next_word() >> 11) as f64) < loss_bound {
+                        if ((loss_draws[link].first_word(sequence) >> 11) as f64) < loss_bound {
                             counters[link].lost += 1;
                             continue;
                         }
-                        let z = standard_normal(&mut jitter_draws[link].at(sequence));
+                        let z = standard_normal(jitter_draws[link], sequence);
                         packet.arrival = packet.arrival.saturating_add_signed((z * SD_NANOS).round_ties_even() as i64);
                         wheel[packet.arrival.div_ceil(TICK_NANOS).max(tick) as usize % 64].push(packet);
                     } else {

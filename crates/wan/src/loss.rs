@@ -4,7 +4,7 @@ use cohaptic_units::Probability;
 
 use crate::GilbertElliott;
 use crate::gilbert_elliott::State;
-use crate::random::Draws;
+use crate::random::{Draws, Stream};
 
 /// A loss model.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -56,12 +56,15 @@ impl LossStage {
         }
     }
 
-    /// Whether the packet whose draws these are is lost.
+    /// Whether that packet of the link is lost.
     #[inline]
-    pub(crate) fn loses(&mut self, mut draws: Draws) -> bool {
+    pub(crate) fn loses(&mut self, stream: Stream, packet: u64) -> bool {
         match self {
-            Self::Independent(probability) => probability.happens(draws.next_word()),
-            Self::GilbertElliott(chain, state) => chain.loses(state, draws.next_word(), draws.next_word()),
+            Self::Independent(probability) => probability.happens(stream.first_word(packet)),
+            Self::GilbertElliott(chain, state) => {
+                let mut draws = stream.at(packet);
+                chain.loses(state, draws.next_word(), draws.next_word())
+            }
         }
     }
 }

@@ -198,7 +198,7 @@ impl<T> Chain<T> {
             return Outcome::Dropped(DropCause::Outage);
         }
         if let Some(loss) = &mut self.loss
-            && loss.loses(self.loss_draws.at(number))
+            && loss.loses(self.loss_draws, number)
         {
             return Outcome::Dropped(DropCause::Loss);
         }
@@ -244,7 +244,7 @@ impl<T> Chain<T> {
     /// When a packet that begins to propagate now arrives.
     #[inline(always)]
     fn arrival(&mut self, now: Instant, number: u64) -> Instant {
-        let delay = self.delay.draw_nanos(|| self.jitter_draws.at(number));
+        let delay = self.delay.draw_nanos(self.jitter_draws, number);
         self.order.arrival(later(now, delay))
     }
 }

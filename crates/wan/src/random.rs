@@ -68,6 +68,15 @@ impl Stream {
     }
 }
 
+impl Stream {
+    /// The first word of a packet's draws, without the state that further ones need.
+    #[must_use]
+    #[inline]
+    pub const fn first_word(self, packet: u64) -> u64 {
+        philox(packet, 0, self.key)[0]
+    }
+}
+
 /// The random numbers of one packet for one purpose: as many as are wanted, 128 bits a block.
 ///
 /// It is a generator for `rand_distr`.

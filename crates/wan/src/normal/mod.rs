@@ -6,33 +6,47 @@
 
 mod tables;
 
-use crate::random::Draws;
+use crate::random::{Draws, Stream};
 use tables::{F, R, X};
 
-/// A standard normal number. It takes one word of the draws, seldom more.
+/// The standard normal number of a packet. It takes one word of its draws, seldom more.
 #[must_use]
 #[inline]
-pub fn standard_normal(draws: &mut Draws) -> f64 {
-    loop {
-        let word = draws.next_word();
-        // The layer, the sign and the place in the layer are different bits of the word.
-        let layer = usize::from(word.to_le_bytes()[0]);
-        let size = unit(word) * X[layer];
-        let found = if size < X[layer + 1] { Some(size) } else { outside_the_core(layer, size, draws) };
-        if let Some(size) = found {
-            return if word & 0x100 == 0 { size } else { -size };
-        }
-    }
+pub fn standard_normal(stream: Stream, packet: u64) -> f64 {
+    let word = stream.first_word(packet);
+    let (layer, size) = point(word);
+    if size < X[layer + 1] { signed(word, size) } else { outside_the_core(stream.at(packet)) }
 }
 
-/// The point lies in a layer's wedge or in the tail: decides with more draws. `None`: it lies above the density.
+/// The layer, and how far to the right in it. They and the sign are different bits of the word.
+#[inline]
+fn point(word: u64) -> (usize, f64) {
+    let layer = usize::from(word.to_le_bytes()[0]);
+    (layer, unit(word) * X[layer])
+}
+
+#[inline]
+fn signed(word: u64, size: f64) -> f64 {
+    if word & 0x100 == 0 { size } else { -size }
+}
+
+/// The first point lies in a wedge or in the tail: begins again with it, and goes on with more draws until one lies under the density.
 #[cold]
-fn outside_the_core(layer: usize, size: f64, draws: &mut Draws) -> Option<f64> {
-    if layer == 0 {
-        return Some(tail(draws));
+fn outside_the_core(mut draws: Draws) -> f64 {
+    loop {
+        let word = draws.next_word();
+        let (layer, size) = point(word);
+        if size < X[layer + 1] {
+            return signed(word, size);
+        }
+        if layer == 0 {
+            return signed(word, tail(&mut draws));
+        }
+        let height = F[layer] + (F[layer + 1] - F[layer]) * draws.next_unit();
+        if height < libm::exp(-0.5 * size * size) {
+            return signed(word, size);
+        }
     }
-    let height = F[layer] + (F[layer + 1] - F[layer]) * draws.next_unit();
-    (height < libm::exp(-0.5 * size * size)).then_some(size)
 }
 
 /// A draw from the tail beyond R, by Marsaglia (1964).
@@ -58,7 +72,7 @@ fn unit(word: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::{Purpose, Stream};
+    use crate::random::Purpose;
 
     /// Every layer has the same area, that of the lowest with its tail: R·F(R) + √(π/2)·erfc(R/√2). Tables of 16 digits are consistent to 1e-14.
     #[test]
@@ -81,7 +95,7 @@ mod tests {
         let count = 2_000_000_u32;
         let mut sums = [0.0; 4];
         for packet in 0..u64::from(count) {
-            let z = standard_normal(&mut stream.at(packet));
+            let z = standard_normal(stream, packet);
             let square = z * z;
             for (sum, power) in sums.iter_mut().zip([z, square, square * z, square * square]) {
                 *sum += power;
@@ -97,7 +111,7 @@ mod tests {
     #[test]
     fn the_tail_has_its_share() {
         let stream = Stream::new(4, b"normal", Purpose::Jitter);
-        let beyond = (0..2_000_000).filter(|&packet| standard_normal(&mut stream.at(packet)).abs() > 3.8).count();
+        let beyond = (0..2_000_000).filter(|&packet| standard_normal(stream, packet).abs() > 3.8).count();
         assert!((213..=366).contains(&beyond), "{beyond}");
     }
 
@@ -105,7 +119,7 @@ mod tests {
     #[test]
     fn draws_never_change() {
         let stream = Stream::new(1, b"left->right", Purpose::Jitter);
-        let drawn: [u64; 3] = core::array::from_fn(|packet| standard_normal(&mut stream.at(packet as u64)).to_bits());
+        let drawn: [u64; 3] = core::array::from_fn(|packet| standard_normal(stream, packet as u64).to_bits());
         assert_eq!(drawn, [13_805_245_113_503_555_042, 4_609_251_688_676_149_596, 4_597_926_677_260_238_969]);
     }
 }

@@ -131,15 +131,12 @@ fn losses(name: &LinkName, configs: &[(Instant, LinkConfig)], offered: &[Offered
 fn delay(name: &LinkName, config: &LinkConfig, number: u64) -> u64 {
     let mean = i128::try_from(config.delay.mean().as_nanos()).unwrap();
     let Some(jitter) = config.delay.jitter() else { return u64::try_from(mean).unwrap() };
-    let mut draws = Stream::new(SEED, name.as_str().as_bytes(), Purpose::Jitter).at(number);
+    let stream = Stream::new(SEED, name.as_str().as_bytes(), Purpose::Jitter);
     let sd = jitter.sd.as_nanos() as f64;
     let deviation = match jitter.distribution {
-        Distribution::Normal => {
-            let standard = cohaptic_wan::standard_normal(&mut draws);
-            sd * standard
-        }
+        Distribution::Normal => sd * cohaptic_wan::standard_normal(stream, number),
         // Uniform over ±√3·σ.
-        Distribution::Uniform => 3f64.sqrt() * sd * (2.0 * draws.next_unit() - 1.0),
+        Distribution::Uniform => 3f64.sqrt() * sd * (2.0 * stream.at(number).next_unit() - 1.0),
         other => unreachable!("no model for {other:?}"),
     };
     #[expect(clippy::cast_possible_truncation, reason = "the tests draw at most seconds")]
