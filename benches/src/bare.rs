@@ -78,10 +78,8 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
     let copy = Motion::new(OBJECT_MASS / n as f64, COPY_DAMPING);
     let gains = mesh.scaled_gains();
     let names: Vec<String> = (0..n).map(|i| format!("peer{}", i + 1)).collect();
-    let streams = |purpose| -> Vec<Stream> {
-        (0..n * n).map(|link| Stream::new(1, LinkName::between(&names[link / n], &names[link % n]).as_str().as_bytes(), purpose)).collect()
-    };
-    let (loss_draws, jitter_draws) = (streams(Purpose::Loss), streams(Purpose::Jitter));
+    let stream = |link: usize| Stream::new(1, LinkName::between(&names[link / n], &names[link % n]).as_str().as_bytes());
+    let draws: Vec<Stream> = (0..n * n).map(stream).collect();
     let loss_bound = LOSS * 9_007_199_254_740_992.0;
 
     let (mut xh, mut vh) = (vec![0.0; n], vec![0.0; n]);
@@ -108,11 +106,14 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
                     counters[link].offered += 1;
                     let mut packet = Packet { arrival: now + DELAY_NANOS, sent: now, sequence, from, to, x: xo[from], v: vo[from] };
                     if mesh.impaired {
-                        if ((loss_draws[link].first_word(sequence) >> 11) as f64) < loss_bound {
+                        let words = draws[link].packet(sequence);
+                        let [loss_word, jitter_word] = words.loss_and_jitter();
+                        if ((loss_word >> 11) as f64) < loss_bound {
                             counters[link].lost += 1;
                             continue;
                         }
-                        let z = standard_normal(jitter_draws[link], sequence);
+                        let mut more = words.more(Purpose::Jitter);
+                        let z = standard_normal(jitter_word, || more.next_word());
                         packet.arrival = packet.arrival.saturating_add_signed((z * SD_NANOS).round_ties_even() as i64);
                         wheel[packet.arrival.div_ceil(TICK_NANOS).max(tick) as usize % 64].push(packet);
                     } else {

@@ -66,6 +66,7 @@ impl Schedule {
     }
 
     /// Writes down which peers tick at that instant, in order. Each must be put back with [`Schedule::tick_again`].
+    #[inline]
     pub(crate) fn take(&mut self, at: Instant, peers: &mut Vec<usize>) {
         if let Self::EventDriven(queue) = self {
             peers.clear();

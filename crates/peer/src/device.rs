@@ -110,7 +110,7 @@ impl<const A: usize> Device<A> for SimulatedDevice<A> {
         self.state
     }
 
-    #[inline]
+    #[inline(always)]
     fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
         let hand = self.hand.at(now);
         //= Rakhsha & Constantinescu 2015, eq. (7): mH·aH = Fh − FC − bH·vH

@@ -122,7 +122,16 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
     #[inline]
     pub fn handle_datagram(&mut self, datagram: &[u8]) -> Result<Reception, ReceiveError> {
-        let sample = Sample::<A>::decode(datagram, self.config.axes)?;
+        self.handle_sample(&Sample::decode(datagram, self.config.axes)?)
+    }
+
+    /// Step 2 with a datagram that was decoded already: many peers may receive the same one.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
+    #[inline]
+    pub fn handle_sample(&mut self, sample: &Sample<A>) -> Result<Reception, ReceiveError> {
         if sample.session != self.config.session {
             return Err(ReceiveError::Session { found: sample.session });
         }
@@ -141,7 +150,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     }
 
     /// Step 3: computes the forces of this tick.
-    #[inline]
+    #[inline(always)]
     pub fn compute(&mut self, now: Instant) -> Forces<A> {
         if self.stale_mean {
             self.held.refresh();
@@ -159,13 +168,16 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             }
         }
         let computed = Acting { coupling, on_object };
-        self.applied = if self.config.compute_delay { self.computed } else { computed };
-        self.computed = computed;
+        if self.config.compute_delay {
+            self.applied = core::mem::replace(&mut self.computed, computed);
+        } else {
+            self.applied = computed;
+        }
         Forces { coupling, coordination: command.force, target: command.target }
     }
 
     /// Step 4: moves to the next tick, `span` after `now`.
-    #[inline]
+    #[inline(always)]
     pub fn advance(&mut self, now: Instant, span: Duration) {
         self.device.advance(now, span, self.applied.coupling);
         self.object.advance(span, self.applied.on_object);

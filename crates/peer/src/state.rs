@@ -15,8 +15,13 @@ impl<const A: usize> State<A> {
 
     /// Whether every component is a finite number.
     #[must_use]
+    #[inline]
     pub fn is_finite(&self) -> bool {
-        self.position.iter().chain(&self.velocity).all(|value| value.is_finite())
+        let mut finite = true;
+        for axis in 0..A {
+            finite &= self.position[axis].is_finite() & self.velocity[axis].is_finite();
+        }
+        finite
     }
 }
 

@@ -23,7 +23,7 @@ impl Stepper {
     }
 
     /// Moves the body over `span` under the held force.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn advance<const A: usize>(&self, state: &mut State<A>, span: Duration, force: [f64; A]) {
         let other;
         let map = if span == self.short.0 {

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use crate::normal::standard_normal;
-use crate::random::Stream;
+use crate::random::{PacketDraws, Purpose, unit};
 
 /// The law of the jitter. Its standard deviation is the one asked for, but for what the normal law loses below zero delay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -126,13 +126,16 @@ impl DelayStage {
         Self { mean_nanos: u64::try_from(delay.mean.as_nanos()).unwrap_or(u64::MAX), jitter: delay.jitter.map(law) }
     }
 
-    /// The delay of one packet \[ns\], drawn from the stream if there is jitter. Rounded to the nearest nanosecond.
+    /// The delay of one packet \[ns\], if there is jitter from `word`, the first of its words for jitter. Rounded to the nearest nanosecond.
     #[inline]
-    pub(crate) fn draw_nanos(&self, stream: Stream, packet: u64) -> u64 {
+    pub(crate) fn draw_nanos(&self, word: u64, packet: PacketDraws) -> u64 {
         let deviation = match self.jitter {
             None => return self.mean_nanos,
-            Some(Law::Normal { sd_nanos }) => sd_nanos * standard_normal(stream, packet),
-            Some(Law::Uniform { reach_nanos }) => reach_nanos * (2.0 * stream.at(packet).next_unit() - 1.0),
+            Some(Law::Normal { sd_nanos }) => {
+                let mut more = packet.more(Purpose::Jitter);
+                sd_nanos * standard_normal(word, || more.next_word())
+            }
+            Some(Law::Uniform { reach_nanos }) => reach_nanos * (2.0 * unit(word) - 1.0),
         };
         #[expect(clippy::cast_possible_truncation, reason = "saturates, beyond 292 years")]
         let deviation = libm::rint(deviation) as i64;
@@ -156,14 +159,15 @@ fn uniform_reach(sd: Duration) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Purpose;
+    use crate::random::Stream;
 
     const MILLISECOND: Duration = Duration::from_millis(1);
 
     fn draws(delay: Delay, count: u64) -> Vec<f64> {
-        let stream = Stream::new(1, b"delay", Purpose::Jitter);
+        let stream = Stream::new(1, b"delay");
         let stage = DelayStage::new(delay);
-        (0..count).map(|packet| stage.draw_nanos(stream, packet) as f64 / 1e6).collect()
+        let draw = |packet: PacketDraws| stage.draw_nanos(packet.first(Purpose::Jitter), packet) as f64 / 1e6;
+        (0..count).map(|number| draw(stream.packet(number))).collect()
     }
 
     fn jitter(distribution: Distribution, sd: Duration) -> Jitter {

@@ -1,7 +1,7 @@
 //! The event queue: a ring while events come in order, and a calendar of buckets, each sorted when its time comes, as soon as they do not.
 //!
 //! Where all links have one constant delay, events are pushed in the order in which they are taken. Then the queue is a ring: a push, a pop and one
-//! comparison an event. The first event out of order turns the ring into the front of a calendar; an empty queue is a ring again.
+//! comparison an event. The first event out of order turns the ring into a calendar; an empty queue is a ring again.
 //!
 //! ```text
 //!   front          ring of 8192 buckets of 2^w ns each                  far
@@ -14,12 +14,15 @@
 //! and sorting it once is cheaper than a heap's sifting of every event. Which bucket an event is in, or whether the
 //! queue is a ring, never changes the order: that is by key alone.
 //!
+//! In the calendar an event stays where it was stored first, in a slab. What is sorted is one word an event: how far into its bucket it happens, and
+//! where it is. Events themselves, of 48 bytes, are moved only in and out.
+//!
 //! The width of a bucket follows the events, so that a bucket holds about eight: fewer cost a search for the next bucket each, more a longer sort.
 //! With 10 peers and jitter this took 6 % off the instructions of a packet, against a fixed width that suits 50.
 
 use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::vec::Vec;
-use core::cmp::Ordering;
+use core::cmp::Reverse;
 
 use cohaptic_units::Instant;
 
@@ -38,18 +41,21 @@ pub trait Event {
 /// Events in order of their keys.
 #[derive(Clone, Debug)]
 pub struct EventQueue<E> {
-    /// The bucket being taken from, in order, and whatever was pushed that is not later than it. All events, while `in_order`.
-    front: VecDeque<E>,
-    /// Whether all pending events are in the front, because they came in order.
+    /// All events, while they come in order.
+    ordered: VecDeque<E>,
     in_order: bool,
+    /// The events of the calendar, each in its place until it is taken.
+    slab: Slab<E>,
+    /// The bucket being taken from, in order, and whatever was pushed that is not later than it.
+    front: VecDeque<Entry>,
     /// The number of the front's bucket. Every event in the ring is in a later one.
     current: u64,
-    ring: Vec<Bucket<E>>,
+    ring: Vec<Vec<Packed>>,
     /// A bit for each bucket that is not empty.
     occupied: [u64; RING / 64],
     /// Memory of emptied buckets, to be used again: what is touched is what is pending, not the whole ring.
-    spare: Vec<Vec<E>>,
-    far: BinaryHeap<Far<E>>,
+    spare: Vec<Vec<Packed>>,
+    far: BinaryHeap<Reverse<Entry>>,
     len: usize,
     /// Buckets are 2 to this power ns wide.
     width: u32,
@@ -57,13 +63,11 @@ pub struct EventQueue<E> {
     brought: (u32, u64),
 }
 
-/// Events of one span of time, in no order.
-#[derive(Clone, Debug)]
-struct Bucket<E> {
-    events: Vec<E>,
-    /// The earliest of them; [`Instant::MAX`] if there is none.
-    earliest: Instant,
-}
+/// An event outside the ring: its instant and its place in the slab.
+type Entry = (Instant, u32);
+
+/// An event in a bucket: how long after the bucket's begin it happens \[ns\] in the upper half, its place in the slab in the lower.
+type Packed = u64;
 
 /// How many buckets there are, each 2 to the power of one of these widths ns wide: the ring reaches from 134 ms to 34 s.
 const RING: usize = 8192;
@@ -84,10 +88,12 @@ impl<E: Event> EventQueue<E> {
     #[must_use]
     pub fn new() -> Self {
         Self {
-            front: VecDeque::new(),
+            ordered: VecDeque::new(),
             in_order: true,
+            slab: Slab { places: Vec::new(), free: Vec::new() },
+            front: VecDeque::new(),
             current: 0,
-            ring: core::iter::repeat_with(|| Bucket { events: Vec::new(), earliest: Instant::MAX }).take(RING).collect(),
+            ring: Vec::new(),
             occupied: [0; RING / 64],
             spare: Vec::new(),
             far: BinaryHeap::new(),
@@ -114,8 +120,8 @@ impl<E: Event> EventQueue<E> {
     pub fn push(&mut self, event: E) {
         self.len += 1;
         if self.in_order {
-            if self.front.back().is_none_or(|last| last.key() <= event.key()) {
-                self.front.push_back(event);
+            if self.ordered.back().is_none_or(|last| last.key() <= event.key()) {
+                self.ordered.push_back(event);
                 return;
             }
             self.become_calendar();
@@ -126,43 +132,64 @@ impl<E: Event> EventQueue<E> {
     /// Takes the first event if it is not later than `now`.
     #[inline(always)]
     pub fn pop_due(&mut self, now: Instant) -> Option<E> {
-        if self.front.front().is_none_or(|first| first.at() > now) && !self.advance(now) {
+        if self.in_order {
+            if self.ordered.front()?.at() > now {
+                return None;
+            }
+            self.len -= 1;
+            return self.ordered.pop_front();
+        }
+        if self.front.front().is_none_or(|first| first.0 > now) && !self.advance(now) {
             return None;
         }
+        let (_, place) = self.front.pop_front()?;
         self.len -= 1;
-        self.in_order |= self.len == 0;
-        self.front.pop_front()
+        self.in_order = self.len == 0;
+        self.slab.take(place)
     }
 
     /// The instant of the first event.
     #[must_use]
     pub fn next_at(&self) -> Option<Instant> {
-        if let Some(first) = self.front.front() {
-            return Some(first.at());
+        if self.in_order {
+            return self.ordered.front().map(Event::at);
         }
-        self.next_occupied().map(|bucket| self.ring[slot(bucket)].earliest).or_else(|| self.far.peek().map(|far| far.0.at()))
+        if let Some(first) = self.front.front() {
+            return Some(first.0);
+        }
+        let Some(bucket) = self.next_occupied() else {
+            return self.far.peek().map(|Reverse(first)| first.0);
+        };
+        self.ring[slot(bucket)].iter().min().map(|first| self.unpack(bucket, *first).0)
     }
 
-    /// Sorts the events of the ring that the queue was into buckets, from the first one on.
+    /// Puts the events of the ring that the queue was into buckets, from the first one on.
     #[cold]
     fn become_calendar(&mut self) {
         self.in_order = false;
-        let events = core::mem::take(&mut self.front);
-        self.current = events.front().map_or(0, |first| self.bucket_of(first.at()));
-        for event in events {
+        self.ring.resize_with(RING, Vec::new);
+        self.current = self.ordered.front().map_or(0, |first| self.bucket_of(first.at()));
+        for event in core::mem::take(&mut self.ordered) {
             self.push_calendar(event);
         }
     }
 
     #[inline]
     fn push_calendar(&mut self, event: E) {
-        let bucket = self.bucket_of(event.at());
+        let at = event.at();
+        let place = self.slab.store(event);
+        self.push_entry((at, place));
+    }
+
+    #[inline]
+    fn push_entry(&mut self, entry: Entry) {
+        let bucket = self.bucket_of(entry.0);
         if bucket <= self.current {
-            self.push_front(event);
+            self.push_front(entry);
         } else if bucket - self.current < RING as u64 {
-            self.push_ring(bucket, event);
+            self.push_ring(bucket, entry);
         } else {
-            self.far.push(Far(event));
+            self.far.push(Reverse(entry));
         }
     }
 
@@ -170,14 +197,19 @@ impl<E: Event> EventQueue<E> {
         at.as_nanos() >> self.width
     }
 
+    fn pack(&self, (at, place): Entry) -> Packed {
+        (at.as_nanos() & ((1 << self.width) - 1)) << 32 | u64::from(place)
+    }
+
+    fn unpack(&self, bucket: u64, packed: Packed) -> Entry {
+        (Instant::from_nanos((bucket << self.width) + (packed >> 32)), place_of(packed))
+    }
+
     /// Brings the next bucket that is due to the front; says whether the front now begins with an event that is due.
     fn advance(&mut self, now: Instant) -> bool {
-        if self.in_order {
-            return false;
-        }
         let present = self.bucket_of(now);
         while self.front.is_empty() && self.len > 0 {
-            let next = self.next_occupied().or_else(|| self.far.peek().map(|far| self.bucket_of(far.0.at())));
+            let next = self.next_occupied().or_else(|| self.far.peek().map(|Reverse(first)| self.bucket_of(first.0)));
             let Some(next) = next.filter(|&next| next <= present) else {
                 break;
             };
@@ -187,20 +219,25 @@ impl<E: Event> EventQueue<E> {
             // Nothing lies before the present: later events may use the whole ring from here on.
             self.move_to(self.current.max(present));
         }
-        self.front.front().is_some_and(|first| first.at() <= now)
+        self.front.front().is_some_and(|first| first.0 <= now)
     }
 
     fn bring_to_front(&mut self, bucket: u64) {
         let place = slot(bucket);
         self.occupied[place / 64] &= !(1 << (place % 64));
-        let bucket_now = &mut self.ring[place];
-        let mut events = core::mem::take(&mut bucket_now.events);
-        bucket_now.earliest = Instant::MAX;
-        events.sort_unstable_by_key(Event::key);
+        let mut events = core::mem::take(&mut self.ring[place]);
         self.brought = (self.brought.0 + 1, self.brought.1 + events.len() as u64);
-        let emptied = core::mem::replace(&mut self.front, VecDeque::from(events));
-        if emptied.capacity() > 0 {
-            self.spare.push(Vec::from(emptied));
+        let mut few = [0; FEW];
+        let sorted = sort(&mut events, &mut few);
+        if sorted.windows(2).any(|pair| pair[0] >> 32 == pair[1] >> 32) {
+            // Instants decide most often, so that the events themselves are looked at only where two are equal.
+            sorted.sort_unstable_by(|a, b| self.slab.key(place_of(*a)).cmp(&self.slab.key(place_of(*b))));
+        }
+        let start = bucket << self.width;
+        self.front.extend(sorted.iter().map(|&packed| (Instant::from_nanos(start + (packed >> 32)), place_of(packed))));
+        events.clear();
+        if events.capacity() > 0 {
+            self.spare.push(events);
         }
         self.move_to(bucket);
         if self.brought.0 == LOOK_EVERY {
@@ -223,60 +260,57 @@ impl<E: Event> EventQueue<E> {
         if !WIDTHS.contains(&width) {
             return;
         }
-        let mut events: Vec<E> = core::mem::take(&mut self.front).into();
-        for bucket in &mut self.ring {
-            events.append(&mut bucket.events);
-            bucket.earliest = Instant::MAX;
+        let mut entries: Vec<Entry> = core::mem::take(&mut self.front).into();
+        while let Some(bucket) = self.next_occupied() {
+            let place = slot(bucket);
+            self.occupied[place / 64] &= !(1 << (place % 64));
+            let events = core::mem::take(&mut self.ring[place]);
+            entries.extend(events.iter().map(|packed| self.unpack(bucket, *packed)));
         }
-        events.extend(core::mem::take(&mut self.far).into_iter().map(|far| far.0));
-        self.occupied = [0; RING / 64];
+        entries.extend(core::mem::take(&mut self.far).into_iter().map(|Reverse(entry)| entry));
         self.width = width;
-        self.current = events.iter().map(|event| self.bucket_of(event.at())).min().unwrap_or(0);
-        for event in events {
-            self.push_calendar(event);
+        self.current = entries.iter().map(|entry| self.bucket_of(entry.0)).min().unwrap_or(0);
+        for entry in entries {
+            self.push_entry(entry);
         }
     }
 
     /// Makes a bucket the current one, and pulls in from afar what the ring now reaches.
     fn move_to(&mut self, bucket: u64) {
         self.current = bucket;
-        while let Some(first) = self.far.peek() {
-            let bucket = self.bucket_of(first.0.at());
-            if bucket.saturating_sub(self.current) >= RING as u64 {
+        while let Some(Reverse(first)) = self.far.peek() {
+            if self.bucket_of(first.0).saturating_sub(self.current) >= RING as u64 {
                 break;
             }
-            let Some(Far(event)) = self.far.pop() else { break };
-            if bucket <= self.current {
-                self.push_front(event);
-            } else {
-                self.push_ring(bucket, event);
-            }
+            let Some(Reverse(entry)) = self.far.pop() else { break };
+            self.push_entry(entry);
         }
     }
 
-    fn push_front(&mut self, event: E) {
+    fn push_front(&mut self, entry: Entry) {
+        let key = |(at, place): Entry| (at, self.slab.key(place));
+        let wanted = key(entry);
         // Bursts come in order: most often the event belongs at the end.
-        if self.front.back().is_none_or(|last| last.key() <= event.key()) {
-            self.front.push_back(event);
+        if self.front.back().is_none_or(|last| key(*last) <= wanted) {
+            self.front.push_back(entry);
         } else {
-            let key = event.key();
-            let place = self.front.partition_point(|other| other.key() <= key);
-            self.front.insert(place, event);
+            let place = self.front.partition_point(|other| key(*other) <= wanted);
+            self.front.insert(place, entry);
         }
     }
 
     #[inline]
-    fn push_ring(&mut self, bucket: u64, event: E) {
+    fn push_ring(&mut self, bucket: u64, entry: Entry) {
+        let packed = self.pack(entry);
         let place = slot(bucket);
-        let Bucket { events, earliest } = &mut self.ring[place];
+        let events = &mut self.ring[place];
         if events.is_empty() {
             self.occupied[place / 64] |= 1 << (place % 64);
             if let Some(spare) = self.spare.pop() {
                 *events = spare;
             }
         }
-        *earliest = (*earliest).min(event.at());
-        events.push(event);
+        events.push(packed);
     }
 
     /// The first bucket after the current one that is not empty.
@@ -307,27 +341,56 @@ fn slot(bucket: u64) -> usize {
     (bucket & (RING as u64 - 1)) as usize
 }
 
-/// An event beyond the ring, ordered so that the heap gives the earliest.
+#[expect(clippy::cast_possible_truncation, reason = "the lower half is the place")]
+fn place_of(packed: Packed) -> u32 {
+    packed as u32
+}
+
+/// Sorts words that are all different, into `few` where there are few. Then each is put behind as many as are smaller: no branch depends on the order,
+/// which a processor could not foresee. It took 4 % off a packet with jitter.
+fn sort<'a>(words: &'a mut [Packed], few: &'a mut [Packed; FEW]) -> &'a mut [Packed] {
+    if words.len() > FEW {
+        words.sort_unstable();
+        return words;
+    }
+    for word in &*words {
+        let rank: usize = words.iter().map(|other| usize::from(other < word)).sum();
+        few[rank] = *word;
+    }
+    &mut few[..words.len()]
+}
+
+/// So many words are sorted by counting.
+const FEW: usize = 24;
+
+/// Events in places of their own, which are used again.
 #[derive(Clone, Debug)]
-struct Far<E>(E);
-
-impl<E: Event> PartialEq for Far<E> {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
+struct Slab<E> {
+    places: Vec<Option<E>>,
+    free: Vec<u32>,
 }
 
-impl<E: Event> Eq for Far<E> {}
-
-impl<E: Event> PartialOrd for Far<E> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
+impl<E: Event> Slab<E> {
+    #[inline]
+    fn store(&mut self, event: E) -> u32 {
+        if let Some(place) = self.free.pop() {
+            self.places[place as usize] = Some(event);
+            return place;
+        }
+        let place = u32::try_from(self.places.len()).expect("fewer than 2^32 events, 200 GB of them, are pending");
+        self.places.push(Some(event));
+        place
     }
-}
 
-impl<E: Event> Ord for Far<E> {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.0.key().cmp(&self.0.key())
+    #[inline]
+    fn take(&mut self, place: u32) -> Option<E> {
+        self.free.push(place);
+        self.places[place as usize].take()
+    }
+
+    /// The key of a stored event; `None` only for a place that is free.
+    fn key(&self, place: u32) -> Option<E::Key> {
+        self.places[place as usize].as_ref().map(Event::key)
     }
 }
 

@@ -107,7 +107,7 @@ impl<P> Link<P> {
         let sequence = self.stats.offered;
         self.stats.offered += 1;
         let packet = InLink { sequence, sent: now, size, payload };
-        match self.pipeline.offer(now, sequence) {
+        match self.pipeline.offer(now, sequence, self.pipeline.words(sequence)) {
             Outcome::Arrives(at) => self.pending.push(Pending { at, what: What::Arrives(packet) }),
             Outcome::Dropped(cause) => self.drop(now, cause, packet),
             Outcome::Queues => match self.pipeline.enqueue(now, sequence, size, packet) {

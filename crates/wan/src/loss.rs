@@ -4,7 +4,7 @@ use cohaptic_units::Probability;
 
 use crate::GilbertElliott;
 use crate::gilbert_elliott::State;
-use crate::random::{Draws, Stream};
+use crate::random::{PacketDraws, Purpose};
 
 /// A loss model.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -39,32 +39,29 @@ pub(crate) enum LossStage {
 }
 
 impl LossStage {
-    /// The stage for a model; `None` if nothing is ever lost. `initial` draws the state in which a chain begins.
-    pub(crate) fn new(loss: Loss, initial: &mut Draws) -> Option<Self> {
+    /// The stage for a model; `None` if nothing is ever lost. `initial` is the random word for the state in which a chain begins.
+    pub(crate) fn new(loss: Loss, initial: u64) -> Option<Self> {
         match loss {
             Loss::None => None,
             Loss::Independent(probability) => Some(Self::Independent(probability)),
-            Loss::GilbertElliott(chain) => Some(Self::GilbertElliott(chain, chain.stationary_state(initial.next_word()))),
+            Loss::GilbertElliott(chain) => Some(Self::GilbertElliott(chain, chain.stationary_state(initial))),
         }
     }
 
     /// The same stage with a new model; a chain stays in the state it is in.
-    pub(crate) fn reconfigured(self, loss: Loss, initial: &mut Draws) -> Option<Self> {
+    pub(crate) fn reconfigured(self, loss: Loss, initial: u64) -> Option<Self> {
         match (self, loss) {
             (Self::GilbertElliott(_, state), Loss::GilbertElliott(chain)) => Some(Self::GilbertElliott(chain, state)),
             _ => Self::new(loss, initial),
         }
     }
 
-    /// Whether that packet of the link is lost.
+    /// Whether a packet is lost. `word` is the first of its words for loss.
     #[inline]
-    pub(crate) fn loses(&mut self, stream: Stream, packet: u64) -> bool {
+    pub(crate) fn loses(&mut self, word: u64, packet: PacketDraws) -> bool {
         match self {
-            Self::Independent(probability) => probability.happens(stream.first_word(packet)),
-            Self::GilbertElliott(chain, state) => {
-                let mut draws = stream.at(packet);
-                chain.loses(state, draws.next_word(), draws.next_word())
-            }
+            Self::Independent(probability) => probability.happens(word),
+            Self::GilbertElliott(chain, state) => chain.loses(state, word, packet.more(Purpose::Loss).next_word()),
         }
     }
 }

@@ -16,7 +16,7 @@ use cohaptic_units::{Bytes, Instant};
 
 use crate::bottleneck::Departure;
 use crate::event_queue::Event;
-use crate::pipeline::{Enqueued, Outcome, Pipeline, check_time};
+use crate::pipeline::{Enqueued, Outcome, Pipeline, Words, check_time};
 use crate::{DropCause, EventQueue, Fate, LinkConfig, LinkName, LinkStats, TimeWentBack};
 
 /// A node of a network, by its place from 0.
@@ -110,6 +110,8 @@ pub struct Network<P> {
     happened: VecDeque<NetworkEvent<P>>,
     /// Whether anything but final arrivals can be pending.
     has_inner_events: bool,
+    /// Whether any link has ever drawn random numbers.
+    is_random: bool,
 }
 
 /// A link or an access line with its counters.
@@ -165,6 +167,9 @@ enum Hop {
     Link,
     Downlink,
 }
+
+/// For so many receivers of a packet, random words are drawn in one go.
+const DRAWN_AT_ONCE: u16 = 8;
 
 /// Lines are counted in the lower bits of a [`Place`].
 const LINE_BITS: u32 = 29;
@@ -224,12 +229,14 @@ impl<P> Network<P> {
             pending: EventQueue::new(),
             happened: VecDeque::new(),
             has_inner_events: false,
+            is_random: false,
             config,
         };
         for from in 0..nodes {
             for to in 0..nodes {
                 let config = if from == to { LinkConfig::default() } else { link(NodeId(from.into()), NodeId(to.into())) };
                 network.has_inner_events |= config.bottleneck.is_some();
+                network.is_random |= config.is_random();
                 let line = network.line(&network.link_name(Path { from, to }), config);
                 network.links.push(line);
             }
@@ -281,9 +288,9 @@ impl<P> Network<P> {
         let size = u32::try_from(size.get()).unwrap_or(u32::MAX);
         let packet = InNetwork { sequence, sent: now, entered: now, path, size, payload };
         if self.uplinks[from.0 as usize].is_some() {
-            self.offer(now, Hop::Uplink, from.0, packet);
+            self.enter(now, Hop::Uplink, from.0, packet);
         } else {
-            self.offer(now, Hop::Link, link, packet);
+            self.enter(now, Hop::Link, link, packet);
         }
         Ok(())
     }
@@ -307,11 +314,34 @@ impl<P> Network<P> {
         }
         self.let_pass(now)?;
         let size = u32::try_from(size.get()).unwrap_or(u32::MAX);
-        for to in (0..self.nodes).filter(|to| *to != sender) {
-            let path = Path { from: sender, to };
-            let link = self.link(path);
-            let sequence = self.links[link as usize].stats.offered;
-            self.offer(now, Hop::Link, link, InNetwork { sequence, sent: now, entered: now, path, size, payload: payload.clone() });
+        if !self.is_random {
+            for to in (0..self.nodes).filter(|to| *to != sender) {
+                let path = Path { from: sender, to };
+                let link = self.link(path);
+                let sequence = self.links[link as usize].stats.offered;
+                let packet = InNetwork { sequence, sent: now, entered: now, path, size, payload: payload.clone() };
+                self.offer(now, Hop::Link, link, packet, [0; 2]);
+            }
+            return Ok(());
+        }
+        let first = self.link(Path { from: sender, to: 0 });
+        let mut begin = 0;
+        while begin < self.nodes {
+            // All draws of some packets before any other work: so a processor computes several at once. It took 10 % off a packet with jitter.
+            let end = self.nodes.min(begin + DRAWN_AT_ONCE);
+            let mut words = [[0; 2]; DRAWN_AT_ONCE as usize];
+            for (words, to) in words.iter_mut().zip(begin..end) {
+                let Line { stats, pipeline } = &self.links[(first + u32::from(to)) as usize];
+                *words = pipeline.words(stats.offered);
+            }
+            for (words, to) in words.into_iter().zip(begin..end).filter(|(_, to)| *to != sender) {
+                let path = Path { from: sender, to };
+                let link = first + u32::from(to);
+                let sequence = self.links[link as usize].stats.offered;
+                let packet = InNetwork { sequence, sent: now, entered: now, path, size, payload: payload.clone() };
+                self.offer(now, Hop::Link, link, packet, words);
+            }
+            begin = end;
         }
         Ok(())
     }
@@ -362,6 +392,7 @@ impl<P> Network<P> {
         let line = self.link(path);
         self.let_pass(now)?;
         self.has_inner_events |= config.bottleneck.is_some();
+        self.is_random |= config.is_random();
         let name = self.link_name(path);
         let (departure, released) = self.links[line as usize].pipeline.reconfigure(now, self.config.seed, &name, config);
         if let Some(departure) = departure {
@@ -451,9 +482,9 @@ impl<P> Network<P> {
         stats.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
         let packet = InNetwork { sequence, sent, entered: at, path, size, payload };
         match hop {
-            Hop::Uplink => self.offer(at, Hop::Link, self.link(path), packet),
+            Hop::Uplink => self.enter(at, Hop::Link, self.link(path), packet),
             Hop::Link if self.has_inner_events && self.downlinks[usize::from(path.to)].is_some() => {
-                self.offer(at, Hop::Downlink, path.to.into(), packet);
+                self.enter(at, Hop::Downlink, path.to.into(), packet);
             }
             Hop::Link | Hop::Downlink => return Some(packet.event(at, Fate::Delivered(at))),
         }
@@ -469,12 +500,20 @@ impl<P> Network<P> {
         }
     }
 
+    /// Hands a packet to a line.
+    fn enter(&mut self, now: Instant, hop: Hop, line: u32, packet: InNetwork<P>) {
+        let Line { stats, pipeline } = self.line_mut(hop, line);
+        let words = pipeline.words(stats.offered);
+        self.offer(now, hop, line, packet, words);
+    }
+
+    /// The same, with the packet's first random words.
     #[inline(always)]
-    fn offer(&mut self, now: Instant, hop: Hop, line: u32, packet: InNetwork<P>) {
+    fn offer(&mut self, now: Instant, hop: Hop, line: u32, packet: InNetwork<P>, words: Words) {
         let Line { stats, pipeline } = self.line_mut(hop, line);
         let number = stats.offered;
         stats.offered += 1;
-        match pipeline.offer(now, number) {
+        match pipeline.offer(now, number, words) {
             Outcome::Arrives(at) => self.schedule(at, hop, line, packet),
             Outcome::Dropped(cause) => self.drop(now, hop, line, cause, packet),
             Outcome::Queues => match pipeline.enqueue(now, number, Bytes::new(packet.size.into()), packet) {

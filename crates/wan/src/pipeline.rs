@@ -91,6 +91,9 @@ pub(crate) enum Enqueued<T> {
     Dropped(DropCause, T),
 }
 
+/// The first words of a packet for loss and for jitter.
+pub(crate) type Words = [u64; 2];
+
 /// The stages of one link.
 #[derive(Clone, Debug)]
 pub(crate) enum Pipeline<T> {
@@ -102,14 +105,15 @@ pub(crate) enum Pipeline<T> {
 #[derive(Clone, Debug)]
 pub(crate) struct Chain<T> {
     outages: Outages,
+    /// The random numbers of the link, one address a packet.
+    draws: Stream,
+    is_random: bool,
     loss: Option<LossStage>,
-    loss_draws: Stream,
     /// In a box, so that a link without one is small: the links of a large mesh fill the cache.
     bottleneck: Option<Box<BottleneckStage<(u64, T)>>>,
     /// The last announcement of a bottleneck that was taken away.
     announced: u64,
     delay: DelayStage,
-    jitter_draws: Stream,
     order: OrderStage,
 }
 
@@ -125,10 +129,20 @@ impl<T> Pipeline<T> {
 
     /// Decides about packet number `number` of this link.
     #[inline]
-    pub(crate) fn offer(&mut self, now: Instant, number: u64) -> Outcome {
+    pub(crate) fn offer(&mut self, now: Instant, number: u64, words: Words) -> Outcome {
         match self {
             Self::Constant(delay, order) => Outcome::Arrives(order.arrival(later(now, *delay))),
-            Self::Chain(chain) => chain.offer(now, number),
+            Self::Chain(chain) => chain.offer(now, number, words),
+        }
+    }
+
+    /// The first random words of packet number `number`, which [`Pipeline::offer`] wants; zeros if the link draws none.
+    #[inline]
+    pub(crate) fn words(&self, number: u64) -> Words {
+        match self {
+            Self::Constant(..) => [0; 2],
+            Self::Chain(chain) if chain.is_random => chain.draws.packet(number).loss_and_jitter(),
+            Self::Chain(_) => [0; 2],
         }
     }
 
@@ -162,7 +176,7 @@ impl<T> Pipeline<T> {
                 order.set_policy(config.order);
                 *self = Self::Chain(Box::new(Chain { order: *order, ..Chain::new(seed, name, config) }));
             }
-            Self::Chain(chain) => return chain.reconfigure(now, seed, name, config),
+            Self::Chain(chain) => return chain.reconfigure(now, config),
         }
         (None, Vec::new())
     }
@@ -172,6 +186,10 @@ fn constant_nanos(config: &LinkConfig) -> u64 {
     u64::try_from(config.delay.mean().as_nanos()).unwrap_or(u64::MAX)
 }
 
+fn initial(draws: Stream) -> u64 {
+    draws.packet(0).first(Purpose::InitialState)
+}
+
 #[inline]
 fn later(now: Instant, nanos: u64) -> Instant {
     Instant::from_nanos(now.as_nanos().saturating_add(nanos))
@@ -179,33 +197,35 @@ fn later(now: Instant, nanos: u64) -> Instant {
 
 impl<T> Chain<T> {
     fn new(seed: u64, name: &LinkName, config: LinkConfig) -> Self {
-        let stream = |purpose| Stream::new(seed, name.as_str().as_bytes(), purpose);
+        let draws = Stream::new(seed, name.as_str().as_bytes());
         Self {
+            is_random: config.is_random(),
             outages: config.outages,
-            loss: LossStage::new(config.loss, &mut stream(Purpose::LossState).at(0)),
-            loss_draws: stream(Purpose::Loss),
+            draws,
+            loss: LossStage::new(config.loss, initial(draws)),
             bottleneck: config.bottleneck.map(|bottleneck| Box::new(BottleneckStage::new(bottleneck, 0))),
             announced: 0,
             delay: DelayStage::new(config.delay),
-            jitter_draws: stream(Purpose::Jitter),
             order: OrderStage::new(config.order),
         }
     }
 
     #[inline(always)]
-    fn offer(&mut self, now: Instant, number: u64) -> Outcome {
+    fn offer(&mut self, now: Instant, number: u64, [loss_word, jitter_word]: Words) -> Outcome {
         if self.outages.covers(now) {
             return Outcome::Dropped(DropCause::Outage);
         }
+        let packet = self.draws.packet(number);
         if let Some(loss) = &mut self.loss
-            && loss.loses(self.loss_draws, number)
+            && loss.loses(loss_word, packet)
         {
             return Outcome::Dropped(DropCause::Loss);
         }
         if self.bottleneck.is_some() {
             return Outcome::Queues;
         }
-        Outcome::Arrives(self.arrival(now, number))
+        let delay = self.delay.draw_nanos(jitter_word, packet);
+        Outcome::Arrives(self.order.arrival(later(now, delay)))
     }
 
     fn depart(&mut self, departure: Departure) -> Option<(T, Instant, Option<Departure>)> {
@@ -213,12 +233,13 @@ impl<T> Chain<T> {
         Some((item, self.arrival(departure.at, number), next))
     }
 
-    fn reconfigure(&mut self, now: Instant, seed: u64, name: &LinkName, config: LinkConfig) -> (Option<Departure>, Vec<(T, Instant)>) {
-        let mut initial = Stream::new(seed, name.as_str().as_bytes(), Purpose::LossState).at(0);
+    fn reconfigure(&mut self, now: Instant, config: LinkConfig) -> (Option<Departure>, Vec<(T, Instant)>) {
+        let initial = initial(self.draws);
         self.loss = match self.loss {
-            Some(stage) => stage.reconfigured(config.loss, &mut initial),
-            None => LossStage::new(config.loss, &mut initial),
+            Some(stage) => stage.reconfigured(config.loss, initial),
+            None => LossStage::new(config.loss, initial),
         };
+        self.is_random = config.is_random();
         self.outages = config.outages;
         self.delay = DelayStage::new(config.delay);
         self.order.set_policy(config.order);
@@ -244,7 +265,8 @@ impl<T> Chain<T> {
     /// When a packet that begins to propagate now arrives.
     #[inline(always)]
     fn arrival(&mut self, now: Instant, number: u64) -> Instant {
-        let delay = self.delay.draw_nanos(self.jitter_draws, number);
+        let packet = self.draws.packet(number);
+        let delay = self.delay.draw_nanos(packet.first(Purpose::Jitter), packet);
         self.order.arrival(later(now, delay))
     }
 }

@@ -1,40 +1,64 @@
 //! Random numbers with an address.
 //!
-//! A draw is a pure function of (seed, link, purpose, packet): there is no generator whose state one impairment could advance under another. So
+//! A draw is a pure function of (seed, link, packet, copy, purpose): there is no generator whose state one impairment could advance under another. So
 //! adding a link, a peer or an impairment, or changing one parameter, leaves every other draw as it was, and two runs that differ in one thing
 //! share all their other randomness (common random numbers).
 //!
-//! The function is Philox-2×64 with 7 rounds (Salmon, Moraes, Dror & Shaw, *Parallel Random Numbers: As Easy as 1, 2, 3*, SC11, 2011): the counter is
-//! (packet, block), the key comes from (seed, link, purpose). The authors found 6 rounds enough for every test of BigCrush; golden vectors below.
+//! The function is Philox-2×64 with 7 rounds (Salmon, Moraes, Dror & Shaw, *Parallel Random Numbers: As Easy as 1, 2, 3*, SC11, 2011): the key comes from
+//! (seed, link), the counter from (packet, copy, purpose, block). The authors found 6 rounds enough for every test of BigCrush; golden vectors below.
+//!
+//! A block has two words. The first words of two purposes share a block, loss with jitter, duplication with corruption, since a link that needs one
+//! often needs the other: with loss and jitter that took 4 % off a packet. What a purpose needs beyond its first word lies in blocks of its own.
 
 use core::convert::Infallible;
 
 use rand_core::TryRng;
 
-/// What a random number is drawn for. Each purpose of each link has a stream of its own.
+/// What a random number is drawn for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Purpose {
     /// Whether a packet is lost.
     Loss,
-    /// The state in which a loss model begins.
-    LossState,
     /// How far a packet's delay is from the mean.
     Jitter,
+    /// Whether a packet is duplicated.
+    Duplication,
+    /// Whether a packet is corrupted, and which of its bits.
+    Corruption,
+    /// Whether a packet is reordered.
+    Reordering,
+    /// What an active queue does with a packet.
+    Queue,
+    /// The state in which a chain with memory begins: its draws are those of packet 0.
+    InitialState,
+    /// How long a link is up and down in turn: the draws of "packet" n are those of the n-th span.
+    Outage,
+    /// When a modulator changes state, and to which: the draws of "packet" n are those of its n-th change.
+    Modulation,
+    /// When a slot opens: the draws of "packet" n are those of the n-th slot.
+    Slot,
 }
 
 impl Purpose {
     /// Part of the address, so these numbers must never change.
     const fn code(self) -> u64 {
         match self {
-            Self::Loss => 1,
-            Self::LossState => 2,
-            Self::Jitter => 3,
+            Self::Loss => 0,
+            Self::Jitter => 1,
+            Self::Duplication => 2,
+            Self::Corruption => 3,
+            Self::Reordering => 4,
+            Self::Queue => 5,
+            Self::InitialState => 6,
+            Self::Outage => 8,
+            Self::Modulation => 10,
+            Self::Slot => 12,
         }
     }
 }
 
-/// The random numbers of one purpose on one link.
+/// The random numbers of one link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Stream {
     key: u64,
@@ -43,7 +67,7 @@ pub struct Stream {
 impl Stream {
     /// The stream with that address. `label` names the link; equal labels have equal streams.
     #[must_use]
-    pub fn new(seed: u64, label: &[u8], purpose: Purpose) -> Self {
+    pub fn new(seed: u64, label: &[u8]) -> Self {
         // The address is absorbed word by word, each with its position, by the same function that makes the draws.
         let mut key = philox(seed, 0, 0)[0];
         let mut position = 1;
@@ -57,33 +81,76 @@ impl Stream {
             word[..chunk.len()].copy_from_slice(chunk);
             absorb(u64::from_le_bytes(word));
         }
-        absorb(purpose.code());
         Self { key }
     }
 
-    /// The draws of packet number `packet`.
-    #[must_use]
-    pub const fn at(self, packet: u64) -> Draws {
-        Draws { key: self.key, packet, block: 0, spare: None }
-    }
-}
-
-impl Stream {
-    /// The first word of a packet's draws, without the state that further ones need.
+    /// The draws of one packet.
     #[must_use]
     #[inline]
-    pub const fn first_word(self, packet: u64) -> u64 {
-        philox(packet, 0, self.key)[0]
+    pub const fn packet(self, number: u64) -> PacketDraws {
+        self.copy(number, 0)
+    }
+
+    /// The draws of a copy of a packet; copy 0 is the packet itself.
+    #[must_use]
+    #[inline]
+    pub const fn copy(self, number: u64, copy: u8) -> PacketDraws {
+        PacketDraws { key: self.key, number, copy }
     }
 }
 
-/// The random numbers of one packet for one purpose: as many as are wanted, 128 bits a block.
+/// The random numbers of one packet, or of one copy of it, for all purposes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct PacketDraws {
+    key: u64,
+    number: u64,
+    copy: u8,
+}
+
+impl PacketDraws {
+    /// The first words for [`Purpose::Loss`] and [`Purpose::Jitter`].
+    #[must_use]
+    #[inline]
+    pub const fn loss_and_jitter(self) -> [u64; 2] {
+        self.block(0, 0)
+    }
+
+    /// The first word for a purpose: 64 uniform bits.
+    #[must_use]
+    #[inline]
+    pub const fn first(self, purpose: Purpose) -> u64 {
+        let code = purpose.code();
+        self.block(0, code / 2)[(code % 2) as usize]
+    }
+
+    /// The words for a purpose from the first one on.
+    #[must_use]
+    #[inline]
+    pub const fn draws(self, purpose: Purpose) -> Draws {
+        Draws { packet: self, purpose, block: 0, spare: None }
+    }
+
+    /// The words for a purpose from the second one on.
+    #[must_use]
+    #[inline]
+    pub const fn more(self, purpose: Purpose) -> Draws {
+        Draws { packet: self, purpose, block: 1, spare: None }
+    }
+
+    /// Block 0 belongs to a pair of purposes, later ones to one.
+    #[inline]
+    const fn block(self, block: u64, whose: u64) -> [u64; 2] {
+        philox(self.number, block << 16 | (self.copy as u64) << 8 | whose, self.key)
+    }
+}
+
+/// The random numbers of one packet for one purpose: as many as are wanted.
 ///
 /// It is a generator for `rand_distr`.
 #[derive(Clone, Copy, Debug)]
 pub struct Draws {
-    key: u64,
-    packet: u64,
+    packet: PacketDraws,
+    purpose: Purpose,
     block: u64,
     spare: Option<u64>,
 }
@@ -95,7 +162,11 @@ impl Draws {
         if let Some(word) = self.spare.take() {
             return word;
         }
-        let [word, spare] = philox(self.packet, self.block, self.key);
+        if self.block == 0 {
+            self.block = 1;
+            return self.packet.first(self.purpose);
+        }
+        let [word, spare] = self.packet.block(self.block, self.purpose.code());
         self.block += 1;
         self.spare = Some(spare);
         word
@@ -103,11 +174,18 @@ impl Draws {
 
     /// A uniform number in [0, 1), a multiple of 2⁻⁵³.
     #[inline]
-    #[expect(clippy::cast_precision_loss, reason = "53 bits are exact in an f64")]
     pub fn next_unit(&mut self) -> f64 {
-        const TWO_POW_MINUS_53: f64 = 1.0 / 9_007_199_254_740_992.0;
-        (self.next_word() >> 11) as f64 * TWO_POW_MINUS_53
+        unit(self.next_word())
     }
+}
+
+/// The top 53 bits of a word as a number in [0, 1).
+#[must_use]
+#[inline]
+#[expect(clippy::cast_precision_loss, reason = "53 bits are exact in an f64")]
+pub fn unit(word: u64) -> f64 {
+    const TWO_POW_MINUS_53: f64 = 1.0 / 9_007_199_254_740_992.0;
+    (word >> 11) as f64 * TWO_POW_MINUS_53
 }
 
 impl TryRng for Draws {
@@ -173,37 +251,53 @@ mod tests {
     /// The addresses are a promise: a scene gives the same bytes with every version. If this test fails, the change breaks recorded results.
     #[test]
     fn addresses_never_change() {
-        let draw = |seed, label: &str, purpose| Stream::new(seed, label.as_bytes(), purpose).at(0).next_word();
+        let packet = |seed, label: &str, number, copy| Stream::new(seed, label.as_bytes()).copy(number, copy);
         let drawn = [
-            draw(0, "", Purpose::Loss),
-            draw(1, "left->right", Purpose::Loss),
-            draw(1, "left->right", Purpose::Jitter),
-            draw(u64::MAX, "a peer with a long name->another one", Purpose::LossState),
+            packet(0, "", 0, 0).first(Purpose::Loss),
+            packet(1, "left->right", 0, 0).first(Purpose::Loss),
+            packet(1, "left->right", 0, 0).first(Purpose::Jitter),
+            packet(1, "left->right", 7, 1).first(Purpose::Corruption),
+            packet(1, "left->right", 7, 1).more(Purpose::Corruption).next_word(),
+            packet(u64::MAX, "a peer with a long name->another one", 0, 0).first(Purpose::InitialState),
         ];
-        assert_eq!(drawn, [13_054_728_836_745_160_658, 16_532_924_348_238_823_526, 548_372_529_604_639_721, 15_233_301_043_234_685_537]);
+
+        let expected = [
+            1_842_404_019_259_666_520,
+            13_572_114_012_027_969_562,
+            3_580_754_297_706_433_943,
+            17_893_050_011_931_159_018,
+            8_806_227_843_080_467_796,
+            14_331_108_856_863_319_007,
+        ];
+        assert_eq!(drawn, expected);
     }
 
     #[test]
-    fn streams_differ_in_every_part_of_their_address() {
-        let keys = [
-            Stream::new(1, b"a->b", Purpose::Loss),
-            Stream::new(2, b"a->b", Purpose::Loss),
-            Stream::new(1, b"b->a", Purpose::Loss),
-            Stream::new(1, b"a->b", Purpose::Jitter),
-            Stream::new(1, b"a->b\0", Purpose::Loss),
-        ];
-        for (i, a) in keys.iter().enumerate() {
-            assert!(keys[..i].iter().all(|b| a != b));
+    fn no_two_draws_share_an_address() {
+        use Purpose::{Corruption, Duplication, InitialState, Jitter, Loss, Modulation, Outage, Queue, Reordering, Slot};
+        let mut words = std::collections::BTreeSet::new();
+        let mut count = 0;
+        for (seed, label) in [(1, "a->b"), (2, "a->b"), (1, "b->a"), (1, "a->b\0")] {
+            let stream = Stream::new(seed, label.as_bytes());
+            for (number, copy) in [(0, 0), (1, 0), (0, 1), (256, 0), (1 << 16, 0), (0, 255)] {
+                for purpose in [Loss, Jitter, Duplication, Corruption, Reordering, Queue, InitialState, Outage, Modulation, Slot] {
+                    let mut draws = stream.copy(number, copy).draws(purpose);
+                    words.extend(core::iter::repeat_with(|| draws.next_word()).take(6));
+                    count += 6;
+                }
+            }
         }
+        assert_eq!(words.len(), count);
     }
 
     #[test]
     fn a_packet_has_the_same_draws_whenever_they_are_asked_for() {
-        let stream = Stream::new(7, b"x", Purpose::Jitter);
-        let mut once = stream.at(41);
+        let packet = Stream::new(7, b"x").packet(41);
+        let mut once = packet.draws(Purpose::Jitter);
         let first: [u64; 5] = core::array::from_fn(|_| once.next_word());
-        let mut again = stream.at(41);
-        assert_eq!(first, core::array::from_fn(|_| again.next_word()));
-        assert_ne!(stream.at(42).next_word(), first[0]);
+        let mut more = packet.more(Purpose::Jitter);
+        let again = [packet.first(Purpose::Jitter), more.next_word(), more.next_word(), more.next_word(), more.next_word()];
+        assert_eq!(first, again);
+        assert_eq!(packet.loss_and_jitter(), [packet.first(Purpose::Loss), packet.first(Purpose::Jitter)]);
     }
 }

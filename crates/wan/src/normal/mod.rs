@@ -6,16 +6,15 @@
 
 mod tables;
 
-use crate::random::{Draws, Stream};
+use crate::random::unit;
 use tables::{F, R, X};
 
-/// The standard normal number of a packet. It takes one word of its draws, seldom more.
+/// The standard normal number of a uniform word. It takes no more words than that one, or seldom a few.
 #[must_use]
 #[inline]
-pub fn standard_normal(stream: Stream, packet: u64) -> f64 {
-    let word = stream.first_word(packet);
+pub fn standard_normal(word: u64, more: impl FnMut() -> u64) -> f64 {
     let (layer, size) = point(word);
-    if size < X[layer + 1] { signed(word, size) } else { outside_the_core(stream.at(packet)) }
+    if size < X[layer + 1] { signed(word, size) } else { outside_the_core(word, more) }
 }
 
 /// The layer, and how far to the right in it. They and the sign are different bits of the word.
@@ -30,49 +29,47 @@ fn signed(word: u64, size: f64) -> f64 {
     if word & 0x100 == 0 { size } else { -size }
 }
 
-/// The first point lies in a wedge or in the tail: begins again with it, and goes on with more draws until one lies under the density.
+/// The first point lies in a wedge or in the tail: goes on with more words until one lies under the density.
 #[cold]
-fn outside_the_core(mut draws: Draws) -> f64 {
+fn outside_the_core(mut word: u64, mut more: impl FnMut() -> u64) -> f64 {
     loop {
-        let word = draws.next_word();
         let (layer, size) = point(word);
         if size < X[layer + 1] {
             return signed(word, size);
         }
         if layer == 0 {
-            return signed(word, tail(&mut draws));
+            return signed(word, tail(&mut more));
         }
-        let height = F[layer] + (F[layer + 1] - F[layer]) * draws.next_unit();
+        let height = F[layer] + (F[layer + 1] - F[layer]) * unit(more());
         if height < libm::exp(-0.5 * size * size) {
             return signed(word, size);
         }
+        word = more();
     }
 }
 
 /// A draw from the tail beyond R, by Marsaglia (1964).
-fn tail(draws: &mut Draws) -> f64 {
+fn tail(more: &mut impl FnMut() -> u64) -> f64 {
     loop {
         // 1 − u lies in (0, 1]: its logarithm is finite.
-        let beyond = -libm::log(1.0 - draws.next_unit()) / R;
-        let height = -libm::log(1.0 - draws.next_unit());
+        let beyond = -libm::log(1.0 - unit(more())) / R;
+        let height = -libm::log(1.0 - unit(more()));
         if 2.0 * height > beyond * beyond {
             return R + beyond;
         }
     }
 }
 
-/// The top 53 bits as a number in [0, 1).
-#[inline]
-#[expect(clippy::cast_precision_loss, reason = "53 bits are exact in an f64")]
-fn unit(word: u64) -> f64 {
-    const TWO_POW_MINUS_53: f64 = 1.0 / 9_007_199_254_740_992.0;
-    (word >> 11) as f64 * TWO_POW_MINUS_53
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Purpose;
+    use crate::random::{Purpose, Stream};
+
+    fn draw(stream: Stream, number: u64) -> f64 {
+        let packet = stream.packet(number);
+        let mut more = packet.more(Purpose::Jitter);
+        standard_normal(packet.first(Purpose::Jitter), || more.next_word())
+    }
 
     /// Every layer has the same area, that of the lowest with its tail: R·F(R) + √(π/2)·erfc(R/√2). Tables of 16 digits are consistent to 1e-14.
     #[test]
@@ -91,11 +88,11 @@ mod tests {
     /// k = 1, 2, 3, 4; 4.5 of them are exceeded by chance once in 150 000.
     #[test]
     fn moments_are_those_of_the_normal_law() {
-        let stream = Stream::new(3, b"normal", Purpose::Jitter);
+        let stream = Stream::new(3, b"normal");
         let count = 2_000_000_u32;
         let mut sums = [0.0; 4];
         for packet in 0..u64::from(count) {
-            let z = standard_normal(stream, packet);
+            let z = draw(stream, packet);
             let square = z * z;
             for (sum, power) in sums.iter_mut().zip([z, square, square * z, square * square]) {
                 *sum += power;
@@ -110,16 +107,16 @@ mod tests {
     /// Of 2·10⁶ draws about 2·10⁶·erfc(3.8/√2) = 289.4 lie beyond 3.8, all of them from the tail; Poisson, 4.5 standard deviations of 17.
     #[test]
     fn the_tail_has_its_share() {
-        let stream = Stream::new(4, b"normal", Purpose::Jitter);
-        let beyond = (0..2_000_000).filter(|&packet| standard_normal(stream, packet).abs() > 3.8).count();
+        let stream = Stream::new(4, b"normal");
+        let beyond = (0..2_000_000).filter(|&packet| draw(stream, packet).abs() > 3.8).count();
         assert!((213..=366).contains(&beyond), "{beyond}");
     }
 
     /// A draw is part of every recorded result with jitter: if this fails, the change breaks them.
     #[test]
     fn draws_never_change() {
-        let stream = Stream::new(1, b"left->right", Purpose::Jitter);
-        let drawn: [u64; 3] = core::array::from_fn(|packet| standard_normal(stream, packet as u64).to_bits());
-        assert_eq!(drawn, [13_805_245_113_503_555_042, 4_609_251_688_676_149_596, 4_597_926_677_260_238_969]);
+        let stream = Stream::new(1, b"left->right");
+        let drawn: [u64; 3] = core::array::from_fn(|packet| draw(stream, packet as u64).to_bits());
+        assert_eq!(drawn, [13_821_872_902_639_228_385, 13_827_345_273_651_602_772, 4_604_346_350_751_844_895]);
     }
 }

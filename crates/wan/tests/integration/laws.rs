@@ -122,7 +122,7 @@ fn chains_begin_in_their_stationary_law() {
     // the chain is: scipy.stats.binom.ppf([0.0005, 0.9995], 200_000, 0.2).
     let slow = Loss::GilbertElliott(chain(0.000_1, 0.000_4, 0.0, 1.0));
     // A link is 100 kB of ring, so 200,000 of them are asked only where the first draw sends them, and 300 of them where they really begin.
-    let begins_bad = |seed: &u64| Stream::new(*seed, b"a->b", Purpose::LossState).at(0).next_unit() < 0.2;
+    let begins_bad = |seed: &u64| Stream::new(*seed, b"a->b").packet(0).draws(Purpose::InitialState).next_unit() < 0.2;
     let bad = (0..200_000).filter(begins_bad).count();
     assert!((39_412..=40_590).contains(&bad), "{bad} of 200,000 chains begin in the bad state");
     for seed in 0..300 {
@@ -172,10 +172,10 @@ fn packets_at_random_wait_as_long_as_pollaczek_and_khinchine_say() {
     for (seed, load) in [(1u64, 0.3), (2, 0.6), (3, 0.85)] {
         let bottleneck = Bottleneck { rate: rate(BYTE_A_MICROSECOND), overhead: Bytes::ZERO, limit: None };
         let mut link = Link::new(seed, &LinkName::between("a", "b"), LinkConfig { bottleneck: Some(bottleneck), ..LinkConfig::default() });
-        let gaps = Stream::new(seed, b"arrivals", Purpose::Jitter);
+        let gaps = Stream::new(seed, b"arrivals");
         let mut now = Instant::ZERO;
         for number in 0..COUNT {
-            let gap: f64 = Exp1.sample(&mut gaps.at(number));
+            let gap: f64 = Exp1.sample(&mut gaps.packet(number).draws(Purpose::Jitter));
             now += Duration::from_secs_f64(gap * SERVICE / load / 1e9);
             link.handle_packet(now, Bytes::new(64), ()).unwrap();
         }

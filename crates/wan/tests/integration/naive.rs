@@ -92,8 +92,8 @@ fn transmitted(configs: &[(Instant, LinkConfig)], begin: Moment, size: Bytes) ->
 
 /// Which packets the loss model takes. A packet that an outage took asks it nothing.
 fn losses(name: &LinkName, configs: &[(Instant, LinkConfig)], offered: &[Offered]) -> Vec<bool> {
-    let draws = Stream::new(SEED, name.as_str().as_bytes(), Purpose::Loss);
-    let first = Stream::new(SEED, name.as_str().as_bytes(), Purpose::LossState).at(0).next_unit();
+    let stream = Stream::new(SEED, name.as_str().as_bytes());
+    let first = stream.packet(0).draws(Purpose::InitialState).next_unit();
     let stationary_bad = |chain: GilbertElliott| first < chain.p.get() / (chain.p.get() + chain.r.get());
     // A chain that never moves is good: 0/0 is less than nothing.
     let mut chain_is_bad: Option<bool> = None;
@@ -110,7 +110,7 @@ fn losses(name: &LinkName, configs: &[(Instant, LinkConfig)], offered: &[Offered
         }
         let config = &configs[packet.moment.1].1;
         let down = config.outages.as_slice().iter().any(|outage| outage.from <= packet.moment.0 && packet.moment.0 < outage.to);
-        let mut draws = draws.at(number as u64);
+        let mut draws = stream.packet(number as u64).draws(Purpose::Loss);
         lost.push(match config.loss {
             _ if down => false,
             Loss::None => false,
@@ -131,12 +131,12 @@ fn losses(name: &LinkName, configs: &[(Instant, LinkConfig)], offered: &[Offered
 fn delay(name: &LinkName, config: &LinkConfig, number: u64) -> u64 {
     let mean = i128::try_from(config.delay.mean().as_nanos()).unwrap();
     let Some(jitter) = config.delay.jitter() else { return u64::try_from(mean).unwrap() };
-    let stream = Stream::new(SEED, name.as_str().as_bytes(), Purpose::Jitter);
+    let mut draws = Stream::new(SEED, name.as_str().as_bytes()).packet(number).draws(Purpose::Jitter);
     let sd = jitter.sd.as_nanos() as f64;
     let deviation = match jitter.distribution {
-        Distribution::Normal => sd * cohaptic_wan::standard_normal(stream, number),
+        Distribution::Normal => sd * cohaptic_wan::standard_normal(draws.next_word(), || draws.next_word()),
         // Uniform over ±√3·σ.
-        Distribution::Uniform => 3f64.sqrt() * sd * (2.0 * stream.at(number).next_unit() - 1.0),
+        Distribution::Uniform => 3f64.sqrt() * sd * (2.0 * draws.next_unit() - 1.0),
         other => unreachable!("no model for {other:?}"),
     };
     #[expect(clippy::cast_possible_truncation, reason = "the tests draw at most seconds")]
