@@ -231,7 +231,7 @@ impl<E: Event> EventQueue<E> {
         let sorted = sort(&mut events, &mut few);
         if sorted.windows(2).any(|pair| pair[0] >> 32 == pair[1] >> 32) {
             // Instants decide most often, so that the events themselves are looked at only where two are equal.
-            sorted.sort_unstable_by(|a, b| self.slab.key(place_of(*a)).cmp(&self.slab.key(place_of(*b))));
+            sorted.sort_unstable_by_key(|packed| self.slab.key(place_of(*packed)));
         }
         let start = bucket << self.width;
         self.front.extend(sorted.iter().map(|&packed| (Instant::from_nanos(start + (packed >> 32)), place_of(packed))));
