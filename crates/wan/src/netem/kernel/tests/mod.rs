@@ -1,0 +1,1 @@
+//! The kernel's netem: its laws, its queue, its tables.
