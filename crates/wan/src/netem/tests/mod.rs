@@ -2,4 +2,4 @@
 
 mod grammar;
 mod refusals;
-mod round_trip;
+pub(in crate::netem) mod round_trip;
