@@ -59,3 +59,30 @@ pub(super) fn distributed(mean: i64, sigma: i32, draw: impl FnOnce() -> u32, tab
     let rounded = if product >= 0 { product + scale / 2 } else { product - scale / 2 };
     (rounded / scale + i64::from(sigma / TABLE_SCALE) * entry).wrapping_add(mean)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// So the probability of v is (v + 1)/2³², and 0 for 0.
+    #[test]
+    fn a_draw_on_the_bound_is_an_event_and_zero_draws_nothing() {
+        let mut sequence = Correlated::new(0, &mut Unseeded::new(1));
+        let bound = Prng::new(1).next_u32();
+        assert!(sequence.happens(bound, &mut Prng::new(1)));
+        assert!(!sequence.happens(bound - 1, &mut Prng::new(1)));
+        let mut prng = Prng::new(1);
+        assert!(!sequence.happens(0, &mut prng));
+        assert_eq!(prng, Prng::new(1));
+    }
+
+    /// ρ′ = 2³¹ + 1 of 2³² here: by hand, half of the draw and half of the last value.
+    #[test]
+    fn a_correlated_number_is_a_running_mean() {
+        let mut sequence = Correlated { rho: 1 << 31, last: 1000 };
+        let drawn = u64::from(Prng::new(1).next_u32());
+        let expected = (drawn * ((1 << 31) - 1) + 1000 * ((1 << 31) + 1)) >> 32;
+        assert_eq!(u64::from(sequence.next(&mut Prng::new(1))), expected);
+        assert_eq!(u64::from(sequence.last), expected);
+    }
+}

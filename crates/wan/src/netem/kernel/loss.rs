@@ -190,6 +190,18 @@ mod tests {
         assert_eq!(state, State::LostAlone);
     }
 
+    /// Of seed 1 the first draw is 0.064, the second 0.0044, the third 0.54, the fourth 0.0022: transition, loss, transition, loss.
+    #[test]
+    fn the_transition_is_drawn_first_and_the_loss_with_the_state_before_it() {
+        let (mut prng, mut bad) = (Prng::new(1), false);
+        assert!(gilbert_elliott("loss gemodel 1% 60% 50% 1%").loses(&mut bad, &mut prng), "0.0044 loses at 1 %");
+        assert!(!bad, "0.064 stays at 1 %");
+        assert!(!gilbert_elliott("loss gemodel 60% 60% 100% 0%").loses(&mut bad, &mut prng), "nothing is lost in the good state");
+        assert!(bad, "0.54 goes at 60 %");
+        assert!(gilbert_elliott("loss gemodel 60% 100% 100% 0%").loses(&mut bad, &mut prng), "everything is lost in the bad state");
+        assert!(!bad);
+    }
+
     #[test]
     fn two_halves_that_round_up_switch_the_burst_off() {
         let chain = four_state("loss state 50 50 0 100 50");

@@ -107,6 +107,24 @@ fn a_gap_makes_reordering_rarer_than_said() {
     assert!((share - 1.0 / 8.0).abs() < 0.0025, "{share}");
 }
 
+/// A copy that is about to leave counts as the last packet: the line does not begin before it, though the delay may be below zero.
+#[test]
+fn a_reordered_copy_holds_the_line() {
+    let now = at(1000 * MILLISECOND);
+    let mut seen = 0;
+    for seed in 0..1000 {
+        let mut qdisc: Qdisc<u64> = qdisc("delay 1us 100us duplicate 100% reorder 50% rate 8mbit", seed);
+        qdisc.enqueue(now, SIZE, false, 0, &mut |_| {});
+        let copy = qdisc.dequeue(now).is_some_and(|packet| packet.reordered && packet.copy == 1);
+        if copy && qdisc.len() == 1 {
+            seen += 1;
+            assert!(qdisc.next_at() >= now.checked_add(core::time::Duration::from_millis(1)));
+        }
+    }
+    // A quarter of 1000, five standard errors of 13.7.
+    assert!((181..=319).contains(&seen), "{seen}");
+}
+
 #[test]
 fn reordered_packets_pass_rate_and_slots() {
     let mut driver = Driver::new(qdisc("delay 10ms reorder 100% gap 2 rate 8bit slot 1s", 1));
