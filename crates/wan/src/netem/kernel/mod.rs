@@ -2,7 +2,7 @@
 //!
 //! A [`Qdisc`] is the queueing discipline on a device of infinite speed, without a child and at the root: offer it packets with
 //! [`Qdisc::enqueue`], take what leaves with [`Qdisc::dequeue`]. With the same `seed` it makes the same decisions as the kernel, except for what the
-//! kernel does not draw from its seeded generator (below). Implemented from the published formulas; no code is shared with the kernel.
+//! kernel does not draw from its seeded generator (below). Written anew from formulas and facts; no code of the kernel is in it.
 //!
 //! # What happens to a packet
 //!
