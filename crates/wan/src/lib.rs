@@ -43,6 +43,7 @@ mod fate;
 mod gilbert_elliott;
 mod link;
 mod loss;
+pub mod netem;
 mod network;
 mod normal;
 mod order;

@@ -1,0 +1,94 @@
+//! Why words are refused, and the words with a mark under the one to blame.
+
+use alloc::format;
+use alloc::string::{String, ToString};
+use core::ops::Range;
+
+use super::Contradiction;
+
+/// Why the words are no netem, and which of them is to blame.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("{kind}")]
+#[non_exhaustive]
+pub struct NetemError {
+    /// What is wrong.
+    pub kind: NetemErrorKind,
+    /// The bytes of the word to blame in the text that was read.
+    pub span: Range<usize>,
+}
+
+/// What is wrong with the words of a netem.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NetemErrorKind {
+    /// A word where an option was expected.
+    #[error("unknown word \"{word}\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, slot, seed or the end")]
+    UnknownWord {
+        /// The word.
+        word: String,
+    },
+    /// A word that is not what its option takes.
+    #[error("\"{word}\" is not what {option} takes here: expected {expected}")]
+    Value {
+        /// The option.
+        option: &'static str,
+        /// The word.
+        word: String,
+        /// What would have been right.
+        expected: &'static str,
+    },
+    /// The end, where an option lacks a value.
+    #[error("{option} ends too early: expected {expected} after it")]
+    Missing {
+        /// The option.
+        option: &'static str,
+        /// What would have been right.
+        expected: &'static str,
+    },
+    /// An option said before. `tc` would take the last, mixed with what it leaves out.
+    #[error("{option} is said twice: expected it once")]
+    Repeated {
+        /// The option.
+        option: &'static str,
+    },
+    /// Options that do not go together.
+    #[error(transparent)]
+    Contradiction(#[from] Contradiction),
+}
+
+impl NetemError {
+    /// The line of `input` with carets under the word to blame, and what was expected there.
+    ///
+    /// ```text
+    /// delay 24ms loss 250%
+    ///                 ^^^^ expected a percentage from 0 to 100
+    /// ```
+    ///
+    /// `input` is the text that was read; with another one the mark stands elsewhere, or at the end.
+    #[must_use]
+    pub fn excerpt(&self, input: &str) -> String {
+        let start = floor_boundary(input, self.span.start);
+        let end = floor_boundary(input, self.span.end).max(start);
+        let line_start = input[..start].rfind('\n').map_or(0, |newline| newline + 1);
+        let line_end = input[start..].find('\n').map_or(input.len(), |newline| start + newline);
+        let line = input[line_start..line_end].trim_end_matches('\r');
+        // A tab stays a tab, so that the caret stands below its word whatever the width of tabs.
+        let indent: String = input[line_start..start].chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
+        let carets = "^".repeat(input[start..end.min(line_end)].chars().count().max(1));
+        format!("{line}\n{indent}{carets} {}", self.advice())
+    }
+
+    /// What was expected, without repeating the word that stands above it.
+    fn advice(&self) -> String {
+        match &self.kind {
+            NetemErrorKind::Value { expected, .. } => format!("expected {expected}"),
+            NetemErrorKind::Missing { expected, .. } => format!("expected {expected} after this"),
+            NetemErrorKind::UnknownWord { .. } | NetemErrorKind::Repeated { .. } | NetemErrorKind::Contradiction(_) => self.kind.to_string(),
+        }
+    }
+}
+
+/// The last character boundary at or before `index`.
+fn floor_boundary(text: &str, index: usize) -> usize {
+    (0..=index.min(text.len())).rev().find(|&index| text.is_char_boundary(index)).unwrap_or(0)
+}

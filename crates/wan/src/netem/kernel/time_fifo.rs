@@ -1,0 +1,39 @@
+//! Packets in the order of their time to leave, equal times in the order of arrival.
+
+use alloc::collections::BTreeMap;
+
+/// The delay line.
+#[derive(Clone, Debug)]
+pub(super) struct TimeFifo<P> {
+    packets: BTreeMap<(i64, u64), P>,
+    arrivals: u64,
+}
+
+impl<P> TimeFifo<P> {
+    pub(super) const fn new() -> Self {
+        Self { packets: BTreeMap::new(), arrivals: 0 }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.packets.len()
+    }
+
+    pub(super) fn push(&mut self, time: i64, packet: P) {
+        self.packets.insert((time, self.arrivals), packet);
+        self.arrivals += 1;
+    }
+
+    /// The earliest time to leave \[ns\].
+    pub(super) fn first_time(&self) -> Option<i64> {
+        self.packets.first_key_value().map(|((time, _), _)| *time)
+    }
+
+    /// The latest time to leave \[ns\].
+    pub(super) fn last_time(&self) -> Option<i64> {
+        self.packets.last_key_value().map(|((time, _), _)| *time)
+    }
+
+    pub(super) fn pop(&mut self) -> Option<P> {
+        self.packets.pop_first().map(|(_, packet)| packet)
+    }
+}

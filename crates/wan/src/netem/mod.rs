@@ -1,0 +1,41 @@
+//! The words of `tc-netem`, and what the Linux kernel makes of them.
+//!
+//! Two parts, which need nothing else of this crate:
+//!
+//! - [`Netem`]: what the words say. [`Netem::parse`] reads them as `tc` of iproute2 6.6 does (without `tc qdisc … netem`), refuses what makes no
+//!   sense with [an error that points at the word](NetemError::excerpt), and `Display` prints words that read back to the same value.
+//! - [`kernel`]: what Linux 6.6 does when it is told so, draw for draw. That is often not what the words say: `loss 1% 25%` loses 0.00015 %.
+//!
+//! ```
+//! use cohaptic_wan::netem::{LossSpec, Netem};
+//!
+//! let netem = Netem::parse("delay 24ms 2ms distribution normal loss 1% 25%")?;
+//! let Some(LossSpec::Random(loss)) = &netem.loss else { panic!("a random loss was said") };
+//! assert_eq!(loss.percent.fraction(), 0.01);
+//! assert_eq!(netem.to_string(), "delay 24ms 2ms distribution normal loss 1% 25%");
+//!
+//! let words = "delay 24ms loss 250%";
+//! let error = Netem::parse(words).expect_err("more than everything");
+//! assert_eq!(error.excerpt(words), "delay 24ms loss 250%\n                ^^^^ expected a percentage from 0 to 100");
+//! # Ok::<(), cohaptic_wan::netem::NetemError>(())
+//! ```
+
+mod error;
+pub mod kernel;
+mod number;
+mod parse;
+mod percent;
+mod print;
+mod rules;
+mod spec;
+
+pub use error::{NetemError, NetemErrorKind};
+pub use percent::Percent;
+pub use rules::Contradiction;
+pub use spec::{
+    CellSpec, ChanceSpec, DelaySpec, Distribution, FramingSpec, GemodelSpec, JitterSpec, LossSpec, Netem, RateSpec, ReorderSpec, SlotGap, SlotSpec,
+    StateSpec, TableName,
+};
+
+#[cfg(test)]
+mod tests;

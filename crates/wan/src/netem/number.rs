@@ -1,0 +1,224 @@
+//! Numbers with units, as `tc` reads them.
+//!
+//! A number is what C's `strtod` reads of decimals (sign, point, exponent), the rest is its unit; units ignore case. Not read, though `strtod` does:
+//! hexadecimal floats, `inf` and `nan`. Integers are what `strtol` reads: octal after `0`, hexadecimal after `0x`.
+
+use core::num::NonZeroU64;
+use core::time::Duration;
+
+use super::Percent;
+
+/// A number and what stands behind it.
+struct Number<'a> {
+    value: f64,
+    /// The same, if it was written as a plain integer: exact where the other is not.
+    integer: Option<u128>,
+    unit: &'a str,
+}
+
+/// Splits a text into a finite number, not below zero, and its unit.
+fn number(text: &str) -> Option<Number<'_>> {
+    let bytes = text.as_bytes();
+    let digits_from = |from: usize| bytes[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+    let sign = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
+    let whole = digits_from(sign);
+    let mut end = sign + whole;
+    let mut digits = whole;
+    if bytes.get(end) == Some(&b'.') {
+        let decimals = digits_from(end + 1);
+        digits += decimals;
+        if digits > 0 {
+            end += 1 + decimals;
+        }
+    }
+    if digits == 0 {
+        return None;
+    }
+    let is_integer = end == sign + whole;
+    let mut is_plain = is_integer;
+    if matches!(bytes.get(end), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+        let exponent = digits_from((end + 1 + sign).min(bytes.len()));
+        if exponent > 0 {
+            end += 1 + sign + exponent;
+            is_plain = false;
+        }
+    }
+    let (written, unit) = text.split_at(end);
+    let value: f64 = written.parse().ok()?;
+    let integer = if is_plain { written.parse().ok() } else { None };
+    (value.is_finite() && value >= 0.0).then_some(Number { value, integer, unit })
+}
+
+impl Number<'_> {
+    /// The scale of the unit among `units`.
+    fn scale(&self, units: &[(&str, u64)]) -> Option<u64> {
+        units.iter().find(|(name, _)| name.eq_ignore_ascii_case(self.unit)).map(|&(_, scale)| scale)
+    }
+
+    /// The number times `scale`, as an integer where it was written as one.
+    fn times(&self, scale: u64) -> Scaled {
+        let product = self.integer.and_then(|integer| integer.checked_mul(u128::from(scale)));
+        product.map_or_else(|| Scaled::Real(self.value * real(scale)), Scaled::Integer)
+    }
+}
+
+/// A number times the scale of its unit.
+enum Scaled {
+    Integer(u128),
+    Real(f64),
+}
+
+/// Every scale is below 2⁵³ or has few bits set.
+#[expect(clippy::cast_precision_loss, reason = "the scales of the tables below are exact")]
+fn real(scale: u64) -> f64 {
+    scale as f64
+}
+
+/// 2³², whose square is 2⁶⁴.
+const TWO_POW_32: f64 = 4_294_967_296.0;
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be in 0..2^64; the fraction is cut off as in C")]
+fn truncated(value: f64) -> Option<u64> {
+    (0.0..TWO_POW_32 * TWO_POW_32).contains(&value).then_some(value as u64)
+}
+
+/// What a number without unit means as a time.
+#[derive(Clone, Copy)]
+pub(super) enum Bare {
+    /// In `delay`, up to iproute2 6.8.
+    Microseconds,
+    /// In `slot`.
+    Nanoseconds,
+}
+
+pub(super) const TIME: &str = "a time such as 10ms, 250us or 1.5s, below 292 years";
+
+/// Reads a time, rounded to the nearest nanosecond.
+pub(super) fn time(text: &str, bare: Bare) -> Option<Duration> {
+    const S: u64 = 1_000_000_000;
+    const MS: u64 = 1_000_000;
+    const US: u64 = 1_000;
+    let units = [
+        ("s", S),
+        ("sec", S),
+        ("secs", S),
+        ("ms", MS),
+        ("msec", MS),
+        ("msecs", MS),
+        ("us", US),
+        ("usec", US),
+        ("usecs", US),
+        ("ns", 1),
+        ("nsec", 1),
+        ("nsecs", 1),
+        (
+            "",
+            match bare {
+                Bare::Microseconds => US,
+                Bare::Nanoseconds => 1,
+            },
+        ),
+    ];
+    let number = number(text)?;
+    let nanos = match number.times(number.scale(&units)?) {
+        Scaled::Integer(nanos) => u64::try_from(nanos).ok()?,
+        Scaled::Real(nanos) => truncated(libm::rint(nanos))?,
+    };
+    (nanos <= i64::MAX.unsigned_abs()).then_some(Duration::from_nanos(nanos))
+}
+
+pub(super) const PERCENT: &str = "a percentage from 0 to 100";
+
+/// Reads a percentage, with or without its sign.
+pub(super) fn percent(text: &str) -> Option<Percent> {
+    let number = number(text)?;
+    matches!(number.unit, "" | "%").then_some(())?;
+    Percent::new(number.value)
+}
+
+pub(super) const RATE: &str = "a rate of at least 8bit such as 10mbit, 64kbit or 1.5mbps (the last is bytes per second)";
+
+/// Reads a rate as bytes per second, cut off as `tc` does.
+pub(super) fn rate(text: &str) -> Option<NonZeroU64> {
+    const KI: u64 = 1 << 10;
+    let units = [
+        ("", 1),
+        ("bit", 1),
+        ("kibit", KI),
+        ("kbit", 1_000),
+        ("mibit", KI * KI),
+        ("mbit", 1_000_000),
+        ("gibit", KI * KI * KI),
+        ("gbit", 1_000_000_000),
+        ("tibit", KI * KI * KI * KI),
+        ("tbit", 1_000_000_000_000),
+        ("bps", 8),
+        ("kibps", 8 * KI),
+        ("kbps", 8_000),
+        ("mibps", 8 * KI * KI),
+        ("mbps", 8_000_000),
+        ("gibps", 8 * KI * KI * KI),
+        ("gbps", 8_000_000_000),
+        ("tibps", 8 * KI * KI * KI * KI),
+        ("tbps", 8_000_000_000_000),
+    ];
+    let number = number(text)?;
+    let bytes = match number.times(number.scale(&units)?) {
+        Scaled::Integer(bits) => u64::try_from(bits / 8).ok()?,
+        Scaled::Real(bits) => truncated(bits / 8.0)?,
+    };
+    NonZeroU64::new(bytes)
+}
+
+/// Reads a size in bytes, or a count of packets: `tc` reads `limit` with the same words. The prefixes are binary.
+pub(super) fn size(text: &str) -> Option<u32> {
+    const KI: u64 = 1 << 10;
+    let units = [
+        ("", 1),
+        ("b", 1),
+        ("k", KI),
+        ("kb", KI),
+        ("kbit", KI / 8),
+        ("m", KI * KI),
+        ("mb", KI * KI),
+        ("mbit", KI * KI / 8),
+        ("g", KI * KI * KI),
+        ("gb", KI * KI * KI),
+        ("gbit", KI * KI * KI / 8),
+    ];
+    let number = number(text)?;
+    match number.times(number.scale(&units)?) {
+        Scaled::Integer(size) => u32::try_from(size).ok(),
+        Scaled::Real(size) => u32::try_from(truncated(size)?).ok(),
+    }
+}
+
+/// Reads an integer not below zero, in base 8, 10 or 16 as its prefix says.
+pub(super) fn unsigned(text: &str) -> Option<u64> {
+    let digits = text.strip_prefix('+').unwrap_or(text);
+    let (digits, radix) = match digits.strip_prefix("0x").or_else(|| digits.strip_prefix("0X")) {
+        Some(hexadecimal) => (hexadecimal, 16),
+        None if digits.len() > 1 && digits.starts_with('0') => (&digits[1..], 8),
+        None => (digits, 10),
+    };
+    // The standard reader would take a second sign.
+    digits.starts_with(|c: char| c.is_digit(radix)).then_some(())?;
+    u64::from_str_radix(digits, radix).ok()
+}
+
+/// Reads an integer with a sign, in base 8, 10 or 16 as its prefix says.
+pub(super) fn signed(text: &str) -> Option<i64> {
+    let magnitude = |digits| i64::try_from(unsigned(digits)?).ok();
+    match text.strip_prefix('-') {
+        Some(digits) if digits.starts_with('+') => None,
+        Some(digits) => magnitude(digits).map(|magnitude| -magnitude),
+        None => magnitude(text),
+    }
+}
+
+/// Reads a decimal integer.
+pub(super) fn decimal(text: &str) -> Option<u64> {
+    text.starts_with(|c: char| c.is_ascii_digit()).then_some(())?;
+    text.parse().ok()
+}

@@ -1,0 +1,303 @@
+//! From words to [`Netem`].
+//!
+//! An option may be shortened as `tc` lets one: the first option in the order of [`KEYWORDS`] that begins with the word is meant. Values that may be
+//! left out are taken if the next word begins with a digit (or, where an overhead may be negative, a minus).
+
+use alloc::string::ToString;
+use alloc::vec::Vec;
+use core::iter::Peekable;
+use core::num::NonZeroU32;
+use core::ops::Range;
+
+use super::number::{self, Bare, PERCENT, RATE, TIME};
+use super::{
+    CellSpec, ChanceSpec, Contradiction, DelaySpec, Distribution, FramingSpec, GemodelSpec, JitterSpec, LossSpec, Netem, NetemError, NetemErrorKind,
+    Percent, RateSpec, ReorderSpec, SlotGap, SlotSpec, StateSpec,
+};
+
+/// What an option is called in messages, which is its full name too.
+type Keyword = &'static str;
+
+/// The options in the order in which `tc` compares them, and what each is: `l` is `limit`, `d` is `delay`, `r` is `reorder`, `s` is `seed`.
+const KEYWORDS: [(&str, Keyword); 14] = [
+    ("limit", "limit"),
+    ("latency", "delay"),
+    ("delay", "delay"),
+    ("loss", "loss"),
+    ("drop", "loss"),
+    ("seed", "seed"),
+    ("ecn", "ecn"),
+    ("reorder", "reorder"),
+    ("corrupt", "corrupt"),
+    ("gap", "gap"),
+    ("duplicate", "duplicate"),
+    ("distribution", "distribution"),
+    ("rate", "rate"),
+    ("slot", "slot"),
+];
+
+const COUNT: &str = "a count of packets from 0 to 4294967295";
+const NAME: &str = "the name of a distribution: uniform, normal, pareto, paretonormal or that of a table";
+const SLOT: &str = "a time such as 800us, or distribution NAME DELAY JITTER";
+const SLOT_COUNT: &str = "a number from 1 to 2147483647";
+const GAP: &str = "a number of packets from 1 to 4294967295";
+const OVERHEAD: &str = "a number of bytes from -2147483648 to 2147483647";
+const CELL: &str = "a cell size from 1 to 4294967295 bytes";
+const SEED: &str = "a decimal number from 0 to 18446744073709551615";
+
+impl Netem {
+    /// Reads the options of a netem, in any order: what stands behind `netem` in a command for `tc`.
+    ///
+    /// Stricter than `tc`: nothing may be said twice, negative times, sizes and counts are refused, and so are zero where it would switch off what is
+    /// said (`gap 0`, a cell of 0, `rate 0`), rates below a byte per second, and chains whose ways out of a state sum to more than 1. More lenient:
+    /// `packets` and `bytes` of a slot may stand in either order, and `ns` is a unit of `delay` (as in iproute2 from 6.9 on; there a delay without
+    /// unit is nanoseconds, here it is microseconds as in 6.6).
+    ///
+    /// # Errors
+    ///
+    /// [`NetemError`], which points at the word to blame.
+    pub fn parse(input: &str) -> Result<Self, NetemError> {
+        let mut parser =
+            Parser { words: words(input).peekable(), last: 0..0, seen: Vec::new(), netem: Self::default(), distribution: None, gap: None };
+        while let Some(word) = parser.words.next() {
+            parser.option(word)?;
+        }
+        parser.finish()
+    }
+}
+
+/// A word and where it stands.
+struct Word<'a> {
+    text: &'a str,
+    span: Range<usize>,
+}
+
+fn words(input: &str) -> impl Iterator<Item = Word<'_>> {
+    let mut rest = 0;
+    core::iter::from_fn(move || {
+        let start = rest + input[rest..].find(|c: char| !c.is_whitespace())?;
+        let end = input[start..].find(char::is_whitespace).map_or(input.len(), |length| start + length);
+        rest = end;
+        Some(Word { text: &input[start..end], span: start..end })
+    })
+}
+
+/// A word to which a contradiction can point.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Option(Keyword),
+    Probability(usize),
+    SlotMax,
+    SlotJitter,
+}
+
+struct Parser<'a, W: Iterator<Item = Word<'a>>> {
+    words: Peekable<W>,
+    /// Where the word that was read last stands.
+    last: Range<usize>,
+    seen: Vec<(Place, Range<usize>)>,
+    netem: Netem,
+    distribution: Option<Distribution>,
+    gap: Option<NonZeroU32>,
+}
+
+impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
+    fn option(&mut self, word: Word<'a>) -> Result<(), NetemError> {
+        let Some(&(_, option)) = KEYWORDS.iter().find(|(name, _)| name.starts_with(word.text)) else {
+            return Err(NetemError { kind: NetemErrorKind::UnknownWord { word: word.text.to_string() }, span: word.span });
+        };
+        if self.seen.iter().any(|(place, _)| *place == Place::Option(option)) {
+            return Err(NetemError { kind: NetemErrorKind::Repeated { option }, span: word.span });
+        }
+        self.last = word.span;
+        self.mark(Place::Option(option));
+        match option {
+            "limit" => self.netem.limit = Some(self.value(option, COUNT, number::size)?),
+            "delay" => self.netem.delay = Some(self.delay()?),
+            "loss" => self.netem.loss = Some(self.loss()?),
+            "seed" => self.netem.seed = Some(self.value(option, SEED, number::decimal)?),
+            "ecn" => self.netem.ecn = true,
+            "reorder" => self.netem.reorder = Some(ReorderSpec { chance: self.chance(option)?, gap: None }),
+            "corrupt" => self.netem.corrupt = Some(self.chance(option)?),
+            "gap" => self.gap = Some(self.value(option, GAP, count)?),
+            "duplicate" => self.netem.duplicate = Some(self.chance(option)?),
+            "distribution" => self.distribution = Some(self.value(option, NAME, Distribution::named)?),
+            "rate" => self.netem.rate = Some(self.rate()?),
+            // What is left of the table.
+            _ => self.netem.slot = Some(self.slot()?),
+        }
+        Ok(())
+    }
+
+    /// Puts together what was said apart, and checks the whole.
+    fn finish(mut self) -> Result<Netem, NetemError> {
+        if let Some(distribution) = self.distribution.take() {
+            match self.netem.delay.as_mut().and_then(|delay| delay.jitter.as_mut()) {
+                Some(jitter) => jitter.distribution = Some(distribution),
+                None => return Err(self.blame(Contradiction::DistributionWithoutJitter)),
+            }
+        }
+        if let Some(gap) = self.gap {
+            match self.netem.reorder.as_mut() {
+                Some(reorder) => reorder.gap = Some(gap),
+                None => return Err(self.blame(Contradiction::GapWithoutReorder)),
+            }
+        }
+        self.netem.check().map_err(|contradiction| self.blame(contradiction))?;
+        Ok(self.netem)
+    }
+
+    fn delay(&mut self) -> Result<DelaySpec, NetemError> {
+        let time = |text: &str| number::time(text, Bare::Microseconds);
+        let mut delay = DelaySpec { time: self.value("delay", TIME, time)?, jitter: None };
+        if let Some(jitter) = self.optional("delay", TIME, time)? {
+            delay.jitter = Some(JitterSpec { time: jitter, correlation: self.optional("delay", PERCENT, number::percent)?, distribution: None });
+        }
+        Ok(delay)
+    }
+
+    fn chance(&mut self, option: Keyword) -> Result<ChanceSpec, NetemError> {
+        let percent = self.value(option, PERCENT, number::percent)?;
+        Ok(ChanceSpec { percent, correlation: self.optional(option, PERCENT, number::percent)? })
+    }
+
+    fn loss(&mut self) -> Result<LossSpec, NetemError> {
+        match self.words.peek().map(|word| word.text) {
+            Some("state") => {
+                self.skip();
+                let [p13, p31, p32, p23, p14] = self.probabilities::<5>()?;
+                Ok(LossSpec::State(StateSpec { p13: p13.unwrap_or_default(), p31, p32, p23, p14 }))
+            }
+            Some("gemodel") => {
+                self.skip();
+                let [p, r, loss_in_bad, loss_in_good] = self.probabilities::<4>()?;
+                Ok(LossSpec::Gemodel(GemodelSpec { p: p.unwrap_or_default(), r, loss_in_bad, loss_in_good }))
+            }
+            Some("random") => {
+                self.skip();
+                Ok(LossSpec::Random(self.chance("loss")?))
+            }
+            Some(_) | None => Ok(LossSpec::Random(self.chance("loss")?)),
+        }
+    }
+
+    /// The first is required, the others follow as long as there are numbers.
+    fn probabilities<const N: usize>(&mut self) -> Result<[Option<Percent>; N], NetemError> {
+        let mut said = [None; N];
+        said[0] = Some(self.value("loss", PERCENT, number::percent)?);
+        for (index, percent) in said.iter_mut().enumerate().skip(1) {
+            *percent = self.optional("loss", PERCENT, number::percent)?;
+            if percent.is_none() {
+                break;
+            }
+            self.mark(Place::Probability(index));
+        }
+        Ok(said)
+    }
+
+    fn rate(&mut self) -> Result<RateSpec, NetemError> {
+        let bytes_per_sec = self.value("rate", RATE, number::rate)?;
+        let overhead = |text: &str| i32::try_from(number::signed(text)?).ok();
+        let framing = match self.optional_signed("rate", OVERHEAD, overhead)? {
+            None => None,
+            Some(bytes) => {
+                // A minus here would be the overhead of a cell whose size was not said.
+                let cell = match self.optional_signed("rate", CELL, count)? {
+                    None => None,
+                    Some(size) => Some(CellSpec { size, overhead: self.optional_signed("rate", OVERHEAD, overhead)? }),
+                };
+                Some(FramingSpec { overhead: bytes, cell })
+            }
+        };
+        Ok(RateSpec { bytes_per_sec, framing })
+    }
+
+    fn slot(&mut self) -> Result<SlotSpec, NetemError> {
+        let time = |text: &str| number::time(text, Bare::Nanoseconds);
+        let gap = if self.words.peek().is_some_and(|word| word.text == "distribution") {
+            self.skip();
+            let distribution = self.value("slot", NAME, Distribution::named)?;
+            let delay = self.value("slot", TIME, time)?;
+            let jitter = self.value("slot", TIME, time)?;
+            self.mark(Place::SlotJitter);
+            SlotGap::Drawn { distribution, delay, jitter }
+        } else {
+            let min = self.value("slot", SLOT, time)?;
+            let max = self.optional("slot", TIME, time)?;
+            self.mark(Place::SlotMax);
+            SlotGap::Range { min, max }
+        };
+        let mut slot = SlotSpec { gap, packets: None, bytes: None };
+        while let Some(word) = self.words.peek() {
+            let budget = ["packets", "bytes"].into_iter().find(|name| name.starts_with(word.text));
+            let Some(option) = budget else { break };
+            let said = if option == "packets" { slot.packets } else { slot.bytes };
+            if said.is_some() {
+                return Err(NetemError { kind: NetemErrorKind::Repeated { option }, span: word.span.clone() });
+            }
+            self.skip();
+            let countable = |count: NonZeroU32| (count.get() <= i32::MAX.unsigned_abs()).then_some(count);
+            if option == "packets" {
+                slot.packets = Some(self.value("packets", SLOT_COUNT, |text| count(text).and_then(countable))?);
+            } else {
+                slot.bytes = Some(self.value("bytes", SLOT_COUNT, |text| number::size(text).and_then(NonZeroU32::new).and_then(countable))?);
+            }
+        }
+        Ok(slot)
+    }
+
+    /// The next word, which must be there and must be right.
+    fn value<V>(&mut self, option: Keyword, expected: &'static str, read: impl Fn(&str) -> Option<V>) -> Result<V, NetemError> {
+        let Some(word) = self.words.next() else {
+            return Err(NetemError { kind: NetemErrorKind::Missing { option, expected }, span: self.last.clone() });
+        };
+        self.last = word.span.clone();
+        read(word.text).ok_or_else(|| NetemError { kind: NetemErrorKind::Value { option, word: word.text.to_string(), expected }, span: word.span })
+    }
+
+    /// The next word if it begins with a digit; then it must be right.
+    fn optional<V>(&mut self, option: Keyword, expected: &'static str, read: impl Fn(&str) -> Option<V>) -> Result<Option<V>, NetemError> {
+        let follows = self.words.peek().is_some_and(|word| word.text.starts_with(|c: char| c.is_ascii_digit()));
+        if follows { self.value(option, expected, read).map(Some) } else { Ok(None) }
+    }
+
+    /// The next word if it begins with a digit or a minus; then it must be right.
+    fn optional_signed<V>(&mut self, option: Keyword, expected: &'static str, read: impl Fn(&str) -> Option<V>) -> Result<Option<V>, NetemError> {
+        let follows = self.words.peek().is_some_and(|word| word.text.starts_with(|c: char| c.is_ascii_digit() || c == '-'));
+        if follows { self.value(option, expected, read).map(Some) } else { Ok(None) }
+    }
+
+    fn skip(&mut self) {
+        if let Some(word) = self.words.next() {
+            self.last = word.span;
+        }
+    }
+
+    fn mark(&mut self, place: Place) {
+        self.seen.push((place, self.last.clone()));
+    }
+
+    /// The error that points at the last word of those that contradict each other.
+    fn blame(&self, contradiction: Contradiction) -> NetemError {
+        let places: &[Place] = match contradiction {
+            Contradiction::ReorderWithoutDelay => &[Place::Option("reorder")],
+            Contradiction::GapWithoutReorder => &[Place::Option("gap")],
+            Contradiction::EcnWithoutLoss => &[Place::Option("ecn")],
+            Contradiction::DistributionWithoutJitter => &[Place::Option("distribution")],
+            Contradiction::WaysOutOfState1 => &[Place::Probability(4)],
+            Contradiction::WaysOutOfState3 => &[Place::Probability(2)],
+            Contradiction::SlotRange => &[Place::SlotMax],
+            Contradiction::SlotWithoutJitter => &[Place::SlotJitter],
+            // Refused word by word, or impossible to say.
+            Contradiction::ProbabilitySkipped | Contradiction::SlotTooLarge | Contradiction::TimeTooLong => &[],
+        };
+        let at = self.seen.iter().find(|(place, _)| places.contains(place));
+        let span = at.map_or_else(|| self.last.clone(), |(_, span)| span.clone());
+        NetemError { kind: contradiction.into(), span }
+    }
+}
+
+/// A number above zero.
+fn count(text: &str) -> Option<NonZeroU32> {
+    NonZeroU32::new(u32::try_from(number::unsigned(text)?).ok()?)
+}

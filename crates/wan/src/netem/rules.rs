@@ -1,0 +1,141 @@
+//! Which options contradict each other.
+
+use core::time::Duration;
+
+use super::{DelaySpec, GemodelSpec, LossSpec, Netem, Percent, SlotGap, SlotSpec, StateSpec};
+
+/// Two options that cannot both be meant, or one that lacks another.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Contradiction {
+    /// There is nothing to overtake.
+    #[error("reorder sends packets before those that wait: expected a delay above zero beside it")]
+    ReorderWithoutDelay,
+    /// A gap says which packets may be reordered.
+    #[error("gap says which packets are reordered: expected reorder above 0 % beside it")]
+    GapWithoutReorder,
+    /// A mark stands for a loss.
+    #[error("ecn marks packets that would be lost: expected a loss above 0 % beside it")]
+    EcnWithoutLoss,
+    /// A distribution has something to distribute.
+    #[error("a distribution is that of the jitter: expected delay TIME JITTER, both above zero, beside it")]
+    DistributionWithoutJitter,
+    /// p13 + p14 is above 1.
+    #[error("p13 and p14 are the ways out of state 1: expected a sum of at most 100 %")]
+    WaysOutOfState1,
+    /// p31 + p32 is above 1.
+    #[error("p31 and p32 are the ways out of state 3: expected a sum of at most 100 %")]
+    WaysOutOfState3,
+    /// A model's probability was given without one that has to be said before it.
+    #[error("a loss model's probabilities can only be said in order: expected those before it too")]
+    ProbabilitySkipped,
+    /// The longest is shorter than the shortest.
+    #[error("the longest gap between slots is shorter than the shortest: expected at least the shortest")]
+    SlotRange,
+    /// A slot distribution without deviation.
+    #[error("a slot distribution without deviation: expected a jitter above zero")]
+    SlotWithoutJitter,
+    /// More than the kernel's signed 32 bits count.
+    #[error("expected at most 2147483647 packets and bytes in a slot")]
+    SlotTooLarge,
+    /// Longer than the kernel's 64 bits count.
+    #[error("expected times below 292 years")]
+    TimeTooLong,
+}
+
+/// The rounding of decimal percentages to binary must not make 100 % more than that.
+const SLACK: f64 = 1e-9;
+
+impl Netem {
+    /// Whether all options can be meant at once. What [`Netem::parse`] gives always can.
+    ///
+    /// # Errors
+    ///
+    /// The first [`Contradiction`] in the order of the fields.
+    pub fn check(&self) -> Result<(), Contradiction> {
+        self.delay.as_ref().map_or(Ok(()), check_delay)?;
+        match &self.loss {
+            None | Some(LossSpec::Random(_)) => {}
+            Some(LossSpec::State(state)) => check_state(state)?,
+            Some(LossSpec::Gemodel(model)) => check_gemodel(model)?,
+        }
+        if self.ecn && !self.can_lose() {
+            return Err(Contradiction::EcnWithoutLoss);
+        }
+        self.check_reorder()?;
+        self.slot.as_ref().map_or(Ok(()), check_slot)
+    }
+
+    /// As `tc` tells it: the chains count as a loss whatever their probabilities.
+    fn can_lose(&self) -> bool {
+        match &self.loss {
+            None => false,
+            Some(LossSpec::Random(chance)) => chance.percent.as_u32() > 0,
+            Some(LossSpec::State(_) | LossSpec::Gemodel(_)) => true,
+        }
+    }
+
+    fn check_reorder(&self) -> Result<(), Contradiction> {
+        let Some(reorder) = &self.reorder else { return Ok(()) };
+        let delayed = self.delay.as_ref().is_some_and(|delay| !delay.time.is_zero());
+        if reorder.chance.percent.as_u32() == 0 {
+            return if reorder.gap.is_some() { Err(Contradiction::GapWithoutReorder) } else { Ok(()) };
+        }
+        if delayed { Ok(()) } else { Err(Contradiction::ReorderWithoutDelay) }
+    }
+}
+
+fn check_time(time: Duration) -> Result<(), Contradiction> {
+    if i64::try_from(time.as_nanos()).is_ok() { Ok(()) } else { Err(Contradiction::TimeTooLong) }
+}
+
+fn check_delay(delay: &DelaySpec) -> Result<(), Contradiction> {
+    check_time(delay.time)?;
+    let Some(jitter) = &delay.jitter else { return Ok(()) };
+    check_time(jitter.time)?;
+    if jitter.distribution.is_some() && (delay.time.is_zero() || jitter.time.is_zero()) {
+        return Err(Contradiction::DistributionWithoutJitter);
+    }
+    Ok(())
+}
+
+fn check_state(state: &StateSpec) -> Result<(), Contradiction> {
+    check_order(&[state.p31, state.p32, state.p23, state.p14])?;
+    let [p13, p31, p32, _, p14] = state.probabilities();
+    if p13 + p14 > 1.0 + SLACK {
+        return Err(Contradiction::WaysOutOfState1);
+    }
+    if p31 + p32 > 1.0 + SLACK { Err(Contradiction::WaysOutOfState3) } else { Ok(()) }
+}
+
+fn check_gemodel(model: &GemodelSpec) -> Result<(), Contradiction> {
+    check_order(&[model.r, model.loss_in_bad, model.loss_in_good])
+}
+
+fn check_order(said: &[Option<Percent>]) -> Result<(), Contradiction> {
+    let in_order = said.windows(2).all(|pair| pair[0].is_some() || pair[1].is_none());
+    if in_order { Ok(()) } else { Err(Contradiction::ProbabilitySkipped) }
+}
+
+fn check_slot(slot: &SlotSpec) -> Result<(), Contradiction> {
+    match &slot.gap {
+        SlotGap::Range { min, max } => {
+            check_time(*min)?;
+            if let Some(max) = max {
+                check_time(*max)?;
+                if max < min {
+                    return Err(Contradiction::SlotRange);
+                }
+            }
+        }
+        SlotGap::Drawn { delay, jitter, .. } => {
+            check_time(*delay)?;
+            check_time(*jitter)?;
+            if jitter.is_zero() {
+                return Err(Contradiction::SlotWithoutJitter);
+            }
+        }
+    }
+    let countable = [slot.packets, slot.bytes].into_iter().flatten().all(|count| i32::try_from(count.get()).is_ok());
+    if countable { Ok(()) } else { Err(Contradiction::SlotTooLarge) }
+}

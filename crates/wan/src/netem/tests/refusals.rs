@@ -1,0 +1,147 @@
+//! What is refused, with the word that is to blame.
+
+use crate::netem::{Contradiction, DelaySpec, LossSpec, Netem, NetemErrorKind, Percent, StateSpec};
+
+/// Words, and the part of them to which the error must point.
+const REFUSED: &[(&str, &str)] = &[
+    ("foo", "foo"),
+    ("delay 1ms jitter 5", "jitter"),
+    ("delay 1ms 1ms 1% 3", "3"),
+    ("Delay 1ms", "Delay"),
+    ("delay", "delay"),
+    ("loss random", "random"),
+    ("slot distribution normal 1ms", "1ms"),
+    ("delay -5ms", "-5ms"),
+    ("delay ms", "ms"),
+    ("delay 1.5.2ms", "1.5.2ms"),
+    ("delay 5m", "5m"),
+    ("delay inf", "inf"),
+    ("delay 1e400s", "1e400s"),
+    ("delay 9223372036854775808ns", "9223372036854775808ns"),
+    ("delay 1ms 2parsecs", "2parsecs"),
+    ("delay 1ms .5ms", ".5ms"),
+    ("loss 101%", "101%"),
+    ("loss 100.5", "100.5"),
+    ("loss -1%", "-1%"),
+    ("loss 1%%", "1%%"),
+    ("loss 5% 150", "150"),
+    ("loss rand 5%", "rand"),
+    ("loss gemodel 1 150", "150"),
+    ("limit -1", "-1"),
+    ("limit 5000000000", "5000000000"),
+    ("limit 1t", "1t"),
+    ("rate 10%", "10%"),
+    ("rate 1k", "1k"),
+    ("rate 0", "0"),
+    ("rate 7", "7"),
+    ("rate -1", "-1"),
+    ("rate 1e30", "1e30"),
+    ("rate 1mbit 1.5", "1.5"),
+    ("rate 1mbit -14 -5", "-5"),
+    ("rate 1mbit 0 0", "0"),
+    ("rate 1mbit 2147483648", "2147483648"),
+    ("rate 1mbit --1", "--1"),
+    ("rate 1mbit -+1", "-+1"),
+    ("rate 1mbit 0 08", "08"),
+    ("gap 0", "0"),
+    ("seed -1", "-1"),
+    ("seed 0x10", "0x10"),
+    ("seed 18446744073709551616", "18446744073709551616"),
+    ("slot 5 -5", "-5"),
+    ("slot packets 5", "packets"),
+    ("slot 1us packets -1", "-1"),
+    ("slot 1us packets 0", "0"),
+    ("slot 1us bytes 3000000000", "3000000000"),
+    ("slot 1us packets 5 packets 6", "packets"),
+    // Said twice.
+    ("delay 1ms loss 1% delay 2ms", "delay"),
+    ("loss 1% drop 2%", "drop"),
+    // Contradictions.
+    ("loss 1% reorder 25%", "reorder"),
+    ("reorder 25% delay 0ms", "reorder"),
+    ("gap 5 delay 1ms", "gap"),
+    ("reorder 0% delay 1ms gap 5", "gap"),
+    ("ecn", "ecn"),
+    ("ecn loss 0%", "ecn"),
+    ("delay 1ms distribution normal", "distribution"),
+    ("distribution normal", "distribution"),
+    ("distribution normal delay 1ms 0", "distribution"),
+    ("distribution normal delay 0 1ms", "distribution"),
+    ("loss state 60% 10% 10% 10% 50%", "50%"),
+    ("loss state 10% 60% 50%", "50%"),
+    ("slot 100us 50us", "50us"),
+    ("slot 1us 5", "5"),
+    ("slot distribution normal 1ms 0", "0"),
+];
+
+#[test]
+fn every_error_points_at_the_word_to_blame() {
+    for (words, blamed) in REFUSED {
+        let error = Netem::parse(words).expect_err(words);
+        assert_eq!(&words[error.span.clone()], *blamed, "{words}: {error}");
+        // The last of several equal words is the one that was read when it went wrong, but for those said twice first.
+        let excerpt = error.excerpt(words);
+        let (line, marks) = excerpt.split_once('\n').unwrap();
+        assert_eq!(line, *words);
+        let (indent, carets) = (marks.find('^').unwrap(), marks.matches('^').count());
+        assert_eq!((indent, carets), (error.span.start, blamed.len()), "{excerpt}");
+        assert!(marks.contains("expected "), "{excerpt}");
+        assert!(error.to_string().contains("expected "), "{error}");
+    }
+}
+
+#[test]
+fn what_is_said_twice_is_blamed_the_second_time() {
+    let words = "delay 1ms loss 1% delay 2ms";
+    assert_eq!(Netem::parse(words).unwrap_err().span, 18..23);
+}
+
+#[test]
+fn an_excerpt_shows_the_line_of_the_word() {
+    let words = "delay 24ms\n\tloss µ5%\r\nlimit 5";
+    let error = Netem::parse(words).unwrap_err();
+    assert_eq!(error.excerpt(words), "\tloss µ5%\n\t     ^^^ expected a percentage from 0 to 100");
+    assert_eq!(error.to_string(), "\"µ5%\" is not what loss takes here: expected a percentage from 0 to 100");
+    let missing = Netem::parse("delay 1ms rate").unwrap_err();
+    assert!(missing.excerpt("delay 1ms rate").starts_with("delay 1ms rate\n          ^^^^ expected a rate of at least 8bit"));
+}
+
+#[test]
+fn an_excerpt_of_another_text_does_not_panic() {
+    let error = Netem::parse("delay 24ms loss µ5%").unwrap_err();
+    for other in ["", "µ", "µµµµµµµµµµµµµµ", "\n\n", "delay 24ms loss \n5%"] {
+        assert!(error.excerpt(other).contains('^'));
+    }
+}
+
+/// Some shares sum to 1 only up to rounding.
+#[test]
+fn ways_out_of_a_state_may_sum_to_all() {
+    for tenth in 0..=1000 {
+        let words = format!(
+            "loss state {}% {}% {}% 50% {}%",
+            f64::from(tenth) / 10.0,
+            f64::from(tenth) / 10.0,
+            f64::from(1000 - tenth) / 10.0,
+            f64::from(1000 - tenth) / 10.0
+        );
+        assert!(Netem::parse(&words).is_ok(), "{words}");
+    }
+}
+
+#[test]
+fn what_cannot_be_said_is_found_in_values_made_by_hand() {
+    let percent = Percent::new(1.0);
+    let skipped = StateSpec { p13: Percent::ZERO, p31: None, p32: percent, p23: None, p14: None };
+    let netem = Netem { loss: Some(LossSpec::State(skipped)), ..Netem::default() };
+    assert_eq!(netem.check(), Err(Contradiction::ProbabilitySkipped));
+    let netem = Netem { delay: Some(DelaySpec { time: core::time::Duration::MAX, jitter: None }), ..Netem::default() };
+    assert_eq!(netem.check(), Err(Contradiction::TimeTooLong));
+}
+
+#[test]
+fn an_unknown_word_says_what_is_known() {
+    let error = Netem::parse("help").unwrap_err();
+    assert!(matches!(&error.kind, NetemErrorKind::UnknownWord { word } if word == "help"));
+    assert!(error.to_string().contains("expected limit, delay"));
+}

@@ -1,0 +1,164 @@
+//! Printing and reading are inverse, and reading never panics.
+
+use core::num::{NonZeroU32, NonZeroU64};
+use core::time::Duration;
+
+use proptest::option::of;
+use proptest::prelude::*;
+
+use crate::netem::{
+    CellSpec, ChanceSpec, DelaySpec, Distribution, FramingSpec, GemodelSpec, JitterSpec, LossSpec, Netem, Percent, RateSpec, ReorderSpec, SlotGap,
+    SlotSpec, StateSpec,
+};
+
+fn percent() -> impl Strategy<Value = Percent> {
+    let round = (0..=1000_u32).prop_map(|tenths| f64::from(tenths) / 10.0);
+    prop_oneof![round, 0.0..=100.0, 0.0..=1e-12].prop_map(|value| Percent::new(value).unwrap())
+}
+
+fn chance() -> impl Strategy<Value = ChanceSpec> {
+    (percent(), of(percent())).prop_map(|(percent, correlation)| ChanceSpec { percent, correlation })
+}
+
+/// Above zero; every number of digits is as likely.
+fn time() -> impl Strategy<Value = Duration> {
+    (1..=63_u32, any::<u64>()).prop_map(|(bits, word)| Duration::from_nanos((word >> (64 - bits)).max(1)))
+}
+
+fn distribution() -> impl Strategy<Value = Distribution> {
+    let name = prop_oneof![Just("uniform"), Just("normal"), Just("pareto"), Just("paretonormal")].prop_map(str::to_owned);
+    prop_oneof![name, "[!-~]{1,12}"].prop_map(|name| Distribution::named(&name).unwrap())
+}
+
+fn delay() -> impl Strategy<Value = DelaySpec> {
+    let jitter = (time(), of(percent()), of(distribution()));
+    let jitter = jitter.prop_map(|(time, correlation, distribution)| JitterSpec { time, correlation, distribution });
+    (time(), of(jitter)).prop_map(|(time, jitter)| DelaySpec { time, jitter })
+}
+
+/// The first `count` of them.
+fn said<const N: usize>() -> impl Strategy<Value = [Option<Percent>; N]> {
+    (prop::collection::vec(percent(), N), 0..=N).prop_map(|(all, count)| core::array::from_fn(|index| (index < count).then_some(all[index])))
+}
+
+fn loss() -> impl Strategy<Value = LossSpec> {
+    let half = |percent: Percent| Percent::new(percent.get() / 2.0).unwrap();
+    let state = (percent(), said::<4>()).prop_map(move |(p13, [p31, p32, p23, p14])| {
+        LossSpec::State(StateSpec { p13: half(p13), p31: p31.map(half), p32: p32.map(half), p23, p14: p14.map(half) })
+    });
+    let gemodel =
+        (percent(), said::<3>()).prop_map(|(p, [r, loss_in_bad, loss_in_good])| LossSpec::Gemodel(GemodelSpec { p, r, loss_in_bad, loss_in_good }));
+    prop_oneof![chance().prop_map(LossSpec::Random), state, gemodel]
+}
+
+fn rate() -> impl Strategy<Value = RateSpec> {
+    let bytes = (1..=64_u32, any::<u64>()).prop_map(|(bits, word)| NonZeroU64::new((word >> (64 - bits)).max(1)).unwrap());
+    let cell = (1..=u32::MAX, of(any::<i32>())).prop_map(|(size, overhead)| CellSpec { size: NonZeroU32::new(size).unwrap(), overhead });
+    let framing = (any::<i32>(), of(cell)).prop_map(|(overhead, cell)| FramingSpec { overhead, cell });
+    (bytes, of(framing)).prop_map(|(bytes_per_sec, framing)| RateSpec { bytes_per_sec, framing })
+}
+
+fn slot() -> impl Strategy<Value = SlotSpec> {
+    let range = (time(), of(time())).prop_map(|(a, b)| match b {
+        None => SlotGap::Range { min: a, max: None },
+        Some(b) => SlotGap::Range { min: a.min(b), max: Some(a.max(b)) },
+    });
+    let drawn = (distribution(), time(), time()).prop_map(|(distribution, delay, jitter)| SlotGap::Drawn { distribution, delay, jitter });
+    let count = || of((1..=i32::MAX).prop_map(|count| NonZeroU32::new(count.unsigned_abs()).unwrap()));
+    (prop_oneof![range, drawn], count(), count()).prop_map(|(gap, packets, bytes)| SlotSpec { gap, packets, bytes })
+}
+
+pub(in crate::netem) fn netem() -> impl Strategy<Value = Netem> {
+    let reorder = (chance(), of((1..=u32::MAX).prop_map(|gap| NonZeroU32::new(gap).unwrap()))).prop_map(|(chance, gap)| ReorderSpec { chance, gap });
+    let head = (of(any::<u32>()), of(delay()), of(loss()), any::<bool>());
+    let tail = (of(chance()), of(chance()), of(reorder), of(rate()), of(slot()), of(any::<u64>()));
+    (head, tail)
+        .prop_map(|((limit, delay, loss, ecn), (corrupt, duplicate, reorder, rate, slot, seed))| Netem {
+            limit,
+            delay,
+            loss,
+            ecn,
+            corrupt,
+            duplicate,
+            reorder,
+            rate,
+            slot,
+            seed,
+        })
+        .prop_map(|mut netem| {
+            // What would contradict goes.
+            netem.ecn = netem.ecn && Netem { reorder: None, ..netem.clone() }.check().is_ok();
+            if netem.check().is_err() {
+                netem.reorder = None;
+            }
+            netem
+        })
+}
+
+/// Words that are likely to mean something, in an order that is not.
+fn salad() -> impl Strategy<Value = String> {
+    let word = prop_oneof![
+        prop::sample::select(vec![
+            "limit",
+            "delay",
+            "latency",
+            "loss",
+            "drop",
+            "random",
+            "state",
+            "gemodel",
+            "ecn",
+            "corrupt",
+            "duplicate",
+            "reorder",
+            "gap",
+            "distribution",
+            "normal",
+            "rate",
+            "slot",
+            "packets",
+            "bytes",
+            "seed",
+            "0",
+            "1",
+            "5%",
+            "10ms",
+            "1mbit",
+            "-14",
+            "0x10",
+            "1e3",
+            "1e",
+            "1e+",
+            ".",
+            "-",
+            "+",
+            "0x",
+        ])
+        .prop_map(str::to_owned),
+        "\\PC{0,8}",
+        "[0-9.eE+-]{1,8}[a-zA-Z%]{0,3}",
+    ];
+    prop::collection::vec(word, 0..12).prop_map(|words| words.join(" "))
+}
+
+proptest! {
+    #[test]
+    fn what_is_printed_reads_back_to_the_same(netem in netem()) {
+        prop_assert_eq!(netem.check(), Ok(()));
+        let words = netem.to_string();
+        let read = Netem::parse(&words).map_err(|error| TestCaseError::fail(error.excerpt(&words)))?;
+        prop_assert_eq!(&read, &netem);
+        prop_assert_eq!(read.to_string(), words);
+    }
+
+    #[test]
+    fn no_text_makes_it_panic(text in prop_oneof![salad(), "\\PC{0,40}", any::<String>()]) {
+        match Netem::parse(&text) {
+            Ok(netem) => prop_assert_eq!(Netem::parse(&netem.to_string()), Ok(netem)),
+            Err(error) => {
+                prop_assert!(text.get(error.span.clone()).is_some_and(|word| !word.is_empty()), "{:?} in {:?}", error.span, text);
+                prop_assert!(error.excerpt(&text).contains('^'));
+            }
+        }
+    }
+}
