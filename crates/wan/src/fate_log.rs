@@ -16,6 +16,7 @@
 mod error;
 mod text;
 
+use alloc::string::String;
 use alloc::vec::Vec;
 
 pub use error::FateLogError;
@@ -59,7 +60,7 @@ impl FateLog {
 
     /// The text of the whole log.
     #[must_use]
-    pub fn to_text(&self) -> alloc::string::String {
+    pub fn to_text(&self) -> String {
         use core::fmt::Write as _;
         let mut text = alloc::format!("{}\n", FateRow::HEADER);
         for &record in &self.records {

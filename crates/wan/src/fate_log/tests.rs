@@ -2,7 +2,6 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::DropCause;
-use alloc::string::String;
 use cohaptic_units::{Bytes, Instant};
 
 const HEADER: &str = "sequence,copy,offered_ns,size,at_ns,fate,marked,damaged";
@@ -100,7 +99,7 @@ fn packet(sequence: u64, offered: u64, size: u64, ends: &[(u64, u8, bool, bool)]
     };
     let mut rows: Vec<_> = (1..ends.len()).map(|_| row(0, at(0), Fate::Duplicated, false, false)).collect();
     for (copy, &(span, what, marked, damaged)) in (0..).zip(ends) {
-        let fate = DropCause::ALL.get(usize::from(what)).map_or(Fate::Delivered(at(span)), |&cause| Fate::Dropped(cause));
+        let fate = DropCause::ALL.get(usize::from(what)).map_or_else(|| Fate::Delivered(at(span)), |&cause| Fate::Dropped(cause));
         rows.push(row(copy, at(span), fate, marked, damaged));
     }
     rows
