@@ -5,6 +5,7 @@
 //! | [`fates`] | the fate log as a file: a streaming writer and a reader |
 //! | [`pcapng`] | the fates as a capture file that packet analysers open |
 //! | [`achieved`] | figures of a link's delays, losses and order, each with its uncertainty, to be set beside what was asked for |
+//! | [`fit`](mod@fit) | an estimate of a link from measured one-way delays and losses, with its goodness |
 //!
 //! It knows packets ([`PacketRecord`]) and nothing of what they carry. Figures are computed with the
 //! platform's mathematics, so that their last digits may differ between platforms; what a link does never does.
@@ -30,6 +31,7 @@
 
 pub mod achieved;
 pub mod fates;
+pub mod fit;
 pub mod pcapng;
 mod series;
 #[cfg(test)]
