@@ -28,6 +28,12 @@ impl DropCause {
         }
     }
 
+    /// The cause of that name; `None` if there is none.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|cause| cause.name() == name)
+    }
+
     pub(crate) const fn index(self) -> usize {
         match self {
             Self::Outage => 0,
@@ -45,15 +51,42 @@ pub enum Fate {
     Delivered(Instant),
     /// It did not, for this reason.
     Dropped(DropCause),
+    /// A copy of it was made. This is not its end: the packet and its copy each go on to one of the others.
+    Duplicated,
 }
 
 impl Fate {
-    /// The name in records: `delivered`, or that of the cause.
+    /// The name in records: `delivered`, `duplicated`, or that of the cause.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Delivered(_) => "delivered",
             Self::Dropped(cause) => cause.name(),
+            Self::Duplicated => "duplicated",
+        }
+    }
+
+    /// Whether the packet is out of the link with this: delivered or dropped.
+    #[must_use]
+    pub const fn is_end(self) -> bool {
+        match self {
+            Self::Delivered(_) | Self::Dropped(_) => true,
+            Self::Duplicated => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cause_is_found_by_its_name_and_no_other_text_is() {
+        for cause in DropCause::ALL {
+            assert_eq!(DropCause::from_name(cause.name()), Some(cause));
+        }
+        for name in ["", "delivered", "duplicated", "Loss", "loss "] {
+            assert_eq!(DropCause::from_name(name), None);
         }
     }
 }

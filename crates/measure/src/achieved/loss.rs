@@ -1,0 +1,121 @@
+//! Figures of losses.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::accumulator::Outcome;
+use super::delay::LAGS;
+use crate::series::{self, count_u64};
+
+/// Figures of which packets arrived, in the order of sending.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct LossFigures {
+    /// Packets of which a copy arrived.
+    pub received: u64,
+    /// Packets of which no copy arrived.
+    pub lost: u64,
+    /// The share of packets lost; `None` if none has ended.
+    #[serde(rename = "loss", skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// Wilson's interval for it at confidence 0.95, for independent losses. Bursts make it too narrow: compare [`LossFigures::standard_error`].
+    #[serde(rename = "loss_interval_95", skip_serializing_if = "Option::is_none")]
+    pub interval_95: Option<[f64; 2]>,
+    /// The standard error of the share by 30 batch means, which takes bursts into account. `None` of fewer than 300 packets.
+    #[serde(rename = "loss_se", skip_serializing_if = "Option::is_none")]
+    pub standard_error: Option<f64>,
+    /// The mean number of packets lost one after another.
+    #[serde(rename = "loss_run_mean", skip_serializing_if = "Option::is_none")]
+    pub run_mean: Option<f64>,
+    /// The standard error of that mean, sd/√(number of runs): runs of a Markov chain are independent.
+    #[serde(rename = "loss_run_mean_se", skip_serializing_if = "Option::is_none")]
+    pub run_mean_se: Option<f64>,
+    /// How many runs of each length. Runs at the ends of the measurement are cut off by it and counted as they are.
+    #[serde(rename = "loss_runs")]
+    pub runs: BTreeMap<u64, u64>,
+    /// The mean number of packets received between two losses that are not adjacent, and at the ends.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gap_mean: Option<f64>,
+    /// The standard error of that mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gap_mean_se: Option<f64>,
+    /// How many gaps of each length.
+    pub gaps: BTreeMap<u64, u64>,
+    /// The autocorrelation of the loss indicator (1 lost, 0 received) at lags of 1 to 10 packets. Empty if nothing or everything was lost.
+    #[serde(rename = "loss_autocorrelation")]
+    pub autocorrelation: Vec<f64>,
+}
+
+impl LossFigures {
+    pub(super) fn of(outcomes: &[Outcome]) -> Self {
+        let by_packet: Vec<Option<f64>> = outcomes.iter().map(|outcome| outcome.lost().map(|lost| f64::from(u8::from(lost)))).collect();
+        let indicator: Vec<f64> = by_packet.iter().filter_map(|lost| *lost).collect();
+        let [gaps, runs] = runs(outcomes.iter().filter_map(|outcome| outcome.lost()));
+        let packets = |runs: &BTreeMap<u64, u64>| runs.iter().map(|(length, times)| length * times).sum::<u64>();
+        let (received, lost) = (packets(&gaps), packets(&runs));
+        let ended = received + lost;
+        Self {
+            received,
+            lost,
+            value: (ended > 0).then(|| count_u64(lost) / count_u64(ended)),
+            interval_95: series::wilson(lost, ended),
+            standard_error: series::batch_standard_error(&indicator),
+            run_mean: mean_of_lengths(&runs),
+            run_mean_se: standard_error_of_lengths(&runs),
+            gap_mean: mean_of_lengths(&gaps),
+            gap_mean_se: standard_error_of_lengths(&gaps),
+            runs,
+            gaps,
+            autocorrelation: series::autocorrelation(&by_packet, LAGS),
+        }
+    }
+}
+
+impl Outcome {
+    pub(super) const fn delay(self) -> Option<u64> {
+        match self {
+            Self::Received(nanos) => Some(nanos),
+            Self::Lost | Self::OnTheWay => None,
+        }
+    }
+
+    const fn lost(self) -> Option<bool> {
+        match self {
+            Self::Received(_) => Some(false),
+            Self::Lost => Some(true),
+            Self::OnTheWay => None,
+        }
+    }
+}
+
+/// How many runs of each length, of received and of lost packets.
+fn runs(lost: impl Iterator<Item = bool>) -> [BTreeMap<u64, u64>; 2] {
+    let mut runs = [BTreeMap::new(), BTreeMap::new()];
+    let mut current: Option<(bool, u64)> = None;
+    // One step beyond the end closes the last run.
+    for lost in lost.map(Some).chain([None]) {
+        match (current, lost) {
+            (Some((kind, length)), Some(lost)) if kind == lost => current = Some((kind, length + 1)),
+            (before, next) => {
+                if let Some((kind, length)) = before {
+                    *runs[usize::from(kind)].entry(length).or_default() += 1;
+                }
+                current = next.map(|lost| (lost, 1));
+            }
+        }
+    }
+    runs
+}
+
+fn mean_of_lengths(runs: &BTreeMap<u64, u64>) -> Option<f64> {
+    let times: u64 = runs.values().sum();
+    (times > 0).then(|| runs.iter().map(|(length, times)| count_u64(length * times)).sum::<f64>() / count_u64(times))
+}
+
+fn standard_error_of_lengths(runs: &BTreeMap<u64, u64>) -> Option<f64> {
+    let mean = mean_of_lengths(runs)?;
+    let times: u64 = runs.values().sum();
+    let squares: f64 = runs.iter().map(|(&length, &times)| count_u64(times) * (count_u64(length) - mean).powi(2)).sum();
+    (times > 1).then(|| (squares / count_u64(times - 1) / count_u64(times)).sqrt())
+}

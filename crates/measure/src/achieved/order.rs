@@ -1,0 +1,120 @@
+//! The order of arrivals (RFC 4737).
+
+use serde::Serialize;
+
+use crate::series::{count_u64, wilson};
+
+/// Figures of the order in which packets arrived; extra copies are passed over.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct OrderFigures {
+    /// The share of packets received that are reordered: their number is below `NextExp`, the greatest number that has arrived plus one (RFC 4737,
+    /// section 3.3). `None` if nothing arrived.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reordered: Option<f64>,
+    /// Wilson's interval for it at confidence 0.95, for independent packets, which reordering seldom leaves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reordered_interval_95: Option<[f64; 2]>,
+    /// The mean extent of the reordered packets \[arrivals\]: i − j for the i-th arrival, where j is the first arrival of a packet sent later (RFC 4737,
+    /// section 4.2.2).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reordering_extent_mean: Option<f64>,
+    /// The greatest extent \[arrivals\]: a buffer of so many packets restores the order.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reordering_extent_max: Option<u64>,
+}
+
+/// Follows arrivals.
+#[derive(Clone, Debug, Default)]
+pub(super) struct OrderOfArrival {
+    received: u64,
+    next_expected: u64,
+    reordered: u64,
+    extent_sum: u64,
+    extent_max: u64,
+    /// The arrivals (place, number) that exceeded all numbers before, but only those that left numbers out or came after a reordered one: in between,
+    /// both go up by one, and no packet that arrives later can have a number of theirs. Both components increase.
+    records: Vec<(u64, u64)>,
+}
+
+impl OrderOfArrival {
+    /// The first copy of a packet arrives.
+    pub(super) fn arrives(&mut self, sequence: u64) {
+        let place = self.received;
+        self.received += 1;
+        if sequence >= self.next_expected {
+            let follows = sequence == self.next_expected && self.records.last().is_some_and(|(at, number)| place - at == sequence - number);
+            if !follows {
+                self.records.push((place, sequence));
+            }
+            self.next_expected = sequence.saturating_add(1);
+            return;
+        }
+        // The first of the records that is greater: it is the first arrival of all that is.
+        let first_later = self.records.partition_point(|&(_, number)| number < sequence);
+        let extent = self.records.get(first_later).map_or(0, |(at, _)| place - at);
+        self.reordered += 1;
+        self.extent_sum += extent;
+        self.extent_max = self.extent_max.max(extent);
+    }
+
+    pub(super) fn figures(&self) -> OrderFigures {
+        OrderFigures {
+            reordered: (self.received > 0).then(|| count_u64(self.reordered) / count_u64(self.received)),
+            reordered_interval_95: wilson(self.reordered, self.received),
+            reordering_extent_mean: (self.reordered > 0).then(|| count_u64(self.extent_sum) / count_u64(self.reordered)),
+            reordering_extent_max: (self.reordered > 0).then_some(self.extent_max),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn figures(arrivals: &[u64]) -> OrderFigures {
+        let mut order = OrderOfArrival::default();
+        arrivals.iter().for_each(|&sequence| order.arrives(sequence));
+        order.figures()
+    }
+
+    /// Straight from the RFC: i − j with the least j < i of which s\[j\] > s\[i\].
+    fn extents(arrivals: &[u64]) -> Vec<u64> {
+        let extent = |i: usize| arrivals[..i].iter().position(|&earlier| earlier > arrivals[i]).map(|j| (i - j) as u64);
+        (0..arrivals.len()).filter_map(extent).collect()
+    }
+
+    #[test]
+    fn the_examples_of_the_rfc() {
+        // RFC 4737, section 4.2.3 and 7: packet 4 arrives after 5 and 6; extent 2 (numbers here from 0).
+        let late_by_two = figures(&[0, 1, 2, 4, 5, 3, 6, 7, 8, 9]);
+        assert_eq!((late_by_two.reordered, late_by_two.reordering_extent_max), (Some(0.1), Some(2)));
+        // Section 7.2: 7, 8, 9, 10 arrive before 4, 5, 6: three reordered packets with extents 4, 5, 6.
+        let early = figures(&[0, 1, 2, 3, 7, 8, 9, 10, 4, 5, 6, 11]);
+        assert_eq!((early.reordered, early.reordering_extent_mean, early.reordering_extent_max), (Some(0.25), Some(5.0), Some(6)));
+        // Losses are no reordering.
+        assert_eq!(figures(&[0, 2, 5, 6]).reordered, Some(0.0));
+        assert_eq!(figures(&[]).reordered, None);
+    }
+
+    proptest! {
+        #[test]
+        fn extents_are_those_of_the_definition(numbers in prop::collection::btree_set(0..200_u64, 0..60), swaps in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 0..40)) {
+            let mut arrivals: Vec<u64> = numbers.into_iter().collect();
+            for (one, other) in swaps {
+                if !arrivals.is_empty() {
+                    let (one, other) = (one.index(arrivals.len()), other.index(arrivals.len()));
+                    arrivals.swap(one, other);
+                }
+            }
+            let expected = extents(&arrivals);
+            let found = figures(&arrivals);
+            prop_assert_eq!(found.reordering_extent_max, expected.iter().copied().max());
+            prop_assert_eq!(found.reordered, (!arrivals.is_empty()).then(|| expected.len() as f64 / arrivals.len() as f64));
+            let mean = (!expected.is_empty()).then(|| expected.iter().sum::<u64>() as f64 / expected.len() as f64);
+            prop_assert_eq!(found.reordering_extent_mean, mean);
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! The fate log as a file: what became of every packet, in a form that [`FateLog`] reads back exactly and a link can replay.
+//!
+//! The columns are those of [`FateRow`]. The writer holds nothing in memory; the reader holds the log.
+
+use std::io::{self, Read, Write};
+
+use cohaptic_wan::{FateLog, FateLogError, FateRow, PacketRecord};
+
+/// Writes a fate log row by row, in the order of the calls.
+///
+/// Rows are written one by one: give it a [`std::io::BufWriter`]. Call [`FateWriter::finish`] to hear of errors of the last rows.
+#[derive(Debug)]
+pub struct FateWriter<W> {
+    to: W,
+}
+
+impl<W: Write> FateWriter<W> {
+    /// Begins a log: writes the header.
+    ///
+    /// # Errors
+    ///
+    /// Those of the writer.
+    pub fn new(mut to: W) -> io::Result<Self> {
+        writeln!(to, "{}", FateRow::HEADER)?;
+        Ok(Self { to })
+    }
+
+    /// Writes one row.
+    ///
+    /// # Errors
+    ///
+    /// Those of the writer.
+    pub fn write(&mut self, record: &PacketRecord) -> io::Result<()> {
+        writeln!(self.to, "{}", FateRow(*record))
+    }
+
+    /// Ends the log: flushes the writer and gives it back.
+    ///
+    /// # Errors
+    ///
+    /// Those of the writer.
+    pub fn finish(mut self) -> io::Result<W> {
+        self.to.flush()?;
+        Ok(self.to)
+    }
+}
+
+/// Why a file is not read as a fate log.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The file cannot be read, or is not UTF-8.
+    #[error("cannot be read: {0}")]
+    Io(#[from] io::Error),
+    /// It is no complete fate log.
+    #[error(transparent)]
+    Log(#[from] FateLogError),
+}
+
+/// Reads a fate log.
+///
+/// # Errors
+///
+/// [`ReadError`] if the file cannot be read, is not UTF-8, or is no complete fate log; the error names line, column and what was expected.
+pub fn read(mut from: impl Read) -> Result<FateLog, ReadError> {
+    let mut text = String::new();
+    from.read_to_string(&mut text)?;
+    Ok(FateLog::parse(&text)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_units::{Bytes, Instant};
+    use cohaptic_wan::{DropCause, Fate};
+
+    use super::*;
+
+    #[test]
+    fn what_was_written_is_read_back_whatever_the_order() {
+        let record = |sequence, at, fate| PacketRecord {
+            sequence,
+            copy: 0,
+            offered: Instant::from_nanos(sequence),
+            at: Instant::from_nanos(at),
+            size: Bytes::new(1_000),
+            fate,
+            marked: sequence == 1,
+            damaged: sequence == 0,
+        };
+        let rows = [record(1, 5, Fate::Dropped(DropCause::QueueFull)), record(0, 9, Fate::Delivered(Instant::from_nanos(9)))];
+        let mut writer = FateWriter::new(Vec::new()).unwrap();
+        for row in &rows {
+            writer.write(row).unwrap();
+        }
+        let file = writer.finish().unwrap();
+        assert_eq!(read(file.as_slice()).unwrap().records(), [rows[1], rows[0]]);
+    }
+
+    #[test]
+    fn a_file_that_is_no_text_is_refused() {
+        assert!(matches!(read([0xff, 0xfe, 0x00].as_slice()), Err(ReadError::Io(_))));
+        assert_eq!(read(b"x".as_slice()).unwrap_err().to_string(), FateLog::parse("x").unwrap_err().to_string());
+    }
+}

@@ -1,0 +1,140 @@
+//! The link that was estimated, and the same as the text of a scene.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use cohaptic_units::print::Span;
+use serde::Serialize;
+
+use super::law::DelayLaw;
+use super::loss::LossModel;
+
+/// A link as it can be written into a scene.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct FittedLink {
+    /// The mean one-way delay \[s\].
+    pub delay_s: f64,
+    /// The jitter around it.
+    pub jitter: FittedJitter,
+    /// Which packets are lost.
+    pub loss: LossModel,
+}
+
+/// Jitter as it can be written into a scene.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct FittedJitter {
+    /// The standard deviation \[s\].
+    pub sd_s: f64,
+    /// The law.
+    pub distribution: DelayLaw,
+    /// The least delay, from which the lognormal, gamma and Weibull laws begin \[s\]; `None`: zero, or the law has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub floor_s: Option<f64>,
+    /// The correlation of the delays of two packets in a row, by their normal scores; where packets are evenly spaced.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correlation: Option<f64>,
+    /// The time after which it has fallen to 1/e \[s\]; where packets are not evenly spaced.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correlation_time_s: Option<f64>,
+}
+
+impl FittedLink {
+    /// The `[link]` table of a scene, with a line break at the end. Durations are rounded to nanoseconds, other numbers to six digits.
+    #[must_use]
+    pub fn to_scene_toml(&self) -> String {
+        let mut text = format!("[link]\ndelay = \"{}\"\n", duration(self.delay_s));
+        let jitter = &self.jitter;
+        let mut keys = format!("sd = \"{}\", distribution = \"{}\"", duration(jitter.sd_s), jitter.distribution.name());
+        let floor = jitter.floor_s.map(|floor| format!(", floor = \"{}\"", duration(floor)));
+        let correlation = jitter.correlation.map(|correlation| format!(", correlation = {}", number(correlation)));
+        let time = jitter.correlation_time_s.map(|time| format!(", correlation-time = \"{}\"", duration(time)));
+        keys.extend([floor, correlation, time].into_iter().flatten());
+        // Writing to a `String` cannot fail.
+        let _ = writeln!(text, "jitter = {{ {keys} }}");
+        let loss = match self.loss {
+            LossModel::None => None,
+            LossModel::Independent { probability } => Some(number(probability)),
+            LossModel::GilbertElliott { p, r, h, k } => {
+                // Zero and one are what a scene assumes.
+                let h = if h > 0.0 { format!(", h = {}", number(h)) } else { String::new() };
+                let k = if k < 1.0 { format!(", k = {}", number(k)) } else { String::new() };
+                Some(format!("{{ gilbert-elliott = {{ p = {}, r = {}{h}{k} }} }}", number(p), number(r)))
+            }
+            LossModel::GilbertElliottInTime { mean_good_s, mean_bad_s } => {
+                Some(format!("{{ gilbert-elliott = {{ mean-good = \"{}\", mean-bad = \"{}\" }} }}", duration(mean_good_s), duration(mean_bad_s)))
+            }
+        };
+        if let Some(loss) = loss {
+            let _ = writeln!(text, "loss = {loss}");
+        }
+        text
+    }
+}
+
+/// Rounded to nanoseconds; what cannot be counted is as long as can be.
+fn duration(seconds: f64) -> Span {
+    let nanos = Duration::try_from_secs_f64(seconds.max(0.0)).unwrap_or(Duration::from_nanos(i64::MAX.unsigned_abs()));
+    Span(nanos.min(Duration::from_nanos(i64::MAX.unsigned_abs())))
+}
+
+/// Six digits, as a TOML float.
+fn number(value: f64) -> String {
+    let rounded = format!("{value:.5e}").parse().unwrap_or(value);
+    format!("{rounded:?}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LINK: FittedLink = FittedLink {
+        delay_s: 0.024,
+        jitter: FittedJitter { sd_s: 0.002, distribution: DelayLaw::Gamma, floor_s: Some(0.02), correlation: Some(0.9), correlation_time_s: None },
+        loss: LossModel::GilbertElliott { p: 0.01, r: 1.0 / 3.0, h: 0.0, k: 1.0 },
+    };
+
+    #[test]
+    fn a_link_reads_as_a_scene() {
+        assert_eq!(
+            LINK.to_scene_toml(),
+            "[link]\n\
+             delay = \"24ms\"\n\
+             jitter = { sd = \"2ms\", distribution = \"gamma\", floor = \"20ms\", correlation = 0.9 }\n\
+             loss = { gilbert-elliott = { p = 0.01, r = 0.333333 } }\n"
+        );
+    }
+
+    #[test]
+    fn every_text_is_toml_with_values_that_scenes_read() {
+        let models = [
+            LossModel::None,
+            LossModel::Independent { probability: 1e-7 },
+            LossModel::GilbertElliott { p: 1.234_567_89e-5, r: 1.0, h: 0.25, k: 0.999 },
+            LossModel::GilbertElliottInTime { mean_good_s: 12.5, mean_bad_s: 1e300 },
+        ];
+        for loss in models {
+            let jitter = FittedJitter { correlation: None, correlation_time_s: Some(1.0 / 3.0), floor_s: None, ..LINK.jitter };
+            let text = FittedLink { loss, jitter, ..LINK }.to_scene_toml();
+            let table: toml::Table = text.parse().unwrap();
+            let link = table["link"].as_table().unwrap();
+            let span = |value: &toml::Value| cohaptic_units::parse::duration(value.as_str().unwrap()).unwrap().as_secs_f64();
+            assert_eq!(span(&link["jitter"]["correlation-time"]), 0.333_333_333);
+            match loss {
+                LossModel::None => assert!(!link.contains_key("loss")),
+                LossModel::Independent { probability } => assert_eq!(link["loss"].as_float(), Some(probability)),
+                LossModel::GilbertElliott { r, h, k, .. } => {
+                    let chain = &link["loss"]["gilbert-elliott"];
+                    assert_eq!(chain["p"].as_float(), Some(1.234_57e-5));
+                    assert_eq!(["r", "h", "k"].map(|key| chain[key].as_float().unwrap()), [r, h, k]);
+                }
+                LossModel::GilbertElliottInTime { mean_good_s, .. } => {
+                    let chain = &link["loss"]["gilbert-elliott"];
+                    assert_eq!(span(&chain["mean-good"]), mean_good_s);
+                    assert!(span(&chain["mean-bad"]) > 9e9);
+                }
+            }
+        }
+    }
+}

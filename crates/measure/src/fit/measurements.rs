@@ -1,0 +1,98 @@
+//! One-way measurements, checked once.
+
+use super::skew::Skew;
+
+/// One packet: when it was sent, and how long it took.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Measurement {
+    /// When it was sent, from any origin \[s\].
+    pub sent_s: f64,
+    /// Its one-way delay \[s\]; `None`: it was lost. Negative if the two clocks are offset, see [`Measurements::shifted`].
+    pub delay_s: Option<f64>,
+}
+
+/// Packets in the order of sending, all numbers finite.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Measurements(Vec<Measurement>);
+
+/// Why measurements are refused. Packets are counted from 1.
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeasurementsError {
+    /// A time or delay is NaN or infinite.
+    #[error("packet {packet}: found {value}, expected a finite time and a finite delay (a lost packet has none)")]
+    NotFinite {
+        /// Which packet.
+        packet: usize,
+        /// The number.
+        value: f64,
+    },
+    /// A packet was sent before the one before it.
+    #[error("packet {packet} was sent at {sent_s} s, the one before it at {before_s} s: expected packets in the order of sending")]
+    TimeGoesBack {
+        /// Which packet.
+        packet: usize,
+        /// When it was sent \[s\].
+        sent_s: f64,
+        /// When the one before it was \[s\].
+        before_s: f64,
+    },
+}
+
+impl Measurements {
+    /// Checks that all numbers are finite and that packets stand in the order of sending; equal instants are allowed.
+    ///
+    /// # Errors
+    ///
+    /// [`MeasurementsError`] with the packet that is wrong.
+    pub fn new(packets: Vec<Measurement>) -> Result<Self, MeasurementsError> {
+        let mut before_s = f64::NEG_INFINITY;
+        for (packet, &Measurement { sent_s, delay_s }) in (1..).zip(&packets) {
+            if let Some(value) = [Some(sent_s), delay_s].into_iter().flatten().find(|value| !value.is_finite()) {
+                return Err(MeasurementsError::NotFinite { packet, value });
+            }
+            if sent_s < before_s {
+                return Err(MeasurementsError::TimeGoesBack { packet, sent_s, before_s });
+            }
+            before_s = sent_s;
+        }
+        Ok(Self(packets))
+    }
+
+    /// The packets, in the order of sending.
+    #[must_use]
+    pub fn packets(&self) -> &[Measurement] {
+        &self.0
+    }
+
+    /// The packets that arrived: (sending, delay) \[s\].
+    pub(super) fn arrivals(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.0.iter().filter_map(|packet| Some((packet.sent_s, packet.delay_s?)))
+    }
+
+    /// The same with every delay longer by `by_s` \[s\], for two clocks whose offset is known or assumed. From one-way measurements alone the offset
+    /// cannot be told from the delay.
+    ///
+    /// # Errors
+    ///
+    /// [`MeasurementsError::NotFinite`] if a sum is not finite.
+    pub fn shifted(&self, by_s: f64) -> Result<Self, MeasurementsError> {
+        Self::new(self.0.iter().map(|packet| Measurement { delay_s: packet.delay_s.map(|delay| delay + by_s), ..*packet }).collect())
+    }
+
+    /// The same without the linear drift of one clock against the other, and that drift. The delay of the first packet stays as it is. `None` if fewer
+    /// than two instants of sending arrived.
+    ///
+    /// See [`Skew`] for the method, and for what it takes for drift.
+    #[must_use]
+    pub fn without_skew(&self) -> Option<(Self, Skew)> {
+        let arrivals: Vec<(f64, f64)> = self.arrivals().collect();
+        let skew = Skew::of(&arrivals)?;
+        let origin = self.0.first()?.sent_s;
+        let corrected = |packet: &Measurement| Measurement {
+            delay_s: packet.delay_s.map(|delay| delay - skew.seconds_per_second * (packet.sent_s - origin)),
+            ..*packet
+        };
+        Some((Self(self.0.iter().map(corrected).collect()), skew))
+    }
+}

@@ -1,0 +1,113 @@
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::test_rng::TestRng;
+
+/// A link with a gamma law through a Gaussian copula of correlation time τ, and Gilbert–Elliott losses, made without the emulator.
+fn measured(seed: u64, n: usize, gap: impl Fn(&mut TestRng) -> f64) -> Measurements {
+    let mut rng = TestRng::new(seed);
+    let (mut sent_s, mut z): (f64, f64) = (0.0, StandardNormal.sample(&mut rng));
+    let mut bad = false;
+    let packets = (0..n)
+        .map(|_| {
+            let gap = gap(&mut rng);
+            sent_s += gap;
+            let (phi, noise): (f64, f64) = ((-gap / 0.05).exp(), StandardNormal.sample(&mut rng));
+            z = phi * z + (1.0 - phi * phi).sqrt() * noise;
+            bad ^= rng.unit() < if bad { 0.3 } else { 0.02 };
+            Measurement { sent_s, delay_s: (!bad).then(|| 0.02 + gamma_of_shape_2(z) * 0.002) }
+        })
+        .collect();
+    Measurements::new(packets).unwrap()
+}
+
+/// The number of the gamma law of shape 2 and scale 1 at the place of a standard normal number: 1 − (1 + x)e^{−x} = Φ(z), by bisection.
+fn gamma_of_shape_2(z: f64) -> f64 {
+    let above = law::normal_below(-z);
+    search::crossing(0.0, 60.0, |x| above - (1.0 + x) * (-x).exp())
+}
+
+#[test]
+fn a_link_is_found_from_its_measurements() {
+    let fitted = fit(&measured(1, 40_000, |_| 0.008)).unwrap();
+    let Fitted { link, goodness } = &fitted;
+    assert!(goodness.evenly_spaced && goodness.packets == 40_000);
+    assert_eq!(link.jitter.distribution, DelayLaw::Gamma, "{goodness:#?}");
+    // Mean 24 ms, deviation 2.83 ms, 37 500 arrivals, φ = 0.852: as many as 3 000 independent ones. Five standard errors of mean, and of deviation with
+    // kurtosis 6.
+    assert!((link.delay_s - 0.024).abs() < 5.0 * 0.00283 / 3_000_f64.sqrt(), "{link:?}");
+    assert!((link.jitter.sd_s - 0.002_828).abs() < 5.0 * 0.00283 * (5.0 / 4.0 / 3_000_f64).sqrt(), "{link:?}");
+    // F(x) = x²/2 near zero, in units of 2 ms; the least of 3 000.
+    assert!((link.jitter.floor_s.unwrap() - 0.02).abs() < 0.002 * (2.0 * 7.0 / 3_000_f64).sqrt(), "{link:?}");
+    let correlation = goodness.correlation.unwrap();
+    assert!((link.jitter.correlation.unwrap() - (-0.008_f64 / 0.05).exp()).abs() < 4.0 * correlation.lag_one_se.unwrap(), "{link:?}");
+    let LossModel::GilbertElliott { p, r, .. } = link.loss else { panic!("{link:?}") };
+    let [se_p, se_r] = goodness.losses[0].standard_errors.unwrap();
+    assert!((p - 0.02).abs() < 4.0 * se_p && (r - 0.3).abs() < 4.0 * se_r, "{link:?}");
+    assert!(goodness.least_s >= 0.02 && goodness.floor_robson_whitlock_s <= goodness.least_s);
+
+    let json = serde_json::to_value(&fitted).unwrap();
+    assert_eq!(json["link"]["jitter"]["distribution"], "gamma");
+    assert!(json["link"]["loss"]["gilbert-elliott"]["p"].is_f64());
+    assert_eq!(json["goodness"]["laws"][0]["distribution"], "gamma");
+    assert!(json["link"]["jitter"].get("correlation_time_s").is_none());
+    let scene = link.to_scene_toml();
+    assert!(scene.contains("distribution = \"gamma\", floor = \"") && scene.contains("correlation = 0.8") && scene.contains("gilbert-elliott"));
+}
+
+#[test]
+fn uneven_gaps_give_figures_in_time() {
+    // Gaps of 1 to 15 ms.
+    let fitted = fit(&measured(2, 40_000, |rng| 0.001 + 0.014 * rng.unit())).unwrap();
+    assert!(!fitted.goodness.evenly_spaced);
+    let correlation = fitted.goodness.correlation.unwrap();
+    assert_eq!((fitted.link.jitter.correlation, fitted.link.jitter.correlation_time_s), (None, Some(correlation.time_s)));
+    assert!((correlation.time_s - 0.05).abs() < 4.0 * correlation.time_se_s.unwrap(), "{correlation:?}");
+    assert!(matches!(fitted.link.loss, LossModel::GilbertElliottInTime { .. }));
+    assert!(fitted.link.to_scene_toml().contains("correlation-time = \""));
+}
+
+#[test]
+fn drift_between_clocks_can_be_removed_first() {
+    let clean = measured(3, 20_000, |_| 0.008);
+    // 160 s at 100 ppm: 16 ms.
+    let drifted = Measurements::new(
+        clean.packets().iter().map(|packet| Measurement { delay_s: packet.delay_s.map(|delay| delay + 1e-4 * packet.sent_s), ..*packet }).collect(),
+    )
+    .unwrap();
+    let (corrected, skew) = drifted.without_skew().unwrap();
+    // The lower ends of the two halves are known to F⁻¹(7/n) of 800 effective delays, 0.26 ms, 80 s apart.
+    assert!((skew.seconds_per_second - 1e-4).abs() < 0.000_26 / 80.0, "{skew:?}");
+    let [before, after] = [&drifted, &corrected].map(|measurements| fit(measurements).unwrap().link.jitter.sd_s);
+    assert!(before > 0.005 && (after - 0.002_83).abs() < 0.000_6, "{before} {after}");
+    assert_eq!(corrected.packets()[0], drifted.packets()[0]);
+}
+
+#[test]
+fn what_cannot_be_estimated_says_why() {
+    let of = |delays: &dyn Fn(usize) -> Option<f64>, n: usize| {
+        fit(&Measurements::new((0..n).map(|i| Measurement { sent_s: i as f64 * 0.001, delay_s: delays(i) }).collect()).unwrap())
+    };
+    assert_eq!(of(&|_| None, 100).unwrap_err().to_string(), "none of 100 packets arrived: expected at least 50 delays");
+    assert_eq!(of(&|_| None, 0).unwrap_err(), FitError::NothingArrived { packets: 0 });
+    assert_eq!(of(&|i| Some(i as f64), 49).unwrap_err().to_string(), "only 49 packets arrived: expected at least 50 delays");
+    assert_eq!(of(&|_| Some(0.024), 60).unwrap_err(), FitError::ConstantDelay { received: 60, delay_s: 0.024 });
+    assert!(matches!(of(&|i| Some(0.01 - i as f64 * 0.001), 60).unwrap_err(), FitError::NegativeDelay { .. }));
+    let one_instant = Measurements::new((0..60).map(|i| Measurement { sent_s: 1.0, delay_s: Some(f64::from(i)) }).collect()).unwrap();
+    assert_eq!(fit(&one_instant).unwrap_err(), FitError::OneInstant { sent_s: 1.0 });
+
+    let packet = |sent_s, delay_s| Measurement { sent_s, delay_s };
+    let refused = |packets: &[Measurement]| Measurements::new(packets.to_vec()).unwrap_err();
+    assert!(matches!(refused(&[packet(0.0, Some(f64::NAN))]), MeasurementsError::NotFinite { packet: 1, .. }));
+    assert!(matches!(refused(&[packet(f64::INFINITY, None)]), MeasurementsError::NotFinite { packet: 1, .. }));
+    assert!(matches!(refused(&[packet(1.0, None), packet(0.5, None)]), MeasurementsError::TimeGoesBack { packet: 2, .. }));
+}
+
+#[test]
+fn a_known_offset_can_be_added() {
+    let early =
+        Measurements::new((0..60).map(|i| Measurement { sent_s: f64::from(i), delay_s: Some(-1.0 + 1e-3 * f64::from(i % 7)) }).collect()).unwrap();
+    assert!(matches!(fit(&early), Err(FitError::NegativeDelay { .. })));
+    assert!((fit(&early.shifted(1.02).unwrap()).unwrap().goodness.least_s - 0.02).abs() < 1e-12);
+    assert!(early.shifted(f64::NAN).is_err());
+}

@@ -1,0 +1,64 @@
+//! A UDP datagram in IPv4 around a payload (RFC 791, RFC 768).
+
+const IP_HEADER: usize = 20;
+const UDP_HEADER: usize = 8;
+/// What the 16 bits of the IP length leave.
+const LONGEST_PAYLOAD: usize = 65_535 - IP_HEADER - UDP_HEADER;
+
+const SOURCE: [u8; 4] = [192, 0, 2, 1];
+const DESTINATION: [u8; 4] = [192, 0, 2, 2];
+const SOURCE_PORT: u16 = 49_152;
+const DESTINATION_PORT: u16 = 49_153;
+const UDP: u8 = 17;
+/// RFC 3168: congestion experienced.
+const CONGESTION_EXPERIENCED: u8 = 0b11;
+
+/// A datagram, or its beginning.
+pub(super) struct Datagram {
+    pub(super) captured: Vec<u8>,
+    /// Its length when it was sent \[byte\].
+    pub(super) length: usize,
+}
+
+pub(super) fn build(sequence: u64, marked: bool, payload: &[u8], size: usize) -> Datagram {
+    let payload_length = size.max(payload.len()).min(LONGEST_PAYLOAD);
+    let payload = &payload[..payload.len().min(LONGEST_PAYLOAD)];
+    let [ip_length, udp_length] = [IP_HEADER + UDP_HEADER + payload_length, UDP_HEADER + payload_length].map(sixteen_bits);
+
+    let mut ip = [0; IP_HEADER];
+    ip[0] = 0x45; // version 4, five words of header
+    ip[1] = if marked { CONGESTION_EXPERIENCED } else { 0 };
+    ip[2..4].copy_from_slice(&ip_length);
+    ip[4..6].copy_from_slice(&sequence.to_be_bytes()[6..]);
+    ip[8] = 64; // hops left
+    ip[9] = UDP;
+    ip[12..16].copy_from_slice(&SOURCE);
+    ip[16..20].copy_from_slice(&DESTINATION);
+    let checksum = !sum(0, &ip);
+    ip[10..12].copy_from_slice(&checksum.to_be_bytes());
+
+    let mut udp = [0; UDP_HEADER];
+    udp[0..2].copy_from_slice(&SOURCE_PORT.to_be_bytes());
+    udp[2..4].copy_from_slice(&DESTINATION_PORT.to_be_bytes());
+    udp[4..6].copy_from_slice(&udp_length);
+    if payload.len() == payload_length {
+        let pseudo_header = [&SOURCE[..], &DESTINATION, &[0, UDP], &udp_length].concat();
+        let checksum = !sum(sum(sum(0, &pseudo_header), &udp), payload);
+        // Zero means "none"; the other zero of ones' complement stands for it.
+        udp[6..8].copy_from_slice(&if checksum == 0 { u16::MAX } else { checksum }.to_be_bytes());
+    }
+    Datagram { captured: [&ip[..], &udp, payload].concat(), length: IP_HEADER + UDP_HEADER + payload_length }
+}
+
+fn sixteen_bits(length: usize) -> [u8; 2] {
+    u16::try_from(length).expect("the payload is cut").to_be_bytes()
+}
+
+/// The ones' complement sum of 16-bit words (RFC 1071); an odd byte is padded with zero.
+fn sum(start: u16, bytes: &[u8]) -> u16 {
+    bytes.chunks(2).fold(start, |sum, pair| {
+        let word = u16::from_be_bytes([pair[0], pair.get(1).copied().unwrap_or(0)]);
+        let (sum, carry) = sum.overflowing_add(word);
+        sum + u16::from(carry)
+    })
+}

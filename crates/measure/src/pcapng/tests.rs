@@ -1,0 +1,148 @@
+use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::DropCause;
+use pcap_parser::traits::PcapNGPacketBlock;
+use pcap_parser::{Block, PcapNGSlice};
+use proptest::prelude::*;
+
+use super::*;
+
+fn record(sequence: u64, at: u64, size: u64, fate: Fate) -> PacketRecord {
+    let (offered, at) = (Instant::from_nanos(sequence * 1_000), Instant::from_nanos(at));
+    PacketRecord { sequence, copy: 0, offered, at, size: Bytes::new(size), fate, marked: false, damaged: false }
+}
+
+fn delivered(sequence: u64, at: u64, size: u64) -> PacketRecord {
+    record(sequence, at, size, Fate::Delivered(Instant::from_nanos(at)))
+}
+
+fn capture(frames: &[(PacketRecord, &[u8])]) -> Vec<u8> {
+    let mut writer = CaptureWriter::new(Vec::new(), "left->right").unwrap();
+    for (record, payload) in frames {
+        writer.write(record, payload).unwrap();
+    }
+    writer.finish().unwrap()
+}
+
+#[derive(Clone, PartialEq, Eq, Debug)]
+struct Frame {
+    nanos: u64,
+    original: usize,
+    data: Vec<u8>,
+    comment: String,
+}
+
+/// As an independent library reads it.
+fn frames_by_library(file: &[u8]) -> Vec<Frame> {
+    let mut frames = Vec::new();
+    for block in PcapNGSlice::from_slice(file).unwrap() {
+        let block = block.unwrap();
+        let pcap_parser::PcapBlockOwned::NG(block) = block else { panic!("another format") };
+        if let Block::EnhancedPacket(packet) = &block {
+            frames.push(Frame {
+                nanos: u64::from(packet.ts_high) << 32 | u64::from(packet.ts_low),
+                original: usize::try_from(packet.orig_len()).unwrap(),
+                data: packet.packet_data().to_vec(),
+                comment: packet.options[0].as_str().unwrap().to_string(),
+            });
+        } else if let Block::InterfaceDescription(interface) = &block {
+            assert_eq!(interface.linktype.0, 101);
+            assert_eq!(interface.ts_resolution(), Some(1_000_000_000));
+            assert_eq!(interface.if_name().unwrap().unwrap(), "left->right");
+        } else if let Block::SectionHeader(header) = &block {
+            assert_eq!((header.major_version, header.minor_version, header.section_len), (1, 0, -1));
+        } else {
+            panic!("not one of the three kinds");
+        }
+    }
+    frames
+}
+
+/// As the specification says, by hand: block by block, every length twice.
+fn frames_by_hand(mut file: &[u8]) -> Vec<Frame> {
+    let word = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    let mut frames = Vec::new();
+    while !file.is_empty() {
+        let length = word(file, 4) as usize;
+        assert_eq!(length % 4, 0);
+        let (block, rest) = file.split_at(length);
+        assert_eq!(word(block, length - 4) as usize, length);
+        if word(block, 0) == 6 {
+            let captured = word(block, 20) as usize;
+            let option = 28 + captured.next_multiple_of(4);
+            let comment_length = usize::from(u16::from_le_bytes(block[option + 2..option + 4].try_into().unwrap()));
+            assert_eq!(&block[option..option + 2], [1, 0]);
+            assert_eq!(word(block, length - 8), 0, "the end of the options");
+            frames.push(Frame {
+                nanos: u64::from(word(block, 12)) << 32 | u64::from(word(block, 16)),
+                original: word(block, 24) as usize,
+                data: block[28..28 + captured].to_vec(),
+                comment: String::from_utf8(block[option + 4..option + 4 + comment_length].to_vec()).unwrap(),
+            });
+        }
+        file = rest;
+    }
+    frames
+}
+
+/// The sum of the 16-bit words of ones' complement, done in 64 bits and folded at the end.
+fn ones_complement(bytes: &[u8]) -> u64 {
+    let mut sum: u64 = bytes.chunks(2).map(|pair| u64::from(pair[0]) << 8 | u64::from(pair.get(1).copied().unwrap_or(0))).sum();
+    while sum > 0xffff {
+        sum = (sum & 0xffff) + (sum >> 16);
+    }
+    sum
+}
+
+#[test]
+fn the_fate_stands_in_the_comment() {
+    let copy = PacketRecord { copy: 1, marked: true, ..delivered(2, 24_102_000, 3) };
+    let damaged = PacketRecord { damaged: true, ..delivered(70_000, u64::MAX, 3) };
+    let file = capture(&[
+        (record(0, 5, 3, Fate::Dropped(DropCause::QueueFull)), b"abc"),
+        (record(2, 2_000, 3, Fate::Duplicated), b"abc"),
+        (copy, b"abc"),
+        (damaged, b"abd"),
+    ]);
+    let frames = frames_by_library(&file);
+    assert_eq!(frames, frames_by_hand(&file));
+    let comments: Vec<&str> = frames.iter().map(|frame| frame.comment.as_str()).collect();
+    assert_eq!(comments[..3], ["packet 0 dropped: queue-full", "packet 2 duplicated", "packet 2 delivered after 24.1ms, copy 1, marked"]);
+    assert!(comments[3].starts_with("packet 70000 delivered after") && comments[3].ends_with(", damaged"));
+    assert_eq!(frames.iter().map(|frame| frame.nanos).collect::<Vec<_>>(), [5, 2_000, 24_102_000, u64::MAX]);
+    assert_eq!((frames[1].data[1], frames[2].data[1]), (0, 3), "congestion experienced");
+    assert_eq!(frames[3].data[4..6], 4_464_u16.to_be_bytes(), "70 000 modulo 65 536");
+}
+
+#[test]
+fn a_payload_that_is_not_known_is_cut_off_and_has_no_checksum() {
+    let frames = frames_by_hand(&capture(&[(delivered(0, 1, 64), b""), (delivered(1, 2, u64::MAX), b"ab")]));
+    assert_eq!((frames[0].original, frames[0].data.len()), (92, 28));
+    assert_eq!(frames[0].data[2..4], 92_u16.to_be_bytes());
+    assert_eq!(frames[0].data[26..28], [0, 0]);
+    assert_eq!((frames[1].original, frames[1].data.len()), (65_535, 30));
+}
+
+#[test]
+fn a_name_of_any_length_fits() {
+    let file = CaptureWriter::new(Vec::new(), &"ä".repeat(40_000)).unwrap().finish().unwrap();
+    assert_eq!(PcapNGSlice::from_slice(&file).unwrap().count(), 2);
+}
+
+proptest! {
+    #[test]
+    fn headers_and_checksums_are_right(sequence in 0..1_000_000_u64, later in any::<u32>(), payload in prop::collection::vec(any::<u8>(), 0..200), marked: bool) {
+        let row = PacketRecord { marked, ..delivered(sequence, sequence * 1_000 + u64::from(later), payload.len() as u64) };
+        let file = capture(&[(row, &payload)]);
+        let frames = frames_by_library(&file);
+        prop_assert_eq!(&frames, &frames_by_hand(&file));
+        let data = &frames[0].data;
+        prop_assert_eq!(&data[28..], &payload[..]);
+        prop_assert_eq!(frames[0].original, data.len());
+        // A header with its checksum sums to all ones (RFC 1071).
+        prop_assert_eq!(ones_complement(&data[..20]), 0xffff);
+        let pseudo = [&data[12..20], &[0, 17], &data[24..26], &data[20..]].concat();
+        prop_assert_eq!(ones_complement(&pseudo), 0xffff);
+        prop_assert_ne!(&data[26..28], &[0, 0]);
+        prop_assert_eq!(usize::from(u16::from_be_bytes([data[24], data[25]])), payload.len() + 8);
+    }
+}

@@ -1,0 +1,107 @@
+//! The rows of a fate log as text.
+
+use alloc::string::ToString;
+use alloc::vec::Vec;
+use core::fmt;
+use core::str::FromStr;
+
+use cohaptic_units::{Bytes, Instant};
+
+use super::{FateLogError, Numbered};
+use crate::{DropCause, Fate, PacketRecord};
+
+/// A record as a line of a fate log, without the newline: `2,0,2000000,64,27000000,delivered,1,0`.
+///
+/// The column `at_ns` is [`PacketRecord::at`]. A reader takes it for the instant of [`Fate::Delivered`] too, which it is.
+#[derive(Clone, Copy, Debug)]
+pub struct FateRow(pub PacketRecord);
+
+impl FateRow {
+    /// The first line of a fate log.
+    pub const HEADER: &'static str = "sequence,copy,offered_ns,size,at_ns,fate,marked,damaged";
+    pub(super) const COLUMNS: [&'static str; 8] = ["sequence", "copy", "offered_ns", "size", "at_ns", "fate", "marked", "damaged"];
+}
+
+impl fmt::Display for FateRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let PacketRecord { sequence, copy, offered, at, size, fate, marked, damaged } = self.0;
+        let (offered, at, size, fate) = (offered.as_nanos(), at.as_nanos(), size.get(), fate.name());
+        write!(f, "{sequence},{copy},{offered},{size},{at},{fate},{},{}", u8::from(marked), u8::from(damaged))
+    }
+}
+
+/// Reads every row, and the line it stands on.
+pub(super) fn rows(text: &str) -> Result<Vec<Numbered>, FateLogError> {
+    // A byte order mark is what some spreadsheets begin a file with.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut lines = text.lines();
+    let header = lines.next().unwrap_or_default();
+    if header != FateRow::HEADER {
+        return Err(FateLogError::Header { found: header.to_string() });
+    }
+    (2..).zip(lines).map(|(line, row)| Ok((line, record(line, row)?))).collect()
+}
+
+fn record(line: u64, row: &str) -> Result<PacketRecord, FateLogError> {
+    let mut cells = [""; FateRow::COLUMNS.len()];
+    let found = row.split(',').count();
+    if found != cells.len() {
+        return Err(FateLogError::Cells { line, found });
+    }
+    for (cell, text) in cells.iter_mut().zip(row.split(',')) {
+        *cell = text;
+    }
+    let row = Row { line, cells };
+    let at = Instant::from_nanos(row.number(4)?);
+    Ok(PacketRecord {
+        sequence: row.number(0)?,
+        copy: row.read(1, "a number from 0 to 255")?,
+        offered: Instant::from_nanos(row.number(2)?),
+        at,
+        size: Bytes::new(row.number(3)?),
+        fate: row.fate(5, at)?,
+        marked: row.flag(6)?,
+        damaged: row.flag(7)?,
+    })
+}
+
+struct Row<'a> {
+    line: u64,
+    cells: [&'a str; FateRow::COLUMNS.len()],
+}
+
+impl Row<'_> {
+    fn number(&self, column: usize) -> Result<u64, FateLogError> {
+        self.read(column, "a whole number from 0 to 2^64 - 1")
+    }
+
+    fn read<T: FromStr>(&self, column: usize, expected: &'static str) -> Result<T, FateLogError> {
+        let text = self.cells[column];
+        // Rust reads "+1" too, which no writer of this format writes.
+        let plain = text.bytes().all(|byte| byte.is_ascii_digit());
+        text.parse().ok().filter(|_| plain).ok_or_else(|| self.refused(column, expected))
+    }
+
+    fn flag(&self, column: usize) -> Result<bool, FateLogError> {
+        match self.cells[column] {
+            "0" => Ok(false),
+            "1" => Ok(true),
+            _ => Err(self.refused(column, "0 or 1")),
+        }
+    }
+
+    fn fate(&self, column: usize, at: Instant) -> Result<Fate, FateLogError> {
+        let name = self.cells[column];
+        if let Some(cause) = DropCause::from_name(name) {
+            return Ok(Fate::Dropped(cause));
+        }
+        [Fate::Delivered(at), Fate::Duplicated]
+            .into_iter()
+            .find(|fate| fate.name() == name)
+            .ok_or_else(|| FateLogError::UnknownFate { line: self.line, found: name.to_string() })
+    }
+
+    fn refused(&self, column: usize, expected: &'static str) -> FateLogError {
+        FateLogError::Cell { line: self.line, column: FateRow::COLUMNS[column], found: self.cells[column].to_string(), expected }
+    }
+}
