@@ -41,6 +41,7 @@ mod delay;
 mod event_queue;
 mod fate;
 mod gilbert_elliott;
+pub mod law;
 mod link;
 mod loss;
 mod network;

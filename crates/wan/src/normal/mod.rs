@@ -15,7 +15,15 @@ use tables::{F, R, X};
 pub fn standard_normal(stream: Stream, packet: u64) -> f64 {
     let word = stream.first_word(packet);
     let (layer, size) = point(word);
-    if size < X[layer + 1] { signed(word, size) } else { outside_the_core(stream.at(packet)) }
+    if size < X[layer + 1] { signed(word, size) } else { outside_the_core_of_draws(stream.at(packet)) }
+}
+
+/// A standard normal number from a uniform word, and from `more` words if that is not enough. Of the words of a packet's draws it makes that packet's
+/// [`standard_normal`].
+#[inline]
+pub(crate) fn normal_from_words(word: u64, more: impl FnMut() -> u64) -> f64 {
+    let (layer, size) = point(word);
+    if size < X[layer + 1] { signed(word, size) } else { outside_the_core(word, more) }
 }
 
 /// The layer, and how far to the right in it. They and the sign are different bits of the word.
@@ -30,31 +38,36 @@ fn signed(word: u64, size: f64) -> f64 {
     if word & 0x100 == 0 { size } else { -size }
 }
 
-/// The first point lies in a wedge or in the tail: begins again with it, and goes on with more draws until one lies under the density.
 #[cold]
-fn outside_the_core(mut draws: Draws) -> f64 {
+fn outside_the_core_of_draws(mut draws: Draws) -> f64 {
+    outside_the_core(draws.next_word(), || draws.next_word())
+}
+
+/// The first point lies in a wedge or in the tail: begins again with it, and goes on with more words until one lies under the density.
+#[cold]
+fn outside_the_core(mut word: u64, mut more: impl FnMut() -> u64) -> f64 {
     loop {
-        let word = draws.next_word();
         let (layer, size) = point(word);
         if size < X[layer + 1] {
             return signed(word, size);
         }
         if layer == 0 {
-            return signed(word, tail(&mut draws));
+            return signed(word, tail(&mut more));
         }
-        let height = F[layer] + (F[layer + 1] - F[layer]) * draws.next_unit();
+        let height = F[layer] + (F[layer + 1] - F[layer]) * unit(more());
         if height < libm::exp(-0.5 * size * size) {
             return signed(word, size);
         }
+        word = more();
     }
 }
 
 /// A draw from the tail beyond R, by Marsaglia (1964).
-fn tail(draws: &mut Draws) -> f64 {
+fn tail(more: &mut impl FnMut() -> u64) -> f64 {
     loop {
         // 1 − u lies in (0, 1]: its logarithm is finite.
-        let beyond = -libm::log(1.0 - draws.next_unit()) / R;
-        let height = -libm::log(1.0 - draws.next_unit());
+        let beyond = -libm::log(1.0 - unit(more())) / R;
+        let height = -libm::log(1.0 - unit(more()));
         if 2.0 * height > beyond * beyond {
             return R + beyond;
         }
