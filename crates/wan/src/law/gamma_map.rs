@@ -41,16 +41,16 @@ impl GammaMap {
     #[inline]
     pub(super) fn at_normal(&self, z: f64) -> f64 {
         let position = (z + RANGE) * DENSITY;
-        let cell = libm::floor(position);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates below; above there is no such cell")]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, to cells that are refused below")]
+        let cell = position as u32;
         match self.cells.get(cell as usize) {
-            Some(Some(terms)) if position >= 0.0 => sum(terms, 2.0 * (position - cell) - 1.0),
+            Some(Some(terms)) if position >= 0.0 => sum(terms, 2.0 * (position - f64::from(cell)) - 1.0),
             Some(_) | None => self.exactly(z),
         }
     }
 
     #[cold]
-    pub(super) fn exactly(&self, z: f64) -> f64 {
+    fn exactly(&self, z: f64) -> f64 {
         gamma_inverse::inverse(self.shape, Tail::of_normal(z), z)
     }
 }
