@@ -8,6 +8,7 @@
 )]
 
 pub mod bare;
+pub mod samplers;
 
 use cohaptic_harness::{Model, NoObserver, Simulation, Summary};
 use cohaptic_peer::{DeviceConfig, Gains};

@@ -42,6 +42,7 @@ mod event_queue;
 mod fate;
 mod fate_log;
 mod gilbert_elliott;
+pub mod law;
 mod link;
 mod loss;
 pub mod netem;

@@ -1,0 +1,107 @@
+//! Ways to draw a delay, for the comparison of their speed and their errors.
+
+use cohaptic_wan::law::{Distribution, Law};
+
+/// The laws that are compared: in milliseconds, 24 ± 2, those on a half-line from 20.
+///
+/// # Panics
+///
+/// If one of them were refused, which a test would show.
+#[must_use]
+pub fn laws() -> [(&'static str, Law); 4] {
+    [
+        ("normal", Distribution::Normal, 0.0),
+        ("Pareto", Distribution::Pareto, 0.0),
+        ("gamma", Distribution::Gamma, 20.0),
+        ("lognormal", Distribution::LogNormal, 20.0),
+    ]
+    .map(|(name, distribution, floor)| (name, Law::new(&distribution, MEAN, SD, Some(floor)).expect("a law")))
+}
+
+/// The mean of all laws.
+pub const MEAN: f64 = 24.0;
+/// The standard deviation of all laws.
+pub const SD: f64 = 2.0;
+
+/// Uniform words (Steele, Lea & Flood 2014, `SplitMix64`): about a nanosecond each.
+#[inline]
+pub fn next_word(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let z = (*state ^ (*state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+/// The middle of one of 2⁵³ equal parts of (0, 1).
+#[inline]
+#[must_use]
+pub fn unit(word: u64) -> f64 {
+    ((word >> 11) as f64 + 0.5) * (1.0 / 9_007_199_254_740_992.0)
+}
+
+/// netem's way: 4096 entries of 16 bits, 8192·(F⁻¹(i/4096) − mean)/sd, one of them at random.
+#[derive(Clone, Debug)]
+pub struct Netem(Vec<i16>);
+
+impl Netem {
+    /// The table of a law. What 16 bits cannot hold, beyond four deviations, is cut off.
+    #[must_use]
+    pub fn new(law: &Law) -> Self {
+        let entry = |i: u16| (8192.0 * (law.quantile(f64::from(i) / 4096.0) - MEAN) / SD).round() as i16;
+        Self((0..4096).map(entry).collect())
+    }
+
+    /// A draw.
+    #[inline]
+    #[must_use]
+    pub fn draw(&self, word: u64) -> f64 {
+        MEAN + SD / 8192.0 * f64::from(self.0[(word & 4095) as usize])
+    }
+
+    /// The equally probable delays, sorted.
+    #[must_use]
+    pub fn delays(&self) -> Vec<f64> {
+        (0..self.0.len() as u64).map(|i| self.draw(i)).collect()
+    }
+}
+
+/// 65536 quantiles as `f64`.
+#[derive(Clone, Debug)]
+pub struct Fine(Vec<f64>);
+
+impl Fine {
+    /// The table of a law: its quantiles in the middle of 65536 equal parts.
+    #[must_use]
+    pub fn new(law: &Law) -> Self {
+        Self((0..65_536).map(|i| law.quantile((f64::from(i) + 0.5) / 65_536.0)).collect())
+    }
+
+    /// One of them at random.
+    #[inline]
+    #[must_use]
+    pub fn step(&self, word: u64) -> f64 {
+        self.0[(word >> 48) as usize]
+    }
+
+    /// Linear interpolation between neighbours.
+    #[inline]
+    #[must_use]
+    pub fn interpolated(&self, word: u64) -> f64 {
+        let position = unit(word) * 65_535.0;
+        let cell = position as usize;
+        self.0[cell] + (position - cell as f64) * (self.0[cell + 1] - self.0[cell])
+    }
+
+    /// The quantiles.
+    #[must_use]
+    pub fn delays(&self) -> &[f64] {
+        &self.0
+    }
+}
+
+/// A draw of the law itself, with further words from the same generator.
+#[inline]
+pub fn draw(law: &Law, state: &mut u64) -> f64 {
+    let word = next_word(state);
+    law.draw(word, || next_word(state))
+}

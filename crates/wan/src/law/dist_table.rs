@@ -1,0 +1,204 @@
+//! Tables of quantiles in the format of netem's `.dist` files.
+//!
+//! A `.dist` file lists N integers, 8192·F⁻¹(i/N) of a law with mean 0 and standard deviation 1, where `#` begins a comment. netem draws one entry at
+//! random, each with the same probability, and delays by mean + sd·entry/8192. [`Distribution::Table`](super::Distribution::Table) does exactly this;
+//! an entry's size is limited to 32767, which is 4 standard deviations. For a law that interpolates between the entries, make an
+//! [`Empirical`](super::Empirical) of them.
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::fmt;
+
+use super::tail::Tail;
+
+/// The entries of a `.dist` file, sorted. One of them stands for `entry/8192` standard deviations.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct DistTable {
+    entries: Vec<i16>,
+}
+
+/// Why a text is no table. Lines and columns count from 1, columns in characters.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DistTableError {
+    /// A word that is no integer.
+    #[error("line {line}, column {column}: `{word}` is no integer: expected one from -32768 to 32767, decimal, 0x… or 0… in octal")]
+    NotAnInteger {
+        /// The line of the word.
+        line: usize,
+        /// The column of its first character.
+        column: usize,
+        /// The word, or its first 24 characters.
+        word: Box<str>,
+    },
+    /// An integer that an entry cannot hold.
+    #[error("line {line}, column {column}: `{word}` is out of range: expected an integer from -32768 to 32767")]
+    OutOfRange {
+        /// The line of the word.
+        line: usize,
+        /// The column of its first character.
+        column: usize,
+        /// The word, or its first 24 characters.
+        word: Box<str>,
+    },
+    /// An entry too many.
+    #[error("line {line}, column {column}: entry {} begins here: expected at most {}", DistTable::MOST + 1, DistTable::MOST)]
+    TooMany {
+        /// The line of the entry.
+        line: usize,
+        /// The column of its first character.
+        column: usize,
+    },
+    /// No entries.
+    #[error("a table without entries: expected 1 to {}", DistTable::MOST)]
+    Empty,
+}
+
+impl DistTable {
+    /// The most entries that `tc` accepts.
+    pub const MOST: usize = 16_384;
+    /// An entry of this size is one standard deviation.
+    pub const ONE_DEVIATION: f64 = 8192.0;
+
+    /// Reads a `.dist` file: integers as C's `strtol` reads them in base 0, separated by white space; `#` begins a comment up to the end of the line.
+    ///
+    /// # Errors
+    ///
+    /// [`DistTableError`], with the place of the first word that is wrong.
+    pub fn parse(text: &str) -> Result<Self, DistTableError> {
+        let mut entries = Vec::new();
+        for (number, line) in text.lines().enumerate() {
+            let line_number = number + 1;
+            let content = line.split('#').next().unwrap_or_default();
+            for (column, word) in words(content) {
+                let shown = || word.chars().take(24).collect();
+                let entry = match integer(word) {
+                    None => return Err(DistTableError::NotAnInteger { line: line_number, column, word: shown() }),
+                    Some(value) => i16::try_from(value).map_err(|_| DistTableError::OutOfRange { line: line_number, column, word: shown() })?,
+                };
+                if entries.len() == Self::MOST {
+                    return Err(DistTableError::TooMany { line: line_number, column });
+                }
+                entries.push(entry);
+            }
+        }
+        if entries.is_empty() {
+            return Err(DistTableError::Empty);
+        }
+        entries.sort_unstable();
+        Ok(Self { entries })
+    }
+
+    /// The entries, sorted. There is at least one.
+    #[must_use]
+    pub fn entries(&self) -> &[i16] {
+        &self.entries
+    }
+
+    /// The entry of a place: each has the same share of the probability.
+    pub(super) fn at(&self, place: Tail) -> f64 {
+        let count = self.entries.len();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "neither negative nor above 16384; a NaN becomes 0")]
+        let index = match place {
+            Tail::Below(p) => ((p * real(count)) as usize).min(count - 1),
+            // The entry of 1 − q, counted from above.
+            Tail::Above(q) => count - (libm::ceil(q * real(count)) as usize).clamp(1, count),
+        };
+        f64::from(self.entries[index])
+    }
+
+    /// The probabilities of at most x, and of more.
+    pub(super) fn tails(&self, x: f64) -> (f64, f64) {
+        let count = self.entries.len();
+        let below = self.entries.partition_point(|&entry| f64::from(entry) <= x);
+        (real(below) / real(count), real(count - below) / real(count))
+    }
+
+    /// The mean and the standard deviation of max(entry, cut).
+    pub(super) fn moments(&self, cut: f64) -> (f64, f64) {
+        let count = real(self.entries.len());
+        let values = || self.entries.iter().map(|&entry| f64::from(entry).max(cut));
+        let mean = values().sum::<f64>() / count;
+        (mean, libm::sqrt(values().map(|value| (value - mean) * (value - mean)).sum::<f64>() / count))
+    }
+}
+
+/// Writes the entries as a `.dist` file, eight a line.
+impl fmt::Display for DistTable {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for line in self.entries.chunks(8) {
+            for (i, entry) in line.iter().enumerate() {
+                write!(formatter, "{}{entry}", if i == 0 { "" } else { " " })?;
+            }
+            writeln!(formatter)?;
+        }
+        Ok(())
+    }
+}
+
+/// The words of a line, each with its column.
+fn words(line: &str) -> impl Iterator<Item = (usize, &str)> {
+    line.split_whitespace().map(move |word| {
+        // Both are slices of one string.
+        let start = word.as_ptr().addr() - line.as_ptr().addr();
+        (line[..start].chars().count() + 1, word)
+    })
+}
+
+/// `strtol` in base 0, of the whole word. Numbers beyond an `i64` are given as its ends.
+fn integer(word: &str) -> Option<i64> {
+    let (negative, digits) = match word.strip_prefix('-') {
+        Some(digits) => (true, digits),
+        None => (false, word.strip_prefix('+').unwrap_or(word)),
+    };
+    let (radix, digits) = match (digits.strip_prefix("0x").or_else(|| digits.strip_prefix("0X")), digits.strip_prefix('0')) {
+        (Some(hex), _) => (16, hex),
+        (None, Some(octal)) if !octal.is_empty() => (8, octal),
+        (None, _) => (10, digits),
+    };
+    if digits.is_empty() {
+        return None;
+    }
+    let size = digits.chars().try_fold(0_i64, |value, c| {
+        let digit = c.to_digit(radix)?;
+        Some(value.saturating_mul(i64::from(radix)).saturating_add(i64::from(digit)))
+    })?;
+    Some(if negative { -size } else { size })
+}
+
+#[expect(clippy::cast_precision_loss, reason = "there are at most 16384 entries")]
+fn real(count: usize) -> f64 {
+    count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_are_read_as_by_strtol() {
+        let table = DistTable::parse("# a comment\n\n -32768 +7 0x1F\t017 # 99\r\n0 -0X10").unwrap();
+        assert_eq!(table.entries(), [-32_768, -16, 0, 7, 15, 31]);
+    }
+
+    #[test]
+    fn a_bad_word_is_shown_with_its_place() {
+        let reason = |text: &str| DistTable::parse(text).unwrap_err().to_string();
+        assert_eq!(reason("1 2\n µ  3x"), "line 2, column 2: `µ` is no integer: expected one from -32768 to 32767, decimal, 0x… or 0… in octal");
+        assert_eq!(reason("1\n2 40000"), "line 2, column 3: `40000` is out of range: expected an integer from -32768 to 32767");
+        assert!(reason("09").contains("`09` is no integer"));
+        assert!(reason("99999999999999999999").contains("out of range"));
+        assert_eq!(reason(" # nothing\n"), "a table without entries: expected 1 to 16384");
+        assert_eq!(reason(&"1 ".repeat(16_385)), "line 1, column 32769: entry 16385 begins here: expected at most 16384");
+    }
+
+    #[test]
+    fn every_entry_has_the_same_share() {
+        let table = DistTable::parse("30 10 20 20").unwrap();
+        let at = [Tail::Below(0.0), Tail::Below(0.24), Tail::Below(0.26), Tail::Above(0.5), Tail::Above(0.26), Tail::Above(0.24), Tail::Above(0.0)];
+        assert_eq!(at.map(|place| table.at(place)), [10.0, 10.0, 20.0, 20.0, 20.0, 30.0, 30.0]);
+        assert_eq!([9.0, 10.0, 20.0, 30.0].map(|x| table.tails(x).0), [0.0, 0.25, 0.75, 1.0]);
+        assert_eq!(table.moments(f64::NEG_INFINITY), (20.0, libm::sqrt(50.0)));
+        assert_eq!(table.moments(20.0), (22.5, libm::sqrt(18.75)));
+    }
+}

@@ -1,0 +1,97 @@
+//! The gamma law as a function of a standard normal number, x(z) = P⁻¹(a, Φ(z)), quickly.
+//!
+//! x(z) is smooth, and its Taylor series at any point follows from one exact inverse: x′ = x·v and v′ = v·(−z + (x − a)·v), where
+//! v = φ(z)/(x^a·e^(−x)/Γ(a)) (the idea is Steinbrecher & Shaw's, *Quantile mechanics*, 2008). A cell of width 1/8 has eleven derivatives. A cell whose
+//! next two terms could be seen (small shapes, where x(z) falls off like a power of Φ) has none, nor has |z| ≥ 8: there the exact inverse answers.
+
+use alloc::vec::Vec;
+
+use super::special::{gamma, gamma_inverse, normal};
+use super::tail::Tail;
+
+/// Cells lie in (−RANGE, RANGE).
+const RANGE: f64 = 8.0;
+/// Cells per unit of z.
+const DENSITY: f64 = 8.0;
+const CELLS: u32 = 128;
+const TERMS: usize = 12;
+/// Terms computed but not kept: they say how good the kept ones are.
+const WITNESSES: usize = 2;
+/// What the terms left out may add, relative to x.
+const TOLERANCE: f64 = 1e-14;
+
+/// x(z) of one shape.
+#[derive(Clone, Debug)]
+pub(super) struct GammaMap {
+    shape: f64,
+    /// Taylor coefficients in units of half a cell; `None` where they would not do.
+    cells: Vec<Option<[f64; TERMS]>>,
+}
+
+impl GammaMap {
+    pub(super) fn new(shape: f64) -> Self {
+        let centre = |cell| (f64::from(cell) + 0.5) / DENSITY - RANGE;
+        Self { shape, cells: (0..CELLS).map(|cell| taylor(shape, centre(cell))).collect() }
+    }
+
+    pub(super) const fn shape(&self) -> f64 {
+        self.shape
+    }
+
+    #[inline]
+    pub(super) fn at_normal(&self, z: f64) -> f64 {
+        let position = (z + RANGE) * DENSITY;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, to cells that are refused below")]
+        let cell = position as u32;
+        match self.cells.get(cell as usize) {
+            Some(Some(terms)) if position >= 0.0 => sum(terms, 2.0 * (position - f64::from(cell)) - 1.0),
+            Some(_) | None => self.exactly(z),
+        }
+    }
+
+    #[cold]
+    fn exactly(&self, z: f64) -> f64 {
+        gamma_inverse::inverse(self.shape, Tail::of_normal(z), z)
+    }
+}
+
+/// Σ terms·tᵏ, in pairs and pairs of pairs: half the latency of Horner's rule.
+#[inline]
+fn sum(terms: &[f64; TERMS], t: f64) -> f64 {
+    let t2 = t * t;
+    let t4 = t2 * t2;
+    let four = |k: usize| (terms[k] + terms[k + 1] * t) + (terms[k + 2] + terms[k + 3] * t) * t2;
+    four(0) + (four(4) + four(8) * t4) * t4
+}
+
+/// The series at `z`, if it is good enough.
+fn taylor(a: f64, z: f64) -> Option<[f64; TERMS]> {
+    const ALL: usize = TERMS + WITNESSES;
+    let half = 0.5 / DENSITY;
+    let first = gamma_inverse::inverse(a, Tail::of_normal(z), z);
+    let slope = gamma::incomplete(a, first).slope;
+    let (mut x, mut v, mut s) = ([0.0; ALL], [0.0; ALL], [0.0; ALL]);
+    (x[0], v[0]) = (first, normal::density(z) / slope);
+    // s = −z + (x − a)·v.
+    let mut excess = x;
+    excess[0] = first - a;
+    let product = |left: &[f64; ALL], right: &[f64; ALL], n: usize| (0..=n).map(|i| left[i] * right[n - i]).sum::<f64>();
+    let mut order = 0.0;
+    for n in 0..ALL - 1 {
+        order += 1.0;
+        s[n] = product(&excess, &v, n);
+        match n {
+            0 => s[0] -= z,
+            1 => s[1] -= half,
+            _ => {}
+        }
+        x[n + 1] = half / order * product(&x, &v, n);
+        excess[n + 1] = x[n + 1];
+        v[n + 1] = half / order * product(&v, &s, n);
+    }
+    let mut terms = [0.0; TERMS];
+    terms.copy_from_slice(&x[..TERMS]);
+    let witnesses: f64 = x[TERMS..].iter().map(|term| term.abs()).sum();
+    // A NaN is no witness.
+    (witnesses <= TOLERANCE * sum(&terms, -1.0)).then_some(terms)
+}
