@@ -62,3 +62,20 @@ fn sum(start: u16, bytes: &[u8]) -> u16 {
         sum + u16::from(carry)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_payload_has_the_checksum_that_means_none() {
+        let mut other_zero = 0;
+        for payload in 0..=u16::MAX {
+            let Datagram { captured, .. } = build(1, false, &payload.to_be_bytes(), 2);
+            assert_ne!(captured[26..28], [0, 0]);
+            other_zero += u32::from(captured[26..28] == [0xff, 0xff]);
+        }
+        // Of the 65 536 payloads, 65 535 different sums: one checksum comes twice, and one of all would be zero.
+        assert!((1..=2).contains(&other_zero), "{other_zero}");
+    }
+}
