@@ -57,6 +57,11 @@ impl<const A: usize> Datagrams<A> {
         &self.slots[handle.0.get() as usize - 1].sample
     }
 
+    /// One copy more is on the way.
+    pub(crate) fn retain(&mut self, handle: Handle) {
+        self.slot_mut(handle).copies += 1;
+    }
+
     /// One copy less is on the way.
     #[inline]
     pub(crate) fn release(&mut self, handle: Handle) {

@@ -3,7 +3,7 @@
 use cohaptic_peer::{Contact, Hand, Integrator, wire};
 use cohaptic_scene::{ChangeKind, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::Span;
-use cohaptic_wan::{Distribution, LinkConfig, Loss, Order, QueueLimit};
+use cohaptic_wan::{Distribution, LinkConfig, LinkModel, Loss, Order, QueueLimit, Service};
 
 use crate::plan::{DeviceChoice, Model, Plan, Ticking};
 
@@ -163,7 +163,7 @@ impl Rows {
         for (config, count) in &used {
             let part = format!("{count} {}", if *count == 1 { "link" } else { "links" });
             if config.is_constant_delay() {
-                self.model(&part, format!("constant delay {}", Span(config.delay.mean())), "one addition a packet: nothing else is configured");
+                self.model(&part, format!("constant delay {}", Span(config.mean_delay())), "one addition a packet: nothing else is configured");
             } else {
                 self.model(&part, describe_link(config), "a chain of the stages that are configured");
             }
@@ -180,9 +180,9 @@ impl Rows {
             self.model(&format!("{direction} of {peer}"), describe_link(line), "shared by all that passes it");
         }
         let timeline_is_random =
-            scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Links(links) if links.iter().any(|link| link.config.is_random())));
-        let lines_are_random = access_lines(scene).iter().any(|(_, _, line)| line.is_random());
-        if used.iter().all(|(config, _)| !config.is_random()) && !lines_are_random && !timeline_is_random {
+            scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Links(links) if links.iter().any(|link| link.config.has_chance())));
+        let lines_are_random = access_lines(scene).iter().any(|(_, _, line)| line.has_chance());
+        if used.iter().all(|(config, _)| !config.has_chance()) && !lines_are_random && !timeline_is_random {
             self.leave_out("random numbers: no link has jitter or loss");
         }
     }
@@ -222,25 +222,39 @@ fn describe(peer: &PeerSpec) -> String {
     format!("device of {} kg that {contact}, {hand}", peer.device.mass)
 }
 
-fn describe_link(config: &LinkConfig) -> String {
+fn describe_link(model: &LinkModel) -> String {
+    match model {
+        LinkModel::Fixed(config) => describe_config(config),
+        LinkModel::Modulated(modulated) => format!("{} states in turn, by chance", modulated.configs().len()),
+        LinkModel::Replay(log) => format!("a replay of {} packets", log.packets()),
+        LinkModel::Kernel(netem) => format!("netem of Linux 6.6: {}", netem.words()),
+        _ => "a link".into(),
+    }
+}
+
+fn describe_config(config: &LinkConfig) -> String {
     let mut stages = Vec::new();
     if !config.outages.is_empty() {
-        stages.push(format!("{} outages", config.outages.as_slice().len()));
+        stages.push(format!("{} outages", config.outages.scheduled().len()));
     }
-    match config.loss {
+    match &config.loss {
         Loss::None => {}
         Loss::Independent(probability) => stages.push(format!("independent loss {probability}")),
         Loss::GilbertElliott(_) => stages.push("Gilbert-Elliott loss".into()),
         _ => stages.push("loss".into()),
     }
-    if let Some(bottleneck) = config.bottleneck {
+    if let Some(bottleneck) = &config.bottleneck {
         let limit = match bottleneck.limit {
             None => "unlimited".into(),
             Some(QueueLimit::Packets(packets)) => format!("{packets} packets"),
             Some(QueueLimit::Bytes(bytes)) => bytes.to_string(),
             Some(_) => "limited".into(),
         };
-        stages.push(format!("queue ({limit}) before {}", bottleneck.rate));
+        let service = match &bottleneck.service {
+            Service::Rate(rate) => rate.to_string(),
+            _ => "a recorded line".into(),
+        };
+        stages.push(format!("queue ({limit}) before {service}"));
     }
     let mean = Span(config.delay.mean());
     match config.delay.jitter() {
@@ -261,7 +275,7 @@ fn describe_link(config: &LinkConfig) -> String {
 }
 
 /// The configurations that links between different peers have, and how many links have each.
-fn used_links(scene: &Scene) -> Vec<(&LinkConfig, usize)> {
+fn used_links(scene: &Scene) -> Vec<(&LinkModel, usize)> {
     let mut counts = vec![0; scene.links.configs.len()];
     for (from, row) in scene.links.index.iter().enumerate() {
         for (to, config) in row.iter().enumerate() {
@@ -271,7 +285,7 @@ fn used_links(scene: &Scene) -> Vec<(&LinkConfig, usize)> {
     scene.links.configs.iter().map(AsRef::as_ref).zip(counts).filter(|(_, count)| *count > 0).collect()
 }
 
-fn access_lines(scene: &Scene) -> Vec<(&str, &'static str, &LinkConfig)> {
+fn access_lines(scene: &Scene) -> Vec<(&str, &'static str, &LinkModel)> {
     scene
         .peers
         .iter()
@@ -285,7 +299,7 @@ fn dimensions(scene: &Scene, plan: &Plan) -> Dimensions {
     let (peers, axes) = (scene.peers.len() as u64, scene.axes.count() as u64);
     let devices = plan.devices.iter().filter(|choice| **choice == DeviceChoice::Simulated).count() as u64;
     let links = used_links(scene).into_iter();
-    let delays: f64 = links.map(|(config, count)| config.delay.mean().as_secs_f64() * count_f64(count)).sum();
+    let delays: f64 = links.map(|(config, count)| config.mean_delay().as_secs_f64() * count_f64(count)).sum();
     Dimensions {
         plant: 2 * axes * (peers + devices),
         held: 2 * axes * peers * (peers - 1),

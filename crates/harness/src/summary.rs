@@ -46,6 +46,8 @@ pub struct PeerSummary {
     pub velocity: Vec<f64>,
     /// How many samples arrived too late or repeated, and changed nothing.
     pub stale_samples: u64,
+    /// Samples that arrived damaged and were refused by the decoder.
+    pub refused_samples: u64,
 }
 
 /// One link at the end of a run.

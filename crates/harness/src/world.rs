@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
+use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_peer::{
     Clock, Contact, CopyConfig, Device, Held, ObjectCopy, Peer, PeerConfig, Reception, RestingDevice, SimulatedDevice, State, Strategy,
 };
 use cohaptic_scene::{Change, ChangeKind, Scene};
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{AccessLine, Fate, Network, NetworkConfig, NodeId};
+use cohaptic_wan::{AccessLine, Damage, Fate, Network, NetworkConfig, NodeId};
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
@@ -49,6 +50,7 @@ struct Member<const A: usize, S> {
     next_send: u64,
     send_every: u64,
     stale_samples: u64,
+    refused_samples: u64,
 }
 
 /// What stands for a peer's device.
@@ -153,6 +155,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
                 position: position[..self.axes].to_vec(),
                 velocity: velocity[..self.axes].to_vec(),
                 stale_samples: member.stale_samples,
+                refused_samples: member.refused_samples,
             }
         });
         Summary {
@@ -227,13 +230,23 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
         while let Some(event) = self.network.poll_event() {
             if let Fate::Delivered(_) = event.fate {
                 let receiver = &mut self.members[event.to.0 as usize];
-                match receiver.peer.handle_sample(self.datagrams.sample(event.payload)) {
+                let sample = self.datagrams.sample(event.payload);
+                let received = match &event.damage {
+                    None => receiver.peer.handle_sample(sample),
+                    Some(damage) => receiver.peer.handle_datagram(damaged(sample, self.axes, damage, &mut [0; MAX_LEN])),
+                };
+                match received {
                     Ok(Reception::Newest) => {}
                     Ok(Reception::Stale) => receiver.stale_samples += 1,
+                    Err(_) if event.damage.is_some() => receiver.refused_samples += 1,
                     Err(error) => unreachable!("peers of one scene understand each other: {error}"),
                 }
             }
-            self.datagrams.release(event.payload);
+            if event.fate == Fate::Duplicated {
+                self.datagrams.retain(event.payload);
+            } else {
+                self.datagrams.release(event.payload);
+            }
             if watch.packets {
                 let (from, to) = (event.from.0 as usize, event.to.0 as usize);
                 let (sequence, sent, at, size, fate) = (event.sequence, event.sent, event.at, event.size, event.fate);
@@ -326,7 +339,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
         let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to)));
         pairs
             .filter(|(from, to)| from != to)
-            .filter_map(|(from, to)| self.network.link_stats(node(from), node(to)).map(|stats| LinkSummary { from, to, stats: *stats }))
+            .filter_map(|(from, to)| self.network.link_stats(node(from), node(to)).map(|stats| LinkSummary { from, to, stats }))
             .collect()
     }
 
@@ -335,7 +348,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
         lines
             .filter_map(|(peer, uplink)| {
                 let line = if uplink { AccessLine::Uplink(node(peer)) } else { AccessLine::Downlink(node(peer)) };
-                self.network.access_stats(line).map(|stats| AccessSummary { peer, uplink, stats: *stats })
+                self.network.access_stats(line).map(|stats| AccessSummary { peer, uplink, stats })
             })
             .collect()
     }
@@ -387,6 +400,7 @@ impl<const A: usize, S: Strategy<A>> Member<A, S> {
             next_send: spec.phase,
             send_every: u64::try_from(send_every).unwrap_or(u64::MAX),
             stale_samples: 0,
+            refused_samples: 0,
         }
     }
 
@@ -394,6 +408,13 @@ impl<const A: usize, S: Strategy<A>> Member<A, S> {
     fn is_finite(&self) -> bool {
         self.peer.object().state().is_finite() & self.peer.device().state().is_finite()
     }
+}
+
+/// The bytes of a sample as they arrive.
+fn damaged<'a, const A: usize>(sample: &Sample<A>, axes: usize, damage: &Damage, buffer: &'a mut [u8; MAX_LEN]) -> &'a [u8] {
+    let len = sample.encode(axes, buffer);
+    damage.apply(&mut buffer[..len]);
+    &buffer[..len]
 }
 
 fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator};
 use cohaptic_units::{Instant, Probability};
-use cohaptic_wan::{DropCause, LinkConfig};
+use cohaptic_wan::{DropCause, LinkModel};
 
 /// A scene, ready to be run. Every number in it has been checked; every peer it names exists.
 #[derive(Clone, PartialEq, Debug)]
@@ -127,16 +127,16 @@ pub struct PeerSpec {
     /// With which velocity its copy and its device begin [m/s].
     pub velocity: [f64; 3],
     /// The line that all it sends passes before the links, if it has one.
-    pub uplink: Option<LinkConfig>,
+    pub uplink: Option<LinkModel>,
     /// The line that all it receives passes after the links, if it has one.
-    pub downlink: Option<LinkConfig>,
+    pub downlink: Option<LinkModel>,
 }
 
 /// The directed links of a full mesh. Equal links share one configuration.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LinkTable {
     /// The different configurations, in order of first use.
-    pub configs: Vec<Arc<LinkConfig>>,
+    pub configs: Vec<Arc<LinkModel>>,
     /// For each sender, for each receiver, which configuration; the diagonal has no meaning.
     pub index: Vec<Vec<usize>>,
 }
@@ -144,7 +144,7 @@ pub struct LinkTable {
 impl LinkTable {
     /// The link from one peer to another, by their places in [`Scene::peers`].
     #[must_use]
-    pub fn between(&self, from: usize, to: usize) -> &LinkConfig {
+    pub fn between(&self, from: usize, to: usize) -> &LinkModel {
         &self.configs[self.index[from][to]]
     }
 }
@@ -190,7 +190,7 @@ pub struct LinkChange {
     /// The receiver's place in [`Scene::peers`].
     pub to: usize,
     /// From now on.
-    pub config: Arc<LinkConfig>,
+    pub config: Arc<LinkModel>,
 }
 
 /// What must come out of a run for `cohaptic check` to pass. Absent entries are not looked at.

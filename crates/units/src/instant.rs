@@ -53,6 +53,13 @@ impl Instant {
         self.checked_add(span).unwrap_or(Self::MAX)
     }
 
+    /// The instant so many nanoseconds later, or [`Instant::MAX`] if that cannot be counted.
+    #[must_use]
+    #[inline]
+    pub const fn saturating_add_nanos(self, nanos: u64) -> Self {
+        Self(self.0.saturating_add(nanos))
+    }
+
     /// The span since `earlier`, or `None` if `earlier` is later than `self`.
     #[must_use]
     #[inline]

@@ -6,25 +6,47 @@ use cohaptic_units::Instant;
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[non_exhaustive]
 pub enum DropCause {
+    /// A predicate of the program took it.
+    Filter,
+    /// It was larger than the link takes, or than a token bucket ever holds.
+    Mtu,
     /// The link was down when the packet was offered.
     Outage,
     /// The loss model took it.
     Loss,
-    /// The queue before the serialiser was full.
+    /// As many packets as the link may hold were under way.
+    Limit,
+    /// The queue before the serialiser, or before the token bucket, was full.
     QueueFull,
+    /// Random early detection took it, before the queue was full.
+    Red,
+    /// Controlled delay took it, because packets had waited too long for too long.
+    CoDel,
+    /// Its bits were damaged, and the receiver's checksum found it.
+    Checksum,
+    /// The log that the link replays has ended.
+    EndOfLog,
 }
 
 impl DropCause {
     /// Every cause, in the order of the stages.
-    pub const ALL: [Self; 3] = [Self::Outage, Self::Loss, Self::QueueFull];
+    pub const ALL: [Self; 10] =
+        [Self::Filter, Self::Mtu, Self::Outage, Self::Loss, Self::Limit, Self::QueueFull, Self::Red, Self::CoDel, Self::Checksum, Self::EndOfLog];
 
     /// The name in records and JSON: `queue-full`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Filter => "filter",
+            Self::Mtu => "mtu",
             Self::Outage => "outage",
             Self::Loss => "loss",
+            Self::Limit => "limit",
             Self::QueueFull => "queue-full",
+            Self::Red => "red",
+            Self::CoDel => "codel",
+            Self::Checksum => "checksum",
+            Self::EndOfLog => "end-of-log",
         }
     }
 
@@ -34,12 +56,9 @@ impl DropCause {
         Self::ALL.into_iter().find(|cause| cause.name() == name)
     }
 
+    /// Its place in [`DropCause::ALL`].
     pub(crate) const fn index(self) -> usize {
-        match self {
-            Self::Outage => 0,
-            Self::Loss => 1,
-            Self::QueueFull => 2,
-        }
+        self as usize
     }
 }
 
@@ -79,6 +98,11 @@ impl Fate {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_cause_has_its_place() {
+        assert!(DropCause::ALL.iter().enumerate().all(|(place, cause)| cause.index() == place));
+    }
 
     #[test]
     fn every_cause_is_found_by_its_name_and_no_other_text_is() {

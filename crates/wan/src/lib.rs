@@ -1,7 +1,8 @@
 //! A wide-area network emulated as pure state machines.
 //!
-//! A [`Link`] takes packets in at an instant and gives them back later, or not at all: it is a chain of impairments (outage, loss, a bottleneck
-//! with a finite queue, propagation delay with jitter, an order policy), each in a file of its own. A [`Network`] is directed links and shared
+//! A [`Link`] takes packets in at an instant and gives them back later, twice, damaged, or not at all: it is a chain of impairments (outage, loss,
+//! duplication, corruption, a token bucket, a bottleneck with a finite queue, slots, reordering, propagation delay with jitter, an order policy), each in a
+//! file of its own. A [`LinkModel`] is one such chain, several in turn, a recording, or Linux's netem to the bit. A [`Network`] is directed links and shared
 //! access lines between N nodes over one event queue. Every packet has a [`Fate`], and every fate a counter, so that at every instant
 //!
 //! ```text
@@ -11,7 +12,7 @@
 //! Time is an argument: nothing here reads a clock, opens a socket, or draws a random number that has no address (see [`random`]). The same seed
 //! and the same calls give the same answers on every platform. This crate does not know what travels in the packets.
 //!
-//! Read [`LinkConfig`] first, then [`Link`].
+//! Read [`LinkConfig`] first, then [`Link`]. [`netem`] reads the words of `tc-netem`.
 //!
 //! ```
 //! use bytes::Bytes as Payload;
@@ -35,39 +36,66 @@
 
 extern crate alloc;
 
-mod bottleneck;
+mod chance;
 mod config;
+mod corruption;
 mod delay;
+mod direct;
+mod engine;
 mod event_queue;
 mod fate;
 mod fate_log;
-mod gilbert_elliott;
+mod filter;
+mod kernel_link;
 pub mod law;
 mod link;
 mod loss;
+mod model;
+mod modulation;
 pub mod netem;
 mod network;
 mod normal;
 mod order;
 mod outage;
+mod packet;
 mod packet_record;
+mod path_trace;
 mod pipeline;
+mod queue;
 pub mod random;
+mod reorder;
+mod replay;
+mod slots;
+mod sojourn;
+mod staged;
 mod stats;
 
-pub use bottleneck::{Bottleneck, QueueLimit};
-pub use config::LinkConfig;
-pub use delay::{Delay, DelayError, Distribution, Jitter};
+pub use chance::{Chance, ChanceError};
+pub use config::{Layout, LinkConfig};
+pub use corruption::{Checksum, Corruption, Damage, Flips};
+pub use delay::{Correlation, Delay, DelayError, Jitter};
 pub use event_queue::{Event, EventQueue};
 pub use fate::{DropCause, Fate};
 pub use fate_log::{FateLog, FateLogError, FateRow};
-pub use gilbert_elliott::GilbertElliott;
+pub use filter::Offered;
+pub use law::Distribution;
 pub use link::{Link, LinkEvent};
-pub use loss::Loss;
+pub use loss::{Bursts, Counts, FourState, FourStateError, GilbertElliott, GilbertElliottInTime, Loss, NoTime, Pattern, PatternError};
+pub use model::{KernelNetem, LinkModel};
+pub use modulation::{Modulated, Modulator, ModulatorError, ModulatorState};
 pub use network::{AccessLine, Network, NetworkConfig, NetworkError, NetworkEvent, NodeId};
 pub use normal::standard_normal;
 pub use order::Order;
-pub use outage::{Outage, Outages, OutagesError};
+pub use outage::{IdleOutages, Outage, Outages, OutagesError, RandomOutages};
+pub use packet::PacketInfo;
 pub use packet_record::PacketRecord;
+pub use path_trace::{Between, PathTrace, PathTraceError};
 pub use pipeline::{LinkName, TimeWentBack};
+pub use queue::{
+    Bottleneck, Cells, CoDel, DeliveryTrace, DeliveryTraceError, Discipline, Framing, MAHIMAHI_BYTES, Peak, QueueLimit, Red, RedError, Service,
+    TokenBucket,
+};
+pub use reorder::{Displacement, Reorder};
+pub use slots::{Slots, SlotsError};
+pub use sojourn::Sojourn;
 pub use stats::LinkStats;

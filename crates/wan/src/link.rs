@@ -1,49 +1,78 @@
 //! One link and what is on the way through it.
 
+use alloc::boxed::Box;
 use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+use core::fmt;
 
 use cohaptic_units::{Bytes, Instant};
 
-use crate::bottleneck::Departure;
 use crate::event_queue::Event;
-use crate::pipeline::{Enqueued, Outcome, Pipeline, check_time};
-use crate::{DropCause, EventQueue, Fate, LinkConfig, LinkName, LinkStats, TimeWentBack};
+use crate::filter::{Filter, Offered};
+use crate::packet::{Carried, Exit, Marks, Outputs, PacketInfo};
+use crate::pipeline::{Outcome, Pipeline, check_time};
+use crate::{Damage, DropCause, EventQueue, Fate, LinkModel, LinkName, LinkStats, PacketRecord, TimeWentBack};
 
 /// A directed link as a state machine: packets in with [`Link::handle_packet`], packets and their fates out with [`Link::poll_event`].
 ///
 /// The driver hands packets in, asks with [`Link::poll_timeout`] when to come back, calls [`Link::handle_timeout`] then, and drains
 /// [`Link::poll_event`] until it gives `None`. Being late costs nothing but lateness: every event carries the instant at which it happened. The
-/// answer of `poll_timeout` may change after `handle_packet`, `handle_timeout` and `set_config`.
+/// answer of `poll_timeout` may change after `handle_packet`, `handle_timeout` and `set_model`.
 ///
-/// At equal instants a packet leaves the bottleneck before another is offered to it, and events come in the order of (instant, sequence).
-#[derive(Clone, Debug)]
+/// At equal instants a packet leaves a queue before another is offered to it, and events come in the order of (instant, sequence, copy).
+#[derive(Clone)]
 pub struct Link<P> {
     seed: u64,
     name: LinkName,
     now: Instant,
+    filter: Option<Filter<P>>,
     pipeline: Pipeline<InLink<P>>,
     pending: EventQueue<Pending<P>>,
-    /// Drops and arrivals that have happened and were not polled yet.
+    /// Events that have happened and were not polled yet.
     happened: VecDeque<LinkEvent<P>>,
     stats: LinkStats,
+    outputs: Outputs<InLink<P>>,
 }
 
-/// What became of one packet.
+/// What became of one packet, or that a copy of it was made.
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct LinkEvent<P> {
     /// The number of the packet on this link, from 0.
     pub sequence: u64,
+    /// 0 for the packet itself, 1 for a copy that the link made. With [`Fate::Duplicated`] it is the number of the new copy.
+    pub copy: u8,
     /// When it was offered.
     pub sent: Instant,
-    /// When it arrived or was dropped.
+    /// When it arrived or was dropped, or when the copy was made.
     pub at: Instant,
     /// Its size.
     pub size: Bytes,
-    /// What it carries.
+    /// What it carries, as it was offered: see `damage`.
     pub payload: P,
     /// What became of it.
     pub fate: Fate,
+    /// Whether an active queue marked it: congestion experienced.
+    pub marked: bool,
+    /// The bits that were flipped. [`Damage::apply`] flips them.
+    pub damage: Option<Damage>,
+}
+
+impl<P> LinkEvent<P> {
+    /// The event as a row of a fate log.
+    #[must_use]
+    pub const fn record(&self) -> PacketRecord {
+        PacketRecord {
+            sequence: self.sequence,
+            copy: self.copy,
+            offered: self.sent,
+            at: self.at,
+            size: self.size,
+            fate: self.fate,
+            marked: self.marked,
+            damaged: self.damage.is_some(),
+        }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -54,67 +83,80 @@ struct InLink<P> {
     payload: P,
 }
 
-/// A departure from the bottleneck or an arrival.
+/// An arrival, or the time to wake the engine.
 #[derive(Clone, Debug)]
 struct Pending<P> {
     at: Instant,
-    what: What<P>,
+    what: Option<Arrival<P>>,
 }
 
 #[derive(Clone, Debug)]
-enum What<P> {
-    Departs(u64),
-    Arrives(InLink<P>),
+struct Arrival<P> {
+    packet: InLink<P>,
+    copy: u8,
+    marks: Option<Box<Marks>>,
 }
 
 impl<P> Event for Pending<P> {
-    type Key = (Instant, bool, u64);
+    type Key = (Instant, Option<(u64, u8)>);
 
+    #[inline]
     fn at(&self) -> Instant {
         self.at
     }
 
+    /// The engine is woken before anything arrives.
+    #[inline]
     fn key(&self) -> Self::Key {
-        match &self.what {
-            What::Departs(ticket) => (self.at, false, *ticket),
-            What::Arrives(packet) => (self.at, true, packet.sequence),
-        }
+        (self.at, self.what.as_ref().map(|arrival| (arrival.packet.sequence, arrival.copy)))
     }
 }
 
-impl<P> Link<P> {
-    /// A link with that configuration. Links of equal seed and name draw the same random numbers.
+impl<P: Clone> Link<P> {
+    /// An empty link. The seed and the name are the address of its random numbers.
     #[must_use]
-    pub fn new(seed: u64, name: &LinkName, config: LinkConfig) -> Self {
+    pub fn new(seed: u64, name: &LinkName, model: impl Into<LinkModel>) -> Self {
         Self {
             seed,
             name: name.clone(),
             now: Instant::ZERO,
-            pipeline: Pipeline::new(seed, name, config, false),
+            filter: None,
+            pipeline: Pipeline::new(seed, name, model.into(), false),
             pending: EventQueue::new(),
             happened: VecDeque::new(),
             stats: LinkStats::default(),
+            outputs: Vec::new(),
         }
     }
 
-    /// Takes a packet in.
+    /// Drops every packet of which the filter says so, before anything else happens to it. The filter sees the packet and its payload.
+    #[must_use]
+    pub fn with_filter(mut self, drops: impl Fn(&Offered<'_, P>) -> bool + Send + Sync + 'static) -> Self {
+        self.filter = Some(Filter::new(drops));
+        self
+    }
+
+    /// Takes a packet in. A size alone is a packet without ECN.
     ///
     /// # Errors
     ///
     /// [`TimeWentBack`] if an earlier call had a later instant; nothing was changed.
-    pub fn handle_packet(&mut self, now: Instant, size: Bytes, payload: P) -> Result<(), TimeWentBack> {
+    #[inline]
+    pub fn handle_packet(&mut self, now: Instant, info: impl Into<PacketInfo>, payload: P) -> Result<(), TimeWentBack> {
         self.handle_timeout(now)?;
-        let sequence = self.stats.offered;
-        self.stats.offered += 1;
-        let packet = InLink { sequence, sent: now, size, payload };
+        let info = info.into();
+        let sequence = self.stats.flow.offered;
+        self.stats.flow.offered += 1;
+        let filtered = self.filter.as_ref().is_some_and(|filter| filter.drops(&Offered { sequence, now, info, payload: &payload }));
+        let packet = InLink { sequence, sent: now, size: info.size, payload };
+        if filtered {
+            self.drop(now, DropCause::Filter, packet, 0, Marks::default());
+            return Ok(());
+        }
         match self.pipeline.offer(now, sequence, self.pipeline.words(sequence)) {
-            Outcome::Arrives(at) => self.pending.push(Pending { at, what: What::Arrives(packet) }),
-            Outcome::Dropped(cause) => self.drop(now, cause, packet),
-            Outcome::Queues => match self.pipeline.enqueue(now, sequence, size, packet) {
-                Enqueued::Served(departure) => self.announce(departure),
-                Enqueued::Waits => {}
-                Enqueued::Dropped(cause, packet) => self.drop(now, cause, packet),
-            },
+            Outcome::Arrives(at) => self.pending.push(Pending { at, what: Some(Arrival { packet, copy: 0, marks: None }) }),
+            Outcome::Dropped(cause) => self.drop(now, cause, packet, 0, Marks::default()),
+            Outcome::Enters => self.enter(now, info, packet),
         }
         Ok(())
     }
@@ -124,56 +166,37 @@ impl<P> Link<P> {
     /// # Errors
     ///
     /// [`TimeWentBack`] if an earlier call had a later instant; nothing was changed.
+    #[inline]
     pub fn handle_timeout(&mut self, now: Instant) -> Result<(), TimeWentBack> {
         check_time(&mut self.now, now)?;
-        while let Some(Pending { at, what }) = self.pending.pop_due(now) {
-            match what {
-                What::Departs(ticket) => {
-                    if let Some((packet, arrival, next)) = self.pipeline.depart(Departure { at, ticket }) {
-                        self.pending.push(Pending { at: arrival, what: What::Arrives(packet) });
-                        if let Some(next) = next {
-                            self.announce(next);
-                        }
-                    }
-                }
-                What::Arrives(packet) => {
-                    self.stats.delivered += 1;
-                    self.stats.delay_nanos += u128::from(at.as_nanos() - packet.sent.as_nanos());
-                    self.happened.push_back(packet.event(at, Fate::Delivered(at)));
-                }
-            }
-        }
+        self.let_happen(now);
         Ok(())
     }
 
-    /// When [`Link::handle_timeout`] must be called next; `None` if nothing is on the way. Never before the last instant given. After a
-    /// change of rate it may name an instant at which nothing happens.
+    /// When [`Link::handle_timeout`] must be called next; `None` if nothing is on the way. Never before the last instant given. After a live change it may name an instant at which nothing happens.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.pending.next_at()
     }
 
-    /// The next packet that has arrived or was dropped; `None` when all have been polled.
+    /// The next packet that has arrived or was dropped, or a copy that was made; `None` when all have been polled.
     #[must_use]
+    #[inline]
     pub fn poll_event(&mut self) -> Option<LinkEvent<P>> {
         self.happened.pop_front()
     }
 
-    /// Changes the configuration from `now` on. Packets that propagate keep their delay; one that is being serialised keeps the bits already
-    /// sent; those that wait are served at the new rate, or leave at once if there is no bottleneck any more.
+    /// Changes the model from `now` on. Packets that propagate keep their delay; one that is being serialised keeps the bits already sent; those that wait
+    /// are served at the new rate, or go on at once if what they wait for is gone. Chains and correlations go on from the state they are in.
     ///
     /// # Errors
     ///
     /// [`TimeWentBack`] if an earlier call had a later instant; nothing was changed.
-    pub fn set_config(&mut self, now: Instant, config: LinkConfig) -> Result<(), TimeWentBack> {
+    pub fn set_model(&mut self, now: Instant, model: impl Into<LinkModel>) -> Result<(), TimeWentBack> {
         self.handle_timeout(now)?;
-        let (departure, released) = self.pipeline.reconfigure(now, self.seed, &self.name, config);
-        if let Some(departure) = departure {
-            self.announce(departure);
-        }
-        for (packet, at) in released {
-            self.pending.push(Pending { at, what: What::Arrives(packet) });
-        }
+        let mut outputs = core::mem::take(&mut self.outputs);
+        self.pipeline.reconfigure(now, self.seed, &self.name, model.into(), &mut outputs);
+        self.come_out(outputs);
         Ok(())
     }
 
@@ -183,19 +206,95 @@ impl<P> Link<P> {
         &self.stats
     }
 
-    fn drop(&mut self, now: Instant, cause: DropCause, packet: InLink<P>) {
-        self.stats.dropped[cause.index()] += 1;
-        self.happened.push_back(packet.event(now, Fate::Dropped(cause)));
+    /// Hands a packet to the engine.
+    fn enter(&mut self, now: Instant, info: PacketInfo, packet: InLink<P>) {
+        // The packet itself is counted already.
+        let inside = self.stats.in_flight() - 1;
+        let mut outputs = core::mem::take(&mut self.outputs);
+        if let Some(engine) = self.pipeline.engine() {
+            let carried = Carried { number: packet.sequence, copy: 0, info, marks: Marks::default(), item: packet };
+            engine.offer(now, carried, inside, &mut outputs);
+        }
+        self.come_out(outputs);
     }
 
-    fn announce(&mut self, Departure { at, ticket }: Departure) {
-        self.pending.push(Pending { at, what: What::Departs(ticket) });
+    /// Lets all that is due happen, and keeps the events until they are polled.
+    #[inline(always)]
+    fn let_happen(&mut self, now: Instant) {
+        while let Some(Pending { at, what }) = self.pending.pop_due(now) {
+            match what {
+                Some(arrival) => {
+                    let event = self.arrive(at, arrival);
+                    self.happened.push_back(event);
+                }
+                None => self.wake(at),
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn arrive(&mut self, at: Instant, arrival: Arrival<P>) -> LinkEvent<P> {
+        let Arrival { packet, copy, marks } = arrival;
+        let marks = marks.map_or_else(Marks::default, |marks| *marks);
+        if marks.discarded_on_arrival {
+            self.stats.seldom.dropped[DropCause::Checksum.index()] += 1;
+            return packet.event(at, Fate::Dropped(DropCause::Checksum), copy, marks);
+        }
+        self.stats.flow.delivered += 1;
+        self.stats.flow.delay_nanos += u128::from(at.as_nanos() - packet.sent.as_nanos());
+        packet.event(at, Fate::Delivered(at), copy, marks)
+    }
+
+    #[cold]
+    fn wake(&mut self, at: Instant) {
+        let mut outputs = core::mem::take(&mut self.outputs);
+        if let Some(engine) = self.pipeline.engine() {
+            engine.woken(at);
+            engine.pass(at, &mut outputs);
+        }
+        self.come_out(outputs);
+    }
+
+    /// Deals with what has come out of the engine, and asks it when to be woken.
+    fn come_out(&mut self, mut outputs: Outputs<InLink<P>>) {
+        for output in outputs.drain(..) {
+            let Carried { copy, marks, item, .. } = output.packet;
+            match output.exit {
+                Exit::Arrives(at) => {
+                    self.stats.seldom.marked += u64::from(marks.congestion);
+                    self.stats.seldom.damaged += u64::from(marks.damage.is_some());
+                    let marks = (marks != Marks::default()).then(|| Box::new(marks));
+                    self.pending.push(Pending { at, what: Some(Arrival { packet: item, copy, marks }) });
+                }
+                Exit::Dropped(at, cause) => self.drop(at, cause, item, copy, marks),
+                Exit::Copied(at) => {
+                    self.stats.seldom.duplicated += 1;
+                    self.happened.push_back(item.event(at, Fate::Duplicated, copy, marks));
+                }
+            }
+        }
+        self.outputs = outputs;
+        if let Some(at) = self.pipeline.engine().and_then(crate::engine::Engine::announce) {
+            self.pending.push(Pending { at, what: None });
+        }
+    }
+
+    fn drop(&mut self, now: Instant, cause: DropCause, packet: InLink<P>, copy: u8, marks: Marks) {
+        self.stats.seldom.dropped[cause.index()] += 1;
+        self.happened.push_back(packet.event(now, Fate::Dropped(cause), copy, marks));
     }
 }
 
 impl<P> InLink<P> {
-    fn event(self, at: Instant, fate: Fate) -> LinkEvent<P> {
+    #[inline]
+    fn event(self, at: Instant, fate: Fate, copy: u8, marks: Marks) -> LinkEvent<P> {
         let Self { sequence, sent, size, payload } = self;
-        LinkEvent { sequence, sent, at, size, payload, fate }
+        LinkEvent { sequence, copy, sent, at, size, payload, fate, marked: marks.congestion, damage: marks.damage }
+    }
+}
+
+impl<P> fmt::Debug for Link<P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Link").field("name", &self.name).field("now", &self.now).field("stats", &self.stats).finish_non_exhaustive()
     }
 }

@@ -8,16 +8,19 @@
 //! Every pair of nodes has a link in either direction. A node may have an *uplink*, one line that all it sends passes before the links, and a
 //! *downlink*, one line that all it receives passes after them.
 
-use alloc::collections::VecDeque;
+use alloc::collections::{BTreeMap, VecDeque};
 use alloc::string::String;
 use alloc::vec::Vec;
 
 use cohaptic_units::{Bytes, Instant};
 
-use crate::bottleneck::Departure;
+use crate::direct::Words;
 use crate::event_queue::Event;
-use crate::pipeline::{Enqueued, Outcome, Pipeline, Words, check_time};
-use crate::{DropCause, EventQueue, Fate, LinkConfig, LinkName, LinkStats, TimeWentBack};
+use crate::filter::{Filter, Offered};
+use crate::packet::{Carried, Exit, Marks, Outputs, PacketInfo};
+use crate::pipeline::{Outcome, Pipeline, check_time};
+use crate::stats::{Flow, Seldom};
+use crate::{Damage, DropCause, EventQueue, Fate, LinkModel, LinkName, LinkStats, TimeWentBack};
 
 /// A node of a network, by its place from 0.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -63,8 +66,8 @@ pub enum NetworkError {
     NoLine(AccessLine),
 }
 
-/// What became of one packet, end to end.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+/// What became of one packet, end to end, or that a copy of it was made.
+#[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct NetworkEvent<P> {
     /// Who sent it.
@@ -73,16 +76,23 @@ pub struct NetworkEvent<P> {
     pub to: NodeId,
     /// The number of the packet on its path, from 0.
     pub sequence: u64,
+    /// 0 for the packet itself. A copy that its uplink made differs in the lowest bit, one that its link made in the second, its downlink in the third.
+    /// With [`Fate::Duplicated`] it is the number of the new copy.
+    pub copy: u8,
     /// When the network took it.
     pub sent: Instant,
-    /// When it arrived or was dropped.
+    /// When it arrived or was dropped, or when the copy was made.
     pub at: Instant,
     /// Its size.
     pub size: Bytes,
-    /// What it carries.
+    /// What it carries, as it was offered: see `damage`.
     pub payload: P,
     /// What became of it.
     pub fate: Fate,
+    /// Whether an active queue marked it: congestion experienced.
+    pub marked: bool,
+    /// The bits that were flipped. [`Damage::apply`] flips them.
+    pub damage: Option<Damage>,
 }
 
 /// A network of N nodes as a state machine.
@@ -108,16 +118,22 @@ pub struct Network<P> {
     paths: Vec<u64>,
     pending: EventQueue<Pending<P>>,
     happened: VecDeque<NetworkEvent<P>>,
+    /// Counters that few packets touch, in the order of links, uplinks and downlinks.
+    seldom: Vec<Seldom>,
+    filters: BTreeMap<Path, Filter<P>>,
+    /// The damage to packets on their way that are flagged as damaged.
+    damages: BTreeMap<(Path, u64, u8), Damage>,
+    outputs: Outputs<InNetwork<P>>,
     /// Whether anything but final arrivals can be pending.
     has_inner_events: bool,
     /// Whether any link has ever drawn random numbers.
     is_random: bool,
 }
 
-/// A link or an access line with its counters.
+/// A link or an access line with the counters that every packet touches.
 #[derive(Clone, Debug)]
 struct Line<P> {
-    stats: LinkStats,
+    flow: Flow,
     pipeline: Pipeline<InNetwork<P>>,
 }
 
@@ -129,8 +145,40 @@ struct InNetwork<P> {
     /// When it entered the line that it is in.
     entered: Instant,
     path: Path,
-    size: u32,
+    size: SizeAndMarks,
     payload: P,
+}
+
+/// The size of a packet in the upper 24 bits, and below what happened to it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct SizeAndMarks(u32);
+
+impl SizeAndMarks {
+    const ECN_CAPABLE: u32 = 1 << 3;
+    const MARKED: u32 = 1 << 4;
+    const DAMAGED: u32 = 1 << 5;
+    const DISCARDED_ON_ARRIVAL: u32 = 1 << 6;
+
+    fn new(info: PacketInfo) -> Self {
+        let size = u32::try_from(info.size.get()).unwrap_or(u32::MAX).min((1 << 24) - 1);
+        Self(size << 8).with(Self::ECN_CAPABLE, info.ecn_capable)
+    }
+
+    fn size(self) -> Bytes {
+        Bytes::new((self.0 >> 8).into())
+    }
+
+    fn copy(self) -> u8 {
+        self.0.to_le_bytes()[0] & 0b111
+    }
+
+    fn has(self, flag: u32) -> bool {
+        self.0 & flag != 0
+    }
+
+    fn with(self, flag: u32, set: bool) -> Self {
+        if set { Self(self.0 | flag) } else { Self(self.0 & !flag) }
+    }
 }
 
 /// From whom to whom.
@@ -144,18 +192,18 @@ struct Path {
 #[derive(Clone, Debug)]
 struct Pending<P> {
     at: Instant,
-    /// The packet's sequence on its path, or the ticket of a departure.
+    /// The packet's sequence on its path.
     sequence: u64,
     sent: Instant,
     entered: Instant,
     place: Place,
     path: Path,
-    size: u32,
-    /// `None`: a departure from a bottleneck.
+    size: SizeAndMarks,
+    /// `None`: the time to wake the line's engine.
     payload: Option<P>,
 }
 
-/// Stage and line in one number: what breaks ties between simultaneous events. All departures come before all arrivals, so that what leaves one
+/// Kind and line in one number: what breaks ties between simultaneous events. All engines are woken before anything arrives, so that what leaves one
 /// line finds the room that a departure from the next line makes at the same instant.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Place(u32);
@@ -175,7 +223,7 @@ const DRAWN_AT_ONCE: u16 = 8;
 const LINE_BITS: u32 = 29;
 
 impl Place {
-    fn departure(hop: Hop, line: u32) -> Self {
+    fn waking(hop: Hop, line: u32) -> Self {
         Self((hop as u32) << LINE_BITS | line)
     }
 
@@ -197,7 +245,7 @@ impl Place {
 }
 
 impl<P> Event for Pending<P> {
-    type Key = (Instant, Place, u64, Path);
+    type Key = (Instant, Place, u64, Path, u8);
 
     #[inline]
     fn at(&self) -> Instant {
@@ -206,18 +254,18 @@ impl<P> Event for Pending<P> {
 
     #[inline]
     fn key(&self) -> Self::Key {
-        (self.at, self.place, self.sequence, self.path)
+        (self.at, self.place, self.sequence, self.path, self.size.copy())
     }
 }
 
-impl<P> Network<P> {
-    /// A network whose links have the configurations that `link` gives for (sender, receiver).
+impl<P: Clone> Network<P> {
+    /// A network whose links are what `link` gives for (sender, receiver).
     ///
     /// # Panics
     ///
     /// With more than 23,170 nodes: links are counted in 29 bits, nodes in 16.
     #[must_use]
-    pub fn new(config: NetworkConfig, mut link: impl FnMut(NodeId, NodeId) -> LinkConfig) -> Self {
+    pub fn new<M: Into<LinkModel>>(config: NetworkConfig, mut link: impl FnMut(NodeId, NodeId) -> M) -> Self {
         let nodes = u16::try_from(config.nodes.len()).ok().filter(|nodes| *nodes <= 23_170).expect("a network has at most 23,170 nodes");
         let mut network = Self {
             nodes,
@@ -228,16 +276,19 @@ impl<P> Network<P> {
             paths: Vec::new(),
             pending: EventQueue::new(),
             happened: VecDeque::new(),
+            seldom: alloc::vec![Seldom::default(); config.nodes.len() * (config.nodes.len() + 2)],
+            filters: BTreeMap::new(),
+            damages: BTreeMap::new(),
+            outputs: Vec::new(),
             has_inner_events: false,
             is_random: false,
             config,
         };
         for from in 0..nodes {
             for to in 0..nodes {
-                let config = if from == to { LinkConfig::default() } else { link(NodeId(from.into()), NodeId(to.into())) };
-                network.has_inner_events |= config.bottleneck.is_some();
-                network.is_random |= config.is_random();
-                let line = network.line(&network.link_name(Path { from, to }), config);
+                let model = if from == to { LinkModel::default() } else { link(NodeId(from.into()), NodeId(to.into())).into() };
+                network.is_random |= model.is_random();
+                let line = network.line(&network.link_name(Path { from, to }), model);
                 network.links.push(line);
             }
         }
@@ -249,14 +300,14 @@ impl<P> Network<P> {
     /// # Errors
     ///
     /// [`NetworkError::NoLine`] if there is no such node.
-    pub fn with_access_line(mut self, access: AccessLine, config: LinkConfig) -> Result<Self, NetworkError> {
+    pub fn with_access_line(mut self, access: AccessLine, model: impl Into<LinkModel>) -> Result<Self, NetworkError> {
         let (AccessLine::Uplink(node) | AccessLine::Downlink(node)) = access;
         let name = self.config.nodes.get(node.0 as usize).ok_or(NetworkError::NoLine(access))?;
         let name = match access {
             AccessLine::Uplink(_) => LinkName::uplink(name),
             AccessLine::Downlink(_) => LinkName::downlink(name),
         };
-        let line = self.line(&name, config);
+        let line = self.line(&name, model.into());
         match access {
             AccessLine::Uplink(_) => {
                 self.paths = alloc::vec![0; self.links.len()];
@@ -268,25 +319,41 @@ impl<P> Network<P> {
         Ok(self)
     }
 
-    /// Takes a packet from one node to another. A size beyond 4,294,967,295 bytes counts as that.
+    /// Drops every packet from one node to another of which the filter says so, before anything else happens to it.
+    ///
+    /// # Errors
+    ///
+    /// [`NetworkError`] if there is no such link.
+    pub fn with_filter(
+        mut self,
+        from: NodeId,
+        to: NodeId,
+        drops: impl Fn(&Offered<'_, P>) -> bool + Send + Sync + 'static,
+    ) -> Result<Self, NetworkError> {
+        let path = self.path(from, to)?;
+        self.filters.insert(path, Filter::new(drops));
+        Ok(self)
+    }
+
+    /// Takes a packet from one node to another. A size alone is a packet without ECN; one beyond 16,777,215 bytes counts as that.
     ///
     /// # Errors
     ///
     /// [`NetworkError`] if time went back or there is no such link; nothing was changed.
     #[inline]
-    pub fn handle_packet(&mut self, now: Instant, from: NodeId, to: NodeId, size: Bytes, payload: P) -> Result<(), NetworkError> {
+    pub fn handle_packet(&mut self, now: Instant, from: NodeId, to: NodeId, info: impl Into<PacketInfo>, payload: P) -> Result<(), NetworkError> {
         let path = self.path(from, to)?;
         let link = self.link(path);
         self.let_pass(now)?;
         let sequence = match self.paths.get_mut(link as usize) {
-            None => self.links[link as usize].stats.offered,
+            None => self.links[link as usize].flow.offered,
             Some(count) => {
                 *count += 1;
                 *count - 1
             }
         };
-        let size = u32::try_from(size.get()).unwrap_or(u32::MAX);
-        let packet = InNetwork { sequence, sent: now, entered: now, path, size, payload };
+        let info = info.into();
+        let packet = InNetwork { sequence, sent: now, entered: now, path, size: SizeAndMarks::new(info), payload };
         if self.uplinks[from.0 as usize].is_some() {
             self.enter(now, Hop::Uplink, from.0, packet);
         } else {
@@ -301,24 +368,22 @@ impl<P> Network<P> {
     /// # Errors
     ///
     /// [`NetworkError`] if time went back or there is no such node; nothing was changed.
-    pub fn handle_broadcast(&mut self, now: Instant, from: NodeId, size: Bytes, payload: P) -> Result<(), NetworkError>
-    where
-        P: Clone,
-    {
+    pub fn handle_broadcast(&mut self, now: Instant, from: NodeId, info: impl Into<PacketInfo>, payload: P) -> Result<(), NetworkError> {
+        let info = info.into();
         let sender = self.place(from).ok_or(NetworkError::NoLink { from, to: from })?;
         if !self.paths.is_empty() {
             for to in (0..self.nodes).filter(|to| *to != sender) {
-                self.handle_packet(now, from, NodeId(to.into()), size, payload.clone())?;
+                self.handle_packet(now, from, NodeId(to.into()), info, payload.clone())?;
             }
             return Ok(());
         }
         self.let_pass(now)?;
-        let size = u32::try_from(size.get()).unwrap_or(u32::MAX);
+        let size = SizeAndMarks::new(info);
         if !self.is_random {
             for to in (0..self.nodes).filter(|to| *to != sender) {
                 let path = Path { from: sender, to };
                 let link = self.link(path);
-                let sequence = self.links[link as usize].stats.offered;
+                let sequence = self.links[link as usize].flow.offered;
                 let packet = InNetwork { sequence, sent: now, entered: now, path, size, payload: payload.clone() };
                 self.offer(now, Hop::Link, link, packet, [0; 2]);
             }
@@ -331,13 +396,13 @@ impl<P> Network<P> {
             let end = self.nodes.min(begin + DRAWN_AT_ONCE);
             let mut words = [[0; 2]; DRAWN_AT_ONCE as usize];
             for (words, to) in words.iter_mut().zip(begin..end) {
-                let Line { stats, pipeline } = &self.links[(first + u32::from(to)) as usize];
-                *words = pipeline.words(stats.offered);
+                let Line { flow, pipeline } = &self.links[(first + u32::from(to)) as usize];
+                *words = pipeline.words(flow.offered);
             }
             for (words, to) in words.into_iter().zip(begin..end).filter(|(_, to)| *to != sender) {
                 let path = Path { from: sender, to };
                 let link = first + u32::from(to);
-                let sequence = self.links[link as usize].stats.offered;
+                let sequence = self.links[link as usize].flow.offered;
                 let packet = InNetwork { sequence, sent: now, entered: now, path, size, payload: payload.clone() };
                 self.offer(now, Hop::Link, link, packet, words);
             }
@@ -382,47 +447,61 @@ impl<P> Network<P> {
         None
     }
 
-    /// Changes the configuration of a link from `now` on: see [`crate::Link::set_config`].
+    /// Changes the model of a link from `now` on: see [`crate::Link::set_model`].
     ///
     /// # Errors
     ///
     /// [`NetworkError`] if time went back or there is no such link; nothing was changed.
-    pub fn set_link(&mut self, now: Instant, from: NodeId, to: NodeId, config: LinkConfig) -> Result<(), NetworkError> {
+    pub fn set_link(&mut self, now: Instant, from: NodeId, to: NodeId, model: impl Into<LinkModel>) -> Result<(), NetworkError> {
         let path = self.path(from, to)?;
         let line = self.link(path);
         self.let_pass(now)?;
-        self.has_inner_events |= config.bottleneck.is_some();
-        self.is_random |= config.is_random();
+        let model = model.into();
+        self.has_inner_events |= !model.is_direct();
+        self.is_random |= model.is_random();
         let name = self.link_name(path);
-        let (departure, released) = self.links[line as usize].pipeline.reconfigure(now, self.config.seed, &name, config);
-        if let Some(departure) = departure {
-            self.announce(Hop::Link, line, departure);
-        }
-        for (packet, at) in released {
-            self.schedule(at, Hop::Link, line, packet);
-        }
+        let mut outputs = core::mem::take(&mut self.outputs);
+        self.links[line as usize].pipeline.reconfigure(now, self.config.seed, &name, model, &mut outputs);
+        self.come_out(Hop::Link, line, outputs);
         Ok(())
     }
 
     /// The counters of a link; `None` if there is none.
     #[must_use]
-    pub fn link_stats(&self, from: NodeId, to: NodeId) -> Option<&LinkStats> {
+    pub fn link_stats(&self, from: NodeId, to: NodeId) -> Option<LinkStats> {
         let path = self.path(from, to).ok()?;
-        self.links.get(self.link(path) as usize).map(|line| &line.stats)
+        let line = self.link(path);
+        Some(LinkStats { flow: self.links.get(line as usize)?.flow, seldom: self.seldom[self.seldom_place(Hop::Link, line)] })
     }
 
     /// The counters of an access line; `None` if the node has none.
     #[must_use]
-    pub fn access_stats(&self, access: AccessLine) -> Option<&LinkStats> {
-        let line = match access {
-            AccessLine::Uplink(node) => self.uplinks.get(node.0 as usize),
-            AccessLine::Downlink(node) => self.downlinks.get(node.0 as usize),
+    pub fn access_stats(&self, access: AccessLine) -> Option<LinkStats> {
+        let (hop, line, place) = match access {
+            AccessLine::Uplink(node) => (Hop::Uplink, self.uplinks.get(node.0 as usize)?.as_ref()?, node.0),
+            AccessLine::Downlink(node) => (Hop::Downlink, self.downlinks.get(node.0 as usize)?.as_ref()?, node.0),
         };
-        line?.as_ref().map(|line| &line.stats)
+        Some(LinkStats { flow: line.flow, seldom: self.seldom[self.seldom_place(hop, place)] })
     }
 
-    fn line(&self, name: &LinkName, config: LinkConfig) -> Line<P> {
-        Line { stats: LinkStats::default(), pipeline: Pipeline::new(self.config.seed, name, config, self.config.general) }
+    fn line(&mut self, name: &LinkName, model: LinkModel) -> Line<P> {
+        self.has_inner_events |= !model.is_direct();
+        Line { flow: Flow::default(), pipeline: Pipeline::new(self.config.seed, name, model, self.config.general) }
+    }
+
+    fn seldom_place(&self, hop: Hop, line: u32) -> usize {
+        let nodes = usize::from(self.nodes);
+        line as usize
+            + match hop {
+                Hop::Link => 0,
+                Hop::Uplink => nodes * nodes,
+                Hop::Downlink => nodes * (nodes + 1),
+            }
+    }
+
+    fn seldom_mut(&mut self, hop: Hop, line: u32) -> &mut Seldom {
+        let place = self.seldom_place(hop, line);
+        &mut self.seldom[place]
     }
 
     fn link_name(&self, path: Path) -> LinkName {
@@ -474,53 +553,136 @@ impl<P> Network<P> {
         let Pending { at, sequence, sent, entered, place, path, size, payload } = pending;
         let hop = place.hop();
         let Some(payload) = payload else {
-            self.depart(hop, place.line(), Departure { at, ticket: sequence });
+            self.wake(at, hop, place.line());
             return None;
         };
-        let stats = &mut self.line_mut(hop, place.line()).stats;
-        stats.delivered += 1;
-        stats.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
-        let packet = InNetwork { sequence, sent, entered: at, path, size, payload };
+        let packet = InNetwork { sequence, sent, entered, path, size, payload };
+        if size.has(SizeAndMarks::DISCARDED_ON_ARRIVAL)
+            && (hop == Hop::Downlink || self.downlinks[usize::from(path.to)].is_none())
+            && hop != Hop::Uplink
+        {
+            return Some(self.discard(at, hop, place.line(), packet));
+        }
+        let flow = &mut self.line_mut(hop, place.line()).flow;
+        flow.delivered += 1;
+        flow.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
+        let packet = InNetwork { entered: at, ..packet };
         match hop {
             Hop::Uplink => self.enter(at, Hop::Link, self.link(path), packet),
             Hop::Link if self.has_inner_events && self.downlinks[usize::from(path.to)].is_some() => {
                 self.enter(at, Hop::Downlink, path.to.into(), packet);
             }
-            Hop::Link | Hop::Downlink => return Some(packet.event(at, Fate::Delivered(at))),
+            Hop::Link | Hop::Downlink => return Some(self.event(packet, at, Fate::Delivered(at))),
         }
         None
     }
 
-    fn depart(&mut self, hop: Hop, line: u32, departure: Departure) {
-        if let Some((packet, arrival, next)) = self.line_mut(hop, line).pipeline.depart(departure) {
-            self.schedule(arrival, hop, line, packet);
-            if let Some(next) = next {
-                self.announce(hop, line, next);
-            }
+    /// The receiver's checksum finds the damage.
+    #[cold]
+    fn discard(&mut self, at: Instant, hop: Hop, line: u32, packet: InNetwork<P>) -> NetworkEvent<P> {
+        self.seldom_mut(hop, line).dropped[DropCause::Checksum.index()] += 1;
+        self.event(packet, at, Fate::Dropped(DropCause::Checksum))
+    }
+
+    #[cold]
+    fn wake(&mut self, at: Instant, hop: Hop, line: u32) {
+        let mut outputs = core::mem::take(&mut self.outputs);
+        if let Some(engine) = self.line_mut(hop, line).pipeline.engine() {
+            engine.woken(at);
+            engine.pass(at, &mut outputs);
         }
+        self.come_out(hop, line, outputs);
     }
 
     /// Hands a packet to a line.
     fn enter(&mut self, now: Instant, hop: Hop, line: u32, packet: InNetwork<P>) {
-        let Line { stats, pipeline } = self.line_mut(hop, line);
-        let words = pipeline.words(stats.offered);
+        let Line { flow, pipeline } = self.line_mut(hop, line);
+        let words = pipeline.words(flow.offered);
         self.offer(now, hop, line, packet, words);
     }
 
     /// The same, with the packet's first random words.
     #[inline(always)]
     fn offer(&mut self, now: Instant, hop: Hop, line: u32, packet: InNetwork<P>, words: Words) {
-        let Line { stats, pipeline } = self.line_mut(hop, line);
-        let number = stats.offered;
-        stats.offered += 1;
+        if !self.filters.is_empty() && self.is_filtered(now, hop, &packet) {
+            self.line_mut(hop, line).flow.offered += 1;
+            return self.drop(now, hop, line, DropCause::Filter, packet);
+        }
+        let Line { flow, pipeline } = self.line_mut(hop, line);
+        let number = flow.offered;
+        flow.offered += 1;
         match pipeline.offer(now, number, words) {
             Outcome::Arrives(at) => self.schedule(at, hop, line, packet),
             Outcome::Dropped(cause) => self.drop(now, hop, line, cause, packet),
-            Outcome::Queues => match pipeline.enqueue(now, number, Bytes::new(packet.size.into()), packet) {
-                Enqueued::Served(departure) => self.announce(hop, line, departure),
-                Enqueued::Waits => {}
-                Enqueued::Dropped(cause, packet) => self.drop(now, hop, line, cause, packet),
-            },
+            Outcome::Enters => self.enter_engine(now, hop, line, number, packet),
+        }
+    }
+
+    /// Whether a filter takes the packet, which it sees when it enters its link.
+    fn is_filtered(&self, now: Instant, hop: Hop, packet: &InNetwork<P>) -> bool {
+        let info = PacketInfo { size: packet.size.size(), ecn_capable: packet.size.has(SizeAndMarks::ECN_CAPABLE) };
+        let offered = Offered { sequence: packet.sequence, now, info, payload: &packet.payload };
+        hop == Hop::Link && self.filters.get(&packet.path).is_some_and(|filter| filter.drops(&offered))
+    }
+
+    fn enter_engine(&mut self, now: Instant, hop: Hop, line: u32, number: u64, packet: InNetwork<P>) {
+        let seldom = *self.seldom_mut(hop, line);
+        let flow = self.line_mut(hop, line).flow;
+        // The packet itself is counted already.
+        let inside = LinkStats { flow, seldom }.in_flight() - 1;
+        let info = PacketInfo { size: packet.size.size(), ecn_capable: packet.size.has(SizeAndMarks::ECN_CAPABLE) };
+        let marks = Marks {
+            congestion: packet.size.has(SizeAndMarks::MARKED),
+            damage: self.take_damage(&packet),
+            discarded_on_arrival: packet.size.has(SizeAndMarks::DISCARDED_ON_ARRIVAL),
+        };
+        let mut outputs = core::mem::take(&mut self.outputs);
+        if let Some(engine) = self.line_mut(hop, line).pipeline.engine() {
+            engine.offer(now, Carried { number, copy: 0, info, marks, item: packet }, inside, &mut outputs);
+        }
+        self.come_out(hop, line, outputs);
+    }
+
+    fn take_damage(&mut self, packet: &InNetwork<P>) -> Option<Damage> {
+        if packet.size.has(SizeAndMarks::DAMAGED) { self.damages.remove(&(packet.path, packet.sequence, packet.size.copy())) } else { None }
+    }
+
+    /// Deals with what has come out of a line's engine, and asks it when to be woken.
+    fn come_out(&mut self, hop: Hop, line: u32, mut outputs: Outputs<InNetwork<P>>) {
+        for output in outputs.drain(..) {
+            let Carried { copy, marks, item: mut packet, .. } = output.packet;
+            let before = packet.size;
+            packet.size = packet
+                .size
+                .with(1 << hop as u32, copy == 1)
+                .with(SizeAndMarks::MARKED, marks.congestion)
+                .with(SizeAndMarks::DAMAGED, marks.damage.is_some())
+                .with(SizeAndMarks::DISCARDED_ON_ARRIVAL, marks.discarded_on_arrival);
+            let seldom = self.seldom_mut(hop, line);
+            match output.exit {
+                Exit::Arrives(at) => {
+                    seldom.marked += u64::from(marks.congestion && !before.has(SizeAndMarks::MARKED));
+                    if let Some(damage) = marks.damage {
+                        seldom.damaged += u64::from(!before.has(SizeAndMarks::DAMAGED));
+                        self.damages.insert((packet.path, packet.sequence, packet.size.copy()), damage);
+                    }
+                    self.schedule(at, hop, line, packet);
+                }
+                Exit::Dropped(at, cause) => {
+                    packet.size = packet.size.with(SizeAndMarks::DAMAGED, false);
+                    self.drop(at, hop, line, cause, packet);
+                }
+                Exit::Copied(at) => {
+                    seldom.duplicated += 1;
+                    packet.size = packet.size.with(SizeAndMarks::DAMAGED, false);
+                    let event = self.event(packet, at, Fate::Duplicated);
+                    self.happened.push_back(event);
+                }
+            }
+        }
+        self.outputs = outputs;
+        if let Some(at) = self.line_mut(hop, line).pipeline.engine().and_then(crate::engine::Engine::announce) {
+            self.announce(hop, line, at);
         }
     }
 
@@ -529,8 +691,18 @@ impl<P> Network<P> {
             // Arrivals that wait to be polled came before this drop.
             self.let_happen(now);
         }
-        self.line_mut(hop, line).stats.dropped[cause.index()] += 1;
-        self.happened.push_back(packet.event(now, Fate::Dropped(cause)));
+        self.seldom_mut(hop, line).dropped[cause.index()] += 1;
+        let event = self.event(packet, now, Fate::Dropped(cause));
+        self.happened.push_back(event);
+    }
+
+    #[inline]
+    fn event(&mut self, packet: InNetwork<P>, at: Instant, fate: Fate) -> NetworkEvent<P> {
+        let damage = self.take_damage(&packet);
+        let InNetwork { sequence, sent, path, size, payload, .. } = packet;
+        let (from, to) = (NodeId(path.from.into()), NodeId(path.to.into()));
+        let (copy, marked, size) = (size.copy(), size.has(SizeAndMarks::MARKED), size.size());
+        NetworkEvent { from, to, sequence, copy, sent, at, size, payload, fate, marked, damage }
     }
 
     #[inline(always)]
@@ -539,9 +711,10 @@ impl<P> Network<P> {
         self.pending.push(Pending { at, sequence, sent, entered, place: Place::arrival(hop, line), path, size, payload: Some(payload) });
     }
 
-    fn announce(&mut self, hop: Hop, line: u32, Departure { at, ticket }: Departure) {
-        let place = Place::departure(hop, line);
-        self.pending.push(Pending { at, sequence: ticket, sent: at, entered: at, place, path: Path { from: 0, to: 0 }, size: 0, payload: None });
+    fn announce(&mut self, hop: Hop, line: u32, at: Instant) {
+        let place = Place::waking(hop, line);
+        let (path, size) = (Path { from: 0, to: 0 }, SizeAndMarks(0));
+        self.pending.push(Pending { at, sequence: 0, sent: at, entered: at, place, path, size, payload: None });
     }
 
     #[inline(always)]
@@ -552,13 +725,5 @@ impl<P> Network<P> {
             Hop::Downlink => &mut self.downlinks[line as usize],
         };
         access.as_mut().expect("a packet is in an access line only where there is one")
-    }
-}
-
-impl<P> InNetwork<P> {
-    #[inline]
-    fn event(self, at: Instant, fate: Fate) -> NetworkEvent<P> {
-        let Self { sequence, sent, path, size, payload, .. } = self;
-        NetworkEvent { from: NodeId(path.from.into()), to: NodeId(path.to.into()), sequence, sent, at, size: Bytes::new(size.into()), payload, fate }
     }
 }

@@ -32,6 +32,8 @@ pub enum Purpose {
     Queue,
     /// The state in which a chain with memory begins: its draws are those of packet 0.
     InitialState,
+    /// Whether a recorded path loses a packet.
+    TraceLoss,
     /// How long a link is up and down in turn: the draws of "packet" n are those of the n-th span.
     Outage,
     /// When a modulator changes state, and to which: the draws of "packet" n are those of its n-th change.
@@ -51,6 +53,7 @@ impl Purpose {
             Self::Reordering => 4,
             Self::Queue => 5,
             Self::InitialState => 6,
+            Self::TraceLoss => 7,
             Self::Outage => 8,
             Self::Modulation => 10,
             Self::Slot => 12,
@@ -274,13 +277,13 @@ mod tests {
 
     #[test]
     fn no_two_draws_share_an_address() {
-        use Purpose::{Corruption, Duplication, InitialState, Jitter, Loss, Modulation, Outage, Queue, Reordering, Slot};
+        use Purpose::{Corruption, Duplication, InitialState, Jitter, Loss, Modulation, Outage, Queue, Reordering, Slot, TraceLoss};
         let mut words = std::collections::BTreeSet::new();
         let mut count = 0;
         for (seed, label) in [(1, "a->b"), (2, "a->b"), (1, "b->a"), (1, "a->b\0")] {
             let stream = Stream::new(seed, label.as_bytes());
             for (number, copy) in [(0, 0), (1, 0), (0, 1), (256, 0), (1 << 16, 0), (0, 255)] {
-                for purpose in [Loss, Jitter, Duplication, Corruption, Reordering, Queue, InitialState, Outage, Modulation, Slot] {
+                for purpose in [Loss, Jitter, Duplication, Corruption, Reordering, Queue, InitialState, TraceLoss, Outage, Modulation, Slot] {
                     let mut draws = stream.copy(number, copy).draws(purpose);
                     words.extend(core::iter::repeat_with(|| draws.next_word()).take(6));
                     count += 6;

@@ -1,7 +1,9 @@
 //! The keys of a link: of `[link]`, of an entry of `[\[links\]]`, of an access line, and of a change in the timeline.
 
 use cohaptic_units::{Bytes, Probability, Rate};
-use cohaptic_wan::{Bottleneck, Delay, Distribution, GilbertElliott, Jitter, LinkConfig, Loss, Order, Outage, Outages, QueueLimit};
+use cohaptic_wan::{
+    Bottleneck, Delay, Distribution, Framing, GilbertElliott, Jitter, LinkConfig, LinkModel, Loss, Order, Outage, Outages, QueueLimit,
+};
 
 use crate::context::Context;
 use crate::table_reader::TableReader;
@@ -12,7 +14,7 @@ use crate::values;
 pub(crate) const LINK_KEYS: [&str; 8] = ["delay", "jitter", "order", "loss", "rate", "queue", "overhead", "outage"];
 
 /// Reads the keys of a link. `beside`: keys of the same table that somebody else reads.
-pub(crate) fn read_link(node: &Node, context: Context<'_>, beside: &[&'static str]) -> Option<LinkConfig> {
+pub(crate) fn read_link(node: &Node, context: Context<'_>, beside: &[&'static str]) -> Option<LinkModel> {
     let mut table = TableReader::new(node, context, "a table of link keys such as { delay = \"24ms\" }")?;
     table.know(beside);
     table.know(&LINK_KEYS);
@@ -39,19 +41,22 @@ pub(crate) fn read_link(node: &Node, context: Context<'_>, beside: &[&'static st
             })
             .ok()?,
     };
-    Some(LinkConfig { outages: outages?, loss: loss?, bottleneck: bottleneck?, delay, order: order? })
+    let config = LinkConfig { outages: outages?, loss: loss?, bottleneck: bottleneck?, delay, order: order?, ..LinkConfig::default() };
+    Some(config.into())
 }
 
 fn read_jitter(node: &Node, context: Context<'_>) -> Option<Jitter> {
     if node.as_table().is_none() {
-        return Some(Jitter { sd: values::duration(node, context)?, distribution: Distribution::Normal });
+        return Some(Jitter::new(values::duration(node, context)?, Distribution::Normal));
     }
     let mut table = TableReader::new(node, context, "a duration or a table")?;
     let sd = table.required("sd", "the standard deviation, a duration such as \"2ms\"", values::duration);
     let laws = [("normal", Distribution::Normal), ("uniform", Distribution::Uniform)];
-    let distribution = table.optional("distribution", Distribution::Normal, |node, context| values::choice(node, context, &laws));
+    let distribution = table.optional("distribution", Distribution::Normal, |node, context| {
+        values::choice(node, context, &[0, 1].map(|i: usize| (laws[i].0, i))).map(|i| laws[i].1.clone())
+    });
     table.finish();
-    Some(Jitter { sd: sd?, distribution: distribution? })
+    Some(Jitter::new(sd?, distribution?))
 }
 
 fn read_loss(node: &Node, context: Context<'_>) -> Option<Loss> {
@@ -90,7 +95,8 @@ fn read_bottleneck(table: &mut TableReader<'_>, context: Context<'_>) -> Option<
     let overhead = table.optional("overhead", Bytes::ZERO, values::size);
     let (rate, limit, overhead) = (rate?.flatten(), limit?, overhead?);
     if let Some(rate) = rate {
-        return Some(Some(Bottleneck { rate, overhead, limit }));
+        let overhead = i32::try_from(overhead.get()).unwrap_or(i32::MAX);
+        return Some(Some(Bottleneck { framing: Framing { overhead, cells: None }, limit, ..Bottleneck::at_rate(rate) }));
     }
     for entry in [queue_entry, overhead_entry].into_iter().flatten() {
         if !context.partial && rate_entry.is_none_or(|rate| written_together(rate, entry)) {

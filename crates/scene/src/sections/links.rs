@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use cohaptic_wan::LinkConfig;
+use cohaptic_wan::LinkModel;
 
 use super::link::{LINK_KEYS, is_empty, read_link};
 use super::selector::read_ends;
@@ -29,7 +29,7 @@ pub(crate) struct LinkClasses {
 #[derive(Clone, Debug)]
 struct Class {
     keys: Node,
-    config: Arc<LinkConfig>,
+    config: Arc<LinkModel>,
 }
 
 /// Reads `[link]` and `[\[links\]]`. `None` where something was refused.
@@ -65,7 +65,7 @@ fn read_entry(
     below: &Node,
     seen: &mut BTreeSet<(usize, usize)>,
     context: Context<'_>,
-) -> Option<((usize, usize), Option<(Node, LinkConfig)>)> {
+) -> Option<((usize, usize), Option<(Node, LinkModel)>)> {
     let mut table = TableReader::new(entry, context, "a table with from, to and link keys")?;
     let ends = read_ends(&mut table, context);
     let to = table.get("to");
@@ -95,7 +95,7 @@ fn read_entry(
 impl LinkClasses {
     /// The table of configurations: equal ones are shared, and stand in order of first use.
     pub(crate) fn table(&self) -> LinkTable {
-        let mut configs: Vec<Arc<LinkConfig>> = Vec::new();
+        let mut configs: Vec<Arc<LinkModel>> = Vec::new();
         let mut config_of: Vec<Option<usize>> = vec![None; self.classes.len()];
         let mut index = self.index.clone();
         for (from, row) in index.iter_mut().enumerate() {
@@ -149,7 +149,7 @@ impl LinkClasses {
         (0..count).flat_map(|from| (0..count).filter(move |&to| to != from).map(move |to| (from, to))).collect()
     }
 
-    fn add(&mut self, keys: Node, config: LinkConfig) -> usize {
+    fn add(&mut self, keys: Node, config: LinkModel) -> usize {
         self.classes.push(Class { keys, config: Arc::new(config) });
         self.classes.len() - 1
     }

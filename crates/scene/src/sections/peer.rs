@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use cohaptic_peer::{Clock, Contact, DeviceConfig, Direction, Drift, Gains, Hand};
 use cohaptic_units::print::Span;
-use cohaptic_wan::LinkConfig;
+use cohaptic_wan::LinkModel;
 
 use super::hand::read_hand;
 use super::header::read_scaling;
@@ -34,8 +34,8 @@ pub(crate) struct PeerKeys {
     pub(crate) hand: Option<Hand>,
     pub(crate) position: Option<[f64; 3]>,
     pub(crate) velocity: Option<[f64; 3]>,
-    pub(crate) uplink: Option<LinkConfig>,
-    pub(crate) downlink: Option<LinkConfig>,
+    pub(crate) uplink: Option<LinkModel>,
+    pub(crate) downlink: Option<LinkModel>,
 }
 
 /// Reads the keys of a peer. `beside`: keys of the same table that somebody else reads. `update`: the period of sending and where it is written.

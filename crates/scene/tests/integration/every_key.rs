@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains, Hand, Integrator, Signal};
 use cohaptic_scene::{Axes, Bounds, ChangeKind, LinkSelector, Scaling, Scene};
 use cohaptic_units::{Bytes, Hertz, Instant, Probability, Rate};
-use cohaptic_wan::{Bottleneck, Delay, Distribution, DropCause, GilbertElliott, Jitter, Loss, Order, Outage, QueueLimit};
+use cohaptic_wan::{
+    Bottleneck, Delay, Distribution, DropCause, Framing, GilbertElliott, Jitter, LinkConfig, LinkModel, Loss, Order, Outage, QueueLimit,
+};
 
 const MILLISECOND: Duration = Duration::from_millis(1);
 
@@ -39,6 +41,10 @@ fn the_header_the_object_and_the_coordination_are_as_written() {
     assert_eq!(scene.integrator, Integrator::RungeKutta4 { steps: 4 });
 }
 
+fn fixed(model: &LinkModel) -> &LinkConfig {
+    model.as_fixed().unwrap()
+}
+
 #[test]
 fn a_peer_is_its_own_keys_over_those_of_all_peers() {
     let scene = scene();
@@ -54,9 +60,10 @@ fn a_peer_is_its_own_keys_over_those_of_all_peers() {
     assert_eq!((left.clock.tick, left.clock.offset, left.clock.drift.parts_per_billion()), (MILLISECOND, 300_000 * Duration::from_nanos(1), -20_000));
     assert_eq!((left.phase, left.compute_delay, left.contact), (3, true, Contact::Grasp));
     assert_eq!((left.coupling, left.coupling_scaling), (Gains { stiffness: 3500.0, damping: 5.0 }, Scaling::InverseN));
-    let line = Bottleneck { rate: Rate::bits_per_sec(10_000_000).unwrap(), overhead: Bytes::new(28), limit: None };
-    assert_eq!(left.uplink.as_ref().unwrap().bottleneck, Some(line));
-    assert_eq!(left.downlink.as_ref().unwrap().delay, Delay::constant(MILLISECOND));
+    let line =
+        Bottleneck { framing: Framing { overhead: 28, cells: None }, limit: None, ..Bottleneck::at_rate(Rate::bits_per_sec(10_000_000).unwrap()) };
+    assert_eq!(fixed(left.uplink.as_ref().unwrap()).bottleneck, Some(line));
+    assert_eq!(fixed(left.downlink.as_ref().unwrap()).delay, Delay::constant(MILLISECOND));
 
     assert_eq!(right.contact, Contact::Push(Direction { axis: 1, positive: false }));
     assert_eq!((right.clock.offset, right.clock.drift.parts_per_billion()), (300_000 * Duration::from_nanos(1), 10_000));
@@ -81,22 +88,29 @@ fn every_kind_of_hand_is_read() {
 #[test]
 fn a_link_is_its_own_keys_over_those_of_all_links() {
     let scene = scene();
-    let usual = scene.links.between(2, 3);
-    assert_eq!(usual.delay, Delay::with_jitter(24 * MILLISECOND, Jitter { sd: 2 * MILLISECOND, distribution: Distribution::Uniform }).unwrap());
+    let usual = fixed(scene.links.between(2, 3));
+    assert_eq!(usual.delay, Delay::with_jitter(24 * MILLISECOND, Jitter::new(2 * MILLISECOND, Distribution::Uniform)).unwrap());
     let bursts = GilbertElliott { p: probability(0.01), r: probability(0.1), h: probability(0.5), k: probability(0.999) };
-    assert_eq!((usual.loss, usual.order), (Loss::GilbertElliott(bursts), Order::InOrder));
-    let queue = Bottleneck { rate: Rate::bits_per_sec(1_000_000).unwrap(), overhead: Bytes::new(28), limit: Some(QueueLimit::Packets(100)) };
-    assert_eq!(usual.bottleneck, Some(queue));
-    assert_eq!(usual.outages.as_slice(), [Outage { from: at(1_000), to: at(2_000) }, Outage { from: at(3_000), to: at(3_500) }]);
+    assert_eq!((usual.loss.clone(), usual.order), (Loss::GilbertElliott(bursts), Order::InOrder));
+    let queue = Bottleneck {
+        framing: Framing { overhead: 28, cells: None },
+        limit: Some(QueueLimit::Packets(100)),
+        ..Bottleneck::at_rate(Rate::bits_per_sec(1_000_000).unwrap())
+    };
+    assert_eq!(usual.bottleneck, Some(queue.clone()));
+    assert_eq!(*usual.outages.scheduled(), [Outage { from: at(1_000), to: at(2_000) }, Outage { from: at(3_000), to: at(3_500) }]);
 
-    let there = scene.links.between(0, 1);
-    assert_eq!(there.delay, Delay::with_jitter(40 * MILLISECOND, Jitter { sd: MILLISECOND, distribution: Distribution::Normal }).unwrap());
-    assert_eq!((there.loss, there.order, there.bottleneck), (Loss::Independent(probability(0.01)), Order::InOrder, Some(queue)));
+    let there = fixed(scene.links.between(0, 1));
+    assert_eq!(there.delay, Delay::with_jitter(40 * MILLISECOND, Jitter::new(MILLISECOND, Distribution::Normal)).unwrap());
+    assert_eq!(
+        (there.loss.clone(), there.order, there.bottleneck.clone()),
+        (Loss::Independent(probability(0.01)), Order::InOrder, Some(queue.clone()))
+    );
     assert!(there.outages.is_empty());
 
     // Every inherited impairment is taken away; the queue goes with its rate.
-    let back = scene.links.between(1, 0);
-    assert_eq!((back.delay, back.loss, back.bottleneck), (Delay::constant(24 * MILLISECOND), Loss::None, None));
+    let back = fixed(scene.links.between(1, 0));
+    assert_eq!((back.delay.clone(), back.loss.clone(), back.bottleneck.clone()), (Delay::constant(24 * MILLISECOND), Loss::None, None));
     assert_eq!(scene.links.configs.len(), 3);
 }
 
@@ -109,12 +123,12 @@ fn changes_stand_in_order_of_time_and_on_top_of_each_other() {
     assert_eq!(all.len(), 6 * 5);
     // The link without a rate stays without one: its queue means nothing.
     let back = all.iter().find(|change| (change.from, change.to) == (1, 0)).unwrap();
-    assert_eq!((back.config.delay, back.config.bottleneck), (Delay::constant(50 * MILLISECOND), None));
+    assert_eq!((fixed(&back.config).delay.clone(), fixed(&back.config).bottleneck.clone()), (Delay::constant(50 * MILLISECOND), None));
     let ChangeKind::Links(one) = &scene.timeline[1].what else { panic!("links") };
     let [change] = one.as_slice() else { panic!("one link") };
     assert_eq!((change.from, change.to), (0, 1));
-    assert_eq!((change.config.delay.mean(), change.config.loss), (50 * MILLISECOND, Loss::Independent(probability(0.2))));
-    assert_eq!(change.config.bottleneck.unwrap().limit, Some(QueueLimit::Bytes(Bytes::new(64_000))));
+    assert_eq!((change.config.mean_delay(), fixed(&change.config).loss.clone()), (50 * MILLISECOND, Loss::Independent(probability(0.2))));
+    assert_eq!(fixed(&change.config).bottleneck.as_ref().unwrap().limit, Some(QueueLimit::Bytes(Bytes::new(64_000))));
     assert_eq!(scene.timeline[2].what, ChangeKind::Contact { peer: 2, contact: Contact::Grasp });
     let up = Some(Hand::Force(Signal::Constant([0.0, 1.0, 0.0])));
     assert_eq!(scene.timeline[3].what, ChangeKind::Hand { peer: 2, hand: up });
@@ -142,17 +156,17 @@ fn an_override_goes_wherever_its_path_leads() {
         Scene::read(&path(), &overrides).unwrap_or_else(|error| panic!("{error}"))
     };
     assert_eq!(set(&["coordination.stiffness=1000"]).coordination.gains.stiffness, 1000.0);
-    assert_eq!(set(&["link.delay=8ms"]).links.between(2, 3).delay.mean(), 8 * MILLISECOND);
-    assert_eq!(set(&["link.delay=\"8ms\"", "link.delay = \"9ms\""]).links.between(2, 3).delay.mean(), 9 * MILLISECOND);
+    assert_eq!(set(&["link.delay=8ms"]).links.between(2, 3).mean_delay(), 8 * MILLISECOND);
+    assert_eq!(set(&["link.delay=\"8ms\"", "link.delay = \"9ms\""]).links.between(2, 3).mean_delay(), 9 * MILLISECOND);
     assert_eq!(set(&["peers.left.contact='none'"]).peers[0].contact, Contact::None);
     assert_eq!(set(&["peers.0.device.mass=3"]).peers[0].device.mass, 3.0);
-    assert_eq!(set(&["links.left.right.delay=70ms"]).links.between(0, 1).delay.mean(), 70 * MILLISECOND);
-    assert_eq!(set(&["links.third.left.delay=70ms"]).links.between(2, 0).delay.mean(), 70 * MILLISECOND);
-    assert_eq!(set(&["links.left.right={ jitter = \"0s\" }"]).links.between(0, 1).delay, Delay::constant(24 * MILLISECOND));
+    assert_eq!(set(&["links.left.right.delay=70ms"]).links.between(0, 1).mean_delay(), 70 * MILLISECOND);
+    assert_eq!(set(&["links.third.left.delay=70ms"]).links.between(2, 0).mean_delay(), 70 * MILLISECOND);
+    assert_eq!(fixed(set(&["links.left.right={ jitter = \"0s\" }"]).links.between(0, 1)).delay, Delay::constant(24 * MILLISECOND));
     assert_eq!(set(&["timeline.0.at=9s"]).timeline[3].at, at(9_000));
     assert_eq!(set(&["expect.travel.0.max=1.5s"]).expect.unwrap().travel[0].bounds.max, Some(1.5));
     assert!(set(&["timeline=[]"]).timeline.is_empty());
-    assert_eq!(set(&["link.rate=unlimited", "timeline=[]"]).links.between(2, 3).bottleneck, None);
+    assert_eq!(fixed(set(&["link.rate=unlimited", "timeline=[]"]).links.between(2, 3)).bottleneck, None);
 }
 
 #[test]
@@ -163,7 +177,7 @@ fn peers_made_by_number_can_be_changed_one_by_one() {
     let scene = Scene::parse(text, Path::new(""), &overrides).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((scene.title.as_str(), scene.peers.len(), scene.links.configs.len()), ("scene", 1000, 2));
     assert_eq!((scene.peers[2].clock.tick, scene.peers[6].contact, scene.peers[999].contact), (2 * MILLISECOND, Contact::None, Contact::Grasp));
-    assert_eq!((scene.links.between(0, 1).delay.mean(), scene.links.between(1, 0).delay.mean()), (9 * MILLISECOND, 5 * MILLISECOND));
+    assert_eq!((scene.links.between(0, 1).mean_delay(), scene.links.between(1, 0).mean_delay()), (9 * MILLISECOND, 5 * MILLISECOND));
 }
 
 #[test]

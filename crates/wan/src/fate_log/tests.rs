@@ -50,7 +50,7 @@ fn what_cannot_be_read_is_named_with_line_and_column() {
     assert_eq!(refusal(&["0,256,1,64,24,loss,0,0"]), "line 2, column copy: found \"256\", expected a number from 0 to 255");
     assert_eq!(refusal(&["0,0,-1,64,24,loss,0,0"]), "line 2, column offered_ns: found \"-1\", expected a whole number from 0 to 2^64 - 1");
     assert_eq!(refusal(&["0,0,0,64,24,delivered,yes,0"]), "line 2, column marked: found \"yes\", expected 0 or 1");
-    assert!(refusal(&["0,0,0,64,24,eaten,0,0"]).starts_with("line 2, column fate: found \"eaten\", expected delivered, duplicated, outage"));
+    assert!(refusal(&["0,0,0,64,24,eaten,0,0"]).starts_with("line 2, column fate: found \"eaten\", expected delivered, duplicated, filter"));
     assert!(FateLog::parse("").unwrap_err().to_string().starts_with("line 1: found \"\", expected the header"));
     assert!(matches!(FateLog::parse("a,b\n"), Err(FateLogError::Header { .. })));
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{
     AccessLine, Bottleneck, Delay, Distribution, DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName, Network, NetworkConfig, NetworkError,
-    NodeId, Order, QueueLimit, TimeWentBack,
+    NodeId, Order, QueueLimit, Service, TimeWentBack,
 };
 use proptest::prelude::*;
 
@@ -60,16 +60,17 @@ proptest! {
     /// The first of the packets that leave in a window may have been sent almost wholly before it: that is the one packet more.
     #[test]
     fn no_window_carries_more_than_the_rate_and_one_packet(bottleneck in bottleneck(), offered in offers()) {
-        let config = LinkConfig { bottleneck: Some(bottleneck), ..LinkConfig::default() };
+        let Service::Rate(rate) = bottleneck.service else { unreachable!("only rates are drawn") };
+        let config = LinkConfig { bottleneck: Some(bottleneck.clone()), ..LinkConfig::default() };
         let departures: Vec<(Instant, Bytes)> = run(&config, &offered).into_iter()
             .filter(|event| matches!(event.fate, Fate::Delivered(_)))
-            .map(|event| (event.at, event.size + bottleneck.overhead))
+            .map(|event| (event.at, bottleneck.framing.on_the_line(event.size)))
             .collect();
         for (first, (from, _)) in departures.iter().enumerate() {
             let mut bits = 0;
             for (to, size) in &departures[first + 1..] {
                 bits += u128::from(size.get()) * 8;
-                prop_assert!(bits * 1_000_000_000 <= bottleneck.rate.bits_sent(*to - *from), "{} bits from {} to {}", bits, from, to);
+                prop_assert!(bits * 1_000_000_000 <= rate.bits_sent(*to - *from), "{} bits from {} to {}", bits, from, to);
             }
         }
     }
@@ -92,7 +93,7 @@ proptest! {
                 }
                 Operation::Configure { gap, config } => {
                     now += gap;
-                    subject.set_config(now, *config).unwrap();
+                    subject.set_model(now, *config).unwrap();
                 }
                 Operation::Poll => {
                     drain(&mut subject);
@@ -133,7 +134,7 @@ proptest! {
         let refused = match which {
             0 => subject.handle_packet(past, Bytes::new(1), 0),
             1 => subject.handle_timeout(past),
-            _ => subject.set_config(past, changed),
+            _ => subject.set_model(past, changed),
         };
         let TimeWentBack { now: given, was, .. } = refused.unwrap_err();
         prop_assert_eq!((given, was), (past, now));
@@ -187,7 +188,7 @@ fn a_change_to_in_order_holds_for_what_is_on_the_way() {
     let millis = |millis: u64| at(millis * 1_000_000);
     subject.handle_packet(millis(0), Bytes::new(1), 'a').unwrap();
     let shorter = LinkConfig { delay: Delay::constant(Duration::from_millis(1)), order: Order::InOrder, ..LinkConfig::default() };
-    subject.set_config(millis(1), shorter).unwrap();
+    subject.set_model(millis(1), shorter).unwrap();
     subject.handle_packet(millis(2), Bytes::new(1), 'b').unwrap();
     subject.handle_timeout(millis(10)).unwrap();
     let arrivals: Vec<(char, Instant)> = std::iter::from_fn(|| subject.poll_event()).map(|event| (event.payload, event.at)).collect();
@@ -198,7 +199,7 @@ fn a_change_to_in_order_holds_for_what_is_on_the_way() {
 fn a_limit_in_bytes_does_not_wrap_for_packets_beyond_counting() {
     // The first is on the line. The second fills a queue of 2⁶⁴−1 bytes; the third finds it full.
     let limit = Some(QueueLimit::Bytes(Bytes::new(u64::MAX)));
-    let bottleneck = Bottleneck { rate: rate(u64::MAX), overhead: Bytes::ZERO, limit };
+    let bottleneck = Bottleneck { limit, ..Bottleneck::at_rate(rate(u64::MAX)) };
     let mut subject = link(LinkConfig { bottleneck: Some(bottleneck), ..LinkConfig::default() });
     for number in 0..3 {
         subject.handle_packet(Instant::ZERO, Bytes::new(u64::MAX), number).unwrap();
@@ -216,7 +217,7 @@ fn the_least_delay_is_kept_and_nearly_reached() {
     let sd = Duration::from_millis(10);
     let delay = jittery(mean, sd, Distribution::Uniform);
     let offered = vec![(nanos(1_000), Bytes::new(64)); usize::from(COUNT)];
-    let events = run(&LinkConfig { delay, ..LinkConfig::default() }, &offered);
+    let events = run(&LinkConfig { delay: delay.clone(), ..LinkConfig::default() }, &offered);
     let smallest = events.into_iter().map(|event| event.at - event.sent).min().unwrap();
     let width = sd.mul_f64(2.0 * 3f64.sqrt());
     assert!(smallest >= delay.least(), "{smallest:?} is below {:?}", delay.least());

@@ -95,7 +95,7 @@ proptest! {
                 Operation::Poll => ledger.drain(&mut subject)?,
                 Operation::Configure { gap, config } => {
                     now += gap;
-                    subject.set_config(now, *config).unwrap();
+                    subject.set_model(now, *config).unwrap();
                 }
             }
             audit(&subject, &ledger, offered)?;
@@ -165,21 +165,21 @@ fn audit_network(plan: &Plan, network: &Network<Payload>, polled: &Ledger, offer
             Some(uplink) => {
                 prop_assert_eq!(uplink.offered(), handed);
                 prop_assert_eq!(onward, uplink.delivered());
-                add(uplink)?;
+                add(&uplink)?;
             }
         }
         let mut arrived = 0;
         for (to, from) in lines(node) {
             let stats = network.link_stats(from, to).unwrap();
             arrived += stats.delivered();
-            add(stats)?;
+            add(&stats)?;
         }
         match network.access_stats(AccessLine::Downlink(node)) {
             None => delivered += arrived,
             Some(downlink) => {
                 prop_assert_eq!(downlink.offered(), arrived);
                 delivered += downlink.delivered();
-                add(downlink)?;
+                add(&downlink)?;
             }
         }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{Distribution, DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName, Loss, Network, NetworkConfig, NetworkEvent, NodeId, Order};
+use cohaptic_wan::{Distribution, DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName, Loss, Network, NetworkConfig, NetworkEvent, NodeId};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -144,7 +144,7 @@ proptest! {
             alone.handle_packet(now, size, 7).unwrap();
             network.handle_packet(now, NodeId(0), NodeId(1), size, 7).unwrap();
             if number == change {
-                alone.set_config(now, changed.clone()).unwrap();
+                alone.set_model(now, changed.clone()).unwrap();
                 network.set_link(now, NodeId(0), NodeId(1), changed.clone()).unwrap();
             }
             if polls {
@@ -160,7 +160,7 @@ proptest! {
         both[1].extend(drain_network(&mut network).into_iter().map(of_network));
         let [of_link, of_network] = both;
         prop_assert_eq!(of_link, of_network);
-        prop_assert_eq!(Some(alone.stats()), network.link_stats(NodeId(0), NodeId(1)));
+        prop_assert_eq!(Some(*alone.stats()), network.link_stats(NodeId(0), NodeId(1)));
     }
 
     /// Also when the one node more comes first in the list, so that all the others have other numbers.
@@ -199,7 +199,7 @@ proptest! {
 
     #[test]
     fn a_change_of_delay_leaves_the_losses_alone(loss in loss(), delays in (delay(), delay())) {
-        let with = |delay| lost(&fates(&LinkConfig { loss, delay, ..LinkConfig::default() }, 200));
+        let with = |delay| lost(&fates(&LinkConfig { loss: loss.clone(), delay, ..LinkConfig::default() }, 200));
         prop_assert_eq!(with(delays.0), with(delays.1));
     }
 
@@ -210,10 +210,9 @@ proptest! {
         let distribution = if uniform { Distribution::Uniform } else { Distribution::Normal };
         let with = |p| fates(&LinkConfig {
             loss: Loss::Independent(probability(p)),
-            delay: jittery(nanos(50_000), nanos(20_000), distribution),
-            order: Order::AllowReordering,
-            bottleneck: None,
+            delay: jittery(nanos(50_000), nanos(20_000), distribution.clone()),
             outages: config.outages.clone(),
+            ..LinkConfig::default()
         }, 200);
         for (fewer, more) in with(low).into_iter().zip(with(high)) {
             match (fewer, more) {

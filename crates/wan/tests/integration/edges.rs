@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{Bottleneck, Delay, Distribution, DropCause, Fate, Link, LinkConfig, LinkName, Loss, NodeId, Order};
+use cohaptic_wan::{Bottleneck, Delay, Distribution, DropCause, Fate, Framing, Link, LinkConfig, LinkName, Loss, NodeId, Order};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -29,11 +29,9 @@ fn long_delay() -> impl Strategy<Value = Delay> {
 }
 
 fn extreme_config() -> impl Strategy<Value = LinkConfig> {
-    let bottleneck = (select(vec![1, 8, u64::MAX]), edge()).prop_map(|(bits, overhead)| Bottleneck {
-        rate: rate(bits),
-        overhead: Bytes::new(overhead),
-        limit: None,
-    });
+    let overhead = select(vec![0, 1, i32::MAX]);
+    let bottleneck = (select(vec![1, 8, u64::MAX]), overhead)
+        .prop_map(|(bits, overhead)| Bottleneck { framing: Framing { overhead, cells: None }, ..Bottleneck::at_rate(rate(bits)) });
     (long_delay(), proptest::option::of(bottleneck), select(vec![Order::AllowReordering, Order::InOrder]))
         .prop_map(|(delay, bottleneck, order)| LinkConfig { delay, bottleneck, order, ..LinkConfig::default() })
 }
@@ -53,7 +51,7 @@ proptest! {
             subject.handle_packet(now, Bytes::new(size), 0).unwrap();
             network.handle_packet(now, NodeId(0), NodeId(1), Bytes::new(size), 0).unwrap();
             if number == change {
-                subject.set_config(now, changed.clone()).unwrap();
+                subject.set_model(now, changed.clone()).unwrap();
                 network.set_link(now, NodeId(0), NodeId(1), changed.clone()).unwrap();
             }
         }
@@ -112,7 +110,7 @@ fn a_link_that_loses_everything_heals() {
         subject.handle_packet(millis(number), Bytes::new(64), number).unwrap();
     }
     assert_eq!((subject.poll_timeout(), subject.stats().dropped(DropCause::Loss)), (None, 100));
-    subject.set_config(millis(100), healed).unwrap();
+    subject.set_model(millis(100), healed).unwrap();
     for number in 100..200 {
         subject.handle_packet(millis(number), Bytes::new(64), number).unwrap();
     }
@@ -136,7 +134,7 @@ fn a_link_without_delay_delivers_at_the_instant_of_sending() {
 
 #[test]
 fn a_packet_of_no_bytes_takes_no_time_on_the_line() {
-    let bottleneck = Bottleneck { rate: rate(1), overhead: Bytes::ZERO, limit: Some(cohaptic_wan::QueueLimit::Packets(0)) };
+    let bottleneck = Bottleneck { limit: Some(cohaptic_wan::QueueLimit::Packets(0)), ..Bottleneck::at_rate(rate(1)) };
     let mut subject = link(LinkConfig { bottleneck: Some(bottleneck), ..LinkConfig::default() });
     // The line is idle again before the next is offered, although nothing may wait.
     for number in 0..3 {

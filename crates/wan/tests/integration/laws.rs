@@ -126,7 +126,7 @@ fn chains_begin_in_their_stationary_law() {
     let bad = (0..200_000).filter(begins_bad).count();
     assert!((39_412..=40_590).contains(&bad), "{bad} of 200,000 chains begin in the bad state");
     for seed in 0..300 {
-        assert_eq!(losses(seed, slow, 1), [begins_bad(&seed)]);
+        assert_eq!(losses(seed, slow.clone(), 1), [begins_bad(&seed)]);
     }
 }
 
@@ -140,7 +140,7 @@ fn a_queue_of_regular_arrivals_drops_exactly_what_does_not_fit() {
     for limit in [1, 2, 7, 100, 1_000] {
         for bytes in [false, true] {
             let bound = if bytes { QueueLimit::Bytes(Bytes::new(3 * limit + 2)) } else { QueueLimit::Packets(limit) };
-            let bottleneck = Bottleneck { rate: rate(BYTE_A_MICROSECOND), overhead: Bytes::ZERO, limit: Some(bound) };
+            let bottleneck = Bottleneck { limit: Some(bound), ..Bottleneck::at_rate(rate(BYTE_A_MICROSECOND)) };
             let mut link = Link::new(1, &LinkName::between("a", "b"), LinkConfig { bottleneck: Some(bottleneck), ..LinkConfig::default() });
             (0..COUNT).for_each(|number| link.handle_packet(at(number * 2_000), Bytes::new(3), ()).unwrap());
             link.handle_timeout(Instant::MAX).unwrap();
@@ -170,7 +170,7 @@ fn packets_at_random_wait_as_long_as_pollaczek_and_khinchine_say() {
     const COUNT: u64 = 300_000;
     const SERVICE: f64 = 64_000.0;
     for (seed, load) in [(1u64, 0.3), (2, 0.6), (3, 0.85)] {
-        let bottleneck = Bottleneck { rate: rate(BYTE_A_MICROSECOND), overhead: Bytes::ZERO, limit: None };
+        let bottleneck = Bottleneck::at_rate(rate(BYTE_A_MICROSECOND));
         let mut link = Link::new(seed, &LinkName::between("a", "b"), LinkConfig { bottleneck: Some(bottleneck), ..LinkConfig::default() });
         let gaps = Stream::new(seed, b"arrivals");
         let mut now = Instant::ZERO;

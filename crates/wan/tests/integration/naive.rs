@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::random::{Purpose, Stream};
-use cohaptic_wan::{Distribution, DropCause, Fate, GilbertElliott, LinkConfig, LinkName, Loss, NodeId, Order, QueueLimit};
+use cohaptic_wan::{Distribution, DropCause, Fate, GilbertElliott, LinkConfig, LinkName, Loss, NodeId, Order, QueueLimit, Service};
 
 use crate::random_links::{Plan, SEED, Sending, name};
 
@@ -20,7 +20,7 @@ pub(crate) struct Offered {
 }
 
 /// When a packet had the line to itself.
-struct Service {
+struct Served {
     begin: Moment,
     end: Moment,
     size: Bytes,
@@ -28,22 +28,22 @@ struct Service {
 
 /// The fates of all packets of one link. Configuration i holds from its instant on; either all of them have a bottleneck or none has.
 pub(crate) fn fates(name: &LinkName, configs: &[(Instant, LinkConfig)], offered: &[Offered]) -> Vec<Fate> {
-    let mut served: Vec<Service> = Vec::new();
+    let mut served: Vec<Served> = Vec::new();
     let mut arrivals: Vec<Instant> = Vec::new();
     let lost = losses(name, configs, offered);
     let mut fate = |number: usize, packet: &Offered| {
         let config = &configs[packet.moment.1].1;
         let now = packet.moment;
-        if config.outages.as_slice().iter().any(|outage| outage.from <= now.0 && now.0 < outage.to) {
+        if config.outages.scheduled().iter().any(|outage| outage.from <= now.0 && now.0 < outage.to) {
             return Fate::Dropped(DropCause::Outage);
         }
         if lost[number] {
             return Fate::Dropped(DropCause::Loss);
         }
         let mut leaves = now;
-        if let Some(bottleneck) = config.bottleneck {
+        if let Some(bottleneck) = &config.bottleneck {
             let busy = served.iter().any(|service| service.end > now);
-            let waiting: Vec<&Service> = served.iter().filter(|service| service.begin > now).collect();
+            let waiting: Vec<&Served> = served.iter().filter(|service| service.begin > now).collect();
             let bytes: u128 = waiting.iter().map(|service| u128::from(service.size.get())).sum();
             let full = match bottleneck.limit {
                 Some(QueueLimit::Packets(limit)) => waiting.len() as u64 + 1 > limit,
@@ -56,7 +56,7 @@ pub(crate) fn fates(name: &LinkName, configs: &[(Instant, LinkConfig)], offered:
             // Lindley: a packet is served when it is there and the one before it is gone.
             let begin = served.last().map_or(now, |previous| previous.end.max(now));
             leaves = transmitted(configs, begin, packet.size);
-            served.push(Service { begin, end: leaves, size: packet.size });
+            served.push(Served { begin, end: leaves, size: packet.size });
         }
         let config = &configs[leaves.1].1;
         let wanted = Instant::from_nanos(leaves.0.as_nanos() + delay(name, config, number as u64));
@@ -71,11 +71,15 @@ pub(crate) fn fates(name: &LinkName, configs: &[(Instant, LinkConfig)], offered:
 
 /// When a packet that has the line from `begin` on is sent: its bits are taken away span by span, in units of 10⁻⁹ bit.
 fn transmitted(configs: &[(Instant, LinkConfig)], begin: Moment, size: Bytes) -> Moment {
-    let bottleneck = |index: usize| configs[index].1.bottleneck.unwrap();
+    let bottleneck = |index: usize| configs[index].1.bottleneck.as_ref().unwrap();
+    let rate_of = |index: usize| match &bottleneck(index).service {
+        Service::Rate(rate) => *rate,
+        other => unreachable!("no model for {other:?}"),
+    };
     let (mut now, mut index) = begin;
-    let mut left = (u128::from(size.get()) + u128::from(bottleneck(index).overhead.get())) * 8 * 1_000_000_000;
+    let mut left = (u128::from(size.get()) + u128::try_from(bottleneck(index).framing.overhead).unwrap()) * 8 * 1_000_000_000;
     loop {
-        let rate = u128::from(bottleneck(index).rate.as_bits_per_sec());
+        let rate = u128::from(rate_of(index).as_bits_per_sec());
         // Rounded up to a nanosecond.
         let needed = left / rate + u128::from(left % rate > 0);
         let end = u128::from(now.as_nanos()) + needed;
@@ -101,17 +105,17 @@ fn losses(name: &LinkName, configs: &[(Instant, LinkConfig)], offered: &[Offered
     let mut lost = Vec::new();
     for (number, packet) in offered.iter().enumerate() {
         while applied < packet.moment.1 + 1 {
-            chain_is_bad = match configs[applied].1.loss {
-                Loss::GilbertElliott(chain) => Some(chain_is_bad.unwrap_or_else(|| stationary_bad(chain))),
+            chain_is_bad = match &configs[applied].1.loss {
+                Loss::GilbertElliott(chain) => Some(chain_is_bad.unwrap_or_else(|| stationary_bad(*chain))),
                 Loss::None | Loss::Independent(_) => None,
                 other => unreachable!("no model for {other:?}"),
             };
             applied += 1;
         }
         let config = &configs[packet.moment.1].1;
-        let down = config.outages.as_slice().iter().any(|outage| outage.from <= packet.moment.0 && packet.moment.0 < outage.to);
+        let down = config.outages.scheduled().iter().any(|outage| outage.from <= packet.moment.0 && packet.moment.0 < outage.to);
         let mut draws = stream.packet(number as u64).draws(Purpose::Loss);
-        lost.push(match config.loss {
+        lost.push(match &config.loss {
             _ if down => false,
             Loss::None => false,
             Loss::Independent(p) => draws.next_unit() < p.get(),
@@ -133,7 +137,7 @@ fn delay(name: &LinkName, config: &LinkConfig, number: u64) -> u64 {
     let Some(jitter) = config.delay.jitter() else { return u64::try_from(mean).unwrap() };
     let mut draws = Stream::new(SEED, name.as_str().as_bytes()).packet(number).draws(Purpose::Jitter);
     let sd = jitter.sd.as_nanos() as f64;
-    let deviation = match jitter.distribution {
+    let deviation = match &jitter.distribution {
         Distribution::Normal => sd * cohaptic_wan::standard_normal(draws.next_word(), || draws.next_word()),
         // Uniform over ±√3·σ.
         Distribution::Uniform => 3f64.sqrt() * sd * (2.0 * draws.next_unit() - 1.0),

@@ -1,7 +1,7 @@
 //! Links and networks against the naive model: every fate and every instant, to the nanosecond.
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{Bottleneck, Delay, DropCause, Fate, LinkConfig, LinkName, Loss, NodeId, Order, Outages, QueueLimit};
+use cohaptic_wan::{Bottleneck, Delay, DropCause, Fate, LinkConfig, LinkName, Loss, NodeId, Order, Outages, QueueLimit, Service};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -39,7 +39,7 @@ fn both(initial: &LinkConfig, script: &[Operation]) -> (Vec<Fate>, Vec<Fate>) {
             Operation::Poll => events.extend(drain(&mut subject)),
             Operation::Configure { gap, config } => {
                 now += *gap;
-                subject.set_config(now, (**config).clone()).unwrap();
+                subject.set_model(now, (**config).clone()).unwrap();
                 configs.push((now, (**config).clone()));
             }
         }
@@ -100,7 +100,7 @@ proptest! {
         mut bottleneck in bottleneck(),
     ) {
         bottleneck.limit = None;
-        let config = |bits| LinkConfig { bottleneck: Some(Bottleneck { rate: rate(bits), ..bottleneck }), ..LinkConfig::default() };
+        let config = |bits| LinkConfig { bottleneck: Some(Bottleneck { service: Service::Rate(rate(bits)), ..bottleneck.clone() }), ..LinkConfig::default() };
         let script: Vec<Operation> = sizes.iter().map(|size| Operation::Offer { gap: nanos(0), size: Bytes::new(*size) })
             .chain(rates.iter().map(|(gap, bits)| Operation::Configure { gap: nanos(*gap), config: Box::new(config(*bits)) }))
             .collect();
@@ -128,8 +128,8 @@ proptest! {
             let micros = line.delay.mean().as_micros() % 3;
             line.delay = Delay::constant(nanos(u64::try_from(micros).unwrap() * 1_000));
             if let Some(bottleneck) = &mut line.bottleneck {
-                bottleneck.rate = rate(BYTE_A_MICROSECOND);
-                bottleneck.overhead = Bytes::ZERO;
+                bottleneck.service = Service::Rate(rate(BYTE_A_MICROSECOND));
+                bottleneck.framing.overhead = 0;
             }
         }
         compare_network(&plan, false, &script)?;
@@ -166,7 +166,7 @@ fn a_departure_from_a_link_makes_room_for_what_leaves_the_uplink_at_that_instant
     // uplink at 1, 2, 3, 4 µs. The link serves the first over [1, 3], and the second waits from 2 to 3; at 3 the third comes and finds room.
     // The link then serves the second until 5; the fourth comes at 4 and is dropped.
     let line = |bits, limit| LinkConfig {
-        bottleneck: Some(Bottleneck { rate: rate(bits), overhead: Bytes::ZERO, limit }),
+        bottleneck: Some(Bottleneck { limit, ..Bottleneck::at_rate(rate(bits)) }),
         delay: Delay::default(),
         order: Order::AllowReordering,
         ..LinkConfig::default()
@@ -205,7 +205,7 @@ proptest! {
             packets.push(Offered { moment: (now, 0), size: *size });
         }
         let change = now + nanos(change);
-        subject.set_config(change, LinkConfig::default()).unwrap();
+        subject.set_model(change, LinkConfig::default()).unwrap();
         subject.handle_timeout(change).unwrap();
         let events = drain(&mut subject).into_iter().map(|event| (event.sequence, event.fate)).collect();
         let model: Vec<Fate> = fates(&LinkName::between("left", "right"), &[(Instant::ZERO, narrow)], &packets)

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Probability, Rate};
 use cohaptic_wan::{
-    AccessLine, Bottleneck, Delay, Distribution, GilbertElliott, Jitter, Link, LinkConfig, LinkEvent, LinkName, Loss, Network, NetworkConfig,
-    NetworkEvent, NodeId, Order, Outage, Outages, QueueLimit,
+    AccessLine, Bottleneck, Delay, Distribution, Framing, GilbertElliott, Jitter, Link, LinkConfig, LinkEvent, LinkName, Loss, Network,
+    NetworkConfig, NetworkEvent, NodeId, Order, Outage, Outages, QueueLimit,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -36,7 +36,7 @@ pub(crate) fn probability(value: f64) -> Probability {
 }
 
 pub(crate) fn jittery(mean: Duration, sd: Duration, distribution: Distribution) -> Delay {
-    Delay::with_jitter(mean, Jitter { sd, distribution }).unwrap()
+    Delay::with_jitter(mean, Jitter::new(sd, distribution)).unwrap()
 }
 
 /// What is done to one link; each `gap` is the time since the operation before.
@@ -152,9 +152,9 @@ pub(crate) fn bottleneck() -> impl Strategy<Value = Bottleneck> {
         2 => (0..12u64).prop_map(|bytes| Some(QueueLimit::Bytes(Bytes::new(bytes)))),
     ];
     (rates, select(vec![0, 0, 1, 28]), limits).prop_map(|(bits, overhead, limit)| Bottleneck {
-        rate: rate(bits),
-        overhead: Bytes::new(overhead),
+        framing: Framing { overhead, cells: None },
         limit,
+        ..Bottleneck::at_rate(rate(bits))
     })
 }
 
@@ -193,6 +193,7 @@ pub(crate) fn config_with(bottleneck: impl Strategy<Value = Option<Bottleneck>>)
         bottleneck,
         delay,
         order,
+        ..LinkConfig::default()
     })
 }
 

@@ -31,9 +31,9 @@ fn distance(sample: Vec<f64>, name: &str, law: &Law) -> f64 {
 }
 
 fn draws(law: &Law, seed: u64, count: u64) -> Vec<f64> {
-    let stream = Stream::new(seed, b"law", Purpose::Jitter);
+    let stream = Stream::new(seed, b"law");
     let draw = |packet| {
-        let mut draws = stream.at(packet);
+        let mut draws = stream.packet(packet).draws(Purpose::Jitter);
         law.draw(draws.next_word(), || draws.next_word())
     };
     (0..count).map(draw).collect()
@@ -92,11 +92,15 @@ fn a_gaussian_copula_has_the_law_and_the_correlation() {
             continue;
         }
         let phi = law.gaussian_correlation(rho).unwrap();
-        let stream = Stream::new(seed, b"copula", Purpose::Jitter);
-        let mut z = crate::standard_normal(stream, u64::MAX);
+        let stream = Stream::new(seed, b"copula");
+        let normal = |packet: u64| {
+            let mut draws = stream.packet(packet).draws(Purpose::Jitter);
+            crate::standard_normal(draws.next_word(), || draws.next_word())
+        };
+        let mut z = normal(u64::MAX);
         let delays: Vec<f64> = (0..400_000)
             .map(|packet| {
-                z = phi * z + libm::sqrt(1.0 - phi * phi) * crate::standard_normal(stream, packet);
+                z = phi * z + libm::sqrt(1.0 - phi * phi) * normal(packet);
                 law.at_normal(z)
             })
             .collect();

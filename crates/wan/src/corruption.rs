@@ -1,0 +1,228 @@
+//! Bits that are flipped on the way.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+use cohaptic_units::{Bytes, Probability};
+
+use crate::chance::ChanceStage;
+use crate::random::{PacketDraws, Purpose, unit};
+use crate::{Chance, PacketInfo};
+
+/// Which bits of which packets are flipped, and who notices.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Corruption {
+    /// How bits are chosen.
+    pub bits: Flips,
+    /// The bytes that may be hit, counted from the packet's begin; `None`: the whole packet. What lies beyond a packet's end does not count.
+    pub within: Option<Range<u64>>,
+    /// What the receiver does with a damaged packet.
+    pub checksum: Checksum,
+}
+
+/// How bits are chosen.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum Flips {
+    /// Some packets are damaged, each of them in so many different bits, every set of them equally likely; in all bits if there are not so many.
+    Bits {
+        /// Which packets.
+        packets: Chance,
+        /// How many bits of each.
+        count: u32,
+    },
+    /// Every bit for itself, with this probability.
+    Rate(Probability),
+}
+
+/// What the receiver does with a damaged packet.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Checksum {
+    /// It discards it when it arrives, as a network stack does whose checksum fails. That a checksum may miss damage is not modelled.
+    #[default]
+    Discards,
+    /// It takes it: the checksum was computed after the damage, or there is none.
+    Passes,
+}
+
+/// The bits of a packet that were flipped.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub struct Damage(Arc<[u64]>);
+
+impl Damage {
+    /// The bits, ascending: 0 is the lowest bit of the first byte. None if a log is replayed that says only that there was damage.
+    #[must_use]
+    pub fn bits(&self) -> &[u64] {
+        &self.0
+    }
+
+    /// Flips them. Bits beyond the end are left out.
+    pub fn apply(&self, bytes: &mut [u8]) {
+        for bit in &*self.0 {
+            if let Some(byte) = usize::try_from(bit / 8).ok().and_then(|place| bytes.get_mut(place)) {
+                *byte ^= 1 << (bit % 8);
+            }
+        }
+    }
+
+    /// Damage of which nobody knows where it is.
+    pub(crate) fn unknown() -> Self {
+        Self(Arc::from([]))
+    }
+
+    /// These bits, if there are any.
+    pub(crate) fn of(mut bits: Vec<u64>) -> Option<Self> {
+        bits.sort_unstable();
+        (!bits.is_empty()).then(|| Self(bits.into()))
+    }
+
+    /// Both: a bit that is flipped twice is whole again.
+    pub(crate) fn and(self, other: &Self) -> Option<Self> {
+        let mut bits: Vec<u64> = self.0.iter().filter(|bit| !other.0.contains(bit)).copied().collect();
+        bits.extend(other.0.iter().filter(|bit| !self.0.contains(bit)));
+        Self::of(bits)
+    }
+}
+
+/// The stage: the configuration and the answer before.
+#[derive(Clone, Debug)]
+pub(crate) struct CorruptionStage {
+    config: Corruption,
+    packets: Option<ChanceStage>,
+}
+
+impl CorruptionStage {
+    pub(crate) fn reconfigured(before: Option<Self>, config: Option<Corruption>) -> Option<Self> {
+        let config = config?;
+        let before = before.and_then(|stage| stage.packets);
+        let packets = match config.bits {
+            Flips::Bits { packets, .. } => ChanceStage::reconfigured(before, packets),
+            Flips::Rate(_) => None,
+        };
+        Some(Self { config, packets })
+    }
+
+    pub(crate) const fn checksum(&self) -> Checksum {
+        self.config.checksum
+    }
+
+    /// The damage to a packet.
+    pub(crate) fn damage(&mut self, info: PacketInfo, packet: PacketDraws) -> Option<Damage> {
+        let end = self.config.within.as_ref().map_or(info.size, |within| info.size.min(Bytes::new(within.end)));
+        let first = 8 * self.config.within.as_ref().map_or(0, |within| within.start);
+        let count = end.get().saturating_mul(8).saturating_sub(first);
+        let bits = match self.config.bits {
+            Flips::Bits { count: wanted, .. } => {
+                if !self.packets.as_mut()?.happens(packet.first(Purpose::Corruption)) {
+                    return None;
+                }
+                some_of(count, wanted, packet)
+            }
+            Flips::Rate(rate) => each_with(count, rate, packet),
+        };
+        Damage::of(bits.into_iter().map(|bit| first + bit).collect())
+    }
+}
+
+/// So many different numbers below `count`, every set equally likely (Floyd; Bentley & Floyd, CACM 30(9), 1987).
+fn some_of(count: u64, wanted: u32, packet: PacketDraws) -> Vec<u64> {
+    let mut more = packet.more(Purpose::Corruption);
+    let mut chosen = Vec::new();
+    for last in count.saturating_sub(wanted.into())..count {
+        let candidate = below(last + 1, more.next_word());
+        chosen.push(if chosen.contains(&candidate) { last } else { candidate });
+    }
+    chosen
+}
+
+/// A number below `bound`: the word scaled, whose bias is at most bound·2⁻⁶⁴.
+#[expect(clippy::cast_possible_truncation, reason = "the upper half of the product is below the bound")]
+fn below(bound: u64, word: u64) -> u64 {
+    (u128::from(bound) * u128::from(word) >> 64) as u64
+}
+
+/// Each of the numbers below `count` with that probability: gaps between them are geometric, drawn by inversion.
+fn each_with(count: u64, rate: Probability, packet: PacketDraws) -> Vec<u64> {
+    if rate == Probability::ZERO {
+        return Vec::new();
+    }
+    if rate == Probability::ONE {
+        return (0..count).collect();
+    }
+    let mut draws = packet.draws(Purpose::Corruption);
+    let log_of_whole = libm::log1p(-rate.get());
+    let mut chosen = Vec::new();
+    let mut next = 0_u64;
+    loop {
+        // 1 − u lies in (0, 1]: its logarithm is finite.
+        let gap = libm::floor(libm::log(1.0 - unit(draws.next_word())) / log_of_whole);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and saturates far beyond any packet")]
+        let gap = gap as u64;
+        next = next.saturating_add(gap);
+        if next >= count {
+            return chosen;
+        }
+        chosen.push(next);
+        next += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Stream;
+
+    fn stage(bits: Flips, within: Option<Range<u64>>) -> CorruptionStage {
+        CorruptionStage::reconfigured(None, Some(Corruption { bits, within, checksum: Checksum::Passes })).unwrap()
+    }
+
+    fn damages(mut stage: CorruptionStage, size: u64, count: u64) -> Vec<Option<Damage>> {
+        let stream = Stream::new(2, b"corruption");
+        (0..count).map(|number| stage.damage(Bytes::new(size).into(), stream.packet(number))).collect()
+    }
+
+    fn always(count: u32) -> Flips {
+        Flips::Bits { packets: Chance::independent(Probability::ONE), count }
+    }
+
+    /// Each of 64 bits is hit as often as another: χ² with 63 degrees of freedom is below 119 but once in 10⁵.
+    #[test]
+    fn every_bit_is_as_likely_as_another() {
+        let mut hits = [0_u32; 64];
+        for damage in damages(stage(always(3), None), 8, 20_000).into_iter().flatten() {
+            assert_eq!(damage.bits().len(), 3);
+            assert!(damage.bits().windows(2).all(|pair| pair[0] < pair[1]));
+            damage.bits().iter().for_each(|bit| hits[usize::try_from(*bit).unwrap()] += 1);
+        }
+        let expected = 60_000.0 / 64.0;
+        let chi_square: f64 = hits.iter().map(|hits| (f64::from(*hits) - expected).powi(2) / expected).sum();
+        assert!(chi_square < 119.0, "{chi_square}");
+    }
+
+    /// The number of flipped bits of 512 at a rate of 0.01 has the mean 5.12 and the variance 5.07; of 20 000 packets the mean is known to 0.016.
+    #[test]
+    fn a_bit_error_rate_flips_that_fraction_of_the_bits() {
+        let damages = damages(stage(Flips::Rate(Probability::new(0.01).unwrap()), None), 64, 20_000);
+        let flipped: usize = damages.iter().flatten().map(|damage| damage.bits().len()).sum();
+        assert!((flipped as f64 / 20_000.0 - 5.12).abs() < 4.5 * 0.016);
+        // Whole with probability 0.99^512 = 0.005832: 116.6 of 20 000, Poisson.
+        let whole = damages.iter().filter(|damage| damage.is_none()).count();
+        assert!((68..=166).contains(&whole), "{whole}");
+    }
+
+    #[test]
+    fn only_the_bytes_that_may_be_hit_are_hit_and_twice_is_whole_again() {
+        for damage in damages(stage(always(5), Some(4..6)), 64, 100).into_iter().flatten() {
+            assert!(damage.bits().iter().all(|bit| (32..48).contains(bit)));
+            let mut bytes = [7; 64];
+            damage.apply(&mut bytes);
+            assert_ne!(bytes, [7; 64]);
+            damage.apply(&mut bytes);
+            assert_eq!(bytes, [7; 64]);
+            assert_eq!(damage.clone().and(&damage), None);
+        }
+        assert!(damages(stage(always(5), Some(70..80)), 64, 10).iter().all(Option::is_none));
+        assert_eq!(damages(stage(always(99), Some(0..2)), 1, 1)[0].as_ref().unwrap().bits(), [0, 1, 2, 3, 4, 5, 6, 7]);
+    }
+}

@@ -1,0 +1,110 @@
+//! Which packets are lost.
+
+mod four_state;
+mod gilbert_elliott;
+mod in_time;
+mod pattern;
+
+use cohaptic_units::{Instant, Probability};
+
+pub use four_state::{Bursts, FourState, FourStateError};
+pub use gilbert_elliott::GilbertElliott;
+pub use in_time::{GilbertElliottInTime, NoTime};
+pub use pattern::{Counts, Pattern, PatternError};
+
+use crate::Chance;
+use crate::chance::ChanceStage;
+use crate::random::{PacketDraws, Purpose, unit};
+
+/// A loss model.
+#[derive(Clone, PartialEq, Debug, Default)]
+#[non_exhaustive]
+pub enum Loss {
+    /// Nothing is lost, and no random number is drawn.
+    #[default]
+    None,
+    /// Every packet is lost with the same probability, whatever happened to the others.
+    Independent(Probability),
+    /// A packet is more likely lost if the one before was; mean and autocorrelation are exactly those asked for.
+    Correlated(Chance),
+    /// Losses come in bursts: a Markov chain of a good and a bad state.
+    GilbertElliott(GilbertElliott),
+    /// The same in continuous time: a burst is so long in seconds, not in packets.
+    GilbertElliottInTime(GilbertElliottInTime),
+    /// Bursts with packets received within, and losses between them.
+    FourState(FourState),
+    /// Chosen packets or chosen spans of time; nothing is drawn.
+    Pattern(Pattern),
+}
+
+impl Loss {
+    /// The long-run fraction of packets lost, `None` where it depends on the start or on what is sent when.
+    #[must_use]
+    pub fn mean(&self) -> Option<f64> {
+        match self {
+            Self::None => Some(0.0),
+            Self::Independent(probability) => Some(probability.get()),
+            Self::Correlated(chance) => Some(chance.probability().get()),
+            Self::GilbertElliott(chain) => chain.mean_loss(),
+            Self::GilbertElliottInTime(chain) => Some(chain.mean_loss()),
+            Self::FourState(chain) => Some(chain.mean_loss()),
+            Self::Pattern(pattern) => pattern.mean_loss(),
+        }
+    }
+
+    /// Whether random numbers are drawn for it.
+    #[must_use]
+    pub const fn is_random(&self) -> bool {
+        !matches!(self, Self::None | Self::Pattern(_))
+    }
+}
+
+/// The loss stage of one link: the model and what it remembers.
+#[derive(Clone, Debug)]
+pub(crate) enum LossStage {
+    Independent(Probability),
+    Correlated(Option<ChanceStage>),
+    GilbertElliott(GilbertElliott, gilbert_elliott::State),
+    InTime(GilbertElliottInTime, Option<in_time::Seen>),
+    FourState(FourState, four_state::State),
+    Pattern(Pattern),
+}
+
+impl LossStage {
+    /// The stage for a model; `None` if nothing is ever lost. `initial` is the random word for the state in which a chain begins.
+    pub(crate) fn new(loss: Loss, initial: u64) -> Option<Self> {
+        Some(match loss {
+            Loss::None => return None,
+            Loss::Independent(probability) => Self::Independent(probability),
+            Loss::Correlated(chance) => Self::Correlated(ChanceStage::new(chance)),
+            Loss::GilbertElliott(chain) => Self::GilbertElliott(chain, chain.stationary_state(initial)),
+            Loss::GilbertElliottInTime(chain) => Self::InTime(chain, None),
+            Loss::FourState(chain) => Self::FourState(chain, chain.initial_state(unit(initial))),
+            Loss::Pattern(pattern) => Self::Pattern(pattern),
+        })
+    }
+
+    /// The stage with a new model; a chain of the same kind stays in the state it is in.
+    pub(crate) fn reconfigured(before: Option<Self>, loss: Loss, initial: u64) -> Option<Self> {
+        Some(match (before, loss) {
+            (Some(Self::GilbertElliott(_, state)), Loss::GilbertElliott(chain)) => Self::GilbertElliott(chain, state),
+            (Some(Self::InTime(_, seen)), Loss::GilbertElliottInTime(chain)) => Self::InTime(chain, seen),
+            (Some(Self::FourState(_, state)), Loss::FourState(chain)) => Self::FourState(chain, state),
+            (Some(Self::Correlated(stage)), Loss::Correlated(chance)) => Self::Correlated(ChanceStage::reconfigured(stage, chance)),
+            (_, loss) => return Self::new(loss, initial),
+        })
+    }
+
+    /// Whether a packet is lost. `word` is the first of its words for loss.
+    #[inline]
+    pub(crate) fn loses(&mut self, now: Instant, number: u64, word: u64, packet: PacketDraws) -> bool {
+        match self {
+            Self::Independent(probability) => probability.happens(word),
+            Self::Correlated(chance) => chance.as_mut().is_some_and(|chance| chance.happens(word)),
+            Self::GilbertElliott(chain, state) => chain.loses(state, word, packet.more(Purpose::Loss).next_word()),
+            Self::InTime(chain, seen) => chain.loses(seen, now, word, packet.more(Purpose::Loss).next_word()),
+            Self::FourState(chain, state) => chain.loses(state, unit(word)),
+            Self::Pattern(pattern) => pattern.covers(number, now),
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Losses that are chosen, not drawn: these packets, or whatever is sent in these spans (KauNet's data-driven and time-driven patterns).
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::ops::Range;
+use core::time::Duration;
+
+use cohaptic_units::Instant;
+
+/// Spans of packet numbers or of nanoseconds, perhaps again and again.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Pattern {
+    spans: Arc<[Range<u64>]>,
+    period: Option<u64>,
+    counts: Counts,
+}
+
+/// What a pattern counts.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Counts {
+    /// Packets offered to the link, from 0.
+    Packets,
+    /// Nanoseconds since the begin of time.
+    Nanoseconds,
+}
+
+/// Why a pattern is refused.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PatternError {
+    /// A span ends before it begins, or when it begins.
+    #[error("span {index} is empty: expected an end after its begin")]
+    Empty {
+        /// Which, from 0.
+        index: usize,
+    },
+    /// A span begins before the one listed before it has ended.
+    #[error("span {index} begins before the one listed before it has ended: expected spans in order")]
+    Order {
+        /// Which, from 0.
+        index: usize,
+    },
+    /// A span ends after the period.
+    #[error("the pattern begins anew after {period}, before its last span has ended at {end}: expected a period that holds all spans")]
+    Period {
+        /// The period.
+        period: u64,
+        /// The end of the last span.
+        end: u64,
+    },
+}
+
+impl Pattern {
+    /// These packets, counted from 0, and again after every `every` packets.
+    ///
+    /// # Errors
+    ///
+    /// [`PatternError`] if a span is empty or out of order, or does not fit the period.
+    pub fn of_packets(packets: Vec<Range<u64>>, every: Option<u64>) -> Result<Self, PatternError> {
+        Self::new(packets, every, Counts::Packets)
+    }
+
+    /// Whatever is offered in these spans (from the first instant on, before the last), and again after every `every`.
+    ///
+    /// # Errors
+    ///
+    /// [`PatternError`] if a span is empty or out of order, or does not fit the period.
+    pub fn in_time(spans: &[Range<Instant>], every: Option<Duration>) -> Result<Self, PatternError> {
+        let spans = spans.iter().map(|span| span.start.as_nanos()..span.end.as_nanos()).collect();
+        Self::new(spans, every.map(|every| u64::try_from(every.as_nanos()).unwrap_or(u64::MAX)), Counts::Nanoseconds)
+    }
+
+    fn new(spans: Vec<Range<u64>>, period: Option<u64>, counts: Counts) -> Result<Self, PatternError> {
+        let mut end = 0;
+        for (index, span) in spans.iter().enumerate() {
+            if span.start >= span.end {
+                return Err(PatternError::Empty { index });
+            }
+            if span.start < end {
+                return Err(PatternError::Order { index });
+            }
+            end = span.end;
+        }
+        if let Some(period) = period.filter(|period| *period < end || *period == 0) {
+            return Err(PatternError::Period { period, end });
+        }
+        Ok(Self { spans: spans.into(), period, counts })
+    }
+
+    /// What it counts.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// The fraction lost in the long run; `None` without a period, where it tends to nothing.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "a fraction")]
+    pub fn mean_loss(&self) -> Option<f64> {
+        let lost: u64 = self.spans.iter().map(|span| span.end - span.start).sum();
+        self.period.map(|period| lost as f64 / period as f64)
+    }
+
+    /// Whether it covers that packet at that instant.
+    #[must_use]
+    pub fn covers(&self, number: u64, now: Instant) -> bool {
+        let counted = match self.counts {
+            Counts::Packets => number,
+            Counts::Nanoseconds => now.as_nanos(),
+        };
+        let place = self.period.map_or(counted, |period| counted % period);
+        let next = self.spans.partition_point(|span| span.end <= place);
+        self.spans.get(next).is_some_and(|span| span.start <= place)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_chosen_packets_are_covered_again_and_again() {
+        let pattern = Pattern::of_packets(vec![1..2, 4..7], Some(10)).unwrap();
+        let covered: Vec<u64> = (0..20).filter(|number| pattern.covers(*number, Instant::ZERO)).collect();
+        assert_eq!(covered, [1, 4, 5, 6, 11, 14, 15, 16]);
+        assert_eq!(pattern.mean_loss(), Some(0.4));
+    }
+
+    #[test]
+    fn a_span_of_time_begins_with_its_first_instant() {
+        let at = Instant::from_nanos;
+        let pattern = Pattern::in_time(&[at(10)..at(20)], None).unwrap();
+        let covered: Vec<u64> = (0..40).filter(|t| pattern.covers(0, at(*t))).collect();
+        assert_eq!(covered, (10..20).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn what_is_no_pattern_is_refused() {
+        assert_eq!(Pattern::of_packets(vec![3..3], None), Err(PatternError::Empty { index: 0 }));
+        assert_eq!(Pattern::of_packets(vec![3..5, 4..9], None), Err(PatternError::Order { index: 1 }));
+        assert!(matches!(Pattern::of_packets(vec![3..5], Some(4)), Err(PatternError::Period { .. })));
+        assert!(matches!(Pattern::of_packets(vec![], Some(0)), Err(PatternError::Period { .. })));
+    }
+}

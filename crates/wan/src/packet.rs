@@ -1,0 +1,64 @@
+//! What a link knows of a packet, and what it hands from stage to stage.
+
+use alloc::vec::Vec;
+
+use cohaptic_units::{Bytes, Instant};
+
+use crate::{Damage, DropCause};
+
+/// What a link needs to know of a packet. A [`Bytes`] is a packet of that size without ECN.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub struct PacketInfo {
+    /// Its size.
+    pub size: Bytes,
+    /// Whether its ends understand explicit congestion notification (RFC 3168): then an active queue marks it where it would drop another.
+    pub ecn_capable: bool,
+}
+
+impl From<Bytes> for PacketInfo {
+    fn from(size: Bytes) -> Self {
+        Self { size, ecn_capable: false }
+    }
+}
+
+/// A packet between two stages of one link, with whatever its owner put around it.
+#[derive(Clone, Debug)]
+pub(crate) struct Carried<T> {
+    /// The number of the packet on this link: the address of its draws.
+    pub(crate) number: u64,
+    /// 0 for the packet itself, 1 for the copy that this link made.
+    pub(crate) copy: u8,
+    pub(crate) info: PacketInfo,
+    pub(crate) marks: Marks,
+    pub(crate) item: T,
+}
+
+/// What a link did to a packet besides delaying it.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub(crate) struct Marks {
+    /// An active queue marked it: congestion experienced.
+    pub(crate) congestion: bool,
+    /// Bits that were flipped.
+    pub(crate) damage: Option<Damage>,
+    /// The receiver's checksum will find the damage.
+    pub(crate) discarded_on_arrival: bool,
+}
+
+/// What comes out of the stages.
+#[derive(Clone, Debug)]
+pub(crate) struct Output<T> {
+    pub(crate) packet: Carried<T>,
+    pub(crate) exit: Exit,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Exit {
+    /// It will come out of the far end then.
+    Arrives(Instant),
+    /// It was dropped then.
+    Dropped(Instant, DropCause),
+    /// It is a copy that was made then, and goes on.
+    Copied(Instant),
+}
+
+pub(crate) type Outputs<T> = Vec<Output<T>>;

@@ -1,0 +1,168 @@
+//! A line whose capacity was recorded: instants at which it can deliver so many bytes (the format of mahimahi; Netravali et al., USENIX ATC 2015).
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use cohaptic_units::{Bytes, Instant};
+
+/// Opportunities to deliver. At each, up to [`DeliveryTrace::bytes`] leave: of one packet or of several, and a packet may need several. What is not used is
+/// lost. A packet that is offered at the very instant of an opportunity waits for the next.
+///
+/// The recording repeats for ever: after its last line it begins anew, with its end as the new zero.
+///
+/// A capacity recorded under full load says little about a light one (Winstein et al. saturate the link to record it): a haptic flow is a light load.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct DeliveryTrace {
+    /// Nanoseconds from the begin of a round, ascending; equal ones are several opportunities at once.
+    opportunities: Arc<[u64]>,
+    bytes: Bytes,
+}
+
+/// Why a recording is refused. Lines count from 1.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DeliveryTraceError {
+    /// A line is no whole number of milliseconds.
+    #[error("line {line}: expected a whole number of milliseconds")]
+    Number {
+        /// Which line.
+        line: usize,
+    },
+    /// A line lies before the one above it.
+    #[error("line {line}: {found} ms comes after {before} ms: expected times in order")]
+    Order {
+        /// Which line.
+        line: usize,
+        /// What it says \[ms\].
+        found: u64,
+        /// What the line above says \[ms\].
+        before: u64,
+    },
+    /// The recording has no length, so that it cannot be repeated.
+    #[error("the recording ends at 0 ms: expected a last line above 0")]
+    NoLength,
+    /// There is no line.
+    #[error("an empty recording: expected a whole number of milliseconds on each line")]
+    Empty,
+    /// No byte could ever leave.
+    #[error("an opportunity to deliver 0 bytes: expected some")]
+    NoBytes,
+}
+
+/// The bytes that mahimahi lets leave at each opportunity. (Its manual says 1500; a tunnel's header makes it 1504.)
+pub const MAHIMAHI_BYTES: Bytes = Bytes::new(1504);
+
+impl DeliveryTrace {
+    /// Reads mahimahi's format: a whole number of milliseconds on each line, not descending.
+    ///
+    /// # Errors
+    ///
+    /// [`DeliveryTraceError`] with the line. Never panics.
+    pub fn parse(text: &str, bytes: Bytes) -> Result<Self, DeliveryTraceError> {
+        let mut opportunities = Vec::new();
+        let mut before = 0;
+        for (place, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+            let line_number = place + 1;
+            let found: u64 = line.trim().parse().map_err(|_| DeliveryTraceError::Number { line: line_number })?;
+            if found < before {
+                return Err(DeliveryTraceError::Order { line: line_number, found, before });
+            }
+            opportunities.push(found.checked_mul(1_000_000).ok_or(DeliveryTraceError::Number { line: line_number })?);
+            before = found;
+        }
+        Self::new(opportunities, bytes)
+    }
+
+    /// Opportunities at these nanoseconds of each round, in order.
+    fn new(opportunities: Vec<u64>, bytes: Bytes) -> Result<Self, DeliveryTraceError> {
+        match opportunities.last() {
+            None => Err(DeliveryTraceError::Empty),
+            Some(0) => Err(DeliveryTraceError::NoLength),
+            Some(_) if bytes == Bytes::ZERO => Err(DeliveryTraceError::NoBytes),
+            Some(_) => Ok(Self { opportunities: opportunities.into(), bytes }),
+        }
+    }
+
+    /// What may leave at each opportunity.
+    #[must_use]
+    pub const fn bytes(&self) -> Bytes {
+        self.bytes
+    }
+
+    /// The mean rate [bit/s].
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "a mean")]
+    pub fn mean_rate(&self) -> f64 {
+        self.opportunities.len() as f64 * 8.0 * self.bytes.get() as f64 / (self.opportunities.last().copied().unwrap_or(1) as f64 / 1e9)
+    }
+
+    /// The first opportunity after `now` and how many there are at that instant; `None` beyond the end of time.
+    pub(crate) fn next_after(&self, now: Instant) -> Option<(Instant, u64)> {
+        let first = self.first_after(now)?;
+        let at = self.instant(first)?;
+        let count = (first..).take_while(|index| self.instant(*index) == Some(at)).count();
+        Some((at, count as u64))
+    }
+
+    /// When the n-th opportunity after `now` is, n from 1; `None` beyond the end of time.
+    pub(crate) fn nth_after(&self, now: Instant, n: u64) -> Option<Instant> {
+        self.instant(self.first_after(now)?.checked_add(n.checked_sub(1)?)?)
+    }
+
+    /// Opportunities are counted on over all rounds.
+    fn first_after(&self, now: Instant) -> Option<u64> {
+        let period = self.opportunities.last()?;
+        let (round, place) = (now.as_nanos() / period, now.as_nanos() % period);
+        let within = self.opportunities.partition_point(|opportunity| *opportunity <= place);
+        round.checked_mul(self.opportunities.len() as u64)?.checked_add(within as u64)
+    }
+
+    fn instant(&self, index: u64) -> Option<Instant> {
+        let count = self.opportunities.len() as u64;
+        let within = self.opportunities[usize::try_from(index % count).ok()?];
+        (index / count).checked_mul(*self.opportunities.last()?)?.checked_add(within).map(Instant::from_nanos)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn millis(t: u64) -> Instant {
+        Instant::from_nanos(t * 1_000_000)
+    }
+
+    #[test]
+    fn the_recording_repeats() {
+        let trace = DeliveryTrace::parse("0\n2\n2\n5\n", MAHIMAHI_BYTES).unwrap();
+        let mut now = Instant::ZERO;
+        let mut seen = Vec::new();
+        for _ in 0..5 {
+            let (at, count) = trace.next_after(now).unwrap();
+            seen.push((at.as_nanos() / 1_000_000, count));
+            now = at;
+        }
+        assert_eq!(seen, [(2, 2), (5, 2), (7, 2), (10, 2), (12, 2)]);
+        assert_eq!(trace.next_after(millis(4)), Some((millis(5), 2)));
+        assert_eq!([1, 2, 3, 4, 5].map(|n| trace.nth_after(millis(4), n).unwrap()), [5, 5, 7, 7, 10].map(millis));
+    }
+
+    #[test]
+    fn one_a_millisecond_is_twelve_megabits() {
+        let trace = DeliveryTrace::parse("1", Bytes::new(1500)).unwrap();
+        assert_eq!(trace.mean_rate(), 12e6);
+        assert_eq!(trace.next_after(Instant::MAX), None);
+    }
+
+    #[test]
+    fn what_is_no_recording_is_refused() {
+        let error = |text| DeliveryTrace::parse(text, MAHIMAHI_BYTES).unwrap_err();
+        assert_eq!(error("1\nx\n"), DeliveryTraceError::Number { line: 2 });
+        assert_eq!(error("3\n2\n"), DeliveryTraceError::Order { line: 2, found: 2, before: 3 });
+        assert_eq!(error("0\n0\n"), DeliveryTraceError::NoLength);
+        assert_eq!(error("\n"), DeliveryTraceError::Empty);
+        assert_eq!(error("99999999999999999999"), DeliveryTraceError::Number { line: 1 });
+        assert_eq!(error("9999999999999999999"), DeliveryTraceError::Number { line: 1 });
+        assert_eq!(DeliveryTrace::parse("1", Bytes::ZERO), Err(DeliveryTraceError::NoBytes));
+    }
+}

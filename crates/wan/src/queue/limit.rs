@@ -1,0 +1,38 @@
+//! How much may wait.
+
+use core::time::Duration;
+
+use cohaptic_units::Bytes;
+
+/// How much may wait in a queue. What is being sent does not count.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum QueueLimit {
+    /// At most so many packets wait; with 0, a packet that finds the line busy is dropped.
+    Packets(u64),
+    /// The packets that wait hold at most so many bytes together, framing not counted.
+    Bytes(Bytes),
+    /// No packet waits longer than this: one whose turn would come later, at the present rate, is dropped.
+    Time(Duration),
+}
+
+/// What waits, as a limit sees it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Waiting {
+    pub(crate) packets: u64,
+    /// Wider than [`Bytes`], whose sum would saturate and then count wrongly.
+    pub(crate) bytes: u128,
+    /// How long the newest packet would wait for its turn.
+    pub(crate) time: Duration,
+}
+
+impl QueueLimit {
+    /// Whether another packet of that size may wait too.
+    pub(crate) fn admits(self, waiting: Waiting, size: Bytes) -> bool {
+        match self {
+            Self::Packets(limit) => waiting.packets < limit,
+            Self::Bytes(limit) => waiting.bytes + u128::from(size.get()) <= u128::from(limit.get()),
+            Self::Time(limit) => waiting.time <= limit,
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Where packets wait: the bottleneck with its queue, and the token bucket.
+
+mod bottleneck;
+mod codel;
+mod delivery_trace;
+mod framing;
+mod limit;
+mod red;
+mod token_bucket;
+
+pub use bottleneck::{Bottleneck, Discipline, Service};
+pub use codel::CoDel;
+pub use delivery_trace::{DeliveryTrace, DeliveryTraceError, MAHIMAHI_BYTES};
+pub use framing::{Cells, Framing};
+pub use limit::QueueLimit;
+pub use red::{Red, RedError};
+pub use token_bucket::{Peak, TokenBucket};
+
+pub(crate) use bottleneck::BottleneckStage;
+pub(crate) use token_bucket::TokenBucketStage;

@@ -1,0 +1,158 @@
+//! Random early detection (Floyd & Jacobson, *Random Early Detection Gateways for Congestion Avoidance*, IEEE/ACM ToN 1(4), 1993).
+
+use cohaptic_units::{Bytes, Probability};
+
+/// The parameters of RED. The average queue decides about a packet that is offered: below `min` it passes, above `max` it is dropped, and in between it is
+/// dropped with a probability that rises from nothing to `max_probability`, spread evenly over the packets.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Red {
+    min: Bytes,
+    max: Bytes,
+    max_probability: Probability,
+    weight: f64,
+    mean_packet: Bytes,
+    ecn: bool,
+}
+
+/// Why parameters of RED are refused.
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RedError {
+    /// The thresholds are not in order.
+    #[error("RED begins to drop at {min} and drops all at {max}: expected the first below the second")]
+    Thresholds {
+        /// The lower one.
+        min: Bytes,
+        /// The upper one.
+        max: Bytes,
+    },
+    /// The average would never move, or would overshoot.
+    #[error("the weight {0} of the newest queue length in its average: expected a number above 0, at most 1")]
+    Weight(f64),
+    /// A mean packet of no bytes.
+    #[error("a mean packet of 0 bytes: expected some")]
+    MeanPacket,
+}
+
+impl Red {
+    /// Checks the parameters. `weight`: of the newest queue length in the average, 0.002 by custom. `mean_packet`: how fast the average decays while
+    /// the line is idle, by (1−weight)^m with m mean packets' time. `ecn`: a capable packet is marked where another is dropped, up to `max`.
+    ///
+    /// # Errors
+    ///
+    /// [`RedError`] if the thresholds are out of order, the weight is not in (0, 1] or the mean packet is empty.
+    pub fn new(min: Bytes, max: Bytes, max_probability: Probability, weight: f64, mean_packet: Bytes, ecn: bool) -> Result<Self, RedError> {
+        if min >= max {
+            return Err(RedError::Thresholds { min, max });
+        }
+        if !(weight > 0.0 && weight <= 1.0) {
+            return Err(RedError::Weight(weight));
+        }
+        if mean_packet == Bytes::ZERO {
+            return Err(RedError::MeanPacket);
+        }
+        Ok(Self { min, max, max_probability, weight, mean_packet, ecn })
+    }
+
+    /// The mean packet, whose time on the line is the unit of the decay while idle.
+    #[must_use]
+    pub const fn mean_packet(&self) -> Bytes {
+        self.mean_packet
+    }
+}
+
+/// What RED says to a packet.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Verdict {
+    Pass,
+    Mark,
+    Drop,
+}
+
+/// The average and the count since the last packet hit.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct RedState {
+    average: f64,
+    /// Packets that passed between the thresholds since one was hit.
+    count: f64,
+}
+
+impl RedState {
+    /// Decides about a packet that finds `queued` bytes waiting, after the line was idle for so many mean packets' time.
+    pub(crate) fn verdict(&mut self, red: &Red, queued: u128, idle_packets: f64, ecn_capable: bool, word: u64) -> Verdict {
+        #[expect(clippy::cast_precision_loss, reason = "an average")]
+        let queued = queued as f64;
+        self.average *= libm::pow(1.0 - red.weight, idle_packets);
+        self.average += red.weight * (queued - self.average);
+        #[expect(clippy::cast_precision_loss, reason = "thresholds of an average")]
+        let (min, max) = (red.min.get() as f64, red.max.get() as f64);
+        if self.average < min {
+            self.count = 0.0;
+            return Verdict::Pass;
+        }
+        if self.average >= max {
+            self.count = 0.0;
+            return Verdict::Drop;
+        }
+        let base = red.max_probability.get() * (self.average - min) / (max - min);
+        // The gap between hits is then uniform on 1 … 1/base (the paper's method 2).
+        let left = 1.0 - self.count * base;
+        let hit = if left > base { base / left } else { 1.0 };
+        if !Probability::new(hit).unwrap_or(Probability::ONE).happens(word) {
+            self.count += 1.0;
+            return Verdict::Pass;
+        }
+        self.count = 0.0;
+        if red.ecn && ecn_capable { Verdict::Mark } else { Verdict::Drop }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Purpose, Stream};
+
+    fn red(ecn: bool) -> Red {
+        Red::new(Bytes::new(1000), Bytes::new(3000), Probability::new(0.1).unwrap(), 1.0, Bytes::new(100), ecn).unwrap()
+    }
+
+    /// Half way between the thresholds 1/20 is the base probability: gaps between hits are uniform on 1 … 20, whose mean is 10.5. Of 20 000 packets
+    /// about 1905 are hit; the standard error of the mean gap is √(399/12/1905) = 0.132.
+    #[test]
+    fn gaps_between_hits_are_uniform() {
+        let mut state = RedState::default();
+        let stream = Stream::new(3, b"red");
+        let verdicts: Vec<Verdict> =
+            (0..20_000).map(|number| state.verdict(&red(true), 2000, 0.0, true, stream.packet(number).first(Purpose::Queue))).collect();
+        let hits: Vec<usize> = verdicts.iter().enumerate().filter(|(_, verdict)| **verdict == Verdict::Mark).map(|(place, _)| place).collect();
+        let gaps: Vec<usize> = hits.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(gaps.iter().all(|gap| (1..=20).contains(gap)));
+        let mean = gaps.iter().sum::<usize>() as f64 / gaps.len() as f64;
+        assert!((mean - 10.5).abs() < 4.5 * 0.132, "{mean}");
+    }
+
+    #[test]
+    fn below_nothing_and_above_everything_is_hit() {
+        let mut state = RedState::default();
+        assert_eq!(state.verdict(&red(true), 999, 0.0, true, 0), Verdict::Pass);
+        assert_eq!(state.verdict(&red(true), 3000, 0.0, true, u64::MAX), Verdict::Drop);
+        assert_eq!(state.verdict(&red(false), 2000, 0.0, true, 0), Verdict::Drop);
+    }
+
+    #[test]
+    fn an_average_forgets_while_the_line_is_idle() {
+        let slow = Red::new(Bytes::new(1000), Bytes::new(3000), Probability::ONE, 0.5, Bytes::new(100), false).unwrap();
+        let mut state = RedState { average: 4000.0, count: 0.0 };
+        // After two mean packets' time 1000 is left of the average, and half of it when nothing waits.
+        assert_eq!(state.verdict(&slow, 0, 2.0, false, 0), Verdict::Pass);
+        assert!((state.average - 500.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn parameters_that_make_no_sense_are_refused() {
+        let bytes = Bytes::new;
+        assert!(matches!(Red::new(bytes(2), bytes(2), Probability::ONE, 0.1, bytes(1), false), Err(RedError::Thresholds { .. })));
+        assert!(matches!(Red::new(bytes(1), bytes(2), Probability::ONE, 0.0, bytes(1), false), Err(RedError::Weight(_))));
+        assert!(matches!(Red::new(bytes(1), bytes(2), Probability::ONE, 0.1, bytes(0), false), Err(RedError::MeanPacket)));
+    }
+}

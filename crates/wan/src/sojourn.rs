@@ -1,0 +1,97 @@
+//! How long something stays as it is.
+
+use core::time::Duration;
+
+use crate::random::unit;
+
+/// The law of a span of time.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum Sojourn {
+    /// Always as long.
+    Fixed(Duration),
+    /// Exponential with that mean: without memory.
+    Exponential(Duration),
+    /// Uniform between two spans.
+    Uniform(Duration, Duration),
+    /// The sum of so many exponential stages (at least 1), of that mean together: the more stages, the steadier.
+    Erlang(Duration, u32),
+}
+
+impl Sojourn {
+    /// The mean span.
+    #[must_use]
+    pub fn mean(&self) -> Duration {
+        match *self {
+            Self::Fixed(span) | Self::Exponential(span) | Self::Erlang(span, _) => span,
+            Self::Uniform(from, to) => from + to.saturating_sub(from) / 2,
+        }
+    }
+
+    /// Whether it can be drawn and comes to an end: the mean is above zero, and the bounds are in order.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let in_order = match *self {
+            Self::Uniform(from, to) => from <= to,
+            Self::Erlang(_, stages) => stages > 0,
+            Self::Fixed(_) | Self::Exponential(_) => true,
+        };
+        in_order && !self.mean().is_zero()
+    }
+
+    /// A span, at least a nanosecond.
+    pub(crate) fn draw(&self, mut word: impl FnMut() -> u64) -> Duration {
+        #[expect(clippy::cast_precision_loss, reason = "a span enters a random law as a real number")]
+        let nanos = |span: Duration| span.as_nanos() as f64;
+        // 1 − u lies in (0, 1]: its logarithm is finite.
+        let mut exponential = || -libm::log(1.0 - unit(word()));
+        let drawn = match *self {
+            Self::Fixed(span) => return span.max(Duration::from_nanos(1)),
+            Self::Exponential(mean) => nanos(mean) * exponential(),
+            Self::Uniform(from, to) => nanos(from) + (nanos(to) - nanos(from)) * unit(word()),
+            Self::Erlang(mean, stages) => nanos(mean) / f64::from(stages) * (0..stages).map(|_| exponential()).sum::<f64>(),
+        };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative; saturates beyond 584 years")]
+        Duration::from_nanos((libm::rint(drawn) as u64).max(1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Purpose, Stream};
+
+    /// Mean and deviation of 100 000 draws of each law: the standard error of the mean is σ/√n, that of the deviation below 1.5·σ/√n (kurtosis ≤ 9).
+    #[test]
+    fn draws_have_the_mean_and_the_deviation_of_their_law() {
+        let ms = Duration::from_millis;
+        let laws = [
+            (Sojourn::Exponential(ms(10)), 10.0, 10.0),
+            (Sojourn::Uniform(ms(4), ms(16)), 10.0, 12.0 / 12.0_f64.sqrt()),
+            (Sojourn::Erlang(ms(10), 4), 10.0, 5.0),
+        ];
+        let stream = Stream::new(6, b"sojourn");
+        for (law, mean, sd) in laws {
+            let drawn: Vec<f64> = (0..100_000)
+                .map(|n| {
+                    let mut draws = stream.packet(n).draws(Purpose::Outage);
+                    law.draw(|| draws.next_word()).as_secs_f64() * 1e3
+                })
+                .collect();
+            let average = drawn.iter().sum::<f64>() / 1e5;
+            let deviation = (drawn.iter().map(|x| (x - average).powi(2)).sum::<f64>() / 1e5).sqrt();
+            let error = sd / 1e5_f64.sqrt();
+            assert!((average - mean).abs() < 4.5 * error, "{law:?}: {average}");
+            assert!((deviation - sd).abs() < 4.5 * 1.5 * error, "{law:?}: {deviation}");
+        }
+    }
+
+    #[test]
+    fn what_never_ends_or_cannot_be_drawn_is_not_sound() {
+        let ms = Duration::from_millis;
+        for law in [Sojourn::Fixed(ms(0)), Sojourn::Exponential(ms(0)), Sojourn::Uniform(ms(2), ms(1)), Sojourn::Erlang(ms(1), 0)] {
+            assert!(!law.is_sound());
+        }
+        assert_eq!(Sojourn::Fixed(ms(3)).draw(|| 0), ms(3));
+    }
+}
