@@ -236,21 +236,27 @@ impl DelayStage {
     /// The delay \[ns\] of one packet, if there is jitter from `word`, the first of its words for jitter. Rounded to the nearest nanosecond.
     #[inline]
     pub(crate) fn draw_nanos(&mut self, now: Instant, word: u64, packet: PacketDraws) -> u64 {
+        self.draw_nanos_for(Purpose::Jitter, now, word, packet)
+    }
+
+    /// The same from the words for another purpose.
+    #[inline]
+    pub(crate) fn draw_nanos_for(&mut self, purpose: Purpose, now: Instant, word: u64, packet: PacketDraws) -> u64 {
         match &self.law {
             StageLaw::Constant => self.mean_nanos,
             StageLaw::Normal { sd_nanos } => {
-                let mut more = packet.more(Purpose::Jitter);
+                let mut more = packet.more(purpose);
                 let deviation = libm::rint(sd_nanos * standard_normal(word, || more.next_word()));
                 #[expect(clippy::cast_possible_truncation, reason = "saturates, beyond 292 years")]
                 self.mean_nanos.saturating_add_signed(deviation as i64)
             }
-            StageLaw::Independent(_) | StageLaw::Correlated(_) => self.draw_by_law(now, word, packet),
+            StageLaw::Independent(_) | StageLaw::Correlated(_) => self.draw_by_law(purpose, now, word, packet),
         }
     }
 
     #[inline(never)]
-    fn draw_by_law(&mut self, now: Instant, word: u64, packet: PacketDraws) -> u64 {
-        let mut more = packet.more(Purpose::Jitter);
+    fn draw_by_law(&mut self, purpose: Purpose, now: Instant, word: u64, packet: PacketDraws) -> u64 {
+        let mut more = packet.more(purpose);
         match &self.law {
             StageLaw::Constant | StageLaw::Normal { .. } => self.mean_nanos,
             StageLaw::Independent(checked) => count(checked.law.draw(word, || more.next_word())),

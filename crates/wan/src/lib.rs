@@ -96,6 +96,6 @@ pub use queue::{
     TokenBucket,
 };
 pub use reorder::{Displacement, Reorder};
-pub use slots::{Slots, SlotsError};
+pub use slots::{SlotGap, Slots, SlotsError};
 pub use sojourn::Sojourn;
 pub use stats::LinkStats;

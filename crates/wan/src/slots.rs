@@ -6,6 +6,8 @@ use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
 
+use crate::Delay;
+use crate::delay::DelayStage;
 use crate::packet::Carried;
 use crate::random::{Purpose, Stream, unit};
 
@@ -13,14 +15,28 @@ use crate::random::{Purpose, Stream, unit};
 ///
 /// A packet that finds a slot coming waits for it; one that finds none opens the next one, a gap after its own instant. When a slot's share is used up,
 /// the next one opens a gap later.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct Slots {
-    min: Duration,
-    max: Duration,
+    gap: SlotGap,
     /// How many packets leave in a slot; `None`: any number.
     pub packets: Option<NonZeroU64>,
     /// How many bytes leave in a slot, the packet that exceeds them included; `None`: any number.
     pub bytes: Option<NonZeroU64>,
+}
+
+/// How long it is from one slot to the next.
+#[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum SlotGap {
+    /// Uniform between two spans.
+    Between {
+        /// The shortest.
+        min: Duration,
+        /// The longest, not below the shortest.
+        max: Duration,
+    },
+    /// Drawn as a delay is: correlation is that of one gap with the next.
+    Drawn(Delay),
 }
 
 /// The longest gap is shorter than the shortest.
@@ -44,13 +60,19 @@ impl Slots {
         if max < min {
             return Err(SlotsError { min, max });
         }
-        Ok(Self { min, max, packets: None, bytes: None })
+        Ok(Self { gap: SlotGap::Between { min, max }, packets: None, bytes: None })
     }
 
-    /// The shortest and the longest gap.
+    /// Slots whose gaps have the law of a delay, and that take anything.
     #[must_use]
-    pub const fn gaps(&self) -> (Duration, Duration) {
-        (self.min, self.max)
+    pub const fn drawn(gap: Delay) -> Self {
+        Self { gap: SlotGap::Drawn(gap), packets: None, bytes: None }
+    }
+
+    /// The gap from one slot to the next.
+    #[must_use]
+    pub const fn gap(&self) -> &SlotGap {
+        &self.gap
     }
 }
 
@@ -58,6 +80,8 @@ impl Slots {
 #[derive(Clone, Debug)]
 pub(crate) struct SlotStage<T> {
     config: Slots,
+    /// Draws the gaps that have a law.
+    law: Option<DelayStage>,
     waiting: VecDeque<Carried<T>>,
     /// The slot that comes, or the last one.
     opens: Instant,
@@ -68,11 +92,24 @@ pub(crate) struct SlotStage<T> {
 }
 
 impl<T> SlotStage<T> {
-    pub(crate) const fn new(config: Slots) -> Self {
-        Self { config, waiting: VecDeque::new(), opens: Instant::ZERO, count: 0, packets_left: 0, bytes_left: 0 }
+    pub(crate) fn new(config: Slots) -> Self {
+        let law = match &config.gap {
+            SlotGap::Between { .. } => None,
+            SlotGap::Drawn(delay) => Some(DelayStage::new(delay)),
+        };
+        Self { config, law, waiting: VecDeque::new(), opens: Instant::ZERO, count: 0, packets_left: 0, bytes_left: 0 }
     }
 
-    pub(crate) const fn reconfigure(&mut self, config: Slots) {
+    /// New gaps and shares from the next slot on. Correlated gaps go on from where they are.
+    pub(crate) fn reconfigure(&mut self, config: Slots) {
+        self.law = match (self.law.take(), &config.gap) {
+            (_, SlotGap::Between { .. }) => None,
+            (None, SlotGap::Drawn(delay)) => Some(DelayStage::new(delay)),
+            (Some(mut law), SlotGap::Drawn(delay)) => {
+                law.reconfigure(delay);
+                Some(law)
+            }
+        };
         self.config = config;
     }
 
@@ -110,13 +147,26 @@ impl<T> SlotStage<T> {
     }
 
     fn open_next(&mut self, now: Instant, draws: Stream) {
-        let Slots { min, max, packets, bytes } = self.config;
-        #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a gap of some milliseconds")]
-        let beyond = (unit(draws.packet(self.count).first(Purpose::Slot)) * (max - min).as_nanos() as f64) as u64;
+        let draws = draws.packet(self.count);
+        let word = draws.first(Purpose::Slot);
+        let gap = match (&self.config.gap, &mut self.law) {
+            (SlotGap::Between { min, max }, _) => {
+                #[expect(
+                    clippy::cast_precision_loss,
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a gap of some milliseconds"
+                )]
+                let beyond = (unit(word) * (*max - *min).as_nanos() as f64) as u64;
+                min.saturating_add(Duration::from_nanos(beyond))
+            }
+            (SlotGap::Drawn(_), Some(law)) => Duration::from_nanos(law.draw_nanos_for(Purpose::Slot, now, word, draws)),
+            (SlotGap::Drawn(delay), None) => delay.mean(),
+        };
         self.count += 1;
-        self.opens = now.saturating_add(min.saturating_add(Duration::from_nanos(beyond)));
-        self.packets_left = packets.map_or(u64::MAX, NonZeroU64::get);
-        self.bytes_left = bytes.map_or(Bytes::new(u64::MAX).get(), NonZeroU64::get);
+        self.opens = now.saturating_add(gap);
+        self.packets_left = self.config.packets.map_or(u64::MAX, NonZeroU64::get);
+        self.bytes_left = self.config.bytes.map_or(Bytes::new(u64::MAX).get(), NonZeroU64::get);
     }
 }
 
@@ -174,5 +224,19 @@ mod tests {
         let mean = gaps.iter().sum::<u64>() as f64 / 2000.0;
         assert!((mean - 199.5).abs() < 4.5 * 1.29, "{mean}");
         assert!(Slots::new(Duration::from_nanos(2), Duration::from_nanos(1)).is_err());
+    }
+
+    /// Gaps of 400 ± 50 ns, normal: of 2000 the mean is known to 50/√2000 = 1.12 ns and the deviation to 50/√4000 = 0.79 ns; 4.5 of them.
+    #[test]
+    fn gaps_have_the_law_of_a_delay() {
+        let law = crate::Jitter::new(Duration::from_nanos(50), crate::Distribution::Normal);
+        let config = Slots::drawn(Delay::with_jitter(Duration::from_nanos(400), law).unwrap());
+        let offers: Vec<u64> = (0..2000).map(|n| n * 1000).collect();
+        let gaps: Vec<f64> = run(config, &offers).into_iter().map(|(offered, left)| (left - offered) as f64).collect();
+        let mean = gaps.iter().sum::<f64>() / 2000.0;
+        let sd = (gaps.iter().map(|gap| (gap - mean).powi(2)).sum::<f64>() / 2000.0).sqrt();
+        assert!((mean - 400.0).abs() < 4.5 * 1.12, "{mean}");
+        assert!((sd - 50.0).abs() < 4.5 * 0.79, "{sd}");
+        assert_eq!(run(Slots::drawn(Delay::constant(Duration::from_nanos(10))), &[0, 3, 9, 25]), [(0, 10), (3, 10), (9, 10), (25, 35)]);
     }
 }

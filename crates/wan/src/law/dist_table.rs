@@ -66,25 +66,7 @@ impl DistTable {
     ///
     /// [`DistTableError`], with the place of the first word that is wrong.
     pub fn parse(text: &str) -> Result<Self, DistTableError> {
-        let mut entries = Vec::new();
-        for (number, line) in text.lines().enumerate() {
-            let line_number = number + 1;
-            let content = line.split('#').next().unwrap_or_default();
-            for (column, word) in words(content) {
-                let shown = || word.chars().take(24).collect();
-                let entry = match integer(word) {
-                    None => return Err(DistTableError::NotAnInteger { line: line_number, column, word: shown() }),
-                    Some(value) => i16::try_from(value).map_err(|_| DistTableError::OutOfRange { line: line_number, column, word: shown() })?,
-                };
-                if entries.len() == Self::MOST {
-                    return Err(DistTableError::TooMany { line: line_number, column });
-                }
-                entries.push(entry);
-            }
-        }
-        if entries.is_empty() {
-            return Err(DistTableError::Empty);
-        }
+        let mut entries = entries(text)?;
         entries.sort_unstable();
         Ok(Self { entries })
     }
@@ -134,6 +116,27 @@ impl fmt::Display for DistTable {
         }
         Ok(())
     }
+}
+
+/// The entries of a `.dist` file in the order of the file: at least one.
+pub(crate) fn entries(text: &str) -> Result<Vec<i16>, DistTableError> {
+    let mut entries = Vec::new();
+    for (number, content) in text.lines().enumerate() {
+        let line = number + 1;
+        let content = content.split('#').next().unwrap_or_default();
+        for (column, word) in words(content) {
+            let shown = || word.chars().take(24).collect();
+            let entry = match integer(word) {
+                None => return Err(DistTableError::NotAnInteger { line, column, word: shown() }),
+                Some(value) => i16::try_from(value).map_err(|_| DistTableError::OutOfRange { line, column, word: shown() })?,
+            };
+            if entries.len() == DistTable::MOST {
+                return Err(DistTableError::TooMany { line, column });
+            }
+            entries.push(entry);
+        }
+    }
+    if entries.is_empty() { Err(DistTableError::Empty) } else { Ok(entries) }
 }
 
 /// The words of a line, each with its column.

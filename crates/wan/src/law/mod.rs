@@ -58,6 +58,7 @@ mod tests;
 
 use alloc::sync::Arc;
 
+pub(crate) use dist_table::entries as dist_file_entries;
 pub use dist_table::{DistTable, DistTableError};
 pub use empirical::{Empirical, EmpiricalError};
 pub use error::LawError;

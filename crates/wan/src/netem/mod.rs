@@ -1,9 +1,10 @@
 //! The words of `tc-netem`, and what the Linux kernel makes of them.
 //!
-//! Two parts, which need nothing else of this crate:
+//! Three parts:
 //!
 //! - [`Netem`]: what the words say. [`Netem::parse`] reads them as `tc` of iproute2 6.6 does (without `tc qdisc … netem`), refuses what makes no
 //!   sense with [an error that points at the word](NetemError::excerpt), and `Display` prints words that read back to the same value.
+//! - [`Netem::to_link_config`]: a link that does what the words say, exactly.
 //! - [`kernel`]: what Linux 6.6 does when it is told so, draw for draw. That is often not what the words say: `loss 1% 25%` loses 0.00015 %.
 //!
 //! ```
@@ -21,6 +22,7 @@
 //! ```
 
 mod error;
+mod exact;
 pub mod kernel;
 mod number;
 mod parse;
@@ -30,6 +32,7 @@ mod rules;
 mod spec;
 
 pub use error::{NetemError, NetemErrorKind};
+pub use exact::ExactError;
 pub use percent::Percent;
 pub use rules::Contradiction;
 pub use spec::{

@@ -43,6 +43,22 @@ pub enum Contradiction {
     TimeTooLong,
 }
 
+impl Contradiction {
+    /// The option that should be said otherwise.
+    #[must_use]
+    pub const fn option(self) -> &'static str {
+        match self {
+            Self::ReorderWithoutDelay => "reorder",
+            Self::GapWithoutReorder => "gap",
+            Self::EcnWithoutLoss => "ecn",
+            Self::DistributionWithoutJitter => "distribution",
+            Self::WaysOutOfState1 | Self::WaysOutOfState3 | Self::ProbabilitySkipped => "loss",
+            Self::SlotRange | Self::SlotWithoutJitter | Self::SlotTooLarge => "slot",
+            Self::TimeTooLong => "delay",
+        }
+    }
+}
+
 /// The rounding of decimal percentages to binary must not make 100 % more than that.
 const SLACK: f64 = 1e-9;
 

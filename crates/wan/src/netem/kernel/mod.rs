@@ -44,7 +44,7 @@ mod time_fifo;
 
 pub use prng::Prng;
 pub use qdisc::{Dequeued, DropReason, FlippedBit, Output, Qdisc, QdiscError};
-pub use table::{Table, TableError};
+pub use table::Table;
 
 #[cfg(test)]
 mod tests;

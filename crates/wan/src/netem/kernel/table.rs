@@ -1,10 +1,9 @@
 //! Tables of inverse distributions.
 
 use alloc::boxed::Box;
-use alloc::string::{String, ToString};
-use alloc::vec::Vec;
 
 use super::built_in;
+use crate::law::{DistTable, DistTableError, dist_file_entries};
 
 /// An inverse distribution function at equal steps, in multiples of 1/8192 of the deviation: what a `.dist` file holds.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -12,32 +11,9 @@ pub struct Table {
     entries: Box<[i16]>,
 }
 
-/// Why a text is no table.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum TableError {
-    /// A word that is no integer of 16 bits.
-    #[error("line {line}: \"{word}\" is no entry of a table: expected an integer from -32768 to 32767")]
-    Entry {
-        /// The line, from 1.
-        line: usize,
-        /// The word.
-        word: String,
-    },
-    /// Nothing to draw from.
-    #[error("a table without entries: expected 1 to 16384")]
-    Empty,
-    /// More than the kernel takes.
-    #[error("line {line}: entry number 16385 of a table: expected 1 to 16384")]
-    TooLong {
-        /// The line, from 1.
-        line: usize,
-    },
-}
-
 impl Table {
     /// The most entries the kernel takes.
-    pub const LONGEST: usize = 16_384;
+    pub const LONGEST: usize = DistTable::MOST;
 
     /// A table of these entries; `None` unless there are 1 to 16384.
     #[must_use]
@@ -46,24 +22,13 @@ impl Table {
         (1..=Self::LONGEST).contains(&entries.len()).then_some(Self { entries })
     }
 
-    /// Reads a `.dist` file: integers between white space, in base 8 after `0` and 16 after `0x`; lines that begin with `#` are comments.
+    /// Reads a `.dist` file as [`DistTable::parse`] does, and keeps the order of the file: the kernel draws a place in it.
     ///
     /// # Errors
     ///
-    /// [`TableError`] for what is no integer of 16 bits (`tc` would cut it off), no entry at all, or more than 16384.
-    pub fn parse(text: &str) -> Result<Self, TableError> {
-        let mut entries = Vec::new();
-        for (index, content) in text.lines().enumerate().filter(|(_, content)| !content.starts_with('#')) {
-            let line = index + 1;
-            for word in content.split_whitespace() {
-                let entry = crate::netem::number::signed(word).and_then(|entry| i16::try_from(entry).ok());
-                entries.push(entry.ok_or_else(|| TableError::Entry { line, word: word.to_string() })?);
-                if entries.len() > Self::LONGEST {
-                    return Err(TableError::TooLong { line });
-                }
-            }
-        }
-        Self::new(entries).ok_or(TableError::Empty)
+    /// [`DistTableError`] for what is no integer of 16 bits (`tc` would cut it off), no entry at all, or more than 16384.
+    pub fn parse(text: &str) -> Result<Self, DistTableError> {
+        Ok(Self { entries: dist_file_entries(text)?.into() })
     }
 
     /// The table `normal`, entry for entry as iproute2 ships it.

@@ -1,8 +1,9 @@
 //! The built-in tables and the files.
 
+use crate::law::DistTableError;
 use crate::netem::kernel::correlated::distributed;
 use crate::netem::kernel::tests::{deviation, mean};
-use crate::netem::kernel::{Prng, Table, TableError};
+use crate::netem::kernel::{Prng, Table};
 
 /// Fowler, Noll and Vo's hash (FNV-1a, 64 bits) of the entries as decimal numbers, one a line.
 fn hash(table: &Table) -> u64 {
@@ -51,13 +52,13 @@ fn a_file_is_read_as_tc_reads_it() {
 }
 
 #[test]
-fn what_is_no_table_is_refused_with_its_line() {
-    assert_eq!(Table::parse("# nothing\n\n"), Err(TableError::Empty));
-    assert_eq!(Table::parse("1 2\n# x\n3 four\n"), Err(TableError::Entry { line: 3, word: "four".into() }));
-    assert_eq!(Table::parse("32768"), Err(TableError::Entry { line: 1, word: "32768".into() }));
+fn what_is_no_table_is_refused_with_its_place() {
+    assert_eq!(Table::parse("# nothing\n\n"), Err(DistTableError::Empty));
+    assert_eq!(Table::parse("1 2\n# x\n3 four\n"), Err(DistTableError::NotAnInteger { line: 3, column: 3, word: "four".into() }));
+    assert_eq!(Table::parse("32768"), Err(DistTableError::OutOfRange { line: 1, column: 1, word: "32768".into() }));
     let full = "1\n".repeat(Table::LONGEST);
     assert_eq!(Table::parse(&full).unwrap().entries().len(), 16_384);
-    assert_eq!(Table::parse(&format!("{full}1\n")), Err(TableError::TooLong { line: 16_385 }));
+    assert_eq!(Table::parse(&format!("{full}1\n")), Err(DistTableError::TooMany { line: 16_385, column: 1 }));
     assert_eq!(Table::new(Vec::new()), None);
 }
 

@@ -1,0 +1,248 @@
+//! Words that mean what they say: the link that they ask for.
+//!
+//! Each option becomes the stage of the same name, in netem's order ([`Layout::Netem`]). Nothing is rounded to ticks and nothing wraps around.
+//! `docs/netem.md` says word by word what is meant, and what the kernel does instead.
+
+use alloc::sync::Arc;
+use core::time::Duration;
+
+use cohaptic_units::print::Span;
+use cohaptic_units::{Probability, Rate};
+
+use super::{ChanceSpec, Contradiction, DelaySpec, Distribution, GemodelSpec, JitterSpec, LossSpec, Netem, RateSpec, SlotGap, StateSpec, TableName};
+use crate::law::DistTable;
+use crate::{
+    Bottleneck, Cells, Chance, ChanceError, Checksum, Correlation, Corruption, Delay, DelayError, Displacement, Flips, FourState, FourStateError,
+    Framing, GilbertElliott, Jitter, Layout, LinkConfig, Loss, Reorder, Slots,
+};
+
+/// Why words that `tc` accepts ask for what cannot be.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExactError {
+    /// Options that do not go together.
+    #[error(transparent)]
+    Contradiction(#[from] Contradiction),
+    /// A law with a least value that would begin below zero. netem sends at once what should leave before it came, which is another law with another mean.
+    #[error(
+        "{option}: {law} jitter of {} around {} begins below zero: expected a jitter of at most {}", Span(*jitter), Span(*mean), Span(*largest)
+    )]
+    BelowZero {
+        /// The option.
+        option: &'static str,
+        /// The law.
+        law: &'static str,
+        /// The mean.
+        mean: Duration,
+        /// The jitter: half the width if the law is uniform, else the standard deviation.
+        jitter: Duration,
+        /// The largest jitter possible.
+        largest: Duration,
+    },
+    /// A delay or a gap between slots that no law has.
+    #[error("{option}: {reason}")]
+    Delay {
+        /// The option.
+        option: &'static str,
+        /// What cannot be.
+        reason: DelayError,
+    },
+    /// A correlation that such events cannot have.
+    #[error("{option}: {reason}")]
+    Chance {
+        /// The option.
+        option: &'static str,
+        /// What cannot be.
+        reason: ChanceError,
+    },
+    /// A four-state chain that cannot be.
+    #[error("loss state: {0}")]
+    State(FourStateError),
+    /// A table that nobody has.
+    #[error("distribution {}: there is no such table: expected uniform, normal, pareto, paretonormal or a file {}.dist", .0.as_str(), .0.as_str())]
+    NoTable(TableName),
+    /// A rate that cannot be counted in bits.
+    #[error("rate: {bytes_per_sec} bytes/s are more bits than can be counted: expected at most {} bytes/s", u64::MAX / 8)]
+    Rate {
+        /// The rate.
+        bytes_per_sec: u64,
+    },
+    /// A cell that is smaller on the line than what it carries.
+    #[error("rate: a cell overhead of {found} bytes: expected zero or more")]
+    CellOverhead {
+        /// What was said.
+        found: i32,
+    },
+}
+
+impl ExactError {
+    /// The option to blame.
+    #[must_use]
+    pub const fn option(&self) -> &'static str {
+        match self {
+            Self::Contradiction(contradiction) => contradiction.option(),
+            Self::BelowZero { option, .. } | Self::Delay { option, .. } | Self::Chance { option, .. } => option,
+            Self::State(_) => "loss",
+            Self::NoTable(_) => "distribution",
+            Self::Rate { .. } | Self::CellOverhead { .. } => "rate",
+        }
+    }
+}
+
+/// Where tables come from.
+type Tables<'a> = &'a mut dyn FnMut(&TableName) -> Option<Arc<DistTable>>;
+
+impl Netem {
+    /// The link that does what the words say. `tables` finds the distributions that are not built in.
+    ///
+    /// Not as in the kernel: without `limit` any number of packets is held, and `seed` says nothing, since every link has random numbers of its own.
+    ///
+    /// # Errors
+    ///
+    /// [`ExactError`] if the words ask for what cannot be: a uniform or Pareto delay that reaches below zero, a correlation that the law cannot have, a
+    /// table that is missing.
+    pub fn to_link_config(&self, tables: &mut dyn FnMut(&TableName) -> Option<Arc<DistTable>>) -> Result<LinkConfig, ExactError> {
+        self.check()?;
+        let corrupted = self.corrupt.map_or(Ok(Chance::default()), |spec| chance("corrupt", spec))?;
+        Ok(LinkConfig {
+            loss: self.loss.as_ref().map_or(Ok(Loss::None), loss)?,
+            marks_instead_of_loss: self.ecn,
+            duplication: self.duplicate.map_or(Ok(Chance::default()), |spec| chance("duplicate", spec))?,
+            corruption: (!corrupted.is_never()).then_some(Corruption {
+                bits: Flips::Bits { packets: corrupted, count: 1 },
+                within: None,
+                checksum: Checksum::Discards,
+            }),
+            limit: self.limit.map(u64::from),
+            bottleneck: self.rate.as_ref().map(bottleneck).transpose()?,
+            slots: self.slots(tables)?,
+            reorder: self.reordering()?,
+            delay: self.delay.as_ref().map_or_else(|| Ok(Delay::default()), |spec| delay(spec, tables))?,
+            layout: Layout::Netem,
+            ..LinkConfig::default()
+        })
+    }
+
+    fn slots(&self, tables: Tables<'_>) -> Result<Option<Slots>, ExactError> {
+        let Some(spec) = &self.slot else { return Ok(None) };
+        let mut slots = match &spec.gap {
+            SlotGap::Range { min, max } => {
+                let max = max.unwrap_or(*min);
+                Slots::new(*min, max).map_err(|_| Contradiction::SlotRange)?
+            }
+            SlotGap::Drawn { distribution, delay, jitter } => {
+                let spec = JitterSpec { time: *jitter, correlation: None, distribution: Some(distribution.clone()) };
+                Slots::drawn(with_jitter("slot", *delay, &spec, tables)?)
+            }
+        };
+        slots.packets = spec.packets.map(Into::into);
+        slots.bytes = spec.bytes.map(Into::into);
+        Ok(Some(slots))
+    }
+
+    fn reordering(&self) -> Result<Option<Reorder>, ExactError> {
+        let Some(spec) = &self.reorder else { return Ok(None) };
+        let packets = chance("reorder", spec.chance)?;
+        let gap = spec.gap.unwrap_or(core::num::NonZeroU32::MIN);
+        Ok((!packets.is_never()).then_some(Reorder { packets, how: Displacement::Jump { gap } }))
+    }
+}
+
+fn chance(option: &'static str, spec: ChanceSpec) -> Result<Chance, ExactError> {
+    let correlation = spec.correlation.map_or(0.0, super::Percent::fraction);
+    Chance::correlated(spec.percent.probability(), correlation).map_err(|reason| ExactError::Chance { option, reason })
+}
+
+fn loss(spec: &LossSpec) -> Result<Loss, ExactError> {
+    Ok(match spec {
+        LossSpec::Random(spec) => {
+            let chance = chance("loss", *spec)?;
+            match chance.correlation() {
+                _ if chance.is_never() => Loss::None,
+                0.0 => Loss::Independent(chance.probability()),
+                _ => Loss::Correlated(chance),
+            }
+        }
+        LossSpec::State(spec) => Loss::FourState(four_state(spec)?),
+        LossSpec::Gemodel(spec) => Loss::GilbertElliott(gilbert_elliott(spec)),
+    })
+}
+
+fn four_state(spec: &StateSpec) -> Result<FourState, ExactError> {
+    let [p13, p31, p32, p23, p14] = spec.probabilities();
+    // Percentages whose sum is 100 may be a hair more in binary, which the words do not mean.
+    let [p32, p14] = [p32.min(1.0 - p31), p14.min(1.0 - p13)];
+    let [p13, p31, p32, p23, p14] = [p13, p31, p32, p23, p14].map(probability);
+    FourState::new(p13, p31, p32, p23, p14).map_err(ExactError::State)
+}
+
+fn gilbert_elliott(spec: &GemodelSpec) -> GilbertElliott {
+    let [p, r, loss_in_bad, loss_in_good] = spec.probabilities();
+    // The words name what is lost, the model what gets through.
+    let [p, r, h, k] = [p, r, 1.0 - loss_in_bad, 1.0 - loss_in_good].map(probability);
+    GilbertElliott { p, r, h, k }
+}
+
+fn delay(spec: &DelaySpec, tables: Tables<'_>) -> Result<Delay, ExactError> {
+    match &spec.jitter {
+        Some(jitter) if !jitter.time.is_zero() => with_jitter("delay", spec.time, jitter, tables),
+        _ => Ok(Delay::constant(spec.time)),
+    }
+}
+
+fn with_jitter(option: &'static str, mean: Duration, spec: &JitterSpec, tables: Tables<'_>) -> Result<Delay, ExactError> {
+    let (distribution, sd) = match &spec.distribution {
+        None | Some(Distribution::Uniform) => (crate::Distribution::Uniform, deviation_of_half_width(spec.time)),
+        Some(Distribution::Normal) => (crate::Distribution::Normal, spec.time),
+        Some(Distribution::Pareto) => (crate::Distribution::Pareto, spec.time),
+        Some(Distribution::ParetoNormal) => (crate::Distribution::ParetoNormal, spec.time),
+        Some(Distribution::Table(name)) => {
+            let table = tables(name).ok_or_else(|| ExactError::NoTable(name.clone()))?;
+            (crate::Distribution::Table(table), spec.time)
+        }
+    };
+    let correlation = spec.correlation.map_or(Correlation::None, |percent| Correlation::PerPacket(percent.fraction()));
+    let jitter = Jitter { correlation, ..Jitter::new(sd, distribution) };
+    Delay::with_jitter(mean, jitter).map_err(|reason| match reason {
+        DelayError::ReachesBelowFloor { law, largest, .. } => {
+            // In the measure of the words, which for a uniform law is half its width.
+            let largest = if matches!(spec.distribution, None | Some(Distribution::Uniform)) { mean } else { largest };
+            ExactError::BelowZero { option, law, mean, jitter: spec.time, largest }
+        }
+        DelayError::FloorAboveMean { .. } | DelayError::Correlation { .. } | DelayError::NoTime | DelayError::TooLong => {
+            ExactError::Delay { option, reason }
+        }
+    })
+}
+
+/// The deviation of a uniform law, 1/√3 of its half-width, down to a nanosecond: a law that may just begin at zero then does.
+fn deviation_of_half_width(half_width: Duration) -> Duration {
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a jitter is below 292 years; not negative"
+    )]
+    let nanos = (half_width.as_nanos() as f64 / libm::sqrt(3.0)) as u64;
+    Duration::from_nanos(nanos)
+}
+
+fn bottleneck(spec: &RateSpec) -> Result<Bottleneck, ExactError> {
+    let bytes_per_sec = spec.bytes_per_sec.get();
+    let rate = bytes_per_sec.checked_mul(8).and_then(Rate::bits_per_sec).ok_or(ExactError::Rate { bytes_per_sec })?;
+    let mut framing = Framing::default();
+    if let Some(spec) = &spec.framing {
+        framing.overhead = spec.overhead;
+        if let Some(cell) = &spec.cell {
+            let overhead = cell.overhead.unwrap_or(0);
+            let overhead = u32::try_from(overhead).map_err(|_| ExactError::CellOverhead { found: overhead })?;
+            framing.cells = Some(Cells { payload: cell.size, overhead });
+        }
+    }
+    Ok(Bottleneck { framing, ..Bottleneck::at_rate(rate) })
+}
+
+/// A fraction that was computed from percentages.
+fn probability(value: f64) -> Probability {
+    Probability::new(value.clamp(0.0, 1.0)).unwrap_or_default()
+}
