@@ -57,7 +57,7 @@ impl Schedule {
     }
 
     /// The next instant at which any peer ticks; `None` beyond the end of time.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn next_instant(&self) -> Option<Instant> {
         match self {
             Self::Lockstep { next, .. } => Some(*next),
@@ -66,7 +66,7 @@ impl Schedule {
     }
 
     /// Writes down which peers tick at that instant, in order. Each must be put back with [`Schedule::tick_again`].
-    #[inline]
+    #[inline(always)]
     pub(crate) fn take(&mut self, at: Instant, peers: &mut Vec<usize>) {
         if let Self::EventDriven(queue) = self {
             peers.clear();

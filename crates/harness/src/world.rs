@@ -133,7 +133,9 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
             return Ok(Step::Ended(Ending::Diverged(now)));
         }
         self.now = now;
-        self.change(now);
+        if !self.changes.is_empty() {
+            self.change(now);
+        }
         self.schedule.take(now, &mut self.ticking);
         self.send(now);
         self.deliver(now, observer, watch)?;
@@ -179,6 +181,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
     }
 
     /// Changes of the timeline up to and including `now`, each at its own instant.
+    #[inline(never)]
     fn change(&mut self, now: Instant) {
         while let Some(change) = self.changes.pop_if(|change| change.at <= now) {
             match change.what {

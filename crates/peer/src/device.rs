@@ -91,8 +91,13 @@ impl<const A: usize> HandForce<A> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn at(&self, now: Instant) -> [f64; A] {
+        if let Self::Constant(force) = self { *force } else { self.varying(now) }
+    }
+
+    #[inline(never)]
+    fn varying(&self, now: Instant) -> [f64; A] {
         match self {
             Self::Constant(force) => *force,
             Self::Force(signal) => signal.value(now),

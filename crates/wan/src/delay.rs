@@ -1,5 +1,6 @@
 //! Propagation delay with jitter.
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::time::Duration;
 
@@ -197,8 +198,6 @@ fn explain(error: LawError, mean: Duration, jitter: &Jitter) -> DelayError {
 pub(crate) struct DelayStage {
     mean_nanos: u64,
     law: StageLaw,
-    /// The Gaussian chain: its latest value, and when that was; `None` before the first packet.
-    chain: Option<(f64, Instant)>,
 }
 
 /// How a delay is drawn; spans as numbers, converted once.
@@ -210,7 +209,15 @@ enum StageLaw {
         sd_nanos: f64,
     },
     Independent(Arc<Checked>),
-    Correlated(Arc<Checked>),
+    /// In a box, as whatever is seldom: the links of a large mesh fill the cache.
+    Correlated(Box<Correlated>),
+}
+
+#[derive(Clone, Debug)]
+struct Correlated {
+    checked: Arc<Checked>,
+    /// The Gaussian chain: its latest value, and when that was; `None` before the first packet.
+    chain: Option<(f64, Instant)>,
 }
 
 impl DelayStage {
@@ -222,15 +229,20 @@ impl DelayStage {
                     StageLaw::Normal { sd_nanos: nanos(*sd) }
                 }
                 (_, Memory::None) => StageLaw::Independent(Arc::clone(checked)),
-                (_, Memory::PerPacket(_) | Memory::InTime { .. }) => StageLaw::Correlated(Arc::clone(checked)),
+                (_, Memory::PerPacket(_) | Memory::InTime { .. }) => {
+                    StageLaw::Correlated(Box::new(Correlated { checked: Arc::clone(checked), chain: None }))
+                }
             },
         };
-        Self { mean_nanos: u64::try_from(delay.mean.as_nanos()).unwrap_or(u64::MAX), law, chain: None }
+        Self { mean_nanos: u64::try_from(delay.mean.as_nanos()).unwrap_or(u64::MAX), law }
     }
 
     /// New laws for later packets. Correlated delays go on from where they are.
     pub(crate) fn reconfigure(&mut self, delay: &Delay) {
-        *self = Self { chain: self.chain, ..Self::new(delay) };
+        let before = core::mem::replace(self, Self::new(delay));
+        if let (StageLaw::Correlated(before), StageLaw::Correlated(now)) = (before.law, &mut self.law) {
+            now.chain = before.chain;
+        }
     }
 
     /// The delay \[ns\] of one packet, if there is jitter from `word`, the first of its words for jitter. Rounded to the nearest nanosecond.
@@ -257,12 +269,13 @@ impl DelayStage {
     #[inline(never)]
     fn draw_by_law(&mut self, purpose: Purpose, now: Instant, word: u64, packet: PacketDraws) -> u64 {
         let mut more = packet.more(purpose);
-        match &self.law {
+        match &mut self.law {
             StageLaw::Constant | StageLaw::Normal { .. } => self.mean_nanos,
             StageLaw::Independent(checked) => count(checked.law.draw(word, || more.next_word())),
-            StageLaw::Correlated(checked) => {
+            StageLaw::Correlated(correlated) => {
+                let Correlated { checked, chain } = &mut **correlated;
                 let fresh = standard_normal(word, || more.next_word());
-                let z = match self.chain {
+                let z = match *chain {
                     None => fresh,
                     Some((before, at)) => {
                         let phi = match checked.memory {
@@ -273,7 +286,7 @@ impl DelayStage {
                         phi * before + libm::sqrt((1.0 - phi) * (1.0 + phi)) * fresh
                     }
                 };
-                self.chain = Some((z, now));
+                *chain = Some((z, now));
                 count(checked.law.at_normal(z))
             }
         }

@@ -2,6 +2,8 @@
 //!
 //! A link with no other stage is these and nothing else: a function from a packet to its arrival.
 
+use alloc::boxed::Box;
+
 use cohaptic_units::Instant;
 
 use crate::delay::DelayStage;
@@ -19,7 +21,8 @@ pub(crate) struct Direct {
     /// The random numbers of the link, one address a packet.
     pub(crate) draws: Stream,
     is_random: bool,
-    pub(crate) outages: OutageStage,
+    /// In a box, as whatever is seldom: the links of a large mesh fill the cache.
+    outages: Option<Box<OutageStage>>,
     pub(crate) loss: Option<LossStage>,
     pub(crate) delay: DelayStage,
     pub(crate) order: OrderStage,
@@ -31,7 +34,7 @@ impl Direct {
         Self {
             draws,
             is_random: config.is_random(),
-            outages: OutageStage::new(config.outages.clone(), draws),
+            outages: OutageStage::new(config.outages.clone(), draws).map(Box::new),
             loss: LossStage::new(config.loss.clone(), draws.packet(0).first(Purpose::InitialState)),
             delay: DelayStage::new(&config.delay),
             order: OrderStage::new(config.order),
@@ -47,7 +50,7 @@ impl Direct {
     /// When a packet arrives, or why it never does.
     #[inline(always)]
     pub(crate) fn offer(&mut self, now: Instant, number: u64, [loss_word, jitter_word]: Words) -> Result<Instant, DropCause> {
-        if self.outages.is_down(now, self.draws) {
+        if self.is_down(now) {
             return Err(DropCause::Outage);
         }
         let packet = self.draws.packet(number);
@@ -60,10 +63,16 @@ impl Direct {
         Ok(self.order.arrival(now.saturating_add_nanos(delay)))
     }
 
+    /// Whether the link is down for a packet that is offered `now`.
+    #[inline]
+    pub(crate) fn is_down(&mut self, now: Instant) -> bool {
+        self.outages.as_mut().is_some_and(|outages| outages.is_down(now, self.draws))
+    }
+
     /// Changes the configuration, keeping what the stages remember.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: &LinkConfig) {
         self.is_random = config.is_random();
-        self.outages.reconfigure(now, config.outages.clone(), self.draws);
+        self.outages = OutageStage::reconfigured(self.outages.take().map(|stage| *stage), now, config.outages.clone(), self.draws).map(Box::new);
         let initial = self.draws.packet(0).first(Purpose::InitialState);
         self.loss = LossStage::reconfigured(self.loss.take(), config.loss.clone(), initial);
         self.delay.reconfigure(&config.delay);

@@ -619,12 +619,14 @@ impl<P: Clone> Network<P> {
     }
 
     /// Whether a filter takes the packet, which it sees when it enters its link.
+    #[inline(never)]
     fn is_filtered(&self, now: Instant, hop: Hop, packet: &InNetwork<P>) -> bool {
         let info = PacketInfo { size: packet.size.size(), ecn_capable: packet.size.has(SizeAndMarks::ECN_CAPABLE) };
         let offered = Offered { sequence: packet.sequence, now, info, payload: &packet.payload };
         hop == Hop::Link && self.filters.get(&packet.path).is_some_and(|filter| filter.drops(&offered))
     }
 
+    #[inline(never)]
     fn enter_engine(&mut self, now: Instant, hop: Hop, line: u32, number: u64, packet: InNetwork<P>) {
         let seldom = *self.seldom_mut(hop, line);
         let flow = self.line_mut(hop, line).flow;
@@ -643,8 +645,14 @@ impl<P: Clone> Network<P> {
         self.come_out(hop, line, outputs);
     }
 
+    #[inline(always)]
     fn take_damage(&mut self, packet: &InNetwork<P>) -> Option<Damage> {
-        if packet.size.has(SizeAndMarks::DAMAGED) { self.damages.remove(&(packet.path, packet.sequence, packet.size.copy())) } else { None }
+        if packet.size.has(SizeAndMarks::DAMAGED) { self.find_damage(packet.path, packet.sequence, packet.size) } else { None }
+    }
+
+    #[cold]
+    fn find_damage(&mut self, path: Path, sequence: u64, size: SizeAndMarks) -> Option<Damage> {
+        self.damages.remove(&(path, sequence, size.copy()))
     }
 
     /// Deals with what has come out of a line's engine, and asks it when to be woken.
@@ -686,6 +694,7 @@ impl<P: Clone> Network<P> {
         }
     }
 
+    #[inline(never)]
     fn drop(&mut self, now: Instant, hop: Hop, line: u32, cause: DropCause, packet: InNetwork<P>) {
         if !self.has_inner_events {
             // Arrivals that wait to be polled came before this drop.
@@ -696,7 +705,7 @@ impl<P: Clone> Network<P> {
         self.happened.push_back(event);
     }
 
-    #[inline]
+    #[inline(always)]
     fn event(&mut self, packet: InNetwork<P>, at: Instant, fate: Fate) -> NetworkEvent<P> {
         let damage = self.take_damage(&packet);
         let InNetwork { sequence, sent, path, size, payload, .. } = packet;

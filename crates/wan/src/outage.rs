@@ -157,30 +157,28 @@ pub(crate) struct OutageStage {
 }
 
 impl OutageStage {
-    pub(crate) fn new(outages: Outages, draws: Stream) -> Self {
-        let mut stage = Self { outages, span: 0, span_ends: Instant::MAX, last_taken: Instant::ZERO };
-        if let Some(random) = stage.outages.random {
-            stage.span_ends = Instant::ZERO.saturating_add(drawn(random.up, draws, 0));
-        }
-        stage
+    /// The stage from the begin of time; `None` if the link is never down.
+    pub(crate) fn new(outages: Outages, draws: Stream) -> Option<Self> {
+        Self::reconfigured(None, Instant::ZERO, outages, draws)
     }
 
-    /// New outages. A link that fails at random stays in the span that it is in; one that begins to do so begins up.
-    pub(crate) fn reconfigure(&mut self, now: Instant, outages: Outages, draws: Stream) {
-        if let (None, Some(random)) = (self.outages.random, outages.random) {
-            self.span += self.span % 2;
-            self.span_ends = now.saturating_add(drawn(random.up, draws, self.span));
+    /// The stage with new outages. A link that fails at random stays in the span that it is in; one that begins to do so begins up.
+    pub(crate) fn reconfigured(before: Option<Self>, now: Instant, outages: Outages, draws: Stream) -> Option<Self> {
+        if outages.is_empty() {
+            return None;
         }
-        self.outages = outages;
+        let begin = Self { outages: Outages::default(), span: 0, span_ends: Instant::MAX, last_taken: now };
+        let mut stage = before.unwrap_or(begin);
+        if let (None, Some(random)) = (stage.outages.random, outages.random) {
+            stage.span += stage.span % 2;
+            stage.span_ends = now.saturating_add(drawn(random.up, draws, stage.span));
+        }
+        stage.outages = outages;
+        Some(stage)
     }
 
     /// Whether the link is down for a packet that is offered `now`.
-    #[inline]
     pub(crate) fn is_down(&mut self, now: Instant, draws: Stream) -> bool {
-        !self.outages.is_empty() && self.is_down_by_some(now, draws)
-    }
-
-    fn is_down_by_some(&mut self, now: Instant, draws: Stream) -> bool {
         let mut down = self.outages.scheduled_at(now);
         if let Some(random) = self.outages.random {
             while self.span_ends <= now {
@@ -238,7 +236,7 @@ mod tests {
         let millis = Duration::from_millis;
         let random = RandomOutages { up: Sojourn::Exponential(millis(30)), down: Sojourn::Exponential(millis(10)) };
         let draws = Stream::new(4, b"outage");
-        let mut stage = OutageStage::new(Outages::default().with_random(random).unwrap(), draws);
+        let mut stage = OutageStage::new(Outages::default().with_random(random).unwrap(), draws).unwrap();
         let seen = 10_000_000_u64;
         let down = (0..seen).filter(|n| stage.is_down(Instant::from_nanos(n * 100_000), draws)).count();
         assert!((down as f64 / seen as f64 - 0.25).abs() < 4.5 * 0.0017, "{down}");
@@ -249,7 +247,7 @@ mod tests {
         let nanos = Duration::from_nanos;
         let outages = Outages::default().with_idle(IdleOutages { after: nanos(10), down: nanos(5) }).unwrap();
         let draws = Stream::new(0, b"");
-        let mut stage = OutageStage::new(outages, draws);
+        let mut stage = OutageStage::new(outages, draws).unwrap();
         let down: Vec<u64> = [0, 9, 18, 28, 32, 33, 44, 63, 67].into_iter().filter(|t| stage.is_down(Instant::from_nanos(*t), draws)).collect();
         // Taken at 0, 9 and 18; down from 28 to 33, when it is taken again; down from 43 to 48, up to 58, down to 63, taken.
         assert_eq!(down, [28, 32, 44]);

@@ -316,7 +316,7 @@ impl<T: Clone> Staged<T> {
                     }
                 }
                 Stage::Outage => {
-                    if self.direct.outages.is_down(now, self.direct.draws) {
+                    if self.direct.is_down(now) {
                         return drop(outputs, now, DropCause::Outage, packet);
                     }
                 }

@@ -5,6 +5,8 @@ mod gilbert_elliott;
 mod in_time;
 mod pattern;
 
+use alloc::boxed::Box;
+
 use cohaptic_units::{Instant, Probability};
 
 pub use four_state::{Bursts, FourState, FourStateError};
@@ -63,6 +65,13 @@ impl Loss {
 #[derive(Clone, Debug)]
 pub(crate) enum LossStage {
     Independent(Probability),
+    /// In a box, as whatever is seldom: the links of a large mesh fill the cache.
+    WithMemory(Box<Remembering>),
+}
+
+/// A model that looks at more than a packet's own word.
+#[derive(Clone, Debug)]
+pub(crate) enum Remembering {
     Correlated(Option<ChanceStage>),
     GilbertElliott(GilbertElliott, gilbert_elliott::State),
     InTime(GilbertElliottInTime, Option<in_time::Seen>),
@@ -73,26 +82,29 @@ pub(crate) enum LossStage {
 impl LossStage {
     /// The stage for a model; `None` if nothing is ever lost. `initial` is the random word for the state in which a chain begins.
     pub(crate) fn new(loss: Loss, initial: u64) -> Option<Self> {
-        Some(match loss {
-            Loss::None => return None,
-            Loss::Independent(probability) => Self::Independent(probability),
-            Loss::Correlated(chance) => Self::Correlated(ChanceStage::new(chance)),
-            Loss::GilbertElliott(chain) => Self::GilbertElliott(chain, chain.stationary_state(initial)),
-            Loss::GilbertElliottInTime(chain) => Self::InTime(chain, None),
-            Loss::FourState(chain) => Self::FourState(chain, chain.initial_state(unit(initial))),
-            Loss::Pattern(pattern) => Self::Pattern(pattern),
-        })
+        Self::reconfigured(None, loss, initial)
     }
 
     /// The stage with a new model; a chain of the same kind stays in the state it is in.
     pub(crate) fn reconfigured(before: Option<Self>, loss: Loss, initial: u64) -> Option<Self> {
-        Some(match (before, loss) {
-            (Some(Self::GilbertElliott(_, state)), Loss::GilbertElliott(chain)) => Self::GilbertElliott(chain, state),
-            (Some(Self::InTime(_, seen)), Loss::GilbertElliottInTime(chain)) => Self::InTime(chain, seen),
-            (Some(Self::FourState(_, state)), Loss::FourState(chain)) => Self::FourState(chain, state),
-            (Some(Self::Correlated(stage)), Loss::Correlated(chance)) => Self::Correlated(ChanceStage::reconfigured(stage, chance)),
-            (_, loss) => return Self::new(loss, initial),
-        })
+        let before = match before {
+            Some(Self::WithMemory(before)) => Some(*before),
+            Some(Self::Independent(_)) | None => None,
+        };
+        let stage = match (before, loss) {
+            (_, Loss::None) => return None,
+            (_, Loss::Independent(probability)) => return Some(Self::Independent(probability)),
+            (Some(Remembering::GilbertElliott(_, state)), Loss::GilbertElliott(chain)) => Remembering::GilbertElliott(chain, state),
+            (_, Loss::GilbertElliott(chain)) => Remembering::GilbertElliott(chain, chain.stationary_state(initial)),
+            (Some(Remembering::InTime(_, seen)), Loss::GilbertElliottInTime(chain)) => Remembering::InTime(chain, seen),
+            (_, Loss::GilbertElliottInTime(chain)) => Remembering::InTime(chain, None),
+            (Some(Remembering::FourState(_, state)), Loss::FourState(chain)) => Remembering::FourState(chain, state),
+            (_, Loss::FourState(chain)) => Remembering::FourState(chain, chain.initial_state(unit(initial))),
+            (Some(Remembering::Correlated(stage)), Loss::Correlated(chance)) => Remembering::Correlated(ChanceStage::reconfigured(stage, chance)),
+            (_, Loss::Correlated(chance)) => Remembering::Correlated(ChanceStage::new(chance)),
+            (_, Loss::Pattern(pattern)) => Remembering::Pattern(pattern),
+        };
+        Some(Self::WithMemory(Box::new(stage)))
     }
 
     /// Whether a packet is lost. `word` is the first of its words for loss.
@@ -100,6 +112,14 @@ impl LossStage {
     pub(crate) fn loses(&mut self, now: Instant, number: u64, word: u64, packet: PacketDraws) -> bool {
         match self {
             Self::Independent(probability) => probability.happens(word),
+            Self::WithMemory(stage) => stage.loses(now, number, word, packet),
+        }
+    }
+}
+
+impl Remembering {
+    fn loses(&mut self, now: Instant, number: u64, word: u64, packet: PacketDraws) -> bool {
+        match self {
             Self::Correlated(chance) => chance.as_mut().is_some_and(|chance| chance.happens(word)),
             Self::GilbertElliott(chain, state) => chain.loses(state, word, packet.more(Purpose::Loss).next_word()),
             Self::InTime(chain, seen) => chain.loses(seen, now, word, packet.more(Purpose::Loss).next_word()),

@@ -103,11 +103,11 @@ impl Netem {
     /// table that is missing.
     pub fn to_link_config(&self, tables: &mut dyn FnMut(&TableName) -> Option<Arc<DistTable>>) -> Result<LinkConfig, ExactError> {
         self.check()?;
-        let corrupted = self.corrupt.map_or(Ok(Chance::default()), |spec| chance("corrupt", spec))?;
+        let corrupted = self.corrupt.map_or_else(|| Ok(Chance::default()), |spec| chance("corrupt", spec))?;
         Ok(LinkConfig {
             loss: self.loss.as_ref().map_or(Ok(Loss::None), loss)?,
             marks_instead_of_loss: self.ecn,
-            duplication: self.duplicate.map_or(Ok(Chance::default()), |spec| chance("duplicate", spec))?,
+            duplication: self.duplicate.map_or_else(|| Ok(Chance::default()), |spec| chance("duplicate", spec))?,
             corruption: (!corrupted.is_never()).then_some(Corruption {
                 bits: Flips::Bits { packets: corrupted, count: 1 },
                 within: None,
