@@ -134,6 +134,15 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
+    /// When the engine must be woken, if the link has one.
+    #[inline]
+    pub(crate) fn next_wake(&self) -> Option<Instant> {
+        match self {
+            Self::Engine(engine) => engine.next_at(),
+            Self::Constant(..) | Self::Direct(_) => None,
+        }
+    }
+
     /// Changes the model. What propagates keeps its delay. What leaves the engine by that is in `outputs`.
     pub(crate) fn reconfigure(&mut self, now: Instant, seed: u64, name: &LinkName, model: LinkModel, outputs: &mut Outputs<T>) {
         match (self, model) {
