@@ -165,10 +165,17 @@ impl OutageStage {
         stage
     }
 
-    /// New outages. A link that fails at random stays in the span that it is in; one that begins to do so begins up.
+    /// New outages. A link that fails at random stays in the span that it is in; one that begins to do so begins up, and one that begins to go down when
+    /// idle was used just now.
     pub(crate) fn reconfigure(&mut self, now: Instant, outages: Outages, draws: Stream) {
+        if self.outages.idle.is_none() {
+            self.last_taken = now;
+        }
         if let (None, Some(random)) = (self.outages.random, outages.random) {
-            self.span += self.span % 2;
+            // No span is drawn twice: one that had begun before is not begun again.
+            if self.span_ends < Instant::MAX {
+                self.span += 2 - self.span % 2;
+            }
             self.span_ends = now.saturating_add(drawn(random.up, draws, self.span));
         }
         self.outages = outages;
@@ -253,6 +260,37 @@ mod tests {
         let down: Vec<u64> = [0, 9, 18, 28, 32, 33, 44, 63, 67].into_iter().filter(|t| stage.is_down(Instant::from_nanos(*t), draws)).collect();
         // Taken at 0, 9 and 18; down from 28 to 33, when it is taken again; down from 43 to 48, up to 58, down to 63, taken.
         assert_eq!(down, [28, 32, 44]);
+    }
+
+    #[test]
+    fn a_link_that_begins_to_fail_again_draws_new_spans() {
+        let random = RandomOutages { up: Sojourn::Exponential(Duration::from_millis(30)), down: Sojourn::Exponential(Duration::from_millis(10)) };
+        let (draws, random) = (Stream::new(4, b"outage"), Outages::default().with_random(random).unwrap());
+        let mut stage = OutageStage::new(Outages::default(), draws);
+        let ends: std::collections::BTreeSet<Instant> = (0..100)
+            .map(|_| {
+                stage.reconfigure(Instant::ZERO, random.clone(), draws);
+                let ends = stage.span_ends;
+                stage.reconfigure(Instant::ZERO, Outages::default(), draws);
+                ends
+            })
+            .collect();
+        assert_eq!(ends.len(), 100);
+        assert_eq!(
+            OutageStage::new(random, draws).span_ends,
+            Instant::ZERO.saturating_add(drawn(Sojourn::Exponential(Duration::from_millis(30)), draws, 0))
+        );
+    }
+
+    #[test]
+    fn a_link_that_begins_to_sleep_was_used_just_now() {
+        let nanos = Duration::from_nanos;
+        let idle = Outages::default().with_idle(IdleOutages { after: nanos(10), down: nanos(5) }).unwrap();
+        let draws = Stream::new(0, b"");
+        let mut stage = OutageStage::new(Outages::default(), draws);
+        stage.reconfigure(Instant::from_nanos(12), idle, draws);
+        assert!(!stage.is_down(Instant::from_nanos(13), draws));
+        assert!(stage.is_down(Instant::from_nanos(23), draws));
     }
 
     #[test]
