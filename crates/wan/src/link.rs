@@ -209,7 +209,7 @@ impl<P: Clone> Link<P> {
         Ok(())
     }
 
-    /// What the link did so far.
+    /// What the link did so far. A packet counts as delivered when its arrival is polled, or when time is let pass beyond it.
     #[must_use]
     pub const fn stats(&self) -> &LinkStats {
         &self.stats

@@ -353,20 +353,16 @@ impl<T: Clone> Staged<T> {
                         outputs.push(Output { packet: copy.clone(), exit: Exit::Copied(now) });
                         let before = outputs.len();
                         self.walk(place + 1, now, packet, inside, outputs);
-                        let went_in = !outputs[before..].iter().any(|output| matches!(output.exit, Exit::Dropped(..)));
-                        return self.walk(place + 1, now, copy, inside + u64::from(went_in), outputs);
+                        // The packet may have been dropped, or others from the head of a queue in its stead.
+                        let dropped = outputs[before..].iter().filter(|output| matches!(output.exit, Exit::Dropped(..))).count() as u64;
+                        return self.walk(place + 1, now, copy, (inside + 1).saturating_sub(dropped), outputs);
                     }
                 }
                 Stage::Corruption => {
                     if let Some(corruption) = &mut self.corruption
                         && let Some(damage) = corruption.damage(packet.info, draws)
                     {
-                        packet.marks.discarded_on_arrival |= corruption.checksum() == Checksum::Discards;
-                        packet.marks.damage = match packet.marks.damage.take() {
-                            None => Some(damage),
-                            Some(before) => before.and(&damage),
-                        };
-                        packet.marks.discarded_on_arrival &= packet.marks.damage.is_some();
+                        packet.marks.damage(Some(damage), corruption.checksum() == Checksum::Discards);
                     }
                 }
                 Stage::Limit => {
