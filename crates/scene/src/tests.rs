@@ -113,7 +113,10 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
     check_added(&[
         ("[expect]\nstabel = true", "19:1: expect.stabel: unknown key: expected one of stable, discrepancy"),
         ("[simulation]\nstep = 1", "19:1: simulation.step: unknown key: expected one of integrator, substeps"),
-        ("[[links]]\nfrom = \"left\"\nto = \"right\"\ncorrupted = 1", "21:1: links.left.right.corrupted: unknown key: expected one of from, to, delay"),
+        (
+            "[[links]]\nfrom = \"left\"\nto = \"right\"\ncorrupted = 1",
+            "21:1: links.left.right.corrupted: unknown key: expected one of from, to, delay",
+        ),
         ("[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { dealy = \"1ms\" }", "21:9: timeline.0.set.dealy: unknown key"),
         (
             "[[timeline]]\nat = \"1s\"\npeer = \"left\"\nset = { device = { mass = 1 } }",
