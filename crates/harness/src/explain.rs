@@ -1,10 +1,13 @@
 //! What a scene makes the program model, what it leaves out, and why.
 
+mod links;
+
 use cohaptic_peer::{Contact, Hand, Integrator, wire};
 use cohaptic_scene::{ChangeKind, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::Span;
-use cohaptic_wan::{Distribution, LinkConfig, LinkModel, Loss, Order, QueueLimit, Service};
+use cohaptic_wan::LinkModel;
 
+use self::links::describe_link;
 use crate::plan::{DeviceChoice, Model, Plan, Ticking};
 
 /// What `cohaptic explain` shows.
@@ -183,7 +186,7 @@ impl Rows {
             scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Links(links) if links.iter().any(|link| link.config.has_chance())));
         let lines_are_random = access_lines(scene).iter().any(|(_, _, line)| line.has_chance());
         if used.iter().all(|(config, _)| !config.has_chance()) && !lines_are_random && !timeline_is_random {
-            self.leave_out("random numbers: no link has jitter or loss");
+            self.leave_out("random numbers: no link leaves anything to chance");
         }
     }
 }
@@ -220,58 +223,6 @@ fn describe(peer: &PeerSpec) -> String {
         Some(Hand::Arm { .. }) => "an arm, its spring and damper part of the plant",
     };
     format!("device of {} kg that {contact}, {hand}", peer.device.mass)
-}
-
-fn describe_link(model: &LinkModel) -> String {
-    match model {
-        LinkModel::Fixed(config) => describe_config(config),
-        LinkModel::Modulated(modulated) => format!("{} states in turn, by chance", modulated.configs().len()),
-        LinkModel::Replay(log) => format!("a replay of {} packets", log.packets()),
-        LinkModel::Kernel(netem) => format!("netem of Linux 6.6: {}", netem.words()),
-        _ => "a link".into(),
-    }
-}
-
-fn describe_config(config: &LinkConfig) -> String {
-    let mut stages = Vec::new();
-    if !config.outages.is_empty() {
-        stages.push(format!("{} outages", config.outages.scheduled().len()));
-    }
-    match &config.loss {
-        Loss::None => {}
-        Loss::Independent(probability) => stages.push(format!("independent loss {probability}")),
-        Loss::GilbertElliott(_) => stages.push("Gilbert-Elliott loss".into()),
-        _ => stages.push("loss".into()),
-    }
-    if let Some(bottleneck) = &config.bottleneck {
-        let limit = match bottleneck.limit {
-            None => "unlimited".into(),
-            Some(QueueLimit::Packets(packets)) => format!("{packets} packets"),
-            Some(QueueLimit::Bytes(bytes)) => bytes.to_string(),
-            Some(_) => "limited".into(),
-        };
-        let service = match &bottleneck.service {
-            Service::Rate(rate) => rate.to_string(),
-            _ => "a recorded line".into(),
-        };
-        stages.push(format!("queue ({limit}) before {service}"));
-    }
-    let mean = Span(config.delay.mean());
-    match config.delay.jitter() {
-        None => stages.push(format!("delay {mean}")),
-        Some(jitter) => {
-            let law = match jitter.distribution {
-                Distribution::Normal => "normal",
-                Distribution::Uniform => "uniform",
-                _ => "random",
-            };
-            stages.push(format!("delay {mean}, {law} jitter of {}", Span(jitter.sd)));
-        }
-    }
-    if config.order == Order::InOrder {
-        stages.push("in order".into());
-    }
-    stages.join(", then ")
 }
 
 /// The configurations that links between different peers have, and how many links have each.

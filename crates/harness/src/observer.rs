@@ -30,7 +30,7 @@ pub trait Observer {
         Ok(())
     }
 
-    /// A packet has arrived or was dropped.
+    /// A packet, or a copy that a link made of one, has arrived or was dropped.
     ///
     /// # Errors
     ///
@@ -73,14 +73,14 @@ pub struct TickRow<'a> {
     pub coordination_force: &'a [f64],
 }
 
-/// What became of one packet.
+/// What became of one packet, or of one copy of it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct PacketRow {
     /// The sender.
     pub from: usize,
     /// The receiver.
     pub to: usize,
-    /// The number of the packet on its path, from 0.
+    /// The number of the packet on its path, from 0; a copy has that of its packet.
     pub sequence: u64,
     /// When it was sent.
     pub sent: Instant,

@@ -8,7 +8,7 @@ use cohaptic_peer::{
 };
 use cohaptic_scene::{Change, ChangeKind, Scene};
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{AccessLine, Damage, Fate, Network, NetworkConfig, NodeId};
+use cohaptic_wan::{AccessLine, Damage, Fate, Network, NetworkConfig, NodeId, PacketInfo};
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
@@ -222,7 +222,9 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
             let local_time = member.clock.local_time(member.tick);
             let stored = self.datagrams.store(others, self.axes, |datagram| member.peer.sample(local_time, datagram));
             let (handle, len) = stored.expect("a run ends before a state that is not finite is sent");
-            self.network.handle_broadcast(now, node(from), Bytes::new(len as u64), handle).expect("instants come in order");
+            // Capable of ECN, so that a queue that marks has something to mark: nobody sends less for it, but what is marked arrives.
+            let info = PacketInfo { size: Bytes::new(len as u64), ecn_capable: true };
+            self.network.handle_broadcast(now, node(from), info, handle).expect("instants come in order");
         }
         self.earliest_send = self.members.iter().map(|member| member.next_send).min().unwrap_or(0);
     }
@@ -250,7 +252,8 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
             } else {
                 self.datagrams.release(event.payload);
             }
-            if watch.packets {
+            // Making a copy is no end: the packet and its copy each have one.
+            if watch.packets && event.fate.is_end() {
                 let (from, to) = (event.from.0 as usize, event.to.0 as usize);
                 let (sequence, sent, at, size, fate) = (event.sequence, event.sent, event.at, event.size, event.fate);
                 observer.on_packet(&PacketRow { from, to, sequence, sent, at, size, fate })?;

@@ -1,16 +1,12 @@
 //! What every reader of a part of the scene needs to know, and where it reports what is wrong.
 
 use core::cell::RefCell;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
-
-use cohaptic_peer::Table as MotionTable;
 
 use crate::error::{Diagnostic, SceneError};
 use crate::model::Axes;
 use crate::names::Names;
-use crate::sections::Columns;
+use crate::sections::{Files, Modulators};
 use crate::source::{Place, Sources};
 use crate::tree::Node;
 
@@ -32,19 +28,19 @@ impl Faults {
     }
 }
 
-/// What has been learnt from files of motion: each file is read once. `None`: it was refused.
-pub(crate) type MotionFiles = RefCell<BTreeMap<(PathBuf, Columns), Option<Arc<MotionTable>>>>;
-
 /// Where a reader stands. A reader answers `None` where it has reported a fault.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Context<'a> {
     pub(crate) sources: Sources<'a>,
     pub(crate) faults: &'a Faults,
-    pub(crate) motion_files: &'a MotionFiles,
+    /// What has been learnt from the files that the scene names.
+    pub(crate) files: &'a Files,
     /// `None`: not known, because the number itself was refused.
     pub(crate) axes: Option<Axes>,
     /// `None`: not known, because the list itself was refused.
     pub(crate) names: Option<&'a Names>,
+    /// `None`: not known, because the list itself was refused.
+    pub(crate) modulators: Option<&'a Modulators>,
     /// Whether defaults are looked at on their own: then nothing can be missing.
     pub(crate) partial: bool,
 }

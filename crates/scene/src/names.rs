@@ -35,7 +35,7 @@ impl Names {
 
 /// Says which words would have been right, and which one was perhaps meant: `one of delay, jitter; did you mean "delay"?`
 pub(crate) fn one_of<'a>(words: impl IntoIterator<Item = &'a str>, given: &str) -> String {
-    const MOST: usize = 16;
+    const MOST: usize = 32;
     let words: Vec<&str> = words.into_iter().collect();
     let mut text = match words.as_slice() {
         [] => return "none".to_owned(),
@@ -100,6 +100,6 @@ mod tests {
     #[test]
     fn many_words_are_not_all_listed() {
         let words: Vec<String> = (0..100).map(|n| format!("peer{n}")).collect();
-        assert!(one_of(words.iter().map(String::as_str), "nobody").ends_with("peer15 and 84 more"));
+        assert!(one_of(words.iter().map(String::as_str), "nobody").ends_with("peer31 and 68 more"));
     }
 }

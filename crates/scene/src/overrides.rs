@@ -107,7 +107,7 @@ fn put(node: &mut Node, segments: &[Segment<'_>], value: Node, way: &Insertion) 
             Ok(())
         }
         Value::Table(table) => {
-            let list = way.path.is_empty() && matches!(first.name, "peers" | "links" | "timeline");
+            let list = way.path.is_empty() && matches!(first.name, "peers" | "links" | "modulators" | "timeline");
             let make = || {
                 let value = if list { Value::List(Vec::new()) } else { Value::Table(Table::default()) };
                 Node { value, place: first.place, path: next.path.clone() }
@@ -185,10 +185,11 @@ fn put_into_entry(entry: &mut Arc<Node>, rest: &[Segment<'_>], mut value: Node, 
     put(entry, rest, value, &way)
 }
 
-/// `timeline.0.…`: an element by its place.
+/// `timeline.0.…`, `modulators.cell.states.good.…`: an element by its place, or by its name if it has one.
 fn element<'a>(elements: &'a mut [Arc<Node>], index: &Segment<'_>, path: &str) -> Result<&'a mut Node, Refused> {
     let count = elements.len();
-    let found = index.name.parse::<usize>().ok().and_then(|index| elements.get_mut(index));
+    let named = elements.iter().position(|entry| text_of(entry, "name") == Some(index.name));
+    let found = named.or_else(|| index.name.parse().ok()).and_then(|index| elements.get_mut(index));
     found.map(Arc::make_mut).ok_or_else(|| {
         let message = format!("there is no entry {}: expected the place of one of its {count} entries, from 0", quote(index.name));
         refused(index, join(path, index.name), message)

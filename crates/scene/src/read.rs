@@ -1,8 +1,6 @@
 //! From files and texts to scenes.
 
-use core::cell::RefCell;
 use core::ops::Range;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use toml::de::DeTable;
@@ -12,8 +10,8 @@ use crate::error::{Diagnostic, SceneError};
 use crate::model::Scene;
 use crate::overrides;
 use crate::sections::{
-    Header, LinkClasses, PeerSources, check_enough, read_coordination, read_expect, read_header, read_integrator, read_links, read_names,
-    read_object, read_peers, read_timeline,
+    Files, Header, LinkClasses, PeerSources, check_enough, read_coordination, read_expect, read_header, read_integrator, read_links, read_modulators,
+    read_names, read_object, read_peers, read_timeline,
 };
 use crate::source::{BEGINNING, Place, Sources};
 use crate::table_reader::TableReader;
@@ -40,7 +38,7 @@ impl Scene {
         }
     }
 
-    /// Reads a scene from a text. `file` stands in messages, and its folder is where files of hand motion are looked for.
+    /// Reads a scene from a text. `file` stands in messages, and its folder is where files that the scene names are looked for.
     ///
     /// # Errors
     ///
@@ -49,8 +47,8 @@ impl Scene {
         let sources = Sources { file, text, overrides };
         let mut document = parse_toml(text, sources)?;
         let faults = Faults::default();
-        let motion_files = RefCell::new(BTreeMap::new());
-        let context = Context { sources, faults: &faults, motion_files: &motion_files, axes: None, names: None, partial: false };
+        let files = Files::default();
+        let context = Context { sources, faults: &faults, files: &files, axes: None, names: None, modulators: None, partial: false };
         overrides::apply(&mut document, overrides, context);
         let scene = read_document(&document, context);
         match (faults.into_first(), scene) {
@@ -71,7 +69,7 @@ impl Scene {
 /// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
 fn read_document(document: &Node, context: Context<'_>) -> Option<Scene> {
     let mut root = TableReader::new(document, context, "a table")?;
-    root.know(&["scene", "object", "coordination", "simulation", "peer", "peers", "link", "links", "timeline", "expect"]);
+    root.know(&["scene", "object", "coordination", "simulation", "peer", "peers", "modulators", "link", "links", "timeline", "expect"]);
     let header_node = root.get("scene");
     let header = root.required("scene", "a table [scene] with a duration", read_header).unwrap_or_default();
     let Header { title, duration, seed, axes, count } = header;
@@ -79,7 +77,9 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Scene> {
     let context = Context { axes, ..context };
     let names = count.and_then(|count| read_names(peers_node, count, context));
     let context = Context { names: names.as_ref(), ..context };
-    // From here on the readers know axes and names.
+    let modulators = read_modulators(root.get("modulators"), context);
+    let context = Context { modulators: modulators.as_ref(), ..context };
+    // From here on the readers know axes, names and modulators.
     let object = root.required("object", "a table [object] with a mass", |node, _| read_object(node, context));
     let coordination_node = root.get("coordination");
     let coordination = root.required("coordination", "a table [coordination] with a strategy", read_coordination);

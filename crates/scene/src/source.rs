@@ -34,6 +34,11 @@ pub(crate) struct Sources<'a> {
 }
 
 impl Sources<'_> {
+    /// The text in which a place lies.
+    pub(crate) fn text_of(&self, place: Place) -> &str {
+        place.source.checked_sub(1).and_then(|index| self.overrides.get(index)).map_or(self.text, String::as_str)
+    }
+
     /// Says what is wrong at a place.
     pub(crate) fn diagnostic(&self, place: Place, key: String, message: String) -> Diagnostic {
         let given = place.source.checked_sub(1).and_then(|index| self.overrides.get(index));

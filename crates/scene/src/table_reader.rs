@@ -37,6 +37,11 @@ impl<'a> TableReader<'a> {
         self.entry(key).map(|entry| &*entry.node)
     }
 
+    /// The names of all keys, in the order in which they were laid over each other.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &'a str> {
+        self.table.0.iter().map(|entry| entry.name.as_str())
+    }
+
     /// The value under a key that must be there.
     pub(crate) fn required<T>(&mut self, key: &'static str, expected: &str, read: impl FnOnce(&'a Node, Context<'a>) -> Option<T>) -> Option<T> {
         match self.get(key) {

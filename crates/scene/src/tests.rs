@@ -79,7 +79,8 @@ fn the_display_form_shows_the_line_with_carets_below_the_place() {
 #[test]
 fn the_display_form_of_an_override_shows_the_override() {
     let error = refused(SCENE, &["link.dlay=\"8ms\""]);
-    let expected = "--set link.dlay=\"8ms\": link.dlay: unknown key: expected one of delay, jitter, order, loss, rate, queue, overhead, outage; \
+    let expected = "--set link.dlay=\"8ms\": link.dlay: unknown key: expected one of delay, jitter, order, loss, mark-instead-of-loss, duplicate, \
+                    corrupt, reorder, rate, queue, overhead, cells, token-bucket, slots, mtu, limit, outage, trace, modulated, replay, netem, netem-profile; \
                     did you mean \"delay\"?\n |\n | link.dlay=\"8ms\"\n |      ^^^^";
     assert_eq!(error.to_string(), expected);
 }
@@ -90,7 +91,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "[object]",
             "[objekt]",
-            "3:2: objekt: unknown key: expected one of scene, object, coordination, simulation, peer, peers, link, links, timeline, expect; did you mean \"object\"?",
+            "3:2: objekt: unknown key: expected one of scene, object, coordination, simulation, peer, peers, modulators, link, links, timeline, expect; did you mean \"object\"?",
         ),
         ("duration = \"7s\"", "duration = \"7s\"\nspeed = 1", "3:1: scene.speed: unknown key: expected one of title, duration, seed, axes, count"),
         ("mass = 0.45", "mass = 0.45\nmas = 1", "5:1: object.mas: unknown key"),
@@ -106,13 +107,16 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
             "14:1: peers.left.colour: unknown key: expected one of name, tick, compute-delay, phase, contact",
         ),
         ("[peer]", "[peer]\nname = \"x\"", "10:1: peer.name: unknown key"),
-        ("[link]", "[link]\nduplicate = 0.1", "17:1: link.duplicate: unknown key: expected one of delay, jitter"),
+        ("[link]", "[link]\nduplicat = 0.1", "17:1: link.duplicat: unknown key: expected one of delay, jitter"),
         ("[link]", "[link]\nfrom = \"left\"", "17:1: link.from: unknown key"),
     ]);
     check_added(&[
         ("[expect]\nstabel = true", "19:1: expect.stabel: unknown key: expected one of stable, discrepancy"),
         ("[simulation]\nstep = 1", "19:1: simulation.step: unknown key: expected one of integrator, substeps"),
-        ("[[links]]\nfrom = \"left\"\nto = \"right\"\ncorrupt = 1", "21:1: links.left.right.corrupt: unknown key: expected one of from, to, delay"),
+        (
+            "[[links]]\nfrom = \"left\"\nto = \"right\"\ncorrupted = 1",
+            "21:1: links.left.right.corrupted: unknown key: expected one of from, to, delay",
+        ),
         ("[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { dealy = \"1ms\" }", "21:9: timeline.0.set.dealy: unknown key"),
         (
             "[[timeline]]\nat = \"1s\"\npeer = \"left\"\nset = { device = { mass = 1 } }",

@@ -20,6 +20,8 @@ enum Range {
     Any,
     NotNegative,
     Positive,
+    Fraction,
+    Correlation,
 }
 
 /// Above zero \[kg\].
@@ -44,6 +46,14 @@ pub(crate) const FORCE: Quantity = Quantity { range: Range::Any, unit: "N" };
 pub(crate) const FREQUENCY: Quantity = Quantity { range: Range::NotNegative, unit: "Hz" };
 /// Any \[rad\].
 pub(crate) const ANGLE: Quantity = Quantity { range: Range::Any, unit: "rad" };
+/// At least zero, beside others.
+pub(crate) const WEIGHT: Quantity = Quantity { range: Range::NotNegative, unit: "" };
+/// At least zero \[packet\].
+pub(crate) const PACKETS: Quantity = Quantity { range: Range::NotNegative, unit: "packets" };
+/// From 0 to 1.
+pub(crate) const FRACTION: Quantity = Quantity { range: Range::Fraction, unit: "" };
+/// From −1 to below 1.
+pub(crate) const CORRELATION: Quantity = Quantity { range: Range::Correlation, unit: "" };
 
 impl Quantity {
     /// In words: `a number above zero \[kg\]`.
@@ -52,8 +62,10 @@ impl Quantity {
             Range::Any => "a number",
             Range::NotNegative => "a number of at least zero",
             Range::Positive => "a number above zero",
+            Range::Fraction => "a number from 0 to 1",
+            Range::Correlation => "a number from -1 to below 1",
         };
-        format!("{range} [{}]", self.unit)
+        if self.unit.is_empty() { range.to_owned() } else { format!("{range} [{}]", self.unit) }
     }
 
     /// Reads a number in that range.
@@ -63,6 +75,8 @@ impl Quantity {
             Range::Any => true,
             Range::NotNegative => value >= 0.0,
             Range::Positive => value > 0.0,
+            Range::Fraction => (0.0..=1.0).contains(&value),
+            Range::Correlation => (-1.0..1.0).contains(&value),
         };
         if !within {
             context.fault_at(node, format!("{} is out of range: expected {}", written(node), self.expected()));
@@ -238,6 +252,40 @@ pub(crate) fn rate(node: &Node, context: Context<'_>) -> Option<Rate> {
 /// A size such as "1500B".
 pub(crate) fn size(node: &Node, context: Context<'_>) -> Option<Bytes> {
     quantity(node, context, parse::size)
+}
+
+/// A size that may be taken away, such as "28B" or "-14B".
+pub(crate) fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
+    const EXPECTED: &str = "a size such as \"28B\", or \"-14B\" for bytes that are not sent";
+    let text = text(node, context, EXPECTED)?;
+    let (negative, plain) = match text.trim_start().strip_prefix('-') {
+        Some(rest) => (true, rest),
+        None => (false, text),
+    };
+    let size = match parse::size(plain) {
+        Ok(size) => i64::try_from(size.get()).unwrap_or(i64::MAX),
+        Err(_) => return quantity(node, context, parse::size).and(None),
+    };
+    let size = i32::try_from(if negative { -size } else { size }).ok();
+    if size.is_none() {
+        context.fault_at(node, format!("{} is out of range: expected {EXPECTED}", quote(text)));
+    }
+    size
+}
+
+/// A number of packets such as "100 packets"; `None` if the text is none.
+pub(crate) fn packets(text: &str) -> Option<u64> {
+    let number = text.trim().strip_suffix("packets").or_else(|| text.trim().strip_suffix("packet"))?.trim();
+    let plain = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+    plain.then(|| number.parse().ok()).flatten()
+}
+
+/// Reports why the emulator refuses something, at the value that was written last of those that do not fit together.
+pub(crate) fn refuse(context: Context<'_>, nodes: &[Option<&Node>], fallback: &Node, error: &dyn core::fmt::Display) {
+    let last = nodes.iter().copied().flatten().max_by_key(|node| node.place);
+    let error = error.to_string();
+    let message = if error.contains("expected") { error } else { format!("{error}: expected another value") };
+    context.fault_at(last.unwrap_or(fallback), message);
 }
 
 /// A probability: a number from 0 to 1, or a text such as "1.5%".

@@ -34,6 +34,7 @@ struct PeerDocument {
     position_m: Components,
     velocity_m_s: Components,
     stale_samples: u64,
+    refused_samples: u64,
 }
 
 /// A number in a scene of one axis, a list with more.
@@ -67,6 +68,8 @@ struct Counters {
     delivered: u64,
     dropped: BTreeMap<&'static str, u64>,
     in_flight: u64,
+    marked: u64,
+    damaged: u64,
     mean_delay_s: Option<f64>,
 }
 
@@ -86,6 +89,7 @@ impl Document {
             position_m: Components::new(&peer.position),
             velocity_m_s: Components::new(&peer.velocity),
             stale_samples: peer.stale_samples,
+            refused_samples: peer.refused_samples,
         };
         Self {
             title: scene.title.clone(),
@@ -121,6 +125,8 @@ impl Counters {
             delivered: stats.delivered(),
             dropped: DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause))).collect(),
             in_flight: stats.in_flight(),
+            marked: stats.marked(),
+            damaged: stats.damaged(),
             mean_delay_s: stats.mean_delay().map(|delay| delay.as_secs_f64()),
         }
     }

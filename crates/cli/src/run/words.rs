@@ -65,6 +65,10 @@ fn packets(summary: &Summary) -> String {
         + summary.links.iter().filter(|link| !has_line(link.to, false)).map(|link| link.stats.delivered()).sum::<u64>();
     let stats = || summary.links.iter().map(|link| link.stats).chain(summary.access_lines.iter().map(|line| line.stats));
     let mut parts = vec![format!("{sent} packets sent over {} links", summary.links.len()), format!("{delivered} delivered")];
+    let copies: u64 = stats().map(|stats| stats.duplicated()).sum();
+    if copies > 0 {
+        parts.push(format!("{copies} copies made"));
+    }
     for cause in DropCause::ALL {
         let dropped: u64 = stats().map(|stats| stats.dropped(cause)).sum();
         if dropped > 0 {
@@ -76,6 +80,10 @@ fn packets(summary: &Summary) -> String {
     let stale: u64 = summary.peers.iter().map(|peer| peer.stale_samples).sum();
     if stale > 0 {
         parts.push(format!("{stale} of those delivered too late to be used"));
+    }
+    let refused: u64 = summary.peers.iter().map(|peer| peer.refused_samples).sum();
+    if refused > 0 {
+        parts.push(format!("{refused} delivered damaged and refused"));
     }
     parts.join(", ")
 }

@@ -1,20 +1,17 @@
 //! Files of recorded motion or force: rows of comma-separated numbers, the time first.
 
 use core::ops::Range;
-use std::path::Path;
 use std::sync::Arc;
 
 use cohaptic_peer::{Table as MotionTable, TableError};
 use cohaptic_units::{Instant, parse};
 
+use super::named_file::{Fault, file_path, read_file};
 use crate::context::Context;
-use crate::error::{Diagnostic, Origin};
-use crate::excerpt::Excerpt;
 use crate::tree::{Node, quote, shorten};
-use crate::values;
 
 /// What the columns after the time hold.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Columns {
     /// fx, fy, fz \[N\].
     Force,
@@ -34,54 +31,10 @@ impl Columns {
 
 /// Reads the file that `node` names, relative to the folder of the scene.
 pub(crate) fn read_motion_file(node: &Node, context: Context<'_>, columns: Columns) -> Option<Arc<MotionTable>> {
-    let name = values::text(node, context, "the name of a CSV file, relative to the folder of the scene")?;
-    if name.is_empty() {
-        context.fault_at(node, "the name is empty: expected the name of a CSV file, relative to the folder of the scene");
-        return None;
-    }
-    let axes = context.axes?.count();
-    let path = context.sources.file.parent().unwrap_or_else(|| Path::new("")).join(name);
-    // The same file with the other columns is another matter, and is refused by its header.
-    let key = (path.clone(), columns);
-    if let Some(known) = context.motion_files.borrow().get(&key) {
-        return known.clone();
-    }
-    let table = load(node, context, &path, &columns.header(axes));
-    context.motion_files.borrow_mut().insert(key, table.clone());
-    table
-}
-
-fn load(node: &Node, context: Context<'_>, path: &Path, header: &[&str]) -> Option<Arc<MotionTable>> {
-    let bytes = match std::fs::read(path) {
-        Ok(bytes) => bytes,
-        Err(error) => {
-            context.unreadable(node, path.to_path_buf(), error);
-            return None;
-        }
-    };
-    let refused = |text: &str, Fault { span, message }: Fault| {
-        let origin = Origin::File(path.to_path_buf());
-        let diagnostic = Diagnostic { origin, excerpt: Excerpt::new(text, span), key: node.path.clone(), message, note: None };
-        context.fault_in_file(node, diagnostic);
-    };
-    let parsed = match core::str::from_utf8(&bytes) {
-        Ok(text) => parse_rows(text, header).map_err(|fault| refused(text, fault)),
-        Err(error) => {
-            let at = error.valid_up_to();
-            let fault = Fault { span: at..at + 1, message: "not UTF-8: expected a CSV file".to_owned() };
-            // Before the place, the text with replacements is the text itself.
-            refused(&String::from_utf8_lossy(&bytes), fault);
-            Err(())
-        }
-    };
-    parsed.ok().map(Arc::new)
-}
-
-/// What is wrong, and where in the text.
-#[derive(Debug)]
-struct Fault {
-    span: Range<usize>,
-    message: String,
+    let path = file_path(node, context, "the name of a CSV file, relative to the folder of the scene")?;
+    let header = columns.header(context.axes?.count());
+    // The same file with other columns is another matter, and is refused by its header.
+    read_file(node, context, &path, &header.join(","), |text| parse_rows(text, &header).map(Arc::new))
 }
 
 fn parse_rows(text: &str, header: &[&str]) -> Result<MotionTable, Fault> {
@@ -200,6 +153,7 @@ fn without_exponent(text: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::excerpt::Excerpt;
 
     fn nanos(text: &str) -> Option<u64> {
         seconds(text).ok().map(Instant::as_nanos)
