@@ -8,6 +8,8 @@
 )]
 
 pub mod bare;
+pub mod machine;
+pub mod one_link;
 pub mod samplers;
 
 use cohaptic_harness::{Model, NoObserver, Simulation, Summary};

@@ -11,6 +11,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
+use cohaptic_benches::machine::processor;
 use cohaptic_benches::samplers::{Fine, MEAN, Netem, SD, draw, laws, next_word, unit};
 use cohaptic_wan::law::Law;
 
@@ -162,11 +163,4 @@ const Z_9999: f64 = 3.719_016_485_455_709;
 /// Φ(z), from a normal law.
 fn probability(normal: &Law, z: f64) -> f64 {
     normal.cdf(MEAN + SD * z)
-}
-
-/// The processor as Linux names it.
-fn processor() -> String {
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let name = text.lines().find(|line| line.starts_with("model name")).and_then(|line| line.split_once(':'));
-    name.map_or_else(|| "an unnamed processor".into(), |(_, name)| name.trim().to_owned())
 }

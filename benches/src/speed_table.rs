@@ -3,10 +3,9 @@
 #![allow(clippy::cast_precision_loss, reason = "seconds and rounds are small")]
 
 use std::hint::black_box;
-use std::time::Duration;
 
+use cohaptic_benches::machine::{median, peak_memory, processor, time};
 use cohaptic_benches::{Mesh, bare};
-use rustix::time::{ClockId, clock_gettime};
 
 /// What the project asks of itself in each cell: times real time.
 const ASKED: [f64; 6] = [12_000.0, 8_000.0, 2_500.0, 1_200.0, 120.0, 50.0];
@@ -67,36 +66,6 @@ fn measure(mesh: Mesh) -> (f64, f64) {
         rounds[0].push(time(|| drop(black_box(Mesh::run(&scene)))));
         rounds[1].push(time(|| drop(black_box(bare::run(mesh, seconds * 1000)))));
     }
-    let [program, bare] = rounds.map(|mut times| {
-        times.sort();
-        seconds as f64 / times[ROUNDS / 2].as_secs_f64()
-    });
+    let [program, bare] = rounds.map(|times| seconds as f64 / median(times).as_secs_f64());
     (program, bare)
-}
-
-/// The processor time of this thread that the work takes: what else the machine does counts less.
-fn time(work: impl FnOnce()) -> Duration {
-    let start = processor_time();
-    work();
-    processor_time() - start
-}
-
-fn processor_time() -> Duration {
-    let time = clock_gettime(ClockId::ThreadCPUTime);
-    time.try_into().expect("processor time is not negative")
-}
-
-/// The processor as Linux names it.
-fn processor() -> String {
-    field("/proc/cpuinfo", "model name").unwrap_or_else(|| "an unnamed processor".into())
-}
-
-fn peak_memory() -> String {
-    field("/proc/self/status", "VmHWM").unwrap_or_else(|| "not told by this system".into())
-}
-
-fn field(file: &str, name: &str) -> Option<String> {
-    let text = std::fs::read_to_string(file).ok()?;
-    let line = text.lines().find(|line| line.starts_with(name))?;
-    Some(line.split_once(':')?.1.trim().to_owned())
 }

@@ -1,10 +1,11 @@
 //! Bits that are flipped on the way.
 
+use alloc::collections::BTreeSet;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use cohaptic_units::{Bytes, Probability};
+use cohaptic_units::Probability;
 
 use crate::chance::ChanceStage;
 use crate::random::{PacketDraws, Purpose, unit};
@@ -15,7 +16,8 @@ use crate::{Chance, PacketInfo};
 pub struct Corruption {
     /// How bits are chosen.
     pub bits: Flips,
-    /// The bytes that may be hit, counted from the packet's begin; `None`: the whole packet. What lies beyond a packet's end does not count.
+    /// The bytes that may be hit, counted from the packet's begin; `None`: the whole packet. What lies beyond a packet's end does not count, nor what lies
+    /// beyond 65,536 bytes: no datagram is longer.
     pub within: Option<Range<u64>>,
     /// What the receiver does with a damaged packet.
     pub checksum: Checksum,
@@ -77,13 +79,19 @@ impl Damage {
         (!bits.is_empty()).then(|| Self(bits.into()))
     }
 
-    /// Both: a bit that is flipped twice is whole again.
+    /// Both: a bit that is flipped twice is whole again. Where nobody knows which bits they were, there is damage still.
     pub(crate) fn and(self, other: &Self) -> Option<Self> {
+        if self.0.is_empty() || other.0.is_empty() {
+            return Some(Self::unknown());
+        }
         let mut bits: Vec<u64> = self.0.iter().filter(|bit| !other.0.contains(bit)).copied().collect();
         bits.extend(other.0.iter().filter(|bit| !self.0.contains(bit)));
         Self::of(bits)
     }
 }
+
+/// So many bytes at the begin of a packet can be hit: the damage to a packet is a list, and a size alone takes no memory.
+const LONGEST: u64 = 1 << 16;
 
 /// The stage: the configuration and the answer before.
 #[derive(Clone, Debug)]
@@ -109,9 +117,10 @@ impl CorruptionStage {
 
     /// The damage to a packet.
     pub(crate) fn damage(&mut self, info: PacketInfo, packet: PacketDraws) -> Option<Damage> {
-        let end = self.config.within.as_ref().map_or(info.size, |within| info.size.min(Bytes::new(within.end)));
-        let first = 8 * self.config.within.as_ref().map_or(0, |within| within.start);
-        let count = end.get().saturating_mul(8).saturating_sub(first);
+        let (start, end) = self.config.within.as_ref().map_or((0, LONGEST), |within| (within.start, within.end));
+        let end = end.min(info.size.get()).min(LONGEST);
+        let first = 8 * start.min(end);
+        let count = 8 * end - first;
         let bits = match self.config.bits {
             Flips::Bits { count: wanted, .. } => {
                 if !self.packets.as_mut()?.happens(packet.first(Purpose::Corruption)) {
@@ -128,12 +137,14 @@ impl CorruptionStage {
 /// So many different numbers below `count`, every set equally likely (Floyd; Bentley & Floyd, CACM 30(9), 1987).
 fn some_of(count: u64, wanted: u32, packet: PacketDraws) -> Vec<u64> {
     let mut more = packet.more(Purpose::Corruption);
-    let mut chosen = Vec::new();
+    let mut chosen = BTreeSet::new();
     for last in count.saturating_sub(wanted.into())..count {
         let candidate = below(last + 1, more.next_word());
-        chosen.push(if chosen.contains(&candidate) { last } else { candidate });
+        if !chosen.insert(candidate) {
+            chosen.insert(last);
+        }
     }
-    chosen
+    chosen.into_iter().collect()
 }
 
 /// A number below `bound`: the word scaled, whose bias is at most bound·2⁻⁶⁴.
@@ -170,6 +181,8 @@ fn each_with(count: u64, rate: Probability, packet: PacketDraws) -> Vec<u64> {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_units::Bytes;
+
     use super::*;
     use crate::random::Stream;
 
@@ -221,7 +234,11 @@ mod tests {
             damage.apply(&mut bytes);
             assert_eq!(bytes, [7; 64]);
             assert_eq!(damage.clone().and(&damage), None);
+            assert_eq!(damage.clone().and(&Damage::unknown()), Some(Damage::unknown()));
         }
+        assert!(damages(stage(always(5), Some(u64::MAX - 1..u64::MAX)), u64::MAX, 10).iter().all(Option::is_none));
+        assert_eq!(damages(stage(Flips::Rate(Probability::ONE), None), u64::MAX, 1)[0].as_ref().unwrap().bits().len(), 8 << 16);
+        assert_eq!(damages(stage(always(u32::MAX), None), u64::MAX, 1)[0].as_ref().unwrap().bits().len(), 8 << 16);
         assert!(damages(stage(always(5), Some(70..80)), 64, 10).iter().all(Option::is_none));
         assert_eq!(damages(stage(always(99), Some(0..2)), 1, 1)[0].as_ref().unwrap().bits(), [0, 1, 2, 3, 4, 5, 6, 7]);
     }

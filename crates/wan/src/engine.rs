@@ -67,6 +67,12 @@ impl<T: Clone> Engine<T> {
         self.kind.pass(now, outputs);
     }
 
+    /// When [`Engine::pass`] must be called.
+    pub(crate) fn next_at(&self) -> Option<Instant> {
+        let next = self.kind.next_at();
+        self.retiring.iter().filter_map(Kind::next_at).chain(next).min()
+    }
+
     /// The owner was woken for that instant: says again when it must be.
     pub(crate) fn woken(&mut self, at: Instant) {
         if self.announced == Some(at) {
@@ -74,9 +80,9 @@ impl<T: Clone> Engine<T> {
         }
     }
 
-    /// When [`Engine::pass`] must be called, if that was not said yet.
+    /// The same, if it was not said yet: for an owner who writes it down.
     pub(crate) fn announce(&mut self) -> Option<Instant> {
-        let next = self.retiring.iter().chain([&self.kind]).filter_map(Kind::next_at).min()?;
+        let next = self.next_at()?;
         if self.announced.is_some_and(|announced| announced <= next) {
             return None;
         }

@@ -57,8 +57,7 @@ impl<T: Clone> KernelStage<T> {
             let mut packet = Carried { copy: left.copy, ..left.item };
             packet.marks.congestion |= left.marked;
             if let Some(bit) = left.corrupted {
-                packet.marks.damage = Damage::of(vec![u64::from(bit.byte) * 8 + u64::from(bit.bit)]);
-                packet.marks.discarded_on_arrival = true;
+                packet.marks.damage(Damage::of(vec![u64::from(bit.byte) * 8 + u64::from(bit.bit)]), true);
             }
             outputs.push(Output { packet, exit: Exit::Arrives(now) });
         }

@@ -83,11 +83,10 @@ struct InLink<P> {
     payload: P,
 }
 
-/// An arrival, or the time to wake the engine.
 #[derive(Clone, Debug)]
 struct Pending<P> {
     at: Instant,
-    what: Option<Arrival<P>>,
+    arrival: Arrival<P>,
 }
 
 #[derive(Clone, Debug)]
@@ -98,17 +97,16 @@ struct Arrival<P> {
 }
 
 impl<P> Event for Pending<P> {
-    type Key = (Instant, Option<(u64, u8)>);
+    type Key = (Instant, u64, u8);
 
     #[inline]
     fn at(&self) -> Instant {
         self.at
     }
 
-    /// The engine is woken before anything arrives.
     #[inline]
     fn key(&self) -> Self::Key {
-        (self.at, self.what.as_ref().map(|arrival| (arrival.packet.sequence, arrival.copy)))
+        (self.at, self.arrival.packet.sequence, self.arrival.copy)
     }
 }
 
@@ -143,7 +141,10 @@ impl<P: Clone> Link<P> {
     /// [`TimeWentBack`] if an earlier call had a later instant; nothing was changed.
     #[inline]
     pub fn handle_packet(&mut self, now: Instant, info: impl Into<PacketInfo>, payload: P) -> Result<(), TimeWentBack> {
-        self.handle_timeout(now)?;
+        check_time(&mut self.now, now)?;
+        if self.pipeline.engine().is_some() {
+            self.let_happen(now);
+        }
         let info = info.into();
         let sequence = self.stats.flow.offered;
         self.stats.flow.offered += 1;
@@ -154,7 +155,7 @@ impl<P: Clone> Link<P> {
             return Ok(());
         }
         match self.pipeline.offer(now, sequence, self.pipeline.words(sequence)) {
-            Outcome::Arrives(at) => self.pending.push(Pending { at, what: Some(Arrival { packet, copy: 0, marks: None }) }),
+            Outcome::Arrives(at) => self.pending.push(Pending { at, arrival: Arrival { packet, copy: 0, marks: None } }),
             Outcome::Dropped(cause) => self.drop(now, cause, packet, 0, Marks::default()),
             Outcome::Enters => self.enter(now, info, packet),
         }
@@ -176,14 +177,22 @@ impl<P: Clone> Link<P> {
     /// When [`Link::handle_timeout`] must be called next; `None` if nothing is on the way. Never before the last instant given. After a live change it may name an instant at which nothing happens.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        self.pending.next_at()
+        let wake = self.pipeline.next_wake();
+        let next = self.pending.next_at().map_or(wake, |arrival| Some(wake.map_or(arrival, |wake| wake.min(arrival))))?;
+        // What has arrived and was not polled yet is there now.
+        Some(next.max(self.now))
     }
 
     /// The next packet that has arrived or was dropped, or a copy that was made; `None` when all have been polled.
     #[must_use]
     #[inline]
     pub fn poll_event(&mut self) -> Option<LinkEvent<P>> {
-        self.happened.pop_front()
+        if let Some(event) = self.happened.pop_front() {
+            return Some(event);
+        }
+        // Without an engine arrivals wait here: nothing that comes meanwhile depends on them.
+        let Pending { at, arrival } = self.pending.pop_due(self.now)?;
+        Some(self.arrive(at, arrival))
     }
 
     /// Changes the model from `now` on. Packets that propagate keep their delay; one that is being serialised keeps the bits already sent; those that wait
@@ -200,7 +209,7 @@ impl<P: Clone> Link<P> {
         Ok(())
     }
 
-    /// What the link did so far.
+    /// What the link did so far. A packet counts as delivered when its arrival is polled, or when time is let pass beyond it.
     #[must_use]
     pub const fn stats(&self) -> &LinkStats {
         &self.stats
@@ -221,14 +230,17 @@ impl<P: Clone> Link<P> {
     /// Lets all that is due happen, and keeps the events until they are polled.
     #[inline(always)]
     fn let_happen(&mut self, now: Instant) {
-        while let Some(Pending { at, what }) = self.pending.pop_due(now) {
-            match what {
-                Some(arrival) => {
-                    let event = self.arrive(at, arrival);
-                    self.happened.push_back(event);
-                }
-                None => self.wake(at),
+        loop {
+            // The engine is woken before anything arrives at the same instant.
+            if let Some(wake) = self.pipeline.next_wake().filter(|wake| *wake <= now)
+                && self.pending.next_at().is_none_or(|arrival| wake <= arrival)
+            {
+                self.wake(wake);
+                continue;
             }
+            let Some(Pending { at, arrival }) = self.pending.pop_due(now) else { return };
+            let event = self.arrive(at, arrival);
+            self.happened.push_back(event);
         }
     }
 
@@ -245,17 +257,15 @@ impl<P: Clone> Link<P> {
         packet.event(at, Fate::Delivered(at), copy, marks)
     }
 
-    #[cold]
     fn wake(&mut self, at: Instant) {
         let mut outputs = core::mem::take(&mut self.outputs);
         if let Some(engine) = self.pipeline.engine() {
-            engine.woken(at);
             engine.pass(at, &mut outputs);
         }
         self.come_out(outputs);
     }
 
-    /// Deals with what has come out of the engine, and asks it when to be woken.
+    /// Deals with what has come out of the engine.
     fn come_out(&mut self, mut outputs: Outputs<InLink<P>>) {
         for output in outputs.drain(..) {
             let Carried { copy, marks, item, .. } = output.packet;
@@ -264,7 +274,7 @@ impl<P: Clone> Link<P> {
                     self.stats.seldom.marked += u64::from(marks.congestion);
                     self.stats.seldom.damaged += u64::from(marks.damage.is_some());
                     let marks = (marks != Marks::default()).then(|| Box::new(marks));
-                    self.pending.push(Pending { at, what: Some(Arrival { packet: item, copy, marks }) });
+                    self.pending.push(Pending { at, arrival: Arrival { packet: item, copy, marks } });
                 }
                 Exit::Dropped(at, cause) => self.drop(at, cause, item, copy, marks),
                 Exit::Copied(at) => {
@@ -274,12 +284,13 @@ impl<P: Clone> Link<P> {
             }
         }
         self.outputs = outputs;
-        if let Some(at) = self.pipeline.engine().and_then(crate::engine::Engine::announce) {
-            self.pending.push(Pending { at, what: None });
-        }
     }
 
     fn drop(&mut self, now: Instant, cause: DropCause, packet: InLink<P>, copy: u8, marks: Marks) {
+        if self.pipeline.engine().is_none() {
+            // Arrivals that wait to be polled came before this drop.
+            self.let_happen(now);
+        }
         self.stats.seldom.dropped[cause.index()] += 1;
         self.happened.push_back(packet.event(now, Fate::Dropped(cause), copy, marks));
     }

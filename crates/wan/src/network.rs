@@ -677,7 +677,9 @@ impl<P: Clone> Network<P> {
                     self.schedule(at, hop, line, packet);
                 }
                 Exit::Dropped(at, cause) => {
-                    packet.size = packet.size.with(SizeAndMarks::DAMAGED, false);
+                    if let Some(damage) = marks.damage {
+                        self.damages.insert((packet.path, packet.sequence, packet.size.copy()), damage);
+                    }
                     self.drop(at, hop, line, cause, packet);
                 }
                 Exit::Copied(at) => {

@@ -162,15 +162,22 @@ impl OutageStage {
         Self::reconfigured(None, Instant::ZERO, outages, draws)
     }
 
-    /// The stage with new outages. A link that fails at random stays in the span that it is in; one that begins to do so begins up.
+    /// The stage with new outages. A link that fails at random stays in the span that it is in; one that begins to do so begins up, and one that begins to
+    /// go down when idle was used just now.
     pub(crate) fn reconfigured(before: Option<Self>, now: Instant, outages: Outages, draws: Stream) -> Option<Self> {
-        if outages.is_empty() {
+        if before.is_none() && outages.is_empty() {
             return None;
         }
         let begin = Self { outages: Outages::default(), span: 0, span_ends: Instant::MAX, last_taken: now };
         let mut stage = before.unwrap_or(begin);
+        if stage.outages.idle.is_none() {
+            stage.last_taken = now;
+        }
         if let (None, Some(random)) = (stage.outages.random, outages.random) {
-            stage.span += stage.span % 2;
+            // No span is drawn twice: one that had begun before is not begun again.
+            if stage.span_ends < Instant::MAX {
+                stage.span += 2 - stage.span % 2;
+            }
             stage.span_ends = now.saturating_add(drawn(random.up, draws, stage.span));
         }
         stage.outages = outages;
@@ -251,6 +258,36 @@ mod tests {
         let down: Vec<u64> = [0, 9, 18, 28, 32, 33, 44, 63, 67].into_iter().filter(|t| stage.is_down(Instant::from_nanos(*t), draws)).collect();
         // Taken at 0, 9 and 18; down from 28 to 33, when it is taken again; down from 43 to 48, up to 58, down to 63, taken.
         assert_eq!(down, [28, 32, 44]);
+    }
+
+    #[test]
+    fn a_link_that_begins_to_fail_again_draws_new_spans() {
+        let random = RandomOutages { up: Sojourn::Exponential(Duration::from_millis(30)), down: Sojourn::Exponential(Duration::from_millis(10)) };
+        let (draws, random) = (Stream::new(4, b"outage"), Outages::default().with_random(random).unwrap());
+        let mut stage = None;
+        let ends: std::collections::BTreeSet<Instant> = (0..100)
+            .map(|_| {
+                let failing = OutageStage::reconfigured(stage.take(), Instant::ZERO, random.clone(), draws).unwrap();
+                let ends = failing.span_ends;
+                stage = OutageStage::reconfigured(Some(failing), Instant::ZERO, Outages::default(), draws);
+                ends
+            })
+            .collect();
+        assert_eq!(ends.len(), 100);
+        assert_eq!(
+            OutageStage::new(random, draws).unwrap().span_ends,
+            Instant::ZERO.saturating_add(drawn(Sojourn::Exponential(Duration::from_millis(30)), draws, 0))
+        );
+    }
+
+    #[test]
+    fn a_link_that_begins_to_sleep_was_used_just_now() {
+        let nanos = Duration::from_nanos;
+        let idle = Outages::default().with_idle(IdleOutages { after: nanos(10), down: nanos(5) }).unwrap();
+        let draws = Stream::new(0, b"");
+        let mut stage = OutageStage::reconfigured(None, Instant::from_nanos(12), idle, draws).unwrap();
+        assert!(!stage.is_down(Instant::from_nanos(13), draws));
+        assert!(stage.is_down(Instant::from_nanos(23), draws));
     }
 
     #[test]

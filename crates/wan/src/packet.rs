@@ -44,6 +44,18 @@ pub(crate) struct Marks {
     pub(crate) discarded_on_arrival: bool,
 }
 
+impl Marks {
+    /// More bits were flipped, of a packet that a line before may have damaged already; `is_discarded`: a checksum will find it.
+    pub(crate) fn damage(&mut self, damage: Option<Damage>, is_discarded: bool) {
+        self.damage = match (self.damage.take(), damage) {
+            (Some(before), Some(damage)) => before.and(&damage),
+            (before, damage) => before.or(damage),
+        };
+        // Two flips of one bit leave nothing to find.
+        self.discarded_on_arrival = self.damage.is_some() && (self.discarded_on_arrival || is_discarded);
+    }
+}
+
 /// What comes out of the stages.
 #[derive(Clone, Debug)]
 pub(crate) struct Output<T> {

@@ -134,6 +134,15 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
+    /// When the engine must be woken, if the link has one.
+    #[inline]
+    pub(crate) fn next_wake(&self) -> Option<Instant> {
+        match self {
+            Self::Engine(engine) => engine.next_at(),
+            Self::Constant(..) | Self::Direct(_) => None,
+        }
+    }
+
     /// Changes the model. What propagates keeps its delay. What leaves the engine by that is in `outputs`.
     pub(crate) fn reconfigure(&mut self, now: Instant, seed: u64, name: &LinkName, model: LinkModel, outputs: &mut Outputs<T>) {
         match (self, model) {
@@ -178,7 +187,12 @@ fn reconfigure_engine<T: Clone>(engine: &mut Engine<T>, now: Instant, seed: u64,
 /// The engine for a model, around the stages that decide at once if they have a past.
 fn kind<T: Clone>(now: Instant, seed: u64, name: &LinkName, model: LinkModel, past: Option<Direct>) -> Kind<T> {
     let staged = |config: LinkConfig, modulation| {
-        let direct = past.unwrap_or_else(|| Direct::new(seed, name, &config));
+        // A link that becomes one with stages later begins its outages then.
+        let direct = past.unwrap_or_else(|| {
+            let mut direct = Direct::new(seed, name, &LinkConfig::default());
+            direct.reconfigure(now, &config);
+            direct
+        });
         Kind::Staged(Box::new(Staged::new(now, direct, config, modulation)))
     };
     match model {

@@ -44,7 +44,7 @@ impl<T: Clone> ReplayStage<T> {
             let mut packet = Carried { copy, ..packet.clone() };
             packet.marks.congestion |= record.marked;
             if record.damaged {
-                packet.marks.damage = Some(Damage::unknown());
+                packet.marks.damage(Some(Damage::unknown()), false);
             }
             let output = Output { packet, exit };
             if at == now || matches!(exit, Exit::Arrives(_)) {

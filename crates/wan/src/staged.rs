@@ -86,6 +86,11 @@ pub(crate) struct Staged<T> {
     /// How many have propagated there: what breaks ties.
     line_count: u64,
     modulation: Option<ModulationStage>,
+    /// What happens next, and the next change of state: kept, because they are asked for more often than they change.
+    next: Option<(Instant, Stage)>,
+    next_change: Option<Instant>,
+    /// Memory for what leaves a stage, to be used again.
+    released: VecDeque<Carried<T>>,
 }
 
 /// A packet on the line between two stages, ordered so that the heap gives the earliest.
@@ -135,10 +140,14 @@ impl<T: Clone> Staged<T> {
             line: BinaryHeap::new(),
             line_count: 0,
             modulation: None,
+            next: None,
+            next_change: None,
+            released: VecDeque::new(),
         };
         // Nothing is inside that could come out.
         stages.apply(now, config, &mut Vec::new());
         stages.modulation = modulation;
+        stages.look_ahead();
         stages
     }
 
@@ -146,28 +155,29 @@ impl<T: Clone> Staged<T> {
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
         self.pass(now, outputs);
         self.walk(0, now, packet, inside, outputs);
+        self.look_ahead();
         self.pass(now, outputs);
     }
 
     /// When [`Staged::pass`] must be called next; `None` if nothing waits.
     pub(crate) fn next_at(&self) -> Option<Instant> {
-        let (next, _) = self.next_event()?;
+        let (next, _) = self.next?;
         // While something waits a change of state may change when it leaves.
-        let change = self.modulation.as_ref().and_then(ModulationStage::next_change);
-        Some(change.map_or(next, |change| change.min(next)))
+        Some(self.next_change.map_or(next, |change| change.min(next)))
     }
 
     /// Lets all happen that is due.
     pub(crate) fn pass(&mut self, now: Instant, outputs: &mut Outputs<T>) {
         loop {
-            let event = self.next_event().filter(|(at, _)| *at <= now);
-            let change = self.modulation.as_ref().and_then(ModulationStage::next_change).filter(|at| *at <= now);
+            let event = self.next.filter(|(at, _)| *at <= now);
+            let change = self.next_change.filter(|at| *at <= now);
             match (event, change) {
                 // At one instant what leaves does so before the change.
                 (Some((at, stage)), change) if change.is_none_or(|change| at <= change) => self.release(at, stage, outputs),
                 (_, Some(change)) => self.change(change, outputs),
                 _ => return,
             }
+            self.look_ahead();
         }
     }
 
@@ -176,6 +186,12 @@ impl<T: Clone> Staged<T> {
         self.pass(now, outputs);
         self.modulation = modulation;
         self.apply(now, config, outputs);
+        self.look_ahead();
+    }
+
+    fn look_ahead(&mut self) {
+        self.next = self.next_event();
+        self.next_change = self.modulation.as_ref().and_then(ModulationStage::next_change);
     }
 
     fn change(&mut self, at: Instant, outputs: &mut Outputs<T>) {
@@ -268,7 +284,7 @@ impl<T: Clone> Staged<T> {
     }
 
     fn release(&mut self, now: Instant, stage: Stage, outputs: &mut Outputs<T>) {
-        let mut released = VecDeque::new();
+        let mut released = core::mem::take(&mut self.released);
         match stage {
             Stage::Bucket => released.extend(self.bucket.as_mut().and_then(|bucket| bucket.release(now, outputs))),
             Stage::Bottleneck => {
@@ -294,9 +310,10 @@ impl<T: Clone> Staged<T> {
             }
             Stage::Mtu | Stage::Outage | Stage::Loss | Stage::Duplication | Stage::Corruption | Stage::Limit => {}
         }
-        for packet in released {
+        for packet in released.drain(..) {
             self.walk_on(stage, now, packet, outputs);
         }
+        self.released = released;
     }
 
     fn walk_on(&mut self, after: Stage, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) {
@@ -336,20 +353,16 @@ impl<T: Clone> Staged<T> {
                         outputs.push(Output { packet: copy.clone(), exit: Exit::Copied(now) });
                         let before = outputs.len();
                         self.walk(place + 1, now, packet, inside, outputs);
-                        let went_in = !outputs[before..].iter().any(|output| matches!(output.exit, Exit::Dropped(..)));
-                        return self.walk(place + 1, now, copy, inside + u64::from(went_in), outputs);
+                        // The packet may have been dropped, or others from the head of a queue in its stead.
+                        let dropped = outputs[before..].iter().filter(|output| matches!(output.exit, Exit::Dropped(..))).count() as u64;
+                        return self.walk(place + 1, now, copy, (inside + 1).saturating_sub(dropped), outputs);
                     }
                 }
                 Stage::Corruption => {
                     if let Some(corruption) = &mut self.corruption
                         && let Some(damage) = corruption.damage(packet.info, draws)
                     {
-                        packet.marks.discarded_on_arrival |= corruption.checksum() == Checksum::Discards;
-                        packet.marks.damage = match packet.marks.damage.take() {
-                            None => Some(damage),
-                            Some(before) => before.and(&damage),
-                        };
-                        packet.marks.discarded_on_arrival &= packet.marks.damage.is_some();
+                        packet.marks.damage(Some(damage), corruption.checksum() == Checksum::Discards);
                     }
                 }
                 Stage::Limit => {

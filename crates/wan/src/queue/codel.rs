@@ -94,7 +94,7 @@ impl CoDelState {
         self.dropping = true;
         // A queue that grew again soon after it was controlled is dropped from at the rate that controlled it.
         let since = self.count - self.last_count;
-        let recently = now.saturating_duration_since(self.drop_next) < codel.interval * 16;
+        let recently = now.saturating_duration_since(self.drop_next) < codel.interval.saturating_mul(16);
         self.count = if since > 1 && recently { since } else { 1 };
         self.drop_next = control_law(now, codel.interval, self.count);
         self.last_count = self.count;

@@ -176,13 +176,26 @@ impl<T> TokenBucketStage<T> {
 
     fn admits(&self, now: Instant, size: Bytes) -> bool {
         let Some(limit) = self.config.limit else { return true };
-        let bits = self.waiting.iter().map(|packet| self.needed(packet));
         let time = match limit {
-            // What waits leaves at the mean rate; the peak only orders it within.
-            QueueLimit::Time(_) => self.mean.holds_at(bits.sum()).saturating_duration_since(now),
+            QueueLimit::Time(_) => self.turn_of(size).saturating_duration_since(now),
             QueueLimit::Packets(_) | QueueLimit::Bytes(_) => Duration::ZERO,
         };
         limit.admits(Waiting { packets: self.waiting.len() as u64, bytes: self.waiting_bytes, time }, size)
+    }
+
+    /// When another packet of that size would leave, at the present rates: that is the turn of one that takes no time to leave.
+    fn turn_of(&self, size: Bytes) -> Instant {
+        let (mut mean, mut peak) = (self.mean, self.peak);
+        let mut turn = mean.since;
+        for size in self.waiting.iter().map(|packet| packet.info.size).chain([size]) {
+            let needed = giga_bits(self.config.framing.on_the_line(size));
+            turn = mean.holds_at(needed).max(peak.map_or(Instant::ZERO, |peak| peak.holds_at(needed)));
+            for bucket in [Some(&mut mean), peak.as_mut()].into_iter().flatten() {
+                bucket.fill(turn);
+                bucket.tokens = bucket.tokens.saturating_sub(needed);
+            }
+        }
+        turn
     }
 }
 
@@ -232,6 +245,22 @@ mod tests {
     fn a_peak_spreads_the_burst() {
         let peak = Peak { rate: Rate::bits_per_sec(16_000_000).unwrap(), burst: Bytes::new(40) };
         assert_eq!(departures(bucket(Some(peak)), &[0, 0, 0], 40), (vec![0, 20, 40], 0));
+    }
+
+    /// 100 bytes of credit for two packets; the third leaves at 20 µs, the fourth at 60, a fifth would at 100. Behind a peak of a byte in 2 µs they leave at
+    /// 0, 80, 160 …, though the mean bucket would let them go sooner.
+    #[test]
+    fn no_packet_waits_longer_than_a_limit_in_time() {
+        let limit = |micros| Some(QueueLimit::Time(Duration::from_micros(micros)));
+        let with = |peak, limit| {
+            let mut stage = bucket(peak);
+            stage.config.limit = limit;
+            stage
+        };
+        assert_eq!(departures(with(None, limit(60)), &[0, 0, 0, 0, 0], 40), (vec![0, 0, 20, 60], 1));
+        assert_eq!(departures(with(None, limit(59)), &[0, 0, 0, 0, 0], 40), (vec![0, 0, 20], 2));
+        let peak = Peak { rate: Rate::bits_per_sec(4_000_000).unwrap(), burst: Bytes::new(40) };
+        assert_eq!(departures(with(Some(peak), limit(160)), &[0, 0, 0, 0, 0], 40), (vec![0, 80, 160], 2));
     }
 
     #[test]

@@ -151,7 +151,8 @@ proptest! {
                 alone.handle_timeout(now).unwrap();
                 both[0].extend(drain(&mut alone).into_iter().map(of_link));
                 both[1].extend(drain_network(&mut network).into_iter().map(of_network));
-                prop_assert_eq!(alone.poll_timeout(), network.poll_timeout());
+                // A network may name an instant at which nothing happens any more.
+                prop_assert!(network.poll_timeout().unwrap_or(Instant::MAX) <= alone.poll_timeout().unwrap_or(Instant::MAX));
             }
         }
         alone.handle_timeout(Instant::MAX).unwrap();
