@@ -60,13 +60,16 @@ impl Beside {
         let seen = &mut self.packets[number];
         match record.fate {
             Fate::Duplicated => seen.copied = true,
-            _ if record.copy > 0 => {}
-            end => {
-                seen.end = Some(end);
-                seen.delay_s = record.at.saturating_duration_since(record.offered).as_secs_f64();
-                seen.marked = record.marked;
-                seen.damaged = record.damaged;
+            end @ (Fate::Delivered(_) | Fate::Dropped(_)) => {
+                if record.copy == 0 {
+                    seen.end = Some(end);
+                    seen.delay_s = record.at.saturating_duration_since(record.offered).as_secs_f64();
+                    seen.marked = record.marked;
+                    seen.damaged = record.damaged;
+                }
             }
+            // `Fate` may grow; what is no end changes no figure here.
+            _ => {}
         }
     }
 
