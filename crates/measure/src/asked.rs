@@ -81,7 +81,7 @@ impl Asked {
         let damaged = config.corruption.as_ref().and_then(|corruption| match corruption.bits {
             Flips::Bits { packets, .. } => Some(packets.probability().get()),
             Flips::Rate(rate) => {
-                let end = corruption.within.as_ref().map_or(size.get(), |within| size.get().min(within.end));
+                let end = corruption.within.as_ref().map_or_else(|| size.get(), |within| size.get().min(within.end));
                 let begin = corruption.within.as_ref().map_or(0, |within| within.start);
                 Some(-libm::expm1(8.0 * count_u64(end.saturating_sub(begin)) * libm::log1p(-rate.get())))
             }
@@ -89,7 +89,7 @@ impl Asked {
             _ => None,
         });
         Self {
-            mean_s: (!traced).then(|| law.map_or(config.delay.mean().as_secs_f64(), |law| seconds(law.mean()))),
+            mean_s: (!traced).then(|| law.map_or_else(|| config.delay.mean().as_secs_f64(), |law| seconds(law.mean()))),
             sd_s: (!traced).then(|| law.map_or(0.0, |law| seconds(law.sd()))),
             least_s: (!traced).then(|| config.delay.least().as_secs_f64()),
             quantiles_s: law.map(|law| QUANTILES.into_iter().map(|(name, p)| (name, seconds(law.quantile(p)))).collect()).unwrap_or_default(),
@@ -99,7 +99,7 @@ impl Asked {
             damaged,
             rate_bit_s: config.bottleneck.as_ref().and_then(|bottleneck| match &bottleneck.service {
                 Service::Rate(rate) => Some(count_u64(rate.as_bits_per_sec())),
-                _ => None,
+                Service::Recorded(_) | _ => None,
             }),
             stages: Stages {
                 delay: (alone && !in_order).then(|| config.delay.clone()),

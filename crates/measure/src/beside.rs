@@ -58,15 +58,13 @@ impl Beside {
             self.packets.resize(number + 1, Seen::default());
         }
         let seen = &mut self.packets[number];
-        match record.fate {
-            Fate::Duplicated => seen.copied = true,
-            _ if record.copy > 0 => {}
-            end => {
-                seen.end = Some(end);
-                seen.delay_s = record.at.saturating_duration_since(record.offered).as_secs_f64();
-                seen.marked = record.marked;
-                seen.damaged = record.damaged;
-            }
+        if record.fate == Fate::Duplicated {
+            seen.copied = true;
+        } else if record.copy == 0 && record.fate.is_end() {
+            seen.end = Some(record.fate);
+            seen.delay_s = record.at.saturating_duration_since(record.offered).as_secs_f64();
+            seen.marked = record.marked;
+            seen.damaged = record.damaged;
         }
     }
 

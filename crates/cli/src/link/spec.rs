@@ -121,7 +121,7 @@ fn replay(path: &Path) -> Result<Spec, Failure> {
     let file = File::open(path).map_err(unreadable)?;
     let log = fates::read(file).map_err(|error| match error {
         ReadError::Io(error) => unreadable(error),
-        other => Failure::Input(format!("{}: {other}", output::path(path))),
+        other @ (ReadError::Log(_) | _) => Failure::Input(format!("{}: {other}", output::path(path))),
     })?;
     let packets = u64::try_from(log.packets()).ok();
     let model = LinkModel::Replay(Arc::new(log));

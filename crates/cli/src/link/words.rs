@@ -17,14 +17,14 @@ pub(super) fn describe(spec: &Spec, measured: &Measured) -> String {
     if measured.interrupted {
         line(format!("  INTERRUPTED after {} of {} packets", measured.sent, measured.wanted));
     }
-    line(format!("  {:<24}{:>14}{:>14}{:>14}", "", "asked", "achieved", "std. error"));
+    line(format!("  {:<24}{:>18}{:>18}{:>14}", "", "asked", "achieved", "std. error"));
     for figure in &measured.figures {
         line(row(figure));
     }
     let compared = |name: &str| measured.figures.iter().any(|figure| figure.name == name);
     for (name, asked, achieved) in others(spec, &measured.achieved) {
         if !compared(name) && (asked.is_some() || achieved.is_some()) {
-            line(format!("  {:<24}{:>14}{:>14}", label(name), shown(name, asked), shown(name, achieved)));
+            line(format!("  {:<24}{:>18}{:>18}", label(name), shown(name, asked), shown(name, achieved)));
         }
     }
     if measured.figures.iter().any(|figure| figure.outside) {
@@ -47,7 +47,7 @@ fn row(figure: &Figure) -> String {
     let name = figure.name.as_str();
     let mark = if figure.outside { "  *" } else { "" };
     let [asked, achieved, error] = [Some(figure.asked), figure.achieved, figure.standard_error].map(|value| shown(name, value));
-    format!("  {:<24}{asked:>14}{achieved:>14}{error:>14}{mark}", label(name))
+    format!("  {:<24}{asked:>18}{achieved:>18}{error:>14}{mark}", label(name))
 }
 
 /// What is shown where it was not compared.
