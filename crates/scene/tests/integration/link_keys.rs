@@ -117,7 +117,7 @@ fn every_kind_of_loss_is_read() {
     assert_eq!(loss("{ bursts = { loss = 0.02, length = 5 } }"), Loss::FourState(FourState::from_bursts(plain).unwrap()));
     assert_eq!(loss("{ correlated = { probability = \"5%\", correlation = 0.5 } }"), Loss::Correlated(Chance::correlated(p(0.05), 0.5).unwrap()));
     assert_eq!(loss("{ packets = [3, \"10-19\"], every = 100 }"), Loss::Pattern(Pattern::of_packets(vec![3..4, 10..20], Some(100)).unwrap()));
-    assert_eq!(loss("{ packets = [3] }"), Loss::Pattern(Pattern::of_packets(vec![3..4], None).unwrap()));
+    assert_eq!(loss("{ packets = [3, 5] }"), Loss::Pattern(Pattern::of_packets(vec![3..4, 5..6], None).unwrap()));
     assert_eq!(
         loss("{ times = [{ from = \"100ms\", to = \"200ms\" }], every = \"1s\" }"),
         Loss::Pattern(Pattern::in_time(&[at(100)..at(200)], Some(1000 * MS)).unwrap())
