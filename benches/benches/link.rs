@@ -13,7 +13,7 @@ fn links(criterion: &mut Criterion) {
         group.bench_function(name, |bencher| bencher.iter(|| drive(&config, PACKETS)));
     }
     for (name, config) in ["str0m-netem: delay", "str0m-netem: jitter and loss", "str0m-netem: full"].into_iter().zip(str0m_configs()) {
-        group.bench_function(name, |bencher| bencher.iter(|| str0m(config.clone(), PACKETS)));
+        group.bench_function(name, |bencher| bencher.iter(|| str0m(config, PACKETS)));
     }
     group.bench_function("a bare ring", |bencher| bencher.iter(|| ring(PACKETS)));
     group.bench_function("a bare heap", |bencher| bencher.iter(|| heap(PACKETS)));

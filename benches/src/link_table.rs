@@ -32,13 +32,13 @@ fn beside_others() {
     let (_, all) = stages().pop().expect("there are stages");
     let subjects: Vec<Subject> = vec![
         ("cohaptic", Box::new(|| drive(&constant(), PACKETS))),
-        ("str0m-netem 0.4", Box::new(move || str0m(plain.clone(), PACKETS))),
+        ("str0m-netem 0.4", Box::new(move || str0m(plain, PACKETS))),
         ("a bare ring", Box::new(|| ring(PACKETS))),
         ("cohaptic", Box::new(|| drive(&jitter_and_loss(), PACKETS))),
-        ("str0m-netem 0.4 (uniform jitter)", Box::new(move || str0m(jittery.clone(), PACKETS))),
+        ("str0m-netem 0.4 (uniform jitter)", Box::new(move || str0m(jittery, PACKETS))),
         ("a bare binary heap, same draws", Box::new(|| heap(PACKETS))),
         ("cohaptic", Box::new(move || drive(&all, PACKETS))),
-        ("str0m-netem 0.4 (jitter, loss, duplication, reordering, rate)", Box::new(move || str0m(full.clone(), PACKETS))),
+        ("str0m-netem 0.4 (jitter, loss, duplication, reordering, rate)", Box::new(move || str0m(full, PACKETS))),
         ("a bare binary heap: taking one of 10⁴ events, pushing it again", Box::new(|| hold(PACKETS))),
     ];
     let times = measure(&subjects);

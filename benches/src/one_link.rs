@@ -140,9 +140,9 @@ pub fn str0m(config: NetemConfig, packets: u64) -> u64 {
 pub fn str0m_configs() -> [NetemConfig; 3] {
     let constant = NetemConfig::new().latency(DELAY).seed(1);
     let one_percent = RandomLoss::new(str0m_netem::Probability::new(0.01));
-    let jitter = constant.clone().jitter(DELAY / 10).loss(one_percent);
+    let jitter = constant.jitter(DELAY / 10).loss(one_percent);
     let buffer = DataSize::bytes(10_000_000);
-    let full = jitter.clone().duplicate(str0m_netem::Probability::new(0.001)).reorder_gap(1000).link(Bitrate::bps(RATE), buffer);
+    let full = jitter.duplicate(str0m_netem::Probability::new(0.001)).reorder_gap(1000).link(Bitrate::bps(RATE), buffer);
     [constant, jitter, full]
 }
 

@@ -1,6 +1,7 @@
 //! Why a command ended without its result, and with which exit status.
 
 use std::io;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use cohaptic_harness::record::RecordError;
@@ -21,6 +22,17 @@ pub(crate) enum Failure {
     /// A fault in what `--against` says.
     Against(SceneError),
     Record(RecordError),
+    /// A fault in the keys of a link.
+    LinkKeys(SceneError),
+    /// A fault in an argument or in a file that was read, in words.
+    Input(String),
+    /// A file that cannot be read or written.
+    File {
+        /// What cannot be done to it: "read".
+        verb: &'static str,
+        path: PathBuf,
+        error: io::Error,
+    },
     StandardOutput(io::Error),
 }
 
@@ -32,6 +44,10 @@ impl Failure {
             // The scene knows of overrides, and not which option they came from.
             Self::Against(error) => (error.to_string().replacen("--set ", "--against ", 1), scene_status(error)),
             Self::Record(error) => (error.to_string(), INPUT_OUTPUT),
+            // The scene knows of overrides, and not that these are words of their own.
+            Self::LinkKeys(error) => (error.to_string().replacen("--set link.", "", 1), scene_status(error)),
+            Self::Input(message) => (message.clone(), BAD_INPUT),
+            Self::File { verb, path, error } => (format!("cannot {verb} {}: {error}", path.display()), INPUT_OUTPUT),
             Self::StandardOutput(error) => (format!("cannot write to standard output: {error}"), INPUT_OUTPUT),
         };
         // If standard error cannot be written to either, the exit status is all that is left to say it with.

@@ -24,6 +24,17 @@ impl Progress {
         Self(bar)
     }
 
+    /// Progress through a number of packets.
+    pub(crate) fn through_packets(count: u64) -> Self {
+        let bar = bar(count);
+        bar.set_style(style("{bar:30} {percent:>3} %  {pos}/{len} packets, {eta} left"));
+        Self(bar)
+    }
+
+    pub(crate) fn reach_number(&self, number: u64) {
+        self.0.set_position(number);
+    }
+
     pub(crate) fn reach(&self, now: Instant) {
         self.0.set_position(now.as_nanos() / 1_000_000);
     }

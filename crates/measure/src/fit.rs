@@ -175,11 +175,12 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     let losses = loss::fit_all(&packets.iter().map(|packet| (packet.sent_s, packet.delay_s.is_none())).collect::<Vec<_>>(), evenly_spaced);
     let delays: Vec<f64> = arrivals.iter().map(|arrival| arrival.1).collect();
     let begins_at_floor = matches!(best.distribution, DelayLaw::Lognormal | DelayLaw::Gamma | DelayLaw::Weibull);
+    let floor_s = best.floor_s.filter(|_| begins_at_floor);
     let jitter = FittedJitter {
         sd_s: best.sd_s,
         distribution: best.distribution,
-        floor_s: best.floor_s.filter(|_| begins_at_floor),
-        correlation: correlation.filter(|_| evenly_spaced).map(|fit| fit.lag_one),
+        floor_s,
+        correlation: correlation.filter(|_| evenly_spaced).map(|fit| of_delays(&best, floor_s, fit.lag_one)),
         correlation_time_s: correlation.filter(|_| !evenly_spaced).map(|fit| fit.time_s),
     };
     let goodness = Goodness {
@@ -200,6 +201,12 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     };
     let link = FittedLink { delay_s: best.mean_s, jitter, loss: goodness.losses.first().expect("one model always applies").model };
     Ok(Fitted { link, goodness })
+}
+
+/// The correlation of delays of that law whose normal scores have the correlation `phi`.
+fn of_delays(law: &LawFit, floor_s: Option<f64>, phi: f64) -> f64 {
+    // A law that a link refuses, one a hair too wide, has the correlation of a normal one, which differs in the second digit.
+    cohaptic_wan::law::Law::new(&law.distribution.into(), law.mean_s, law.sd_s, floor_s).map_or(phi, |law| law.correlation(phi))
 }
 
 /// The median gap, and whether nearly all gaps are like it.

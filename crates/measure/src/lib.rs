@@ -5,6 +5,9 @@
 //! | [`fates`] | the fate log as a file: a streaming writer and a reader |
 //! | [`pcapng`] | the fates as a capture file that packet analysers open |
 //! | [`achieved`] | figures of a link's delays, losses and order, each with its uncertainty, to be set beside what was asked for |
+//! | [`steady`] | a steady stream of packets over one link |
+//! | [`asked`] | the figures that follow from the laws of a link |
+//! | [`beside`] | what was achieved beside what was asked for, and whether it is too far off |
 //! | [`fit`](mod@fit) | an estimate of a link from measured one-way delays and losses, with its goodness |
 //!
 //! It knows packets ([`PacketRecord`]) and nothing of what they carry. Figures are computed with the
@@ -30,9 +33,12 @@
 #![cfg_attr(test, allow(clippy::float_cmp, clippy::cast_precision_loss, reason = "tests compare exact values and count samples"))]
 
 pub mod achieved;
+pub mod asked;
+pub mod beside;
 pub mod fates;
 pub mod fit;
 pub mod pcapng;
 mod series;
+pub mod steady;
 #[cfg(test)]
 mod test_rng;

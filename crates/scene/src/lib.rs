@@ -30,6 +30,7 @@
 mod context;
 mod error;
 mod excerpt;
+mod link_keys;
 mod model;
 mod names;
 mod overrides;
@@ -44,5 +45,6 @@ mod tree;
 mod values;
 
 pub use error::{Diagnostic, SceneError};
+pub use link_keys::link_from_keys;
 pub use model::*;
 pub use read::scene_files;

@@ -264,7 +264,11 @@ pub(crate) fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
     };
     let size = match parse::size(plain) {
         Ok(size) => i64::try_from(size.get()).unwrap_or(i64::MAX),
-        Err(_) => return quantity(node, context, parse::size).and(None),
+        Err(error) => {
+            let error = parse::size(&shorten(plain)).err().unwrap_or(error);
+            context.fault_at(node, error.to_string());
+            return None;
+        }
     };
     let size = i32::try_from(if negative { -size } else { size }).ok();
     if size.is_none() {

@@ -148,9 +148,8 @@ fn some_of(count: u64, wanted: u32, packet: PacketDraws) -> Vec<u64> {
 }
 
 /// A number below `bound`: the word scaled, whose bias is at most bound·2⁻⁶⁴.
-#[expect(clippy::cast_possible_truncation, reason = "the upper half of the product is below the bound")]
 fn below(bound: u64, word: u64) -> u64 {
-    (u128::from(bound) * u128::from(word) >> 64) as u64
+    ((u128::from(bound) * u128::from(word)) >> 64) as u64
 }
 
 /// Each of the numbers below `count` with that probability: gaps between them are geometric, drawn by inversion.

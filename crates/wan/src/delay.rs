@@ -367,7 +367,7 @@ mod tests {
                 let covariance = sample.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum::<f64>() / n;
                 let expected = match correlation {
                     Correlation::PerPacket(rho) => rho,
-                    _ => delay.law().unwrap().correlation(0.9),
+                    Correlation::None | Correlation::InTime(_) => delay.law().unwrap().correlation(0.9),
                 };
                 assert!((covariance / variance - expected).abs() < 4.5 * 3.0 * 0.0014, "{distribution:?} {correlation:?} {}", covariance / variance);
                 // Every 50th is independent of the others but for 0.9^50 = 0.5 %: n = 2000.

@@ -22,7 +22,9 @@ pub struct Offered<'a, P> {
 }
 
 /// A predicate on packets.
-pub(crate) struct Filter<P>(Arc<dyn Fn(&Offered<'_, P>) -> bool + Send + Sync>);
+pub(crate) struct Filter<P>(Arc<Predicate<P>>);
+
+type Predicate<P> = dyn Fn(&Offered<'_, P>) -> bool + Send + Sync;
 
 impl<P> Filter<P> {
     pub(crate) fn new(drops: impl Fn(&Offered<'_, P>) -> bool + Send + Sync + 'static) -> Self {

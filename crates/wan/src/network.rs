@@ -11,6 +11,7 @@
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::num::NonZeroU32;
 
 use cohaptic_units::{Bytes, Instant};
 
@@ -149,11 +150,12 @@ struct InNetwork<P> {
     payload: P,
 }
 
-/// The size of a packet in the upper 24 bits, and below what happened to it.
+/// The size of a packet in the upper 24 bits, and below what happened to it. A bit is always set, so that an `Option` of what has it is no larger.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct SizeAndMarks(u32);
+struct SizeAndMarks(NonZeroU32);
 
 impl SizeAndMarks {
+    const NOTHING: Self = Self(NonZeroU32::MIN.saturating_mul(NonZeroU32::MIN.saturating_add((1 << 7) - 1)));
     const ECN_CAPABLE: u32 = 1 << 3;
     const MARKED: u32 = 1 << 4;
     const DAMAGED: u32 = 1 << 5;
@@ -161,23 +163,23 @@ impl SizeAndMarks {
 
     fn new(info: PacketInfo) -> Self {
         let size = u32::try_from(info.size.get()).unwrap_or(u32::MAX).min((1 << 24) - 1);
-        Self(size << 8).with(Self::ECN_CAPABLE, info.ecn_capable)
+        Self(Self::NOTHING.0 | size << 8).with(Self::ECN_CAPABLE, info.ecn_capable)
     }
 
     fn size(self) -> Bytes {
-        Bytes::new((self.0 >> 8).into())
+        Bytes::new((self.0.get() >> 8).into())
     }
 
     fn copy(self) -> u8 {
-        self.0.to_le_bytes()[0] & 0b111
+        self.0.get().to_le_bytes()[0] & 0b111
     }
 
     fn has(self, flag: u32) -> bool {
-        self.0 & flag != 0
+        self.0.get() & flag != 0
     }
 
     fn with(self, flag: u32, set: bool) -> Self {
-        if set { Self(self.0 | flag) } else { Self(self.0 & !flag) }
+        Self(if set { self.0 | flag } else { Self::NOTHING.0 | self.0.get() & !flag })
     }
 }
 
@@ -724,7 +726,7 @@ impl<P: Clone> Network<P> {
 
     fn announce(&mut self, hop: Hop, line: u32, at: Instant) {
         let place = Place::waking(hop, line);
-        let (path, size) = (Path { from: 0, to: 0 }, SizeAndMarks(0));
+        let (path, size) = (Path { from: 0, to: 0 }, SizeAndMarks::NOTHING);
         self.pending.push(Pending { at, sequence: 0, sent: at, entered: at, place, path, size, payload: None });
     }
 

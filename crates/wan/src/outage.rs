@@ -190,7 +190,7 @@ impl OutageStage {
         if let Some(random) = self.outages.random {
             while self.span_ends <= now {
                 self.span += 1;
-                let law = if self.span % 2 == 0 { random.up } else { random.down };
+                let law = if self.span.is_multiple_of(2) { random.up } else { random.down };
                 self.span_ends = self.span_ends.saturating_add(drawn(law, draws, self.span));
                 if self.span_ends == Instant::MAX {
                     break;

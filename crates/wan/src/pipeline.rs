@@ -100,7 +100,9 @@ impl<T: Clone> Pipeline<T> {
                 Self::Constant(constant_nanos(&config), OrderStage::new(Order::AllowReordering))
             }
             LinkModel::Fixed(config) if config.is_direct() && !general => Self::Direct(Box::new(Direct::new(seed, name, &config))),
-            model => Self::Engine(Box::new(Engine::new(kind(Instant::ZERO, seed, name, model, None)))),
+            LinkModel::Fixed(_) | LinkModel::Modulated(_) | LinkModel::Replay(_) | LinkModel::Kernel(_) => {
+                Self::Engine(Box::new(Engine::new(kind(Instant::ZERO, seed, name, model, None))))
+            }
         }
     }
 

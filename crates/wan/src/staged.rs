@@ -240,7 +240,7 @@ impl<T: Clone> Staged<T> {
         self.bucket = match (self.bucket.take(), config.token_bucket) {
             (None, new) => new.map(|new| TokenBucketStage::new(now, new)),
             (Some(mut stage), Some(new)) => {
-                stage.reconfigure(now, new);
+                stage.reconfigure(now, new, outputs);
                 Some(stage)
             }
             (Some(stage), None) => {
@@ -286,7 +286,7 @@ impl<T: Clone> Staged<T> {
     fn release(&mut self, now: Instant, stage: Stage, outputs: &mut Outputs<T>) {
         let mut released = core::mem::take(&mut self.released);
         match stage {
-            Stage::Bucket => released.extend(self.bucket.as_mut().and_then(|bucket| bucket.release(now, outputs))),
+            Stage::Bucket => released.extend(self.bucket.as_mut().and_then(|bucket| bucket.release(now))),
             Stage::Bottleneck => {
                 if let Some(bottleneck) = &mut self.bottleneck {
                     bottleneck.release(now, &mut released, outputs);

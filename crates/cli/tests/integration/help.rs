@@ -6,7 +6,7 @@ use crate::scenes::TWO;
 #[test]
 fn help_names_the_commands() {
     let text = Desk::new().text("--help");
-    assert!(["run", "check", "explain", "Exit status: 0 done", "130 interrupted"].iter().all(|word| text.contains(word)), "{text}");
+    assert!(["run", "check", "explain", "link", "fit", "Exit status: 0 done", "130 interrupted"].iter().all(|word| text.contains(word)), "{text}");
     assert!(Desk::new().text("--version").starts_with("cohaptic "));
 }
 
@@ -16,6 +16,11 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
         ("run", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--against <KEY=VALUE>", "--out <DIR>", "--no-plot", "--general"][..]),
         ("check", &["<SCENE>...", "--set <KEY=VALUE>", "--json", "--jobs <N>", "--general"]),
         ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json"]),
+        (
+            "link",
+            &["[SPEC]...", "--from <FATES.csv>", "--packets <N>", "--every <TIME>", "--size <SIZE>", "--seed <N>", "--profile <PROFILE>", "--ecn"],
+        ),
+        ("fit", &["<FILE> [RECEIVER]", "--port <N>", "--skew", "--json", "--out <SCENE_LINK.toml>"]),
     ] {
         let text = Desk::new().text(&format!("{command} --help"));
         for part in options.iter().chain(&["Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output"]) {

@@ -8,7 +8,7 @@ use crate::desk::{Desk, Outcome, parse};
 use crate::scenes::TWO;
 
 /// Interrupts a command once the process of this id has begun.
-fn interrupted(desk: &Desk, line: &str, begun: impl Fn(u32) -> bool) -> Outcome {
+pub(crate) fn interrupted(desk: &Desk, line: &str, begun: impl Fn(u32) -> bool) -> Outcome {
     let mut child = desk.command(line).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     while !begun(child.id()) {
         assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");

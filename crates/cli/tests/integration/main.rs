@@ -8,9 +8,11 @@ mod check;
 mod desk;
 mod errors;
 mod explain;
+mod fit;
 mod help;
 #[cfg(unix)]
 mod interrupt;
+mod link;
 mod output;
 mod overrides;
 mod records;

@@ -40,6 +40,19 @@ impl DelayLaw {
     }
 }
 
+impl From<DelayLaw> for cohaptic_wan::Distribution {
+    fn from(law: DelayLaw) -> Self {
+        match law {
+            DelayLaw::Normal => Self::Normal,
+            DelayLaw::Uniform => Self::Uniform,
+            DelayLaw::Laplace => Self::Laplace,
+            DelayLaw::Lognormal => Self::LogNormal,
+            DelayLaw::Gamma => Self::Gamma,
+            DelayLaw::Weibull => Self::Weibull,
+        }
+    }
+}
+
 /// A law with its parameters \[s\].
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Law {

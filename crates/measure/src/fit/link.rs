@@ -32,7 +32,8 @@ pub struct FittedJitter {
     /// The least delay, from which the lognormal, gamma and Weibull laws begin \[s\]; `None`: zero, or the law has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub floor_s: Option<f64>,
-    /// The correlation of the delays of two packets in a row, by their normal scores; where packets are evenly spaced.
+    /// The autocorrelation of the delays at lag one, as a scene means it: that of the chosen law whose normal scores have the correlation of
+    /// [`Goodness::correlation`](super::Goodness::correlation). Where packets are evenly spaced.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation: Option<f64>,
     /// The time after which it has fallen to 1/e \[s\]; where packets are not evenly spaced.

@@ -1,5 +1,7 @@
 //! One-way measurements, checked once.
 
+use cohaptic_wan::{Fate, FateLog};
+
 use super::skew::Skew;
 
 /// One packet: when it was sent, and how long it took.
@@ -59,6 +61,25 @@ impl Measurements {
         Ok(Self(packets))
     }
 
+    /// The packets of a fate log: each was sent when it was offered and took as long as the first of its copies to arrive.
+    #[must_use]
+    pub fn from_fates(log: &FateLog) -> Self {
+        let mut packets: Vec<Measurement> = Vec::with_capacity(log.packets());
+        let mut before = None;
+        for record in log.records() {
+            if before != Some(record.sequence) {
+                before = Some(record.sequence);
+                packets.push(Measurement { sent_s: record.offered.as_secs_f64(), delay_s: None });
+            }
+            if let (Fate::Delivered(at), Some(packet)) = (record.fate, packets.last_mut()) {
+                let delay_s = at.saturating_duration_since(record.offered).as_secs_f64();
+                packet.delay_s = Some(packet.delay_s.map_or(delay_s, |earlier| earlier.min(delay_s)));
+            }
+        }
+        // A log stands in the order of sending, and its instants are finite.
+        Self(packets)
+    }
+
     /// The packets, in the order of sending.
     #[must_use]
     pub fn packets(&self) -> &[Measurement] {
@@ -94,5 +115,19 @@ impl Measurements {
             ..*packet
         };
         Some((Self(self.0.iter().map(corrected).collect()), skew))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fate_log_is_measurements() {
+        let rows = "0,0,0,64,24000000,delivered,0,0\n1,0,1000000,64,1000000,loss,0,0\n2,0,2000000,64,2000000,duplicated,0,0\n\
+                    2,0,2000000,64,27000000,delivered,0,0\n2,1,2000000,64,26000000,delivered,0,0\n";
+        let log = FateLog::parse(&format!("{}\n{rows}", cohaptic_wan::FateRow::HEADER)).unwrap();
+        let packet = |sent_s, delay_s| Measurement { sent_s, delay_s };
+        assert_eq!(Measurements::from_fates(&log).packets(), [packet(0.0, Some(0.024)), packet(0.001, None), packet(0.002, Some(0.024))]);
     }
 }

@@ -40,7 +40,11 @@ fn a_link_is_found_from_its_measurements() {
     // F(x) = x²/2 near zero, in units of 2 ms; the least of 3 000.
     assert!((link.jitter.floor_s.unwrap() - 0.02).abs() < 0.002 * (2.0 * 7.0 / 3_000_f64).sqrt(), "{link:?}");
     let correlation = goodness.correlation.unwrap();
-    assert!((link.jitter.correlation.unwrap() - (-0.008_f64 / 0.05).exp()).abs() < 4.0 * correlation.lag_one_se.unwrap(), "{link:?}");
+    let phi = (-0.008_f64 / 0.05).exp();
+    assert!((correlation.lag_one - phi).abs() < 4.0 * correlation.lag_one_se.unwrap(), "{link:?}");
+    // The correlation of the delays themselves, of the law that they have. It grows hardly faster than φ.
+    let rho = cohaptic_wan::law::Law::new(&cohaptic_wan::Distribution::Gamma, 24.0, 8_f64.sqrt(), Some(20.0)).unwrap().correlation(phi);
+    assert!((link.jitter.correlation.unwrap() - rho).abs() < 4.0 * 1.1 * correlation.lag_one_se.unwrap(), "{rho} {link:?}");
     let LossModel::GilbertElliott { p, r, .. } = link.loss else { panic!("{link:?}") };
     let [se_p, se_r] = goodness.losses[0].standard_errors.unwrap();
     assert!((p - 0.02).abs() < 4.0 * se_p && (r - 0.3).abs() < 4.0 * se_r, "{link:?}");

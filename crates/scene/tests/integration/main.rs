@@ -4,5 +4,6 @@
 
 mod every_key;
 mod files;
+mod link_keys;
 mod manual;
 mod mutations;

@@ -194,7 +194,7 @@ proptest! {
 
     #[test]
     fn any_override_is_taken_or_refused(
-        key in "(scene|peer|peers|link|links|timeline|expect|coordination)(\\.(left|right|0|9|hand|delay|device|mass|at|set|count|x|\"|)){0,5}",
+        key in "(scene|peer|peers|modulators|link|links|timeline|expect|coordination)(\\.(left|right|0|9|hand|delay|jitter|loss|queue|netem|trace|modulated|device|mass|at|set|count|x|\"|)){0,5}",
         value in prop_oneof!["\\PC{0,12}", prop::sample::select(&NUMBERS[..]).prop_map(str::to_owned), prop::sample::select(&TEXTS[..]).prop_map(str::to_owned)],
     ) {
         let original = std::fs::read_to_string(path()).unwrap();

@@ -91,8 +91,7 @@ impl<T> TokenBucketStage<T> {
     /// Takes a packet. It comes back if it may leave at once.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) -> Option<Carried<T>> {
         let needed = self.needed(&packet);
-        let smallest = self.peak.map_or(self.mean.size, |peak| peak.size.min(self.mean.size));
-        if needed > smallest {
+        if needed > self.largest() {
             outputs.push(Output { packet, exit: Exit::Dropped(now, DropCause::Mtu) });
             return None;
         }
@@ -119,20 +118,19 @@ impl<T> TokenBucketStage<T> {
         Some(self.peak.map_or(mean, |peak| mean.max(peak.holds_at(needed))))
     }
 
-    /// The packet that leaves `now`, which is the instant announced. `None` if a live change made it too large for the buckets: it is dropped.
-    pub(crate) fn release(&mut self, now: Instant, outputs: &mut Outputs<T>) -> Option<Carried<T>> {
+    /// The packet that leaves `now`, which is the instant announced.
+    pub(crate) fn release(&mut self, now: Instant) -> Option<Carried<T>> {
         self.fill(now);
         let packet = self.waiting.pop_front()?;
         self.waiting_bytes -= u128::from(packet.info.size.get());
-        if self.pay(self.needed(&packet)) {
-            return Some(packet);
-        }
-        outputs.push(Output { packet, exit: Exit::Dropped(now, DropCause::Mtu) });
-        None
+        let paid = self.pay(self.needed(&packet));
+        debug_assert!(paid, "what waits fits into the buckets, and is released when they hold it");
+        Some(packet)
     }
 
-    /// Changes rates, sizes and limit. Tokens that came until now stay, as far as the new buckets hold them; a new peak bucket is full.
-    pub(crate) fn reconfigure(&mut self, now: Instant, config: TokenBucket) {
+    /// Changes rates, sizes and limit. Tokens that came until now stay, as far as the new buckets hold them; a new peak bucket is full. What waits and is
+    /// now too large for them could never leave: it is dropped.
+    pub(crate) fn reconfigure(&mut self, now: Instant, config: TokenBucket, outputs: &mut Outputs<T>) {
         self.fill(now);
         let change = |old: Bucket, rate, burst| {
             let size = giga_bits(burst);
@@ -144,11 +142,25 @@ impl<T> TokenBucketStage<T> {
             None => Bucket::full(now, peak.rate, peak.burst),
         });
         self.config = config;
+        let largest = self.largest();
+        for packet in core::mem::take(&mut self.waiting) {
+            if self.needed(&packet) > largest {
+                self.waiting_bytes -= u128::from(packet.info.size.get());
+                outputs.push(Output { packet, exit: Exit::Dropped(now, DropCause::Mtu) });
+            } else {
+                self.waiting.push_back(packet);
+            }
+        }
     }
 
     /// Everything that waits, in order.
     pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
         self.waiting.into_iter()
+    }
+
+    /// What the largest packet takes that may ever leave.
+    fn largest(&self) -> u128 {
+        self.peak.map_or(self.mean.size, |peak| peak.size.min(self.mean.size))
     }
 
     fn needed(&self, packet: &Carried<T>) -> u128 {
@@ -217,19 +229,19 @@ mod tests {
     /// Offers packets of 40 bytes at these microseconds; when they leave, and how many never do.
     fn departures(mut stage: TokenBucketStage<char>, offers: &[u64], size: u64) -> (Vec<u64>, usize) {
         let (mut left, mut outputs) = (Vec::new(), Vec::new());
-        let mut pass = |stage: &mut TokenBucketStage<char>, until: Instant, outputs: &mut Vec<_>| {
+        let mut pass = |stage: &mut TokenBucketStage<char>, until: Instant| {
             while let Some(at) = stage.next_at().filter(|at| *at <= until) {
-                left.extend(stage.release(at, outputs).map(|_| at.as_nanos() / 1_000));
+                left.extend(stage.release(at).map(|_| at.as_nanos() / 1_000));
             }
             left.len()
         };
         let mut at_once = Vec::new();
         for &t in offers {
-            pass(&mut stage, micros(t), &mut outputs);
+            pass(&mut stage, micros(t));
             let packet = Carried { number: 0, copy: 0, info: Bytes::new(size).into(), marks: Marks::default(), item: 'x' };
             at_once.extend(stage.offer(micros(t), packet, &mut outputs).map(|_| t));
         }
-        pass(&mut stage, Instant::MAX, &mut outputs);
+        pass(&mut stage, Instant::MAX);
         at_once.extend(left);
         at_once.sort_unstable();
         (at_once, outputs.len())

@@ -12,10 +12,10 @@ use rand_distr::{Distribution as _, Exp1};
 
 use crate::random_links::{BYTE_A_MICROSECOND, at, probability, rate};
 
-const NORMAL_9995: f64 = 3.2905;
+pub(crate) const NORMAL_9995: f64 = 3.2905;
 
 /// Which of `count` packets are lost.
-fn losses(seed: u64, loss: Loss, count: usize) -> Vec<bool> {
+pub(crate) fn losses(seed: u64, loss: Loss, count: usize) -> Vec<bool> {
     let mut link = Link::new(seed, &LinkName::between("a", "b"), LinkConfig { loss, ..LinkConfig::default() });
     (0..count as u64).for_each(|number| link.handle_packet(at(number), Bytes::new(64), ()).unwrap());
     link.handle_timeout(Instant::MAX).unwrap();
@@ -31,7 +31,7 @@ fn count(lost: &[bool]) -> usize {
 }
 
 /// The lengths of the runs of lost packets that begin and end within.
-fn bursts(lost: &[bool]) -> Vec<usize> {
+pub(crate) fn bursts(lost: &[bool]) -> Vec<usize> {
     let runs: Vec<&[bool]> = lost.chunk_by(|a, b| a == b).collect();
     runs[1..runs.len() - 1].iter().filter(|run| run[0]).map(|run| run.len()).collect()
 }

@@ -2,12 +2,21 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail")]
 #![expect(clippy::cast_precision_loss, reason = "tests count samples")]
 
+mod any_link;
 mod bounds;
+mod by_stage;
 mod conservation;
+mod delay_laws;
 mod determinism;
 mod edges;
 mod event_queue;
+mod every_stage;
+mod fingerprints;
+mod kernel_tbf;
 mod laws;
+mod loss_laws;
+mod metamorphic;
 mod naive;
 mod oracle;
+mod queue_laws;
 mod random_links;

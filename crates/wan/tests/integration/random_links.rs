@@ -131,7 +131,7 @@ pub(crate) fn any_size() -> impl Strategy<Value = Bytes> {
     prop_oneof![20 => size(), 1 => any::<u32>().prop_map(|size| Bytes::new(size.into())), 1 => any::<u64>().prop_map(Bytes::new)]
 }
 
-fn some_probability() -> impl Strategy<Value = Probability> {
+pub(crate) fn some_probability() -> impl Strategy<Value = Probability> {
     prop_oneof![1 => Just(0.0), 1 => Just(1.0), 6 => 0.0..1.0f64].prop_map(probability)
 }
 
@@ -169,7 +169,7 @@ pub(crate) fn delay() -> impl Strategy<Value = Delay> {
     ]
 }
 
-fn outages() -> impl Strategy<Value = Outages> {
+pub(crate) fn outages() -> impl Strategy<Value = Outages> {
     vec((0..40u64, 1..20u64), 0..3).prop_map(|spans| {
         let mut edge = 0;
         let mut next = |micros| {

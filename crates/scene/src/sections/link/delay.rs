@@ -45,7 +45,7 @@ fn read_jitter(node: &Node, context: Context<'_>) -> Option<Read> {
         Some(Distribution::Empirical(delays)) => Some((nanos(delays.mean()), nanos(delays.sd()))),
         Some(_) | None => None,
     };
-    if own.is_none() && sd == Some(None) {
+    if distribution.is_some() && own.is_none() && sd == Some(None) {
         table.miss("sd", "the standard deviation, a duration such as \"2ms\"");
     }
     table.finish();

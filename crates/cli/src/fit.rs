@@ -1,0 +1,160 @@
+//! `cohaptic fit`.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::ExitCode;
+
+use cohaptic_measure::fit::{self, Fitted, LossFit, LossModel, Measurements, Skew, captures};
+use cohaptic_wan::{FateLog, FateRow};
+use serde::Serialize;
+
+use crate::arguments::FitArguments;
+use crate::failure::Failure;
+use crate::output;
+use crate::output_file::OutputFile;
+
+/// What `cohaptic fit --json` prints.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    fitted: &'a Fitted,
+    /// The keys of a scene.
+    scene: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    skew: Option<Skew>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    matched: Option<Matched>,
+}
+
+/// What was left over of a pair of captures.
+#[derive(Clone, Copy, Serialize)]
+struct Matched {
+    unmatched_sent: usize,
+    unmatched_arrived: usize,
+    ambiguous: usize,
+}
+
+/// Estimates a link.
+pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
+    let (measurements, matched) = read(arguments)?;
+    let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", output::path(&arguments.file)));
+    let (measurements, skew) = if arguments.skew {
+        let (corrected, skew) =
+            measurements.without_skew().ok_or_else(|| named(&"no two packets arrived that were sent at different times: expected some"))?;
+        (corrected, Some(skew))
+    } else {
+        (measurements, None)
+    };
+    let fitted = fit::fit(&measurements).map_err(|error| named(&error))?;
+    let scene = fitted.link.to_scene_toml();
+    if let Some(path) = &arguments.out {
+        let (file, mut to) = OutputFile::create(path)?;
+        let written = to.write_all(scene.as_bytes()).and_then(|()| to.flush()).map(|()| to);
+        file.finish(written)?;
+    }
+    if arguments.json {
+        output::json(&Document { fitted: &fitted, scene: &scene, skew, matched })?;
+    } else {
+        output::text(&describe(&fitted, &scene, skew, matched))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Failure> {
+    let path = &arguments.file;
+    if let Some(receiver) = &arguments.receiver {
+        let matched = captures::between(open(path)?, open(receiver)?, arguments.port)
+            .map_err(|error| Failure::Input(format!("{}, {}: {error}", output::path(path), output::path(receiver))))?;
+        let left = Matched { unmatched_sent: matched.unmatched_sent, unmatched_arrived: matched.unmatched_arrived, ambiguous: matched.ambiguous };
+        return Ok((matched.measurements, Some(left)));
+    }
+    let bytes = std::fs::read(path).map_err(|error| unreadable(path, error))?;
+    let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", output::path(path)));
+    let text = String::from_utf8_lossy(&bytes);
+    if text.trim_start_matches('\u{feff}').starts_with(FateRow::HEADER) {
+        return Ok((Measurements::from_fates(&FateLog::parse(&text).map_err(|error| named(&error))?), None));
+    }
+    Ok((Measurements::from_csv(bytes.as_slice()).map_err(|error| named(&error))?, None))
+}
+
+fn open(path: &Path) -> Result<File, Failure> {
+    File::open(path).map_err(|error| unreadable(path, error))
+}
+
+fn unreadable(path: &Path, error: std::io::Error) -> Failure {
+    Failure::File { verb: "read", path: path.to_path_buf(), error }
+}
+
+fn describe(fitted: &Fitted, scene: &str, skew: Option<Skew>, matched: Option<Matched>) -> String {
+    let goodness = &fitted.goodness;
+    let mut text = format!("{scene}\n");
+    // Writing to a string does not fail.
+    let mut line = |line: String| {
+        let _ = writeln!(text, "{line}");
+    };
+    let spaced = if goodness.evenly_spaced { "evenly" } else { "unevenly" };
+    line(format!(
+        "{} packets, {} arrived, one every {} ({spaced}); they say as much as {:.0} independent ones",
+        goodness.packets,
+        goodness.received,
+        milliseconds(goodness.spacing_s),
+        goodness.effective
+    ));
+    if let Some(matched) = matched {
+        line(format!(
+            "{} sent and {} received without a counterpart, {} ambiguous",
+            matched.unmatched_sent, matched.unmatched_arrived, matched.ambiguous
+        ));
+    }
+    if let Some(skew) = skew {
+        line(format!("clocks drift by {:.3} us/s, removed", skew.seconds_per_second * 1e6));
+    }
+    let error = goodness.mean_se_s.map_or_else(String::new, |error| format!(" +- {}", milliseconds(error)));
+    line(format!(
+        "mean {}{error}, standard deviation {}, least {}",
+        milliseconds(goodness.mean_s),
+        milliseconds(goodness.sd_s),
+        milliseconds(goodness.least_s)
+    ));
+    line(format!("\n  {:<12}{:>14}{:>14}{:>14}{:>16}{:>12}", "law", "mean", "sd", "floor", "AIC - best", "Kolmogorov"));
+    let best = goodness.laws.first().map_or(0.0, |law| law.aic);
+    for law in &goodness.laws {
+        let floor = law.floor_s.map_or_else(|| "-".to_owned(), milliseconds);
+        let [mean, sd] = [law.mean_s, law.sd_s].map(milliseconds);
+        line(format!("  {:<12}{mean:>14}{sd:>14}{floor:>14}{:>16.1}{:>12.5}", law.distribution.name(), law.aic - best, law.kolmogorov));
+    }
+    match goodness.correlation {
+        None => line("\ndelays are as good as independent".to_owned()),
+        Some(correlation) => {
+            let [time, lag] = [correlation.time_se_s.map(milliseconds), correlation.lag_one_se.map(|error| format!("{error:.5}"))]
+                .map(|error| error.map_or_else(String::new, |error| format!(" +- {error}")));
+            line(format!(
+                "\ncorrelation time {}{time}, normal scores of neighbours {:.5}{lag}",
+                milliseconds(correlation.time_s),
+                correlation.lag_one
+            ));
+        }
+    }
+    line(format!("\n  {:<60}{:>12}{:>14}", "loss", "mean", "BIC - best"));
+    let best = goodness.losses.first().map_or(0.0, |loss| loss.bic);
+    for loss in &goodness.losses {
+        line(format!("  {:<60}{:>10.5} %{:>14.1}", model(loss), loss.mean_loss * 100.0, loss.bic - best));
+    }
+    text
+}
+
+fn model(loss: &LossFit) -> String {
+    match loss.model {
+        LossModel::None => "none".to_owned(),
+        LossModel::Independent { .. } => "independent".to_owned(),
+        LossModel::GilbertElliott { p, r, h, k } => format!("Gilbert-Elliott p {p:.5} r {r:.5} h {h:.3} k {k:.5}"),
+        LossModel::GilbertElliottInTime { mean_good_s, mean_bad_s } => format!("in time, good {mean_good_s:.4} s bad {mean_bad_s:.4} s"),
+        _ => String::new(),
+    }
+}
+
+fn milliseconds(seconds: f64) -> String {
+    format!("{:.5} ms", seconds * 1e3)
+}

@@ -1,0 +1,159 @@
+//! `cohaptic link`.
+
+mod spec;
+mod words;
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::process::ExitCode;
+use std::time::Instant as Clock;
+
+use cohaptic_measure::achieved::{Accumulator, Achieved, FateCounts};
+use cohaptic_measure::asked::Asked;
+use cohaptic_measure::beside::{Beside, Figure};
+use cohaptic_measure::fates::FateWriter;
+use cohaptic_measure::pcapng::CaptureWriter;
+use cohaptic_measure::steady::SteadyStream;
+use cohaptic_wan::{Link, LinkName, PacketInfo, PacketRecord};
+use serde::Serialize;
+
+use crate::arguments::LinkArguments;
+use crate::failure::{Failure, INTERRUPTED};
+use crate::output_file::OutputFile;
+use crate::progress::Progress;
+use crate::{interrupt, output};
+use spec::Spec;
+
+/// Without `--packets`.
+const PACKETS: u64 = 100_000;
+
+/// What `cohaptic link --json` prints.
+#[derive(Serialize)]
+struct Document<'a> {
+    asked: AskedDocument<'a>,
+    achieved: &'a Achieved,
+    compared: &'a [Figure],
+    fates: &'a FateCounts,
+    packets_per_s: f64,
+    interrupted: bool,
+    files: &'a [String],
+}
+
+#[derive(Serialize)]
+struct AskedDocument<'a> {
+    spec: &'a str,
+    #[serde(flatten)]
+    figures: &'a Asked,
+}
+
+/// What came of the stream.
+struct Measured {
+    achieved: Achieved,
+    figures: Vec<Figure>,
+    sent: u64,
+    wanted: u64,
+    interrupted: bool,
+    packets_per_s: f64,
+    files: Vec<String>,
+}
+
+/// Drives one link and says what it was asked for and what it achieved.
+pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
+    let spec = Spec::read(arguments)?;
+    let measured = drive(arguments, &spec)?;
+    if arguments.json {
+        output::json(&Document {
+            asked: AskedDocument { spec: &spec.said, figures: &spec.asked },
+            achieved: &measured.achieved,
+            compared: &measured.figures,
+            fates: &measured.achieved.fates,
+            packets_per_s: measured.packets_per_s,
+            interrupted: measured.interrupted,
+            files: &measured.files,
+        })?;
+    } else {
+        output::text(&words::describe(&spec, &measured))?;
+    }
+    Ok(if measured.interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+fn drive(arguments: &LinkArguments, spec: &Spec) -> Result<Measured, Failure> {
+    let wanted = arguments.packets.map(Into::into).or(spec.packets).unwrap_or(PACKETS);
+    let info = PacketInfo { size: arguments.size, ecn_capable: arguments.ecn };
+    let stream = SteadyStream { packets: wanted, every: arguments.every, info };
+    // Half of all time is left for delays.
+    if stream.sent(wanted).as_nanos() > u64::MAX / 2 {
+        return Err(Failure::Input("the stream lasts longer than 292 years: expected fewer packets, or less time between them".to_owned()));
+    }
+    let mut link = Link::new(arguments.seed, &LinkName::between("sender", "receiver"), spec.model.clone());
+    let mut sinks = Sinks::create(arguments)?;
+    let mut accumulator = Accumulator::new();
+    let mut beside = Beside::default();
+    let progress = Progress::through_packets(wanted);
+    let start = Clock::now();
+    let sent = stream.over(
+        &mut link,
+        |record| {
+            // Records come in the order in which things happen.
+            let _ = accumulator.record(record);
+            beside.record(record);
+            sinks.write(record)
+        },
+        |sent| {
+            progress.reach_number(sent);
+            !interrupt::asked()
+        },
+    )?;
+    let wall_s = start.elapsed().as_secs_f64();
+    progress.clear();
+    let files = sinks.finish()?;
+    #[expect(clippy::cast_precision_loss, reason = "for people")]
+    let packets_per_s = sent as f64 / wall_s;
+    let figures = beside.figures(&spec.asked);
+    Ok(Measured { achieved: accumulator.finish(), figures, sent, wanted, interrupted: sent < wanted, packets_per_s, files })
+}
+
+/// The files that are written.
+struct Sinks {
+    fates: Option<(OutputFile, FateWriter<BufWriter<File>>)>,
+    capture: Option<(OutputFile, CaptureWriter<BufWriter<File>>)>,
+    files: Vec<String>,
+}
+
+impl Sinks {
+    fn create(arguments: &LinkArguments) -> Result<Self, Failure> {
+        let mut sinks = Self { fates: None, capture: None, files: Vec::new() };
+        if let Some(path) = &arguments.fates {
+            let (file, to) = OutputFile::create(path)?;
+            let writer = FateWriter::new(to).map_err(|error| file.failure(error))?;
+            sinks.fates = Some((file, writer));
+        }
+        if let Some(path) = &arguments.pcapng {
+            let (file, to) = OutputFile::create(path)?;
+            let writer = CaptureWriter::new(to, "link").map_err(|error| file.failure(error))?;
+            sinks.capture = Some((file, writer));
+        }
+        sinks.files = [&arguments.fates, &arguments.pcapng].into_iter().flatten().map(|path| output::path(path)).collect();
+        Ok(sinks)
+    }
+
+    fn write(&mut self, record: &PacketRecord) -> Result<(), Failure> {
+        if let Some((file, writer)) = &mut self.fates {
+            writer.write(record).map_err(|error| file.failure(error))?;
+        }
+        if let Some((file, writer)) = &mut self.capture {
+            writer.write(record, &[]).map_err(|error| file.failure(error))?;
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<Vec<String>, Failure> {
+        if let Some((file, writer)) = self.fates {
+            file.finish(writer.finish())?;
+        }
+        if let Some((file, writer)) = self.capture {
+            file.finish(writer.finish())?;
+        }
+        Ok(self.files)
+    }
+}

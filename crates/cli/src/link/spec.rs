@@ -1,0 +1,129 @@
+//! What the link is told to do: from words, keys or a file.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use cohaptic_measure::asked::Asked;
+use cohaptic_measure::fates::{self, ReadError};
+use cohaptic_scene::link_from_keys;
+use cohaptic_wan::law::DistTable;
+use cohaptic_wan::netem::kernel::Table;
+use cohaptic_wan::netem::{Netem, TableName};
+use cohaptic_wan::{KernelNetem, LinkModel};
+
+use crate::arguments::{LinkArguments, Profile};
+use crate::failure::Failure;
+use crate::output;
+
+/// A link, and what it is asked for.
+pub(super) struct Spec {
+    /// As it was said.
+    pub(super) said: String,
+    pub(super) model: LinkModel,
+    pub(super) asked: Asked,
+    /// How many packets are in the log, if it is a replay.
+    pub(super) packets: Option<u64>,
+}
+
+impl Spec {
+    pub(super) fn read(arguments: &LinkArguments) -> Result<Self, Failure> {
+        if let Some(path) = &arguments.from {
+            return replay(path);
+        }
+        let is_keys = arguments.spec.iter().any(|word| word.contains('='));
+        let said = arguments.spec.join(" ");
+        if is_keys && arguments.profile == Profile::Kernel66 {
+            return Err(Failure::Input("--profile kernel-6.6 is for words of tc-netem: expected those, or no profile".to_owned()));
+        }
+        let (model, asked) = if is_keys { of_keys(arguments)? } else { of_words(arguments, &said)? };
+        Ok(Self { said, model, asked, packets: None })
+    }
+}
+
+fn of_keys(arguments: &LinkArguments) -> Result<(LinkModel, Asked), Failure> {
+    let model = link_from_keys(&arguments.spec).map_err(Failure::LinkKeys)?;
+    let asked = Asked::of(&model, arguments.every, arguments.size);
+    Ok((model, asked))
+}
+
+fn of_words(arguments: &LinkArguments, said: &str) -> Result<(LinkModel, Asked), Failure> {
+    let netem = Netem::parse(said).map_err(|error| Failure::Input(format!("these words are no link:\n{}", error.excerpt(said))))?;
+    let mut fault = None;
+    let exact = netem.to_link_config(&mut |name| {
+        let text = table(name, &mut fault)?;
+        DistTable::parse(&text).map_err(|error| fault = Some(in_table(name, &error))).ok().map(Arc::new)
+    });
+    if let Some(fault) = fault {
+        return Err(fault);
+    }
+    let asked = exact.as_ref().map_or_else(|_| Asked::default(), |config| Asked::of_config(config, arguments.every, arguments.size));
+    match arguments.profile {
+        Profile::Exact => match exact {
+            Ok(config) => Ok((config.into(), asked)),
+            Err(error) => Err(Failure::Input(format!("{error}\n{}", below(said, error.option())))),
+        },
+        Profile::Kernel66 => {
+            let mut fault = None;
+            let named = [netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()?.distribution.clone()), slot_distribution(&netem)];
+            let tables = named.into_iter().flatten().filter_map(|distribution| {
+                let name = TableName::new(distribution.name())?;
+                let text = table(&name, &mut fault)?;
+                Some((name, Table::parse(&text).ok()?))
+            });
+            let tables = tables.collect();
+            fault.map_or(Ok(()), Err)?;
+            let kernel = KernelNetem::new(netem, tables).map_err(|error| Failure::Input(error.to_string()))?;
+            // What the words ask for is what they say, also where the kernel does something else.
+            Ok((kernel.into(), asked))
+        }
+    }
+}
+
+fn slot_distribution(netem: &Netem) -> Option<cohaptic_wan::netem::Distribution> {
+    match &netem.slot.as_ref()?.gap {
+        cohaptic_wan::netem::SlotGap::Drawn { distribution, .. } => Some(distribution.clone()),
+        cohaptic_wan::netem::SlotGap::Range { .. } => None,
+    }
+}
+
+/// The text of `NAME.dist` in the current folder; `None` if there is no such file.
+fn table(name: &TableName, fault: &mut Option<Failure>) -> Option<String> {
+    let path = Path::new(name.as_str()).with_extension("dist");
+    match std::fs::read_to_string(&path) {
+        Ok(text) => Some(text),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
+        Err(error) => {
+            *fault = Some(Failure::File { verb: "read", path, error });
+            None
+        }
+    }
+}
+
+fn in_table(name: &TableName, error: &cohaptic_wan::law::DistTableError) -> Failure {
+    Failure::Input(format!("{}.dist: {error}", name.as_str()))
+}
+
+/// The words with a mark under the option to blame. An option may have been cut short: then the first word that it begins with.
+fn below(said: &str, option: &str) -> String {
+    let words = said.split(' ').scan(0, |start, word| {
+        let at = *start;
+        *start += word.len() + 1;
+        Some((at, word))
+    });
+    let found = words.filter(|(_, word)| !word.is_empty() && option.starts_with(word)).max_by_key(|(at, word)| (word.len(), usize::MAX - at));
+    let (at, length) = found.map_or((0, 1), |(at, word)| (at, word.len()));
+    format!("{said}\n{}{}", " ".repeat(said[..at].chars().count()), "^".repeat(length))
+}
+
+fn replay(path: &Path) -> Result<Spec, Failure> {
+    let unreadable = |error| Failure::File { verb: "read", path: path.to_path_buf(), error };
+    let file = File::open(path).map_err(unreadable)?;
+    let log = fates::read(file).map_err(|error| match error {
+        ReadError::Io(error) => unreadable(error),
+        other => Failure::Input(format!("{}: {other}", output::path(path))),
+    })?;
+    let packets = u64::try_from(log.packets()).ok();
+    let model = LinkModel::Replay(Arc::new(log));
+    Ok(Spec { said: format!("replay of {}", output::path(path)), model, asked: Asked::default(), packets })
+}

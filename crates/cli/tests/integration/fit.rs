@@ -1,0 +1,79 @@
+//! `cohaptic fit`: what a link did is estimated, and is what it was told.
+
+use std::fmt::Write as _;
+
+use serde_json::Value;
+
+use crate::desk::Desk;
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// 40 000 packets. The mean of AR(1) delays with ρ = 0.5 has the standard error 4 ms·√(3/40 000) = 35 µs, the deviation 4 ms·√(5/6/40 000) = 18 µs, ρ
+/// √(0.75/40 000) = 0.0043; p and r of the chain are known to √(p(1−p)·q/40 000·…) = 0.0005 and √(r(1−r)/1000) = 0.013. 4.5 of each.
+#[test]
+fn what_a_link_was_told_is_found_again() {
+    let desk = Desk::new();
+    desk.text("link delay 40ms 4ms 50% distribution normal loss gemodel 1% 25% --packets 40000 --fates f.csv");
+    let document = desk.json("fit f.csv --json --out link.toml");
+    let link = &document["link"];
+    assert!((number(&link["delay_s"]) - 0.04).abs() < 4.5 * 35e-6, "{document:#}");
+    assert!((number(&link["jitter"]["sd_s"]) - 0.004).abs() < 4.5 * 18e-6);
+    assert!((number(&link["jitter"]["correlation"]) - 0.5).abs() < 4.5 * 0.0043);
+    let chain = &link["loss"]["gilbert-elliott"];
+    assert!((number(&chain["p"]) - 0.01).abs() < 4.5 * 0.0005 && (number(&chain["r"]) - 0.25).abs() < 4.5 * 0.013, "{document:#}");
+    assert_eq!((document["goodness"]["packets"].as_u64(), document["goodness"]["laws"].as_array().map(Vec::len)), (Some(40_000), Some(6)));
+    let scene = desk.read("link.toml");
+    assert_eq!(document["scene"], scene);
+    assert!(scene.starts_with("[link]\ndelay = \"") && scene.contains("gilbert-elliott"), "{scene}");
+}
+
+/// A uniform law: the correlation of normal scores φ is 2·sin(πρ/6) = 0.9080 for ρ = 0.9, and it is ρ that a scene takes.
+#[test]
+fn the_correlation_is_that_of_delays_and_not_of_their_scores() {
+    let desk = Desk::new();
+    desk.text("link delay 40ms 4ms 90% --packets 40000 --fates f.csv");
+    let document = desk.json("fit f.csv --json");
+    assert_eq!(document["link"]["jitter"]["distribution"], "uniform");
+    let (rho, phi) = (number(&document["link"]["jitter"]["correlation"]), number(&document["goodness"]["correlation"]["lag_one"]));
+    assert!((rho - 6.0 / std::f64::consts::PI * (phi / 2.0).asin()).abs() < 1e-9, "{rho} {phi}");
+    assert!((rho - 0.9).abs() < 0.01, "{rho}");
+}
+
+#[test]
+fn measurements_are_read_and_a_drift_is_removed() {
+    let desk = Desk::new();
+    desk.text("link delay 20ms 2ms --packets 5000 --fates f.csv");
+    let log = desk.read("f.csv");
+    let mut rows: Vec<[u64; 2]> = log.lines().skip(1).map(|row| [2, 4].map(|place| row.split(',').nth(place).unwrap().parse().unwrap())).collect();
+    rows.sort_unstable();
+    let mut csv = "t_ns,delay_ns\n".to_owned();
+    for [offered, at] in rows {
+        // One clock is faster by 1 ms a second.
+        let _ = writeln!(csv, "{offered},{}", at - offered + offered / 1000);
+    }
+    desk.write("m.csv", csv);
+    let document = desk.json("fit m.csv --skew --json");
+    assert!((number(&document["skew"]["seconds_per_second"]) - 1e-3).abs() < 1e-5, "{document:#}");
+    assert!((number(&document["link"]["delay_s"]) - 0.02).abs() < 2e-4);
+    let text = desk.text("fit m.csv --skew");
+    for part in ["[link]\ndelay = ", "jitter = {", "5000 packets, 5000 arrived", "clocks drift by", "Kolmogorov", "uniform", "BIC"] {
+        assert!(text.contains(part), "no {part:?} in:\n{text}");
+    }
+}
+
+#[test]
+fn what_cannot_be_estimated_is_refused() {
+    let desk = Desk::with("m.csv", "t,delay\n0,0.1\n1,0.2\n");
+    desk.write("bad.csv", "t,delay\n0,soon\n");
+    for (line, status, part) in [
+        ("fit m.csv", 2, "m.csv: only 2 packets arrived: expected at least 50"),
+        ("fit bad.csv", 2, "bad.csv: line 2, column delay: found \"soon\", expected a decimal number"),
+        ("fit gone.csv", 3, "cannot read gone.csv"),
+        ("fit m.csv bad.csv", 2, "m.csv, bad.csv: the capture of the sender"),
+        ("fit m.csv --port 9", 2, "RECEIVER"),
+    ] {
+        desk.cohaptic(line).assert_refused(status, &[part]);
+    }
+}

@@ -1,0 +1,167 @@
+//! What a link is asked for, as far as it follows from its configuration.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use cohaptic_units::Bytes;
+use cohaptic_wan::{Correlation, Flips, Layout, LinkConfig, LinkModel, Order, Service};
+use serde::Serialize;
+
+use crate::series::count_u64;
+
+/// The figures that the laws of a link have, of one packet of a steady stream. What does not follow from a law is left out.
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
+#[non_exhaustive]
+pub struct Asked {
+    /// The mean of the propagation delay \[s\], that of a cut law included.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_s: Option<f64>,
+    /// Its standard deviation \[s\]; zero if the delay is constant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sd_s: Option<f64>,
+    /// The least delay \[s\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_s: Option<f64>,
+    /// Quantiles \[s\] by probability.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub quantiles_s: BTreeMap<&'static str, f64>,
+    /// The autocorrelation of the delays at lags of 1 to 10 packets, none lost. Empty if the delay is constant.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub autocorrelation: Vec<f64>,
+    /// The long-run share of packets that the loss model takes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loss: Option<f64>,
+    /// The share of packets of which a copy is made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub duplicated: Option<f64>,
+    /// The share of packets of which bits are flipped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damaged: Option<f64>,
+    /// The rate of the line \[bit/s\], framing included.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_bit_s: Option<f64>,
+    /// How the figures of packets come about.
+    #[serde(skip)]
+    pub(crate) stages: Stages,
+}
+
+/// What one has to know of a link to tell one stage's work from another's.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct Stages {
+    /// The delay of the link; `None` if something else than its law makes a packet's delay what it is.
+    pub(crate) delay: Option<cohaptic_wan::Delay>,
+    /// Packets are marked instead of lost.
+    pub(crate) marks: bool,
+    /// Copies are made before losses.
+    pub(crate) copies_first: bool,
+}
+
+/// The quantiles of [`Asked`], and whether enough packets of a usual measurement lie beyond.
+pub(crate) const QUANTILES: [(&str, f64); 7] =
+    [("0.01", 0.01), ("0.05", 0.05), ("0.25", 0.25), ("0.5", 0.5), ("0.75", 0.75), ("0.95", 0.95), ("0.99", 0.99)];
+const LAGS: u32 = 10;
+
+impl Asked {
+    /// What is asked of a link over which packets of that size go, one every so often. A link with states, a replay and the kernel's netem have no
+    /// laws of their own: nothing is known of them.
+    #[must_use]
+    pub fn of(model: &LinkModel, every: Duration, size: Bytes) -> Self {
+        model.as_fixed().map_or_else(Self::default, |config| Self::of_config(config, every, size))
+    }
+
+    /// What is asked of one configuration.
+    #[must_use]
+    pub fn of_config(config: &LinkConfig, every: Duration, size: Bytes) -> Self {
+        let law = config.delay.law();
+        let seconds = |nanos: f64| nanos / 1e9;
+        let traced = config.trace.is_some();
+        let varied = config.delay.jitter().is_some();
+        let alone = config.token_bucket.is_none() && config.bottleneck.is_none() && config.slots.is_none() && config.reorder.is_none() && !traced;
+        let in_order = config.order == Order::InOrder && varied;
+        let damaged = config.corruption.as_ref().and_then(|corruption| match corruption.bits {
+            Flips::Bits { packets, .. } => Some(packets.probability().get()),
+            Flips::Rate(rate) => {
+                let end = corruption.within.as_ref().map_or(size.get(), |within| size.get().min(within.end));
+                let begin = corruption.within.as_ref().map_or(0, |within| within.start);
+                Some(-libm::expm1(8.0 * count_u64(end.saturating_sub(begin)) * libm::log1p(-rate.get())))
+            }
+            // A way of choosing bits that is not known here.
+            _ => None,
+        });
+        Self {
+            mean_s: (!traced).then(|| law.map_or(config.delay.mean().as_secs_f64(), |law| seconds(law.mean()))),
+            sd_s: (!traced).then(|| law.map_or(0.0, |law| seconds(law.sd()))),
+            least_s: (!traced).then(|| config.delay.least().as_secs_f64()),
+            quantiles_s: law.map(|law| QUANTILES.into_iter().map(|(name, p)| (name, seconds(law.quantile(p)))).collect()).unwrap_or_default(),
+            autocorrelation: autocorrelation(config, every),
+            loss: config.loss.mean().filter(|_| !traced),
+            duplicated: (!config.duplication.is_never()).then(|| config.duplication.probability().get()),
+            damaged,
+            rate_bit_s: config.bottleneck.as_ref().and_then(|bottleneck| match &bottleneck.service {
+                Service::Rate(rate) => Some(count_u64(rate.as_bits_per_sec())),
+                _ => None,
+            }),
+            stages: Stages {
+                delay: (alone && !in_order).then(|| config.delay.clone()),
+                marks: config.marks_instead_of_loss,
+                copies_first: config.layout == Layout::Netem,
+            },
+        }
+    }
+}
+
+fn autocorrelation(config: &LinkConfig, every: Duration) -> Vec<f64> {
+    let (Some(law), Some(jitter)) = (config.delay.law(), config.delay.jitter()) else { return Vec::new() };
+    let phi = match jitter.correlation {
+        Correlation::None => 0.0,
+        Correlation::PerPacket(rho) => law.gaussian_correlation(rho).unwrap_or(0.0),
+        Correlation::InTime(tau) => libm::exp(-every.as_secs_f64() / tau.as_secs_f64()),
+        // A kind of correlation that is not known here.
+        _ => return Vec::new(),
+    };
+    if phi == 0.0 {
+        return (1..=LAGS).map(|_| 0.0).collect();
+    }
+    (1..=LAGS).map(|lag| law.correlation(libm::pow(phi, f64::from(lag)))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_units::Probability;
+    use cohaptic_wan::netem::Netem;
+    use cohaptic_wan::{Checksum, Corruption};
+
+    use super::*;
+
+    fn asked(words: &str) -> Asked {
+        let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+        Asked::of_config(&config, Duration::from_millis(1), Bytes::new(64))
+    }
+
+    #[test]
+    fn figures_follow_from_the_laws() {
+        let asked = asked("delay 40ms 4ms 50% distribution normal loss gemodel 1% 9% duplicate 2% corrupt 3%");
+        assert_eq!((asked.mean_s, asked.sd_s), (Some(0.04), Some(0.004)));
+        // A normal law: ρⁿ; the quantile of 0.95 lies 1.6449 deviations above the mean.
+        assert!(asked.autocorrelation.iter().zip(1..).all(|(found, lag)| (found - 0.5_f64.powi(lag)).abs() < 1e-12));
+        assert!((asked.quantiles_s["0.95"] - (0.04 + 1.644_853_626_951_472_7 * 0.004)).abs() < 1e-12);
+        assert!((asked.loss.unwrap() - 0.1).abs() < 1e-12);
+        assert_eq!((asked.duplicated, asked.damaged, asked.rate_bit_s), (Some(0.02), Some(0.03), None));
+    }
+
+    #[test]
+    fn a_rate_of_flipped_bits_damages_large_packets_more() {
+        let corruption = Corruption { bits: Flips::Rate(Probability::new(0.001).unwrap()), within: Some(4..200), checksum: Checksum::Passes };
+        let config = LinkConfig { corruption: Some(corruption), ..LinkConfig::default() };
+        let asked = Asked::of_config(&config, Duration::from_millis(1), Bytes::new(64));
+        assert!((asked.damaged.unwrap() - (1.0 - 0.999_f64.powi(480))).abs() < 1e-12);
+        assert_eq!((asked.mean_s, asked.sd_s, asked.loss), (Some(0.0), Some(0.0), Some(0.0)));
+    }
+
+    #[test]
+    fn of_what_has_no_law_nothing_is_said() {
+        let replay = LinkModel::Replay(std::sync::Arc::default());
+        assert_eq!(Asked::of(&replay, Duration::from_millis(1), Bytes::new(64)), Asked::default());
+        assert_eq!(serde_json::to_string(&Asked::default()).unwrap(), "{}");
+    }
+}

@@ -1,0 +1,106 @@
+//! One link, driven by a steady stream of packets.
+
+use std::time::Duration;
+
+use cohaptic_units::Instant;
+use cohaptic_wan::{Link, PacketInfo, PacketRecord};
+
+/// Packets of one size, one every so often, from instant zero on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SteadyStream {
+    /// How many.
+    pub packets: u64,
+    /// The time from one to the next.
+    pub every: Duration,
+    /// What each is.
+    pub info: PacketInfo,
+}
+
+impl SteadyStream {
+    /// When the packet of that number is sent; the last instant there is, where it cannot be counted.
+    #[must_use]
+    pub fn sent(&self, number: u64) -> Instant {
+        let nanos = self.every.as_nanos().saturating_mul(number.into());
+        Instant::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
+    }
+
+    /// Sends the stream over a link that is new, and lets everything arrive. `on_record` hears of every fate, in the order in which they happen;
+    /// `keep_going` is asked before every 1024th packet with the number sent, and ends the stream with `false`. Gives the number of packets sent.
+    ///
+    /// # Errors
+    ///
+    /// The first error of `on_record`.
+    pub fn over<E>(
+        &self,
+        link: &mut Link<()>,
+        mut on_record: impl FnMut(&PacketRecord) -> Result<(), E>,
+        mut keep_going: impl FnMut(u64) -> bool,
+    ) -> Result<u64, E> {
+        let mut drain = |link: &mut Link<()>| {
+            while let Some(event) = link.poll_event() {
+                on_record(&event.record())?;
+            }
+            Ok(())
+        };
+        let mut sent = 0;
+        while sent < self.packets && (!sent.is_multiple_of(1024) || keep_going(sent)) {
+            // Instants grow with the number, and nobody else has the link.
+            let _ = link.handle_packet(self.sent(sent), self.info, ());
+            sent += 1;
+            drain(link)?;
+        }
+        let _ = link.handle_timeout(Instant::MAX);
+        drain(link)?;
+        Ok(sent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_units::Bytes;
+    use cohaptic_wan::{Delay, Fate, LinkConfig, LinkName};
+
+    use super::*;
+
+    const STREAM: SteadyStream =
+        SteadyStream { packets: 3000, every: Duration::from_millis(2), info: PacketInfo { size: Bytes::new(64), ecn_capable: false } };
+
+    fn link() -> Link<()> {
+        let config = LinkConfig { delay: Delay::constant(Duration::from_millis(5)), ..LinkConfig::default() };
+        Link::new(1, &LinkName::between("sender", "receiver"), config)
+    }
+
+    #[test]
+    fn every_packet_is_sent_at_its_time_and_heard_of() {
+        let mut records = Vec::new();
+        let sent = STREAM.over(
+            &mut link(),
+            |record| {
+                records.push(*record);
+                Ok::<(), ()>(())
+            },
+            |_| true,
+        );
+        assert_eq!(sent, Ok(3000));
+        assert_eq!(records.len(), 3000);
+        for (number, record) in (0..).zip(&records) {
+            assert_eq!((record.sequence, record.offered.as_nanos()), (number, number * 2_000_000));
+            assert!(matches!(record.fate, Fate::Delivered(at) if at.as_nanos() == number * 2_000_000 + 5_000_000));
+        }
+    }
+
+    #[test]
+    fn it_ends_when_it_is_asked_to_and_at_an_error() {
+        let mut heard = 0;
+        let sent = STREAM.over(
+            &mut link(),
+            |_| {
+                heard += 1;
+                Ok::<(), ()>(())
+            },
+            |sent| sent < 2048,
+        );
+        assert_eq!((sent, heard), (Ok(2048), 2048));
+        assert_eq!(STREAM.over(&mut link(), |record| if record.sequence < 7 { Ok(()) } else { Err(record.sequence) }, |_| true), Err(7));
+    }
+}

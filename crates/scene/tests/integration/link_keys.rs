@@ -1,0 +1,488 @@
+//! Every key of a link says what is written: from a scene's text to the emulator's configuration.
+
+use core::num::{NonZeroU32, NonZeroU64};
+use core::time::Duration;
+use std::path::Path;
+use std::sync::Arc;
+
+use cohaptic_scene::{ChangeKind, Scene};
+use cohaptic_units::{Bytes, Instant, Probability, Rate};
+use cohaptic_wan::law::DistTable;
+use cohaptic_wan::{
+    Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Delay, DeliveryTrace, Discipline, Displacement,
+    Distribution, FateLog, Flips, FourState, Framing, GilbertElliottInTime, IdleOutages, Jitter, LinkConfig, LinkModel, Loss, MAHIMAHI_BYTES,
+    Modulator, ModulatorState, Outage, Outages, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn,
+    TokenBucket,
+};
+
+const MS: Duration = Duration::from_millis(1);
+
+/// Two peers; the keys of the link come last.
+const SCENE: &str = "scene = { duration = \"9s\", count = 2 }\nobject.mass = 1\npeer = { contact = \"none\", device.mass = 1 }\n\
+                     coordination = { strategy = \"average-position\", stiffness = 1, update = \"8ms\" }\n";
+
+/// The files of this folder are there to be named.
+fn path() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/integration/data/links.toml"))
+}
+
+fn scene(text: &str, overrides: &[&str]) -> Scene {
+    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+    Scene::parse(&format!("{SCENE}{text}"), path(), &overrides).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn model(keys: &str) -> LinkModel {
+    scene(&format!("[link]\n{keys}"), &[]).links.between(0, 1).clone()
+}
+
+fn config(keys: &str) -> LinkConfig {
+    model(keys).as_fixed().unwrap().clone()
+}
+
+/// What is refused, without the beginning of the path.
+fn refused(text: &str, overrides: &[&str]) -> String {
+    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+    let error = Scene::parse(&format!("{SCENE}{text}"), path(), &overrides).expect_err(text).to_string();
+    let folder = path().parent().unwrap().display().to_string();
+    error.replace(&format!("{folder}/"), "")
+}
+
+/// What is found where the message should begin as expected, and does not.
+fn misses(text: &str, expected: &str) -> Option<String> {
+    let found = refused(text, &[]);
+    (!found.starts_with(expected)).then(|| format!("expected {expected}\nfound    {found}\n"))
+}
+
+fn p(value: f64) -> Probability {
+    Probability::new(value).unwrap()
+}
+
+fn at(millis: u64) -> Instant {
+    Instant::from_nanos(millis * 1_000_000)
+}
+
+fn data(name: &str) -> String {
+    std::fs::read_to_string(path().with_file_name(name)).unwrap()
+}
+
+#[test]
+fn every_law_and_memory_of_jitter_is_read() {
+    let jitter = |keys: &str| config(&format!("delay = \"24ms\"\njitter = {keys}")).delay.jitter().unwrap().clone();
+    for (name, law) in [
+        ("normal", Distribution::Normal),
+        ("uniform", Distribution::Uniform),
+        ("pareto", Distribution::Pareto),
+        ("paretonormal", Distribution::ParetoNormal),
+        ("lognormal", Distribution::LogNormal),
+        ("gamma", Distribution::Gamma),
+        ("weibull", Distribution::Weibull),
+        ("laplace", Distribution::Laplace),
+    ] {
+        assert_eq!(jitter(&format!("{{ sd = \"2ms\", distribution = \"{name}\" }}")), Jitter::new(2 * MS, law));
+    }
+    let remembering = |correlation| Jitter { floor: 20 * MS, correlation, ..Jitter::new(2 * MS, Distribution::Gamma) };
+    let text = |key| format!("{{ sd = \"2ms\", distribution = \"gamma\", floor = \"20ms\", {key} }}");
+    assert_eq!(jitter(&text("correlation = 0.25")), remembering(Correlation::PerPacket(0.25)));
+    assert_eq!(jitter(&text("correlation-time = \"50ms\"")), remembering(Correlation::InTime(50 * MS)));
+    assert_eq!(jitter(&text("correlation = 0")), remembering(Correlation::None));
+    let table = Distribution::Table(Arc::new(DistTable::parse(&data("steps.dist")).unwrap()));
+    assert_eq!(jitter("{ sd = \"2ms\", distribution = { table = \"steps.dist\" } }"), Jitter::new(2 * MS, table));
+}
+
+#[test]
+fn measured_delays_bring_their_own_mean_and_deviation() {
+    // Quantiles 20, 22 and 30 ms, linear between: mean (21 + 26)/2 = 23.5 ms, E[x²] = (20² + 20·22 + 22² + 22² + 22·30 + 30²)/6.
+    let own = config("jitter = { distribution = { empirical = \"delays.csv\" } }").delay;
+    let sd = ((400.0 + 440.0 + 484.0 + 484.0 + 660.0 + 900.0) / 6.0_f64 - 23.5 * 23.5).sqrt();
+    assert_eq!(own.mean(), Duration::from_micros(23_500));
+    assert!((own.jitter().unwrap().sd.as_secs_f64() * 1e3 - sd).abs() < 1e-6);
+    let stretched = config("delay = \"50ms\"\njitter = { sd = \"1ms\", distribution = { empirical = \"delays.csv\" } }").delay;
+    assert_eq!((stretched.mean(), stretched.jitter().unwrap().sd), (50 * MS, MS));
+}
+
+#[test]
+fn every_kind_of_loss_is_read() {
+    let loss = |text: &str| config(&format!("loss = {text}")).loss;
+    let in_time = GilbertElliottInTime::new(160 * MS, 40 * MS, p(0.5), p(0.99)).unwrap();
+    assert_eq!(loss("{ gilbert-elliott = { mean-good = \"160ms\", mean-bad = \"40ms\", h = 0.5, k = 0.99 } }"), Loss::GilbertElliottInTime(in_time));
+    let states = |p31, p32, p23, p14| Loss::FourState(FourState::new(p(0.01), p(p31), p(p32), p(p23), p(p14)).unwrap());
+    assert_eq!(loss("{ states = { p13 = \"1%\" } }"), states(0.99, 0.0, 1.0, 0.0));
+    assert_eq!(loss("{ states = { p13 = 0.01, p31 = 0.3, p32 = 0.2, p23 = 0.5, p14 = 0.02 } }"), states(0.3, 0.2, 0.5, 0.02));
+    let bursts = Bursts { loss: 0.04, length: 5.0, density: 0.8, isolated: 0.005, good_run: 1.25 };
+    assert_eq!(
+        loss("{ bursts = { loss = \"4%\", length = 5, density = 0.8, isolated = \"0.5%\", good-run = 1.25 } }"),
+        Loss::FourState(FourState::from_bursts(bursts).unwrap())
+    );
+    let plain = Bursts { loss: 0.02, length: 5.0, density: 1.0, isolated: 0.0, good_run: 1.0 };
+    assert_eq!(loss("{ bursts = { loss = 0.02, length = 5 } }"), Loss::FourState(FourState::from_bursts(plain).unwrap()));
+    assert_eq!(loss("{ correlated = { probability = \"5%\", correlation = 0.5 } }"), Loss::Correlated(Chance::correlated(p(0.05), 0.5).unwrap()));
+    assert_eq!(loss("{ packets = [3, \"10-19\"], every = 100 }"), Loss::Pattern(Pattern::of_packets(vec![3..4, 10..20], Some(100)).unwrap()));
+    assert_eq!(loss("{ packets = [3] }"), Loss::Pattern(Pattern::of_packets(vec![3..4], None).unwrap()));
+    assert_eq!(
+        loss("{ times = [{ from = \"100ms\", to = \"200ms\" }], every = \"1s\" }"),
+        Loss::Pattern(Pattern::in_time(&[at(100)..at(200)], Some(1000 * MS)).unwrap())
+    );
+    assert!(config("loss = 0.1\nmark-instead-of-loss = true").marks_instead_of_loss);
+}
+
+#[test]
+fn copies_damage_and_disorder_are_read() {
+    let half = Chance::correlated(p(0.5), 0.25).unwrap();
+    let table = "probability = 0.5, correlation = 0.25";
+    assert_eq!(config("duplicate = \"1%\"").duplication, Chance::independent(p(0.01)));
+    assert_eq!(config(&format!("duplicate = {{ {table} }}")).duplication, half);
+
+    let corrupt = |text: &str| config(&format!("corrupt = {text}")).corruption;
+    let whole = |bits| Corruption { bits, within: None, checksum: Checksum::Discards };
+    assert_eq!(corrupt("0.01"), Some(whole(Flips::Bits { packets: Chance::independent(p(0.01)), count: 1 })));
+    assert_eq!(corrupt(&format!("{{ {table}, bits = 3 }}")), Some(whole(Flips::Bits { packets: half, count: 3 })));
+    let hit = Corruption { within: Some(8..16), checksum: Checksum::Passes, ..whole(Flips::Rate(p(1e-6))) };
+    assert_eq!(corrupt("{ bit-error-rate = 1e-6, bytes = \"8-15\", checksum = \"passes\" }"), Some(hit));
+    assert_eq!((corrupt("0"), corrupt("{ bit-error-rate = 0, checksum = \"discards\" }")), (None, None));
+
+    let reorder = |text: &str| config(&format!("reorder = {text}")).reorder;
+    let count = |count| NonZeroU32::new(count).unwrap();
+    let how = |how| Some(Reorder { packets: half, how });
+    assert_eq!(reorder("\"25%\""), Some(Reorder { packets: Chance::independent(p(0.25)), how: Displacement::Jump { gap: count(1) } }));
+    assert_eq!(reorder(&format!("{{ {table}, gap = 5 }}")), how(Displacement::Jump { gap: count(5) }));
+    assert_eq!(reorder(&format!("{{ {table}, behind = 2, at-most = \"50ms\" }}")), how(Displacement::Behind { packets: count(2), at_most: 50 * MS }));
+    assert_eq!(reorder(&format!("{{ {table}, later = \"10ms\" }}")), how(Displacement::Later { by: 10 * MS }));
+    assert_eq!(reorder("0"), None);
+}
+
+#[test]
+fn lines_queues_and_limits_are_read() {
+    let mbit = Rate::bits_per_sec(1_000_000).unwrap();
+    let line = |limit, discipline| Some(Bottleneck { limit, discipline, ..Bottleneck::at_rate(mbit) });
+    let queue = |text: &str| config(&format!("rate = \"1Mbit\"\nqueue = {text}")).bottleneck;
+    assert_eq!(queue("{ limit = \"50ms\", discipline = \"head-drop\" }"), line(Some(QueueLimit::Time(50 * MS)), Discipline::HeadDrop));
+    assert_eq!(queue("{ limit = \"unlimited\", discipline = \"codel\" }"), line(None, Discipline::CoDel(CoDel::default())));
+    let codel = CoDel { target: 2 * MS, interval: 30 * MS, mtu: Bytes::new(100), ecn: true };
+    assert_eq!(
+        queue("{ limit = \"9 packets\", discipline.codel = { target = \"2ms\", interval = \"30ms\", mtu = \"100B\", ecn = true } }"),
+        line(Some(QueueLimit::Packets(9)), Discipline::CoDel(codel))
+    );
+    let red = |min, max, most, weight, packet, ecn| {
+        Discipline::Red(Red::new(Bytes::new(min), Bytes::new(max), p(most), weight, Bytes::new(packet), ecn).unwrap())
+    };
+    let bytes = |bytes| Some(QueueLimit::Bytes(Bytes::new(bytes)));
+    assert_eq!(queue("{ limit = \"60kB\", discipline = \"red\" }"), line(bytes(60_000), red(10_000, 30_000, 0.1, 0.002, 500, false)));
+    assert_eq!(
+        queue(
+            "{ limit = \"9kB\", discipline.red = { min = \"1kB\", max = \"3kB\", max-probability = 0.2, weight = 0.1, mean-packet = \"64B\", ecn = true } }"
+        ),
+        line(bytes(9_000), red(1_000, 3_000, 0.2, 0.1, 64, true))
+    );
+    let cells = Cells { payload: NonZeroU32::new(48).unwrap(), overhead: 5 };
+    let framed = config("rate = \"1Mbit\"\noverhead = \"-14B\"\ncells = { payload = \"48B\", overhead = \"5B\" }").bottleneck.unwrap();
+    assert_eq!(framed.framing, Framing { overhead: -14, cells: Some(cells) });
+
+    let bucket = TokenBucket {
+        rate: mbit,
+        burst: Bytes::new(10_000),
+        peak: Some(Peak { rate: Rate::bits_per_sec(2_000_000).unwrap(), burst: Bytes::new(1500) }),
+        framing: Framing { overhead: 28, cells: None },
+        limit: Some(QueueLimit::Packets(7)),
+    };
+    let text = "token-bucket = { rate = \"1Mbit\", burst = \"10kB\", peak = { rate = \"2Mbit\", burst = \"1500B\" }, limit = \"7 packets\", overhead = \"28B\" }";
+    assert_eq!(config(text).token_bucket, Some(bucket));
+
+    let mut slots = Slots::new(10 * MS, 20 * MS).unwrap();
+    (slots.packets, slots.bytes) = (NonZeroU64::new(3), NonZeroU64::new(1500));
+    assert_eq!(config("slots = { min = \"10ms\", max = \"20ms\", packets = 3, bytes = \"1500B\" }").slots, Some(slots));
+    assert_eq!(config("slots = { min = \"10ms\" }").slots, Some(Slots::new(10 * MS, 10 * MS).unwrap()));
+    let drawn = Delay::with_jitter(10 * MS, Jitter::new(MS, Distribution::Normal)).unwrap();
+    assert_eq!(config("slots = { delay = \"10ms\", jitter = \"1ms\" }").slots, Some(Slots::drawn(drawn)));
+
+    let both = config("mtu = \"1500B\"\nlimit = \"1000 packets\"");
+    assert_eq!((both.mtu, both.limit), (Some(Bytes::new(1500)), Some(1000)));
+}
+
+#[test]
+fn every_kind_of_outage_is_read() {
+    let s = |seconds| Duration::from_secs(seconds);
+    let outage = |text: &str| config(&format!("outage = {text}")).outages;
+    let random = |up, down| Outages::default().with_random(RandomOutages { up, down }).unwrap();
+    assert_eq!(outage("{ random = { up = \"30s\", down = { fixed = \"1s\" } } }"), random(Sojourn::Exponential(s(30)), Sojourn::Fixed(s(1))));
+    assert_eq!(
+        outage("{ random = { up = { uniform = [\"1s\", \"2s\"] }, down = { erlang = { mean = \"4s\", stages = 4 } } } }"),
+        random(Sojourn::Uniform(s(1), s(2)), Sojourn::Erlang(s(4), 4))
+    );
+    let all = Outages::new(vec![Outage { from: at(1000), to: at(2000) }])
+        .unwrap()
+        .with_random(RandomOutages { up: Sojourn::Exponential(s(3)), down: Sojourn::Exponential(s(1)) })
+        .unwrap()
+        .with_idle(IdleOutages { after: s(10), down: s(2) })
+        .unwrap();
+    let text = "{ scheduled = [{ from = \"1s\", to = \"2s\" }], random = { up = { exponential = \"3s\" }, down = \"1s\" }, idle = { after = \"10s\", down = \"2s\" } }";
+    assert_eq!(outage(text), all);
+}
+
+#[test]
+fn recordings_are_told_apart_by_their_first_line() {
+    let path = |between, repeats| Some(PathTrace::parse(&data("path.csv"), between, repeats).unwrap());
+    assert_eq!(config("trace = \"path.csv\"").trace, path(Between::Steps, false));
+    assert_eq!(config("trace = { file = \"path.csv\", between = \"lines\", repeat = true }").trace, path(Between::Lines, true));
+    let line = |bytes| Some(Service::Recorded(DeliveryTrace::parse(&data("line.trace"), bytes).unwrap()));
+    let bottleneck = config("trace = \"line.trace\"\nqueue.limit = \"9 packets\"").bottleneck.unwrap();
+    assert_eq!((Some(bottleneck.service), bottleneck.limit), (line(MAHIMAHI_BYTES), Some(QueueLimit::Packets(9))));
+    let service = |keys: &str| config(keys).bottleneck.map(|bottleneck| bottleneck.service);
+    assert_eq!(service("trace = { file = \"line.trace\", bytes = \"1500B\" }"), line(Bytes::new(1500)));
+    // A recorded path says nothing of what a line can deliver.
+    assert_eq!(service("rate = \"1Mbit\"\ntrace = \"path.csv\""), Some(Service::Rate(Rate::bits_per_sec(1_000_000).unwrap())));
+    let log = FateLog::parse(&data("fates.csv")).unwrap();
+    assert_eq!(model("replay = \"fates.csv\""), LinkModel::Replay(Arc::new(log)));
+}
+
+#[test]
+fn the_words_of_tc_are_read_for_both_profiles() {
+    let words = "delay 20ms 5ms 25% distribution steps loss gemodel 1% 10%";
+    let netem = cohaptic_wan::netem::Netem::parse(words).unwrap();
+    let table = Arc::new(DistTable::parse(&data("steps.dist")).unwrap());
+    let exact = netem.to_link_config(&mut |_| Some(Arc::clone(&table))).unwrap();
+    assert_eq!(model(&format!("netem = \"{words}\"")), LinkModel::Fixed(exact));
+    assert_eq!(model(&format!("netem = '{words}'\nnetem-profile = \"exact\"")), model(&format!("netem = \"{words}\"")));
+    let LinkModel::Kernel(kernel) = model(&format!("netem = \"{words}\"\nnetem-profile = \"kernel-6.6\"")) else { panic!("the kernel's") };
+    assert_eq!(*kernel.words(), netem);
+}
+
+const CELL: &str = "[[modulators]]\nname = \"cell\"\nstates = [{ name = \"good\", sojourn = \"2s\", next = { bad = 1, worse = 3 } }, \
+                    { name = \"bad\", sojourn = { fixed = \"1s\" } }, { name = \"worse\", next = \"good\", sojourn = \"1s\" }]\n";
+
+#[test]
+fn a_modulated_link_has_a_configuration_for_each_state() {
+    let text = "[link]\nloss = 0.5\nqueue = { limit = \"9 packets\" }\nrate = \"1Mbit\"\n\
+                modulated = { by = \"cell\", bad = { delay = \"80ms\" }, worse = { loss = 1, rate = \"2Mbit\" } }\n\
+                [[links]]\nfrom = \"peer2\"\nto = \"peer1\"\nmodulated = \"none\"";
+    let scene = scene(&format!("{CELL}{text}"), &[]);
+    let LinkModel::Modulated(modulated) = scene.links.between(0, 1) else { panic!("modulated") };
+    let s = |sojourn: fn(Duration) -> Sojourn, seconds| Some(sojourn(Duration::from_secs(seconds)));
+    let states = vec![
+        ModulatorState { sojourn: s(Sojourn::Exponential, 2), next: vec![0.0, 1.0, 3.0] },
+        ModulatorState { sojourn: s(Sojourn::Fixed, 1), next: vec![1.0, 0.0, 1.0] },
+        ModulatorState { sojourn: s(Sojourn::Exponential, 1), next: vec![1.0, 0.0, 0.0] },
+    ];
+    assert_eq!(*modulated.modulator(), Modulator::new("cell", states).unwrap());
+    let base = scene.links.between(1, 0).as_fixed().unwrap();
+    let [good, bad, worse] = modulated.configs() else { panic!("three states") };
+    assert_eq!(good, base);
+    assert_eq!(*bad, LinkConfig { delay: Delay::constant(80 * MS), ..base.clone() });
+    assert_eq!((&worse.loss, worse.bottleneck.as_ref().unwrap().limit), (&Loss::Independent(p(1.0)), Some(QueueLimit::Packets(9))));
+}
+
+#[test]
+fn what_says_everything_takes_away_what_it_is_laid_over() {
+    let links = "[link]\ndelay = \"24ms\"\nloss = 0.1\n[[links]]\nfrom = \"peer1\"\nto = \"peer2\"\nnetem = \"delay 5ms\"\n";
+    let scene_of = |rest: &str, set: &[&str]| scene(&format!("{links}{rest}"), set);
+    let there = |scene: &Scene| scene.links.between(0, 1).as_fixed().unwrap().clone();
+    let five = scene_of("", &[]);
+    assert_eq!((there(&five).delay, there(&five).loss), (Delay::constant(5 * MS), Loss::None));
+    // And is taken away by "none".
+    let none = scene_of("", &["links.peer1.peer2.netem=none"]);
+    assert_eq!(none.links.between(0, 1), none.links.between(1, 0));
+    let back = scene_of("[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { netem = \"none\", delay = \"9ms\" }", &[]);
+    let ChangeKind::Links(changes) = &back.timeline[0].what else { panic!("links") };
+    assert!(changes.iter().all(|change| change.config.mean_delay() == 9 * MS && change.config.as_fixed().unwrap().loss == Loss::Independent(p(0.1))));
+    // An override of a whole link counts as laid over it.
+    let set = scene("[link]\ndelay = \"24ms\"\nloss = 0.1", &["link.replay=fates.csv"]);
+    assert!(matches!(set.links.between(0, 1), LinkModel::Replay(_)));
+    let rate = scene("[link]\nrate = \"1Mbit\"\n[[links]]\nfrom = \"peer1\"\nto = \"peer2\"\ntrace = \"line.trace\"", &[]);
+    assert!(matches!(there(&rate).bottleneck.unwrap().service, Service::Recorded(_)));
+}
+
+#[test]
+fn lines_changes_and_overrides_take_the_same_keys() {
+    let peers = "[[peers]]\nname = \"peer1\"\nuplink = { duplicate = \"1%\", slots.min = \"10ms\" }\ndownlink = { netem = \"delay 1ms\" }\n";
+    let with_lines = scene(peers, &[]);
+    let uplink = with_lines.peers[0].uplink.as_ref().unwrap().as_fixed().unwrap();
+    assert_eq!((uplink.duplication, uplink.slots.is_some()), (Chance::independent(p(0.01)), true));
+    assert_eq!(with_lines.peers[0].downlink.as_ref().unwrap().mean_delay(), MS);
+
+    let change = "[link]\ndelay = \"24ms\"\n[[timeline]]\nat = \"1s\"\nlink = \"all\"\n\
+                  set = { reorder = \"5%\", corrupt = 0.1, jitter = { sd = \"1ms\", distribution = \"uniform\" }, outage.idle = { after = \"1s\", down = \"1s\" } }";
+    let ChangeKind::Links(changes) = scene(change, &[]).timeline[0].what.clone() else { panic!("links") };
+    let changed = changes[0].config.as_fixed().unwrap();
+    assert!(changed.reorder.is_some() && changed.corruption.is_some() && changed.outages.idle().is_some());
+    assert_eq!(changed.delay, Delay::with_jitter(24 * MS, Jitter::new(MS, Distribution::Uniform)).unwrap());
+
+    let set = |text: &str| scene(CELL, &[text]).links.between(0, 1).clone();
+    assert_eq!(set("link.loss.bursts={ loss = 0.02, length = 5 }"), model("loss.bursts = { loss = 0.02, length = 5 }"));
+    assert_eq!(set("link.corrupt.bit-error-rate=1e-6"), model("corrupt.bit-error-rate = 1e-6"));
+    assert_eq!(set("link.netem=delay 20ms"), model("netem = \"delay 20ms\""));
+    assert_eq!(set("link.limit=3 packets"), model("limit = \"3 packets\""));
+}
+
+#[test]
+fn modulators_can_be_changed_by_name_or_place() {
+    let text = format!("link.modulated = {{ by = \"cell\" }}\n{CELL}");
+    for path in ["modulators.cell.states.bad.sojourn", "modulators.0.states.1.sojourn"] {
+        let scene = scene(&text, &[&format!("{path}=7s")]);
+        let LinkModel::Modulated(modulated) = scene.links.between(0, 1) else { panic!("modulated") };
+        assert_eq!(modulated.modulator().states()[1].sojourn, Some(Sojourn::Exponential(Duration::from_secs(7))));
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused_with_the_reason() {
+    let mut wrong = Vec::new();
+    // The line of `[link]` is the fifth.
+    for (keys, expected) in [
+        (
+            "jitter = { sd = \"1ms\", distribution = \"gauss\" }",
+            "6:39: link.jitter.distribution: unknown name \"gauss\": expected one of normal, uniform",
+        ),
+        ("jitter = { distribution = \"gamma\" }", "6:10: link.jitter.sd: missing key"),
+        (
+            "jitter = { sd = \"1ms\", correlation = 0.1, correlation-time = \"1s\" }",
+            "6:43: link.jitter.correlation-time: \"correlation\" is given already",
+        ),
+        ("jitter = { sd = \"1ms\", correlation = 1 }", "6:38: link.jitter.correlation: 1 is out of range: expected a number from -1 to below 1"),
+        (
+            "delay = \"24ms\"\njitter = { sd = \"9ms\", distribution = \"lognormal\", correlation = -0.99 }",
+            "7:10: link.jitter: delays with this law cannot have the correlation -0.99",
+        ),
+        ("delay = \"1ms\"\njitter = { sd = \"1ms\", floor = \"2ms\" }", "7:10: link.jitter: the mean delay of 1ms is below the least delay of 2ms"),
+        ("loss = { gilbert-elliott = { p = 0.1, r = 1.5 } }", "6:43: link.loss.gilbert-elliott.r: 1.5 is out of range"),
+        ("loss = { gilbert-elliott = { p = 0.1, mean-good = \"1s\", mean-bad = \"1s\" } }", "6:30: link.loss.gilbert-elliott.p: p beside mean times"),
+        ("loss = { gilbert-elliott = { mean-good = \"0s\", mean-bad = \"1s\" } }", "6:42: link.loss.gilbert-elliott.mean-good: zero is out of range"),
+        ("loss = { states = { p13 = 0.6, p14 = 0.6 } }", "6:19: link.loss.states: p13 = 60% and p14 = 60% are more than 1 together: expected a sum"),
+        ("loss = { bursts = { loss = 0.5, length = 2, density = 0.4 } }", "6:19: link.loss.bursts: bursts need 0 ≤ isolated ≤ loss < density"),
+        (
+            "loss = { correlated = { probability = 0.1, correlation = -0.5 } }",
+            "6:58: link.loss.correlated.correlation: events of probability 10% cannot",
+        ),
+        ("loss = { packets = [3, \"9-8\"] }", "6:24: link.loss.packets.1: \"9-8\" is no row of packets"),
+        ("loss = { packets = [3, 1] }", "6:24: link.loss.packets.1: span 1 begins before the one listed before it has ended"),
+        ("loss = { packets = [3], every = 2 }", "6:33: link.loss.every: the pattern begins anew after 2"),
+        ("loss = { correlated = 0.1, every = 2 }", "6:28: link.loss.every: every means nothing beside correlated"),
+        ("loss = { packets = [], times = [] }", "6:24: link.loss.times: \"packets\" is given already"),
+        ("corrupt = { bit-error-rate = 0.1, bits = 3 }", "6:35: link.corrupt.bits: bits beside bit-error-rate"),
+        ("corrupt = { probability = 0.1, bytes = \"8\\u2013\" }", "6:40: link.corrupt.bytes: \"8–\" is no row of bytes"),
+        ("corrupt = { probability = 0.1, bits = 0 }", "6:39: link.corrupt.bits: 0 is out of range"),
+        ("reorder = { probability = 0.1, behind = 1 }", "6:11: link.reorder.at-most: missing key"),
+        ("reorder = { probability = 0.1, gap = 2, later = \"1s\" }", "6:41: link.reorder.later: \"gap\" is given already"),
+        ("reorder = { probability = 0.1, at-most = \"1s\" }", "6:32: link.reorder.at-most: at-most says how long a packet is held"),
+        (
+            "rate = \"1Mbit\"\nqueue = { limit = \"9 packets\", discipline = \"red\" }",
+            "7:45: link.queue.discipline: red takes its thresholds from the limit",
+        ),
+        (
+            "rate = \"1Mbit\"\nqueue = { limit = \"9kB\", discipline = \"fifo\" }",
+            "7:39: link.queue.discipline: unknown name \"fifo\": expected one of tail-drop",
+        ),
+        (
+            "rate = \"1Mbit\"\nqueue = { limit = \"9kB\", discipline = { red = { min = \"2kB\", max = \"1kB\" } } }",
+            "7:68: link.queue.discipline.red.max: RED begins to drop at 2000B and drops all at 1000B",
+        ),
+        ("rate = \"1Mbit\"\noverhead = \"-3GB\"", "7:12: link.overhead: unknown unit \"GB\""),
+        ("rate = \"1Mbit\"\noverhead = \"-3000MB\"", "7:12: link.overhead: \"-3000MB\" is out of range"),
+        ("rate = \"1Mbit\"\ncells = { payload = \"0B\" }", "7:21: link.cells.payload: 0B is out of range"),
+        ("cells = { payload = \"48B\" }", "6:1: link.cells: cells means nothing on a link without a rate"),
+        ("rate = \"1Mbit\"\ntrace = \"line.trace\"", "7:1: link.trace: a line cannot have a rate and a recording"),
+        ("token-bucket = { rate = \"1Mbit\" }", "6:16: link.token-bucket.burst: missing key"),
+        ("slots = { min = \"2ms\", max = \"1ms\" }", "6:30: link.slots.max: gaps between slots of 2ms to 1ms"),
+        ("slots = { min = \"2ms\", delay = \"1ms\" }", "6:24: link.slots.delay: delay beside min"),
+        ("limit = \"64kB\"", "6:9: link.limit: \"64kB\" is no number of packets"),
+        ("outage = { random = { up = \"0s\", down = \"1s\" } }", "6:28: link.outage.random.up: a span that cannot be drawn"),
+        ("outage = { random = { up = { uniform = [\"1s\"] }, down = \"1s\" } }", "6:40: link.outage.random.up.uniform: a list of 1"),
+        ("netem = \"delay 20ms loss 250%\"", "6:26: link.netem: \"250%\" is not what loss takes here: expected a percentage"),
+        ("netem = \"dealy 20ms\"", "6:10: link.netem: unknown word \"dealy\""),
+        ("netem = \"loss 1% delay 1ms 2ms\"", "6:18: link.netem: delay: uniform jitter of 2ms around 1ms begins below zero"),
+        ("delay = \"1ms\"\nnetem = \"delay 2ms\"", "7:1: link.netem: netem beside delay: netem says everything about this link"),
+        ("netem-profile = \"exact\"", "6:1: link.netem-profile: netem-profile means nothing without words"),
+        ("netem = \"delay 300s\"\nnetem-profile = \"kernel-6.6\"", "6:9: link.netem: a delay of 300s: expected less than"),
+        ("replay = \"fates.csv\"\nnetem = \"delay 2ms\"", "7:1: link.netem: netem beside replay"),
+        ("modulated = { by = \"nobody\" }", "6:20: link.modulated.by: there is no modulator \"nobody\": expected an entry [[modulators]]"),
+        ("modulated = { good = {} }", "6:13: link.modulated: missing key by"),
+    ] {
+        wrong.extend(misses(&format!("[link]\n{keys}"), &format!("links.toml:{expected}")));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_modulator_that_cannot_be_is_refused() {
+    let mut wrong = Vec::new();
+    for (text, expected) in [
+        ("modulators = [{ name = \"m\", states = [] }]", "5:38: modulators.m.states: no state: expected at least one"),
+        ("modulators = [{ states = [] }]", "5:15: modulators.0.name: missing key"),
+        (
+            "modulators = [{ name = \"m\", states = [{ name = \"a\", sojourn = \"1s\" }] }]",
+            "5:39: modulators.m.states.a: the state \"a\" ends, and no other",
+        ),
+        (
+            "modulators = [{ name = \"m\", states = [{ name = \"a\", sojourn = \"1s\", next = \"b\" }] }]",
+            "5:76: modulators.m.states.a.next: there is no state \"b\": expected a",
+        ),
+        ("modulators = [{ name = \"m\", states = [{ name = \"by\" }] }]", "5:48: modulators.m.states.by.name: \"by\" cannot be this name"),
+        (
+            "modulators = [{ name = \"m\", states = [{ name = \"a\" }] }, { name = \"m\", states = [{ name = \"a\" }] }]",
+            "5:67: modulators.m.name: there is a modulator \"m\" already",
+        ),
+        (
+            &format!("link.modulated = {{ by = \"cell\", goood = {{}} }}\n{CELL}"),
+            "5:33: link.modulated.goood: modulator \"cell\" has no such state: expected by, or one of good, bad, worse; did you mean \"good\"?",
+        ),
+        (
+            &format!("link.modulated = {{ by = \"cell\", good = {{ netem = \"delay 1ms\" }} }}\n{CELL}"),
+            "5:42: link.modulated.good.netem: unknown key",
+        ),
+    ] {
+        wrong.extend(misses(text, &format!("links.toml:{expected}")));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_word_of_tc_is_found_in_an_override_too() {
+    let found = refused("", &["link.netem=delay 20ms loss 250%"]);
+    let expected = "--set link.netem=delay 20ms loss 250%: link.netem: \"250%\" is not what loss takes here: expected a percentage from 0 to 100\n \
+                    |\n | link.netem=delay 20ms loss 250%\n |                            ^^^^";
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn what_is_laid_over_words_of_tc_is_refused() {
+    let found = refused("link.netem = \"delay 5ms\"\n[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { loss = 0.1 }", &[]);
+    assert!(found.starts_with("links.toml:9:9: timeline.0.set.loss: loss beside netem"), "{found}");
+}
+
+#[test]
+fn a_recording_that_makes_no_sense_is_shown_in_its_line() {
+    let mut wrong = Vec::new();
+    for (keys, expected) in [
+        ("trace = \"bad.trace\"", "bad.trace:2:1: link.trace: 2 ms comes after 3 ms: expected times in order\n  |\n2 | 2\n"),
+        ("trace = \"ends-at-0.trace\"", "ends-at-0.trace:1:1: link.trace: the recording ends at 0 ms: expected a last line above 0"),
+        ("trace = \"bad-path.csv\"", "bad-path.csv:3:1: link.trace: column loss: expected a probability from 0 to 1"),
+        ("trace = \"hand.csv\"", "hand.csv:1:1: link.trace: no recording: expected the columns t,delay"),
+        ("trace = { file = \"line.trace\", repeat = true }", "links.toml:6:32: link.trace.repeat: repeat is for a recorded path"),
+        ("trace = { file = \"path.csv\", bytes = \"1B\" }", "links.toml:6:30: link.trace.bytes: bytes is for instants of delivery"),
+        ("replay = \"bad-fates.csv\"", "bad-fates.csv:2:1: link.replay: column fate: found \"vanished\", expected delivered, duplicated"),
+        (
+            "jitter = { sd = \"1ms\", distribution = { table = \"bad.dist\" } }",
+            "bad.dist:2:1: link.jitter.distribution.table: column 3: `x` is no integer",
+        ),
+        ("netem = \"delay 9ms 1ms distribution bad\"", "bad.dist:2:1: link.netem: column 3: `x` is no integer"),
+        ("netem = \"delay 9ms 1ms distribution bad\"\nnetem-profile = \"kernel-6.6\"", "bad.dist:2:1: link.netem: column 3: `x` is no integer"),
+        (
+            "jitter = { distribution = { empirical = \"path.csv\" } }",
+            "path.csv:1:1: link.jitter.distribution.empirical: the header is \"t,delay,loss\": expected delay",
+        ),
+    ] {
+        wrong.extend(misses(&format!("[link]\n{keys}"), expected));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let found = refused("[link]\ntrace = \"bad.trace\"", &[]);
+    assert!(found.contains("note: this file is named at links.toml:6:9, by the key link.trace"), "{found}");
+}
+
+#[test]
+fn a_recording_that_is_not_there_is_an_error_of_the_system() {
+    for keys in
+        ["trace = \"gone\"", "replay = \"gone\"", "netem = \"delay 9ms 1ms distribution gone\"", "jitter = { distribution.empirical = \"gone\" }"]
+    {
+        let error = Scene::parse(&format!("{SCENE}[link]\n{keys}"), path(), &[]).expect_err(keys);
+        assert!(error.is_io(), "{error}");
+        assert_eq!(error.diagnostic().unwrap().line(), 6);
+    }
+}
