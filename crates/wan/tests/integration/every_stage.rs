@@ -104,7 +104,7 @@ fn of_network(event: NetworkEvent<Payload>) -> Seen {
 }
 
 proptest! {
-    #![proptest_config(cases(600))]
+    #![proptest_config(cases(240))]
 
     #[test]
     fn packets_are_conserved_at_every_instant(model in any_model(), script in steps()) {

@@ -14,9 +14,9 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{
     Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Delay, DeliveryTrace, Discipline, Displacement, FateLog,
-    FateRow, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, KernelNetem, Layout, LinkConfig, LinkEvent, LinkModel,
-    LinkName, Loss, Modulated, Modulator, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red, Reorder,
-    Service, Slots, Sojourn, TokenBucket,
+    FateRow, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter, KernelNetem, Layout, LinkConfig, LinkEvent,
+    LinkModel, LinkName, Loss, Modulated, Modulator, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red,
+    Reorder, Service, Slots, Sojourn, TokenBucket,
 };
 
 use crate::any_link::{JITTERS, KERNEL_WORDS, all_events, micros};
@@ -160,7 +160,9 @@ fn models() -> Vec<(String, LinkModel)> {
         };
         add(&format!("jitter, {law}, {memory}"), LinkConfig { delay: delay.clone(), ..LinkConfig::default() });
     }
-    let jittery = LinkConfig { delay: JITTERS[0].clone(), ..base() };
+    let wide = Jitter::new(Duration::from_millis(1), cohaptic_wan::Distribution::Normal);
+    let jittery = LinkConfig { delay: Delay::with_jitter(Duration::from_millis(5), wide).unwrap(), ..base() };
+    add("in any order", jittery.clone());
     add("in order", LinkConfig { order: Order::InOrder, ..jittery.clone() });
     let all = LinkConfig {
         outages: outages(),

@@ -168,7 +168,7 @@ fn agree<T: PartialEq + std::fmt::Debug>(one: &BTreeMap<(u64, u8), T>, other: &B
 }
 
 proptest! {
-    #![proptest_config(cases(400))]
+    #![proptest_config(cases(160))]
 
     #[test]
     fn a_stage_that_does_nothing_changes_nothing(config in any_stages(), offered in packets(), which in 0..14usize) {

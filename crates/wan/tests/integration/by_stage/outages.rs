@@ -74,7 +74,7 @@ fn model(script: &Script<Outages>) -> Vec<Said> {
 }
 
 proptest! {
-    #![proptest_config(cases(600))]
+    #![proptest_config(cases(240))]
 
     #[test]
     fn scheduled_random_and_idle_outages(script in script(any_outages())) {

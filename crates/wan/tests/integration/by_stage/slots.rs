@@ -55,7 +55,7 @@ fn model(script: &Script<Slots>) -> Vec<Said> {
 }
 
 proptest! {
-    #![proptest_config(cases(800))]
+    #![proptest_config(cases(320))]
 
     #[test]
     fn slots_with_shares_of_packets_and_bytes(script in script(slots())) {
