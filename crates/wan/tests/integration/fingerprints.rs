@@ -29,7 +29,9 @@ fn hash(bytes: &[u8]) -> u64 {
 
 /// 2,000 packets of 40 to 1,439 bytes, 100 µs to 700 µs apart: about 15 Mbit/s.
 fn traffic() -> Vec<(Duration, PacketInfo)> {
-    (0..2_000).map(|n: u64| (micros(100 * (1 + n % 7)), PacketInfo { size: Bytes::new(40 + n * 37 % 1_400), ecn_capable: n % 2 == 0 })).collect()
+    (0..2_000)
+        .map(|n: u64| (micros(100 * (1 + n % 7)), PacketInfo { size: Bytes::new(40 + n * 37 % 1_400), ecn_capable: n.is_multiple_of(2) }))
+        .collect()
 }
 
 fn fingerprint(model: LinkModel) -> u64 {
