@@ -104,7 +104,7 @@ fn of_network(event: NetworkEvent<Payload>) -> Seen {
 }
 
 proptest! {
-    #![proptest_config(cases(600))]
+    #![proptest_config(cases(240))]
 
     #[test]
     fn packets_are_conserved_at_every_instant(model in any_model(), script in steps()) {
@@ -221,7 +221,7 @@ proptest! {
         if config.reorder.is_some_and(|reorder| matches!(reorder.how, Displacement::Jump { .. })) {
             config.reorder = None;
         }
-        let least = config.delay.least() + config.trace.as_ref().map_or(nanos(0), cohaptic_wan::PathTrace::least);
+        let least = config.delay.least() + config.trace.as_ref().map_or_else(Default::default, cohaptic_wan::PathTrace::least);
         for event in all_events(config, &offered) {
             if matches!(event.fate, Fate::Delivered(_) | Fate::Dropped(DropCause::Checksum)) {
                 prop_assert!(event.at >= event.sent + least, "{:?}", event);

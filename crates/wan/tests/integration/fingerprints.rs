@@ -14,9 +14,9 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{
     Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Delay, DeliveryTrace, Discipline, Displacement, FateLog,
-    FateRow, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, KernelNetem, Layout, LinkConfig, LinkEvent, LinkModel,
-    LinkName, Loss, Modulated, Modulator, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red, Reorder,
-    Service, Slots, Sojourn, TokenBucket,
+    FateRow, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter, KernelNetem, Layout, LinkConfig, LinkEvent,
+    LinkModel, LinkName, Loss, Modulated, Modulator, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red,
+    Reorder, Service, Slots, Sojourn, TokenBucket,
 };
 
 use crate::any_link::{JITTERS, KERNEL_WORDS, all_events, micros};
@@ -29,7 +29,9 @@ fn hash(bytes: &[u8]) -> u64 {
 
 /// 2,000 packets of 40 to 1,439 bytes, 100 µs to 700 µs apart: about 15 Mbit/s.
 fn traffic() -> Vec<(Duration, PacketInfo)> {
-    (0..2_000).map(|n: u64| (micros(100 * (1 + n % 7)), PacketInfo { size: Bytes::new(40 + n * 37 % 1_400), ecn_capable: n % 2 == 0 })).collect()
+    (0..2_000)
+        .map(|n: u64| (micros(100 * (1 + n % 7)), PacketInfo { size: Bytes::new(40 + n * 37 % 1_400), ecn_capable: n.is_multiple_of(2) }))
+        .collect()
 }
 
 fn fingerprint(model: LinkModel) -> u64 {
@@ -160,7 +162,9 @@ fn models() -> Vec<(String, LinkModel)> {
         };
         add(&format!("jitter, {law}, {memory}"), LinkConfig { delay: delay.clone(), ..LinkConfig::default() });
     }
-    let jittery = LinkConfig { delay: JITTERS[0].clone(), ..base() };
+    let wide = Jitter::new(Duration::from_millis(1), cohaptic_wan::Distribution::Normal);
+    let jittery = LinkConfig { delay: Delay::with_jitter(Duration::from_millis(5), wide).unwrap(), ..base() };
+    add("in any order", jittery.clone());
     add("in order", LinkConfig { order: Order::InOrder, ..jittery.clone() });
     let all = LinkConfig {
         outages: outages(),

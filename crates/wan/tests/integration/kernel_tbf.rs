@@ -20,8 +20,8 @@ const PAYLOAD: usize = 1_000;
 /// Ethernet, IPv4 and UDP: what `tbf` counts besides the payload.
 const HEADERS: i32 = 14 + 20 + 8;
 
-/// Runs this test again where loopback is ours, with a token bucket on it.
-fn enter_namespace() -> Result<(), String> {
+/// Runs this test again where loopback is ours, with a token bucket on it, and gives what it saw, or why it could not.
+fn enter_namespace() -> Result<String, String> {
     let program = std::env::current_exe().map_err(|error| error.to_string())?;
     let script = format!(
         "ip link set lo up && tc qdisc add dev lo root tbf rate {RATE}bit burst {BURST} limit 10000000 && exec \"$0\" --exact {} --nocapture",
@@ -32,7 +32,7 @@ fn enter_namespace() -> Result<(), String> {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     if text(&output.stdout).contains("compared") {
         assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
-        return Ok(());
+        return Ok(text(&output.stdout).lines().filter(|line| line.starts_with("compared")).collect());
     }
     assert!(!text(&output.stdout).contains("panicked") && !text(&output.stderr).contains("panicked"), "{}", text(&output.stderr));
     Err(text(&output.stderr))
@@ -81,8 +81,9 @@ fn the_token_bucket_lets_through_what_the_kernels_does() {
         return;
     }
     if std::env::var_os(INSIDE).is_none() {
-        if let Err(reason) = enter_namespace() {
-            eprintln!("skipped: {}", reason.trim());
+        match enter_namespace() {
+            Ok(seen) => println!("{seen}"),
+            Err(reason) => eprintln!("skipped: {}", reason.trim()),
         }
         return;
     }

@@ -442,7 +442,7 @@ fn queues() -> BoxedStrategy<Discipline> {
 }
 
 proptest! {
-    #![proptest_config(cases(800))]
+    #![proptest_config(cases(320))]
 
     #[test]
     fn tail_and_head_drop_with_all_limits_and_framings(script in script(plain(config(rates(), queues())))) {

@@ -89,7 +89,7 @@ fn model(script: &Script<LinkConfig>) -> Vec<Said> {
 }
 
 proptest! {
-    #![proptest_config(cases(800))]
+    #![proptest_config(cases(320))]
 
     #[test]
     fn sizes_copies_damage_and_limits(script in script(config())) {

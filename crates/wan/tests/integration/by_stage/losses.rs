@@ -81,25 +81,17 @@ enum Memory {
     State(u8),
 }
 
-/// The stationary law of the four states, by moving a probability over the chain until it stays: a lazy chain has the same law and no period.
+/// The stationary law of the four states: where the chain is after 2⁶⁰ steps from the gap. A lazy chain has the same law and no period.
 fn stationary(p: [f64; 5]) -> [f64; 4] {
     let [p13, p31, p32, p23, p14] = p;
-    let mut law = [1.0, 0.0, 0.0, 0.0];
-    for _ in 0..200_000 {
-        let [gap, received, lost, isolated] = law;
-        let moved = [
-            gap * (1.0 - p13 - p14) + lost * p31 + isolated,
-            received * (1.0 - p23) + lost * p32,
-            lost * (1.0 - p31 - p32) + gap * p13 + received * p23,
-            gap * p14,
-        ];
-        let step: f64 = moved.iter().zip(&law).map(|(to, from): (&f64, &f64)| (to - from).abs()).sum();
-        law = std::array::from_fn(|place| 0.5 * (law[place] + moved[place]));
-        if step < 1e-15 {
-            break;
-        }
+    let matrix = [[1.0 - p13 - p14, 0.0, p13, p14], [0.0, 1.0 - p23, p23, 0.0], [p31, p32, 1.0 - p31 - p32, 0.0], [1.0, 0.0, 0.0, 0.0]];
+    let mut lazy: [[f64; 4]; 4] = std::array::from_fn(|from| std::array::from_fn(|to| 0.5 * (matrix[from][to] + f64::from(u8::from(from == to)))));
+    for _ in 0..60 {
+        let squared: [[f64; 4]; 4] = std::array::from_fn(|from| std::array::from_fn(|to| (0..4).map(|via| lazy[from][via] * lazy[via][to]).sum()));
+        // Rounding must not let probability leak away.
+        lazy = squared.map(|row| row.map(|p| p / row.iter().sum::<f64>()));
     }
-    law
+    lazy[0]
 }
 
 impl Memory {

@@ -46,7 +46,7 @@ fn path(modulator: &Modulator, until: u64) -> Vec<(u64, usize)> {
 }
 
 proptest! {
-    #![proptest_config(cases(300))]
+    #![proptest_config(cases(120))]
 
     #[test]
     fn a_modulated_link_is_one_that_is_changed_at_the_instants_of_the_path(modulated in modulated(), mut offered in packets()) {

@@ -51,7 +51,7 @@ fn model(script: &Script<Outages>) -> Vec<Said> {
                     let failing = failing.as_mut().unwrap();
                     while failing.end <= *now {
                         failing.number += 1;
-                        failing.end += span(if failing.number % 2 == 0 { random.up } else { random.down }, failing.number);
+                        failing.end += span(if failing.number.is_multiple_of(2) { random.up } else { random.down }, failing.number);
                     }
                     failing.number % 2 == 1
                 });
@@ -74,7 +74,7 @@ fn model(script: &Script<Outages>) -> Vec<Said> {
 }
 
 proptest! {
-    #![proptest_config(cases(600))]
+    #![proptest_config(cases(240))]
 
     #[test]
     fn scheduled_random_and_idle_outages(script in script(any_outages())) {

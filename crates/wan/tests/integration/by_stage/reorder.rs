@@ -90,7 +90,7 @@ fn model(script: &Script<Config>) -> Vec<Said> {
 }
 
 proptest! {
-    #![proptest_config(cases(800))]
+    #![proptest_config(cases(320))]
 
     #[test]
     fn jumps_swaps_and_late_packets(script in script((proptest::option::weighted(0.9, reorder()), 0..20u64).boxed())) {

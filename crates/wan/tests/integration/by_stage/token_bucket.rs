@@ -72,7 +72,9 @@ fn model(script: &Script<TokenBucket>) -> Vec<Said> {
         match act {
             Act::Offer(packet) => {
                 let bits = needed(&config, packet);
+                let too_large = buckets.all.iter().any(|(_, size, _)| bits > *size);
                 let full = match config.limit {
+                    _ if too_large => false,
                     None => false,
                     Some(QueueLimit::Packets(limit)) => queue.len() as u64 + 1 > limit,
                     Some(QueueLimit::Bytes(limit)) => queue.iter().map(|packet| packet.size).sum::<u64>() + packet.size > limit.get(),
@@ -84,7 +86,7 @@ fn model(script: &Script<TokenBucket>) -> Vec<Said> {
                     }
                     Some(other) => unreachable!("no model for {other:?}"),
                 };
-                if buckets.all.iter().any(|(_, size, _)| bits > *size) {
+                if too_large {
                     said.push(dropped(*packet, *now, DropCause::Mtu, false));
                 } else if queue.is_empty() && buckets.take(bits) {
                     said.push(delivered(*packet, *now, false));
