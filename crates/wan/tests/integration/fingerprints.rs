@@ -134,9 +134,9 @@ fn models() -> Vec<(String, LinkModel)> {
     add("bottleneck, recorded", LinkConfig { bottleneck: Some(Bottleneck { service, ..line.clone() }), ..base() });
 
     let mut slots = Slots::new(Duration::from_millis(1), Duration::from_millis(8)).unwrap();
-    add("slots", LinkConfig { slots: Some(slots), ..base() });
+    add("slots", LinkConfig { slots: Some(slots.clone()), ..base() });
     (slots.packets, slots.bytes) = (7.try_into().ok(), 5_000.try_into().ok());
-    add("slots, shares", LinkConfig { slots: Some(slots), ..base() });
+    add("slots, shares", LinkConfig { slots: Some(slots.clone()), ..base() });
     for (name, how) in [
         ("jump", Displacement::Jump { gap: 5.try_into().unwrap() }),
         ("behind", Displacement::Behind { packets: 3.try_into().unwrap(), at_most: micros(900) }),

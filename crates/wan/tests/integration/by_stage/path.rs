@@ -118,7 +118,13 @@ fn model(script: &Script<Config>) -> Vec<Said> {
     let (mut chain, mut latest, mut said) = (None, 0, Vec::new());
     for (now, act) in script {
         match (act, &config) {
-            (Act::Change(new), _) => config = Some(new.clone()),
+            (Act::Change(new), _) => {
+                // Without correlation in between, the chain begins anew.
+                if new.1.jitter().is_none_or(|jitter| jitter.correlation == Correlation::None) {
+                    chain = None;
+                }
+                config = Some(new.clone());
+            }
             (Act::Offer(packet), Some((recording, delay, in_order))) => {
                 let (recorded, loss) = recording.as_ref().map_or((0, 0.0), |recording| recording.at(*now));
                 if draws(packet.number, 0).draws(Purpose::TraceLoss).next_unit() < loss {

@@ -1,7 +1,7 @@
 //! Slots: what has gathered leaves when one opens, as much as it takes.
 
 use cohaptic_wan::random::Purpose;
-use cohaptic_wan::{LinkConfig, Slots};
+use cohaptic_wan::{LinkConfig, SlotGap, Slots};
 use proptest::prelude::*;
 
 use super::{Act, Packet, Said, Script, delivered, draws, said, script, sorted};
@@ -16,14 +16,14 @@ struct Slot {
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "microseconds")]
 fn open(slots: &Slots, now: u64, number: &mut u64) -> Slot {
-    let (min, max) = slots.gaps();
+    let SlotGap::Between { min, max } = *slots.gap() else { unreachable!("only gaps between two spans are drawn here") };
     let gap = min.as_nanos() as f64 + (draws(*number, 0).draws(Purpose::Slot).next_unit() * (max - min).as_nanos() as f64).floor();
     *number += 1;
     Slot { opens: now + gap as u64, packets: slots.packets.map_or(u64::MAX, u64::from), bytes: slots.bytes.map_or(u64::MAX, u64::from) }
 }
 
 fn model(script: &Script<Slots>) -> Vec<Said> {
-    let Act::Change(mut slots) = script[0].1 else { unreachable!("a script begins with a configuration") };
+    let Act::Change(mut slots) = script[0].1.clone() else { unreachable!("a script begins with a configuration") };
     let (mut slot, mut number, mut waiting, mut said): (Option<Slot>, u64, Vec<Packet>, Vec<Said>) = (None, 0, Vec::new(), Vec::new());
     for (now, act) in script[1..].iter().map(|(now, act)| (*now, Some(act))).chain([(u64::MAX, None)]) {
         // What is offered at the instant of a slot still leaves with it: it is looked at again before the next operation.
@@ -39,7 +39,7 @@ fn model(script: &Script<Slots>) -> Vec<Said> {
         }
         match act {
             None => {}
-            Some(Act::Change(new)) => slots = *new,
+            Some(Act::Change(new)) => slots = new.clone(),
             Some(Act::Offer(packet)) => {
                 if waiting.is_empty() && slot.as_ref().is_none_or(|slot| slot.opens < now) {
                     slot = Some(open(&slots, now, &mut number));
