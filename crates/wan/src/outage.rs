@@ -38,7 +38,7 @@ pub struct RandomOutages {
 /// A link that goes down when nothing was sent for a while (a dial-up line, a sleeping radio), and comes up again after another while.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct IdleOutages {
-    /// How long nothing must be sent. What is dropped does not count as sent.
+    /// How long nothing must be sent. What an outage drops does not count as sent.
     pub after: Duration,
     /// How long it is down then. Nothing being sent, it goes down again `after` that.
     pub down: Duration,

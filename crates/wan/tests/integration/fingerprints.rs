@@ -187,7 +187,10 @@ fn models() -> Vec<(String, LinkModel)> {
     let log = FateLog::new(all_events(all, &traffic()[..1_000]).iter().map(LinkEvent::record)).unwrap();
     models.push(("replay".into(), LinkModel::Replay(Arc::new(log))));
     for words in KERNEL_WORDS {
-        models.push((format!("kernel: {words}"), KernelNetem::new(Netem::parse(words).unwrap(), Vec::new()).unwrap().into()));
+        let netem = Netem::parse(words).unwrap();
+        let exact = netem.to_link_config(&mut |_| None);
+        models.extend(exact.map(|config| (format!("exact: {words}"), config.into())));
+        models.push((format!("kernel: {words}"), KernelNetem::new(netem, Vec::new()).unwrap().into()));
     }
     models
 }
