@@ -99,7 +99,7 @@ pub(crate) struct ExplainArguments {
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_STATUS)]
 pub(crate) struct LinkArguments {
-    /// What the link does: words of tc-netem (delay 20ms 5ms 25% loss 1%), or keys of [link] in a scene (delay=24ms loss=1%)
+    /// What the link does: words of tc-netem (delay 20ms 5ms 25% loss 1%), or keys of the link table of a scene (delay=24ms loss=1%)
     #[arg(required_unless_present = "from", conflicts_with = "from", value_name = "SPEC", allow_negative_numbers = true)]
     pub(crate) spec: Vec<String>,
     /// Replay a file of fates instead, as --fates writes it
@@ -157,7 +157,7 @@ pub(crate) struct FitArguments {
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write the [link] of a scene into this file
+    /// Write the link table of a scene into this file
     #[arg(long, value_name = "SCENE_LINK.toml")]
     pub(crate) out: Option<PathBuf>,
 }

@@ -31,6 +31,12 @@ pub struct Asked {
     /// The long-run share of packets that the loss model takes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
+    /// The mean number of packets that it takes one after another.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loss_run_mean: Option<f64>,
+    /// The autocorrelation of losses at lags of 1 to 10 packets. Empty where there is no simple law.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub loss_autocorrelation: Vec<f64>,
     /// The share of packets of which a copy is made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub duplicated: Option<f64>,
@@ -95,6 +101,8 @@ impl Asked {
             quantiles_s: law.map(|law| QUANTILES.into_iter().map(|(name, p)| (name, seconds(law.quantile(p)))).collect()).unwrap_or_default(),
             autocorrelation: autocorrelation(config, every),
             loss: config.loss.mean().filter(|_| !traced),
+            loss_run_mean: config.loss.mean_run().filter(|_| !traced),
+            loss_autocorrelation: (1..=LAGS).filter(|_| !traced).map_while(|lag| config.loss.autocorrelation(lag)).collect(),
             duplicated: (!config.duplication.is_never()).then(|| config.duplication.probability().get()),
             damaged,
             rate_bit_s: config.bottleneck.as_ref().and_then(|bottleneck| match &bottleneck.service {
@@ -136,6 +144,17 @@ mod tests {
     fn asked(words: &str) -> Asked {
         let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
         Asked::of_config(&config, Duration::from_millis(1), Bytes::new(64))
+    }
+
+    /// p = 1 %, r = 25 %: runs of 4, and the chain forgets by 1 − p − r a packet. DAR(1) with ρ = 0.5 at 5 %: runs of 1/(0.5·0.95).
+    #[test]
+    fn runs_of_losses_follow_from_the_chain() {
+        let chain = asked("loss gemodel 1% 25%");
+        assert_eq!(chain.loss_run_mean, Some(4.0));
+        assert!((chain.loss_autocorrelation[1] - 0.74_f64.powi(2)).abs() < 1e-12);
+        let correlated = asked("loss 5% 50%");
+        assert!((correlated.loss_run_mean.unwrap() - 1.0 / (0.5 * 0.95)).abs() < 1e-12);
+        assert!(asked("delay 5ms").loss_autocorrelation.is_empty());
     }
 
     #[test]

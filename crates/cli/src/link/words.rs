@@ -22,9 +22,10 @@ pub(super) fn describe(spec: &Spec, measured: &Measured) -> String {
         line(row(figure));
     }
     let compared = |name: &str| measured.figures.iter().any(|figure| figure.name == name);
-    for (name, asked, achieved) in others(spec, &measured.achieved) {
+    for (name, asked, achieved, error) in others(spec, &measured.achieved) {
         if !compared(name) && (asked.is_some() || achieved.is_some()) {
-            line(format!("  {:<24}{:>18}{:>18}", label(name), shown(name, asked), shown(name, achieved)));
+            let error = error.map_or_else(String::new, |error| shown(name, Some(error)));
+            line(format!("  {:<24}{:>18}{:>18}{error:>14}", label(name), shown(name, asked), shown(name, achieved)));
         }
     }
     if measured.figures.iter().any(|figure| figure.outside) {
@@ -50,16 +51,22 @@ fn row(figure: &Figure) -> String {
     format!("  {:<24}{asked:>18}{achieved:>18}{error:>14}{mark}", label(name))
 }
 
+/// A name, what was asked, what was achieved, and the standard error of that.
+type Other = (&'static str, Option<f64>, Option<f64>, Option<f64>);
+
 /// What is shown where it was not compared.
-fn others<'a>(spec: &Spec, achieved: &Achieved) -> [(&'a str, Option<f64>, Option<f64>); 6] {
-    let delay = achieved.delay.as_ref();
+fn others(spec: &Spec, achieved: &Achieved) -> [Other; 8] {
+    let (asked, delay, loss) = (&spec.asked, achieved.delay.as_ref(), &achieved.loss);
+    let first = |lags: &[f64]| lags.first().copied();
     [
-        ("mean_s", spec.asked.mean_s, delay.map(|delay| delay.mean_s)),
-        ("sd_s", spec.asked.sd_s, delay.and_then(|delay| delay.sd_s)),
-        ("autocorrelation_1", spec.asked.autocorrelation.first().copied(), delay.and_then(|delay| delay.autocorrelation.first().copied())),
-        ("loss", spec.asked.loss, achieved.loss.value),
-        ("reordered", None, achieved.order.reordered),
-        ("rate_bit_s", spec.asked.rate_bit_s, achieved.throughput_bit_s),
+        ("mean_s", asked.mean_s, delay.map(|delay| delay.mean_s), None),
+        ("sd_s", asked.sd_s, delay.and_then(|delay| delay.sd_s), None),
+        ("autocorrelation_1", first(&asked.autocorrelation), delay.and_then(|delay| first(&delay.autocorrelation)), None),
+        ("loss", asked.loss, loss.value, None),
+        ("loss_run_mean", asked.loss_run_mean, loss.run_mean, loss.run_mean_se),
+        ("loss_autocorrelation_1", first(&asked.loss_autocorrelation), first(&loss.autocorrelation), None),
+        ("reordered", None, achieved.order.reordered, None),
+        ("rate_bit_s", asked.rate_bit_s, achieved.throughput_bit_s, None),
     ]
 }
 
@@ -71,6 +78,8 @@ fn label(name: &str) -> String {
         "mean_s" => "mean delay",
         "sd_s" => "standard deviation",
         "autocorrelation_1" => "autocorrelation, lag 1",
+        "loss_run_mean" => "packets lost in a row",
+        "loss_autocorrelation_1" => "autocorr. of loss, lag 1",
         "rate_bit_s" => "rate",
         other => other,
     }
@@ -81,7 +90,8 @@ fn label(name: &str) -> String {
 fn shown(name: &str, value: Option<f64>) -> String {
     let Some(value) = value else { return "-".to_owned() };
     match name {
-        "autocorrelation_1" => format!("{value:.5}"),
+        "autocorrelation_1" | "loss_autocorrelation_1" => format!("{value:.5}"),
+        "loss_run_mean" => format!("{value:.5}"),
         "rate_bit_s" => format!("{:.3} kbit/s", value / 1e3),
         name if name.ends_with("_s") => format!("{:.5} ms", value * 1e3),
         _ => format!("{:.5} %", value * 100.0),

@@ -63,6 +63,47 @@ fn measurements_are_read_and_a_drift_is_removed() {
     }
 }
 
+/// What is written is read again: by `link` as its keys, by a scene as its `[link]`. At one spacing it speaks of packets, at several of time.
+#[test]
+fn the_link_that_is_found_is_the_link_of_a_scene() {
+    let desk = Desk::new();
+    let spec = "link delay=24ms jitter={sd=\"2ms\",distribution=\"gamma\",floor=\"20ms\",correlation-time=\"50ms\"} loss={gilbert-elliott={mean-good=\"200ms\",mean-bad=\"30ms\"}}";
+    desk.text(&format!("{spec} --packets 8000 --every 2ms --fates even.csv"));
+    desk.text(&format!("{spec} --packets 8000 --every 5ms --seed 2 --fates other.csv"));
+    let mut uneven = "t_ns,delay_ns,lost\n".to_owned();
+    let mut begin = 0;
+    for file in ["even.csv", "other.csv"] {
+        let mut latest = 0;
+        let log = desk.read(file);
+        let mut rows: Vec<(u64, &str, String)> = log
+            .lines()
+            .skip(1)
+            .map(|row| {
+                let values: Vec<&str> = row.split(',').collect();
+                let (offered, at): (u64, u64) = (values[2].parse().unwrap(), values[4].parse().unwrap());
+                if values[5] == "delivered" { (offered, "0", (at - offered).to_string()) } else { (offered, "1", String::new()) }
+            })
+            .collect();
+        rows.sort_unstable();
+        for (offered, lost, delay) in rows {
+            let _ = writeln!(uneven, "{},{delay},{lost}", begin + offered);
+            latest = offered;
+        }
+        begin += latest + 5_000_000;
+    }
+    desk.write("uneven.csv", uneven);
+    for (file, words) in [("even.csv", ["correlation =", " p ="]), ("uneven.csv", ["correlation-time", "mean-good"])] {
+        desk.text(&format!("fit {file} --out link.toml"));
+        let link = desk.read("link.toml");
+        assert!(words.iter().all(|word| link.contains(word)), "{link}");
+        let rest = "[scene]\nduration = \"1s\"\ncount = 2\n[object]\nmass = 0.45\n[coordination]\nstrategy = \"average-position\"\nstiffness = 100\n\
+                    damping = 5\nupdate = \"8ms\"\n[peer]\ncontact = \"none\"\ndevice = { mass = 0.1, damping = 5 }\n\
+                    coupling = { stiffness = 100, damping = 5 }\n";
+        desk.write("scene.toml", format!("{rest}{link}"));
+        assert!(desk.text("explain scene.toml").contains("jitter"), "{link}");
+    }
+}
+
 #[test]
 fn what_cannot_be_estimated_is_refused() {
     let desk = Desk::with("m.csv", "t,delay\n0,0.1\n1,0.2\n");

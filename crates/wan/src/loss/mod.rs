@@ -54,6 +54,33 @@ impl Loss {
         }
     }
 
+    /// The mean number of packets lost one after another, `None` where there is no simple law: losses with other causes between, or chosen ones.
+    ///
+    /// 1/(1−p) for independent losses, 1/((1−ρ)(1−p)) for correlated ones, 1/r for a Gilbert–Elliott chain that loses all in the bad state and nothing in the
+    /// good one.
+    #[must_use]
+    pub fn mean_run(&self) -> Option<f64> {
+        let run = match self {
+            Self::Independent(probability) => 1.0 / (1.0 - probability.get()),
+            Self::Correlated(chance) => 1.0 / ((1.0 - chance.correlation()) * (1.0 - chance.probability().get())),
+            Self::GilbertElliott(chain) if (chain.h, chain.k) == (Probability::ZERO, Probability::ONE) => 1.0 / chain.r.get(),
+            Self::None | Self::GilbertElliott(_) | Self::GilbertElliottInTime(_) | Self::FourState(_) | Self::Pattern(_) => return None,
+        };
+        (run.is_finite() && self.mean().is_some_and(|mean| mean > 0.0)).then_some(run)
+    }
+
+    /// The autocorrelation of losses `lag` packets apart, `None` where there is no simple law or nothing varies.
+    #[must_use]
+    pub fn autocorrelation(&self, lag: u32) -> Option<f64> {
+        self.mean().filter(|mean| *mean > 0.0 && *mean < 1.0)?;
+        match self {
+            Self::Independent(_) => Some(if lag == 0 { 1.0 } else { 0.0 }),
+            Self::Correlated(chance) => Some(libm::pow(chance.correlation(), f64::from(lag))),
+            Self::GilbertElliott(chain) => chain.autocorrelation(lag),
+            Self::None | Self::GilbertElliottInTime(_) | Self::FourState(_) | Self::Pattern(_) => None,
+        }
+    }
+
     /// Whether random numbers are drawn for it.
     #[must_use]
     pub const fn is_random(&self) -> bool {
