@@ -8,93 +8,26 @@
 //! Every pair of nodes has a link in either direction. A node may have an *uplink*, one line that all it sends passes before the links, and a
 //! *downlink*, one line that all it receives passes after them.
 
-use alloc::collections::{BTreeMap, VecDeque};
-use alloc::string::String;
-use alloc::vec::Vec;
-use core::num::NonZeroU32;
+mod config;
+mod pending;
 
-use cohaptic_units::{Bytes, Instant};
+use alloc::collections::{BTreeMap, VecDeque};
+use alloc::vec::Vec;
+
+use cohaptic_units::Instant;
+
+pub use config::{AccessLine, NetworkConfig, NetworkError, NetworkEvent, NodeId};
+use pending::{Hop, InNetwork, Path, Pending, Place, SizeAndMarks};
 
 use crate::direct::Words;
-use crate::event_queue::Event;
 use crate::filter::{Filter, Offered};
 use crate::packet::{Carried, Exit, Marks, Outputs, PacketInfo};
 use crate::pipeline::{Outcome, Pipeline, check_time};
 use crate::stats::{Flow, Seldom};
 use crate::{Damage, DropCause, EventQueue, Fate, LinkModel, LinkName, LinkStats, TimeWentBack};
 
-/// A node of a network, by its place from 0.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub struct NodeId(pub u32);
-
-/// A line that a node shares between all its paths.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub enum AccessLine {
-    /// All that the node sends.
-    Uplink(NodeId),
-    /// All that the node receives.
-    Downlink(NodeId),
-}
-
-/// What a network is made of.
-#[derive(Clone, Debug, Default)]
-pub struct NetworkConfig {
-    /// The seed of all random streams.
-    pub seed: u64,
-    /// The names of the nodes. They are the addresses of the links' random numbers: equal names, equal draws.
-    pub nodes: Vec<String>,
-    /// Whether links whose only impairment is a constant delay take the general path too. It changes no answer, only the speed.
-    pub general: bool,
-}
-
-/// Why a call failed. Nothing was changed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum NetworkError {
-    /// An earlier call had a later instant.
-    #[error(transparent)]
-    TimeWentBack(#[from] TimeWentBack),
-    /// There is no such node, or sender and receiver are the same.
-    #[error("there is no link from node {} to node {}", from.0, to.0)]
-    NoLink {
-        /// The sender.
-        from: NodeId,
-        /// The receiver.
-        to: NodeId,
-    },
-    /// There is no such access line.
-    #[error("there is no {0:?}")]
-    NoLine(AccessLine),
-}
-
-/// What became of one packet, end to end, or that a copy of it was made.
-#[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub struct NetworkEvent<P> {
-    /// Who sent it.
-    pub from: NodeId,
-    /// To whom.
-    pub to: NodeId,
-    /// The number of the packet on its path, from 0.
-    pub sequence: u64,
-    /// 0 for the packet itself. A copy that its uplink made differs in the lowest bit, one that its link made in the second, its downlink in the third.
-    /// With [`Fate::Duplicated`] it is the number of the new copy.
-    pub copy: u8,
-    /// When the network took it.
-    pub sent: Instant,
-    /// When it arrived or was dropped, or when the copy was made.
-    pub at: Instant,
-    /// Its size.
-    pub size: Bytes,
-    /// What it carries, as it was offered: see `damage`.
-    pub payload: P,
-    /// What became of it.
-    pub fate: Fate,
-    /// Whether an active queue marked it: congestion experienced.
-    pub marked: bool,
-    /// The bits that were flipped. [`Damage::apply`] flips them.
-    pub damage: Option<Damage>,
-}
+/// For so many receivers of a packet, random words are drawn in one go.
+const DRAWN_AT_ONCE: u16 = 8;
 
 /// A network of N nodes as a state machine.
 ///
@@ -136,128 +69,6 @@ pub struct Network<P> {
 struct Line<P> {
     flow: Flow,
     pipeline: Pipeline<InNetwork<P>>,
-}
-
-/// A packet on its way.
-#[derive(Clone, Debug)]
-struct InNetwork<P> {
-    sequence: u64,
-    sent: Instant,
-    /// When it entered the line that it is in.
-    entered: Instant,
-    path: Path,
-    size: SizeAndMarks,
-    payload: P,
-}
-
-/// The size of a packet in the upper 24 bits, and below what happened to it. A bit is always set, so that an `Option` of what has it is no larger.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct SizeAndMarks(NonZeroU32);
-
-impl SizeAndMarks {
-    const NOTHING: Self = Self(NonZeroU32::MIN.saturating_mul(NonZeroU32::MIN.saturating_add((1 << 7) - 1)));
-    const ECN_CAPABLE: u32 = 1 << 3;
-    const MARKED: u32 = 1 << 4;
-    const DAMAGED: u32 = 1 << 5;
-    const DISCARDED_ON_ARRIVAL: u32 = 1 << 6;
-
-    fn new(info: PacketInfo) -> Self {
-        let size = u32::try_from(info.size.get()).unwrap_or(u32::MAX).min((1 << 24) - 1);
-        Self(Self::NOTHING.0 | size << 8).with(Self::ECN_CAPABLE, info.ecn_capable)
-    }
-
-    fn size(self) -> Bytes {
-        Bytes::new((self.0.get() >> 8).into())
-    }
-
-    fn copy(self) -> u8 {
-        self.0.get().to_le_bytes()[0] & 0b111
-    }
-
-    fn has(self, flag: u32) -> bool {
-        self.0.get() & flag != 0
-    }
-
-    fn with(self, flag: u32, set: bool) -> Self {
-        Self(if set { self.0 | flag } else { Self::NOTHING.0 | self.0.get() & !flag })
-    }
-}
-
-/// From whom to whom.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-struct Path {
-    from: u16,
-    to: u16,
-}
-
-/// Something that will happen on a line.
-#[derive(Clone, Debug)]
-struct Pending<P> {
-    at: Instant,
-    /// The packet's sequence on its path.
-    sequence: u64,
-    sent: Instant,
-    entered: Instant,
-    place: Place,
-    path: Path,
-    size: SizeAndMarks,
-    /// `None`: the time to wake the line's engine.
-    payload: Option<P>,
-}
-
-/// Kind and line in one number: what breaks ties between simultaneous events. All engines are woken before anything arrives, so that what leaves one
-/// line finds the room that a departure from the next line makes at the same instant.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-struct Place(u32);
-
-/// Which of its three lines a packet is in.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Hop {
-    Uplink,
-    Link,
-    Downlink,
-}
-
-/// For so many receivers of a packet, random words are drawn in one go.
-const DRAWN_AT_ONCE: u16 = 8;
-
-/// Lines are counted in the lower bits of a [`Place`].
-const LINE_BITS: u32 = 29;
-
-impl Place {
-    fn waking(hop: Hop, line: u32) -> Self {
-        Self((hop as u32) << LINE_BITS | line)
-    }
-
-    fn arrival(hop: Hop, line: u32) -> Self {
-        Self((hop as u32 + 3) << LINE_BITS | line)
-    }
-
-    fn hop(self) -> Hop {
-        match self.0 >> LINE_BITS {
-            0 | 3 => Hop::Uplink,
-            1 | 4 => Hop::Link,
-            _ => Hop::Downlink,
-        }
-    }
-
-    fn line(self) -> u32 {
-        self.0 & ((1 << LINE_BITS) - 1)
-    }
-}
-
-impl<P> Event for Pending<P> {
-    type Key = (Instant, Place, u64, Path, u8);
-
-    #[inline]
-    fn at(&self) -> Instant {
-        self.at
-    }
-
-    #[inline]
-    fn key(&self) -> Self::Key {
-        (self.at, self.place, self.sequence, self.path, self.size.copy())
-    }
 }
 
 impl<P: Clone> Network<P> {
