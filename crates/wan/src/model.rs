@@ -6,7 +6,7 @@ use core::time::Duration;
 
 use crate::netem::kernel::{Qdisc, QdiscError, Table};
 use crate::netem::{Netem, TableName};
-use crate::{FateLog, LinkConfig, Modulated};
+use crate::{FateLog, Layout, LinkConfig, Modulated};
 
 /// What a link is: one configuration, several in turn, a recording, or Linux's netem to the bit.
 #[derive(Clone, PartialEq, Debug)]
@@ -91,6 +91,15 @@ impl LinkModel {
         match self {
             Self::Fixed(config) => Some(config),
             Self::Modulated(_) | Self::Replay(_) | Self::Kernel(_) => None,
+        }
+    }
+
+    /// The order of its stages, if it has stages.
+    pub(crate) fn layout(&self) -> Option<Layout> {
+        match self {
+            Self::Fixed(config) => Some(config.layout),
+            Self::Modulated(modulated) => modulated.configs().first().map(|config| config.layout),
+            Self::Replay(_) | Self::Kernel(_) => None,
         }
     }
 

@@ -61,6 +61,9 @@ pub enum ModulatorError {
         /// Which state.
         state: usize,
     },
+    /// The configurations have their stages in different orders.
+    #[error("configurations with their stages in different orders: expected one order for all states")]
+    Layouts,
     /// There are more or fewer configurations than states.
     #[error("{configs} configurations for {states} states: expected one for each")]
     Configs {
@@ -143,10 +146,13 @@ impl Modulated {
     ///
     /// # Errors
     ///
-    /// [`ModulatorError::Configs`] if there is not one configuration for each state.
+    /// [`ModulatorError::Configs`] if there is not one configuration for each state, [`ModulatorError::Layouts`] if they differ in the order of their stages.
     pub fn new(modulator: Modulator, configs: Vec<LinkConfig>) -> Result<Self, ModulatorError> {
         if configs.len() != modulator.states.len() {
             return Err(ModulatorError::Configs { configs: configs.len(), states: modulator.states.len() });
+        }
+        if configs.windows(2).any(|pair| pair[0].layout != pair[1].layout) {
+            return Err(ModulatorError::Layouts);
         }
         Ok(Self { modulator, configs: configs.into() })
     }
@@ -275,5 +281,8 @@ mod tests {
         assert_eq!(Modulator::new("x", vec![dead_end]), Err(ModulatorError::Ends { state: 0 }));
         let alone = Modulator::new("x", vec![ModulatorState { sojourn: None, next: vec![0.0] }]).unwrap();
         assert!(matches!(Modulated::new(alone, vec![]), Err(ModulatorError::Configs { .. })));
+        let two = Modulator::from_rates("x", &[vec![0.0, 1.0], vec![2.0, 0.0]]).unwrap();
+        let configs = [crate::Layout::Physical, crate::Layout::Netem].map(|layout| LinkConfig { layout, ..LinkConfig::default() });
+        assert_eq!(Modulated::new(two, configs.to_vec()), Err(ModulatorError::Layouts));
     }
 }

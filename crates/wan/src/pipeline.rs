@@ -177,6 +177,11 @@ impl<T: Clone> Pipeline<T> {
 fn reconfigure_engine<T: Clone>(engine: &mut Engine<T>, now: Instant, seed: u64, name: &LinkName, model: LinkModel, outputs: &mut Outputs<T>) {
     engine.pass(now, outputs);
     match (&mut engine.kind, model) {
+        // Packets inside are at a place in the old order of stages, which they go on in; new ones find the stages that remember as they are.
+        (Kind::Staged(staged), model) if model.layout().is_some_and(|layout| layout != staged.layout()) => {
+            let past = staged.direct().clone();
+            engine.replace(kind(now, seed, name, model, Some(past)));
+        }
         (Kind::Staged(staged), LinkModel::Fixed(config)) => staged.reconfigure(now, config, None, outputs),
         (Kind::Staged(staged), LinkModel::Modulated(modulated)) => {
             let modulation = ModulationStage::new(seed, modulated, now);

@@ -151,6 +151,16 @@ impl<T: Clone> Staged<T> {
         stages
     }
 
+    /// The order of the stages.
+    pub(crate) fn layout(&self) -> Layout {
+        if self.layout[self.layout.len() - 1] == Stage::Propagation { Layout::Physical } else { Layout::Netem }
+    }
+
+    /// The stages that decide at once, with what they remember.
+    pub(crate) const fn direct(&self) -> &Direct {
+        &self.direct
+    }
+
     /// Takes a packet, while so many are inside.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
         self.pass(now, outputs);

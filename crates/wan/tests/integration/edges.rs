@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{Bottleneck, Delay, Distribution, DropCause, Fate, Framing, Link, LinkConfig, LinkName, Loss, NodeId, Order};
+use cohaptic_wan::{Bottleneck, Delay, Distribution, DropCause, Fate, Framing, Layout, Link, LinkConfig, LinkName, Loss, NodeId, Order};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -142,4 +142,28 @@ fn a_packet_of_no_bytes_takes_no_time_on_the_line() {
     }
     subject.handle_timeout(at(5)).unwrap();
     assert_eq!(drain(&mut subject).into_iter().map(|event| event.fate).collect::<Vec<_>>(), [Fate::Delivered(at(5)); 3]);
+}
+
+/// A packet that waits in a queue of 1 ms a packet before 5 ms of propagation still propagates, once, when the rate moves behind the delay.
+#[test]
+fn a_packet_inside_goes_on_in_the_order_of_stages_it_came_in() {
+    let millis = Duration::from_millis;
+    let config = |layout| LinkConfig {
+        bottleneck: Some(Bottleneck::at_rate(rate(8_000))),
+        delay: Delay::constant(millis(5)),
+        layout,
+        ..LinkConfig::default()
+    };
+    for (first, second) in [(Layout::Physical, Layout::Netem), (Layout::Netem, Layout::Physical)] {
+        let mut subject = link(config(first));
+        for payload in 0..3 {
+            subject.handle_packet(at(0), Bytes::new(1), payload).unwrap();
+        }
+        subject.set_model(at(1_500_000), config(second)).unwrap();
+        subject.handle_packet(at(1_500_000), Bytes::new(1), 3).unwrap();
+        subject.handle_timeout(Instant::MAX).unwrap();
+        let arrived: Vec<(Payload, u64)> = drain(&mut subject).into_iter().map(|event| (event.payload, event.at.as_nanos() / 1_000)).collect();
+        // Waiting for 1, 2 and 3 ms and then propagating, or the other way round: 6, 7 and 8 ms. The new packet has a line of its own: 1.5 + 6 ms.
+        assert_eq!(arrived, [(0, 6_000), (1, 7_000), (3, 7_500), (2, 8_000)], "{first:?}");
+    }
 }
