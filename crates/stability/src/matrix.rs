@@ -1,0 +1,154 @@
+//! A dense real matrix, row by row.
+
+use std::ops::{Index, IndexMut};
+
+/// A dense real matrix, stored row by row.
+///
+/// It holds what the analysis works on. Factorisations of large matrices are left to `faer`.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Matrix {
+    rows: usize,
+    columns: usize,
+    entries: Vec<f64>,
+}
+
+impl Matrix {
+    /// All entries zero.
+    #[must_use]
+    pub fn zeros(rows: usize, columns: usize) -> Self {
+        Self { rows, columns, entries: vec![0.0; rows * columns] }
+    }
+
+    /// Ones on the diagonal.
+    #[must_use]
+    pub fn identity(size: usize) -> Self {
+        Self::from_fn(size, size, |row, column| if row == column { 1.0 } else { 0.0 })
+    }
+
+    /// Each entry from its row and column.
+    #[must_use]
+    pub fn from_fn(rows: usize, columns: usize, mut entry: impl FnMut(usize, usize) -> f64) -> Self {
+        let entries = (0..rows * columns).map(|place| entry(place / columns, place % columns)).collect();
+        Self { rows, columns, entries }
+    }
+
+    /// The number of rows.
+    #[must_use]
+    pub const fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The number of columns.
+    #[must_use]
+    pub const fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// A row.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such row.
+    #[must_use]
+    #[inline]
+    pub fn row(&self, row: usize) -> &[f64] {
+        &self.entries[row * self.columns..(row + 1) * self.columns]
+    }
+
+    /// A row, to be changed.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such row.
+    #[inline]
+    pub fn row_mut(&mut self, row: usize) -> &mut [f64] {
+        &mut self.entries[row * self.columns..(row + 1) * self.columns]
+    }
+
+    /// All entries, row by row.
+    #[must_use]
+    pub fn entries(&self) -> &[f64] {
+        &self.entries
+    }
+
+    /// Rows and columns exchanged.
+    #[must_use]
+    pub fn transposed(&self) -> Self {
+        Self::from_fn(self.columns, self.rows, |row, column| self[(column, row)])
+    }
+
+    /// The product of the two.
+    ///
+    /// # Panics
+    ///
+    /// If this matrix has not as many columns as the other has rows.
+    #[must_use]
+    pub fn times(&self, other: &Self) -> Self {
+        assert_eq!(self.columns, other.rows, "the shapes of a product fit");
+        let mut product = Self::zeros(self.rows, other.columns);
+        for row in 0..self.rows {
+            for (inner, factor) in self.row(row).iter().enumerate() {
+                for (sum, entry) in product.row_mut(row).iter_mut().zip(other.row(inner)) {
+                    *sum += factor * entry;
+                }
+            }
+        }
+        product
+    }
+
+    /// The product with a column.
+    ///
+    /// # Panics
+    ///
+    /// If the column has not as many entries as this matrix has columns.
+    #[must_use]
+    pub fn times_column(&self, column: &[f64]) -> Vec<f64> {
+        assert_eq!(self.columns, column.len(), "the shapes of a product fit");
+        (0..self.rows).map(|row| self.row(row).iter().zip(column).map(|(a, b)| a * b).sum()).collect()
+    }
+
+    /// Every entry times `factor`.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self { rows: self.rows, columns: self.columns, entries: self.entries.iter().map(|entry| entry * factor).collect() }
+    }
+
+    /// The square root of the sum of the squares of all entries, which bounds the 2-norm.
+    #[must_use]
+    pub fn frobenius_norm(&self) -> f64 {
+        let largest = self.largest();
+        if largest == 0.0 || !largest.is_finite() {
+            return largest;
+        }
+        // Scaled, so that squares neither overflow nor vanish.
+        largest * self.entries.iter().map(|entry| (entry / largest).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// The size of the largest entry; NaN if any is.
+    #[must_use]
+    pub fn largest(&self) -> f64 {
+        self.entries.iter().fold(0.0, |largest: f64, entry| if entry.abs() > largest || entry.is_nan() { entry.abs() } else { largest })
+    }
+
+    /// Whether every entry is a finite number.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.entries.iter().all(|entry| entry.is_finite())
+    }
+}
+
+impl Index<(usize, usize)> for Matrix {
+    type Output = f64;
+
+    #[inline]
+    fn index(&self, (row, column): (usize, usize)) -> &f64 {
+        &self.entries[row * self.columns + column]
+    }
+}
+
+impl IndexMut<(usize, usize)> for Matrix {
+    #[inline]
+    fn index_mut(&mut self, (row, column): (usize, usize)) -> &mut f64 {
+        &mut self.entries[row * self.columns + column]
+    }
+}
