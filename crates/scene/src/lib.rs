@@ -27,6 +27,7 @@
 //! # Ok::<(), cohaptic_scene::SceneError>(())
 //! ```
 
+mod assembly;
 mod context;
 mod error;
 mod excerpt;
@@ -38,6 +39,7 @@ mod read;
 mod scaling;
 mod sections;
 mod source;
+mod strategies;
 mod table_reader;
 #[cfg(test)]
 mod tests;
@@ -48,3 +50,4 @@ pub use error::{Diagnostic, SceneError};
 pub use link_keys::link_from_keys;
 pub use model::*;
 pub use read::scene_files;
+pub use strategies::{FromScene, Strategies};
