@@ -90,7 +90,7 @@ pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError>
                 let structure = Structure::of(&[scene], &network, &combination.contacts)?;
                 Ok(of_parts(combination, reduced(&structure, scene, combination.axes)))
             });
-            Ok(worst(modes.collect::<Result<_, AnalysisError>>()?, method, &network, scene))
+            Ok(combine(modes.collect::<Result<_, AnalysisError>>()?, method, &network, scene))
         }
     }
 }
@@ -123,7 +123,7 @@ pub fn analyse_with(scene: &Scene, strategies: &impl Strategies) -> Result<Analy
             frame: map.frame,
         })
     });
-    let mut analysis = worst(modes.collect::<Result<_, AnalysisError>>()?, Method::Full, &network, scene);
+    let mut analysis = combine(modes.collect::<Result<_, AnalysisError>>()?, Method::Full, &network, scene);
     if scene.object.enclosure.is_some() {
         analysis.notes.push("the enclosure is left out: the scene is analysed away from its walls".to_owned());
     }
@@ -135,7 +135,7 @@ fn of_parts(combination: &Combination, reduced: crate::parts::Reduced) -> Contac
     ContactMode { contacts: combination.words.clone(), radius: radius_of(&parts), parts, rigid_modes, dimension, frame }
 }
 
-fn worst(modes: Vec<ContactMode>, method: Method, network: &NominalNetwork, scene: &Scene) -> Analysis {
+pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &NominalNetwork, scene: &Scene) -> Analysis {
     let radius = modes.iter().map(|mode| mode.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 });
     let largest = modes.iter().max_by(|one, other| one.radius.value.total_cmp(&other.radius.value));
     let (rigid_modes, dimension, frame) = largest.map_or((0, 0, Duration::ZERO), |mode| (mode.rigid_modes, mode.dimension, mode.frame));

@@ -8,6 +8,7 @@
 mod analysis;
 mod error;
 mod full;
+mod graph;
 mod lifted;
 mod matrix;
 mod network;
@@ -19,6 +20,7 @@ mod timetable;
 
 pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_with};
 pub use error::AnalysisError;
+pub use graph::{Graph, GraphError, analyse_on};
 pub use matrix::Matrix;
 pub use parts::{Part, PartKind};
 pub use radius::{Radius, Verdict};

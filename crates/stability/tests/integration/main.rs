@@ -1,4 +1,5 @@
 //! The analysis of whole scenes.
 
 mod anchors;
+mod graphs;
 mod reduction;
