@@ -39,6 +39,6 @@ mod world;
 
 pub use observer::{NoObserver, Observer, PacketRow, StateRow, TickRow};
 pub use plan::Model;
-pub use simulation::Simulation;
+pub use simulation::{MOST_PEERS, Simulation, too_large};
 pub use strategies::{FromScene, Strategies};
 pub use summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};

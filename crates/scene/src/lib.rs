@@ -31,6 +31,7 @@ mod context;
 mod error;
 mod excerpt;
 mod link_keys;
+mod link_table;
 mod model;
 mod names;
 mod overrides;
@@ -46,5 +47,6 @@ mod values;
 
 pub use error::{Diagnostic, SceneError};
 pub use link_keys::link_from_keys;
+pub use link_table::LinkTable;
 pub use model::*;
 pub use read::scene_files;
