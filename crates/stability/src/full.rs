@@ -136,7 +136,8 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         self.growth = 0.0;
         let later = Instant::ZERO.saturating_add(self.timetable.frame).saturating_add(self.timetable.frame);
         let relative = |reached: Vec<f64>| -> Vec<f64> { reached.iter().zip(&rest).map(|(reached, rest)| reached - rest).collect() };
-        // Small, middling and large, so that a dead band and a limit are both seen.
+        // Small, middling and large, and each against the others, so that a dead band and a limit are both seen.
+        let mut small: Option<Vec<f64>> = None;
         for amplitude in [1e-6, 1e-2, 10.0] {
             let (one, other) = (noise(size, 1, amplitude), noise(size, 2, amplitude));
             let both: Vec<f64> = one.iter().zip(&other).map(|(one, other)| one - 2.0 * other).collect();
@@ -147,8 +148,13 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             let (reached_one, reached_other, reached_both) =
                 (relative(reached_one), relative(self.push(&other, Instant::ZERO)?), relative(self.push(&both, Instant::ZERO)?));
             let scale = [&reached_one, &reached_other, &rest].into_iter().flatten().fold(amplitude, |largest: f64, entry| largest.max(entry.abs()));
-            let apart = |place: usize| (reached_one[place] - 2.0 * reached_other[place] - reached_both[place]).abs();
-            if let Some(place) = (0..size).find(|place| !(apart(*place) <= 1e-9 * scale.max(self.growth))) {
+            let unit: Vec<f64> = reached_one.iter().map(|entry| entry / amplitude).collect();
+            let small = small.get_or_insert_with(|| unit.clone());
+            // Of the small one, what is left beside a constant force may be few digits.
+            let homogeneous = |place: usize| (unit[place] - small[place]).abs() * amplitude * 1e-3;
+            let apart = |place: usize| (reached_one[place] - 2.0 * reached_other[place] - reached_both[place]).abs().max(homogeneous(place));
+            let limit = 1e-9 * scale.max(self.growth);
+            if let Some(place) = (0..size).find(|place| apart(*place).is_nan() || apart(*place) > limit) {
                 return Err(AnalysisError::NotLinear { peer: self.names[self.layout.owner(place)].clone() });
             }
         }

@@ -3,3 +3,4 @@
 mod anchors;
 mod graphs;
 mod reduction;
+mod strategies;
