@@ -82,7 +82,7 @@ pub struct ContactMode {
 /// [`AnalysisError`] if the scene has no frame that repeats, or cannot be taken apart into linear scenes.
 pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError> {
     match method {
-        Method::Full => analyse_with(scene, &FromScene),
+        Method::Full => push_through(scene, &combinations(scene)?, &FromScene),
         Method::Reduced => {
             let network = NominalNetwork::of(scene)?;
             let combinations = combinations(scene)?;
@@ -101,8 +101,15 @@ pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError>
 ///
 /// As [`analyse`], and if a strategy is not linear or remembers what it does not show.
 pub fn analyse_with(scene: &Scene, strategies: &impl Strategies) -> Result<Analysis, AnalysisError> {
-    let network = NominalNetwork::of(scene)?;
     let combinations = combinations(scene)?;
+    if combinations.iter().any(|combination| combination.axes != scene.axes.count()) {
+        return Err(AnalysisError::MixedAxes);
+    }
+    push_through(scene, &combinations, strategies)
+}
+
+fn push_through(scene: &Scene, combinations: &[Combination], strategies: &impl Strategies) -> Result<Analysis, AnalysisError> {
+    let network = NominalNetwork::of(scene)?;
     // The walls of the simulator push and do not pull, so there is nothing linear to push through them.
     let modes = combinations.iter().filter(|combination| !combination.contacts.at_wall).map(|combination| {
         let contacts = &combination.contacts;

@@ -37,4 +37,7 @@ pub enum AnalysisError {
         /// How many are looked at at most.
         most: u128,
     },
+    /// There is no one matrix.
+    #[error("the scene is not linear: there is one matrix for each combination of contacts; expected contact = \"grasp\" or \"none\"")]
+    SeveralModes,
 }
