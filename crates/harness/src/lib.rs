@@ -33,12 +33,11 @@ mod plan;
 pub mod record;
 mod schedule;
 mod simulation;
-mod strategies;
 mod summary;
 mod world;
 
+pub use cohaptic_scene::{FromScene, Strategies};
 pub use observer::{NoObserver, Observer, PacketRow, StateRow, TickRow};
 pub use plan::Model;
 pub use simulation::{MOST_PEERS, Simulation, too_large};
-pub use strategies::{FromScene, Strategies};
 pub use summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};

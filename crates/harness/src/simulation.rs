@@ -1,12 +1,11 @@
 //! A scene in virtual time.
 
 use cohaptic_peer::Strategy;
-use cohaptic_scene::{Axes, Scene};
+use cohaptic_scene::{Axes, FromScene, Scene, Strategies};
 
 use crate::disturbance::Disturbance;
 use crate::observer::Observer;
 use crate::plan::{Model, Plan};
-use crate::strategies::{FromScene, Strategies};
 use crate::summary::{Ending, Summary};
 use crate::world::{Step, Watch, World};
 

@@ -3,9 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_peer::wire::{MAX_LEN, Sample};
-use cohaptic_peer::{
-    Clock, Contact, CopyConfig, Device, Held, ObjectCopy, Peer, PeerConfig, Reception, RestingDevice, SimulatedDevice, State, Strategy,
-};
+use cohaptic_peer::{Clock, Contact, Device, Held, ObjectCopy, Peer, Reception, RestingDevice, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Change, ChangeKind, Scene};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{AccessLine, Damage, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
@@ -97,7 +95,7 @@ pub(crate) enum Step {
 impl<const A: usize, S: Strategy<A>> World<A, S> {
     /// The scene at its beginning, with the strategies that `strategy` makes for the places of the peers.
     pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>, strategy: impl Fn(usize) -> S) -> Self {
-        let initial: Vec<State<A>> = scene.peers.iter().map(|peer| state(&peer.position, &peer.velocity)).collect();
+        let initial: Vec<State<A>> = (0..scene.peers.len()).map(|place| scene.initial_state(place)).collect();
         let member = |place| Member::new(scene, plan, &initial, disturbance, place, strategy(place));
         let members: Vec<Member<A, S>> = (0..scene.peers.len()).map(member).collect();
         Self {
@@ -380,7 +378,6 @@ impl Watch {
 impl<const A: usize, S: Strategy<A>> Member<A, S> {
     fn new(scene: &Scene, plan: &Plan, initial: &[State<A>], disturbance: Option<Disturbance>, place: usize, strategy: S) -> Self {
         let spec = &scene.peers[place];
-        let peers = scene.peers.len();
         let (clock, integrator) = (spec.clock, scene.integrator);
         let displaced =
             |body| disturbance.map_or(initial[place], |disturbance| disturbance.displace(initial[place], scene.axes.count(), place, body));
@@ -390,21 +387,11 @@ impl<const A: usize, S: Strategy<A>> Member<A, S> {
                 DeviceModel::Simulated(SimulatedDevice::new(spec.device, spec.hand.as_ref(), displaced(0), integrator, &clock))
             }
         };
-        let copy = CopyConfig { mass: scene.copy_mass(), damping: scene.object.damping };
-        let object = ObjectCopy::new(copy, displaced(1), integrator, &clock);
+        let object = ObjectCopy::new(scene.copy_config(), displaced(1), integrator, &clock);
         let others = initial.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
-        let config = PeerConfig {
-            session: scene.seed,
-            place: node(place).0,
-            axes: scene.axes.count(),
-            contact: spec.contact,
-            coupling: spec.coupling.scaled(spec.coupling_scaling.coupling_factor(peers)),
-            compute_delay: spec.compute_delay,
-            enclosure: scene.object.enclosure,
-        };
         let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
         Self {
-            peer: Peer::new(config, device, object, strategy, Held::new(others)),
+            peer: Peer::new(scene.peer_config(place), device, object, strategy, Held::new(others)),
             clock,
             tick: 0,
             next_send: spec.phase,
@@ -443,10 +430,6 @@ fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {
 
 fn node(place: usize) -> NodeId {
     NodeId(u32::try_from(place).expect("a network has fewer than 2^32 nodes"))
-}
-
-fn state<const A: usize>(position: &[f64; 3], velocity: &[f64; 3]) -> State<A> {
-    State { position: std::array::from_fn(|axis| position[axis]), velocity: std::array::from_fn(|axis| velocity[axis]) }
 }
 
 fn row<const A: usize>(state: &State<A>, axes: usize) -> StateRow<'_> {

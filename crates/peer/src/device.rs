@@ -75,6 +75,11 @@ impl<const A: usize> SimulatedDevice<A> {
         Self { state, stepper: Stepper::new(plant, integrator, clock), hand: HandForce::of(hand) }
     }
 
+    /// Puts the device into that state.
+    pub const fn set_state(&mut self, state: State<A>) {
+        self.state = state;
+    }
+
     /// Changes what the hand does. An arm stays the arm that the device was made with; only its wanted motion changes.
     pub fn set_hand(&mut self, hand: Option<&Hand>) {
         self.hand = HandForce::of(hand);

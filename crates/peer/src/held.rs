@@ -72,6 +72,15 @@ impl<const A: usize> Held<A> {
         newer
     }
 
+    /// Holds that state from that sender, as if nothing had ever arrived from it: any sample is newer.
+    ///
+    /// # Panics
+    ///
+    /// If there is no sender in that place.
+    pub fn hold(&mut self, place: usize, state: State<A>) {
+        self.samples[place] = HeldSample { state, next: 0 };
+    }
+
     /// Computes the mean anew.
     ///
     /// Four partial sums, added in pairs: the same order whatever the machine, a quarter of the latency of one sum, and an error of at most

@@ -45,7 +45,7 @@ pub use device::{Device, RestingDevice, SimulatedDevice};
 pub use enclosure::Enclosure;
 pub use held::Held;
 pub use object::ObjectCopy;
-pub use peer::{Forces, Peer, PeerConfig, ReceiveError, Reception};
+pub use peer::{Acting, Forces, Peer, PeerConfig, ReceiveError, Reception};
 pub use plant::{Integrator, Plant, StepMap};
 pub use signal::{Signal, Table, TableError};
 pub use state::State;

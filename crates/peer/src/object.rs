@@ -27,6 +27,11 @@ impl<const A: usize> ObjectCopy<A> {
         &self.state
     }
 
+    /// Puts it into that state.
+    pub const fn set_state(&mut self, state: State<A>) {
+        self.state = state;
+    }
+
     /// Moves it over `span` under a held force.
     #[inline]
     pub(crate) fn advance(&mut self, span: Duration, force: [f64; A]) {

@@ -51,10 +51,12 @@ pub struct Peer<const A: usize, D, S> {
 }
 
 /// The forces that act over a tick: on the device, and in all on the copy.
-#[derive(Clone, Copy, Debug)]
-struct Acting<const A: usize> {
-    coupling: [f64; A],
-    on_object: [f64; A],
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Acting<const A: usize> {
+    /// FC, which the device feels with the opposite sign \[N\].
+    pub coupling: [f64; A],
+    /// The sum of all forces on the copy but its own damping: FC − FT and the walls \[N\].
+    pub on_object: [f64; A],
 }
 
 /// The forces computed at a tick, for the record.
@@ -199,6 +201,38 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     #[inline]
     pub const fn object(&self) -> &ObjectCopy<A> {
         &self.object
+    }
+
+    /// The copy of the object, to put it into a state.
+    pub const fn object_mut(&mut self) -> &mut ObjectCopy<A> {
+        &mut self.object
+    }
+
+    /// Holds that state from another peer (see [`Held::hold`]); the others count in order, with this peer left out.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    pub fn hold(&mut self, other: usize, state: State<A>) {
+        self.held.hold(other, state);
+        self.stale_mean = true;
+    }
+
+    /// The forces computed at the latest tick, which act over the next one if forces are applied one tick late.
+    #[must_use]
+    pub const fn computed(&self) -> &Acting<A> {
+        &self.computed
+    }
+
+    /// Replaces the forces computed at the latest tick.
+    pub const fn set_computed(&mut self, computed: Acting<A>) {
+        self.computed = computed;
+    }
+
+    /// The strategy.
+    #[must_use]
+    pub const fn strategy(&self) -> &S {
+        &self.strategy
     }
 
     /// The strategy, to change its gains.

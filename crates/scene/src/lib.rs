@@ -27,6 +27,7 @@
 //! # Ok::<(), cohaptic_scene::SceneError>(())
 //! ```
 
+mod assembly;
 mod context;
 mod error;
 mod excerpt;
@@ -39,6 +40,7 @@ mod read;
 mod scaling;
 mod sections;
 mod source;
+mod strategies;
 mod table_reader;
 #[cfg(test)]
 mod tests;
@@ -50,3 +52,4 @@ pub use link_keys::link_from_keys;
 pub use link_table::LinkTable;
 pub use model::*;
 pub use read::scene_files;
+pub use strategies::{FromScene, Strategies};

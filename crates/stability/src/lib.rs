@@ -5,8 +5,20 @@
 //! origin. This crate builds that matrix from the same plants and strategies that the simulator steps (lifting: Araki & Yamamoto 1986; Rakhsha &
 //! Constantinescu 2015, Section 3), reduces it where peers are alike, and says how sure it is of the answer.
 
+mod analysis;
+mod error;
+mod full;
+mod lifted;
 mod matrix;
+mod network;
+mod parts;
 mod radius;
+mod spectrum;
+mod structure;
+mod timetable;
 
+pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_with};
+pub use error::AnalysisError;
 pub use matrix::Matrix;
+pub use parts::{Part, PartKind};
 pub use radius::{Radius, Verdict};

@@ -65,6 +65,16 @@ impl Matrix {
         &mut self.entries[row * self.columns..(row + 1) * self.columns]
     }
 
+    /// A row and the one after it, to be changed together.
+    ///
+    /// # Panics
+    ///
+    /// If there are no such rows.
+    #[inline]
+    pub(crate) fn two_rows_mut(&mut self, row: usize) -> (&mut [f64], &mut [f64]) {
+        self.entries[row * self.columns..(row + 2) * self.columns].split_at_mut(self.columns)
+    }
+
     /// All entries, row by row.
     #[must_use]
     pub fn entries(&self) -> &[f64] {

@@ -34,6 +34,18 @@ impl Radius {
         }
     }
 
+    /// The radius over that many frames: the power, with the error that follows.
+    #[must_use]
+    pub fn over(self, frames: u32) -> Self {
+        if frames == 1 {
+            return self;
+        }
+        let power = |base: f64| libm::pow(base, f64::from(frames));
+        let value = power(self.value);
+        let rounding = f64::EPSILON * f64::from(frames) * value;
+        Self { value, error: (power(self.value + self.error) - value).max(value - power((self.value - self.error).max(0.0))) + rounding }
+    }
+
     /// The radius of two systems side by side: the larger, with an error that covers both.
     #[must_use]
     pub fn or(self, other: Self) -> Self {

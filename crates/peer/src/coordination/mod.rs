@@ -44,6 +44,16 @@ pub trait Strategy<const A: usize> {
 
     /// New gains, from the next tick on. A strategy without gains ignores them.
     fn set_gains(&mut self, gains: Gains);
+
+    /// Everything the strategy remembers from tick to tick, as numbers; always as many. Empty for one that remembers nothing.
+    ///
+    /// The stability analysis puts a strategy into a state and looks where it goes. A strategy that remembers what it does not show here is refused there.
+    fn memory(&self) -> &[f64] {
+        &[]
+    }
+
+    /// Puts [`Strategy::memory`] back, or replaces it by as many other numbers.
+    fn set_memory(&mut self, _memory: &[f64]) {}
 }
 
 impl<const A: usize, S: Strategy<A> + ?Sized> Strategy<A> for Box<S> {
@@ -53,6 +63,14 @@ impl<const A: usize, S: Strategy<A> + ?Sized> Strategy<A> for Box<S> {
 
     fn set_gains(&mut self, gains: Gains) {
         (**self).set_gains(gains);
+    }
+
+    fn memory(&self) -> &[f64] {
+        (**self).memory()
+    }
+
+    fn set_memory(&mut self, memory: &[f64]) {
+        (**self).set_memory(memory);
     }
 }
 

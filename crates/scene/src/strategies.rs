@@ -2,12 +2,12 @@
 
 use cohaptic_peer::Strategy;
 use cohaptic_peer::coordination::BuiltIn;
-use cohaptic_scene::Scene;
+
+use crate::Scene;
 
 /// Makes the coordination strategy of each peer, for as many axes as are simulated.
 ///
-/// [`FromScene`] makes what the scene names. Implement this to run a strategy of your own over a scene's network: see
-/// [`crate::Simulation::with_strategies`].
+/// [`FromScene`] makes what the scene names. Implement this to simulate or to analyse a scene with a strategy of your own.
 pub trait Strategies {
     /// The strategy for A axes.
     type Strategy<const A: usize>: Strategy<A>;

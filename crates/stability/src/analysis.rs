@@ -1,0 +1,206 @@
+//! The verdict on a scene as it stands.
+
+use std::time::Duration;
+
+use cohaptic_peer::Contact;
+use cohaptic_scene::{FromScene, Scene, Strategies};
+
+use crate::full::full;
+use crate::network::NominalNetwork;
+use crate::parts::{Part, radius_of, reduced};
+use crate::spectrum::bounded_radius;
+use crate::structure::{Contacts, Structure};
+use crate::{AnalysisError, Radius, Verdict};
+
+/// How a verdict is reached.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Method {
+    /// Peers that are equal are treated together: see [`Part`]. For scenes with the strategies of this workspace.
+    #[default]
+    Reduced,
+    /// Unit vectors of the whole state are pushed through the code that simulates. For any linear strategy.
+    Full,
+}
+
+impl Method {
+    /// The word in JSON.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Reduced => "reduced",
+            Self::Full => "full",
+        }
+    }
+}
+
+/// What is known about the stability of a scene.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Analysis {
+    /// The largest radius of all modes of contact, the rigid-body modes left out.
+    pub radius: Radius,
+    /// How many rigid-body modes were removed: displacements of everything together, and of each device that touches nothing, per axis. Of the mode of
+    /// contact with the largest radius.
+    pub rigid_modes: usize,
+    /// How many states are left: of bodies, of forces that wait to be applied, and of samples that are held or in flight.
+    pub dimension: usize,
+    /// How it was reached.
+    pub method: Method,
+    /// The span that the radius is over: after it everything repeats.
+    pub frame: Duration,
+    /// One entry for a linear scene; one for each combination of open and closed contacts otherwise.
+    pub modes: Vec<ContactMode>,
+    /// What the verdict leaves out, in words.
+    pub notes: Vec<String>,
+}
+
+impl Analysis {
+    /// What the radius says.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        self.radius.verdict()
+    }
+}
+
+/// A combination of contacts in which the scene is linear.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ContactMode {
+    /// Which contacts are closed, in words; empty for a linear scene.
+    pub contacts: String,
+    /// The largest radius of its parts.
+    pub radius: Radius,
+    /// The parts that do not mix.
+    pub parts: Vec<Part>,
+    pub(crate) rigid_modes: usize,
+    pub(crate) dimension: usize,
+    pub(crate) frame: Duration,
+}
+
+/// Analyses the scene as it begins, with the strategy that it names; its timeline is left out.
+///
+/// # Errors
+///
+/// [`AnalysisError`] if the scene has no frame that repeats, or cannot be taken apart into linear scenes.
+pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError> {
+    match method {
+        Method::Full => analyse_with(scene, &FromScene),
+        Method::Reduced => {
+            let network = NominalNetwork::of(scene)?;
+            let combinations = combinations(scene)?;
+            let modes = combinations.iter().map(|combination| {
+                let structure = Structure::of(&[scene], &network, &combination.contacts)?;
+                Ok(of_parts(combination, reduced(&structure, scene, combination.axes)))
+            });
+            Ok(worst(modes.collect::<Result<_, AnalysisError>>()?, method, &network, scene))
+        }
+    }
+}
+
+/// Analyses the scene by the general path, with strategies of the caller's own.
+///
+/// # Errors
+///
+/// As [`analyse`], and if a strategy is not linear or remembers what it does not show.
+pub fn analyse_with(scene: &Scene, strategies: &impl Strategies) -> Result<Analysis, AnalysisError> {
+    let network = NominalNetwork::of(scene)?;
+    let combinations = combinations(scene)?;
+    // The walls of the simulator push and do not pull, so there is nothing linear to push through them.
+    let modes = combinations.iter().filter(|combination| !combination.contacts.at_wall).map(|combination| {
+        let contacts = &combination.contacts;
+        // With one-sided contacts every axis has combinations of its own.
+        let map = match combination.axes {
+            1 => full::<1, _>(scene, &network, contacts, |peer| strategies.strategy(scene, peer)),
+            2 => full::<2, _>(scene, &network, contacts, |peer| strategies.strategy(scene, peer)),
+            _ => full::<3, _>(scene, &network, contacts, |peer| strategies.strategy(scene, peer)),
+        }?;
+        let radius = bounded_radius(&map.monodromy, map.error);
+        let part = Part::whole(radius, map.monodromy.rows());
+        Ok(ContactMode {
+            contacts: combination.words.clone(),
+            radius,
+            parts: vec![part],
+            rigid_modes: map.rigid_modes,
+            dimension: map.monodromy.rows(),
+            frame: map.frame,
+        })
+    });
+    let mut analysis = worst(modes.collect::<Result<_, AnalysisError>>()?, Method::Full, &network, scene);
+    if scene.object.enclosure.is_some() {
+        analysis.notes.push("the enclosure is left out: the scene is analysed away from its walls".to_owned());
+    }
+    Ok(analysis)
+}
+
+fn of_parts(combination: &Combination, reduced: crate::parts::Reduced) -> ContactMode {
+    let crate::parts::Reduced { parts, rigid_modes, dimension, frame } = reduced;
+    ContactMode { contacts: combination.words.clone(), radius: radius_of(&parts), parts, rigid_modes, dimension, frame }
+}
+
+fn worst(modes: Vec<ContactMode>, method: Method, network: &NominalNetwork, scene: &Scene) -> Analysis {
+    let radius = modes.iter().map(|mode| mode.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 });
+    let largest = modes.iter().max_by(|one, other| one.radius.value.total_cmp(&other.radius.value));
+    let (rigid_modes, dimension, frame) = largest.map_or((0, 0, Duration::ZERO), |mode| (mode.rigid_modes, mode.dimension, mode.frame));
+    let mut notes = network.notes.clone();
+    if modes.len() > 1 {
+        notes.push(
+            "the scene is not linear: every combination of its contacts is analysed as if it lasted, and the verdict is that of the worst; changing \
+             between them is not covered"
+                .to_owned(),
+        );
+    }
+    if !scene.timeline.is_empty() {
+        notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
+    }
+    Analysis { radius, rigid_modes, dimension, method, frame, modes, notes }
+}
+
+/// Contacts that are closed together, and for how many axes they stand.
+#[derive(Clone, Debug)]
+pub(crate) struct Combination {
+    pub(crate) contacts: Contacts,
+    pub(crate) axes: usize,
+    words: String,
+}
+
+/// More combinations than this are refused.
+const MOST: u128 = 4096;
+
+/// Every combination of contacts in which the scene is linear.
+pub(crate) fn combinations(scene: &Scene) -> Result<Vec<Combination>, AnalysisError> {
+    let grasping = |peer: usize| scene.peers[peer].contact == Contact::Grasp;
+    let pushing_along = |axis: usize| -> Vec<usize> {
+        let pushes = |peer: &usize| matches!(scene.peers[*peer].contact, Contact::Push(direction) if direction.axis == axis);
+        (0..scene.peers.len()).filter(pushes).collect()
+    };
+    let axes = scene.axes.count();
+    let walls = if scene.object.enclosure.is_some() { vec![false, true] } else { vec![false] };
+    let count = (0..axes).map(|axis| pushing_along(axis).len()).fold(0_u128, |sum, pushing| sum.saturating_add(1_u128 << pushing.min(100)));
+    if count.saturating_mul(walls.len() as u128) > MOST {
+        return Err(AnalysisError::TooManyModes { modes: count.saturating_mul(walls.len() as u128), most: MOST });
+    }
+    let linear = (0..axes).all(|axis| pushing_along(axis).is_empty());
+    let mut all = Vec::new();
+    for at_wall in walls {
+        let wall = if !at_wall { "" } else { "every copy at a wall" };
+        if linear {
+            let touching = (0..scene.peers.len()).map(grasping).collect();
+            all.push(Combination { contacts: Contacts { touching, at_wall }, axes, words: wall.to_owned() });
+            continue;
+        }
+        for axis in 0..axes {
+            let pushing = pushing_along(axis);
+            for closed in 0..1_u64 << pushing.len() {
+                let touches =
+                    |peer: usize| grasping(peer) || pushing.iter().position(|pushing| *pushing == peer).is_some_and(|place| closed >> place & 1 == 1);
+                let touching: Vec<bool> = (0..scene.peers.len()).map(touches).collect();
+                let names: Vec<&str> = pushing.iter().filter(|peer| touching[**peer]).map(|peer| scene.peers[*peer].name.as_str()).collect();
+                let mut words = if axes > 1 { format!("along {}: ", ["x", "y", "z"][axis]) } else { String::new() };
+                words.push_str(&if names.is_empty() { "nobody pushes".to_owned() } else { format!("pushing: {}", names.join(", ")) });
+                if at_wall {
+                    words.push_str("; every copy at a wall");
+                }
+                all.push(Combination { contacts: Contacts { touching, at_wall }, axes: 1, words });
+            }
+        }
+    }
+    Ok(all)
+}

@@ -1,0 +1,319 @@
+//! The general path: unit vectors pushed through the code that simulates.
+//!
+//! Real [`Peer`]s with real strategies are put into a state, stepped through one frame of the timetable, and looked at. Whatever strategy they run is
+//! analysed so, as long as it is linear; one that is not, or that depends on more than it shows, is found out and refused.
+
+use std::time::Duration;
+
+use cohaptic_peer::{Acting, Contact, Device as _, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State, Strategy};
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+
+use crate::lifted::common_time;
+use crate::network::{LinkTiming, NominalNetwork};
+use crate::structure::{Contacts, arm, count};
+use crate::timetable::{Event, NodeClock, Timetable};
+use crate::{AnalysisError, Matrix};
+
+/// What the general path finds: the matrix of one frame in relative coordinates.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct FullMap {
+    pub(crate) monodromy: Matrix,
+    /// A bound of the error of its entries, in the largest sum of sizes of a row.
+    pub(crate) error: f64,
+    pub(crate) rigid_modes: usize,
+    pub(crate) frame: Duration,
+}
+
+/// Pushes every unit vector through a frame of the scene, along A axes.
+pub(crate) fn full<const A: usize, S: Strategy<A>>(
+    scene: &Scene,
+    network: &NominalNetwork,
+    contacts: &Contacts,
+    strategy: impl Fn(usize) -> S,
+) -> Result<FullMap, AnalysisError> {
+    Pusher::<A, S>::new(scene, network, contacts, strategy)?.map()
+}
+
+type Member<const A: usize, S> = Peer<A, SimulatedDevice<A>, S>;
+
+/// The peers, and where their states stand in a vector.
+struct Pusher<const A: usize, S> {
+    members: Vec<Member<A, S>>,
+    names: Vec<String>,
+    timetable: Timetable,
+    layout: Layout,
+    /// What velocities \[s\] and forces [m/N] are multiplied by.
+    time: f64,
+    compliance: Vec<f64>,
+    /// The samples of each peer: those of earlier frames, oldest first, then those of this one.
+    samples: Vec<Vec<State<A>>>,
+    /// The largest number seen on the way of the unit vectors, for the bound of errors.
+    growth: f64,
+}
+
+/// Where the states of each peer begin, and what they are.
+struct Layout {
+    first: Vec<usize>,
+    touching: Vec<bool>,
+    memory: Vec<usize>,
+    pending: Vec<bool>,
+    /// Where the samples of earlier frames of each peer begin, the newest first.
+    samples: Vec<usize>,
+    size: usize,
+    /// States that nothing depends on and that drift with everything else: positions of devices that touch nothing.
+    loose: Vec<usize>,
+    /// Whether something ties the object to ground.
+    tied: bool,
+}
+
+impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
+    fn new(scene: &Scene, network: &NominalNetwork, contacts: &Contacts, strategy: impl Fn(usize) -> S) -> Result<Self, AnalysisError> {
+        let peers = scene.peers.len();
+        let clocks: Vec<NodeClock> = (0..peers).map(|place| NodeClock::of(scene, place)).collect();
+        let pairs = (0..peers).flat_map(|to| (0..peers).filter(move |from| *from != to).map(move |from| (from, to)));
+        let links: Vec<(usize, usize, LinkTiming)> = pairs.map(|(from, to)| (from, to, network.timing(from, to).clone())).collect();
+        let timetable = Timetable::new(&clocks, &links)?;
+        let member = |place: usize| {
+            let spec = &scene.peers[place];
+            let mut config = scene.peer_config(place);
+            config.contact = if contacts.touching[place] { Contact::Grasp } else { Contact::None };
+            config.enclosure = None;
+            // The hand's force moves the device about and has no part in how it moves on its own; the arm has.
+            let hand = matches!(spec.hand, Some(Hand::Arm { .. })).then(|| Hand::Arm { arm: arm(spec), follows: Signal::Constant([0.0; 3]) });
+            let device = SimulatedDevice::new(spec.device, hand.as_ref(), State::REST, scene.integrator, &spec.clock);
+            let object = ObjectCopy::new(scene.copy_config(), State::REST, scene.integrator, &spec.clock);
+            Peer::new(config, device, object, strategy(place), Held::new((1..peers).map(|_| State::REST)))
+        };
+        let members: Vec<Member<A, S>> = (0..peers).map(member).collect();
+        let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
+        let tied = silent || (0..peers).any(|place| contacts.touching[place] && arm(&scene.peers[place]).stiffness > 0.0);
+        let layout = Layout::new(scene, contacts, &members, &timetable, tied);
+        let time = common_time(scene.peers.iter().map(|peer| peer.clock.tick));
+        let compliance = scene.peers.iter().map(|peer| time * peer.clock.tick.as_secs_f64() / scene.copy_mass()).collect();
+        let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
+        Ok(Self { samples: vec![Vec::new(); peers], members, names, timetable, layout, time, compliance, growth: 1.0 })
+    }
+
+    fn map(mut self) -> Result<FullMap, AnalysisError> {
+        self.check()?;
+        let size = self.layout.size;
+        let rest = self.push(&vec![0.0; size], Instant::ZERO)?;
+        let mut free = Vec::with_capacity(A);
+        for axis in 0..A {
+            if self.is_free(axis, &rest)? {
+                free.push(axis);
+            }
+        }
+        // Relative to the first peer's copy, and without what nothing depends on.
+        let reference: Vec<usize> = free.iter().map(|axis| self.layout.first[0] + 2 * A + axis).collect();
+        let kept: Vec<usize> = (0..size).filter(|state| !reference.contains(state) && !self.layout.loose.contains(state)).collect();
+        let translations: Vec<Vec<f64>> = free.iter().map(|axis| self.translation(*axis)).collect();
+        let mut monodromy = Matrix::zeros(kept.len(), kept.len());
+        self.growth = 1.0;
+        for (column, state) in kept.iter().enumerate() {
+            let mut unit = vec![0.0; size];
+            unit[*state] = 1.0;
+            let mut reached = self.push(&unit, Instant::ZERO)?;
+            for (entry, rest) in reached.iter_mut().zip(&rest) {
+                *entry -= rest;
+            }
+            for (row, target) in kept.iter().enumerate() {
+                let moved: f64 = reference.iter().zip(&translations).map(|(reference, translation)| reached[*reference] * translation[*target]).sum();
+                monodromy[(row, column)] = reached[*target] - moved;
+            }
+        }
+        let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
+        // As for the lifted system: each tick rounds, and what is left of the frame magnifies that by at most about the growth.
+        let error = 10.0 * f64::EPSILON * count(ticks) * self.growth * self.growth * count(kept.len()).sqrt();
+        Ok(FullMap { monodromy, error, rigid_modes: free.len() + self.layout.loose.len(), frame: self.timetable.frame })
+    }
+
+    /// Refuses a strategy that is not linear, or that depends on more than the state it shows.
+    fn check(&mut self) -> Result<(), AnalysisError> {
+        let size = self.layout.size;
+        let rest = self.push(&vec![0.0; size], Instant::ZERO)?;
+        self.growth = 0.0;
+        let later = Instant::ZERO.saturating_add(self.timetable.frame).saturating_add(self.timetable.frame);
+        let relative = |reached: Vec<f64>| -> Vec<f64> { reached.iter().zip(&rest).map(|(reached, rest)| reached - rest).collect() };
+        // Small, middling and large, so that a dead band and a limit are both seen.
+        for amplitude in [1e-6, 1e-2, 10.0] {
+            let (one, other) = (noise(size, 1, amplitude), noise(size, 2, amplitude));
+            let both: Vec<f64> = one.iter().zip(&other).map(|(one, other)| one - 2.0 * other).collect();
+            let reached_one = self.push(&one, Instant::ZERO)?;
+            if self.push(&one, later)? != reached_one {
+                return Err(AnalysisError::Remembers);
+            }
+            let (reached_one, reached_other, reached_both) =
+                (relative(reached_one), relative(self.push(&other, Instant::ZERO)?), relative(self.push(&both, Instant::ZERO)?));
+            let scale = [&reached_one, &reached_other, &rest].into_iter().flatten().fold(amplitude, |largest: f64, entry| largest.max(entry.abs()));
+            let apart = |place: usize| (reached_one[place] - 2.0 * reached_other[place] - reached_both[place]).abs();
+            if let Some(place) = (0..size).find(|place| !(apart(*place) <= 1e-9 * scale.max(self.growth))) {
+                return Err(AnalysisError::NotLinear { peer: self.names[self.layout.owner(place)].clone() });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether everything may be moved along an axis without a force; not if an arm, or a strategy of somebody's own, knows where the origin is.
+    fn is_free(&mut self, axis: usize, rest: &[f64]) -> Result<bool, AnalysisError> {
+        if self.layout.tied {
+            return Ok(false);
+        }
+        let moved = self.translation(axis);
+        let reached = self.push(&moved, Instant::ZERO)?;
+        Ok(moved.iter().zip(reached.iter().zip(rest)).all(|(moved, (reached, rest))| (reached - rest - moved).abs() <= 1e-9))
+    }
+
+    /// Everything moved by 1 m along an axis, but for devices that touch nothing.
+    fn translation(&self, axis: usize) -> Vec<f64> {
+        let mut moved = vec![0.0; self.layout.size];
+        for (place, first) in self.layout.first.iter().enumerate() {
+            if self.layout.touching[place] {
+                moved[first + axis] = 1.0;
+            }
+            moved[first + 2 * A + axis] = 1.0;
+            for age in 0..self.timetable.depth[place] {
+                moved[self.layout.samples[place] + age * 2 * A + axis] = 1.0;
+            }
+        }
+        moved
+    }
+
+    /// One frame from the state `z`, beginning at `begin`.
+    fn push(&mut self, z: &[f64], begin: Instant) -> Result<Vec<f64>, AnalysisError> {
+        self.restore(z);
+        let peers = self.members.len();
+        for event in 0..self.timetable.events.len() {
+            match self.timetable.events[event] {
+                Event::Sample { node } => self.samples[node].push(*self.members[node].object().state()),
+                Event::Deliver { from, to, sample } => {
+                    let state = *self.sample(from, sample);
+                    self.members[to].hold(if from < to { from } else { from - 1 }, state);
+                }
+                Event::Tick { node, at, span } => {
+                    let now = begin.saturating_add_nanos(at);
+                    let member = &mut self.members[node];
+                    member.compute(now);
+                    member.advance(now, span);
+                    let (device, object) = (member.device().state(), member.object().state());
+                    for axis in 0..A {
+                        let largest = object.position[axis].abs().max(device.position[axis].abs());
+                        self.growth = self.growth.max(largest + self.time * object.velocity[axis].abs().max(device.velocity[axis].abs()));
+                    }
+                }
+            }
+        }
+        let mut reached = vec![0.0; z.len()];
+        for place in 0..peers {
+            self.read(place, &mut reached);
+        }
+        Ok(reached)
+    }
+
+    /// The sample with that number: from 0 if it is of this frame.
+    fn sample(&self, from: usize, number: i64) -> &State<A> {
+        let place = i64::try_from(self.timetable.depth[from]).unwrap_or(0) + number;
+        &self.samples[from][usize::try_from(place).unwrap_or(0)]
+    }
+
+    fn restore(&mut self, z: &[f64]) {
+        let layout = &self.layout;
+        for (place, member) in self.members.iter_mut().enumerate() {
+            let first = layout.first[place];
+            member.device_mut().set_state(state(&z[first..], self.time));
+            member.object_mut().set_state(state(&z[first + 2 * A..], self.time));
+            let mut next = first + 4 * A;
+            if layout.pending[place] {
+                let force = |from: usize| core::array::from_fn(|axis| z[from + axis] / self.compliance[place]);
+                member.set_computed(Acting { coupling: force(next), on_object: force(next + A) });
+                next += 2 * A;
+            }
+            member.strategy_mut().set_memory(&z[next..next + layout.memory[place]]);
+            // Kept with the oldest first, so that a sample's place follows from its number.
+            let depth = self.timetable.depth[place];
+            let samples = (0..depth).rev().map(|age| state(&z[layout.samples[place] + age * 2 * A..], self.time));
+            self.samples[place].clear();
+            self.samples[place].extend(samples);
+        }
+        for held in 0..self.timetable.held.len() {
+            let (to, from, sample) = self.timetable.held[held];
+            let state = *self.sample(from, sample);
+            self.members[to].hold(if from < to { from } else { from - 1 }, state);
+        }
+    }
+
+    fn read(&self, place: usize, z: &mut [f64]) {
+        let (layout, member) = (&self.layout, &self.members[place]);
+        let first = layout.first[place];
+        write(&member.device().state(), &mut z[first..], self.time);
+        write(member.object().state(), &mut z[first + 2 * A..], self.time);
+        let mut next = first + 4 * A;
+        if layout.pending[place] {
+            let Acting { coupling, on_object } = member.computed();
+            for axis in 0..A {
+                z[next + axis] = coupling[axis] * self.compliance[place];
+                z[next + A + axis] = on_object[axis] * self.compliance[place];
+            }
+            next += 2 * A;
+        }
+        z[next..next + layout.memory[place]].copy_from_slice(member.strategy().memory());
+        for (age, sample) in self.samples[place].iter().rev().take(self.timetable.depth[place]).enumerate() {
+            write(sample, &mut z[layout.samples[place] + age * 2 * A..], self.time);
+        }
+    }
+}
+
+impl Layout {
+    fn new<const A: usize, S: Strategy<A>>(scene: &Scene, contacts: &Contacts, members: &[Member<A, S>], timetable: &Timetable, tied: bool) -> Self {
+        let mut layout = Self {
+            first: Vec::new(),
+            touching: contacts.touching.clone(),
+            memory: Vec::new(),
+            pending: Vec::new(),
+            samples: Vec::new(),
+            size: 0,
+            loose: Vec::new(),
+            tied,
+        };
+        for (place, member) in members.iter().enumerate() {
+            let (pending, memory) = (scene.peers[place].compute_delay, member.strategy().memory().len());
+            layout.first.push(layout.size);
+            layout.pending.push(pending);
+            layout.memory.push(memory);
+            if !contacts.touching[place] && arm(&scene.peers[place]).stiffness == 0.0 {
+                layout.loose.extend((0..A).map(|axis| layout.size + axis));
+            }
+            layout.size += 4 * A + if pending { 2 * A } else { 0 } + memory;
+        }
+        for depth in &timetable.depth {
+            layout.samples.push(layout.size);
+            layout.size += depth * 2 * A;
+        }
+        layout
+    }
+
+    /// The peer to which a state belongs.
+    fn owner(&self, place: usize) -> usize {
+        let firsts = if self.samples.first().is_some_and(|first| place >= *first) { &self.samples } else { &self.first };
+        firsts.partition_point(|first| *first <= place).saturating_sub(1)
+    }
+}
+
+fn state<const A: usize>(z: &[f64], time: f64) -> State<A> {
+    State { position: core::array::from_fn(|axis| z[axis]), velocity: core::array::from_fn(|axis| z[A + axis] / time) }
+}
+
+fn write<const A: usize>(state: &State<A>, z: &mut [f64], time: f64) {
+    for axis in 0..A {
+        z[axis] = state.position[axis];
+        z[A + axis] = state.velocity[axis] * time;
+    }
+}
+
+/// Numbers of either sign up to `amplitude` in size, always the same ones: multiples of an irrational number, which spread evenly.
+fn noise(size: usize, seed: u32, amplitude: f64) -> Vec<f64> {
+    const GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
+    let place = |number: usize| (count(number) + 0.5) * GOLDEN_RATIO * f64::from(seed);
+    (0..size).map(|number| amplitude * (2.0 * (place(number) - place(number).floor()) - 1.0)).collect()
+}

@@ -1,0 +1,302 @@
+//! One frame of the lifted system: where it leads, as a linear function of where it began.
+
+use std::time::Duration;
+
+use cohaptic_peer::Gains;
+
+use super::node::{Node, Rows, Scale, Scratch};
+use crate::Matrix;
+use crate::timetable::{Event, Timetable};
+
+/// Nodes that are coupled through samples.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lifted<'a> {
+    pub(crate) nodes: &'a [Node],
+    /// The weight of each node's samples (column) in each node's target (row).
+    pub(crate) weights: &'a Matrix,
+    pub(crate) timetable: &'a Timetable,
+    /// KT and BT of average-position coordination.
+    pub(crate) coordination: Gains,
+    /// What velocities are multiplied by, about a tick \[s\].
+    pub(crate) time: f64,
+    /// Whether something ties the motion to ground. If not, the whole may be moved without a force, and positions are taken relative to the first
+    /// node's copy.
+    pub(crate) tied: bool,
+}
+
+/// What is pushed and looked at within a frame.
+pub(crate) trait Instrument {
+    /// How many inputs there are, each a column more.
+    fn inputs(&self) -> usize {
+        0
+    }
+
+    /// Sets the hand's force on the device of a node at a tick, `at` ns into the frame, as a function of the inputs \[N\]; answers whether there is one.
+    fn push(&mut self, _node: usize, _at: u64, _inputs: &mut [f64]) -> bool {
+        false
+    }
+
+    /// Sees the velocity of the device of a node at a tick, before it moves; multiplied by the common time.
+    fn see(&mut self, _node: usize, _at: u64, _velocity: &[f64]) {}
+}
+
+/// Nothing is pushed or looked at.
+pub(crate) struct Autonomous;
+
+impl Instrument for Autonomous {}
+
+/// Where a frame leads.
+///
+/// The unknowns, one column each: the states at the beginning, but for the reference; then the samples of earlier frames that are used; then inputs.
+/// A sample is (KT·x + BT·v) of the copy over (KT + BT/time): all that the others need of it, as a length.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct FrameMap {
+    /// The states at the end, one row each, the reference among them, in positions as they are.
+    pub(crate) states: Matrix,
+    /// Which of the rows are positions.
+    positions: Vec<bool>,
+    /// The row of the position that all others are relative to.
+    reference: Option<usize>,
+    /// The samples sent in the frame: for each node, its rows in `sent`.
+    pub(crate) sent: Matrix,
+    first_sent: Vec<usize>,
+    /// The samples of earlier frames that are used: of which node, how many samples before this frame's first.
+    pub(crate) used: Vec<(usize, usize)>,
+    depth: Vec<usize>,
+    /// How far a translation by 1 moves a sample.
+    pub(crate) translation: f64,
+    /// A bound of the rounding errors of all rows, in the largest sum of sizes of a row.
+    pub(crate) error: f64,
+}
+
+impl Lifted<'_> {
+    /// Steps through the frame with all unknowns at once.
+    pub(crate) fn frame(&self, instrument: &mut impl Instrument) -> FrameMap {
+        let Gains { stiffness, damping } = self.coordination;
+        // What a sample is divided by [N/m].
+        let unit = stiffness + damping / self.time;
+        let mut rows: Vec<Rows> = Vec::with_capacity(self.nodes.len());
+        let mut count = 0;
+        for node in self.nodes {
+            rows.push(node.rows(count));
+            count += node.states();
+        }
+        let reference = (!self.tied).then(|| rows[0].object);
+        let used = if unit > 0.0 { self.used() } else { Vec::new() };
+        let states = count - usize::from(reference.is_some());
+        let inputs = states + used.len();
+        let columns = inputs + instrument.inputs();
+        let scale = Scale { time: self.time, compliance: self.nodes[0].compliance(self.time) };
+
+        let mut z = Matrix::zeros(count, columns);
+        for row in 0..count {
+            match reference {
+                Some(reference) if row == reference => {}
+                Some(reference) if row > reference => z[(row, row - 1)] = 1.0,
+                _ => z[(row, row)] = 1.0,
+            }
+        }
+        // Samples: those used of earlier frames, then those sent in this one.
+        let mut first_sent = Vec::with_capacity(self.nodes.len());
+        let mut samples = used.len();
+        for sent in &self.timetable.sent {
+            first_sent.push(samples);
+            samples += sent;
+        }
+        let mut store = Matrix::zeros(samples, columns);
+        for place in 0..used.len() {
+            store[(place, states + place)] = 1.0;
+        }
+        let mut next_sent = first_sent.clone();
+        let nodes = self.nodes.len();
+        let row_of = |node: usize, sample: i64| -> Option<usize> {
+            match usize::try_from(sample) {
+                Ok(number) => Some(first_sent[node] + number),
+                Err(_) => used.iter().position(|(from, age)| *from == node && usize::try_from(-sample) == Ok(*age)),
+            }
+        };
+        let mut held: Vec<Option<usize>> = vec![None; nodes * nodes];
+        for (to, from, sample) in &self.timetable.held {
+            held[to * nodes + from] = row_of(*from, *sample);
+        }
+        let mut targets = Matrix::zeros(nodes, columns);
+        let mut stale = vec![true; nodes];
+        let mut scratch = Scratch::default();
+        scratch.resize(columns);
+        let mut push = vec![0.0; columns];
+        let (mut growth, mut ticks) = (1.0_f64, 0_u32);
+        for event in &self.timetable.events {
+            match *event {
+                Event::Sample { node } => {
+                    if unit > 0.0 {
+                        let (x, v) = (z.row(rows[node].object), z.row(rows[node].object + 1));
+                        let sample = store.row_mut(next_sent[node]);
+                        for column in 0..columns {
+                            sample[column] = stiffness / unit * x[column] + damping / self.time / unit * v[column];
+                        }
+                    }
+                    next_sent[node] += 1;
+                }
+                Event::Deliver { from, to, sample } => {
+                    held[to * nodes + from] = row_of(from, sample);
+                    stale[to] = true;
+                }
+                Event::Tick { node, at, span } => {
+                    if std::mem::take(&mut stale[node]) {
+                        let target = targets.row_mut(node);
+                        target.fill(0.0);
+                        for from in 0..nodes {
+                            let weight = self.weights[(node, from)] * unit;
+                            if let Some(sample) = held[node * nodes + from] {
+                                for (sum, entry) in target.iter_mut().zip(store.row(sample)) {
+                                    *sum += weight * entry;
+                                }
+                            }
+                        }
+                    }
+                    let pushed = match rows[node].device {
+                        Some(device) => {
+                            instrument.see(node, at, z.row(device + 1));
+                            instrument.push(node, at, &mut push[inputs..])
+                        }
+                        None => false,
+                    };
+                    let hand = pushed.then_some(push.as_slice());
+                    self.nodes[node].tick(&mut z, rows[node], self.coordination, targets.row(node), hand, span, scale, &mut scratch);
+                    ticks += 1;
+                    growth = growth.max(norm(&z, rows[node], self.nodes[node].states()));
+                }
+            }
+        }
+        let step = self.nodes.iter().map(|node| node.step_norm(self.coordination, scale)).fold(1.0, f64::max);
+        let mut positions = vec![false; count];
+        for row in &rows {
+            positions[row.object] = true;
+            if let Some(device) = row.device {
+                positions[device] = true;
+            }
+        }
+        FrameMap {
+            states: z,
+            positions,
+            reference,
+            sent: tail(&store, used.len()),
+            first_sent: first_sent.iter().map(|first| first - used.len()).collect(),
+            used,
+            depth: if unit > 0.0 { self.timetable.depth.clone() } else { vec![0; nodes] },
+            translation: if unit > 0.0 { stiffness / unit } else { 0.0 },
+            // Each tick of a node rounds some ten operations on numbers of at most step·growth, and what is left of the frame magnifies that by at
+            // most about the growth.
+            error: 10.0 * f64::EPSILON * f64::from(ticks) * step * growth * growth,
+        }
+    }
+
+    /// The samples of earlier frames that are used in this one, by node and then by age.
+    fn used(&self) -> Vec<(usize, usize)> {
+        let deliveries = self.timetable.events.iter().filter_map(|event| match event {
+            Event::Deliver { from, to, sample } => Some((*to, *from, *sample)),
+            Event::Sample { .. } | Event::Tick { .. } => None,
+        });
+        let all = self.timetable.held.iter().copied().chain(deliveries);
+        // Only samples that weigh something are unknowns; a mean over nobody holds none.
+        let mut used: Vec<(usize, usize)> = all
+            .filter(|(to, from, _)| self.weights[(*to, *from)] != 0.0)
+            .filter_map(|(_, from, sample)| usize::try_from(-sample).ok().filter(|age| *age > 0).map(|age| (from, age)))
+            .collect();
+        used.sort_unstable();
+        used.dedup();
+        used
+    }
+}
+
+impl FrameMap {
+    /// The matrix that one frame multiplies the relative state by: states but for the reference, then for each node the samples of earlier frames, the
+    /// newest first.
+    pub(crate) fn monodromy(&self) -> Matrix {
+        let count = self.states.rows();
+        let kept: Vec<usize> = (0..count).filter(|row| Some(*row) != self.reference).collect();
+        let states = kept.len();
+        let mut first = Vec::with_capacity(self.depth.len());
+        let mut size = states;
+        for depth in &self.depth {
+            first.push(size);
+            size += depth;
+        }
+        // Where the unknowns of the frame stand among the states.
+        let place = |column: usize| if column < states { column } else { self.used_place(column - states, &first) };
+        let columns = states + self.used.len();
+        let mut matrix = Matrix::zeros(size, size);
+        let mut put = |row: usize, source: &[f64], moved: f64| {
+            for (column, entry) in source.iter().enumerate().take(columns) {
+                matrix[(row, place(column))] += entry;
+            }
+            if let Some(reference) = self.reference {
+                for (column, entry) in self.states.row(reference).iter().enumerate().take(columns) {
+                    matrix[(row, place(column))] -= moved * entry;
+                }
+            }
+        };
+        for (row, source) in kept.iter().enumerate() {
+            put(row, self.states.row(*source), if self.positions[*source] { 1.0 } else { 0.0 });
+        }
+        let mut shifted = Vec::new();
+        for (node, depth) in self.depth.iter().enumerate() {
+            let sent = self.sent_by(node);
+            for age in 1..=*depth {
+                let row = first[node] + age - 1;
+                if age <= sent.len() {
+                    put(row, self.sent.row(sent.end - age), self.translation);
+                } else {
+                    put(row, &[], self.translation);
+                    shifted.push((row, first[node] + age - sent.len() - 1));
+                }
+            }
+        }
+        for (row, column) in shifted {
+            matrix[(row, column)] += 1.0;
+        }
+        matrix
+    }
+
+    /// The rows of `sent` that a node sent, in order of time.
+    pub(crate) fn sent_by(&self, node: usize) -> std::ops::Range<usize> {
+        let end = self.first_sent.get(node + 1).copied().unwrap_or(self.sent.rows());
+        self.first_sent[node]..end
+    }
+
+    /// How many unknowns are states.
+    pub(crate) fn state_unknowns(&self) -> usize {
+        self.states.rows() - usize::from(self.reference.is_some())
+    }
+
+    /// The row of the position that all others are relative to.
+    pub(crate) const fn reference(&self) -> Option<usize> {
+        self.reference
+    }
+
+    /// Whether a row is a position.
+    pub(crate) fn is_position(&self, row: usize) -> bool {
+        self.positions[row]
+    }
+
+    fn used_place(&self, number: usize, first: &[usize]) -> usize {
+        let (node, age) = self.used[number];
+        first[node] + age - 1
+    }
+}
+
+/// The largest sum of the sizes of a row, over the rows of one node.
+fn norm(z: &Matrix, rows: Rows, count: usize) -> f64 {
+    let first = rows.device.unwrap_or(rows.object);
+    (first..first + count).map(|row| z.row(row).iter().map(|entry| entry.abs()).sum::<f64>()).fold(0.0, f64::max)
+}
+
+/// The rows from `first` on.
+fn tail(matrix: &Matrix, first: usize) -> Matrix {
+    Matrix::from_fn(matrix.rows() - first, matrix.columns(), |row, column| matrix[(first + row, column)])
+}
+
+/// The common time: the shortest tick of the nodes \[s\].
+pub(crate) fn common_time(ticks: impl Iterator<Item = Duration>) -> f64 {
+    ticks.min().unwrap_or(Duration::from_millis(1)).as_secs_f64()
+}

@@ -1,0 +1,10 @@
+//! The lifted system: nodes of one axis, coupled by weights over the samples they send, and one frame of it as a matrix.
+//!
+//! Lifting turns a system with two rates into one with the slow rate, without approximation (Araki & Yamamoto 1986). A node is a peer, or what a class of
+//! equal peers has in common or apart; the weights are the averaging matrix, or one of its eigenvalues.
+
+pub(crate) mod frame;
+pub(crate) mod node;
+
+pub(crate) use frame::{Autonomous, Lifted, common_time};
+pub(crate) use node::{Body, Node};

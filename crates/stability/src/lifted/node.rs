@@ -1,0 +1,191 @@
+//! A node of the lifted system: a peer, or what a class of equal peers has in common, on one axis.
+//!
+//! Positions are in metres. Velocities are multiplied by a common time and forces by a compliance, so that every state is a length: norms, and errors
+//! bounded by them, then mean something.
+
+use std::time::Duration;
+
+use cohaptic_peer::{Clock, Gains, Integrator, Plant, StepMap};
+
+use crate::Matrix;
+
+/// A body's step maps for the spans between its ticks.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Body {
+    short: (Duration, StepMap),
+    long: StepMap,
+}
+
+impl Body {
+    pub(crate) fn new(plant: Plant, integrator: Integrator, clock: &Clock) -> Self {
+        let (short, long) = clock.spans();
+        let first = plant.step(short, integrator);
+        Self { short: (short, first), long: if long == short { first } else { plant.step(long, integrator) } }
+    }
+
+    fn map(&self, span: Duration) -> &StepMap {
+        if span == self.short.0 { &self.short.1 } else { &self.long }
+    }
+}
+
+/// A node: what of a peer takes part in the linear motion of one axis.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Node {
+    /// The device and the arm that holds it; `None` where it touches nothing.
+    pub(crate) device: Option<Body>,
+    pub(crate) object: Body,
+    /// KC and BC.
+    pub(crate) coupling: Gains,
+    /// A spring and a damper that tie the copy to ground.
+    pub(crate) wall: Option<Gains>,
+    /// Whether forces are applied one tick after they were computed.
+    pub(crate) compute_delay: bool,
+}
+
+/// Where a node's states stand among the rows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Rows {
+    /// Position and velocity of the device, if it takes part.
+    pub(crate) device: Option<usize>,
+    /// Position and velocity of the copy.
+    pub(crate) object: usize,
+    /// The forces that were computed and act next: on the copy and, in the row after it, on the device.
+    pub(crate) pending: Option<usize>,
+}
+
+/// The units of the states.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Scale {
+    /// What velocities are multiplied by \[s\].
+    pub(crate) time: f64,
+    /// What forces are multiplied by [m/N].
+    pub(crate) compliance: f64,
+}
+
+/// Rows that a tick works with, kept from tick to tick.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scratch {
+    coupling: Vec<f64>,
+    on_object: Vec<f64>,
+}
+
+impl Scratch {
+    pub(crate) fn resize(&mut self, columns: usize) {
+        self.coupling.resize(columns, 0.0);
+        self.on_object.resize(columns, 0.0);
+    }
+}
+
+impl Node {
+    /// How many rows its states take.
+    pub(crate) fn states(&self) -> usize {
+        let bodies = if self.device.is_some() { 2 } else { 1 };
+        2 * bodies + if self.compute_delay { bodies } else { 0 }
+    }
+
+    /// Its rows, from `first` on.
+    pub(crate) fn rows(&self, first: usize) -> Rows {
+        let device = self.device.map(|_| first);
+        let object = first + if self.device.is_some() { 2 } else { 0 };
+        Rows { device, object, pending: self.compute_delay.then_some(object + 2) }
+    }
+
+    /// The compliance that makes the node's forces lengths: how far a force moves the copy within the common time.
+    pub(crate) fn compliance(&self, time: f64) -> f64 {
+        self.object.short.1.coefficients().1[1] * time
+    }
+
+    /// The largest sum of the sizes of a row of one tick's matrix, in the units of `scale`: how much rounding errors grow in a tick at most.
+    pub(crate) fn step_norm(&self, coordination: Gains, scale: Scale) -> f64 {
+        let gain = |gains: Gains| gains.stiffness.abs() + gains.damping.abs() / scale.time;
+        let wall = self.wall.map_or(0.0, gain);
+        let on_object = 2.0 * if self.device.is_some() { gain(self.coupling) } else { 0.0 } + 2.0 * gain(coordination) + wall;
+        let row = |body: &Body, force: f64| {
+            let (e, g) = body.short.1.coefficients();
+            let position = 1.0 + e[0][0].abs() + e[0][1].abs() / scale.time + g[0].abs() * force;
+            let velocity = 1.0 + (e[1][0] * scale.time).abs() + e[1][1].abs() + g[1].abs() * scale.time * force;
+            position.max(velocity)
+        };
+        let device = self.device.as_ref().map_or(0.0, |body| row(body, 2.0 * gain(self.coupling)));
+        row(&self.object, on_object).max(device)
+    }
+
+    /// One tick: forces from the rows as they are, `target` the force of the held samples on the copy \[N\], `hand` that of the hand on the device \[N\].
+    /// Every row is a linear function of the same unknowns, one column each.
+    #[expect(clippy::too_many_arguments, reason = "what a tick needs, each of its own kind")]
+    pub(crate) fn tick(
+        &self,
+        z: &mut Matrix,
+        rows: Rows,
+        coordination: Gains,
+        target: &[f64],
+        hand: Option<&[f64]>,
+        span: Duration,
+        scale: Scale,
+        scratch: &mut Scratch,
+    ) {
+        let own = coordination_of(coordination, self.wall);
+        let columns = z.columns();
+        let Scratch { coupling, on_object } = scratch;
+        {
+            let (x, v) = (z.row(rows.object), z.row(rows.object + 1));
+            let damping = own.damping / scale.time;
+            for column in 0..columns {
+                on_object[column] = target[column] - (own.stiffness * x[column] + damping * v[column]);
+            }
+            if let Some(device) = rows.device {
+                let (xh, vh) = (z.row(device), z.row(device + 1));
+                let (stiffness, damping) = (self.coupling.stiffness, self.coupling.damping / scale.time);
+                for column in 0..columns {
+                    //= Rakhsha & Constantinescu 2015, eq. (9)
+                    let force = stiffness * (xh[column] - x[column]) + damping * (vh[column] - v[column]);
+                    coupling[column] = force;
+                    on_object[column] += force;
+                }
+            }
+        }
+        if let Some(pending) = rows.pending {
+            exchange(z.row_mut(pending), on_object, scale.compliance);
+            if rows.device.is_some() {
+                exchange(z.row_mut(pending + 1), coupling, scale.compliance);
+            }
+        }
+        advance(z, rows.object, self.object.map(span), on_object, scale.time);
+        if let (Some(first), Some(device)) = (rows.device, &self.device) {
+            for column in 0..columns {
+                coupling[column] = -coupling[column];
+            }
+            if let Some(hand) = hand {
+                for (force, hand) in coupling.iter_mut().zip(hand) {
+                    *force += hand;
+                }
+            }
+            advance(z, first, device.map(span), coupling, scale.time);
+        }
+    }
+}
+
+/// Coordination and wall pull on the copy's own state alike.
+fn coordination_of(coordination: Gains, wall: Option<Gains>) -> Gains {
+    wall.map_or(coordination, |wall| Gains { stiffness: coordination.stiffness + wall.stiffness, damping: coordination.damping + wall.damping })
+}
+
+/// Stores the forces just computed and gives those computed a tick before.
+fn exchange(stored: &mut [f64], force: &mut [f64], compliance: f64) {
+    for (stored, force) in stored.iter_mut().zip(force) {
+        let before = *stored / compliance;
+        *stored = *force * compliance;
+        *force = before;
+    }
+}
+
+fn advance(z: &mut Matrix, first: usize, map: &StepMap, force: &[f64], time: f64) {
+    let (e, g) = map.coefficients();
+    let (e01, e10, g1) = (e[0][1] / time, e[1][0] * time, g[1] * time);
+    let (x, v) = z.two_rows_mut(first);
+    for ((x, v), f) in x.iter_mut().zip(v).zip(force) {
+        let (x0, v0) = (*x, *v);
+        *x = x0 + (e[0][0] * x0 + e01 * v0 + g[0] * f);
+        *v = v0 + (e10 * x0 + e[1][1] * v0 + g1 * f);
+    }
+}

@@ -1,0 +1,127 @@
+//! The parts of a scene that do not mix, and the spectral radius of each.
+
+use std::time::Duration;
+
+use cohaptic_peer::StepMap;
+use cohaptic_scene::Scene;
+
+use crate::lifted::{Autonomous, Lifted, Node};
+use crate::spectrum::bounded_radius;
+use crate::structure::{Structure, arm, device_plant};
+use crate::{Matrix, Radius};
+
+/// A part of a scene that moves on its own.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Part {
+    /// What moves.
+    pub kind: PartKind,
+    /// How many states it has.
+    pub size: usize,
+    /// How many equal ones there are, of all axes.
+    pub copies: usize,
+    /// Its spectral radius over one frame.
+    pub radius: Radius,
+}
+
+/// What moves in a part of a scene.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum PartKind {
+    /// The whole scene, by the general path.
+    Whole,
+    /// What the peers of each class do on average.
+    Together,
+    /// How equal peers differ from their average.
+    Apart {
+        /// The first peer of the class, by its place in [`Scene::peers`].
+        peer: usize,
+    },
+    /// A device that touches nothing.
+    LooseDevice {
+        /// The first such peer, by its place in [`Scene::peers`].
+        peer: usize,
+    },
+}
+
+impl Part {
+    pub(crate) const fn whole(radius: Radius, size: usize) -> Self {
+        Self { kind: PartKind::Whole, size, copies: 1, radius }
+    }
+}
+
+/// All parts of a scene.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Reduced {
+    pub(crate) parts: Vec<Part>,
+    pub(crate) rigid_modes: usize,
+    /// The states of the whole scene, rigid-body modes left out.
+    pub(crate) dimension: usize,
+    pub(crate) frame: Duration,
+}
+
+/// The largest radius of several parts.
+pub(crate) fn radius_of(parts: &[Part]) -> Radius {
+    parts.iter().map(|part| part.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 })
+}
+
+/// Takes a scene apart along that many equal axes.
+pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize) -> Reduced {
+    let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
+    let quotient = structure.quotient(scene, &nodes);
+    let mut parts = Vec::new();
+    let mut rigid_modes = usize::from(!structure.tied);
+    let mut dimension = 0;
+    let (radius, size) = lifted_radius(&quotient);
+    parts.push(Part { kind: PartKind::Together, size, copies: axes, radius });
+    for (class, members) in structure.classes.iter().enumerate() {
+        let node = &nodes[class];
+        // Each sample is a position and a velocity.
+        dimension += members.len() * (node.states() + 2 * structure.timetable.depth[class]);
+        if let Some(timetable) = &structure.apart[class] {
+            let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
+            let apart = Lifted { nodes: &nodes[class..=class], weights: &weight, timetable, tied: true, ..quotient };
+            let (radius, size) = lifted_radius(&apart);
+            // A class on its own may repeat more often than the whole scene.
+            let frames = structure.timetable.frame.as_nanos() / timetable.frame.as_nanos().max(1);
+            let radius = radius.over(u32::try_from(frames).unwrap_or(u32::MAX));
+            parts.push(Part { kind: PartKind::Apart { peer: members[0] }, size, copies: (members.len() - 1) * axes, radius });
+        }
+        if !structure.touching[class] {
+            let (radius, size) = loose_device(structure, scene, class);
+            parts.push(Part { kind: PartKind::LooseDevice { peer: members[0] }, size, copies: members.len() * axes, radius });
+            rigid_modes += members.len() * (2 - size);
+            dimension += 2 * members.len();
+        }
+    }
+    Reduced { parts, rigid_modes: rigid_modes * axes, dimension: (dimension - rigid_modes) * axes, frame: structure.timetable.frame }
+}
+
+/// The spectral radius of a lifted system, and how many states it has.
+fn lifted_radius(lifted: &Lifted<'_>) -> (Radius, usize) {
+    let frame = lifted.frame(&mut Autonomous);
+    let monodromy = frame.monodromy();
+    (bounded_radius(&monodromy, frame.error), monodromy.rows())
+}
+
+/// A device that touches nothing: its velocity and, if an arm ties it to ground, its position.
+fn loose_device(structure: &Structure, scene: &Scene, class: usize) -> (Radius, usize) {
+    let spec = &scene.peers[structure.classes[class][0]];
+    let (short, long) = spec.clock.spans();
+    let plant = device_plant(spec);
+    let ticks = structure.timetable.frame.as_nanos() / short.as_nanos().max(1);
+    let radius = [plant.step(short, scene.integrator), plant.step(long, scene.integrator)].iter().map(step_radius).fold(0.0, f64::max);
+    let ticks = crate::structure::count(usize::try_from(ticks).unwrap_or(usize::MAX));
+    let value = libm::pow(radius, ticks);
+    let size = if arm(spec).stiffness > 0.0 { 2 } else { 1 };
+    (Radius { value, error: 16.0 * f64::EPSILON * ticks * value }, size)
+}
+
+/// The spectral radius of one step of a body: of its velocity alone if nothing ties it to ground.
+fn step_radius(map: &StepMap) -> f64 {
+    let ([[e00, e01], [e10, e11]], _) = map.coefficients();
+    if map.is_free() {
+        return (1.0 + e11).abs();
+    }
+    let (half_trace, determinant) = (1.0 + 0.5 * (e00 + e11), (1.0 + e00) * (1.0 + e11) - e01 * e10);
+    let discriminant = half_trace * half_trace - determinant;
+    if discriminant < 0.0 { determinant.sqrt() } else { half_trace.abs() + discriminant.sqrt() }
+}

@@ -1,0 +1,198 @@
+//! A linear scene on one axis, sorted into classes of equal peers.
+//!
+//! Peers that are equal, over links that are equal, move in two ways that do not mix: what a class does on average, and how its members differ. The
+//! averages of all classes form one system with a node a class, the *quotient*; member i hears the others' differences as −d_i/(N−1), because the
+//! differences of a class add up to nothing, so each class of n > 1 members has n − 1 copies of one system of a single node with the weight −1/(N−1).
+//! The spectrum of the whole is that of these blocks, exactly.
+
+use cohaptic_peer::{ArmConfig, Coordination, Gains, Hand, Plant};
+use cohaptic_scene::{PeerSpec, Scene};
+
+use crate::lifted::{Body, Lifted, Node, common_time};
+use crate::network::{LinkTiming, NominalNetwork};
+use crate::timetable::{NodeClock, Timetable};
+use crate::{AnalysisError, Matrix};
+
+/// Which parts of a scene that is not linear are in force: one linear scene.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Contacts {
+    /// For each peer, whether its device and its copy are coupled.
+    pub(crate) touching: Vec<bool>,
+    /// Whether every copy is at a wall of the enclosure.
+    pub(crate) at_wall: bool,
+}
+
+/// The classes of a scene and what happens among them in a frame.
+#[derive(Clone, Debug)]
+pub(crate) struct Structure {
+    /// The members of each class, in order; classes in the order of their first members.
+    pub(crate) classes: Vec<Vec<usize>>,
+    /// For each class, whether its members touch the object.
+    pub(crate) touching: Vec<bool>,
+    pub(crate) at_wall: bool,
+    /// A frame of the classes' averages.
+    pub(crate) timetable: Timetable,
+    /// For each class of more than one member, a frame of a single node that hears itself.
+    pub(crate) apart: Vec<Option<Timetable>>,
+    /// The weight of each class's average (column) in the target of each class (row).
+    pub(crate) weights: Matrix,
+    /// Whether something ties the object to ground: an arm's stiffness, a wall, or a peer that holds forever what it began with.
+    pub(crate) tied: bool,
+    peers: usize,
+}
+
+impl Structure {
+    /// The classes of peers that are equal in every one of the scenes, which differ in numbers only.
+    pub(crate) fn of(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
+        let scene = scenes[0];
+        let peers = scene.peers.len();
+        let mut classes: Vec<Vec<usize>> = Vec::new();
+        for place in 0..peers {
+            let found = classes.iter().position(|class| {
+                contacts.touching[class[0]] == contacts.touching[place]
+                    && scenes.iter().all(|scene| alike(&scene.peers[class[0]], &scene.peers[place], contacts.touching[place]))
+            });
+            match found {
+                Some(class) => classes[class].push(place),
+                None => classes.push(vec![place]),
+            }
+        }
+        if !network.is_uniform() {
+            classes = split_by_links(classes, network);
+        }
+        let clocks: Vec<NodeClock> = classes.iter().map(|class| NodeClock::of(scene, class[0])).collect();
+        let mut links: Vec<(usize, usize, LinkTiming)> = Vec::new();
+        for (to, receivers) in classes.iter().enumerate() {
+            for (from, senders) in classes.iter().enumerate() {
+                let pair = if from == to { senders.get(1).map(|second| (*second, receivers[0])) } else { Some((senders[0], receivers[0])) };
+                if let Some((sender, receiver)) = pair {
+                    links.push((from, to, network.timing(sender, receiver).clone()));
+                }
+            }
+        }
+        let timetable = Timetable::new(&clocks, &links)?;
+        let apart = classes.iter().enumerate().map(|(class, members)| {
+            let own = links.iter().find(|(from, to, _)| (*from, *to) == (class, class)).filter(|_| members.len() > 1);
+            own.map(|(_, _, timing)| Timetable::new(&clocks[class..=class], &[(0, 0, timing.clone())])).transpose()
+        });
+        let apart = apart.collect::<Result<Vec<_>, _>>()?;
+        let others = count(peers - 1);
+        let weights = Matrix::from_fn(classes.len(), classes.len(), |row, column| {
+            let heard = classes[column].len() - usize::from(row == column);
+            count(heard) / others
+        });
+        let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
+        let arm = |class: &Vec<usize>| contacts.touching[class[0]] && arm(&scene.peers[class[0]]).stiffness > 0.0;
+        let tied = contacts.at_wall || silent || classes.iter().any(arm);
+        let touching = classes.iter().map(|class| contacts.touching[class[0]]).collect();
+        Ok(Self { classes, touching, at_wall: contacts.at_wall, timetable, apart, weights, tied, peers })
+    }
+
+    /// KT and BT of the average-position strategy that is the same as the scene's.
+    pub(crate) fn coordination(&self, scene: &Scene) -> Gains {
+        let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(self.peers));
+        match scene.coordination.strategy {
+            Coordination::AveragePosition => gains,
+            Coordination::ProportionalDerivative => gains.scaled(count(self.peers - 1)),
+            _ => unreachable!("every strategy of this workspace is listed"),
+        }
+    }
+
+    /// The node that stands for a class.
+    pub(crate) fn node(&self, scene: &Scene, class: usize) -> Node {
+        let spec = &scene.peers[self.classes[class][0]];
+        let object = Plant { mass: scene.copy_mass(), damping: scene.object.damping, stiffness: 0.0 };
+        Node {
+            device: self.touching[class].then(|| Body::new(device_plant(spec), scene.integrator, &spec.clock)),
+            object: Body::new(object, scene.integrator, &spec.clock),
+            coupling: spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers)),
+            wall: scene.object.enclosure.filter(|_| self.at_wall).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping }),
+            compute_delay: spec.compute_delay,
+        }
+    }
+
+    /// The weight with which a difference within a class comes back: −1/(N−1).
+    pub(crate) fn difference_weight(&self) -> f64 {
+        -1.0 / count(self.peers - 1)
+    }
+
+    /// The common time of the classes \[s\].
+    pub(crate) fn time(&self, scene: &Scene) -> f64 {
+        common_time(self.classes.iter().map(|class| scene.peers[class[0]].clock.tick))
+    }
+
+    /// The system of the classes' averages.
+    pub(crate) fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
+        Lifted {
+            nodes,
+            weights: &self.weights,
+            timetable: &self.timetable,
+            coordination: self.coordination(scene),
+            time: self.time(scene),
+            tied: self.tied,
+        }
+    }
+}
+
+/// The device and the arm that holds it.
+pub(crate) fn device_plant(spec: &PeerSpec) -> Plant {
+    let arm = arm(spec);
+    Plant { mass: spec.device.mass + arm.mass, damping: spec.device.damping + arm.damping, stiffness: arm.stiffness }
+}
+
+/// The arm that holds a peer's device; zero without one.
+pub(crate) fn arm(spec: &PeerSpec) -> ArmConfig {
+    match &spec.hand {
+        Some(Hand::Arm { arm, .. }) => *arm,
+        Some(Hand::Force(_)) | None => ArmConfig { mass: 0.0, damping: 0.0, stiffness: 0.0 },
+    }
+}
+
+/// Whether two peers move by the same equations.
+fn alike(one: &PeerSpec, other: &PeerSpec, touching: bool) -> bool {
+    let same_clock = (one.clock, one.phase, one.compute_delay) == (other.clock, other.phase, other.compute_delay);
+    let same_device = || (one.device, arm(one)) == (other.device, arm(other));
+    let same_coupling = || (one.coupling, one.coupling_scaling) == (other.coupling, other.coupling_scaling);
+    same_clock && same_device() && (!touching || same_coupling())
+}
+
+/// Splits classes until every link between two classes is the same.
+fn split_by_links(mut classes: Vec<Vec<usize>>, network: &NominalNetwork) -> Vec<Vec<usize>> {
+    loop {
+        let uneven =
+            (0..classes.len()).find_map(|from| (0..classes.len()).find(|to| !even(&classes[from], &classes[*to], network)).map(|to| (from, to)));
+        let Some((from, to)) = uneven else {
+            return classes;
+        };
+        let mut split: Vec<Vec<usize>> = Vec::with_capacity(classes.len());
+        for (class, members) in classes.iter().enumerate() {
+            if class == from || class == to {
+                split.extend(members.iter().map(|member| vec![*member]));
+            } else {
+                split.push(members.clone());
+            }
+        }
+        split.sort_unstable_by_key(|class| class[0]);
+        classes = split;
+    }
+}
+
+/// Whether all links from one class to another are the same.
+fn even(senders: &[usize], receivers: &[usize], network: &NominalNetwork) -> bool {
+    let mut first: Option<&LinkTiming> = None;
+    for from in senders {
+        for to in receivers.iter().filter(|to| *to != from) {
+            let timing = network.timing(*from, *to);
+            if first.is_some_and(|first| first != timing) {
+                return false;
+            }
+            first = Some(timing);
+        }
+    }
+    true
+}
+
+#[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
+pub(crate) fn count(number: usize) -> f64 {
+    number as f64
+}

@@ -1,0 +1,28 @@
+//! Numbers that are known from elsewhere.
+
+use cohaptic_scene::Scene;
+use cohaptic_stability::{Method, analyse};
+
+/// The paper's parameters (Rakhsha & Constantinescu 2015, Section 3) with everybody touching.
+pub(crate) const PAPER: &str = r#"
+    scene        = { duration = "1s", count = 3 }
+    object       = { mass = 0.45 }
+    coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+    peer         = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+    link         = { delay = "8ms" }
+"#;
+
+pub(crate) fn scene(overrides: &[&str]) -> Scene {
+    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+    Scene::parse(PAPER, "paper.toml".as_ref(), &overrides).unwrap()
+}
+
+/// The radius computed apart from this program from the full matrix: 0.8964881385693.
+#[test]
+fn three_peers_who_touch_have_the_radius_computed_elsewhere() {
+    for method in [Method::Reduced, Method::Full] {
+        let analysis = analyse(&scene(&[]), method).unwrap();
+        assert!((analysis.radius.value - 0.896_488_138_569_3).abs() < 2e-13, "{analysis:?}");
+        assert_eq!(analysis.rigid_modes, 1);
+    }
+}

@@ -1,0 +1,4 @@
+//! The analysis of whole scenes.
+
+mod anchors;
+mod reduction;
