@@ -7,6 +7,8 @@
 
 mod matrix;
 mod radius;
+mod spectrum;
 
 pub use matrix::Matrix;
 pub use radius::{Radius, Verdict};
+pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
