@@ -5,10 +5,12 @@
 //! origin. This crate builds that matrix from the same plants and strategies that the simulator steps (lifting: Araki & Yamamoto 1986; Rakhsha &
 //! Constantinescu 2015, Section 3), reduces it where peers are alike, and says how sure it is of the answer.
 
+mod determinant;
 mod matrix;
 mod radius;
 mod spectrum;
 
+pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
 pub use matrix::Matrix;
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
