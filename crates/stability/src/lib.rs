@@ -6,6 +6,7 @@
 //! Constantinescu 2015, Section 3), reduces it where peers are alike, and says how sure it is of the answer.
 
 mod analysis;
+mod determinant;
 mod error;
 mod full;
 mod graph;
@@ -20,9 +21,11 @@ mod structure;
 mod timetable;
 
 pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_with};
+pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
 pub use error::AnalysisError;
 pub use graph::{Graph, GraphError, analyse_on};
 pub use matrix::Matrix;
 pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use radius::{Radius, Verdict};
+pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
