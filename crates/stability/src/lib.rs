@@ -7,6 +7,8 @@
 
 mod matrix;
 mod radius;
+mod worst_case;
 
 pub use matrix::Matrix;
 pub use radius::{Radius, Verdict};
+pub use worst_case::{Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Pattern, PatternError, WorstCase};
