@@ -49,8 +49,7 @@ pub(super) fn improve(component: &Component<'_>, start: Factors, accuracy: f64) 
         let factors: Vec<Matrix> = factors.iter().map(|factor| factor.scaled(1.0 / largest)).collect();
         let Some(next) = component.images(&factors) else { break };
         let reached = largest_square(&next);
-        // Written so that NaN ends it.
-        if !(reached < square) {
+        if reached >= square || reached.is_nan() {
             break;
         }
         let gap = square - reached;

@@ -181,7 +181,7 @@ fn is_positive(symmetric: &Matrix, error: &Matrix) -> bool {
     let share = gamma(size + 1) / (1.0 - gamma(size + 1));
     // The last terms: the diagonal's subtraction rounds once, at most at 2 + c; underflow in the factorisation (Rump 2006, eq. 2.4 bounds it by less).
     let shift = outward(share * trace * (1.0 + gamma(size)) + rows * (1.0 + gamma(size))) + 4.0 * UNIT + 8.0 * real(size * size) * UNDERFLOW;
-    if !(shift < 0.5) {
+    if shift >= 0.5 || shift.is_nan() {
         return false;
     }
     for place in 0..size {
