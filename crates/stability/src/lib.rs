@@ -19,6 +19,7 @@ mod radius;
 mod spectrum;
 mod structure;
 mod timetable;
+mod worst_case;
 
 pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_with};
 pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
@@ -29,3 +30,4 @@ pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
+pub use worst_case::{Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Pattern, PatternError, WorstCase};
