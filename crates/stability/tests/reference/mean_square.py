@@ -162,7 +162,8 @@ def cases():
     jitter = '{ sd = "1443375ns", distribution = "uniform" }'
     yield "jitter-n2", scene(2, 1000.0, delay="2500us", jitter=jitter), "uniform from 0 to 5 ms: 1, 2, 3, 4 or 5 ticks"
     yield "jitter-n3-ap", scene(3, 1000.0, delay="2500us", jitter=jitter), "the same, 15,625 modes"
-    yield "jitter-n3-pd", scene(3, 700.0, delay="2500us", jitter=jitter, strategy=PD), "the same, PD"
+    narrow = '{ sd = "800us", distribution = "uniform" }'
+    yield "jitter-n3-pd", scene(3, 700.0, delay="2500us", jitter=narrow, strategy=PD), "2, 3 or 4 ticks, 729 modes"
     yield "jitter-n2-next-frame", scene(2, 1000.0, delay="11500us", jitter='{ sd = "1500us", distribution = "uniform" }'), "ticks 9 to 15, unequal chances"
     yield (
         "jitter-n2-different",
