@@ -145,10 +145,12 @@ def group(place):
 
 def check():
     """Lifting against simulation."""
-    for text, peer, hz in ((paper(3), 0, 5.0), (scene(3, 800.0, delay="8ms", peers=EVERY_DIFFERENT), 1, 25.0), (paper(2), 0, 62.5)):
+    different = scene(3, 800.0, delay="8ms", peers=EVERY_DIFFERENT)
+    # The third has a mode that decays by 0.2 % a frame only.
+    for text, peer, hz, settle in ((paper(3), 0, 5.0, 30_000), (different, 1, 25.0, 30_000), (paper(2), 0, 62.5, 100_000)):
         made = parse(text)
         exact = complex(Lifted(made, peer).at(hz)[0])
-        seen = simulated(made, peer, hz, 30_000, 4)
+        seen = simulated(made, peer, hz, settle, 4)
         assert abs(seen - exact) < 1e-8 * abs(exact), (seen, exact)
         print(f"lifted {exact:.10g}, simulated {seen:.10g}", file=sys.stderr, flush=True)
 
