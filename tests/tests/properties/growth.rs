@@ -58,6 +58,16 @@ proptest! {
         let frame = u64::try_from(matrix.frame.as_millis()).unwrap();
         draft.duration = frame * (settle + far + 2) as u64;
         let log = run(&draft.scene(), Model::Least);
+        // Every state, from one frame to the next, first.
+        for frames in settle..settle + 3 {
+            let (before, after) = (state(&matrix, &draft, &log, frames), state(&matrix, &draft, &log, frames + 1));
+            let expected = matrix.matrix.times_column(&before);
+            let size = before.iter().chain(&after).map(|entry| entry.abs()).fold(1e-9, f64::max);
+            for ((after, expected), name) in after.iter().zip(&expected).zip(&matrix.states) {
+                let tolerance = matrix.error * size + 1e-13;
+                prop_assert!((after - expected).abs() <= tolerance, "{} of peer {}: {after:e}, expected {expected:e}", name.kind, name.peer);
+            }
+        }
         let at = |frames: usize| {
             let state = state(&matrix, &draft, &log, frames);
             let component = |part: fn(&(f64, f64)) -> f64| left.iter().zip(&state).map(|(left, state)| part(left) * state).sum::<f64>();
@@ -71,15 +81,29 @@ proptest! {
     }
 }
 
-/// The largest modulus of an eigenvalue, and the left eigenvector as (real, imaginary) parts.
+/// The largest modulus of an eigenvalue, and a left eigenvector as (real, imaginary) parts.
 fn dominant(monodromy: &Monodromy) -> (f64, Vec<(f64, f64)>) {
     let size = monodromy.states.len();
-    let transposed = faer::Mat::from_fn(size, size, |row, column| monodromy.matrix[(column, row)]);
-    let decomposition = transposed.eigen().unwrap();
-    let values: Vec<f64> = (0..size).map(|place| decomposition.S()[place].norm()).collect();
-    let largest = (0..size).max_by(|one, other| values[*one].total_cmp(&values[*other])).unwrap();
-    let vector = decomposition.U().col(largest);
-    (values[largest], (0..size).map(|row| (vector[row].re, vector[row].im)).collect())
+    let transposed = monodromy.matrix.transposed();
+    let decomposition = faer::Mat::from_fn(size, size, |row, column| transposed[(row, column)]).eigen().unwrap();
+    let largest = (0..size).map(|place| decomposition.S()[place].norm()).fold(0.0, f64::max);
+    // Equal eigenvalues, one for each axis, come with vectors of which not all are good: the first that is one.
+    let vectors = (0..size).filter(|place| decomposition.S()[*place].norm() > largest * (1.0 - 1e-12)).map(|place| {
+        let (value, vector) = (decomposition.S()[place], decomposition.U().col(place));
+        let part = |part: fn(&faer::c64) -> f64| (0..size).map(|row| part(&vector[row])).collect::<Vec<f64>>();
+        (value, part(|entry| entry.re), part(|entry| entry.im))
+    });
+    let residual = |(value, real, imaginary): &(faer::c64, Vec<f64>, Vec<f64>)| {
+        let (reached, other) = (transposed.times_column(real), transposed.times_column(imaginary));
+        let entry = |row: usize| {
+            let apart =
+                (reached[row] - value.re * real[row] + value.im * imaginary[row], other[row] - value.re * imaginary[row] - value.im * real[row]);
+            apart.0.hypot(apart.1)
+        };
+        (0..size).map(entry).fold(0.0, f64::max)
+    };
+    let (_, real, imaginary) = vectors.min_by(|one, other| residual(one).total_cmp(&residual(other))).unwrap();
+    (largest, real.into_iter().zip(imaginary).collect())
 }
 
 fn age(kind: StateKind) -> usize {
