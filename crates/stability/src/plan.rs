@@ -50,6 +50,14 @@ struct Bodies {
     loose: Option<Radius>,
 }
 
+impl PlanScratch {
+    /// The matrix of the averages that was computed last.
+    #[cfg(test)]
+    pub(crate) fn together(&self) -> &Matrix {
+        &self.together
+    }
+}
+
 impl Plan {
     /// For scenes that differ in numbers only. Whether an arm ties the object to ground may differ too.
     pub(crate) fn new(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {

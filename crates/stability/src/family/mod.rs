@@ -8,6 +8,8 @@ mod error;
 mod leaves;
 mod prepared;
 mod range;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -37,6 +37,12 @@ impl Prepared {
         !self.leaves.is_empty()
     }
 
+    /// How many numbers are written for each radius.
+    #[cfg(test)]
+    pub(super) fn written(&self) -> usize {
+        self.leaves.iter().map(Vec::len).sum()
+    }
+
     /// A scene of one's own to write in, and room for every plan.
     pub(super) fn scratch(&self) -> (Scene, Vec<PlanScratch>) {
         (self.scene.clone(), vec![PlanScratch::default(); self.plans.len()])
