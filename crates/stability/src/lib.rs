@@ -7,12 +7,15 @@
 
 mod analysis;
 mod boundary;
+mod determinant;
 mod error;
 mod family;
 mod full;
+mod graph;
 mod lifted;
 mod map;
 mod matrix;
+mod monodromy;
 mod network;
 mod parts;
 mod plan;
@@ -21,12 +24,18 @@ mod small;
 mod spectrum;
 mod structure;
 mod timetable;
+mod worst_case;
 
 pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_with};
 pub use boundary::{Boundary, BoundaryError, BoundaryOptions, Crossing, Stretch};
+pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
 pub use error::AnalysisError;
 pub use family::{Family, FamilyError, FamilyScratch, KeyRange, KeyRangeError};
+pub use graph::{Graph, GraphError, analyse_on};
 pub use map::{Grid, Map, MapError, Polyline};
 pub use matrix::Matrix;
+pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use radius::{Radius, Verdict};
+pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
+pub use worst_case::{Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Pattern, PatternError, WorstCase};

@@ -7,7 +7,7 @@ use crate::lifted::{Autonomous, Body, Lifted, Node};
 use crate::network::NominalNetwork;
 use crate::parts::loose_device;
 use crate::small::{SmallFrame, SmallNode};
-use crate::spectrum::{bounded_radius, radius};
+use crate::spectrum::Workspace;
 use crate::structure::{Contacts, Structure, arm, device_plant};
 use crate::{AnalysisError, Matrix, Radius};
 
@@ -33,12 +33,13 @@ struct Apart {
 }
 
 /// Room for the computation, and the step maps of the bodies seen last.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(crate) struct PlanScratch {
     nodes: Vec<Node>,
     bodies: Vec<Bodies>,
     together: Matrix,
     apart: Matrix,
+    workspace: Workspace,
 }
 
 /// What the step maps of a class were computed from.
@@ -88,16 +89,16 @@ impl Plan {
     /// The largest radius of all parts. Without `BOUND` its error is zero and means nothing.
     pub(crate) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut PlanScratch) -> Radius {
         self.refresh(scene, scratch);
-        let PlanScratch { nodes, bodies, together, apart } = scratch;
+        let PlanScratch { nodes, bodies, together, apart, workspace } = scratch;
         let structure = &self.structure;
         let coordination = structure.coordination(scene);
         let tied = self.tied || (0..nodes.len()).any(|class| structure.touching[class] && arm(self.representative(scene, class)).stiffness > 0.0);
         let quotient = Lifted { coordination, tied, ..structure.quotient(scene, nodes) };
-        let mut worst = part::<BOUND>(self.together.as_ref(), &quotient, together);
+        let mut worst = part::<BOUND>(self.together.as_ref(), &quotient, together, workspace);
         for (class, part_of) in self.apart.iter().enumerate() {
             if let (Some(Apart { small, frames }), Some(timetable)) = (part_of, &structure.apart[class]) {
                 let lifted = Lifted { nodes: &nodes[class..=class], weights: &self.difference, timetable, tied: true, ..quotient };
-                let radius = part::<BOUND>(small.as_ref(), &lifted, apart).over(*frames);
+                let radius = part::<BOUND>(small.as_ref(), &lifted, apart, workspace).over(*frames);
                 worst = worse::<BOUND>(worst, radius);
             }
             if let Some(loose) = bodies[class].loose {
@@ -157,7 +158,7 @@ fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
 }
 
 /// The radius of a lifted system.
-fn part<const BOUND: bool>(small: Option<&SmallFrame>, lifted: &Lifted<'_>, matrix: &mut Matrix) -> Radius {
+fn part<const BOUND: bool>(small: Option<&SmallFrame>, lifted: &Lifted<'_>, matrix: &mut Matrix, workspace: &mut Workspace) -> Radius {
     let error = match (small, lifted.nodes) {
         (Some(small), [node]) if SmallFrame::fits(node, lifted.coordination) => {
             let weight = lifted.weights[(0, 0)];
@@ -169,7 +170,7 @@ fn part<const BOUND: bool>(small: Option<&SmallFrame>, lifted: &Lifted<'_>, matr
             frame.error
         }
     };
-    if BOUND { bounded_radius(matrix, error) } else { Radius { value: radius(matrix), error: 0.0 } }
+    if BOUND { workspace.bounded_radius(matrix, error) } else { Radius { value: workspace.radius(matrix), error: 0.0 } }
 }
 
 /// The linear scenes that a scene falls into, one for each combination of contacts.

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use cohaptic_scene::{Scene, SceneError};
+use cohaptic_scene::Scene;
 
 pub use error::FamilyError;
 pub use range::{KeyRange, KeyRangeError};
@@ -80,8 +80,8 @@ impl Family {
         let mut family = Self { text, file, overrides, keys, learned, prepared: Mutex::default(), identity: Arc::new(()) };
         let low: Vec<f64> = family.keys.iter().map(|range| range.low).collect();
         let high: Vec<f64> = family.keys.iter().map(|range| range.high).collect();
-        let at_low = family.scene(&low)?;
-        let at_high = family.scene(&high)?;
+        let at_low = family.scene(&low).map_err(|error| family.no_number(error))?;
+        let at_high = family.scene(&high).map_err(|error| family.no_number(error))?;
         crate::plan::plans(&[&at_low])?;
         drop((at_low, at_high));
         for key in 0..family.keys.len() {
@@ -115,7 +115,7 @@ impl Family {
         self.check(values)?;
         let mut overrides = self.overrides.clone();
         overrides.extend(self.keys.iter().zip(values).map(|(range, value)| range.text(*value)));
-        Scene::parse(&self.text, &self.file, &overrides).map_err(|error| self.no_number(error))
+        Ok(Scene::parse(&self.text, &self.file, &overrides)?)
     }
 
     /// The spectral radius with those values of the keys, without a bound of its error: below 1 the scene is stable.
@@ -242,7 +242,8 @@ impl Family {
     }
 
     /// A fault in a value that the family itself has put in, because it is a number: that the key takes none.
-    fn no_number(&self, error: SceneError) -> FamilyError {
+    fn no_number(&self, error: FamilyError) -> FamilyError {
+        let FamilyError::Scene(error) = error else { return error };
         let fault = error.diagnostic().filter(|fault| fault.override_text().is_some());
         let key = fault.and_then(|fault| self.keys.iter().find(|range| fault.override_text().is_some_and(|text| text.starts_with(&range.key))));
         match (fault, key) {

@@ -45,7 +45,7 @@ impl Prepared {
 
     /// A scene of one's own to write in, and room for every plan.
     pub(super) fn scratch(&self) -> (Scene, Vec<PlanScratch>) {
-        (self.scene.clone(), vec![PlanScratch::default(); self.plans.len()])
+        (self.scene.clone(), self.plans.iter().map(|_| PlanScratch::default()).collect())
     }
 
     /// The largest radius of all combinations of contacts, with those values of the learned keys.

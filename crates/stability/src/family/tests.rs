@@ -65,7 +65,9 @@ fn numbers_of_equal_peers_are_learned() {
         "peer.coupling.stiffness=100..20000",
         "peer.coupling.damping=0..40",
     ] {
-        for overrides in [&[][..], &["coordination.strategy=proportional-derivative", "object.split-mass=false"], &["link.delay=11.3ms", "peer.phase=3"]] {
+        for overrides in
+            [&[][..], &["coordination.strategy=proportional-derivative", "object.split-mass=false"], &["link.delay=11.3ms", "peer.phase=3"]]
+        {
             agrees_everywhere(&family(overrides, &[STIFFNESS, other]), &[true, true]);
         }
     }

@@ -1,4 +1,6 @@
 //! The analysis of whole scenes.
 
 mod anchors;
+mod graphs;
 mod reduction;
+mod strategies;
