@@ -146,8 +146,8 @@ proptest! {
 }
 
 #[test]
-fn a_hundred_thousand_peers_cost_what_ten_do() {
-    // As many as a scene can have; the numbers of the first peer of the only class are all that is ever written.
+fn of_many_equal_peers_only_the_first_is_written() {
+    // The numbers of the first peer of the only class are all that is ever written.
     let family = family(&["scene.count=300"], &[STIFFNESS, "peer.device.mass=0.05..1"]);
     let prepared = family.prepared(&[0.0, 0.05]).unwrap();
     assert_eq!(prepared.written(), 2);
