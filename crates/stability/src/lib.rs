@@ -6,25 +6,33 @@
 //! Constantinescu 2015, Section 3), reduces it where peers are alike, and says how sure it is of the answer.
 
 mod analysis;
+mod boundary;
 mod determinant;
 mod error;
+mod family;
 mod full;
 mod graph;
 mod lifted;
+mod map;
 mod matrix;
 mod monodromy;
 mod network;
 mod parts;
+mod plan;
 mod radius;
+mod small;
 mod spectrum;
 mod structure;
 mod timetable;
 mod worst_case;
 
 pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_with};
+pub use boundary::{Boundary, BoundaryError, BoundaryOptions, Crossing, Stretch};
 pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
 pub use error::AnalysisError;
+pub use family::{Family, FamilyError, FamilyScratch, KeyRange, KeyRangeError};
 pub use graph::{Graph, GraphError, analyse_on};
+pub use map::{Grid, Map, MapError, Polyline};
 pub use matrix::Matrix;
 pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};

@@ -117,7 +117,7 @@ pub(crate) fn alone(structure: &Structure, scene: &Scene, class: usize, axes: us
 }
 
 /// A device that touches nothing: its velocity and, if an arm ties it to ground, its position.
-fn loose_device(structure: &Structure, scene: &Scene, class: usize) -> (Radius, usize) {
+pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -> (Radius, usize) {
     let spec = &scene.peers[structure.classes[class][0]];
     let (short, long) = spec.clock.spans();
     let plant = device_plant(spec);

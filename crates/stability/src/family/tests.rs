@@ -1,0 +1,179 @@
+//! Families against scenes that are read anew and analysed as they stand.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{Method, analyse};
+
+const SCENE: &str = r#"
+    scene        = { duration = "1s", count = 3 }
+    object       = { mass = 0.45 }
+    coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+    peer         = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+    link         = { delay = "8ms" }
+"#;
+
+fn texts(overrides: &[&str]) -> Vec<String> {
+    overrides.iter().map(|text| (*text).to_owned()).collect()
+}
+
+fn try_family(overrides: &[&str], keys: &[&str]) -> Result<Family, FamilyError> {
+    let keys = keys.iter().map(|key| KeyRange::parse(key).unwrap()).collect();
+    Family::new(SCENE, "family.toml".as_ref(), &texts(overrides), keys)
+}
+
+#[track_caller]
+fn family(overrides: &[&str], keys: &[&str]) -> Family {
+    try_family(overrides, keys).unwrap()
+}
+
+/// Both radii of a family against the analysis of the scene read anew.
+#[track_caller]
+fn agrees(family: &Family, values: &[f64], scratch: &mut FamilyScratch) {
+    let expected = analyse(&family.scene(values).unwrap(), Method::Reduced).unwrap().radius;
+    let (plain, bounded) = (family.radius(values, scratch).unwrap(), family.bounded_radius(values, scratch).unwrap());
+    // Peers that happen to be equal are one class in the analysis and not in the family: other matrices, each with its own bound.
+    let close = |value: f64| (value - expected.value).abs() <= 1e-13 * expected.value.max(1.0);
+    assert!(close(plain) && close(bounded.value), "{values:?}: {plain}, {bounded:?}, expected {expected:?}");
+    assert!(bounded.error <= 10.0 * expected.error + 1e-14, "{values:?}: {bounded:?}, expected {expected:?}");
+}
+
+/// At the ends, and at values in between that are spread without a pattern.
+#[track_caller]
+fn agrees_everywhere(family: &Family, learned: &[bool]) {
+    assert_eq!(family.learned(), learned);
+    let mut scratch = FamilyScratch::default();
+    let shares = [0.0, 1.0, 0.5, 0.137, 0.731, 0.0, 0.913, 1.0, 0.277];
+    for (number, share) in shares.iter().enumerate() {
+        let shares = [*share, shares[(number + 4) % shares.len()]];
+        let values = family.keys().iter().zip(shares).map(|(range, share)| range.low + share * (range.high - range.low));
+        agrees(family, &values.collect::<Vec<f64>>(), &mut scratch);
+    }
+}
+
+const STIFFNESS: &str = "coordination.stiffness=0..6000";
+const ARMED: &str = "peer.hand={ arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } }";
+
+#[test]
+fn numbers_of_equal_peers_are_learned() {
+    for other in [
+        "coordination.damping=0..20",
+        "object.mass=0.05..2",
+        "object.damping=0..3",
+        "peer.device.mass=0.05..1",
+        "peer.device.damping=0..10",
+        "peer.coupling.stiffness=100..20000",
+        "peer.coupling.damping=0..40",
+    ] {
+        for overrides in
+            [&[][..], &["coordination.strategy=proportional-derivative", "object.split-mass=false"], &["link.delay=11.3ms", "peer.phase=3"]]
+        {
+            agrees_everywhere(&family(overrides, &[STIFFNESS, other]), &[true, true]);
+        }
+    }
+}
+
+#[test]
+fn numbers_of_single_peers_arms_and_walls_are_learned() {
+    agrees_everywhere(&family(&[], &["peers.peer2.device.mass=0.05..1", "peers.peer3.coupling.damping=0..40"]), &[true, true]);
+    // The same range for one peer and for all: where they are equal the peers are, and everywhere else they are not.
+    agrees_everywhere(&family(&[], &["peers.peer2.device.mass=0.05..1", "peer.device.mass=0.05..1"]), &[true, true]);
+    agrees_everywhere(&family(&["peers.peer3.contact=none"], &["peer.device.damping=0..10", STIFFNESS]), &[true, true]);
+    // An arm of no stiffness does not tie the object to ground, nor a loose device.
+    let arm = "peer.hand.arm.stiffness=0..500";
+    agrees_everywhere(&family(&[ARMED], &[arm, STIFFNESS]), &[true, true]);
+    agrees_everywhere(&family(&[ARMED, "peers.peer3.contact=none"], &[arm, "peer.hand.arm.mass=0..1"]), &[true, true]);
+    let enclosure = "object.enclosure={ min = -0.1, max = 0.1, stiffness = 1000.0, damping = 5.0 }";
+    agrees_everywhere(&family(&[enclosure], &["object.enclosure.stiffness=10..5000", STIFFNESS]), &[true, true]);
+    agrees_everywhere(&family(&["peers.peer1.contact={ push = '+x' }"], &["peer.coupling.stiffness=100..20000", STIFFNESS]), &[true, true]);
+    agrees_everywhere(&family(&["peer.compute-delay=1"], &["peer.coupling.stiffness=100..20000", STIFFNESS]), &[true, true]);
+}
+
+#[test]
+fn what_is_not_a_number_of_the_motion_is_read_anew() {
+    agrees_everywhere(&family(&[], &["link.delay=0ms..50ms"]), &[false]);
+    agrees_everywhere(&family(&[], &["links.peer1.peer2.delay=0ms..50ms", STIFFNESS]), &[false, true]);
+    agrees_everywhere(&family(&["peer.coupling.scaling=inverse-n"], &[STIFFNESS, "link.delay=0ms..50ms"]), &[true, false]);
+    let phases = family(&[], &["peers.peer2.phase=0..7", STIFFNESS]);
+    assert_eq!(phases.learned(), [false, true]);
+    let mut scratch = FamilyScratch::default();
+    for phase in 0..8 {
+        agrees(&phases, &[f64::from(phase), 1500.0], &mut scratch);
+    }
+    assert!(matches!(phases.radius(&[2.5, 1500.0], &mut scratch), Err(FamilyError::Scene(_))));
+}
+
+#[test]
+fn a_scratch_serves_one_family_after_another() {
+    let families = [family(&[], &[STIFFNESS]), family(&["scene.count=5"], &[STIFFNESS]), family(&["peers.peer3.contact=none"], &[STIFFNESS])];
+    let mut scratch = FamilyScratch::default();
+    for _ in 0..2 {
+        for family in &families {
+            agrees(family, &[2345.0], &mut scratch);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    /// The frame on the stack gives the general path's matrix to the bit.
+    #[test]
+    fn a_small_frame_is_the_general_one(
+        peers in 2_u32..7, delay in 0_u32..33_000, every in 1_u32..12, stiffness in 0.0..1e5_f64, damping in 0.0..50.0_f64, mass in 1e-3..10.0_f64,
+        coupling in 0.0..1e5_f64, touching: bool, arm in prop::option::of(0.0..500.0_f64), split: bool,
+    ) {
+        let overrides = [
+            format!("scene.count={peers}"), format!("link.delay={delay}us"), format!("coordination.update={every}ms"),
+            format!("coordination.damping={damping}"), format!("object.mass={mass}"), format!("peer.coupling.stiffness={coupling}"),
+            format!("peer.contact={}", if touching { "grasp" } else { "none" }), format!("object.split-mass={split}"),
+            arm.map_or_else(|| "peer.hand={ force = 0.0 }".to_owned(), |k| format!("peer.hand={{ arm = {{ mass = 0.3, damping = 10.0, stiffness = {k:?} }} }}")),
+        ];
+        let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+        let family = family(&overrides, &["coordination.stiffness=0..100000"]);
+        let scene = family.scene(&[stiffness]).unwrap();
+        let prepared = family.prepared(&[stiffness]).unwrap();
+        let (mut own, mut plans) = prepared.scratch();
+        prepared.radius::<true>(std::iter::once(stiffness), (&mut own, &mut plans));
+        let network = crate::network::NominalNetwork::of(&scene).unwrap();
+        let contacts = crate::analysis::combinations(&scene).unwrap().remove(0).contacts;
+        let structure = crate::structure::Structure::of(&[&scene], &network, &contacts).unwrap();
+        let nodes = [structure.node(&scene, 0)];
+        let frame = structure.quotient(&scene, &nodes).frame(&mut crate::lifted::Autonomous);
+        prop_assert_eq!(plans[0].together(), &frame.monodromy());
+        agrees(&family, &[stiffness], &mut FamilyScratch::default());
+    }
+}
+
+#[test]
+fn of_many_equal_peers_only_the_first_is_written() {
+    // The numbers of the first peer of the only class are all that is ever written.
+    let family = family(&["scene.count=300"], &[STIFFNESS, "peer.device.mass=0.05..1"]);
+    let prepared = family.prepared(&[0.0, 0.05]).unwrap();
+    assert_eq!(prepared.written(), 2);
+    agrees(&family, &[700.0, 0.2], &mut FamilyScratch::default());
+}
+
+#[test]
+fn what_makes_no_family_is_refused_and_says_why() {
+    let message = |overrides: &[&str], keys: &[&str]| try_family(overrides, keys).unwrap_err().to_string();
+    for key in ["scene.title=0..1", "peers.peer1.contact=0..1", "coordination.strategy=0..1", "link.delay=0..50", "coordination=0..1"] {
+        let error = try_family(&[], &[key]).unwrap_err();
+        assert!(matches!(error, FamilyError::NoNumber { .. }), "{key}: {error}");
+        assert!(error.to_string().contains("expected"), "{error}");
+    }
+    let unknown = message(&[], &["coordination.stifness=0..1"]);
+    assert!(unknown.contains("stifness") && unknown.contains("stiffness"), "{unknown}");
+    assert!(message(&[], &["peers.nobody.device.mass=1..2"]).contains("nobody"));
+    assert!(message(&[], &["object.mass=0..1"]).contains("number above zero"));
+    assert!(message(&[], &["link.delay=0parsecs..1parsecs"]).contains("parsecs"));
+    assert!(message(&["object.mass=heavy"], &[STIFFNESS]).contains("heavy"));
+    assert!(message(&[], &[]).contains("0 keys"));
+    assert!(message(&[], &[STIFFNESS, STIFFNESS]).contains("twice"));
+    let mut scratch = FamilyScratch::default();
+    let family = family(&[], &[STIFFNESS]);
+    for value in [-1.0, 6000.1, f64::NAN] {
+        assert!(matches!(family.radius(&[value], &mut scratch), Err(FamilyError::Outside { .. })));
+    }
+    assert!(matches!(family.radius(&[], &mut scratch), Err(FamilyError::Values { given: 0, keys: 1 })));
+}
