@@ -18,4 +18,5 @@ mod overrides;
 mod records;
 mod run;
 mod scenes;
+mod stability_point;
 mod svg;
