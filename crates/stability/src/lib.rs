@@ -6,19 +6,27 @@
 //! Constantinescu 2015, Section 3), reduces it where peers are alike, and says how sure it is of the answer.
 
 mod analysis;
+mod boundary;
 mod error;
+mod family;
 mod full;
 mod lifted;
+mod map;
 mod matrix;
 mod network;
 mod parts;
+mod plan;
 mod radius;
+mod small;
 mod spectrum;
 mod structure;
 mod timetable;
 
 pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_with};
+pub use boundary::{Boundary, BoundaryError, BoundaryOptions, Crossing, Stretch};
 pub use error::AnalysisError;
+pub use family::{Family, FamilyError, FamilyScratch, KeyRange, KeyRangeError};
+pub use map::{Grid, Map, MapError, Polyline};
 pub use matrix::Matrix;
 pub use parts::{Part, PartKind};
 pub use radius::{Radius, Verdict};

@@ -103,7 +103,7 @@ fn lifted_radius(lifted: &Lifted<'_>) -> (Radius, usize) {
 }
 
 /// A device that touches nothing: its velocity and, if an arm ties it to ground, its position.
-fn loose_device(structure: &Structure, scene: &Scene, class: usize) -> (Radius, usize) {
+pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -> (Radius, usize) {
     let spec = &scene.peers[structure.classes[class][0]];
     let (short, long) = spec.clock.spans();
     let plant = device_plant(spec);

@@ -105,10 +105,15 @@ impl Structure {
         Node {
             device: self.touching[class].then(|| Body::new(device_plant(spec), scene.integrator, &spec.clock)),
             object: Body::new(object, scene.integrator, &spec.clock),
-            coupling: spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers)),
+            coupling: self.coupling(spec),
             wall: scene.object.enclosure.filter(|_| self.at_wall).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping }),
             compute_delay: spec.compute_delay,
         }
+    }
+
+    /// KC and BC of a peer, scaled.
+    pub(crate) fn coupling(&self, spec: &PeerSpec) -> Gains {
+        spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers))
     }
 
     /// The weight with which a difference within a class comes back: −1/(N−1).

@@ -23,7 +23,7 @@ impl Body {
         Self { short: (short, first), long: if long == short { first } else { plant.step(long, integrator) } }
     }
 
-    fn map(&self, span: Duration) -> &StepMap {
+    pub(crate) fn map(&self, span: Duration) -> &StepMap {
         if span == self.short.0 { &self.short.1 } else { &self.long }
     }
 }

@@ -1,0 +1,143 @@
+//! Lines of equal radius by marching squares.
+//!
+//! Each square of four neighbouring nodes is crossed by pieces of line that enter and leave it where a side has one node on either side of the level.
+//! Pieces have a direction, the stable side on their left, so that each crossing ends one piece and begins another, and following them gives the lines.
+
+use std::collections::BTreeMap;
+
+use super::Map;
+
+/// A line through the plane of a map.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Polyline {
+    /// Its points (x, y). Those of a closed line do not repeat the first one at the end.
+    pub points: Vec<(f64, f64)>,
+    /// Whether the last point leads to the first one.
+    pub closed: bool,
+}
+
+/// A side of a square: from the node at that row and column to the right, or up.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+struct Side {
+    row: usize,
+    column: usize,
+    up: bool,
+}
+
+/// The map with a margin around it, if lines are to be closed along its edge.
+struct Field<'a> {
+    map: &'a Map,
+    margin: usize,
+}
+
+impl Field<'_> {
+    fn columns(&self) -> usize {
+        self.map.x.len() + 2 * self.margin
+    }
+
+    fn rows(&self) -> usize {
+        self.map.y.len() + 2 * self.margin
+    }
+
+    /// The logarithm of the radius, which is below zero where it is stable; the margin is not.
+    fn level(&self, row: usize, column: usize) -> f64 {
+        // Beyond e^±50 nothing is gained by going on, and infinities have no line between them.
+        const LARGEST: f64 = 50.0;
+        match self.radius(row, column) {
+            Some(radius) if radius.is_nan() => LARGEST,
+            Some(radius) => libm::log(radius).clamp(-LARGEST, LARGEST),
+            None => LARGEST,
+        }
+    }
+
+    fn stable(&self, row: usize, column: usize) -> bool {
+        self.radius(row, column).is_some_and(|radius| radius < 1.0)
+    }
+
+    fn radius(&self, row: usize, column: usize) -> Option<f64> {
+        let row = self.map.radius.get(row.checked_sub(self.margin)?)?;
+        row.get(column.checked_sub(self.margin)?).copied()
+    }
+
+    /// Where the level is crossed on a side. The margin lies on the edge of the map itself.
+    fn point(&self, side: Side) -> (f64, f64) {
+        let (row, column) = if side.up { (side.row + 1, side.column) } else { (side.row, side.column + 1) };
+        let (from, to) = (self.level(side.row, side.column), self.level(row, column));
+        let share = from / (from - to);
+        let at = |values: &[f64], place: usize| values[place.saturating_sub(self.margin).min(values.len() - 1)];
+        let between = |values: &[f64], first: usize, second: usize| {
+            let (first, second) = (at(values, first), at(values, second));
+            first + (second - first) * share
+        };
+        (between(&self.map.x, side.column, column), between(&self.map.y, side.row, row))
+    }
+
+    /// The directed pieces within the square above and to the right of a node: from one side to another.
+    fn pieces(&self, row: usize, column: usize) -> [Option<(Side, Side)>; 2] {
+        let corners = [(row, column), (row, column + 1), (row + 1, column + 1), (row + 1, column)];
+        let [a, b, c, d] = corners.map(|(row, column)| self.stable(row, column));
+        let bottom = Side { row, column, up: false };
+        let right = Side { row, column: column + 1, up: true };
+        let top = Side { row: row + 1, column, up: false };
+        let left = Side { row, column, up: true };
+        match (a, b, c, d) {
+            (false, false, false, false) | (true, true, true, true) => [None, None],
+            (true, false, false, false) => [Some((bottom, left)), None],
+            (false, true, false, false) => [Some((right, bottom)), None],
+            (false, false, true, false) => [Some((top, right)), None],
+            (false, false, false, true) => [Some((left, top)), None],
+            (true, true, false, false) => [Some((right, left)), None],
+            (false, true, true, false) => [Some((top, bottom)), None],
+            (false, false, true, true) => [Some((left, right)), None],
+            (true, false, false, true) => [Some((bottom, top)), None],
+            (false, true, true, true) => [Some((left, bottom)), None],
+            (true, false, true, true) => [Some((bottom, right)), None],
+            (true, true, false, true) => [Some((right, top)), None],
+            (true, true, true, false) => [Some((top, left)), None],
+            // A saddle: the middle decides whether the stable corners hang together.
+            (true, false, true, false) | (false, true, false, true) => {
+                let middle = corners.map(|(row, column)| self.level(row, column)).iter().sum::<f64>();
+                match (a, middle < 0.0) {
+                    (true, true) => [Some((bottom, right)), Some((top, left))],
+                    (true, false) => [Some((bottom, left)), Some((top, right))],
+                    (false, true) => [Some((left, bottom)), Some((right, top))],
+                    (false, false) => [Some((right, bottom)), Some((left, top))],
+                }
+            }
+        }
+    }
+}
+
+/// Every line, in the order of where it begins: first those that end at the edge of the map, then those that are closed.
+pub(super) fn contour(map: &Map, to_the_edge: bool) -> Vec<Polyline> {
+    let field = Field { map, margin: usize::from(to_the_edge) };
+    let mut next: BTreeMap<Side, Side> = BTreeMap::new();
+    for row in 0..field.rows().saturating_sub(1) {
+        for column in 0..field.columns().saturating_sub(1) {
+            next.extend(field.pieces(row, column).into_iter().flatten());
+        }
+    }
+    let ends: std::collections::BTreeSet<Side> = next.values().copied().collect();
+    let open: Vec<Side> = next.keys().filter(|side| !ends.contains(side)).copied().collect();
+    let mut lines = Vec::new();
+    for first in open {
+        lines.push(Polyline { points: follow(&field, &mut next, first), closed: false });
+    }
+    while let Some(first) = next.keys().next().copied() {
+        let mut points = follow(&field, &mut next, first);
+        // The way back to where it began has come to its first point again.
+        points.pop();
+        lines.push(Polyline { points, closed: true });
+    }
+    lines
+}
+
+fn follow(field: &Field<'_>, next: &mut BTreeMap<Side, Side>, first: Side) -> Vec<(f64, f64)> {
+    let mut points = vec![field.point(first)];
+    let mut side = first;
+    while let Some(following) = next.remove(&side) {
+        points.push(field.point(following));
+        side = following;
+    }
+    points
+}

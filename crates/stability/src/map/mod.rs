@@ -1,0 +1,217 @@
+//! Maps: the spectral radius over a grid of two keys.
+
+mod contour;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
+pub use contour::Polyline;
+
+use crate::{Family, FamilyError, FamilyScratch, KeyRange};
+
+/// More cells than this are refused.
+const MOST_CELLS: usize = 100_000_000;
+
+/// How many nodes a map has along each key, the ends of the ranges among them.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Grid {
+    columns: usize,
+    rows: usize,
+}
+
+/// Why there is no map.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MapError {
+    /// The grid has no cells, or too many.
+    #[error("a grid of {columns} x {rows} cells: expected at least 1 and at most {MOST_CELLS} in all")]
+    Grid {
+        /// How many columns.
+        columns: usize,
+        /// How many rows.
+        rows: usize,
+    },
+    /// The family has not two open keys.
+    #[error("{keys} open keys: expected two for a map")]
+    Keys {
+        /// How many.
+        keys: usize,
+    },
+    /// The rows that are given are not those of such a grid.
+    #[error("row {row} of the rows known in advance has {cells} cells: expected {columns}, or none where the row is not known")]
+    Known {
+        /// The first such row.
+        row: usize,
+        /// How many cells it has.
+        cells: usize,
+        /// How many it should have.
+        columns: usize,
+    },
+    /// A cell cannot be computed.
+    #[error(transparent)]
+    Family(#[from] FamilyError),
+}
+
+impl Grid {
+    /// That many nodes along the first key, and along the second.
+    ///
+    /// # Errors
+    ///
+    /// [`MapError::Grid`] for none, and for more than 10⁸ in all.
+    pub const fn new(columns: usize, rows: usize) -> Result<Self, MapError> {
+        match columns.checked_mul(rows) {
+            Some(1..=MOST_CELLS) => Ok(Self { columns, rows }),
+            Some(_) | None => Err(MapError::Grid { columns, rows }),
+        }
+    }
+
+    /// How many nodes along the first key.
+    #[must_use]
+    pub const fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// How many nodes along the second key.
+    #[must_use]
+    pub const fn rows(&self) -> usize {
+        self.rows
+    }
+}
+
+/// The spectral radius over a grid.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Map {
+    /// The values of the first key, ascending.
+    pub x: Vec<f64>,
+    /// The values of the second key, ascending.
+    pub y: Vec<f64>,
+    /// The radius at each value of y, for each value of x; a row is empty if the filling was stopped before it was reached.
+    pub radius: Vec<Vec<f64>>,
+}
+
+impl Map {
+    /// Fills a map of a family with two open keys, the first along x, on all threads of the pool it is called in. What comes out does not depend on
+    /// how many there are.
+    ///
+    /// `done` is called after each row, in no particular order, with its number; `stop` is asked before each row and within long ones: if it answers
+    /// `true`, what is left is not computed and the rows that are not finished stay empty.
+    ///
+    /// # Errors
+    ///
+    /// [`MapError`] if the family has not two keys or a cell cannot be computed.
+    pub fn fill(family: &Family, grid: Grid, done: impl Fn(usize) + Sync, stop: impl Fn() -> bool + Sync) -> Result<Self, MapError> {
+        Self::resume(family, grid, Vec::new(), |row, _| done(row), stop)
+    }
+
+    /// As [`Map::fill`], with rows that are known: `known[row]` is such a row, or empty; rows beyond its end are not known. Known rows are not computed
+    /// again, and `done` is not called for them; for the others it gets the row too, to be put away.
+    ///
+    /// # Errors
+    ///
+    /// As [`Map::fill`], and if a known row has not as many cells as the grid has columns.
+    pub fn resume(
+        family: &Family,
+        grid: Grid,
+        mut known: Vec<Vec<f64>>,
+        done: impl Fn(usize, &[f64]) + Sync,
+        stop: impl Fn() -> bool + Sync,
+    ) -> Result<Self, MapError> {
+        let [first, second] = family.keys() else {
+            return Err(MapError::Keys { keys: family.keys().len() });
+        };
+        let odd = |(row, cells): &(usize, &Vec<f64>)| !cells.is_empty() && cells.len() != grid.columns || *row >= grid.rows;
+        if let Some((row, cells)) = known.iter().enumerate().find(odd) {
+            return Err(MapError::Known { row, cells: cells.len(), columns: if row < grid.rows { grid.columns } else { 0 } });
+        }
+        let (x, y) = (nodes(first, grid.columns), nodes(second, grid.rows));
+        known.resize_with(grid.rows, Vec::new);
+        let stopped = AtomicBool::new(false);
+        let stop = || {
+            if stop() {
+                stopped.store(true, Ordering::Relaxed);
+            }
+            stopped.load(Ordering::Relaxed)
+        };
+        let pool = Scratches::default();
+        let filled = known.par_iter_mut().enumerate().filter(|(_, row)| row.is_empty()).try_for_each(|(number, row)| {
+            if stop() {
+                return Ok(());
+            }
+            let cells = pool.with(|scratch| cells(family, &x, y[number], scratch, &stop));
+            match cells {
+                Ok(Some(cells)) => {
+                    *row = cells;
+                    done(number, row);
+                    Ok(())
+                }
+                Ok(None) => Ok(()),
+                Err(error) => Err(error),
+            }
+        });
+        filled?;
+        Ok(Self { x, y, radius: known })
+    }
+
+    /// Whether every row has been computed.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.radius.iter().all(|row| !row.is_empty())
+    }
+
+    /// Where the radius is 1: polylines with the stable side on their left, x to the right and y up. One that does not end at the edge of the map is
+    /// closed. Between two nodes the logarithm of the radius is taken to be linear; rows that were not computed count as unstable.
+    #[must_use]
+    pub fn contour(&self) -> Vec<Polyline> {
+        contour::contour(self, false)
+    }
+
+    /// The stable region: closed polylines along its edge and the edge of the map, anticlockwise around what is stable and clockwise around what is
+    /// not, to be filled by either rule.
+    #[must_use]
+    pub fn regions(&self) -> Vec<Polyline> {
+        contour::contour(self, true)
+    }
+}
+
+/// One row; `None` if it was stopped.
+fn cells(family: &Family, x: &[f64], y: f64, scratch: &mut FamilyScratch, stop: &impl Fn() -> bool) -> Result<Option<Vec<f64>>, FamilyError> {
+    let mut row = Vec::with_capacity(x.len());
+    for (column, x) in x.iter().enumerate() {
+        if column % 256 == 255 && stop() {
+            return Ok(None);
+        }
+        row.push(family.radius(&[*x, y], scratch)?);
+    }
+    Ok(Some(row))
+}
+
+/// As many values from the low end of the range to the high one, both included, at equal distances; of one the low end.
+pub(crate) fn nodes(range: &KeyRange, count: usize) -> Vec<f64> {
+    let last = crate::structure::count(count.saturating_sub(1));
+    let node = |number: usize| {
+        if number + 1 == count && number > 0 {
+            return range.high;
+        }
+        let share = if number == 0 { 0.0 } else { crate::structure::count(number) / last };
+        (range.low + (range.high - range.low) * share).min(range.high)
+    };
+    (0..count).map(node).collect()
+}
+
+/// Scratches that are lent to threads.
+#[derive(Debug, Default)]
+pub(crate) struct Scratches(Mutex<Vec<FamilyScratch>>);
+
+impl Scratches {
+    pub(crate) fn with<T>(&self, work: impl FnOnce(&mut FamilyScratch) -> T) -> T {
+        let lent = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop();
+        let mut scratch = lent.unwrap_or_default();
+        let result = work(&mut scratch);
+        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(scratch);
+        result
+    }
+}

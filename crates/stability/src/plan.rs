@@ -1,0 +1,172 @@
+//! Radii of one linear scene again and again, while its numbers change: nothing is kept but the radius, and nothing is computed twice.
+
+use cohaptic_peer::{Gains, Plant};
+use cohaptic_scene::Scene;
+
+use crate::lifted::{Autonomous, Body, Lifted, Node};
+use crate::network::NominalNetwork;
+use crate::parts::loose_device;
+use crate::small::{SmallFrame, SmallNode};
+use crate::spectrum::{bounded_radius, radius};
+use crate::structure::{Contacts, Structure, arm, device_plant};
+use crate::{AnalysisError, Matrix, Radius};
+
+/// What about a linear scene does not change with its numbers.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    structure: Structure,
+    /// Whether something other than an arm ties the object to ground.
+    tied: bool,
+    /// The frame of the averages, if it is small.
+    together: Option<SmallFrame>,
+    apart: Vec<Option<Apart>>,
+    /// −1/(N−1).
+    difference: Matrix,
+}
+
+/// How the members of a class differ.
+#[derive(Clone, Debug)]
+struct Apart {
+    small: Option<SmallFrame>,
+    /// How many of its frames the whole scene's takes.
+    frames: u32,
+}
+
+/// Room for the computation, and the step maps of the bodies seen last.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PlanScratch {
+    nodes: Vec<Node>,
+    bodies: Vec<Bodies>,
+    together: Matrix,
+    apart: Matrix,
+}
+
+/// What the step maps of a class were computed from.
+#[derive(Clone, Debug)]
+struct Bodies {
+    object: Plant,
+    device: Plant,
+    /// Of a device that touches nothing.
+    loose: Option<Radius>,
+}
+
+impl Plan {
+    /// For scenes that differ in numbers only. Whether an arm ties the object to ground may differ too.
+    pub(crate) fn new(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
+        // Without arms, to see what else ties.
+        let mut armless = scenes[0].clone();
+        for spec in &mut armless.peers {
+            spec.hand = None;
+        }
+        let all: Vec<&Scene> = std::iter::once(&armless).chain(scenes.iter().copied()).collect();
+        let structure = Structure::of(&all, network, contacts)?;
+        let together = SmallFrame::of(&structure.timetable);
+        let apart = structure.apart.iter().map(|timetable| {
+            timetable.as_ref().map(|timetable| {
+                let frames = structure.timetable.frame.as_nanos() / timetable.frame.as_nanos().max(1);
+                Apart { small: SmallFrame::of(timetable), frames: u32::try_from(frames).unwrap_or(u32::MAX) }
+            })
+        });
+        let apart = apart.collect();
+        let difference = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
+        Ok(Self { tied: structure.tied, together, apart, difference, structure })
+    }
+
+    /// The classes, by their members.
+    pub(crate) fn classes(&self) -> &[Vec<usize>] {
+        &self.structure.classes
+    }
+
+    /// The largest radius of all parts. Without `BOUND` its error is zero and means nothing.
+    pub(crate) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut PlanScratch) -> Radius {
+        self.refresh(scene, scratch);
+        let PlanScratch { nodes, bodies, together, apart } = scratch;
+        let structure = &self.structure;
+        let coordination = structure.coordination(scene);
+        let tied = self.tied || (0..nodes.len()).any(|class| structure.touching[class] && arm(self.representative(scene, class)).stiffness > 0.0);
+        let quotient = Lifted { coordination, tied, ..structure.quotient(scene, nodes) };
+        let mut worst = part::<BOUND>(self.together.as_ref(), &quotient, together);
+        for (class, part_of) in self.apart.iter().enumerate() {
+            if let (Some(Apart { small, frames }), Some(timetable)) = (part_of, &structure.apart[class]) {
+                let lifted = Lifted { nodes: &nodes[class..=class], weights: &self.difference, timetable, tied: true, ..quotient };
+                let radius = part::<BOUND>(small.as_ref(), &lifted, apart).over(*frames);
+                worst = worse::<BOUND>(worst, radius);
+            }
+            if let Some(loose) = bodies[class].loose {
+                worst = worse::<BOUND>(worst, loose);
+            }
+        }
+        worst
+    }
+
+    fn representative<'a>(&self, scene: &'a Scene, class: usize) -> &'a cohaptic_scene::PeerSpec {
+        &scene.peers[self.structure.classes[class][0]]
+    }
+
+    /// Brings the nodes up to date; step maps only where a body has changed.
+    fn refresh(&self, scene: &Scene, scratch: &mut PlanScratch) {
+        let classes = self.structure.classes.len();
+        let loose = |class: usize| (!self.structure.touching[class]).then(|| loose_device(&self.structure, scene, class).0);
+        if scratch.nodes.len() != classes {
+            scratch.nodes = (0..classes).map(|class| self.structure.node(scene, class)).collect();
+            let bodies =
+                |class: usize| Bodies { object: object_plant(scene), device: device_plant(self.representative(scene, class)), loose: loose(class) };
+            scratch.bodies = (0..classes).map(bodies).collect();
+            return;
+        }
+        let object = object_plant(scene);
+        for class in 0..classes {
+            let spec = self.representative(scene, class);
+            let (node, bodies) = (&mut scratch.nodes[class], &mut scratch.bodies[class]);
+            if bodies.object != object {
+                bodies.object = object;
+                node.object = Body::new(object, scene.integrator, &spec.clock);
+            }
+            let device = device_plant(spec);
+            if bodies.device != device {
+                bodies.device = device;
+                bodies.loose = loose(class);
+                node.device = node.device.map(|_| Body::new(device, scene.integrator, &spec.clock));
+            }
+            node.coupling = self.structure.coupling(spec);
+            node.wall = node.wall.and(scene.object.enclosure).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping });
+        }
+    }
+}
+
+fn object_plant(scene: &Scene) -> Plant {
+    Plant { mass: scene.copy_mass(), damping: scene.object.damping, stiffness: 0.0 }
+}
+
+fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
+    if BOUND {
+        one.or(other)
+    } else if other.value > one.value || other.value.is_nan() {
+        other
+    } else {
+        one
+    }
+}
+
+/// The radius of a lifted system.
+fn part<const BOUND: bool>(small: Option<&SmallFrame>, lifted: &Lifted<'_>, matrix: &mut Matrix) -> Radius {
+    let error = match (small, lifted.nodes) {
+        (Some(small), [node]) if SmallFrame::fits(node, lifted.coordination) => {
+            let weight = lifted.weights[(0, 0)];
+            small.monodromy::<BOUND>(SmallNode { node, weight, coordination: lifted.coordination, time: lifted.time, tied: lifted.tied }, matrix)
+        }
+        _ => {
+            let frame = lifted.frame(&mut Autonomous);
+            *matrix = frame.monodromy();
+            frame.error
+        }
+    };
+    if BOUND { bounded_radius(matrix, error) } else { Radius { value: radius(matrix), error: 0.0 } }
+}
+
+/// The linear scenes that a scene falls into, one for each combination of contacts.
+pub(crate) fn plans(scenes: &[&Scene]) -> Result<Vec<Plan>, AnalysisError> {
+    let network = NominalNetwork::of(scenes[0])?;
+    let combinations = crate::analysis::combinations(scenes[0])?;
+    combinations.iter().map(|combination| Plan::new(scenes, &network, &combination.contacts)).collect()
+}

@@ -1,0 +1,245 @@
+//! The frame of a single node on the stack: what a cell of a map costs when all peers are alike.
+//!
+//! The same operations in the same order as [`Lifted::frame`](crate::lifted::Lifted::frame), with the bookkeeping done once: which samples of earlier
+//! frames are used, and what happens when. The matrix that comes out is the same to the bit.
+
+use std::time::Duration;
+
+use cohaptic_peer::Gains;
+
+use crate::Matrix;
+use crate::lifted::{Body, Node};
+use crate::timetable::{Event, Timetable};
+
+/// More samples of earlier frames than this, or more sent in one frame, are left to the general path.
+const MOST_SAMPLES: usize = 4;
+/// Positions and velocities of a device and a copy.
+const MOST_STATES: usize = 4;
+
+/// What happens in a frame of one node that hears itself.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct SmallFrame {
+    steps: Vec<Step>,
+    /// The ages of the samples of earlier frames that are used, ascending.
+    used: Vec<usize>,
+    /// What is held when the frame begins, by its place among the samples.
+    held: Option<usize>,
+    sent: usize,
+    depth: usize,
+    ticks: u32,
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Step {
+    Sample,
+    /// From now on that sample is held, by its place: the used ones of earlier frames first, then those sent in this one.
+    Deliver(usize),
+    Tick(Duration),
+}
+
+/// What a frame is worked out from, beside its steps.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SmallNode<'a> {
+    pub(crate) node: &'a Node,
+    /// How its own samples come back.
+    pub(crate) weight: f64,
+    /// KT and BT of average-position coordination; not both zero.
+    pub(crate) coordination: Gains,
+    /// What velocities are multiplied by \[s\].
+    pub(crate) time: f64,
+    pub(crate) tied: bool,
+}
+
+impl SmallFrame {
+    /// The steps of a timetable; `None` if it is not of one node, or not small.
+    pub(crate) fn of(timetable: &Timetable) -> Option<Self> {
+        let ([sent], [depth]) = (timetable.sent.as_slice(), timetable.depth.as_slice()) else { return None };
+        let deliveries = timetable.events.iter().filter_map(|event| match event {
+            Event::Deliver { sample, .. } => Some(*sample),
+            Event::Sample { .. } | Event::Tick { .. } => None,
+        });
+        let samples = timetable.held.iter().map(|(_, _, sample)| *sample).chain(deliveries);
+        let mut used: Vec<usize> = samples.filter_map(|sample| usize::try_from(-sample).ok().filter(|age| *age > 0)).collect();
+        used.sort_unstable();
+        used.dedup();
+        if used.len() > MOST_SAMPLES || *sent > MOST_SAMPLES {
+            return None;
+        }
+        let place = |sample: i64| match usize::try_from(sample) {
+            Ok(number) => Some(used.len() + number),
+            Err(_) => used.iter().position(|age| usize::try_from(-sample) == Ok(*age)),
+        };
+        let steps = timetable.events.iter().map(|event| match *event {
+            Event::Sample { .. } => Some(Step::Sample),
+            Event::Deliver { sample, .. } => place(sample).map(Step::Deliver),
+            Event::Tick { span, .. } => Some(Step::Tick(span)),
+        });
+        let steps: Vec<Step> = steps.collect::<Option<_>>()?;
+        let held = timetable.held.first().and_then(|(_, _, sample)| place(*sample));
+        let ticks = steps.iter().filter(|step| matches!(step, Step::Tick(_))).count();
+        Some(Self { held, sent: *sent, depth: *depth, ticks: u32::try_from(ticks).ok()?, steps, used })
+    }
+
+    /// Whether this path is for such a node: without a delay of the forces, and with something to hear.
+    pub(crate) fn fits(node: &Node, coordination: Gains) -> bool {
+        !node.compute_delay && coordination.stiffness + coordination.damping > 0.0
+    }
+
+    /// Writes the monodromy matrix into `matrix` and answers a bound of the error of its entries, in the largest sum of sizes of a row; zero without
+    /// `BOUND`.
+    pub(crate) fn monodromy<const BOUND: bool>(&self, small: SmallNode<'_>, matrix: &mut Matrix) -> f64 {
+        let states = small.node.states() - usize::from(!small.tied);
+        // Sizes that the compiler knows are worth a few copies of the loop.
+        match states + self.used.len() {
+            0..=2 => self.run::<2, BOUND>(small, matrix),
+            3 => self.run::<3, BOUND>(small, matrix),
+            4 => self.run::<4, BOUND>(small, matrix),
+            5 => self.run::<5, BOUND>(small, matrix),
+            6 => self.run::<6, BOUND>(small, matrix),
+            _ => self.run::<{ MOST_STATES + MOST_SAMPLES }, BOUND>(small, matrix),
+        }
+    }
+
+    fn run<const C: usize, const BOUND: bool>(&self, small: SmallNode<'_>, matrix: &mut Matrix) -> f64 {
+        let SmallNode { node, weight, coordination, time, tied } = small;
+        let Gains { stiffness, damping } = coordination;
+        let unit = stiffness + damping / time;
+        let (position_share, velocity_share) = (stiffness / unit, damping / time / unit);
+        let count = node.states();
+        let object = count - 2;
+        let reference = (!tied).then_some(object);
+        let states = count - usize::from(!tied);
+        let mut z = [[0.0; C]; MOST_STATES];
+        for row in (0..count).filter(|row| Some(*row) != reference) {
+            z[row][row - usize::from(reference.is_some_and(|reference| row > reference))] = 1.0;
+        }
+        let mut store = [[0.0; C]; 2 * MOST_SAMPLES];
+        for place in 0..self.used.len() {
+            store[place][states + place] = 1.0;
+        }
+        let own = node.wall.map_or(coordination, |wall| Gains { stiffness: stiffness + wall.stiffness, damping: damping + wall.damping });
+        let own_damping = own.damping / time;
+        let (coupling, coupling_damping) = (node.coupling.stiffness, node.coupling.damping / time);
+        let gain = weight * unit;
+        let aim_at = |sample: &[f64; C]| sample.map(|entry| 0.0 + gain * entry);
+        let mut aim = self.held.map_or([0.0; C], |held| aim_at(&store[held]));
+        let mut next_sent = self.used.len();
+        let mut growth = 1.0_f64;
+        let mut maps: Option<(Duration, Map, Map)> = None;
+        for step in &self.steps {
+            match *step {
+                Step::Sample => {
+                    for column in 0..C {
+                        store[next_sent][column] = position_share * z[object][column] + velocity_share * z[object + 1][column];
+                    }
+                    next_sent += 1;
+                }
+                Step::Deliver(sample) => aim = aim_at(&store[sample]),
+                Step::Tick(span) => {
+                    let (on_copy, on_device) = match maps {
+                        Some((of, on_copy, on_device)) if of == span => (on_copy, on_device),
+                        _ => {
+                            let on_copy = Map::of(&node.object, span, time);
+                            let on_device = node.device.as_ref().map_or(on_copy, |device| Map::of(device, span, time));
+                            maps = Some((span, on_copy, on_device));
+                            (on_copy, on_device)
+                        }
+                    };
+                    if node.device.is_some() {
+                        let [xh, vh, x, v] = &mut z;
+                        for column in 0..C {
+                            let own_force = own.stiffness * x[column] + own_damping * v[column];
+                            //= Rakhsha & Constantinescu 2015, eq. (9)
+                            let force = coupling * (xh[column] - x[column]) + coupling_damping * (vh[column] - v[column]);
+                            on_copy.advance(&mut x[column], &mut v[column], (aim[column] - own_force) + force);
+                            on_device.advance(&mut xh[column], &mut vh[column], -force);
+                        }
+                    } else {
+                        let [x, v, ..] = &mut z;
+                        for column in 0..C {
+                            let own_force = own.stiffness * x[column] + own_damping * v[column];
+                            on_copy.advance(&mut x[column], &mut v[column], aim[column] - own_force);
+                        }
+                    }
+                    if BOUND {
+                        let norm = |row: &[f64; C]| row.iter().map(|entry| entry.abs()).sum::<f64>();
+                        growth = z.iter().take(count).map(norm).fold(growth, f64::max);
+                    }
+                }
+            }
+        }
+        let moved = |row: usize| if row == 0 || row == object { 1.0 } else { 0.0 };
+        self.assemble(&z, &store, reference.map(|row| (row, stiffness / unit)), (count, states), moved, matrix);
+        if !BOUND {
+            return 0.0;
+        }
+        let scale = crate::lifted::node::Scale { time, compliance: node.compliance(time) };
+        let step = node.step_norm(coordination, scale).max(1.0);
+        // The same bound as that of the general path, which says why.
+        10.0 * f64::EPSILON * f64::from(self.ticks) * step * growth * growth
+    }
+
+    /// The matrix of the relative state from the rows of states and samples. `reference`: its row, and how far a translation moves a sample.
+    fn assemble<const C: usize>(
+        &self,
+        z: &[[f64; C]; MOST_STATES],
+        store: &[[f64; C]; 2 * MOST_SAMPLES],
+        reference: Option<(usize, f64)>,
+        (count, states): (usize, usize),
+        moved: impl Fn(usize) -> f64,
+        matrix: &mut Matrix,
+    ) {
+        let size = states + self.depth;
+        if matrix.rows() != size || matrix.columns() != size {
+            *matrix = Matrix::zeros(size, size);
+        }
+        let used = self.used.len();
+        let mut put = |row: usize, source: &[f64; C], moved: f64| {
+            let row = matrix.row_mut(row);
+            row.fill(0.0);
+            let origin = reference.map_or(source, |(reference, _)| &z[reference]);
+            let moved = if reference.is_some() { moved } else { 0.0 };
+            for column in 0..states + used {
+                let place = if column < states { column } else { states + self.used[column - states] - 1 };
+                row[place] = source[column] - moved * origin[column];
+            }
+        };
+        let kept = (0..count).filter(|row| reference.is_none_or(|(reference, _)| *row != reference));
+        for (row, source) in kept.enumerate() {
+            put(row, &z[source], moved(source));
+        }
+        let translation = reference.map_or(0.0, |(_, translation)| translation);
+        for age in 1..=self.depth {
+            let row = states + age - 1;
+            if age <= self.sent {
+                put(row, &store[used + self.sent - age], translation);
+            } else {
+                put(row, &[0.0; C], translation);
+            }
+        }
+        for age in self.sent + 1..=self.depth {
+            matrix[(states + age - 1, states + age - self.sent - 1)] += 1.0;
+        }
+    }
+}
+
+/// A body's step in the units of the states.
+#[derive(Clone, Copy, Debug)]
+struct Map {
+    e: [[f64; 2]; 2],
+    g: [f64; 2],
+}
+
+impl Map {
+    fn of(body: &Body, span: Duration, time: f64) -> Self {
+        let (e, g) = body.map(span).coefficients();
+        Self { e: [[e[0][0], e[0][1] / time], [e[1][0] * time, e[1][1]]], g: [g[0], g[1] * time] }
+    }
+
+    #[inline]
+    fn advance(&self, x: &mut f64, v: &mut f64, force: f64) {
+        let (x0, v0) = (*x, *v);
+        *x = x0 + (self.e[0][0] * x0 + self.e[0][1] * v0 + self.g[0] * force);
+        *v = v0 + (self.e[1][0] * x0 + self.e[1][1] * v0 + self.g[1] * force);
+    }
+}
