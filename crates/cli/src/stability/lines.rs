@@ -2,6 +2,7 @@
 
 use cohaptic_harness::record::svg::{COLOURS, Drawing, DrawingResult};
 use plotters::coord::CoordTranslate;
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
 /// Lengths of dashes and gaps \[pixels\]; the first line has none. They repeat after these, with thicker lines.
@@ -72,7 +73,7 @@ pub(crate) fn draw_legend<'a>(area: &Drawing<'a>, entries: &[(Sample, String)]) 
         match *sample {
             Sample::Line(Look { style, dash: None }) => area.draw(&PathElement::new([(LEFT, y), (RIGHT, y)], style))?,
             Sample::Line(Look { style, dash: Some((dash, gap)) }) => {
-                area.draw(&DashedPathElement::new([(LEFT, y), (RIGHT, y)].into_iter(), dash, gap, style))?;
+                area.draw(&DashedPathElement::new([(LEFT, y), (RIGHT, y)], dash, gap, style))?;
             }
             Sample::Area(colour) => area.draw(&Rectangle::new([(LEFT, y - 6), (RIGHT, y + 6)], colour.filled()))?,
         }

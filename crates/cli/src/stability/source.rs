@@ -45,7 +45,12 @@ impl Said<'_> {
                 }
             }
             FamilyError::Analysis(error) => super::not_analysed(self.file, &error),
-            error => {
+            error @ (FamilyError::NoNumber { .. }
+            | FamilyError::Keys { .. }
+            | FamilyError::Twice { .. }
+            | FamilyError::Values { .. }
+            | FamilyError::Outside { .. }
+            | _) => {
                 let about =
                     |(option, range): &&(&'static str, KeyRange)| error.to_string().starts_with(&format!("{} ", range.key)).then_some(*option);
                 match self.ranges.iter().find_map(|range| about(&range)) {

@@ -21,6 +21,20 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
         ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json"]),
         ("stability point", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--method <METHOD>"]),
         (
+            "stability map",
+            &[
+                "<SCENE>",
+                "--json",
+                "--x <KEY=LO..HI>",
+                "--y <KEY=LO..HI>",
+                "--grid <WxH>",
+                "--curve <KEY=VALUE,...>",
+                "--against <KEY=VALUE>",
+                "--out <DIR>",
+            ],
+        ),
+        ("stability boundary", &["<SCENE>", "--json", "--along <KEY=LO..HI>", "--tolerance <T>", "--samples <N>", "--out <DIR>"]),
+        (
             "link",
             &["[SPEC]...", "--from <FATES.csv>", "--packets <N>", "--every <TIME>", "--size <SIZE>", "--seed <N>", "--profile <PROFILE>", "--ecn"],
         ),

@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use super::picture::{Axis, Outline, Picture};
-use super::{Order, VariantMap, verdict};
+use super::{Order, VariantMap};
 use crate::failure::Failure;
 use crate::output;
 use crate::output_file::OutputFile;
@@ -33,11 +33,11 @@ pub(in crate::stability) fn write_file(path: &Path, content: &str) -> Result<(),
 }
 
 /// One row a cell, x running fastest.
-fn table(order: &Order, VariantMap { map, .. }: &VariantMap) -> String {
+fn table(order: &Order, VariantMap { map, verdicts, .. }: &VariantMap) -> String {
     let mut text = format!("{},{},spectral_radius,verdict\n", field(&order.x().key), field(&order.y().key));
-    for (y, row) in map.y.iter().zip(&map.radius) {
-        for (x, radius) in map.x.iter().zip(row) {
-            text.push_str(&format!("{x:?},{y:?},{radius:?},{}\n", verdict(*radius).word()));
+    for ((y, row), verdicts) in map.y.iter().zip(&map.radius).zip(verdicts) {
+        for ((x, radius), verdict) in map.x.iter().zip(row).zip(verdicts) {
+            text.push_str(&format!("{x:?},{y:?},{radius:?},{}\n", verdict.word()));
         }
     }
     text

@@ -5,12 +5,13 @@ mod files;
 mod filling;
 mod glance;
 mod picture;
+mod verdicts;
 mod words;
 
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_stability::{Family, Grid, KeyRange, Map, MapError, Radius, Verdict};
+use cohaptic_stability::{Family, Grid, KeyRange, Map, MapError, Verdict};
 
 use super::source::{self, Said};
 use super::variants::Variant;
@@ -37,6 +38,8 @@ struct VariantMap {
     name: String,
     overrides: Vec<String>,
     map: Map,
+    /// Of every cell, row after row.
+    verdicts: Vec<Vec<Verdict>>,
     /// Its table, if it was written.
     file: Option<String>,
 }
@@ -46,10 +49,13 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let order = Order::new(arguments)?;
     let start = Clock::now();
     let Filled { maps, cells, rows } = filling::fill(&order, arguments)?;
+    let named = maps.into_iter().enumerate().map(|(number, map)| {
+        let Variant { name, overrides, .. } = &order.variants[number];
+        let verdicts = verdicts::verdicts(&order.families[number], &map).map_err(|error| order.failure(number, arguments, error.into()))?;
+        Ok(VariantMap { name: name.clone(), overrides: overrides.clone(), map, verdicts, file: None })
+    });
+    let mut maps = named.collect::<Result<Vec<VariantMap>, Failure>>()?;
     let wall_s = start.elapsed().as_secs_f64();
-    let named = order.variants.iter().zip(maps);
-    let mut maps: Vec<VariantMap> =
-        named.map(|(variant, map)| VariantMap { name: variant.name.clone(), overrides: variant.overrides.clone(), map, file: None }).collect();
     let mut files = Vec::new();
     if let Some(folder) = &arguments.out {
         files = files::write(folder, &order, &mut maps)?;
@@ -95,7 +101,7 @@ impl Order {
         let said = Said { file: &arguments.scene.scene, ranges: &self.ranges, overrides: (variant.option, &variant.overrides) };
         match error {
             MapError::Family(error) => said.failure(error),
-            error => Failure::Input(error.to_string()),
+            error @ (MapError::Grid { .. } | MapError::Keys { .. } | MapError::Known { .. } | _) => Failure::Input(error.to_string()),
         }
     }
 
@@ -111,18 +117,9 @@ impl Order {
 impl VariantMap {
     /// What share of its cells is stable.
     fn stable_fraction(&self) -> f64 {
-        let cells = || self.map.radius.iter().flatten();
-        share(cells().filter(|radius| verdict(**radius) == Verdict::Stable).count(), cells().count())
+        let cells = || self.verdicts.iter().flatten();
+        share(cells().filter(|verdict| **verdict == Verdict::Stable).count(), cells().count())
     }
-}
-
-/// What the radius of a cell says.
-const fn of_cell(value: f64) -> Radius {
-    Radius { value, error: 0.0 }
-}
-
-fn verdict(radius: f64) -> Verdict {
-    of_cell(radius).verdict()
 }
 
 #[expect(clippy::cast_precision_loss, reason = "far fewer cells than 2^52")]

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use cohaptic_stability::{Map, Verdict};
 
 use super::document::Document;
-use super::{Order, VariantMap, glance, verdict};
+use super::{Order, VariantMap, glance};
 use crate::stability::quantity::label;
 
 /// More pictures than this do not fit on a screen.
@@ -22,7 +22,7 @@ pub(super) fn describe(order: &Order, maps: &[VariantMap], document: &Document<'
         if pictures && number < MOST_PICTURES {
             let (x, y) = (label(order.x()), label(order.y()));
             let axes = (glance::Axis { label: &x, values: &map.map.x }, glance::Axis { label: &y, values: &map.map.y });
-            text.push_str(&glance::draw(&axes.0, &axes.1, |column, row| verdict(map.map.radius[row][column]) == Verdict::Stable));
+            text.push_str(&glance::draw(&axes.0, &axes.1, |column, row| map.verdicts[row][column] == Verdict::Stable));
         }
         let _ = writeln!(
             text,
