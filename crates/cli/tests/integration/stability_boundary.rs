@@ -16,9 +16,11 @@ fn crossings(document: &Value) -> Vec<f64> {
 #[test]
 fn the_verdict_changes_at_every_crossing_and_nowhere_else() {
     let desk = Desk::with("paper.toml", PAPER);
-    let document = desk.json(&format!("{ALONG} --json --tolerance 0.001"));
-    let verdict =
-        |stiffness: f64| desk.json(&format!("stability point paper.toml --json --set coordination.stiffness={stiffness}"))["verdict"].clone();
+    let document = desk.json(&format!("{ALONG} --json --tolerance 0.001 --set coordination.damping=1"));
+    let verdict = |stiffness: f64| {
+        desk.json(&format!("stability point paper.toml --json --set coordination.damping=1 --set coordination.stiffness={stiffness}"))["verdict"]
+            .clone()
+    };
     assert_eq!((document["first"].clone(), document["settled"].clone()), (verdict(100.0), true.into()));
     let found = document["crossings"].as_array().unwrap();
     assert!(!found.is_empty());
@@ -55,12 +57,14 @@ fn one_strategy_crosses_where_the_law_says() {
 #[test]
 fn files_hold_what_was_found() {
     let desk = Desk::with("paper.toml", PAPER);
-    let document = desk.json(&format!("{ALONG} --json --out out --samples 50"));
+    let document = desk.json(&format!("{ALONG} --json --out out --samples 50 --set coordination.damping=1"));
     assert_eq!(desk.files("out"), ["boundary.csv", "boundary.svg", "samples.csv"]);
     let mut table = csv::Reader::from_path(desk.path("out/boundary.csv")).unwrap();
     assert_eq!(table.headers().unwrap(), vec!["coordination.stiffness", "from", "to"]);
     let values: Vec<f64> = table.records().map(|row| row.unwrap()[0].parse().unwrap()).collect();
-    assert_eq!(values, crossings(&document));
+    // The reader of JSON in this test may be off by the last bit.
+    assert!(values.iter().zip(crossings(&document)).all(|(table, document)| (table - document).abs() <= 4.0 * f64::EPSILON * document));
+    assert_eq!(values.len(), crossings(&document).len());
     let samples = desk.read("out/samples.csv");
     assert!(samples.starts_with("coordination.stiffness,spectral_radius,error_bound,verdict\n100.0,"));
     assert_eq!(samples.lines().count() as u64 - 1, document["samples"].as_u64().unwrap());
@@ -102,7 +106,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
         ("--along coordination.strategy=0..1".to_owned(), &["coordination.strategy is no number"]),
         ("--along link.delay=0..1".to_owned(), &["link.delay"]),
         ("--along coordination.stiffness=1".to_owned(), &["--along: ", "KEY=LOW..HIGH"]),
-        (format!("{along} --set peers.left.clock.drift=0.123456789"), &["two.toml: ", "clocks"]),
+        (format!("{along} --set peers.left.clock.drift=0.0123456789"), &["two.toml: ", "clocks"]),
     ] {
         desk.cohaptic(&format!("stability boundary two.toml {rest} --out out --json")).assert_refused(2, parts);
         assert_eq!((desk.files(""), desk.path("out").exists()), (vec!["two.toml".to_owned()], false), "{rest}");

@@ -51,7 +51,10 @@ fn the_table_has_the_numbers_of_the_document() {
     assert_eq!(table.headers().unwrap(), vec!["coordination.stiffness", "coordination.damping", "spectral_radius", "verdict"]);
     let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
     let column = |place: usize| rows.iter().map(|row| row[place].parse().unwrap()).collect::<Vec<f64>>();
-    assert_eq!(column(2), cells(&document));
+    // The reader of JSON in this test may be off by the last bit.
+    assert!(
+        column(2).iter().zip(cells(&document)).all(|(table, document)| (table - document).abs() <= 4.0 * f64::EPSILON * document) && rows.len() == 35
+    );
     let (x, y) = (numbers(&document["x"]), numbers(&document["y"]));
     assert_eq!(column(0), x.repeat(5));
     assert_eq!(column(1), y.iter().flat_map(|y| [*y; 7]).collect::<Vec<f64>>());
@@ -166,7 +169,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
         (format!("{x} {y} --grid 5x5 --curve peers.left.contct=none"), &["--curve peers.left.contct=none", "contact"]),
         (format!("{x} {y} --grid 5x5 --against link.delay=8"), &["--against link.delay=8", "^"]),
         (format!("{x} {y} --grid 5x5 --set link.delay=8"), &["--set link.delay=8", "^"]),
-        (format!("{x} {y} --grid 5x5 --set peers.left.clock.drift=0.123456789"), &["two.toml: ", "clocks"]),
+        (format!("{x} {y} --grid 5x5 --set peers.left.clock.drift=0.0123456789"), &["two.toml: ", "clocks"]),
         (format!("{x} {y} --grid 5x5 --jobs 0"), &["--jobs"]),
     ] {
         let outcome = desk.cohaptic(&format!("stability map two.toml {rest} --out out --json"));

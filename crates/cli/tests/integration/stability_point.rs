@@ -126,6 +126,6 @@ fn what_makes_no_sense_is_refused() {
     desk.cohaptic("stability point two.toml --set coordination.stifness=1").assert_refused(2, &["unknown key", "stiffness"]);
     desk.cohaptic("stability point two.toml --method guess").assert_refused(2, &["guess", "reduced", "full"]);
     desk.cohaptic("stability point gone.toml").assert_refused(3, &["gone.toml: cannot be read"]);
-    desk.cohaptic("stability point two.toml --set peers.left.clock.drift=0.123456789").assert_refused(2, &["two.toml: ", "expected", "clocks"]);
+    desk.cohaptic("stability point two.toml --set peers.left.clock.drift=0.0123456789").assert_refused(2, &["two.toml: ", "expected", "clocks"]);
     desk.cohaptic("stability").assert_refused(2, &["point"]);
 }
