@@ -19,8 +19,11 @@ pub(crate) const INTERRUPTED: u8 = 130;
 #[derive(Debug)]
 pub(crate) enum Failure {
     Scene(SceneError),
-    /// A fault in what `--against` says.
-    Against(SceneError),
+    /// A fault in what an option other than `--set` puts into the scene.
+    Override {
+        option: &'static str,
+        error: SceneError,
+    },
     Record(RecordError),
     /// A fault in the keys of a link.
     LinkKeys(SceneError),
@@ -34,6 +37,8 @@ pub(crate) enum Failure {
         error: io::Error,
     },
     StandardOutput(io::Error),
+    /// The user asked for the end before there was a result; how to go on, in words.
+    Interrupted(String),
 }
 
 impl Failure {
@@ -42,16 +47,18 @@ impl Failure {
         let (message, status) = match self {
             Self::Scene(error) => (error.to_string(), scene_status(error)),
             // The scene knows of overrides, and not which option they came from.
-            Self::Against(error) => (error.to_string().replacen("--set ", "--against ", 1), scene_status(error)),
+            Self::Override { option, error } => (error.to_string().replacen("--set", option, 1), scene_status(error)),
             Self::Record(error) => (error.to_string(), INPUT_OUTPUT),
             // The scene knows of overrides, and not that these are words of their own.
             Self::LinkKeys(error) => (error.to_string().replacen("--set link.", "", 1), scene_status(error)),
             Self::Input(message) => (message.clone(), BAD_INPUT),
             Self::File { verb, path, error } => (format!("cannot {verb} {}: {error}", path.display()), INPUT_OUTPUT),
+            Self::Interrupted(message) => (message.clone(), INTERRUPTED),
             Self::StandardOutput(error) => (format!("cannot write to standard output: {error}"), INPUT_OUTPUT),
         };
         // If standard error cannot be written to either, the exit status is all that is left to say it with.
-        let _ = io::Write::write_all(&mut io::stderr(), format!("error: {message}\n").as_bytes());
+        let kind = if status == INTERRUPTED { "interrupted" } else { "error" };
+        let _ = io::Write::write_all(&mut io::stderr(), format!("{kind}: {message}\n").as_bytes());
         ExitCode::from(status)
     }
 }
@@ -59,7 +66,11 @@ impl Failure {
 /// Why the variant of a scene that can be read cannot be had.
 pub(crate) fn of_variant(error: SceneError, against: &[String]) -> Failure {
     let text = error.diagnostic().and_then(cohaptic_scene::Diagnostic::override_text);
-    if text.is_some_and(|text| against.iter().any(|given| given == text)) { Failure::Against(error) } else { Failure::Scene(error) }
+    if text.is_some_and(|text| against.iter().any(|given| given == text)) {
+        Failure::Override { option: "--against", error }
+    } else {
+        Failure::Scene(error)
+    }
 }
 
 /// The exit status for a scene that could not be had.

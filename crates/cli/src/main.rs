@@ -1,4 +1,4 @@
-//! `cohaptic`: runs, checks and explains scenes of people who move one object together over a bad network; drives and estimates links.
+//! `cohaptic`: runs, checks, explains and analyses scenes of people who move one object together over a bad network; drives and estimates links.
 //!
 //! This is the only crate that prints. Results go to standard output, everything else to standard error. Exit status: 0 done, 1 an expectation
 //! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted.
@@ -14,6 +14,7 @@ mod output;
 mod output_file;
 mod progress;
 mod run;
+mod stability;
 mod terminal_plot;
 
 use std::process::ExitCode;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => check::check(&arguments),
         Command::Explain(arguments) => explain::explain(&arguments),
+        Command::Stability(arguments) => stability::stability(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),
     };

@@ -31,6 +31,20 @@ impl Progress {
         Self(bar)
     }
 
+    /// Progress through the rows of maps.
+    pub(crate) fn through_rows(count: usize) -> Self {
+        let bar = bar(count as u64);
+        bar.set_style(style("{bar:30} {percent:>3} %  {pos}/{len} rows, {eta} left"));
+        Self(bar)
+    }
+
+    /// Progress through values of which nobody knows how many there will be.
+    pub(crate) fn through_values() -> Self {
+        let bar = bar(0);
+        bar.set_style(style("{spinner} {pos} values looked at, {elapsed} passed"));
+        Self(bar)
+    }
+
     pub(crate) fn reach_number(&self, number: u64) {
         self.0.set_position(number);
     }

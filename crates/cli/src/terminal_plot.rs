@@ -50,7 +50,7 @@ pub(crate) fn draw(bands: &Bands, scale: f64, unit: &str) -> String {
 }
 
 /// The bit of each dot, by row and column, in a braille pattern.
-const BRAILLE: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+pub(crate) const BRAILLE: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "a share of a small number of dots")]
 fn place(share: f64, dots: usize) -> usize {

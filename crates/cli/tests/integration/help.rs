@@ -6,7 +6,10 @@ use crate::scenes::TWO;
 #[test]
 fn help_names_the_commands() {
     let text = Desk::new().text("--help");
-    assert!(["run", "check", "explain", "link", "fit", "Exit status: 0 done", "130 interrupted"].iter().all(|word| text.contains(word)), "{text}");
+    assert!(
+        ["run", "check", "explain", "stability", "link", "fit", "Exit status: 0 done", "130 interrupted"].iter().all(|word| text.contains(word)),
+        "{text}"
+    );
     assert!(Desk::new().text("--version").starts_with("cohaptic "));
 }
 
@@ -16,6 +19,21 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
         ("run", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--against <KEY=VALUE>", "--out <DIR>", "--no-plot", "--general"][..]),
         ("check", &["<SCENE>...", "--set <KEY=VALUE>", "--json", "--jobs <N>", "--general"]),
         ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json"]),
+        ("stability point", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--method <METHOD>"]),
+        (
+            "stability map",
+            &[
+                "<SCENE>",
+                "--json",
+                "--x <KEY=LO..HI>",
+                "--y <KEY=LO..HI>",
+                "--grid <WxH>",
+                "--curve <KEY=VALUE,...>",
+                "--against <KEY=VALUE>",
+                "--out <DIR>",
+            ],
+        ),
+        ("stability boundary", &["<SCENE>", "--json", "--along <KEY=LO..HI>", "--tolerance <T>", "--samples <N>", "--out <DIR>"]),
         (
             "link",
             &["[SPEC]...", "--from <FATES.csv>", "--packets <N>", "--every <TIME>", "--size <SIZE>", "--seed <N>", "--profile <PROFILE>", "--ecn"],

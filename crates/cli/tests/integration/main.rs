@@ -18,4 +18,7 @@ mod overrides;
 mod records;
 mod run;
 mod scenes;
+mod stability_boundary;
+mod stability_map;
+mod stability_point;
 mod svg;

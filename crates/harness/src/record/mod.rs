@@ -16,6 +16,7 @@ mod links;
 mod packets;
 mod plot;
 mod recorder;
+pub mod svg;
 mod trajectory;
 
 pub use band::Bands;

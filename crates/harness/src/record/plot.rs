@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::band::Bands;
 use super::file::PartialFile;
+use super::svg::{self, COLOURS, Drawing, DrawingResult};
 use crate::record::RecordError;
 
 /// One panel of a plot: curves over time with their names, or without.
@@ -24,50 +24,22 @@ pub(crate) struct Panel<'a> {
 }
 
 /// More curves than this are drawn in one colour and not named.
-const MOST_NAMED: usize = 10;
-
-/// Colours that are told apart with any kind of colour vision (Okabe & Ito 2008), then their darker halves.
-const COLOURS: [RGBColor; MOST_NAMED] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(120, 120, 120),
-    RGBColor(0, 57, 89),
-    RGBColor(106, 47, 0),
-    RGBColor(0, 79, 57),
-];
+const MOST_NAMED: usize = COLOURS.len();
 
 /// Writes the panels below one another.
 pub(crate) fn write(path: PathBuf, panels: &[Panel<'_>]) -> Result<PathBuf, RecordError> {
-    let mut svg = String::new();
-    {
-        let height = 60 + 300 * u32::try_from(panels.len()).unwrap_or(1);
-        let root = SVGBackend::with_string(&mut svg, (960, height)).into_drawing_area();
-        draw(&root, panels).expect("drawing to memory does not fail");
-    }
+    let height = 60 + 300 * u32::try_from(panels.len()).unwrap_or(1);
+    let svg = svg::document((960, height), |root| draw(root, panels));
     let mut file = PartialFile::create(path)?;
-    let svg: String = svg.chars().map(|letter| if is_xml(letter) { letter } else { char::REPLACEMENT_CHARACTER }).collect();
     file.write(svg.as_bytes())?;
     file.finish()
 }
 
-/// Whether XML 1.0 can hold a character, escaped or not: see its production `Char`. A title may have others.
-fn is_xml(letter: char) -> bool {
-    matches!(letter, '\t' | '\n' | '\r' | '\u{20}'..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..)
-}
-
-type Drawing<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type DrawingResult<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
-
 fn draw<'a>(root: &Drawing<'a>, panels: &[Panel<'_>]) -> DrawingResult<'a> {
-    root.fill(&WHITE)?;
     for (area, panel) in root.split_evenly((panels.len(), 1)).iter().zip(panels) {
         draw_panel(area, panel)?;
     }
-    root.present()
+    Ok(())
 }
 
 fn draw_panel<'a>(area: &Drawing<'a>, panel: &Panel<'_>) -> DrawingResult<'a> {

@@ -1,0 +1,73 @@
+//! `link` and `fit`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::EXIT_STATUS;
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_STATUS)]
+pub(crate) struct LinkArguments {
+    /// What the link does: words of tc-netem (delay 20ms 5ms 25% loss 1%), or keys of the link table of a scene (delay=24ms loss=1%)
+    #[arg(required_unless_present = "from", conflicts_with = "from", value_name = "SPEC", allow_negative_numbers = true)]
+    pub(crate) spec: Vec<String>,
+    /// Replay a file of fates instead, as --fates writes it
+    #[arg(long, value_name = "FATES.csv")]
+    pub(crate) from: Option<PathBuf>,
+    /// How many packets are sent [default: 100000, with --from as many as the file has]
+    #[arg(long, value_name = "N")]
+    pub(crate) packets: Option<std::num::NonZeroU64>,
+    /// The time from one packet to the next
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cohaptic_units::parse::duration)]
+    pub(crate) every: std::time::Duration,
+    /// The size of a packet
+    #[arg(long, value_name = "SIZE", default_value = "64B", value_parser = cohaptic_units::parse::size)]
+    pub(crate) size: cohaptic_units::Bytes,
+    /// The seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// What words of tc-netem mean: what they say, or what Linux 6.6 does
+    #[arg(long, value_enum, default_value_t = Profile::Exact)]
+    pub(crate) profile: Profile,
+    /// Packets can carry a congestion mark: they are marked where others would be dropped
+    #[arg(long)]
+    pub(crate) ecn: bool,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write what became of every packet, for --from and for cohaptic fit
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) fates: Option<PathBuf>,
+    /// Write what became of every packet as a capture, for packet analysers
+    #[arg(long, value_name = "FILE")]
+    pub(crate) pcapng: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
+pub(crate) enum Profile {
+    Exact,
+    #[value(name = "kernel-6.6")]
+    Kernel66,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_STATUS)]
+pub(crate) struct FitArguments {
+    /// A CSV of one-way measurements (t,delay or sent,arrived), a file of fates, or the capture of the sender
+    pub(crate) file: PathBuf,
+    /// The capture of the receiver
+    pub(crate) receiver: Option<PathBuf>,
+    /// Only datagrams to this UDP port, of captures
+    #[arg(long, value_name = "N", requires = "receiver")]
+    pub(crate) port: Option<u16>,
+    /// Remove a linear drift of one clock against the other first
+    #[arg(long)]
+    pub(crate) skew: bool,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write the link table of a scene into this file
+    #[arg(long, value_name = "SCENE_LINK.toml")]
+    pub(crate) out: Option<PathBuf>,
+}

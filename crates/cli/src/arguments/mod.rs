@@ -1,0 +1,61 @@
+//! What can be said on the command line.
+
+mod links;
+mod scenes;
+mod stability;
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+pub(crate) use links::{FitArguments, LinkArguments, Profile};
+pub(crate) use scenes::{CheckArguments, ExplainArguments, RunArguments};
+pub(crate) use stability::{BoundaryArguments, GridSize, MapArguments, PointArguments, StabilityArguments, StabilityCommand};
+
+/// Several people feel and move one virtual object together, over a bad network.
+///
+/// A scene is one TOML file: the object, the peers, the links between them, and what is expected. docs/scenes.md lists every key.
+#[derive(Debug, Parser)]
+#[command(name = "cohaptic", version, after_help = EXIT_STATUS)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+const EXIT_STATUS: &str = "Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted.";
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Simulates a scene in virtual time and says what happened
+    Run(RunArguments),
+    /// Runs scenes as tests: each against its own \[expect\]
+    Check(CheckArguments),
+    /// Says what a scene makes the program model, what it leaves out and why, and what it costs
+    Explain(ExplainArguments),
+    /// Says whether a scene is stable without simulating it, maps where it is, and finds where that changes
+    Stability(StabilityArguments),
+    /// Sends a steady stream over one link and sets what it achieved beside what it was asked for
+    Link(LinkArguments),
+    /// Estimates the link that made a file of measurements, captures or fates
+    Fit(FitArguments),
+}
+
+/// What all commands on one scene take.
+#[derive(Debug, Args)]
+pub(crate) struct SceneArguments {
+    /// The scene, a TOML file
+    pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) overrides: Overrides,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Overrides {
+    /// Override a key of the scene by its dotted path, again and again: --set coordination.stiffness=1000 --set link.delay=8ms
+    /// --set peers.left.contact=none
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+}

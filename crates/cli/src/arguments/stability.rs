@@ -1,0 +1,132 @@
+//! `stability` and its commands.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use cohaptic_stability::Method;
+
+use super::{EXIT_STATUS, SceneArguments};
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_STATUS)]
+pub(crate) struct StabilityArguments {
+    #[command(subcommand)]
+    pub(crate) command: StabilityCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum StabilityCommand {
+    /// The verdict for the scene as it stands
+    Point(PointArguments),
+    /// The region of two keys in which the scene is stable
+    Map(MapArguments),
+    /// Where the scene becomes stable and unstable along one key
+    Boundary(BoundaryArguments),
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_STATUS)]
+pub(crate) struct PointArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+    /// How the verdict is reached: peers that are equal taken together, or the whole state pushed through the code that simulates
+    #[arg(long, value_enum, default_value_t = MethodName::Reduced)]
+    pub(crate) method: MethodName,
+}
+
+/// How a verdict is reached.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub(crate) enum MethodName {
+    Reduced,
+    Full,
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Reduced => Self::Reduced,
+            MethodName::Full => Self::Full,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_STATUS)]
+pub(crate) struct MapArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+    /// The key along the horizontal axis, and from where to where: --x coordination.stiffness=0..6000
+    #[arg(long, value_name = "KEY=LO..HI")]
+    pub(crate) x: String,
+    /// The key along the vertical axis, and from where to where: --y coordination.damping=0..50
+    #[arg(long, value_name = "KEY=LO..HI")]
+    pub(crate) y: String,
+    /// How many values of each, the ends among them
+    #[arg(long, value_name = "WxH", value_parser = GridSize::parse)]
+    pub(crate) grid: GridSize,
+    /// Another map in the same picture, with these keys overridden too, again and again:
+    /// --curve scene.count=3,coordination.strategy=proportional-derivative
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    pub(crate) curve: Vec<String>,
+    /// Another map in the same picture, with this key overridden too; said again, all for the same map
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) against: Vec<String>,
+    /// Write map.csv, map-2.csv ... and map.svg into this folder, and keep there what is done if it is interrupted
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// How many cells are computed at the same time [default: one a core]. Results do not depend on it
+    #[arg(long, value_name = "N")]
+    pub(crate) jobs: Option<NonZeroUsize>,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_STATUS)]
+pub(crate) struct BoundaryArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+    /// The key, and from where to where it is searched: --along coordination.stiffness=0..6000
+    #[arg(long, value_name = "KEY=LO..HI")]
+    pub(crate) along: String,
+    /// How exactly a crossing is found, in the unit of the key [default: a billionth of the range]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    pub(crate) tolerance: Option<f64>,
+    /// How many values are looked at first, the ends among them [default: 400]
+    #[arg(long, value_name = "N")]
+    pub(crate) samples: Option<usize>,
+    /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep there what is done if it is interrupted
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// How many cells a map has along each axis.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct GridSize {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+}
+
+impl GridSize {
+    /// More cells than this are refused: their radii alone would fill the memory of a small machine.
+    pub(crate) const MOST_CELLS: usize = 10_000_000;
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let expected = || "expected WIDTHxHEIGHT, such as 60x40".to_owned();
+        let (width, height) = text.split_once(['x', 'X']).ok_or_else(expected)?;
+        let [width, height] = [width, height].map(|side| side.trim().parse::<usize>());
+        let (width, height) = (width.map_err(|_| expected())?, height.map_err(|_| expected())?);
+        if width < 2 || height < 2 {
+            return Err("a map has two sides of each axis: expected at least 2x2".to_owned());
+        }
+        if width.checked_mul(height).is_none_or(|cells| cells > Self::MOST_CELLS) {
+            return Err(format!("too many cells: expected at most {}", Self::MOST_CELLS));
+        }
+        Ok(Self { width, height })
+    }
+}
+
+impl std::fmt::Display for GridSize {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}

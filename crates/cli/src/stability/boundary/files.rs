@@ -1,0 +1,54 @@
+//! The files of a boundary: the crossings, all values looked at, and a picture.
+
+use std::path::Path;
+
+use cohaptic_stability::Boundary;
+
+use super::Order;
+use super::picture::Picture;
+use super::words::crossing_in_words;
+use crate::failure::Failure;
+use crate::output;
+use crate::stability::map::{field, write_file};
+use crate::stability::quantity::label;
+
+/// Writes `boundary.csv`, `samples.csv` and `boundary.svg`, and gives their paths.
+pub(super) fn write(folder: &Path, order: &Order, found: &Boundary) -> Result<Vec<String>, Failure> {
+    let files = [("boundary.csv", crossings(order, found)), ("samples.csv", samples(order, found)), ("boundary.svg", picture(order, found))];
+    let mut written = Vec::new();
+    for (name, content) in files {
+        let path = folder.join(name);
+        write_file(&path, &content)?;
+        written.push(output::path(&path));
+    }
+    Ok(written)
+}
+
+fn crossings(order: &Order, found: &Boundary) -> String {
+    let mut text = format!("{},from,to\n", field(&order.range.key));
+    for crossing in &found.crossings {
+        text.push_str(&format!("{:?},{},{}\n", crossing.value, crossing.from.word(), crossing.to.word()));
+    }
+    text
+}
+
+fn samples(order: &Order, found: &Boundary) -> String {
+    let mut text = format!("{},spectral_radius,error_bound,verdict\n", field(&order.range.key));
+    for (value, radius) in &found.known {
+        text.push_str(&format!("{value:?},{:?},{:?},{}\n", radius.value, radius.error, radius.verdict().word()));
+    }
+    text
+}
+
+fn picture(order: &Order, found: &Boundary) -> String {
+    let samples: Vec<(f64, f64)> = found.known.iter().map(|(value, radius)| (*value, radius.value)).collect();
+    let crossings: Vec<(f64, String)> = found.crossings.iter().map(|crossing| (crossing.value, crossing_in_words(&order.range, crossing))).collect();
+    let picture = Picture {
+        title: &order.title,
+        label: &label(&order.range),
+        range: (order.range.low, order.range.high),
+        samples: &samples,
+        crossings: &crossings,
+    };
+    picture.svg()
+}

@@ -1,0 +1,128 @@
+//! `cohaptic stability boundary`.
+
+mod document;
+mod files;
+mod picture;
+mod words;
+
+use std::process::ExitCode;
+
+use cohaptic_stability::{Boundary, BoundaryError, BoundaryOptions, Family, KeyRange, Radius};
+
+use super::rows_file::{Row, RowsFile, fingerprint};
+use super::source::{self, Said};
+use crate::arguments::BoundaryArguments;
+use crate::failure::Failure;
+use crate::progress::Progress;
+use crate::{interrupt, output};
+use document::Document;
+
+/// The file in which values looked at are kept.
+const ROWS: &str = "boundary.rows.partial";
+
+/// Everything that is asked for, checked: nothing is written before there is one.
+struct Order {
+    title: String,
+    range: KeyRange,
+    options: BoundaryOptions,
+    family: Family,
+    /// What values looked at belong to.
+    header: Vec<String>,
+}
+
+/// Finds every crossing along a key.
+pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failure> {
+    let order = Order::new(arguments)?;
+    let (rows, known) = match &arguments.out {
+        None => (None, Vec::new()),
+        Some(folder) => RowsFile::open(folder.join(ROWS), &order.header).map(|(rows, known)| (Some(rows), known))?,
+    };
+    let found = look(&order, &known);
+    let found = match found {
+        Ok(found) => found,
+        Err(error) => {
+            if let Some(rows) = rows.filter(|_| known.is_empty()) {
+                rows.abandon();
+            }
+            return Err(failure(arguments, &order.range, error));
+        }
+    };
+    if !found.is_settled() && interrupt::asked() {
+        return Err(interrupted(&found, rows, &known, arguments));
+    }
+    let mut written = Vec::new();
+    if let Some(folder) = &arguments.out {
+        written = files::write(folder, &order, &found)?;
+        rows.map_or(Ok(()), RowsFile::remove)?;
+    }
+    if arguments.scene.json {
+        output::json(&Document::new(&order, &found, &written))?;
+    } else {
+        output::text(&words::describe(&order, &found, &written))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Order {
+    fn new(arguments: &BoundaryArguments) -> Result<Self, Failure> {
+        let range = source::range("--along", &arguments.along)?;
+        let mut options = BoundaryOptions::of(&range);
+        options.tolerance = arguments.tolerance.unwrap_or(options.tolerance);
+        options.samples = arguments.samples.unwrap_or(options.samples);
+        if !(options.tolerance > 0.0 && options.tolerance.is_finite()) {
+            return Err(Failure::Input(format!("--tolerance {}: expected a finite number above zero", options.tolerance)));
+        }
+        if options.samples < 2 || options.samples > options.most {
+            return Err(Failure::Input(format!("--samples {}: expected from 2 to {}", options.samples, options.most)));
+        }
+        let (file, set) = (&arguments.scene.scene, &arguments.scene.overrides.set);
+        let text = source::read(file, set)?;
+        let refused = |error| failure(arguments, &range, BoundaryError::Radius(error));
+        let family = Family::new(&text, file, set, vec![range.clone()]).map_err(refused)?;
+        let title = source::at_low(&family).map_err(refused)?.title;
+        let header = vec![
+            format!("cohaptic {} stability boundary: values looked at; the same command goes on from here", env!("CARGO_PKG_VERSION")),
+            format!("scene text {:016x}", fingerprint(&text)),
+            format!("set {set:?}"),
+            format!("along {:?} of the scene {:016x}", arguments.along, source::fingerprint_of(&family).map_err(refused)?),
+            "each row: its number, the value, the spectral radius and its error".to_owned(),
+        ];
+        Ok(Self { title, range, options, family, header })
+    }
+}
+
+fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic_stability::FamilyError>> {
+    let known: Vec<(f64, Radius)> =
+        known.iter().filter_map(|(_, row)| Some((*row.first()?, Radius { value: *row.get(1)?, error: *row.get(2)? }))).collect();
+    let progress = Progress::through_values();
+    let found = Boundary::find(&order.family, order.options, &known, |count| progress.reach_number(count as u64), interrupt::asked);
+    progress.clear();
+    found
+}
+
+/// What went wrong, in the words of the user's options.
+fn failure(arguments: &BoundaryArguments, range: &KeyRange, error: BoundaryError<cohaptic_stability::FamilyError>) -> Failure {
+    match error {
+        BoundaryError::Radius(error) => {
+            Said { file: &arguments.scene.scene, ranges: &[("--along", range.clone())], overrides: ("--set", &[]) }.failure(error)
+        }
+        error @ (BoundaryError::Options { .. } | BoundaryError::Keys { .. } | _) => Failure::Input(error.to_string()),
+    }
+}
+
+/// Keeps what was looked at, and says how to go on.
+fn interrupted(found: &Boundary, rows: Option<RowsFile>, known: &[Row], arguments: &BoundaryArguments) -> Failure {
+    let kept = match (&arguments.out, rows) {
+        (Some(folder), Some(mut rows)) => {
+            let is_known = |value: f64| known.iter().any(|(_, row)| row.first().is_some_and(|known| known.to_bits() == value.to_bits()));
+            let mut new = found.known.iter().filter(|(value, _)| !is_known(*value)).enumerate();
+            if let Err(failure) = new.try_for_each(|(number, (value, radius))| rows.add(known.len() + number, &[*value, radius.value, radius.error]))
+            {
+                return failure;
+            }
+            format!("they are kept in {}, and the same command goes on from there", output::path(&folder.join(ROWS)))
+        }
+        _ => "nothing is kept; with --out DIR they are, and the same command goes on from there".to_owned(),
+    };
+    Failure::Interrupted(format!("{} values have been looked at: {kept}", found.samples))
+}

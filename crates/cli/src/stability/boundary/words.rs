@@ -1,0 +1,45 @@
+//! A boundary in words.
+
+use std::fmt::Write as _;
+
+use cohaptic_stability::{Boundary, Crossing, KeyRange};
+
+use super::Order;
+
+pub(super) fn describe(order: &Order, found: &Boundary, files: &[String]) -> String {
+    let range = &order.range;
+    let mut text = format!("{}\n\n", order.title);
+    // Writing to a string does not fail.
+    let mut line = |line: String| {
+        let _ = writeln!(text, "  {line}");
+    };
+    line(format!("{} from {}", found.first.word(), range.text(range.low)));
+    for crossing in &found.crossings {
+        line(crossing_in_words(range, crossing));
+    }
+    if found.crossings.is_empty() {
+        line(format!("no crossing up to {}", range.text(range.high)));
+    }
+    for stretch in &found.marginal {
+        if stretch.low < stretch.high {
+            line(format!("cannot be told from 1 from {} to {}", range.text(stretch.low), range.text(stretch.high)));
+        } else {
+            line(format!("touches 1, or comes closer than can be told, at {}", range.text(stretch.low)));
+        }
+    }
+    let unit = &range.unit;
+    line(format!(
+        "{} values looked at, {:.3e}{unit} to {:.3e}{unit} apart; crossings to {:.1e}{unit}. What comes and goes between two of them without a trace is not seen",
+        found.samples, found.finest, found.coarsest, order.options.tolerance
+    ));
+    if !found.is_settled() {
+        line("NOT SETTLED: it ended after the most values that it may look at; a larger tolerance or a shorter range decides".to_owned());
+    }
+    files.iter().for_each(|file| line(file.clone()));
+    text
+}
+
+/// One crossing.
+pub(super) fn crossing_in_words(range: &KeyRange, crossing: &Crossing) -> String {
+    format!("{} from {} (before: {})", crossing.to.word(), range.text(crossing.value), crossing.from.word())
+}

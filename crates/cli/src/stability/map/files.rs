@@ -1,0 +1,63 @@
+//! The files of a map: a table for each variant, and one picture.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use super::picture::{Axis, Outline, Picture};
+use super::{Order, VariantMap};
+use crate::failure::Failure;
+use crate::output;
+use crate::output_file::OutputFile;
+use crate::stability::quantity::label;
+
+/// Writes `map.csv`, `map-2.csv` ... and `map.svg`, and gives their paths.
+pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap]) -> Result<Vec<String>, Failure> {
+    let mut files = Vec::new();
+    for (number, map) in maps.iter_mut().enumerate() {
+        let path = folder.join(if number == 0 { "map.csv".to_owned() } else { format!("map-{}.csv", number + 1) });
+        write_file(&path, &table(order, map))?;
+        map.file = Some(output::path(&path));
+        files.push(output::path(&path));
+    }
+    let path = folder.join("map.svg");
+    write_file(&path, &picture(order, maps))?;
+    files.push(output::path(&path));
+    Ok(files)
+}
+
+/// Writes a whole file, which has its name only then.
+pub(in crate::stability) fn write_file(path: &Path, content: &str) -> Result<(), Failure> {
+    let (file, mut to) = OutputFile::create(path)?;
+    let written = to.write_all(content.as_bytes()).and_then(|()| to.flush()).map(|()| to);
+    file.finish(written)
+}
+
+/// One row a cell, x running fastest.
+fn table(order: &Order, VariantMap { map, verdicts, .. }: &VariantMap) -> String {
+    let mut text = format!("{},{},spectral_radius,verdict\n", field(&order.x().key), field(&order.y().key));
+    for ((y, row), verdicts) in map.y.iter().zip(&map.radius).zip(verdicts) {
+        for ((x, radius), verdict) in map.x.iter().zip(row).zip(verdicts) {
+            text.push_str(&format!("{x:?},{y:?},{radius:?},{}\n", verdict.word()));
+        }
+    }
+    text
+}
+
+/// A field of a CSV file, quoted where it must be (RFC 4180).
+pub(in crate::stability) fn field(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+fn picture(order: &Order, maps: &[VariantMap]) -> String {
+    let Some(first) = maps.first() else { return String::new() };
+    let outline = |map: &VariantMap| Outline { name: map.name.clone(), lines: map.map.contour() };
+    let title = format!("{}: spectral radius 1", order.title);
+    Picture {
+        title: &title,
+        x: Axis { label: label(order.x()), values: &first.map.x },
+        y: Axis { label: label(order.y()), values: &first.map.y },
+        outlines: maps.iter().map(outline).collect(),
+        regions: first.map.regions(),
+    }
+    .svg()
+}

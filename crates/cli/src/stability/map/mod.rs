@@ -1,0 +1,128 @@
+//! `cohaptic stability map`.
+
+mod document;
+mod files;
+mod filling;
+mod glance;
+mod picture;
+mod verdicts;
+mod words;
+
+use std::process::ExitCode;
+use std::time::Instant as Clock;
+
+use cohaptic_stability::{Family, Grid, KeyRange, Map, MapError, Verdict};
+
+use super::source::{self, Said};
+use super::variants::Variant;
+use crate::arguments::MapArguments;
+use crate::failure::Failure;
+use crate::output;
+use document::Document;
+pub(super) use files::{field, write_file};
+use filling::Filled;
+
+/// Everything that is asked for, checked: nothing is written before there is one.
+struct Order {
+    text: String,
+    title: String,
+    ranges: [(&'static str, KeyRange); 2],
+    grid: Grid,
+    variants: Vec<Variant>,
+    /// One for each variant.
+    families: Vec<Family>,
+}
+
+/// A map of one variant.
+struct VariantMap {
+    name: String,
+    overrides: Vec<String>,
+    map: Map,
+    /// Of every cell, row after row.
+    verdicts: Vec<Vec<Verdict>>,
+    /// Its table, if it was written.
+    file: Option<String>,
+}
+
+/// Fills the maps and shows or writes them.
+pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
+    let order = Order::new(arguments)?;
+    let start = Clock::now();
+    let Filled { maps, cells, rows } = filling::fill(&order, arguments)?;
+    let named = maps.into_iter().enumerate().map(|(number, map)| {
+        let Variant { name, overrides, .. } = &order.variants[number];
+        let verdicts = verdicts::verdicts(&order.families[number], &map).map_err(|error| order.failure(number, arguments, error.into()))?;
+        Ok(VariantMap { name: name.clone(), overrides: overrides.clone(), map, verdicts, file: None })
+    });
+    let mut maps = named.collect::<Result<Vec<VariantMap>, Failure>>()?;
+    let wall_s = start.elapsed().as_secs_f64();
+    let mut files = Vec::new();
+    if let Some(folder) = &arguments.out {
+        files = files::write(folder, &order, &mut maps)?;
+        rows.map_or(Ok(()), super::rows_file::RowsFile::remove)?;
+    }
+    let document = Document::new(&order, &maps, wall_s, cells, &files);
+    if arguments.scene.json {
+        output::json(&document)?;
+    } else {
+        output::text(&words::describe(&order, &maps, &document, arguments.out.is_none()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Order {
+    fn new(arguments: &MapArguments) -> Result<Self, Failure> {
+        let ranges = [("--x", source::range("--x", &arguments.x)?), ("--y", source::range("--y", &arguments.y)?)];
+        let variants = Variant::all(arguments)?;
+        let size = arguments.grid;
+        if size.width.saturating_mul(size.height).saturating_mul(variants.len()) > crate::arguments::GridSize::MOST_CELLS {
+            let most = crate::arguments::GridSize::MOST_CELLS;
+            return Err(Failure::Input(format!("{} maps of {size} cells: expected at most {most} cells in all", variants.len())));
+        }
+        let grid = Grid::new(size.width, size.height).map_err(|error| Failure::Input(format!("--grid {size}: {error}")))?;
+        let (file, set) = (&arguments.scene.scene, &arguments.scene.overrides.set);
+        let text = source::read(file, set)?;
+        let keys = || ranges.iter().map(|(_, range)| range.clone()).collect::<Vec<_>>();
+        let mut families = Vec::new();
+        for variant in &variants {
+            let said = Said { file, ranges: &ranges, overrides: (variant.option, &variant.overrides) };
+            families.push(Family::new(&text, file, &variant.on_top_of(set), keys()).map_err(|error| said.failure(error))?);
+        }
+        let title = match families.first().map(source::at_low) {
+            Some(Ok(scene)) => scene.title,
+            Some(Err(_)) | None => output::path(file),
+        };
+        Ok(Self { text, title, ranges, grid, variants, families })
+    }
+
+    /// What went wrong with a map, in the words of the user's options.
+    fn failure(&self, variant: usize, arguments: &MapArguments, error: MapError) -> Failure {
+        let variant = &self.variants[variant];
+        let said = Said { file: &arguments.scene.scene, ranges: &self.ranges, overrides: (variant.option, &variant.overrides) };
+        match error {
+            MapError::Family(error) => said.failure(error),
+            error @ (MapError::Grid { .. } | MapError::Keys { .. } | MapError::Known { .. } | _) => Failure::Input(error.to_string()),
+        }
+    }
+
+    fn x(&self) -> &KeyRange {
+        &self.ranges[0].1
+    }
+
+    fn y(&self) -> &KeyRange {
+        &self.ranges[1].1
+    }
+}
+
+impl VariantMap {
+    /// What share of its cells is stable.
+    fn stable_fraction(&self) -> f64 {
+        let cells = || self.verdicts.iter().flatten();
+        share(cells().filter(|verdict| **verdict == Verdict::Stable).count(), cells().count())
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "far fewer cells than 2^52")]
+fn share(part: usize, whole: usize) -> f64 {
+    part as f64 / whole.max(1) as f64
+}

@@ -1,0 +1,107 @@
+//! The JSON document of a verdict.
+
+use cohaptic_scene::Scene;
+use cohaptic_stability::{Analysis, ContactMode, Part, PartKind};
+use serde::Serialize;
+
+use super::{per_second, time_constant};
+
+/// What `cohaptic stability point --json` prints.
+#[derive(Serialize)]
+pub(super) struct Document<'a> {
+    title: &'a str,
+    verdict: &'static str,
+    spectral_radius: f64,
+    error_bound: f64,
+    rigid_modes: usize,
+    dimension: usize,
+    method: &'static str,
+    frame_s: f64,
+    per_second: f64,
+    time_constant_s: Option<f64>,
+    /// Of the mode of contact with the largest radius.
+    parts: Vec<PartDocument<'a>>,
+    modes: Vec<ModeDocument<'a>>,
+    notes: &'a [String],
+}
+
+#[derive(Serialize)]
+struct ModeDocument<'a> {
+    contacts: &'a str,
+    verdict: &'static str,
+    spectral_radius: f64,
+    error_bound: f64,
+    parts: Vec<PartDocument<'a>>,
+}
+
+#[derive(Serialize)]
+struct PartDocument<'a> {
+    kind: &'static str,
+    /// The first peer that it is about; of all peers where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    peer: Option<&'a str>,
+    dimension: usize,
+    multiplicity: usize,
+    spectral_radius: f64,
+    error_bound: f64,
+}
+
+impl<'a> Document<'a> {
+    pub(super) fn new(scene: &'a Scene, analysis: &'a Analysis) -> Self {
+        Self {
+            title: &scene.title,
+            verdict: analysis.verdict().word(),
+            spectral_radius: analysis.radius.value,
+            error_bound: analysis.radius.error,
+            rigid_modes: analysis.rigid_modes,
+            dimension: analysis.dimension,
+            method: analysis.method.word(),
+            frame_s: analysis.frame.as_secs_f64(),
+            per_second: per_second(analysis),
+            time_constant_s: time_constant(analysis),
+            parts: worst_mode(analysis).map(|mode| parts(scene, mode)).unwrap_or_default(),
+            modes: analysis.modes.iter().map(|mode| ModeDocument::new(scene, mode)).collect(),
+            notes: &analysis.notes,
+        }
+    }
+}
+
+impl<'a> ModeDocument<'a> {
+    fn new(scene: &'a Scene, mode: &'a ContactMode) -> Self {
+        Self {
+            contacts: &mode.contacts,
+            verdict: mode.radius.verdict().word(),
+            spectral_radius: mode.radius.value,
+            error_bound: mode.radius.error,
+            parts: parts(scene, mode),
+        }
+    }
+}
+
+fn parts<'a>(scene: &'a Scene, mode: &ContactMode) -> Vec<PartDocument<'a>> {
+    mode.parts.iter().map(|part| PartDocument::new(scene, part)).collect()
+}
+
+impl<'a> PartDocument<'a> {
+    fn new(scene: &'a Scene, part: &Part) -> Self {
+        let (kind, peer) = match part.kind {
+            PartKind::Whole => ("whole", None),
+            PartKind::Together => ("together", None),
+            PartKind::Apart { peer } => ("apart", Some(peer)),
+            PartKind::LooseDevice { peer } => ("loose-device", Some(peer)),
+        };
+        Self {
+            kind,
+            peer: peer.map(|peer| scene.peers[peer].name.as_str()),
+            dimension: part.size,
+            multiplicity: part.copies,
+            spectral_radius: part.radius.value,
+            error_bound: part.radius.error,
+        }
+    }
+}
+
+/// The mode of contact with the largest radius.
+pub(super) fn worst_mode(analysis: &Analysis) -> Option<&ContactMode> {
+    analysis.modes.iter().max_by(|one, other| one.radius.value.total_cmp(&other.radius.value))
+}

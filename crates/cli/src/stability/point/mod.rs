@@ -1,0 +1,40 @@
+//! `cohaptic stability point`.
+
+mod document;
+mod words;
+
+use std::process::ExitCode;
+
+use cohaptic_scene::Scene;
+use cohaptic_stability::{Analysis, analyse};
+
+use super::not_analysed;
+use crate::arguments::PointArguments;
+use crate::failure::Failure;
+use crate::output;
+use document::Document;
+
+/// Says whether the scene is stable.
+pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
+    let path = &arguments.scene.scene;
+    let scene = Scene::read(path, &arguments.scene.overrides.set)?;
+    let analysis = analyse(&scene, arguments.method.into()).map_err(|error| not_analysed(path, &error))?;
+    if arguments.scene.json {
+        output::json(&Document::new(&scene, &analysis))?;
+    } else {
+        output::text(&words::describe(&scene, &analysis))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// After how long the slowest disturbance is smaller, or larger, by a factor of e \[s\]: the frame over the logarithm of the radius. Below zero where it
+/// grows; `None` where it does neither, and where it is gone within one frame.
+fn time_constant(analysis: &Analysis) -> Option<f64> {
+    let seconds = -analysis.frame.as_secs_f64() / analysis.radius.value.ln();
+    (seconds.is_finite() && seconds != 0.0).then_some(seconds)
+}
+
+/// By which factor the slowest disturbance changes in a second.
+fn per_second(analysis: &Analysis) -> f64 {
+    analysis.radius.value.powf(1.0 / analysis.frame.as_secs_f64())
+}

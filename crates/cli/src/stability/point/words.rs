@@ -1,0 +1,105 @@
+//! A verdict in words.
+
+use std::fmt::Write as _;
+
+use cohaptic_scene::Scene;
+use cohaptic_stability::{Analysis, ContactMode, Method, Part, PartKind, Radius, Verdict};
+use cohaptic_units::print::Span;
+
+use super::document::worst_mode;
+use super::{per_second, time_constant};
+
+/// The modes of contact that are listed at most; the worst is always among them.
+const MOST_MODES: usize = 16;
+
+pub(super) fn describe(scene: &Scene, analysis: &Analysis) -> String {
+    let mut text = format!("{}\n\n{}\n", scene.title, sentence(analysis));
+    // Writing to a string does not fail.
+    let mut line = |line: String| {
+        let _ = writeln!(text, "  {line}");
+    };
+    line(format!("spectral radius {} over a frame of {}", number(analysis.radius), Span(analysis.frame)));
+    line(speed(analysis));
+    let rigid = match analysis.rigid_modes {
+        0 => "no rigid-body mode to remove".to_owned(),
+        1 => "1 rigid-body mode removed".to_owned(),
+        count => format!("{count} rigid-body modes removed"),
+    };
+    let states = if analysis.dimension == 1 { "state" } else { "states" };
+    line(format!("{} {states}, {rigid}; method: {}", analysis.dimension, method(analysis.method)));
+    if analysis.modes.len() > 1 {
+        modes(analysis, &mut line);
+    }
+    if let Some(mode) = worst_mode(analysis).filter(|mode| mode.parts.len() > 1) {
+        line(String::new());
+        line(if mode.contacts.is_empty() { "parts that do not mix".to_owned() } else { format!("parts that do not mix, {}", mode.contacts) });
+        for part in &mode.parts {
+            line(format!("  {:<44}{:>4} states, {:>4} times  {}", name(scene, part), part.size, part.copies, number(part.radius)));
+        }
+    }
+    if !analysis.notes.is_empty() {
+        line(String::new());
+        analysis.notes.iter().for_each(|note| line(format!("note: {note}")));
+    }
+    // Lines that are empty but for the indentation.
+    text.replace("\n  \n", "\n\n")
+}
+
+fn sentence(analysis: &Analysis) -> &'static str {
+    match analysis.verdict() {
+        Verdict::Stable => "STABLE: every disturbance of the relative motion dies out",
+        Verdict::Marginal => "MARGINAL: the spectral radius cannot be told from 1 within its error",
+        Verdict::Unstable => "UNSTABLE: some disturbance of the relative motion grows without end",
+    }
+}
+
+/// How fast the slowest disturbance changes.
+fn speed(analysis: &Analysis) -> String {
+    let factors = format!("by a factor of {:.6} a frame and {:.4e} a second", analysis.radius.value, per_second(analysis));
+    match (analysis.verdict(), time_constant(analysis)) {
+        (Verdict::Stable, Some(seconds)) => format!("the slowest disturbance changes {factors}: time constant {}", time(seconds)),
+        (Verdict::Stable, None) => "every disturbance is gone within a frame".to_owned(),
+        (Verdict::Unstable, Some(seconds)) => format!("the fastest disturbance grows {factors}: e times as large in {}", time(-seconds)),
+        (Verdict::Unstable, None) => "the fastest disturbance grows beyond every number within a frame".to_owned(),
+        (Verdict::Marginal, _) => format!("the slowest disturbance changes {factors}"),
+    }
+}
+
+fn modes(analysis: &Analysis, line: &mut impl FnMut(String)) {
+    line(String::new());
+    line(format!("{} combinations of contacts, the worst first", analysis.modes.len()));
+    let mut sorted: Vec<&ContactMode> = analysis.modes.iter().collect();
+    sorted.sort_by(|one, other| other.radius.value.total_cmp(&one.radius.value));
+    for mode in sorted.iter().take(MOST_MODES) {
+        let contacts = if mode.contacts.is_empty() { "away from the walls" } else { &mode.contacts };
+        line(format!("  {contacts:<44}{:<9} {}", mode.radius.verdict().word(), number(mode.radius)));
+    }
+    if sorted.len() > MOST_MODES {
+        line(format!("  ... and {} more", sorted.len() - MOST_MODES));
+    }
+}
+
+fn name(scene: &Scene, part: &Part) -> String {
+    let peer = |peer: usize| &scene.peers[peer].name;
+    match part.kind {
+        PartKind::Whole => "the whole scene".to_owned(),
+        PartKind::Together => "all, equal peers as their average".to_owned(),
+        PartKind::Apart { peer: first } => format!("differences of peers equal to {}", peer(first)),
+        PartKind::LooseDevice { peer: first } => format!("the device of {}, which touches nothing", peer(first)),
+    }
+}
+
+fn method(method: Method) -> &'static str {
+    match method {
+        Method::Reduced => "reduced (equal peers taken together)",
+        Method::Full => "full (the whole state, through the code that simulates)",
+    }
+}
+
+fn number(radius: Radius) -> String {
+    format!("{:.12} +- {:.1e}", radius.value, radius.error)
+}
+
+fn time(seconds: f64) -> String {
+    if seconds < 1.0 { format!("{:.3} ms", seconds * 1e3) } else { format!("{seconds:.3} s") }
+}

@@ -1,0 +1,204 @@
+//! Rows of numbers that are kept while a long computation lasts, so that it can be interrupted and continued.
+//!
+//! The file begins with a header in words, which says what the rows belong to; each row is one line: its number, and values with the fewest digits that read back as
+//! the same `f64`. A line that is not whole, as a machine leaves it that loses its power, is forgotten together with all that follows.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::failure::Failure;
+use crate::output;
+
+/// A file of rows, open at its end.
+#[derive(Debug)]
+pub(crate) struct RowsFile {
+    path: PathBuf,
+    file: File,
+    /// Whether the folder was made for it.
+    made_folder: bool,
+}
+
+/// A row, with a number that tells it from others.
+pub(crate) type Row = (usize, Vec<f64>);
+
+impl RowsFile {
+    /// Opens the file, or begins it and makes its folder. Gives the rows that it has; none if it was begun.
+    ///
+    /// Nothing is written if it belongs to something else.
+    pub(crate) fn open(path: PathBuf, header: &[String]) -> Result<(Self, Vec<Row>), Failure> {
+        let bytes = match fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+            Err(error) => return Err(Failure::File { verb: "read", path, error }),
+        };
+        // What is not text is not whole either.
+        let text = match std::str::from_utf8(&bytes) {
+            Ok(text) => text,
+            Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
+        };
+        let begun = Begun::read(text, header).map_err(|difference| refused(&path, &difference))?;
+        let made_folder = path.parent().is_some_and(|folder| !folder.exists());
+        let opened = Self::open_at(&path, begun.whole, header);
+        let file = opened.map_err(|error| Failure::File { verb: "write", path: path.clone(), error })?;
+        Ok((Self { path, file, made_folder }, begun.rows))
+    }
+
+    fn open_at(path: &Path, whole: usize, header: &[String]) -> io::Result<File> {
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(path)?;
+        file.set_len(whole as u64)?;
+        file.seek(SeekFrom::End(0))?;
+        if whole == 0 {
+            let lines: String = header.iter().map(|line| format!("{line}\n")).collect();
+            file.write_all(lines.as_bytes())?;
+        }
+        Ok(file)
+    }
+
+    /// Adds a row. It is with the system when this returns.
+    pub(crate) fn add(&mut self, number: usize, values: &[f64]) -> Result<(), Failure> {
+        let mut line = number.to_string();
+        for value in values {
+            line.push_str(&format!(" {value:?}"));
+        }
+        line.push('\n');
+        let written = self.file.write_all(line.as_bytes());
+        written.map_err(|error| Failure::File { verb: "write", path: self.path.clone(), error })
+    }
+
+    /// Removes the file, when all that it was kept for is written.
+    pub(crate) fn remove(self) -> Result<(), Failure> {
+        fs::remove_file(&self.path).map_err(|error| Failure::File { verb: "remove", path: self.path, error })
+    }
+
+    /// Removes the file and the folder that was made for it: nothing came of it. What cannot be removed stays.
+    pub(crate) fn abandon(self) {
+        let _ = fs::remove_file(&self.path);
+        if let Some(folder) = self.path.parent().filter(|_| self.made_folder) {
+            let _ = fs::remove_dir(folder);
+        }
+    }
+}
+
+/// What a file of rows holds already.
+struct Begun {
+    rows: Vec<Row>,
+    /// How many bytes are whole lines.
+    whole: usize,
+}
+
+impl Begun {
+    /// The line that differs from the header, if there is one.
+    fn read(text: &str, header: &[String]) -> Result<Self, Difference> {
+        let mut lines = text.split_inclusive('\n').filter_map(|line| line.strip_suffix('\n'));
+        let mut whole = 0;
+        for expected in header {
+            match lines.next() {
+                Some(found) if found == expected => whole += found.len() + 1,
+                Some(found) => return Err(Difference { found: found.to_owned(), expected: expected.clone() }),
+                // Not even the header is whole: nothing is lost by beginning again.
+                None => return Ok(Self { rows: Vec::new(), whole: 0 }),
+            }
+        }
+        let mut rows = Vec::new();
+        for line in lines {
+            let Some(row) = row(line) else { break };
+            rows.push(row);
+            whole += line.len() + 1;
+        }
+        Ok(Self { rows, whole })
+    }
+}
+
+fn row(line: &str) -> Option<Row> {
+    let mut words = line.split(' ');
+    let number = words.next()?.parse().ok()?;
+    Some((number, words.map(str::parse).collect::<Result<_, _>>().ok()?))
+}
+
+/// A line of the header that is another one than expected.
+#[derive(Debug)]
+struct Difference {
+    found: String,
+    expected: String,
+}
+
+fn refused(path: &Path, Difference { found, expected }: &Difference) -> Failure {
+    let shorten = |line: &str| line.chars().flat_map(char::escape_debug).take(200).collect::<String>();
+    Failure::Input(format!(
+        "{} keeps the rows of something else: it says \"{}\", and this command \"{}\": expected the command that began it, another folder, or no such file",
+        output::path(path),
+        shorten(found),
+        shorten(expected)
+    ))
+}
+
+/// A number that other texts do not have: FNV-1a of 64 bits (Fowler, Noll & Vo 1991). It is no protection against malice.
+pub(crate) fn fingerprint(text: &str) -> u64 {
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header() -> Vec<String> {
+        vec!["a map".to_owned(), "grid 2x2".to_owned()]
+    }
+
+    #[test]
+    fn rows_come_back_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/rows.partial");
+        let (mut file, known) = RowsFile::open(path.clone(), &header()).unwrap();
+        assert_eq!(known, Vec::<Row>::new());
+        let rows = [(3, vec![0.0, 0.1 + 0.2, f64::INFINITY]), (1, vec![1.0, -0.0, 5e-324])];
+        rows.iter().for_each(|(number, row)| file.add(*number, row).unwrap());
+        let (file, known) = RowsFile::open(path.clone(), &header()).unwrap();
+        assert_eq!(known, rows);
+        file.remove().unwrap();
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn what_is_abandoned_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut file, _) = RowsFile::open(folder.path().join("new/rows.partial"), &header()).unwrap();
+        file.add(0, &[1.0]).unwrap();
+        file.abandon();
+        assert!(!folder.path().join("new").exists());
+        let (file, _) = RowsFile::open(folder.path().join("rows.partial"), &header()).unwrap();
+        file.abandon();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_torn_line_is_forgotten_wherever_it_was_torn() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.partial");
+        let whole = "a map\ngrid 2x2\n0 0.5\n12 0.25\n";
+        for end in 0..whole.len() {
+            fs::write(&path, &whole[..end]).unwrap();
+            let (mut file, known) = RowsFile::open(path.clone(), &header()).unwrap();
+            assert_eq!(known.len(), whole[..end].matches('\n').count().saturating_sub(2), "{end}");
+            file.add(3, &[7.0]).unwrap();
+            let (_, again) = RowsFile::open(path.clone(), &header()).unwrap();
+            assert_eq!((again.len(), again.last()), (known.len() + 1, Some(&(3, vec![7.0]))), "{end}");
+        }
+    }
+
+    #[test]
+    fn what_belongs_to_something_else_is_refused_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.partial");
+        for text in ["a map\ngrid 3x2\n0.0 0.5\n", "notes\n", "a map\ngrid 2x2 \n"] {
+            fs::write(&path, text).unwrap();
+            let Err(Failure::Input(message)) = RowsFile::open(path.clone(), &header()) else { panic!("{text:?} was taken") };
+            assert!(message.contains("rows.partial keeps the rows of something else"), "{message}");
+            assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! `cohaptic stability point`: the verdict on a scene as it stands. Radii are compared with numbers that were computed elsewhere, and with one another
+//! where a law relates them.
+
+use serde_json::Value;
+
+use crate::desk::Desk;
+use crate::scenes::{PAPER, PLANE, TWO};
+
+fn number(document: &Value, key: &str) -> f64 {
+    document[key].as_f64().unwrap_or_else(|| panic!("no {key} in {document:#}"))
+}
+
+/// The radius of the paper's three users, computed apart from this program from the full matrix: 0.8964881385693.
+#[test]
+fn the_radius_is_the_one_computed_elsewhere() {
+    let desk = Desk::with("paper.toml", PAPER);
+    for (option, method) in [("", "reduced"), ("--method reduced", "reduced"), ("--method full", "full")] {
+        let document = desk.json(&format!("stability point paper.toml --json {option}"));
+        let (radius, error) = (number(&document, "spectral_radius"), number(&document, "error_bound"));
+        assert!((radius - 0.896_488_138_569_3).abs() < 2e-13 + error && error < 1e-6, "{document:#}");
+        assert_eq!((&document["verdict"], &document["method"], &document["rigid_modes"]), (&"stable".into(), &method.into(), &1.into()));
+    }
+}
+
+#[test]
+fn speeds_follow_from_the_radius_and_the_frame() {
+    let document = Desk::with("paper.toml", PAPER).json("stability point paper.toml --json");
+    let (radius, frame) = (number(&document, "spectral_radius"), number(&document, "frame_s"));
+    assert_eq!(frame, 0.008);
+    // In a second are 125 frames; in a time constant a disturbance shrinks by e.
+    assert!((number(&document, "per_second") / radius.powi(125) - 1.0).abs() < 1e-12);
+    let shrinks = radius.powf(number(&document, "time_constant_s") / frame);
+    assert!((shrinks * std::f64::consts::E - 1.0).abs() < 1e-12, "{shrinks}");
+}
+
+#[test]
+fn parts_have_every_state_and_the_largest_radius() {
+    let document = Desk::with("paper.toml", PAPER).json("stability point paper.toml --json --set peers.peer3.contact=none --set scene.count=4");
+    let parts = document["parts"].as_array().unwrap();
+    let kinds: Vec<&str> = parts.iter().map(|part| part["kind"].as_str().unwrap()).collect();
+    assert_eq!(kinds, ["together", "apart", "loose-device"]);
+    assert_eq!((&parts[0].get("peer"), &parts[1]["peer"], &parts[2]["peer"]), (&None, &"peer1".into(), &"peer3".into()));
+    // Three equal peers differ in two ways; of the device that touches nothing only the velocity counts.
+    assert_eq!((&parts[1]["multiplicity"], &parts[2]["multiplicity"], &parts[2]["dimension"]), (&2.into(), &1.into(), &1.into()));
+    let largest = parts.iter().map(|part| number(part, "spectral_radius")).fold(0.0, f64::max);
+    assert!((largest - number(&document, "spectral_radius")).abs() <= number(&document, "error_bound"));
+}
+
+/// PD with gains K is AP with gains (N-1) K: a law of the two strategies, exact.
+#[test]
+fn one_strategy_is_the_other_with_other_gains() {
+    let desk = Desk::with("paper.toml", PAPER);
+    let radius = |set: &str| number(&desk.json(&format!("stability point paper.toml --json {set}")), "spectral_radius");
+    let pd = radius("--set coordination.strategy=proportional-derivative");
+    let ap = radius("--set coordination.stiffness=2000 --set coordination.damping=10");
+    assert!((pd - ap).abs() < 1e-12, "{pd} {ap}");
+}
+
+/// Section 5.1 with a model of the arm, as control.md has it: PD at 2100 N/m is unstable, AP is stable.
+#[test]
+fn the_verdicts_of_the_paper_come_out() {
+    let desk = Desk::new();
+    for (name, verdict, word) in
+        [("ap-2100", "stable", "STABLE"), ("pd-2100", "unstable", "UNSTABLE"), ("ap-1000", "stable", "STABLE"), ("pd-1000", "stable", "STABLE")]
+    {
+        let scene = crate::desk::shipped(&format!("paper/5-1-{name}.toml"));
+        let document = desk.json(&format!("stability point {} --json", scene.display()));
+        assert_eq!(document["verdict"], verdict, "{name}");
+        assert_eq!(number(&document, "spectral_radius") < 1.0, verdict == "stable");
+        assert_eq!(number(&document, "time_constant_s") > 0.0, verdict == "stable");
+        let text = desk.text(&format!("stability point {}", scene.display()));
+        assert!(text.contains(&format!("\n{word}: ")), "{text}");
+    }
+}
+
+#[test]
+fn people_get_the_same_in_words() {
+    let desk = Desk::with("two.toml", TWO);
+    let (text, document) = (desk.text("stability point two.toml"), desk.json("stability point two.toml --json"));
+    let radius = format!("spectral radius {:.12} +- ", number(&document, "spectral_radius"));
+    let states = format!("{} states, 1 rigid-body mode removed; method: reduced", document["dimension"]);
+    for part in [
+        "Two users\n",
+        "over a frame of 8ms",
+        " a frame and ",
+        " a second: ",
+        "parts that do not mix",
+        "all, equal peers as their average",
+        &radius,
+        &states,
+    ] {
+        assert!(text.contains(part), "no {part:?} in {text}");
+    }
+}
+
+#[test]
+fn every_combination_of_one_sided_contacts_is_a_mode() {
+    let desk = Desk::with("two.toml", TWO);
+    let set = "--set 'peers.left.contact={ push = \"+x\" }'";
+    let document = desk.json(&format!("stability point two.toml --json {set}"));
+    let modes = document["modes"].as_array().unwrap();
+    let contacts: Vec<&str> = modes.iter().map(|mode| mode["contacts"].as_str().unwrap()).collect();
+    assert_eq!(contacts, ["nobody pushes", "pushing: left"]);
+    let largest = modes.iter().map(|mode| number(mode, "spectral_radius")).fold(0.0, f64::max);
+    assert!((largest - number(&document, "spectral_radius")).abs() <= number(&document, "error_bound"));
+    assert!(document["notes"][0].as_str().unwrap().contains("not linear"));
+    let text = desk.text(&format!("stability point two.toml {set}"));
+    for part in ["2 combinations of contacts", "nobody pushes", "pushing: left", "note: the scene is not linear"] {
+        assert!(text.contains(part), "no {part:?} in {text}");
+    }
+}
+
+#[test]
+fn equal_axes_are_as_stable_as_one() {
+    let radius = |set: &str| number(&Desk::with("plane.toml", PLANE).json(&format!("stability point plane.toml --json {set}")), "spectral_radius");
+    let rigid = |set: &str| Desk::with("plane.toml", PLANE).json(&format!("stability point plane.toml --json {set}"))["rigid_modes"].clone();
+    let line = "--set scene.axes=1 --set peers.left.hand.force=1.5";
+    assert_eq!(radius(""), radius(line));
+    assert_eq!((rigid(""), rigid(line)), (2.into(), 1.into()));
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let desk = Desk::with("two.toml", TWO);
+    desk.cohaptic("stability point two.toml --set peers.nobody.contact=none").assert_refused(2, &["--set peers.nobody.contact=none", "nobody", "^"]);
+    desk.cohaptic("stability point two.toml --set coordination.stifness=1").assert_refused(2, &["unknown key", "stiffness"]);
+    desk.cohaptic("stability point two.toml --method guess").assert_refused(2, &["guess", "reduced", "full"]);
+    desk.cohaptic("stability point gone.toml").assert_refused(3, &["gone.toml: cannot be read"]);
+    desk.cohaptic("stability point two.toml --set peers.left.clock.drift=0.0123456789").assert_refused(2, &["two.toml: ", "expected", "clocks"]);
+    desk.cohaptic("stability").assert_refused(2, &["point"]);
+}
