@@ -1,4 +1,5 @@
 //! The analysis of whole scenes.
 
+mod admittance;
 mod anchors;
 mod reduction;
