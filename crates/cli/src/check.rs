@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::arguments::CheckArguments;
-use crate::failure::{EXPECTATION, Failure, INTERRUPTED, scene_status};
+use crate::failure::{BAD_INPUT, EXPECTATION, Failure, INTERRUPTED, scene_status};
 use crate::progress::Progress;
 use crate::{interrupt, output};
 
@@ -72,6 +72,15 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
     match Scene::read(file, overrides) {
         Err(error) => Checked::unreadable(file, &error),
         Ok(scene) => {
+            if let Some(reason) = cohaptic_harness::too_large(&scene) {
+                return Checked {
+                    file: output::path(file),
+                    passed: false,
+                    failures: vec![reason],
+                    expects: scene.expect.is_some(),
+                    status: BAD_INPUT,
+                };
+            }
             let failures = harness::check(&scene, model, || !interrupt::asked());
             let status = if failures.is_empty() { 0 } else { EXPECTATION };
             Checked { file: output::path(file), passed: failures.is_empty(), failures, expects: scene.expect.is_some(), status }

@@ -171,7 +171,7 @@ impl Rows {
                 self.model(&part, describe_link(config), "a chain of the stages that are configured");
             }
         }
-        let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Links(_)));
+        let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
         let one_delay = used.len() == 1 && used.iter().all(|(config, _)| config.is_constant_delay());
         if one_delay && !links_change && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()) {
             self.model("packets on the way", "a ring", "all delays are equal, so packets arrive in the order in which they were sent");
@@ -182,8 +182,10 @@ impl Rows {
         for (peer, direction, line) in access_lines(scene) {
             self.model(&format!("{direction} of {peer}"), describe_link(line), "shared by all that passes it");
         }
-        let timeline_is_random =
-            scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Links(links) if links.iter().any(|link| link.config.has_chance())));
+        let timeline_is_random = scene.timeline.iter().any(|change| {
+            matches!(&change.what, ChangeKind::Link(link) if link.config.has_chance())
+                || matches!(&change.what, ChangeKind::AllLinks(links) if links.configs().iter().any(|link| link.has_chance()))
+        });
         let lines_are_random = access_lines(scene).iter().any(|(_, _, line)| line.has_chance());
         if used.iter().all(|(config, _)| !config.has_chance()) && !lines_are_random && !timeline_is_random {
             self.leave_out("random numbers: no link leaves anything to chance");
@@ -226,14 +228,8 @@ fn describe(peer: &PeerSpec) -> String {
 }
 
 /// The configurations that links between different peers have, and how many links have each.
-fn used_links(scene: &Scene) -> Vec<(&LinkModel, usize)> {
-    let mut counts = vec![0; scene.links.configs.len()];
-    for (from, row) in scene.links.index.iter().enumerate() {
-        for (to, config) in row.iter().enumerate() {
-            counts[*config] += usize::from(from != to);
-        }
-    }
-    scene.links.configs.iter().map(AsRef::as_ref).zip(counts).filter(|(_, count)| *count > 0).collect()
+fn used_links(scene: &Scene) -> Vec<(&LinkModel, u64)> {
+    scene.links.used().map(|(config, count)| (config.as_ref(), count)).collect()
 }
 
 fn access_lines(scene: &Scene) -> Vec<(&str, &'static str, &LinkModel)> {
@@ -259,7 +255,7 @@ fn dimensions(scene: &Scene, plan: &Plan) -> Dimensions {
 }
 
 fn cost(scene: &Scene) -> Cost {
-    let axes = count_f64(scene.axes.count());
+    let axes = count_f64(scene.axes.count() as u64);
     let peer_ticks_per_s: f64 = scene.peers.iter().map(|peer| peer.clock.tick.as_secs_f64().recip()).sum();
     let update = scene.coordination.update.as_secs_f64();
     let packets = |constant: bool| -> f64 {
@@ -272,6 +268,6 @@ fn cost(scene: &Scene) -> Cost {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "counts of links and axes are far below 2^53")]
-fn count_f64(count: usize) -> f64 {
+fn count_f64(count: u64) -> f64 {
     count as f64
 }

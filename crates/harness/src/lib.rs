@@ -39,5 +39,5 @@ mod world;
 pub use cohaptic_scene::{FromScene, Strategies};
 pub use observer::{NoObserver, Observer, PacketRow, StateRow, TickRow};
 pub use plan::Model;
-pub use simulation::Simulation;
+pub use simulation::{MOST_PEERS, Simulation, too_large};
 pub use summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};

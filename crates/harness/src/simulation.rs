@@ -9,6 +9,19 @@ use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
 use crate::world::{Step, Watch, World};
 
+/// The most peers that a simulation takes: it makes every one of their N·(N−1) links. A scene may have more, for what does not simulate.
+pub const MOST_PEERS: usize = 4096;
+
+/// Why a scene is too large to be simulated, in words; `None` if it is not.
+#[must_use]
+pub fn too_large(scene: &Scene) -> Option<String> {
+    let peers = scene.peers.len();
+    (peers > MOST_PEERS).then(|| {
+        let links = peers as u128 * (peers as u128 - 1);
+        format!("scene.count: {peers} peers are too many to be simulated, with {links} links between them: expected at most {MOST_PEERS} peers")
+    })
+}
+
 /// How many instants pass between two calls of [`Observer::keep_going`].
 const BREATH: u32 = 1024;
 
@@ -48,7 +61,12 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     /// # Errors
     ///
     /// What the observer's error is.
+    ///
+    /// # Panics
+    ///
+    /// If the scene is [`too_large`].
     pub fn run<O: Observer>(&self, observer: &mut O) -> Result<Summary, O::Error> {
+        assert!(too_large(self.scene).is_none(), "a scene with more peers than a simulation takes is not run");
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         match plan.axes {
             Axes::One => run_to_end(self.world::<1>(&plan), observer),

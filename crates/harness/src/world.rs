@@ -6,7 +6,7 @@ use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_peer::{Clock, Contact, Device, Held, ObjectCopy, Peer, Reception, RestingDevice, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Change, ChangeKind, Scene};
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{AccessLine, Damage, Fate, Network, NetworkConfig, NodeId, PacketInfo};
+use cohaptic_wan::{AccessLine, Damage, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
@@ -183,11 +183,11 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
     fn change(&mut self, now: Instant) {
         while let Some(change) = self.changes.pop_if(|change| change.at <= now) {
             match change.what {
-                ChangeKind::Links(links) => {
-                    for link in links {
-                        self.network
-                            .set_link(change.at, node(link.from), node(link.to), (*link.config).clone())
-                            .expect("changes are in order of time");
+                ChangeKind::Link(link) => self.set_link(change.at, link.from, link.to, &link.config),
+                ChangeKind::AllLinks(links) => {
+                    let places = 0..self.members.len();
+                    for (from, to) in places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to) {
+                        self.set_link(change.at, from, to, links.between(from, to));
                     }
                 }
                 ChangeKind::Contact { peer, contact } => self.members[peer].peer.set_contact(contact),
@@ -203,6 +203,10 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
                 _ => unreachable!("every kind of change of this workspace is listed"),
             }
         }
+    }
+
+    fn set_link(&mut self, at: Instant, from: usize, to: usize, link: &LinkModel) {
+        self.network.set_link(at, node(from), node(to), link.clone()).expect("changes are in order of time");
     }
 
     /// Step 1: those whose time it is send their sample to everybody else.

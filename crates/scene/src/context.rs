@@ -56,6 +56,11 @@ impl Context<'_> {
         self.fault(node.place, &node.path, message);
     }
 
+    /// The same, with a message that takes long to find words for, such as one that goes through the names of all peers: it is made only if it is kept.
+    pub(crate) fn fault_with(&self, node: &Node, message: impl FnOnce() -> String) {
+        self.faults.report(node.place, || SceneError::Invalid(Box::new(self.sources.diagnostic(node.place, node.path.clone(), message()))));
+    }
+
     /// Reports that the file which `node` names cannot be read.
     pub(crate) fn unreadable(&self, node: &Node, path: PathBuf, source: std::io::Error) {
         let message = format!("cannot read {}: {source}: expected a file, relative to the folder of the scene", path.display());

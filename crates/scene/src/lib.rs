@@ -32,6 +32,7 @@ mod context;
 mod error;
 mod excerpt;
 mod link_keys;
+mod link_table;
 mod model;
 mod names;
 mod overrides;
@@ -48,6 +49,7 @@ mod values;
 
 pub use error::{Diagnostic, SceneError};
 pub use link_keys::link_from_keys;
+pub use link_table::LinkTable;
 pub use model::*;
 pub use read::scene_files;
 pub use strategies::{FromScene, Strategies};

@@ -8,6 +8,8 @@ use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::{DropCause, LinkModel};
 
+use crate::LinkTable;
+
 /// A scene, ready to be run. Every number in it has been checked; every peer it names exists.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Scene {
@@ -132,23 +134,6 @@ pub struct PeerSpec {
     pub downlink: Option<LinkModel>,
 }
 
-/// The directed links of a full mesh. Equal links share one configuration.
-#[derive(Clone, PartialEq, Debug)]
-pub struct LinkTable {
-    /// The different configurations, in order of first use.
-    pub configs: Vec<Arc<LinkModel>>,
-    /// For each sender, for each receiver, which configuration; the diagonal has no meaning.
-    pub index: Vec<Vec<usize>>,
-}
-
-impl LinkTable {
-    /// The link from one peer to another, by their places in [`Scene::peers`].
-    #[must_use]
-    pub fn between(&self, from: usize, to: usize) -> &LinkModel {
-        &self.configs[self.index[from][to]]
-    }
-}
-
 /// Something that changes at an instant, before anything else happens at that instant.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Change {
@@ -162,8 +147,10 @@ pub struct Change {
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum ChangeKind {
-    /// These links take these configurations; what is on the way keeps its delay.
-    Links(Vec<LinkChange>),
+    /// A link takes a new configuration; what is on the way keeps its delay.
+    Link(LinkChange),
+    /// All links take the configurations of this table; what is on the way keeps its delay.
+    AllLinks(LinkTable),
     /// A peer's contact changes.
     Contact {
         /// Its place in [`Scene::peers`].

@@ -114,7 +114,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Scene> {
         coordination: coordination?,
         integrator: integrator?,
         peers: peers?,
-        links: links.as_ref().map(LinkClasses::table)?,
+        links: links.as_ref().and_then(LinkClasses::table)?,
         timeline: timeline?,
         expect: expect?,
     })

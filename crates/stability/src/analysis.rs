@@ -82,7 +82,7 @@ pub struct ContactMode {
 /// [`AnalysisError`] if the scene has no frame that repeats, or cannot be taken apart into linear scenes.
 pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError> {
     match method {
-        Method::Full => analyse_with(scene, &FromScene),
+        Method::Full => push_through(scene, &combinations(scene)?, &FromScene),
         Method::Reduced => {
             let network = NominalNetwork::of(scene)?;
             let combinations = combinations(scene)?;
@@ -90,7 +90,7 @@ pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError>
                 let structure = Structure::of(&[scene], &network, &combination.contacts)?;
                 Ok(of_parts(combination, reduced(&structure, scene, combination.axes)))
             });
-            Ok(worst(modes.collect::<Result<_, AnalysisError>>()?, method, &network, scene))
+            Ok(combine(modes.collect::<Result<_, AnalysisError>>()?, method, &network, scene))
         }
     }
 }
@@ -101,8 +101,15 @@ pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError>
 ///
 /// As [`analyse`], and if a strategy is not linear or remembers what it does not show.
 pub fn analyse_with(scene: &Scene, strategies: &impl Strategies) -> Result<Analysis, AnalysisError> {
-    let network = NominalNetwork::of(scene)?;
     let combinations = combinations(scene)?;
+    if combinations.iter().any(|combination| combination.axes != scene.axes.count()) {
+        return Err(AnalysisError::MixedAxes);
+    }
+    push_through(scene, &combinations, strategies)
+}
+
+fn push_through(scene: &Scene, combinations: &[Combination], strategies: &impl Strategies) -> Result<Analysis, AnalysisError> {
+    let network = NominalNetwork::of(scene)?;
     // The walls of the simulator push and do not pull, so there is nothing linear to push through them.
     let modes = combinations.iter().filter(|combination| !combination.contacts.at_wall).map(|combination| {
         let contacts = &combination.contacts;
@@ -123,7 +130,7 @@ pub fn analyse_with(scene: &Scene, strategies: &impl Strategies) -> Result<Analy
             frame: map.frame,
         })
     });
-    let mut analysis = worst(modes.collect::<Result<_, AnalysisError>>()?, Method::Full, &network, scene);
+    let mut analysis = combine(modes.collect::<Result<_, AnalysisError>>()?, Method::Full, &network, scene);
     if scene.object.enclosure.is_some() {
         analysis.notes.push("the enclosure is left out: the scene is analysed away from its walls".to_owned());
     }
@@ -135,7 +142,7 @@ fn of_parts(combination: &Combination, reduced: crate::parts::Reduced) -> Contac
     ContactMode { contacts: combination.words.clone(), radius: radius_of(&parts), parts, rigid_modes, dimension, frame }
 }
 
-fn worst(modes: Vec<ContactMode>, method: Method, network: &NominalNetwork, scene: &Scene) -> Analysis {
+pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &NominalNetwork, scene: &Scene) -> Analysis {
     let radius = modes.iter().map(|mode| mode.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 });
     let largest = modes.iter().max_by(|one, other| one.radius.value.total_cmp(&other.radius.value));
     let (rigid_modes, dimension, frame) = largest.map_or((0, 0, Duration::ZERO), |mode| (mode.rigid_modes, mode.dimension, mode.frame));

@@ -37,4 +37,37 @@ pub enum AnalysisError {
         /// How many are looked at at most.
         most: u128,
     },
+    /// There is no one matrix.
+    #[error("the scene is not linear: there is one matrix for each combination of contacts; expected contact = \"grasp\" or \"none\"")]
+    SeveralModes,
+    /// More is offered to a line than it carries.
+    #[error("{line} is offered {load:.0} bit/s and carries {rate:.0}: its queue never settles; expected a higher rate, or fewer or rarer samples")]
+    Overloaded {
+        /// Which line.
+        line: String,
+        /// What is offered [bit/s].
+        load: f64,
+        /// What it carries [bit/s].
+        rate: f64,
+    },
+    /// What becomes of samples does not repeat soon enough.
+    #[error(
+        "what becomes of samples from {from} to {to} does not repeat within {most} of them: expected a link of constant delay, or periods that meet sooner"
+    )]
+    NoPattern {
+        /// Who sends.
+        from: String,
+        /// Who receives.
+        to: String,
+        /// Within how many it should, with all other links.
+        most: usize,
+    },
+    /// Too many peers with access lines that do more than delay.
+    #[error("{peers} peers whose samples share access lines: expected at most {most}, or access lines that only delay")]
+    TooManyShare {
+        /// How many.
+        peers: usize,
+        /// How many are looked at at most.
+        most: usize,
+    },
 }

@@ -13,7 +13,7 @@ use crate::lifted::common_time;
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::structure::{Contacts, arm, count};
 use crate::timetable::{Event, NodeClock, Timetable};
-use crate::{AnalysisError, Matrix};
+use crate::{AnalysisError, Matrix, StateKind, StateName};
 
 /// What the general path finds: the matrix of one frame in relative coordinates.
 #[derive(Clone, PartialEq, Debug)]
@@ -23,6 +23,12 @@ pub(crate) struct FullMap {
     pub(crate) error: f64,
     pub(crate) rigid_modes: usize,
     pub(crate) frame: Duration,
+    /// What the rows and columns are.
+    pub(crate) states: Vec<StateName>,
+    /// What velocities are multiplied by \[s\].
+    pub(crate) time: f64,
+    /// For each axis, whether positions are relative to the first peer's copy.
+    pub(crate) relative: Vec<bool>,
 }
 
 /// Pushes every unit vector through a frame of the scene, along A axes.
@@ -126,7 +132,16 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
         // As for the lifted system: each tick rounds, and what is left of the frame magnifies that by at most about the growth.
         let error = 10.0 * f64::EPSILON * count(ticks) * self.growth * self.growth * count(kept.len()).sqrt();
-        Ok(FullMap { monodromy, error, rigid_modes: free.len() + self.layout.loose.len(), frame: self.timetable.frame })
+        let names = self.layout.names::<A>(&self.timetable.depth);
+        Ok(FullMap {
+            monodromy,
+            error,
+            rigid_modes: free.len() + self.layout.loose.len(),
+            frame: self.timetable.frame,
+            states: kept.iter().map(|state| names[*state]).collect(),
+            time: self.time,
+            relative: (0..A).map(|axis| free.contains(&axis)).collect(),
+        })
     }
 
     /// Refuses a strategy that is not linear, or that depends on more than the state it shows.
@@ -136,7 +151,8 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         self.growth = 0.0;
         let later = Instant::ZERO.saturating_add(self.timetable.frame).saturating_add(self.timetable.frame);
         let relative = |reached: Vec<f64>| -> Vec<f64> { reached.iter().zip(&rest).map(|(reached, rest)| reached - rest).collect() };
-        // Small, middling and large, so that a dead band and a limit are both seen.
+        // Small, middling and large, and each against the others, so that a dead band and a limit are both seen.
+        let mut small: Option<Vec<f64>> = None;
         for amplitude in [1e-6, 1e-2, 10.0] {
             let (one, other) = (noise(size, 1, amplitude), noise(size, 2, amplitude));
             let both: Vec<f64> = one.iter().zip(&other).map(|(one, other)| one - 2.0 * other).collect();
@@ -147,8 +163,13 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             let (reached_one, reached_other, reached_both) =
                 (relative(reached_one), relative(self.push(&other, Instant::ZERO)?), relative(self.push(&both, Instant::ZERO)?));
             let scale = [&reached_one, &reached_other, &rest].into_iter().flatten().fold(amplitude, |largest: f64, entry| largest.max(entry.abs()));
-            let apart = |place: usize| (reached_one[place] - 2.0 * reached_other[place] - reached_both[place]).abs();
-            if let Some(place) = (0..size).find(|place| !(apart(*place) <= 1e-9 * scale.max(self.growth))) {
+            let unit: Vec<f64> = reached_one.iter().map(|entry| entry / amplitude).collect();
+            let small = small.get_or_insert_with(|| unit.clone());
+            // Of the small one, what is left beside a constant force may be few digits.
+            let homogeneous = |place: usize| (unit[place] - small[place]).abs() * amplitude * 1e-3;
+            let apart = |place: usize| (reached_one[place] - 2.0 * reached_other[place] - reached_both[place]).abs().max(homogeneous(place));
+            let limit = 1e-9 * scale.max(self.growth);
+            if let Some(place) = (0..size).find(|place| apart(*place).is_nan() || apart(*place) > limit) {
                 return Err(AnalysisError::NotLinear { peer: self.names[self.layout.owner(place)].clone() });
             }
         }
@@ -291,6 +312,31 @@ impl Layout {
             layout.size += depth * 2 * A;
         }
         layout
+    }
+
+    /// What every state is, in order.
+    fn names<const A: usize>(&self, depth: &[usize]) -> Vec<StateName> {
+        let mut names = Vec::with_capacity(self.size);
+        for peer in 0..self.first.len() {
+            let kinds: [fn(usize) -> StateKind; 6] = [
+                |axis| StateKind::DevicePosition { axis },
+                |axis| StateKind::DeviceVelocity { axis },
+                |axis| StateKind::ObjectPosition { axis },
+                |axis| StateKind::ObjectVelocity { axis },
+                |axis| StateKind::PendingCoupling { axis },
+                |axis| StateKind::PendingForce { axis },
+            ];
+            let count = if self.pending[peer] { 6 } else { 4 };
+            names.extend(kinds.iter().take(count).flat_map(|kind| (0..A).map(move |axis| StateName { peer, kind: kind(axis) })));
+            names.extend((0..self.memory[peer]).map(|number| StateName { peer, kind: StateKind::Memory { number } }));
+        }
+        for (peer, depth) in depth.iter().enumerate() {
+            for age in 1..=*depth {
+                names.extend((0..A).map(|axis| StateName { peer, kind: StateKind::SamplePosition { axis, age } }));
+                names.extend((0..A).map(|axis| StateName { peer, kind: StateKind::SampleVelocity { axis, age } }));
+            }
+        }
+        names
     }
 
     /// The peer to which a state belongs.

@@ -7,20 +7,29 @@
 
 mod admittance;
 mod analysis;
+mod determinant;
 mod error;
 mod full;
+mod graph;
 mod lifted;
 mod matrix;
+mod monodromy;
 mod network;
 mod parts;
 mod radius;
 mod spectrum;
 mod structure;
 mod timetable;
+mod worst_case;
 
 pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, admittance, ideal};
 pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_with};
+pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
 pub use error::AnalysisError;
+pub use graph::{Graph, GraphError, analyse_on};
 pub use matrix::Matrix;
+pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use radius::{Radius, Verdict};
+pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
+pub use worst_case::{Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Pattern, PatternError, WorstCase};

@@ -24,7 +24,8 @@ pub struct Part {
 }
 
 /// What moves in a part of a scene.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
 pub enum PartKind {
     /// The whole scene, by the general path.
     Whole,
@@ -34,6 +35,11 @@ pub enum PartKind {
     Apart {
         /// The first peer of the class, by its place in [`Scene::peers`].
         peer: usize,
+    },
+    /// Equal peers on a graph, along one eigenvector of its averaging matrix.
+    Mode {
+        /// The eigenvalue.
+        weight: f64,
     },
     /// A device that touches nothing.
     LooseDevice {
@@ -85,10 +91,9 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize) -> Redu
             let radius = radius.over(u32::try_from(frames).unwrap_or(u32::MAX));
             parts.push(Part { kind: PartKind::Apart { peer: members[0] }, size, copies: (members.len() - 1) * axes, radius });
         }
-        if !structure.touching[class] {
-            let (radius, size) = loose_device(structure, scene, class);
-            parts.push(Part { kind: PartKind::LooseDevice { peer: members[0] }, size, copies: members.len() * axes, radius });
-            rigid_modes += members.len() * (2 - size);
+        if let Some((part, rigid)) = alone(structure, scene, class, axes) {
+            parts.push(part);
+            rigid_modes += rigid;
             dimension += 2 * members.len();
         }
     }
@@ -96,10 +101,19 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize) -> Redu
 }
 
 /// The spectral radius of a lifted system, and how many states it has.
-fn lifted_radius(lifted: &Lifted<'_>) -> (Radius, usize) {
+pub(crate) fn lifted_radius(lifted: &Lifted<'_>) -> (Radius, usize) {
     let frame = lifted.frame(&mut Autonomous);
     let monodromy = frame.monodromy();
     (bounded_radius(&monodromy, frame.error), monodromy.rows())
+}
+
+/// The devices of a class if they touch nothing, and how many rigid-body modes they have along one axis.
+pub(crate) fn alone(structure: &Structure, scene: &Scene, class: usize, axes: usize) -> Option<(Part, usize)> {
+    let members = &structure.classes[class];
+    (!structure.touching[class]).then(|| {
+        let (radius, size) = loose_device(structure, scene, class);
+        (Part { kind: PartKind::LooseDevice { peer: members[0] }, size, copies: members.len() * axes, radius }, members.len() * (2 - size))
+    })
 }
 
 /// A device that touches nothing: its velocity and, if an arm ties it to ground, its position.

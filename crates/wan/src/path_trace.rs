@@ -127,6 +127,25 @@ impl PathTrace {
         (delay, row.loss)
     }
 
+    /// After how long it begins anew; `None` if its last row holds for ever.
+    #[must_use]
+    pub fn period(&self) -> Option<Duration> {
+        self.rows.last().filter(|_| self.repeats).map(|last| Duration::from_nanos(last.at.as_nanos()))
+    }
+
+    /// The delay and the loss of the last row.
+    #[must_use]
+    pub fn last(&self) -> (Duration, Probability) {
+        self.rows.last().map_or((Duration::ZERO, Probability::ZERO), |row| (Duration::from_nanos(row.delay_nanos), row.loss))
+    }
+
+    /// The same recording with nothing left to chance: rows that do not lose everything lose nothing.
+    #[must_use]
+    pub fn without_chance(&self) -> Self {
+        let certain = |row: &Row| Row { loss: if row.loss == Probability::ONE { row.loss } else { Probability::ZERO }, ..*row };
+        Self { rows: self.rows.iter().map(certain).collect(), ..self.clone() }
+    }
+
     /// The least delay of all rows.
     #[must_use]
     pub fn least(&self) -> Duration {
@@ -160,6 +179,17 @@ fn row(line: usize, values: &[&str], above: Option<&Row>) -> Result<Row, PathTra
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_certain_is_left_where_chance_is_taken_away() {
+        let trace = |repeats| PathTrace::parse("t,delay,loss\n0,0.01,0.5\n1,,0\n2,0.03,1\n3,0.04,0.1", Between::Steps, repeats).unwrap();
+        let certain = trace(true).without_chance();
+        let loss = |second: u64| certain.at(Instant::from_nanos(second * 1_000_000_000)).1;
+        assert_eq!([0, 1, 2].map(loss), [Probability::ZERO, Probability::ONE, Probability::ONE]);
+        assert_eq!((certain.period(), trace(false).period()), (Some(Duration::from_secs(3)), None));
+        assert_eq!(trace(false).last(), (Duration::from_millis(40), Probability::new(0.1).unwrap()));
+        assert_eq!(trace(false).without_chance().last(), (Duration::from_millis(40), Probability::ZERO));
+    }
 
     const TEXT: &str = "# measured\nt,delay,loss\n0,0.020,0\n1,0.040,0.5\n\n2,,\n3,0.010,0\n";
 

@@ -5,6 +5,7 @@
 mod convergence;
 mod edited_scenes;
 mod equivalence;
+mod growth;
 mod held_samples;
 mod ideal_network;
 mod own_strategies;

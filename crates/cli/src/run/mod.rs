@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use std::time::Instant as Clock;
 
 use cohaptic_harness::record::{Bands, RecordError, Recorder};
-use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow};
+use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow, too_large};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -33,6 +33,9 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         variant.title = format!("{}, with {}", variant.title, arguments.against.join(", "));
         Some(variant)
     };
+    if let Some(reason) = [Some(&scene), variant.as_ref()].into_iter().flatten().find_map(too_large) {
+        return Err(Failure::Input(format!("{}: {reason}", arguments.scene.scene.display())));
+    }
     let first = run_one(arguments, &scene, arguments.out.clone())?;
     let second = match &variant {
         Some(variant) if !interrupt::asked() => Some(run_one(arguments, variant, arguments.out.as_ref().map(|out| out.join("against")))?),

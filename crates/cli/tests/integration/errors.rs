@@ -136,3 +136,18 @@ fn what_does_not_fit_the_axes_is_refused() {
     let desk = Desk::with("plane.toml", &PLANE.replace("[1.5, -0.5]", "1.5"));
     desk.cohaptic("run plane.toml").assert_refused(2, &["hand.force: ", "1.5", "^^^"]);
 }
+
+/// A scene may have more peers than a simulation: what does not simulate takes it.
+#[test]
+fn too_many_peers_to_simulate_are_refused_before_anything_is_written() {
+    let scene = "scene = { duration = \"8ms\", count = 100000 }\nobject.mass = 1\nlink.delay = \"24ms\"\n\
+                 coordination = { strategy = \"average-position\", stiffness = 1, update = \"8ms\" }\npeer = { contact = \"none\", device.mass = 1 }\n";
+    let desk = Desk::with("many.toml", scene);
+    let words = "100000 peers are too many to be simulated, with 9999900000 links between them: expected at most 4096";
+    desk.cohaptic("run many.toml --out out").assert_refused(2, &["error: many.toml: scene.count: ", words]);
+    assert!(!desk.path("out").exists());
+    let checked = desk.cohaptic("check many.toml");
+    assert_eq!(checked.status, Some(2));
+    assert!(checked.stdout.contains(words), "{}", checked.stdout);
+    assert!(desk.text("explain many.toml").contains("9999900000 links"));
+}

@@ -15,12 +15,17 @@ use expectations::Watched;
 
 /// Runs a scene and gives one line for each expectation that does not hold, in the order of the file's sections; empty if all hold.
 ///
+/// A scene that is [too large](crate::too_large) to be simulated gives the one line that says so.
+///
 /// `keep_going` is asked about every thousand instants; when it says `false` the check ends with a line that says so.
 #[must_use]
 pub fn check(scene: &Scene, model: Model, mut keep_going: impl FnMut() -> bool) -> Vec<String> {
     let Some(expect) = &scene.expect else {
         return Vec::new();
     };
+    if let Some(reason) = crate::too_large(scene) {
+        return vec![reason];
+    }
     let mut observer = Watching { watched: Watched::new(scene, expect), keep_going: &mut keep_going };
     let Ok(summary) = Simulation::new(scene, model).run(&mut observer);
     let watched = observer.watched;

@@ -10,8 +10,8 @@ use crate::table_reader::TableReader;
 use crate::tree::Node;
 use crate::values::{self, DAMPING, STIFFNESS};
 
-/// The most peers a scene may have. The links between them take memory that grows with the square.
-const MOST_PEERS: u64 = 4096;
+/// The most peers that `count` makes: a slip of the finger must not take all memory. Each takes about two kilobytes.
+const MOST_PEERS: u64 = 1_000_000;
 
 /// `[scene]`. A field is `None` where it was refused.
 #[derive(Debug, Default)]

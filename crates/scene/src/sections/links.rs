@@ -1,9 +1,10 @@
 //! `[link]` and `[\[links\]]`: what lies between the peers.
 //!
 //! A full mesh of N peers has N·(N−1) links, nearly all of them alike. Links are therefore sorted into *classes*: one for `[link]` and one for each
-//! entry that says something else. Only classes are read; a change in the timeline makes new ones.
+//! entry that says something else. Only classes are read, and only links that have an entry are written down; a change in the timeline makes new classes.
 
-use std::collections::BTreeSet;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use cohaptic_wan::LinkModel;
@@ -11,7 +12,8 @@ use cohaptic_wan::LinkModel;
 use super::link::{LINK_KEYS, is_empty, read_link};
 use super::selector::read_ends;
 use crate::context::Context;
-use crate::model::{LinkChange, LinkTable};
+use crate::link_table::{LinkTable, first_left};
+use crate::model::LinkChange;
 use crate::source::BEGINNING;
 use crate::table_reader::TableReader;
 use crate::tree::Node;
@@ -21,8 +23,11 @@ use crate::values;
 #[derive(Clone, Debug)]
 pub(crate) struct LinkClasses {
     classes: Vec<Class>,
-    /// For each sender, for each receiver, its class.
-    index: Vec<Vec<usize>>,
+    peers: usize,
+    /// The class of the links that have none of their own.
+    usual: usize,
+    /// The classes of the others, by sender and receiver.
+    own: BTreeMap<(usize, usize), usize>,
 }
 
 /// The keys of a class as written, and what they say.
@@ -46,13 +51,12 @@ pub(crate) fn read_links(defaults: Option<&Node>, entries: Option<&Node>, contex
     let own: Vec<_> = entries.iter().map(|entry| read_entry(entry, below, &mut seen, context)).collect();
 
     let base = Class { keys: defaults.clone(), config: Arc::new(base?) };
-    let count = context.names?.len();
-    let mut links = LinkClasses { classes: vec![base], index: vec![vec![0; count]; count] };
+    let mut links = LinkClasses { classes: vec![base], peers: context.names?.len(), usual: 0, own: BTreeMap::new() };
     for entry in own {
         let (ends, class) = entry?;
         if let Some((keys, config)) = class {
             let class = links.add(keys, config);
-            links.set(ends, class);
+            links.own.insert(ends, class);
         }
     }
     Some(links)
@@ -93,70 +97,52 @@ fn read_entry(
 }
 
 impl LinkClasses {
-    /// The table of configurations: equal ones are shared, and stand in order of first use.
-    pub(crate) fn table(&self) -> LinkTable {
-        let mut configs: Vec<Arc<LinkModel>> = Vec::new();
-        let mut config_of: Vec<Option<usize>> = vec![None; self.classes.len()];
-        let mut index = self.index.clone();
-        for (from, row) in index.iter_mut().enumerate() {
-            for (to, place) in row.iter_mut().enumerate() {
-                if from == to {
-                    *place = 0;
-                    continue;
-                }
-                let class = *place;
-                *place = *config_of[class].get_or_insert_with(|| {
-                    let config = &self.classes[class].config;
-                    configs.iter().position(|known| known == config).unwrap_or_else(|| {
-                        configs.push(Arc::clone(config));
-                        configs.len() - 1
-                    })
-                });
+    /// The table of configurations. `None` for fewer than two peers, which have no links; that is refused elsewhere.
+    pub(crate) fn table(&self) -> Option<LinkTable> {
+        let config = |class: usize| Arc::clone(&self.classes[class].config);
+        (self.peers >= 2).then(|| LinkTable::new(self.peers, config(self.usual), self.own.iter().map(|(ends, class)| (*ends, config(*class)))))
+    }
+
+    /// Lays keys over those of one link, and answers what it is now. `None` where something was refused.
+    pub(crate) fn change(&mut self, (from, to): (usize, usize), keys: &Node, context: Context<'_>) -> Option<LinkChange> {
+        let old = self.own.get(&(from, to)).copied().unwrap_or(self.usual);
+        let class = self.lay_over(old, keys, context)?;
+        self.own.insert((from, to), class);
+        Some(LinkChange { from, to, config: Arc::clone(&self.classes[class].config) })
+    }
+
+    /// Lays keys over those of all links, and answers what they are now. `None` where something was refused.
+    pub(crate) fn change_all(&mut self, keys: &Node, context: Context<'_>) -> Option<LinkTable> {
+        let mut new_class = BTreeMap::new();
+        for old in self.in_order_of_use() {
+            if let Entry::Vacant(place) = new_class.entry(old) {
+                place.insert(self.lay_over(old, keys, context)?);
             }
         }
-        LinkTable { configs, index }
+        let renewed = |old: &usize| new_class.get(old).copied().unwrap_or(*old);
+        self.usual = renewed(&self.usual);
+        self.own.values_mut().for_each(|class| *class = renewed(class));
+        self.table()
     }
 
-    /// Lays keys over those of one link, or of all (`None`), and answers what these links are now. `None` where something was refused.
-    pub(crate) fn change(&mut self, ends: Option<(usize, usize)>, keys: &Node, context: Context<'_>) -> Option<Vec<LinkChange>> {
-        let changed = match ends {
-            Some(ends) => vec![ends],
-            None => self.pairs(),
-        };
-        let mut new_class: Vec<Option<usize>> = vec![None; self.classes.len()];
-        let mut answer = Vec::with_capacity(changed.len());
-        for ends in changed {
-            let old = *self.index.get(ends.0)?.get(ends.1)?;
-            let class = match new_class[old] {
-                Some(class) => class,
-                None => {
-                    let merged = keys.over(&self.classes[old].keys, &[]);
-                    let config = read_link(&merged, context, &[])?;
-                    let class = self.add(merged, config);
-                    new_class[old] = Some(class);
-                    class
-                }
-            };
-            self.set(ends, class);
-            answer.push(LinkChange { from: ends.0, to: ends.1, config: Arc::clone(&self.classes[class].config) });
-        }
-        Some(answer)
+    /// The classes that links have, by sender and then by receiver, so that of several faults the same one is found first. Some come more than once.
+    fn in_order_of_use(&self) -> Vec<usize> {
+        let first = first_left(self.peers, self.own.keys().copied());
+        let before = self.own.iter().take_while(|(ends, _)| first.is_none_or(|first| **ends < first));
+        let after = self.own.iter().skip_while(|(ends, _)| first.is_none_or(|first| **ends < first));
+        let class = |(_, class): (&(usize, usize), &usize)| *class;
+        before.map(class).chain(first.map(|_| self.usual)).chain(after.map(class)).collect()
     }
 
-    /// Every directed link, by sender and then by receiver.
-    fn pairs(&self) -> Vec<(usize, usize)> {
-        let count = self.index.len();
-        (0..count).flat_map(|from| (0..count).filter(move |&to| to != from).map(move |to| (from, to))).collect()
+    /// The class of links of an old class over which keys are laid.
+    fn lay_over(&mut self, old: usize, keys: &Node, context: Context<'_>) -> Option<usize> {
+        let merged = keys.over(&self.classes.get(old)?.keys, &[]);
+        let config = read_link(&merged, context, &[])?;
+        Some(self.add(merged, config))
     }
 
     fn add(&mut self, keys: Node, config: LinkModel) -> usize {
         self.classes.push(Class { keys, config: Arc::new(config) });
         self.classes.len() - 1
-    }
-
-    fn set(&mut self, (from, to): (usize, usize), class: usize) {
-        if let Some(place) = self.index.get_mut(from).and_then(|row| row.get_mut(to)) {
-            *place = class;
-        }
     }
 }

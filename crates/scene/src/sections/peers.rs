@@ -1,6 +1,7 @@
 //! `[\[peers\]]` and `count`: who takes part.
 
 use core::time::Duration;
+use std::collections::BTreeMap;
 
 use cohaptic_peer::Gains;
 
@@ -36,8 +37,10 @@ pub(crate) fn read_names(peers: Option<&Node>, count: Option<u64>, context: Cont
         } else if count.is_none() {
             names.push(name);
         } else if names.index(name).is_none() {
-            let expected = one_of(names.as_slice().iter().map(String::as_str), name);
-            context.fault_at(node, format!("{} is none of the peers that scene.count makes: expected {expected}", quote(name)));
+            context.fault_with(node, || {
+                let expected = one_of(names.as_slice().iter().map(String::as_str), name);
+                format!("{} is none of the peers that scene.count makes: expected {expected}", quote(name))
+            });
             complete = false;
         }
     }
@@ -98,13 +101,13 @@ pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, 
     let names = context.names?;
     // What a peer without an entry is like; read only if there is one.
     let shared = if entries.len() < names.len() { Some(read_peer(base, context, &[], sources.update)?) } else { None };
-    let mut keys: Vec<Option<PeerKeys>> = vec![shared; names.len()];
+    let mut keys: BTreeMap<usize, PeerKeys> = BTreeMap::new();
     for (entry, own) in entries.iter().zip(own) {
         let name = entry.as_table().and_then(|table| table.get("name")).and_then(|name| name.node.as_text())?;
-        *keys.get_mut(names.index(name)?)? = Some(own?);
+        keys.insert(names.index(name)?, own?);
     }
-    let named = names.as_slice().iter().zip(keys);
-    named.map(|(name, keys)| Some(spec(name, keys?, object?))).collect()
+    let named = names.as_slice().iter().enumerate();
+    named.map(|(place, name)| Some(spec(name, keys.remove(&place).or_else(|| shared.clone())?, object?))).collect()
 }
 
 fn read_entry(entry: &Node, base: &Node, update: Option<(Duration, &Node)>, context: Context<'_>) -> Option<PeerKeys> {

@@ -14,8 +14,10 @@ pub(crate) fn read_peer_name(node: &Node, context: Context<'_>) -> Option<usize>
     let names = context.names?;
     let index = names.index(name);
     if index.is_none() {
-        let expected = one_of(names.as_slice().iter().map(String::as_str), name);
-        context.fault_at(node, format!("there is no peer {}: expected {expected}", quote(name)));
+        context.fault_with(node, || {
+            let expected = one_of(names.as_slice().iter().map(String::as_str), name);
+            format!("there is no peer {}: expected {expected}", quote(name))
+        });
     }
     index
 }

@@ -52,9 +52,12 @@ pub(crate) fn read_timeline(
     for Planned { at, what } in planned {
         match what {
             PlannedKind::Links { selector, set } => {
-                let ends = if let LinkSelector::Between { from, to } = selector { Some((from, to)) } else { None };
-                let changed = links.change(ends, set, context)?;
-                changes.push(Change { at, what: ChangeKind::Links(changed) });
+                let what = if let LinkSelector::Between { from, to } = selector {
+                    ChangeKind::Link(links.change((from, to), set, context)?)
+                } else {
+                    ChangeKind::AllLinks(links.change_all(set, context)?)
+                };
+                changes.push(Change { at, what });
             }
             PlannedKind::Peer { peer, contact, hand } => {
                 let spec = peers?.get(peer)?;

@@ -281,8 +281,8 @@ fn what_says_everything_takes_away_what_it_is_laid_over() {
     let none = scene_of("", &["links.peer1.peer2.netem=none"]);
     assert_eq!(none.links.between(0, 1), none.links.between(1, 0));
     let back = scene_of("[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { netem = \"none\", delay = \"9ms\" }", &[]);
-    let ChangeKind::Links(changes) = &back.timeline[0].what else { panic!("links") };
-    assert!(changes.iter().all(|change| change.config.mean_delay() == 9 * MS && change.config.as_fixed().unwrap().loss == Loss::Independent(p(0.1))));
+    let ChangeKind::AllLinks(links) = &back.timeline[0].what else { panic!("links") };
+    assert!(links.configs().iter().all(|config| config.mean_delay() == 9 * MS && config.as_fixed().unwrap().loss == Loss::Independent(p(0.1))));
     // An override of a whole link counts as laid over it.
     let set = scene("[link]\ndelay = \"24ms\"\nloss = 0.1", &["link.replay=fates.csv"]);
     assert!(matches!(set.links.between(0, 1), LinkModel::Replay(_)));
@@ -300,8 +300,8 @@ fn lines_changes_and_overrides_take_the_same_keys() {
 
     let change = "[link]\ndelay = \"24ms\"\n[[timeline]]\nat = \"1s\"\nlink = \"all\"\n\
                   set = { reorder = \"5%\", corrupt = 0.1, jitter = { sd = \"1ms\", distribution = \"uniform\" }, outage.idle = { after = \"1s\", down = \"1s\" } }";
-    let ChangeKind::Links(changes) = scene(change, &[]).timeline[0].what.clone() else { panic!("links") };
-    let changed = changes[0].config.as_fixed().unwrap();
+    let ChangeKind::AllLinks(links) = scene(change, &[]).timeline[0].what.clone() else { panic!("links") };
+    let changed = links.between(0, 1).as_fixed().unwrap();
     assert!(changed.reorder.is_some() && changed.corruption.is_some() && changed.outages.idle().is_some());
     assert_eq!(changed.delay, Delay::with_jitter(24 * MS, Jitter::new(MS, Distribution::Uniform)).unwrap());
 

@@ -6,4 +6,5 @@ mod every_key;
 mod files;
 mod link_keys;
 mod manual;
+mod many_peers;
 mod mutations;

@@ -1,44 +1,267 @@
 //! When samples arrive if nothing is left to chance.
+//!
+//! A link that only delays gives its delay at once. From any other what is random is replaced by something stated; if it still does more than delay, the
+//! scene's own samples are sent through the emulator until what becomes of them repeats. Links that share no access line are looked at once for each
+//! configuration and each way of sampling, so that very many equal peers cost as much as two.
 
-use std::sync::Arc;
+mod nominal;
+mod notes;
+mod probe;
+mod sampling;
+#[cfg(test)]
+mod tests;
+mod timing;
+
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// How long the n-th sample of a sender takes on a link.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) enum LinkTiming {
-    /// All the same.
-    Constant(Duration),
-    /// The pattern repeats with its length; `None`: that sample never arrives.
-    Pattern(Arc<[Option<Duration>]>),
-}
-
+use cohaptic_peer::wire::datagram_len;
 use cohaptic_scene::Scene;
+use cohaptic_units::Bytes;
+use cohaptic_wan::{AccessLine, LinkConfig, Network, NetworkConfig, NodeId, PacketInfo};
 
+pub(crate) use timing::LinkTiming;
+
+use self::nominal::Nominal;
+use self::probe::{MOST_SAMPLES, NoPattern, Probe, RatedLine};
+use self::sampling::Sampling;
 use crate::AnalysisError;
 
+/// More peers than this are not probed together.
+const MOST_SHARING: usize = 256;
+
+/// What the links of a scene do with nothing left to chance.
 #[derive(Clone, Debug)]
 pub(crate) struct NominalNetwork {
-    timings: Vec<Vec<LinkTiming>>,
-    uniform: bool,
+    /// The different timings, each used.
+    timings: Vec<LinkTiming>,
+    places: Places,
+    /// What is nominal, in words.
     pub(crate) notes: Vec<String>,
 }
 
+/// Which timing a link has.
+#[derive(Clone, Debug)]
+enum Places {
+    /// By its configuration, the class of its sender and that of its receiver.
+    Classes { links: cohaptic_scene::LinkTable, senders: Vec<usize>, receivers: Vec<usize>, places: BTreeMap<(usize, usize, usize), usize> },
+    /// By sender and receiver, row by row.
+    Each { peers: usize, places: Vec<usize> },
+}
+
+/// The parts of a scene's network without chance.
+struct Lines {
+    size: Bytes,
+    links: Vec<Nominal>,
+    uplinks: Vec<Option<Nominal>>,
+    downlinks: Vec<Option<Nominal>>,
+}
+
 impl NominalNetwork {
+    /// When samples arrive in this scene as it begins.
+    ///
+    /// # Errors
+    ///
+    /// [`AnalysisError`] if what becomes of samples never repeats: a queue that is offered more than it carries, periods that do not meet.
     pub(crate) fn of(scene: &Scene) -> Result<Self, AnalysisError> {
-        let n = scene.peers.len();
-        let timings: Vec<Vec<LinkTiming>> = (0..n)
-            .map(|from| {
-                (0..n).map(|to| LinkTiming::Constant(if from == to { Duration::ZERO } else { scene.links.between(from, to).mean_delay() })).collect()
-            })
-            .collect();
-        let first = timings[0][1].clone();
-        let uniform = (0..n).all(|from| (0..n).all(|to| from == to || timings[from][to] == first));
-        Ok(Self { timings, uniform, notes: Vec::new() })
+        let size = Bytes::new(datagram_len(scene.axes.count()) as u64);
+        let access = |model: Option<&cohaptic_wan::LinkModel>| model.map(|model| Nominal::of(model, size));
+        let lines = Lines {
+            size,
+            links: scene.links.configs().iter().map(|model| Nominal::of(model, size)).collect(),
+            uplinks: scene.peers.iter().map(|peer| access(peer.uplink.as_ref())).collect(),
+            downlinks: scene.peers.iter().map(|peer| access(peer.downlink.as_ref())).collect(),
+        };
+        let constant = |line: &Option<Nominal>| line.as_ref().map_or(Some(Duration::ZERO), Nominal::constant);
+        let delays = |lines: &[Option<Nominal>]| lines.iter().map(constant).collect::<Option<Vec<Duration>>>();
+        let mut known = Known::default();
+        let places = match (delays(&lines.uplinks), delays(&lines.downlinks)) {
+            (Some(uplinks), Some(downlinks)) => by_class(scene, &lines, &uplinks, &downlinks, &mut known)?,
+            _ => shared(scene, &lines, &mut known)?,
+        };
+        known.check_period(scene)?;
+        let Lines { links, uplinks, downlinks, .. } = &lines;
+        Ok(Self { timings: known.timings, places, notes: notes::notes(scene, links, uplinks, downlinks) })
     }
+
+    /// The timing of a link, by the places of its ends; for a peer with itself the answer has no meaning.
     pub(crate) fn timing(&self, from: usize, to: usize) -> &LinkTiming {
-        &self.timings[from][to]
+        if self.is_uniform() {
+            return &self.timings[0];
+        }
+        let place = match &self.places {
+            Places::Classes { links, senders, receivers, places } => {
+                places.get(&(links.config_between(from, to), senders[from], receivers[to])).copied().unwrap_or(0)
+            }
+            Places::Each { peers, places } => places[from * peers + to],
+        };
+        &self.timings[place]
     }
-    pub(crate) fn is_uniform(&self) -> bool {
-        self.uniform
+
+    /// Whether all links have one timing.
+    pub(crate) const fn is_uniform(&self) -> bool {
+        self.timings.len() == 1
     }
+}
+
+/// Timings as they are met, each with a link that has it.
+#[derive(Default)]
+struct Known {
+    timings: Vec<LinkTiming>,
+    links: Vec<(usize, usize)>,
+    places: BTreeMap<LinkTiming, usize>,
+}
+
+impl Known {
+    fn place(&mut self, timing: LinkTiming, link: (usize, usize)) -> usize {
+        *self.places.entry(timing).or_insert_with_key(|timing| {
+            self.timings.push(timing.clone());
+            self.links.push(link);
+            self.timings.len() - 1
+        })
+    }
+
+    /// All patterns together must repeat soon.
+    fn check_period(&self, scene: &Scene) -> Result<(), AnalysisError> {
+        let mut all = 1;
+        for (timing, link) in self.timings.iter().zip(&self.links) {
+            all = all / gcd(all, timing.period()) * timing.period();
+            if all > MOST_SAMPLES {
+                return Err(no_pattern(scene, *link));
+            }
+        }
+        Ok(())
+    }
+}
+
+const fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+/// Where access lines only delay, each link is by itself.
+fn by_class(scene: &Scene, lines: &Lines, uplinks: &[Duration], downlinks: &[Duration], known: &mut Known) -> Result<Places, AnalysisError> {
+    let links = &scene.links;
+    let matters = lines.links.iter().any(|link| link.constant().is_none());
+    let (mut ways, mut spans) = (BTreeMap::new(), BTreeMap::new());
+    let sampling = |peer: usize| matters.then(|| Sampling::of(scene, peer, uplinks[peer]));
+    let senders: Vec<usize> = (0..uplinks.len()).map(|peer| class(&mut ways, (uplinks[peer], sampling(peer)))).collect();
+    let receivers: Vec<usize> = downlinks.iter().map(|delay| class(&mut spans, *delay)).collect();
+    // A link for each combination that there is.
+    let mut members = (vec![Vec::new(); ways.len()], vec![Vec::new(); spans.len()]);
+    for peer in 0..senders.len() {
+        members.0[senders[peer]].push(peer);
+        members.1[receivers[peer]].push(peer);
+    }
+    let mut used: BTreeMap<(usize, usize, usize), (usize, usize)> = BTreeMap::new();
+    for ((from, to), config) in links.exceptions() {
+        used.entry((config, senders[from], receivers[to])).or_insert((from, to));
+    }
+    for (sender, from) in members.0.iter().enumerate() {
+        for (receiver, to) in members.1.iter().enumerate() {
+            let mut pairs = from.iter().flat_map(|from| to.iter().map(move |to| (*from, *to))).filter(|(from, to)| from != to);
+            if let Some(pair) = pairs.find(|(from, to)| links.config_between(*from, *to) == links.usual()) {
+                used.insert((links.usual(), sender, receiver), pair);
+            }
+        }
+    }
+    let mut alone: BTreeMap<(usize, Option<Sampling>), LinkTiming> = BTreeMap::new();
+    let mut places = BTreeMap::new();
+    for ((config, sender, receiver), (from, to)) in used {
+        let link = &lines.links[config];
+        let way = Sampling::of(scene, from, uplinks[from]);
+        let way = if link.is_timeless() { way.timeless() } else { way };
+        let key = (config, link.constant().is_none().then_some(way));
+        let timing = match (alone.get(&key), link.constant()) {
+            (Some(timing), _) => timing.clone(),
+            (None, Some(delay)) => LinkTiming::Constant(delay),
+            (None, None) => probed(scene, lines, link, way, (from, to))?,
+        };
+        let place = known.place(timing.later(uplinks[from].saturating_add(downlinks[to])), (from, to));
+        alone.insert(key, timing);
+        places.insert((config, sender, receiver), place);
+    }
+    Ok(Places::Classes { links: links.clone(), senders, receivers, places })
+}
+
+fn class<K: Ord>(classes: &mut BTreeMap<K, usize>, key: K) -> usize {
+    let next = classes.len();
+    *classes.entry(key).or_insert(next)
+}
+
+/// What one link does by itself.
+fn probed(scene: &Scene, lines: &Lines, link: &Nominal, way: Sampling, (from, to): (usize, usize)) -> Result<LinkTiming, AnalysisError> {
+    let config = NetworkConfig { seed: scene.seed, nodes: [from, to].map(|peer| scene.peers[peer].name.clone()).to_vec(), general: false };
+    let network = Network::new(config, |_, _| link.config.clone());
+    let name = format!("the link from {} to {}", scene.peers[from].name, scene.peers[to].name);
+    let rated = rated(Some(link), lines.size, name, vec![(0, 1)]);
+    let probe = Probe::new(network, 2, vec![way], info(lines.size));
+    let found = probe.patterns(cycle([link], scene, 1), rated.as_slice()).map_err(|error| explained(scene, error, |_, _| (from, to)))?;
+    Ok(found[1].clone())
+}
+
+/// Where lines are shared, all links together.
+fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, AnalysisError> {
+    let peers = scene.peers.len();
+    if peers > MOST_SHARING {
+        return Err(AnalysisError::TooManyShare { peers, most: MOST_SHARING });
+    }
+    let config = NetworkConfig { seed: scene.seed, nodes: scene.peers.iter().map(|peer| peer.name.clone()).collect(), general: false };
+    let link = |from: NodeId, to: NodeId| -> LinkConfig { lines.links[scene.links.config_between(from.0 as usize, to.0 as usize)].config.clone() };
+    let mut network = Network::new(config, link);
+    let mut rates = Vec::new();
+    for (place, peer) in scene.peers.iter().enumerate() {
+        let node = NodeId(u32::try_from(place).unwrap_or(u32::MAX));
+        let others = || (0..peers).filter(move |other| *other != place);
+        for (line, nominal) in [(AccessLine::Uplink(node), &lines.uplinks[place]), (AccessLine::Downlink(node), &lines.downlinks[place])] {
+            let Some(nominal) = nominal else { continue };
+            let (name, paths) = match line {
+                AccessLine::Uplink(_) => (format!("the uplink of {}", peer.name), others().map(|other| (place, other)).collect()),
+                AccessLine::Downlink(_) => (format!("the downlink of {}", peer.name), others().map(|other| (other, place)).collect()),
+            };
+            rates.extend(rated(Some(nominal), lines.size, name, paths));
+            network = network.with_access_line(line, nominal.config.clone()).unwrap_or_else(|_| unreachable!("every peer is a node"));
+        }
+        for to in others() {
+            let name = format!("the link from {} to {}", peer.name, scene.peers[to].name);
+            rates.extend(rated(lines.links.get(scene.links.config_between(place, to)), lines.size, name, vec![(place, to)]));
+        }
+    }
+    let ways = (0..peers).map(|peer| Sampling::of(scene, peer, Duration::ZERO)).collect();
+    let probe = Probe::new(network, peers, ways, info(lines.size));
+    let all = lines.links.iter().chain(lines.uplinks.iter().flatten()).chain(lines.downlinks.iter().flatten());
+    let found = probe.patterns(cycle(all, scene, peers), &rates).map_err(|error| explained(scene, error, |from, to| (from, to)))?;
+    let timings = found.into_iter().enumerate();
+    // The diagonal has no meaning and must not count as another timing.
+    let places = timings.map(|(place, timing)| if place / peers == place % peers { 0 } else { known.place(timing, (place / peers, place % peers)) });
+    Ok(Places::Each { peers, places: places.collect() })
+}
+
+/// Samples are capable of ECN, as in a simulation.
+const fn info(size: Bytes) -> PacketInfo {
+    PacketInfo { size, ecn_capable: true }
+}
+
+fn rated(line: Option<&Nominal>, size: Bytes, name: String, paths: Vec<(usize, usize)>) -> Option<RatedLine> {
+    line?.rate(size).map(|(rate, bits)| RatedLine { name, rate, bits, paths })
+}
+
+/// How many samples it takes at most until what depends on the time or on the number of packets begins anew.
+fn cycle<'a>(lines: impl IntoIterator<Item = &'a Nominal>, scene: &Scene, senders: usize) -> u64 {
+    let update = scene.coordination.update.as_nanos();
+    // A clock may be a tenth fast.
+    let in_time =
+        |line: &Nominal| line.cycle().map_or(0, |cycle| u64::try_from(cycle.as_nanos() * 10 / 9 / update).unwrap_or(u64::MAX).saturating_add(1));
+    lines.into_iter().map(|line| in_time(line).max(line.packet_cycle())).max().unwrap_or(0).max(senders as u64)
+}
+
+fn explained(scene: &Scene, error: NoPattern, link: impl Fn(usize, usize) -> (usize, usize)) -> AnalysisError {
+    match error {
+        NoPattern::Overloaded { line, load, rate } => AnalysisError::Overloaded { line, load, rate },
+        NoPattern::Path { from, to } => no_pattern(scene, link(from, to)),
+    }
+}
+
+fn no_pattern(scene: &Scene, (from, to): (usize, usize)) -> AnalysisError {
+    let name = |peer: usize| scene.peers[peer].name.clone();
+    AnalysisError::NoPattern { from: name(from), to: name(to), most: MOST_SAMPLES }
 }

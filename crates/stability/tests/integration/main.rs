@@ -2,4 +2,6 @@
 
 mod admittance;
 mod anchors;
+mod graphs;
 mod reduction;
+mod strategies;

@@ -93,6 +93,12 @@ impl Pattern {
         self.counts
     }
 
+    /// After how many of what it counts it begins anew; `None` if never.
+    #[must_use]
+    pub const fn period(&self) -> Option<u64> {
+        self.period
+    }
+
     /// The fraction lost in the long run; `None` without a period, where it tends to nothing.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a fraction")]

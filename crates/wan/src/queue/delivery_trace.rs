@@ -89,6 +89,12 @@ impl DeliveryTrace {
         self.bytes
     }
 
+    /// After how long it begins anew.
+    #[must_use]
+    pub fn period(&self) -> core::time::Duration {
+        core::time::Duration::from_nanos(self.opportunities.last().copied().unwrap_or(0))
+    }
+
     /// The mean rate [bit/s].
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a mean")]

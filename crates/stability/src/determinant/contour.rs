@@ -1,0 +1,158 @@
+//! Roots counted by the argument principle, with steps whose phase change is bounded beforehand.
+//!
+//! Between two points of the contour A changes by Δ, and det A by the factor det(1 + A⁻¹Δ) = Π (1 + μ). The sum of the |μ| is at most the nuclear norm of
+//! A⁻¹Δ (Weyl; Horn & Johnson 1991, Theorem 3.3.13), and while that is at most q < 1 the phase has changed by at most asin q < π/2: each factor by at most
+//! asin |μ|, and asin is convex. So a step that is covered by such discs from both ends has a phase change below π, which the determinants at its ends
+//! tell. Rounding and a perturbation of the entries are counted in Δ; a count then holds for every system that near.
+
+use core::f64::consts::PI;
+
+use num_complex::Complex64;
+
+use super::DelayedLoop;
+use super::point::Point;
+
+/// The most points that one count may cost, and that many more for each step of delay. A root that asks for more counts as too near.
+const POINTS: u64 = 10_000;
+const POINTS_PER_STEP: u64 = 60;
+
+/// A circle, or the upper half of one if its centre is real.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Circle {
+    pub(super) centre: Complex64,
+    pub(super) radius: f64,
+}
+
+/// The outcome of one trip around.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Trip {
+    /// Turns of det A; `None` if a root is so near that it cannot be told.
+    pub(super) turns: Option<i64>,
+    /// The point where a root seemed to be nearest.
+    pub(super) nearest: Complex64,
+}
+
+/// What is the same for all points of a circle.
+struct Limits {
+    inner: f64,
+    /// Of each kernel: its limits, and inner^−j.
+    kernels: Vec<((f64, f64), f64)>,
+    /// The perturbation of A at most, and the kernels' rounding.
+    blur: f64,
+}
+
+impl DelayedLoop {
+    /// How often det A turns around zero on the circle, which must not have the origin inside unless it is its centre, for all systems whose
+    /// matrices are within `perturbation` of these in the 2-norm.
+    pub(super) fn trip(&self, circle: Circle, perturbation: f64) -> Trip {
+        let centred = circle.centre.norm() == 0.0;
+        let inner = (if centred { circle.radius } else { circle.centre.norm() - circle.radius }) * (1.0 - 1e-15);
+        let half = circle.centre.im == 0.0;
+        let end = if half { PI } else { 2.0 * PI };
+        let at = |angle: f64| {
+            let z = circle.centre + Complex64::from_polar(circle.radius, angle);
+            // The ends of a half circle are real.
+            if half && (angle <= 0.0 || angle >= PI) { Complex64::from(z.re) } else { z }
+        };
+        let mut trip = Trip { turns: None, nearest: at(0.0) };
+        if inner <= 0.0 {
+            return trip;
+        }
+        let limits = self.limits(inner, perturbation);
+        let Some(mut here) = self.point(at(0.0)) else { return trip };
+        let (mut angle, mut phase, mut worst) = (0.0, 0.0, here.nuclear(self.now.rows()));
+        let mut reach = self.reach(&here, &limits, circle.radius);
+        let steps: u64 = self.terms.iter().map(|term| u64::from(term.kernel.steps())).sum();
+        for _ in 0..POINTS + POINTS_PER_STEP * steps {
+            let Some(covered) = reach else {
+                trip.nearest = here.z;
+                return trip;
+            };
+            let mut step = 1.9 * covered / circle.radius;
+            loop {
+                let next = if angle + step >= end { end } else { angle + step };
+                let Some(there) = self.point(at(next)) else {
+                    trip.nearest = at(next);
+                    return trip;
+                };
+                let back = self.reach(&there, &limits, circle.radius);
+                // Arcs are longer than chords: what covers the arc covers all its points.
+                if let Some(back) = back
+                    && covered + back >= (next - angle) * circle.radius
+                {
+                    phase += (there.direction * here.direction.conj()).arg();
+                    let closeness = there.nuclear(self.now.rows());
+                    if closeness > worst {
+                        (worst, trip.nearest) = (closeness, there.z);
+                    }
+                    (angle, here, reach) = (next, there, Some(back));
+                    break;
+                }
+                step *= 0.5;
+                if step * circle.radius <= 0.9 * covered {
+                    // Already inside the disc of this point, and the next one has no room: rounding.
+                    trip.nearest = there.z;
+                    return trip;
+                }
+            }
+            if angle >= end {
+                let turns = phase / end;
+                trip.turns = Some(rounded(turns));
+                return trip;
+            }
+        }
+        trip
+    }
+
+    fn limits(&self, inner: f64, perturbation: f64) -> Limits {
+        let kernels: Vec<_> =
+            self.terms.iter().map(|term| (term.kernel.limits(inner), super::Kernel::Delay(term.kernel.steps()).limits(inner).0)).collect();
+        let mut blur = perturbation;
+        for (term, ((largest, _), _)) in self.terms.iter().zip(&kernels) {
+            blur += largest * (perturbation + term.kernel.rounding() * term.norm);
+        }
+        Limits { inner, kernels, blur }
+    }
+
+    /// How far from a point the phase is known to change by less than a quarter turn; `None` if not even at the point itself.
+    fn reach(&self, point: &Point, limits: &Limits, longest: f64) -> Option<f64> {
+        let nuclear = point.nuclear(self.now.rows());
+        let fixed = (limits.blur + point.rounding) * nuclear;
+        if fixed.is_nan() || fixed >= 0.9 {
+            return None;
+        }
+        let weights: Vec<f64> = self.terms.iter().map(|term| point.nuclear_with(&term.matrix)).collect();
+        let change = |length: f64| {
+            let mut sum = fixed + length * nuclear;
+            for (place, term) in self.terms.iter().enumerate() {
+                let (bounds, power) = limits.kernels[place];
+                sum += weights[place] * term.kernel.change(point.z, length, bounds, power, limits.inner, point.sizes[place]);
+            }
+            sum
+        };
+        // The change is monotone in the length: bisection in its logarithm, to a tenth.
+        let mut low = 1e-18 * point.z.norm();
+        let mut high = longest;
+        let least = change(low);
+        if least.is_nan() || least >= 0.999 {
+            return None;
+        }
+        if change(high) < 0.999 {
+            return Some(high);
+        }
+        while high > 1.1 * low {
+            let middle = if high > 4.0 * low { (low * high).sqrt() } else { 0.5 * (low + high) };
+            if change(middle) < 0.999 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(low)
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a number of turns is at most the number of points")]
+fn rounded(turns: f64) -> i64 {
+    turns.round() as i64
+}

@@ -1,0 +1,208 @@
+//! Equal peers on a graph: who hears whom.
+//!
+//! A scene lets everybody hear everybody. Where each of N equal peers hears only its neighbours, with weights that are mutual, the averaging matrix
+//! D⁻¹W has a full set of eigenvectors and real eigenvalues λ from −1 to 1 (D^½·D⁻¹W·D^−½ is symmetric). Along each eigenvector every peer does the same thing,
+//! scaled, and hears λ times its own samples: the scene is as many systems of one node. λ = 1 is there once for each connected part, which can be
+//! displaced as a whole.
+
+use cohaptic_peer::Coordination;
+use cohaptic_scene::Scene;
+
+use crate::analysis::{Analysis, combinations, combine};
+use crate::network::NominalNetwork;
+use crate::parts::{alone, lifted_radius};
+use crate::structure::{Structure, count};
+use crate::{AnalysisError, ContactMode, Matrix, Method, Part, PartKind};
+
+/// Who hears whom.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Graph {
+    /// Everybody hears everybody, as in a scene: λ = 1 and N−1 times −1/(N−1).
+    Complete,
+    /// Each hears the one before and the one after: λ = cos(2πk/N).
+    Ring,
+    /// The first hears all others, who hear the first alone: λ = 1, N−2 times 0, and −1.
+    Star,
+    /// Each hears the others with mutual weights: a symmetric matrix of N rows.
+    Weighted(Matrix),
+}
+
+/// Why peers cannot be analysed on a graph.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GraphError {
+    /// The scene cannot be analysed at all.
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
+    /// The peers or their links differ.
+    #[error("peer {peer} or a link of it is not like the others: expected equal peers and equal links on a graph")]
+    Unequal {
+        /// The first peer that differs from the first one.
+        peer: String,
+    },
+    /// The matrix of weights is none.
+    #[error("weight {row},{column} is {found}: expected a symmetric matrix of {peers} rows of numbers that are not negative, zero on the diagonal")]
+    Weight {
+        /// The row, from 0.
+        row: usize,
+        /// The column, from 0.
+        column: usize,
+        /// The weight found; NaN where there is none.
+        found: f64,
+        /// The number of peers.
+        peers: usize,
+    },
+    /// Somebody hears nobody.
+    #[error("peer {peer} hears nobody: expected a weight above zero for each peer")]
+    Alone {
+        /// Its name.
+        peer: String,
+    },
+    /// The stiffness of a peer would depend on how many it hears.
+    #[error(
+        "proportional-derivative coordination is stiffer the more a peer hears, so these peers are not equal: expected average-position, or a graph in which all hear as much"
+    )]
+    Irregular,
+    /// One-sided contacts or walls.
+    #[error("a scene that is not linear cannot be analysed on a graph: expected contact = \"grasp\" or \"none\" and no enclosure")]
+    NotLinear,
+}
+
+/// Analyses the scene's equal peers as if each heard only its neighbours on that graph.
+///
+/// # Errors
+///
+/// [`GraphError`] if the peers are not equal, the scene is not linear, or the weights make no sense.
+pub fn analyse_on(scene: &Scene, graph: &Graph) -> Result<Analysis, GraphError> {
+    let network = NominalNetwork::of(scene).map_err(GraphError::Analysis)?;
+    let combinations = combinations(scene).map_err(GraphError::Analysis)?;
+    let [combination] = combinations.as_slice() else {
+        return Err(GraphError::NotLinear);
+    };
+    let structure = Structure::of(&[scene], &network, &combination.contacts)?;
+    let (Some(timetable), None) = (&structure.apart[0], structure.classes.get(1)) else {
+        let peer = structure.classes.get(1).map_or(0, |class| class[0]);
+        return Err(GraphError::Unequal { peer: scene.peers[peer].name.clone() });
+    };
+    let peers = scene.peers.len();
+    let (spectrum, degree) = graph.spectrum(scene)?;
+    // What the strategy multiplies its gains by among N peers, replaced by what it does among as many as are heard.
+    let coordination = match (scene.coordination.strategy, degree) {
+        (Coordination::ProportionalDerivative, Some(degree)) => structure.coordination(scene).scaled(degree / count(peers - 1)),
+        (Coordination::ProportionalDerivative, None) => return Err(GraphError::Irregular),
+        _ => structure.coordination(scene),
+    };
+    let node = [structure.node(scene, 0)];
+    let quotient = structure.quotient(scene, &node);
+    let mut parts = Vec::new();
+    let mut rigid_modes = 0;
+    for (eigenvalue, copies) in spectrum {
+        let together = eigenvalue == Eigenvalue::One;
+        let weight = Matrix::from_fn(1, 1, |_, _| eigenvalue.value());
+        let tied = structure.tied || !together;
+        if !tied {
+            rigid_modes += copies;
+        }
+        let (radius, size) = lifted_radius(&crate::lifted::Lifted { weights: &weight, timetable, coordination, tied, ..quotient });
+        let kind = if together { PartKind::Together } else { PartKind::Mode { weight: eigenvalue.value() } };
+        parts.push(Part { kind, size, copies: copies * combination.axes, radius });
+    }
+    let mut dimension = peers * (node[0].states() + 2 * structure.timetable.depth[0]);
+    if let Some((part, rigid)) = alone(&structure, scene, 0, combination.axes) {
+        parts.push(part);
+        rigid_modes += rigid;
+        dimension += 2 * peers;
+    }
+    let radius = crate::parts::radius_of(&parts);
+    let (rigid_modes, dimension) = (rigid_modes * combination.axes, (dimension - rigid_modes) * combination.axes);
+    let mode = ContactMode { contacts: String::new(), radius, parts, rigid_modes, dimension, frame: timetable.frame };
+    Ok(combine(vec![mode], Method::Reduced, &network, scene))
+}
+
+/// An eigenvalue of an averaging matrix; 1 is known exactly.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Eigenvalue {
+    One,
+    Other(f64),
+}
+
+impl Eigenvalue {
+    const fn value(self) -> f64 {
+        match self {
+            Self::One => 1.0,
+            Self::Other(value) => value,
+        }
+    }
+}
+
+impl Graph {
+    /// The different eigenvalues of the averaging matrix with their multiplicities; and how many (or how much weight) each peer hears, if all hear as much.
+    #[expect(clippy::type_complexity, reason = "used once, above")]
+    fn spectrum(&self, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>, Option<f64>), GraphError> {
+        let peers = scene.peers.len();
+        let n = count(peers);
+        Ok(match self {
+            Self::Complete => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(-1.0 / (n - 1.0)), peers - 1)], Some(n - 1.0)),
+            // Two peers hear each other, whatever the graph is called.
+            Self::Ring | Self::Star if peers == 2 => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(-1.0), 1)], Some(1.0)),
+            Self::Ring => {
+                let angle = |k: usize| 2.0 * std::f64::consts::PI * count(k) / n;
+                let pair = |k: usize| (Eigenvalue::Other(libm::cos(angle(k))), if 2 * k == peers { 1 } else { 2 });
+                (std::iter::once((Eigenvalue::One, 1)).chain((1..=peers / 2).map(pair)).collect(), Some(2.0))
+            }
+            Self::Star => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(0.0), peers - 2), (Eigenvalue::Other(-1.0), 1)], None),
+            Self::Weighted(weights) => weighted(weights, scene)?,
+        })
+    }
+}
+
+/// The spectrum of D⁻¹W, from that of the symmetric D^−½·W·D^−½.
+#[expect(clippy::type_complexity, reason = "as for the other graphs")]
+fn weighted(weights: &Matrix, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>, Option<f64>), GraphError> {
+    let peers = scene.peers.len();
+    let at = |row: usize, column: usize| {
+        if weights.rows() == peers && weights.columns() == peers { weights[(row, column)] } else { f64::NAN }
+    };
+    for row in 0..peers {
+        for column in 0..peers {
+            let (found, mutual) = (at(row, column), at(column, row));
+            let fits = found.is_finite() && found >= 0.0 && found.to_bits() == mutual.to_bits() && (row != column || found == 0.0);
+            if !fits {
+                return Err(GraphError::Weight { row, column, found, peers });
+            }
+        }
+    }
+    let degrees: Vec<f64> = (0..peers).map(|row| weights.row(row).iter().sum()).collect();
+    if let Some(peer) = degrees.iter().position(|degree| *degree <= 0.0) {
+        return Err(GraphError::Alone { peer: scene.peers[peer].name.clone() });
+    }
+    let symmetric = faer::Mat::from_fn(peers, peers, |row, column| at(row, column) / (degrees[row] * degrees[column]).sqrt());
+    let mut eigenvalues = symmetric.self_adjoint_eigenvalues(faer::Side::Lower).unwrap_or_default();
+    eigenvalues.sort_by(f64::total_cmp);
+    // As many of them are 1 as there are connected parts: these are the largest.
+    let ones = components(weights);
+    eigenvalues.truncate(peers - ones);
+    let mut spectrum = vec![(Eigenvalue::One, ones)];
+    spectrum.extend(eigenvalues.into_iter().map(|value| (Eigenvalue::Other(value), 1)));
+    let regular = degrees.iter().all(|degree| (degree - degrees[0]).abs() <= 1e-12 * degrees[0]);
+    Ok((spectrum, regular.then_some(degrees[0])))
+}
+
+/// How many parts of the graph are not connected with one another.
+fn components(weights: &Matrix) -> usize {
+    let mut seen = vec![false; weights.rows()];
+    let mut parts = 0;
+    for start in 0..weights.rows() {
+        if seen[start] {
+            continue;
+        }
+        parts += 1;
+        let mut reached = vec![start];
+        while let Some(peer) = reached.pop() {
+            if !std::mem::replace(&mut seen[peer], true) {
+                reached.extend((0..weights.columns()).filter(|other| weights[(peer, *other)] > 0.0 && !seen[*other]));
+            }
+        }
+    }
+    parts
+}

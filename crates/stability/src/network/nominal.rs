@@ -1,0 +1,205 @@
+//! A link with nothing left to chance: what is random is replaced by something stated.
+
+use std::time::Duration;
+
+use cohaptic_units::Bytes;
+use cohaptic_units::print::Span;
+use cohaptic_wan::{
+    Chance, Counts, Delay, Discipline, Fate, FateLog, Layout, LinkConfig, LinkModel, Loss, Order, Outages, Pattern, Service, SlotGap, Slots, Sojourn,
+};
+
+/// A link without chance, and in words what was replaced by what.
+#[derive(Clone, Debug)]
+pub(crate) struct Nominal {
+    pub(crate) config: LinkConfig,
+    pub(crate) replaced: Vec<String>,
+}
+
+impl Nominal {
+    /// The nominal link for samples of that size, which understand congestion marks.
+    pub(crate) fn of(model: &LinkModel, size: Bytes) -> Self {
+        let only =
+            |delay, words: String| Self { config: LinkConfig { delay: Delay::constant(delay), ..LinkConfig::default() }, replaced: vec![words] };
+        let mean = model.mean_delay();
+        match model {
+            LinkModel::Fixed(config) => stripped(config, size),
+            LinkModel::Replay(log) => {
+                let mean = mean_delivered(log);
+                only(
+                    mean,
+                    format!("a recording of fates, which ends, is replaced by the mean delay of what it delivered, {}, and no loss", Span(mean)),
+                )
+            }
+            LinkModel::Modulated(_) => {
+                only(mean, format!("a link that changes by chance is replaced by the mean of the delays of its states, {}, alone", Span(mean)))
+            }
+            LinkModel::Kernel(_) => only(mean, format!("Linux's netem is replaced by its mean delay, {}, alone", Span(mean))),
+            _ => only(mean, format!("a link of an unknown kind is replaced by its mean delay, {}", Span(mean))),
+        }
+    }
+
+    /// The delay, if the link does nothing else.
+    pub(crate) fn constant(&self) -> Option<Duration> {
+        // Of equal delays none overtakes another, and with one stage there is one order of stages.
+        let plain = LinkConfig { order: Order::default(), layout: Layout::default(), ..self.config.clone() };
+        plain.is_constant_delay().then(|| self.config.delay.mean())
+    }
+
+    /// Whether what it does to samples does not depend on when the first of them is sent.
+    pub(crate) fn is_timeless(&self) -> bool {
+        self.cycle().is_none() && self.config.outages.is_empty()
+    }
+
+    /// The longest span after which something in it repeats that depends on the time.
+    pub(crate) fn cycle(&self) -> Option<Duration> {
+        let LinkConfig { outages, loss, bottleneck, trace, .. } = &self.config;
+        let outage = outages.random().map(|random| random.up.mean() + random.down.mean());
+        let loss = match loss {
+            Loss::Pattern(pattern) if pattern.counts() == Counts::Nanoseconds => pattern.period().map(Duration::from_nanos),
+            _ => None,
+        };
+        let service = bottleneck.as_ref().and_then(|bottleneck| match &bottleneck.service {
+            Service::Recorded(recording) => Some(recording.period()),
+            _ => None,
+        });
+        [outage, loss, service, trace.as_ref().and_then(cohaptic_wan::PathTrace::period)].into_iter().flatten().max()
+    }
+
+    /// After how many packets a pattern of losses begins anew.
+    pub(crate) fn packet_cycle(&self) -> u64 {
+        match &self.config.loss {
+            Loss::Pattern(pattern) if pattern.counts() == Counts::Packets => pattern.period().unwrap_or(1),
+            _ => 1,
+        }
+    }
+
+    /// The least rate of its queues [bit/s] and what a sample of that size takes \[bit\] there.
+    #[expect(clippy::cast_precision_loss, reason = "a rate, compared with a tolerance")]
+    pub(crate) fn rate(&self, size: Bytes) -> Option<(f64, f64)> {
+        let bits = |bytes: Bytes| bytes.get() as f64 * 8.0;
+        let line = self.config.bottleneck.as_ref().and_then(|line| match &line.service {
+            Service::Rate(rate) => Some((rate.as_bits_per_sec() as f64, bits(line.framing.on_the_line(size)))),
+            Service::Recorded(recording) => Some((recording.mean_rate(), bits(line.framing.on_the_line(size)))),
+            _ => None,
+        });
+        let bucket = self.config.token_bucket.map(|bucket| (bucket.rate.as_bits_per_sec() as f64, bits(bucket.framing.on_the_line(size))));
+        line.into_iter().chain(bucket).min_by(|one, other| (one.0 / one.1).total_cmp(&(other.0 / other.1)))
+    }
+}
+
+fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
+    let mut replaced = Vec::new();
+    let mut config = config.clone();
+    if config.delay.jitter().is_some() {
+        let mean = config.delay.mean();
+        replaced.push(format!("jitter is replaced by the mean delay, {}", Span(mean)));
+        config.delay = Delay::constant(mean);
+    }
+    if config.mtu.is_some_and(|mtu| size <= mtu) {
+        config.mtu = None;
+    }
+    config.outages = outages(&config.outages, &mut replaced);
+    if config.marks_instead_of_loss {
+        // Samples understand marks, so that none of them is lost.
+        config.loss = Loss::None;
+        config.marks_instead_of_loss = false;
+    }
+    config.loss = loss(config.loss, &mut replaced);
+    if !config.duplication.is_never() {
+        replaced.push("duplication is left out".to_owned());
+        config.duplication = Chance::default();
+    }
+    if config.corruption.take().is_some() {
+        replaced.push("corruption is left out".to_owned());
+    }
+    if config.reorder.take().is_some() {
+        replaced.push("reordering on purpose is left out".to_owned());
+    }
+    if let Some(bottleneck) = &mut config.bottleneck
+        && matches!(bottleneck.discipline, Discipline::Red(_))
+    {
+        replaced.push("random early detection is replaced by the limit of the queue alone".to_owned());
+        bottleneck.discipline = Discipline::TailDrop;
+    }
+    config.slots = config.slots.map(|slots| regular(slots, &mut replaced));
+    if let Some(trace) = config.trace.take() {
+        let certain = trace.without_chance();
+        if certain != trace {
+            replaced.push("random loss of a recorded path is left out".to_owned());
+        }
+        if certain.period().is_some() {
+            config.trace = Some(certain);
+        } else {
+            replaced.push("a recorded path, which ends, is replaced by its last row".to_owned());
+            let (delay, loss) = certain.last();
+            config.delay = Delay::constant(config.delay.mean().saturating_add(delay));
+            if loss.get() > 0.0 {
+                config.loss = everything();
+            }
+        }
+    }
+    Nominal { config, replaced }
+}
+
+/// Outages that come and go with spans of fixed length stay; those that are drawn are left out, and those of a list end.
+fn outages(given: &Outages, replaced: &mut Vec<String>) -> Outages {
+    let mut kept = Outages::default();
+    if !given.scheduled().is_empty() {
+        replaced.push("outages at given times are left out, because they end".to_owned());
+    }
+    if let Some(random) = given.random() {
+        if matches!((random.up, random.down), (Sojourn::Fixed(_), Sojourn::Fixed(_))) {
+            kept = kept.clone().with_random(random).unwrap_or(kept);
+        } else {
+            replaced.push("random outages are left out".to_owned());
+        }
+    }
+    if let Some(idle) = given.idle() {
+        kept = kept.clone().with_idle(idle).unwrap_or(kept);
+    }
+    kept
+}
+
+fn loss(given: Loss, replaced: &mut Vec<String>) -> Loss {
+    match given {
+        Loss::None => Loss::None,
+        Loss::Pattern(pattern) if pattern.period().is_some() => Loss::Pattern(pattern),
+        Loss::Pattern(_) => {
+            replaced.push("losses at given places are left out, because they end".to_owned());
+            Loss::None
+        }
+        // A loss of everything is not random.
+        random if random.mean() == Some(1.0) => everything(),
+        random if random.mean() == Some(0.0) => Loss::None,
+        _ => {
+            replaced.push("random loss is left out".to_owned());
+            Loss::None
+        }
+    }
+}
+
+fn everything() -> Loss {
+    let first: core::ops::Range<u64> = 0..1;
+    Pattern::of_packets(Vec::from([first]), Some(1)).map_or(Loss::None, Loss::Pattern)
+}
+
+fn regular(slots: Slots, replaced: &mut Vec<String>) -> Slots {
+    let (mean, random) = match slots.gap() {
+        SlotGap::Between { min, max } => (*min + (*max - *min) / 2, min != max),
+        SlotGap::Drawn(delay) => (delay.mean(), delay.jitter().is_some()),
+        _ => return slots,
+    };
+    if random {
+        replaced.push(format!("random gaps between slots are replaced by their mean, {}", Span(mean)));
+    }
+    let mut regular = Slots::drawn(Delay::constant(mean));
+    (regular.packets, regular.bytes) = (slots.packets, slots.bytes);
+    regular
+}
+
+fn mean_delivered(log: &FateLog) -> Duration {
+    let delays =
+        log.records().iter().filter(|record| record.copy == 0 && matches!(record.fate, Fate::Delivered(_))).map(|record| record.at - record.offered);
+    let (sum, count) = delays.fold((0_u128, 0_u128), |(sum, count), delay| (sum + delay.as_nanos(), count + 1));
+    Duration::from_nanos(u64::try_from(sum / count.max(1)).unwrap_or(u64::MAX))
+}

@@ -1,0 +1,158 @@
+//! Samples are sent through the emulated network itself until what becomes of them repeats.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use cohaptic_units::Instant;
+use cohaptic_wan::{Fate, Network, NodeId, PacketInfo};
+
+use super::sampling::Sampling;
+use super::timing::LinkTiming;
+
+/// The longest pattern, of all links together \[samples\].
+pub(crate) const MOST_SAMPLES: usize = 64;
+
+/// A probe gives up after so many samples of a peer, or so many packets in all.
+const MOST_SENT: u64 = 16_384;
+const MOST_PACKETS: u64 = 1 << 24;
+
+/// The first look at what came out, after so many samples. Twice as many for every further look.
+const FIRST_LOOK: u64 = 256;
+
+const PENDING: u64 = u64::MAX;
+const LOST: u64 = u64::MAX - 1;
+
+/// A network and those who send through it.
+pub(crate) struct Probe {
+    network: Network<()>,
+    nodes: usize,
+    senders: Vec<Sampling>,
+    info: PacketInfo,
+    sent: Vec<u64>,
+    next: BTreeSet<(Instant, usize)>,
+    /// For each path, how long each sample took \[ns\].
+    taken: Vec<Vec<u64>>,
+}
+
+/// A line with a rate.
+#[derive(Clone, Debug)]
+pub(crate) struct RatedLine {
+    pub(crate) name: String,
+    /// What it carries [bit/s].
+    pub(crate) rate: f64,
+    /// What a sample takes \[bit\].
+    pub(crate) bits: f64,
+    pub(crate) paths: Vec<(usize, usize)>,
+}
+
+/// Why no pattern was found.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) enum NoPattern {
+    Overloaded { line: String, load: f64, rate: f64 },
+    Path { from: usize, to: usize },
+}
+
+impl Probe {
+    /// The first nodes of the network send to all others.
+    pub(crate) fn new(network: Network<()>, nodes: usize, senders: Vec<Sampling>, info: PacketInfo) -> Self {
+        let next = senders.iter().enumerate().filter_map(|(place, sampling)| Some((sampling.instant(0)?, place))).collect();
+        Self { network, nodes, sent: vec![0; senders.len()], senders, info, next, taken: vec![Vec::new(); nodes * nodes] }
+    }
+
+    /// What becomes of the samples on each path, by sender and receiver. `cycle`: how many samples it takes at most until what depends on the time or is
+    /// counted by links begins anew; patterns are believed if they outlast it.
+    pub(crate) fn patterns(mut self, cycle: u64, lines: &[RatedLine]) -> Result<Vec<LinkTiming>, NoPattern> {
+        let paths: Vec<(usize, usize)> =
+            (0..self.senders.len()).flat_map(|from| (0..self.nodes).map(move |to| (from, to))).filter(|(from, to)| from != to).collect();
+        let most = MOST_SENT.min(MOST_PACKETS / paths.len().max(1) as u64).max(FIRST_LOOK);
+        let mut samples = FIRST_LOOK;
+        let mut culprit = paths.first().copied().unwrap_or((0, 1));
+        loop {
+            self.send(samples);
+            let mut found = vec![LinkTiming::Constant(Duration::ZERO); self.nodes * self.nodes];
+            let mut missing = None;
+            for (from, to) in &paths {
+                match repeated(&self.taken[from * self.nodes + to], samples / 2, cycle) {
+                    Some(timing) => found[from * self.nodes + to] = timing,
+                    None => missing = missing.or(Some((*from, *to))),
+                }
+            }
+            // A pattern that carries more than a line can is the calm before its queue has filled.
+            let carried = |line: &RatedLine| self.load(line, |from, to| found[from * self.nodes + to].arriving());
+            if missing.is_none() && lines.iter().all(|line| carried(line) <= line.rate * (1.0 + 1e-9)) {
+                return Ok(found);
+            }
+            culprit = missing.unwrap_or(culprit);
+            if samples * 2 > most {
+                break;
+            }
+            samples *= 2;
+        }
+        let overloaded = lines.iter().map(|line| (line, self.load(line, |_, _| 1.0))).find(|(line, load)| *load > line.rate * (1.0 + 1e-9));
+        Err(match overloaded {
+            Some((line, load)) => NoPattern::Overloaded { line: line.name.clone(), load, rate: line.rate },
+            None => NoPattern::Path { from: culprit.0, to: culprit.1 },
+        })
+    }
+
+    /// What passes a line [bit/s], if that fraction of the samples of each path does.
+    fn load(&self, line: &RatedLine, fraction: impl Fn(usize, usize) -> f64) -> f64 {
+        line.paths.iter().map(|(from, to)| fraction(*from, *to) * self.senders[*from].per_second() * line.bits).sum()
+    }
+
+    /// Goes on until everybody has sent so many samples.
+    fn send(&mut self, samples: u64) {
+        let mut waiting = Vec::new();
+        while let Some((now, place)) = self.next.pop_first() {
+            if self.sent[place] >= samples {
+                waiting.push((now, place));
+                continue;
+            }
+            let Ok(from) = u32::try_from(place) else { continue };
+            // Instants come in order, and every sender is a node.
+            let _ = self.network.handle_broadcast(now, NodeId(from), self.info, ());
+            self.sent[place] += 1;
+            self.next.extend(self.senders[place].instant(self.sent[place]).map(|at| (at, place)));
+            if self.next.first().is_none_or(|(at, _)| *at > now) {
+                self.receive(now);
+            }
+        }
+        self.next.extend(waiting);
+    }
+
+    fn receive(&mut self, now: Instant) {
+        // Instants come in order.
+        let _ = self.network.handle_timeout(now);
+        while let Some(event) = self.network.poll_event() {
+            let taken = match event.fate {
+                Fate::Delivered(_) => u64::try_from((event.at - event.sent).as_nanos()).unwrap_or(LOST),
+                _ if event.fate.is_end() => LOST,
+                _ => continue,
+            };
+            let path = &mut self.taken[event.from.0 as usize * self.nodes + event.to.0 as usize];
+            let Ok(place) = usize::try_from(event.sequence) else { continue };
+            if path.len() <= place {
+                path.resize(place + 1, PENDING);
+            }
+            path[place] = taken;
+        }
+    }
+}
+
+/// The shortest pattern that repeats from `start` until nothing more is known, for long enough.
+fn repeated(taken: &[u64], start: u64, cycle: u64) -> Option<LinkTiming> {
+    let known = taken.iter().position(|taken| *taken == PENDING).unwrap_or(taken.len());
+    let start = usize::try_from(start).ok()?;
+    let tail = taken.get(start..known)?;
+    let needed = (MOST_SAMPLES as u64 * 3 / 2).max(cycle.saturating_add(MOST_SAMPLES as u64));
+    if (tail.len() as u64) < needed {
+        return None;
+    }
+    let period = (1..=MOST_SAMPLES).find(|period| tail.iter().zip(&tail[*period..]).all(|(one, next)| one == next))?;
+    let entry = |place: usize| {
+        // The first sample from `start` on that has this place in the pattern.
+        let sample = (place + period - start % period) % period;
+        (tail[sample] != LOST).then(|| Duration::from_nanos(tail[sample]))
+    };
+    Some(LinkTiming::repeating((0..period).map(entry).collect()))
+}

@@ -1,0 +1,98 @@
+//! What the small methods need of a square matrix, so that one source serves arrays of a size known to the compiler and matrices of any size.
+
+use crate::Matrix;
+
+/// A square matrix that is worked on in place.
+pub(super) trait Square {
+    /// Rows, and columns.
+    fn size(&self) -> usize;
+    fn at(&self, row: usize, column: usize) -> f64;
+    fn put(&mut self, row: usize, column: usize, entry: f64);
+}
+
+impl<const N: usize> Square for [[f64; N]; N] {
+    #[inline]
+    fn size(&self) -> usize {
+        N
+    }
+
+    #[inline]
+    fn at(&self, row: usize, column: usize) -> f64 {
+        self[row][column]
+    }
+
+    #[inline]
+    fn put(&mut self, row: usize, column: usize, entry: f64) {
+        self[row][column] = entry;
+    }
+}
+
+impl Square for Matrix {
+    #[inline]
+    fn size(&self) -> usize {
+        self.rows()
+    }
+
+    #[inline]
+    fn at(&self, row: usize, column: usize) -> f64 {
+        self[(row, column)]
+    }
+
+    #[inline]
+    fn put(&mut self, row: usize, column: usize, entry: f64) {
+        self[(row, column)] = entry;
+    }
+}
+
+/// Makes each row about as large as its column by an exact similarity transform with powers of two (Parlett & Reinsch 1969), and gives the ratio of
+/// the largest to the smallest factor: 1 if nothing was to be done.
+///
+/// A row and a column within a factor of eight of each other are left alone, which costs no division.
+#[inline]
+pub(super) fn balance<S: Square>(matrix: &mut S, mut scaled: impl FnMut(usize, i32)) {
+    let size = matrix.size();
+    // Each pass that changes something lowers the norm by a constant factor; the limit only cuts off a slow tail.
+    for _ in 0..16 {
+        let mut changed = false;
+        for place in 0..size {
+            let (mut row, mut column) = (0.0, 0.0);
+            for other in 0..size {
+                row += matrix.at(place, other).abs();
+                column += matrix.at(other, place).abs();
+            }
+            let own = matrix.at(place, place).abs();
+            (row, column) = (row - own, column - own);
+            // An isolated eigenvalue (or rounding in the difference): no factor would be the right one.
+            if row <= own * f64::EPSILON || column <= own * f64::EPSILON || (row < 8.0 * column && column < 8.0 * row) {
+                continue;
+            }
+            // The power of two next to √(row/column), by which the column is multiplied and the row divided.
+            let exponent = ((exponent_of(row) - exponent_of(column)) / 2).clamp(-100, 100);
+            if exponent == 0 {
+                continue;
+            }
+            let (up, down) = (power_of_two(exponent), power_of_two(-exponent));
+            for other in 0..size {
+                if other != place {
+                    matrix.put(place, other, matrix.at(place, other) * down);
+                    matrix.put(other, place, matrix.at(other, place) * up);
+                }
+            }
+            scaled(place, exponent);
+            changed = true;
+        }
+        if !changed {
+            break;
+        }
+    }
+}
+
+/// The binary exponent of a positive normal number.
+pub(super) fn exponent_of(number: f64) -> i32 {
+    i32::try_from((number.to_bits() >> 52) & 0x7ff).unwrap_or(0) - 1023
+}
+
+/// 2^exponent, for exponents of normal numbers.
+pub(super) fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(u64::try_from((exponent + 1023).clamp(1, 2046)).unwrap_or(1) << 52)
+}

@@ -1,0 +1,211 @@
+"""The full monodromy matrix of a scene, by letting one frame happen with rows in place of numbers.
+
+Every quantity (a velocity, a held sample, a force) is kept as the row of its coefficients in the state at the beginning of the frame. What happens at
+each instant is done to the rows in the order that the model prescribes: sample, deliver, forces, move. The rows at the end are the matrix. Nothing
+is assumed about symmetry, delays, phases or clocks: every directed link has its own held sample and its own samples in flight.
+
+The state, at the beginning of a frame (an instant that is a multiple of Tn, before anything happens at it):
+    for each peer, its device and copy as they will be at its first tick of the frame; with a compute delay also the forces computed at its last tick;
+    for each directed link, the sample held and the samples in flight, oldest first.
+"""
+
+from plant import Exact, Maps
+
+
+class Timing:
+    """When samples are sent and from which tick on they are in force, in the steady state, for one frame that begins at t0."""
+
+    def __init__(self, scene):
+        self.scene = scene
+        latest = max([p.offset + p.tick * (p.phase + 1) for p in scene.peers] + [link.delay for link in scene.links.values()])
+        self.t0 = (2 * latest // scene.update + 4) * scene.update
+        self.t1 = self.t0 + scene.update
+
+    def first_tick(self, peer, instant):
+        """The first tick of a peer at or after an instant."""
+        p = self.scene.peers[peer]
+        return p.offset - (-(instant - p.offset) // p.tick) * p.tick
+
+    def sends(self, peer, begin, end):
+        """The instants in begin ≤ t < end at which a peer sends."""
+        p, update = self.scene.peers[peer], self.scene.update
+        first = p.offset + p.phase * p.tick
+        t = first - (-(begin - first) // update) * update
+        return list(range(t, end, update))
+
+    def in_flight(self, sender, receiver, t):
+        """The sending instants of what is in flight at t: sent before t, in force at a tick at or after t."""
+        delay = self.scene.links[sender, receiver].delay
+        sent = self.sends(sender, t - delay - 2 * self.scene.update, t)
+        return [s for s in sent if self.first_tick(receiver, s + delay) >= t]
+
+    def in_force(self, sender, receiver):
+        """What begins to be in force in the frame: pairs of the tick and the sending instant."""
+        delay = self.scene.links[sender, receiver].delay
+        sent = self.sends(sender, self.t0 - delay - 2 * self.scene.update, self.t1)
+        starts = [(self.first_tick(receiver, s + delay), s) for s in sent]
+        return [(tick, s) for tick, s in starts if self.t0 <= tick < self.t1]
+
+
+class Frame:
+    """One frame. `states` names the entries of the state; `matrix` maps it over the frame.
+
+    `forced` is the place of a peer whose hand acts with a force of its own at each tick: `inputs` further columns, one a tick, and `outputs`, the
+    rows of its device's velocity at its ticks.
+
+    `outcomes` says for a directed link what becomes of the sample that would come into force in this frame: None if it is lost, or the delay in ns
+    with which it comes, which must bring it into force within the same frame.
+    """
+
+    def __init__(self, scene, arithmetic=Exact, forced=None, outcomes=None, maps=None):
+        self.scene, self.timing = scene, Timing(scene)
+        count = len(scene.peers)
+        peers, pairs = range(count), list(scene.links)
+        timing = self.timing
+        flights = {pair: timing.in_flight(*pair, timing.t0) for pair in pairs}
+        self.states = []
+        for i in peers:
+            self.states += [("xH", i), ("vH", i), ("xO", i), ("vO", i)]
+            if scene.peers[i].compute_delay:
+                self.states += [("fH", i), ("fO", i)]
+        for pair in pairs:
+            self.states += [("held x", pair), ("held v", pair)]
+            for place in range(len(flights[pair])):
+                self.states += [("flight x", pair, place), ("flight v", pair, place)]
+        place_of = {state: place for place, state in enumerate(self.states)}
+        inputs = 0 if forced is None else scene.update // scene.peers[forced].tick
+        width = len(self.states) + inputs
+
+        def unit(*state):
+            return unit_at(place_of[state])
+
+        def unit_at(place):
+            row = arithmetic.zeros(width)
+            row[place] = arithmetic.number(1)
+            return row
+
+        maps = maps or make_maps(scene, arithmetic)
+        zero = arithmetic.zeros(width)
+        device = [[unit("xH", i), unit("vH", i)] for i in peers]
+        copy = [[unit("xO", i), unit("vO", i)] for i in peers]
+        pending = [[unit("fH", i), unit("fO", i)] if scene.peers[i].compute_delay else None for i in peers]
+        held = {pair: (unit("held x", pair), unit("held v", pair)) for pair in pairs}
+        sample = {}
+        for pair in pairs:
+            for place, sent in enumerate(flights[pair]):
+                sample[pair[0], sent, pair] = (unit("flight x", pair, place), unit("flight v", pair, place))
+        due = {pair: timing.in_force(*pair) for pair in pairs}
+        for pair, outcome in (outcomes or {}).items():
+            ((_, sent),) = due[pair]
+            if outcome is None:
+                due[pair] = []
+            else:
+                tick = timing.first_tick(pair[1], sent + outcome)
+                assert timing.t0 <= tick < timing.t1, "an outcome must stay within the frame"
+                due[pair] = [(tick, sent)]
+
+        def newest(pair, sent):
+            """What a link carries: a sample of before the frame, which is part of its state, or one of this frame."""
+            return sample.get((pair[0], sent, pair)) or sample[pair[0], sent]
+
+        ticks = sorted(
+            (t, i) for i in peers for t in range(timing.first_tick(i, timing.t0), timing.t1, scene.peers[i].tick)
+        )
+        sending = {(t, i) for i in peers for t in timing.sends(i, timing.t0, timing.t1)}
+        self.outputs = []
+        for instant in sorted({t for t, _ in ticks}):
+            ticking = [i for t, i in ticks if t == instant]
+            for i in ticking:  # sample and send
+                if (instant, i) in sending:
+                    sample[i, instant] = tuple(copy[i])
+            for i in ticking:
+                for j in peers:  # deliver
+                    for tick, sent in due.get((j, i), ()):
+                        if tick == instant:
+                            held[j, i] = newest((j, i), sent)
+                # Forces.
+                m = maps[i]
+                mean = [sum((held[j, i][q] for j in peers if j != i), start=zero) / (count - 1) for q in (0, 1)]
+                if scene.peers[i].touches:
+                    fc = m.kc * (device[i][0] - copy[i][0]) + m.bc * (device[i][1] - copy[i][1])
+                else:
+                    fc = zero
+                ft = m.kt * (copy[i][0] - mean[0]) + m.bt * (copy[i][1] - mean[1])
+                applied = [fc, fc - ft]
+                if pending[i] is not None:
+                    applied, pending[i] = pending[i], applied
+                hand = zero
+                if i == forced:
+                    hand = unit_at(len(self.states) + len(self.outputs))
+                    self.outputs.append(device[i][1])
+                # Move.
+                device[i] = move(m.device, device[i], hand - applied[0])
+                copy[i] = move(m.copy, copy[i], applied[1])
+        final = {}
+        for i in peers:
+            final.update({("xH", i): device[i][0], ("vH", i): device[i][1], ("xO", i): copy[i][0], ("vO", i): copy[i][1]})
+            if pending[i] is not None:
+                final.update({("fH", i): pending[i][0], ("fO", i): pending[i][1]})
+        for pair in pairs:
+            final["held x", pair], final["held v", pair] = held[pair]
+            flying = timing.in_flight(*pair, timing.t1)
+            assert len(flying) == len(flights[pair])
+            for place, sent in enumerate(flying):
+                final["flight x", pair, place], final["flight v", pair, place] = newest(pair, sent)
+        whole = arithmetic.zeros(len(self.states), width)
+        for place, state in enumerate(self.states):
+            whole[place] = final[state]
+        self.matrix = whole[:, : len(self.states)]
+        self.inputs = whole[:, len(self.states) :]
+
+
+def make_maps(scene, arithmetic=Exact):
+    """The step maps of every peer; equal peers share theirs."""
+    made = {}
+    result = []
+    for p in scene.peers:
+        key = (p.tick, p.device_mass, p.device_damping, p.arm, p.coupling, p.coupling_scaling)
+        if key not in made:
+            made[key] = Maps(arithmetic, scene, p, len(scene.peers))
+        result.append(made[key])
+    return result
+
+
+def move(maps, state, force):
+    phi, gamma = maps
+    x, v = state
+    return [phi[0, 0] * x + phi[0, 1] * v + gamma[0] * force, phi[1, 0] * x + phi[1, 1] * v + gamma[1] * force]
+
+
+def rigid_modes(scene):
+    """What may be displaced without anything noticing: ("device", i) for a device that touches nothing and is tied to nothing, and "scene" for
+    everything else together, unless an arm with a stiffness holds a device that touches the object."""
+    tied = [p.arm is not None and p.arm[2] > 0 for p in scene.peers]
+    modes = [("device", i) for i, p in enumerate(scene.peers) if not p.touches and not tied[i]]
+    if not any(p.touches and tie for p, tie in zip(scene.peers, tied)):
+        modes.append("scene")
+    return modes
+
+
+def relative(scene, states, matrix):
+    """The matrix of the relative motion: positions are counted from the first peer's copy, which is left out, and so are free devices.
+
+    With e the displacement of everything together (M·e = e) and z = z' + x·e, x the reference: z'⁺ = (M − e·(row of x)) z'.
+    """
+    rigid = rigid_modes(scene)
+    left_out = set()
+    for mode in rigid:
+        if mode != "scene":
+            place = states.index(("xH", mode[1]))
+            column = matrix[:, place]
+            assert abs(column[place] - 1) < 1e-12 and all(value == 0 for row, value in enumerate(column) if row != place)
+            left_out.add(place)
+    if "scene" in rigid:
+        reference = states.index(("xO", 0))
+        e = [1 if "x" in state[0] and (state[0] != "xH" or scene.peers[state[1]].touches) else 0 for state in states]
+        moved = matrix @ e
+        assert all(abs(a - b) < 1e-9 for a, b in zip(moved, e)), "displacing everything must change nothing"
+        matrix = matrix - [[c * value for value in matrix[reference]] for c in e]
+        left_out.add(reference)
+    keep = [place for place in range(len(states)) if place not in left_out]
+    return matrix[keep][:, keep], len(rigid)
