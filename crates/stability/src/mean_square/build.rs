@@ -3,10 +3,10 @@
 use super::arrivals::{Hazard, Hazards, Outcome};
 use super::events::{Arrive, Events, Step};
 use super::law::LossChain;
+use crate::Matrix;
 use crate::lifted::node::{Scale, Scratch};
 use crate::lifted::{Lifted, Node};
 use crate::timetable::{Event, Timetable};
-use crate::Matrix;
 
 /// A link of the scene.
 #[derive(Clone, Debug)]

@@ -142,7 +142,8 @@ impl Events {
                 let line = moment.row(*reference);
                 let square = line[*reference];
                 Matrix::from_fn(size, size, |row, column| {
-                    with(row, column) - moved[row] * line[self.kept[column].0] - line[self.kept[row].0] * moved[column] + moved[row] * moved[column] * square
+                    with(row, column) - moved[row] * line[self.kept[column].0] - line[self.kept[row].0] * moved[column]
+                        + moved[row] * moved[column] * square
                 })
             }
         }

@@ -118,7 +118,8 @@ pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
     }
     notes.dedup();
     let zero = Radius { value: 0.0, error: 0.0 };
-    let none = MeanSquare { radius: zero, nominal_squared: zero, method: MeanSquareMethod::Nominal, frame: Duration::ZERO, unknowns: 0, notes: Vec::new() };
+    let none =
+        MeanSquare { radius: zero, nominal_squared: zero, method: MeanSquareMethod::Nominal, frame: Duration::ZERO, unknowns: 0, notes: Vec::new() };
     Ok(MeanSquare { notes, ..found.unwrap_or(none) })
 }
 
@@ -165,8 +166,13 @@ fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
     };
     let access = |model: &Option<cohaptic_wan::LinkModel>| model.as_ref().is_some_and(|model| is_random(model));
     let queues = |model: &Option<cohaptic_wan::LinkModel>| model.as_ref().is_some_and(|model| !model.is_constant_delay());
-    if let Some(peer) = scene.peers.iter().find(|peer| access(&peer.uplink) || access(&peer.downlink) || (!random.is_empty() && queues(&peer.downlink))) {
-        return Err(AnalysisError::ChanceWithoutMoments { link: peer.name.clone(), why: "its access line ties what happens to several links together" });
+    if let Some(peer) =
+        scene.peers.iter().find(|peer| access(&peer.uplink) || access(&peer.downlink) || (!random.is_empty() && queues(&peer.downlink)))
+    {
+        return Err(AnalysisError::ChanceWithoutMoments {
+            link: peer.name.clone(),
+            why: "its access line ties what happens to several links together",
+        });
     }
     Ok(random)
 }

@@ -17,10 +17,10 @@
 
 use super::arrivals::Hazards;
 use super::positive::{Positive, is_definite, pack, unpack};
-use crate::lifted::node::{Scale, Scratch};
-use crate::lifted::Lifted;
-use crate::timetable::Event;
 use crate::Matrix;
+use crate::lifted::Lifted;
+use crate::lifted::node::{Scale, Scratch};
+use crate::timetable::Event;
 
 /// One frame of equal peers.
 #[derive(Clone, Debug)]
@@ -137,7 +137,8 @@ impl Symmetric {
             }
             result
         };
-        let linear = |with: &[f64], mean: f64| -> Vec<f64> { map.times_column(with).iter().zip(held).map(|(with, held)| with + mean * held).collect() };
+        let linear =
+            |with: &[f64], mean: f64| -> Vec<f64> { map.times_column(with).iter().zip(held).map(|(with, held)| with + mean * held).collect() };
         Moment {
             own: quadratic(own, r, own_held),
             other: quadratic(other, &others, other_held),
