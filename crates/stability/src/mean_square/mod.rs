@@ -164,7 +164,7 @@ fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
         let pairs = (0..peers).flat_map(|to| (0..peers).filter(move |from| *from != to).map(move |from| (from, to)));
         pairs.filter(|(from, to)| is_random(scene.links.between(*from, *to))).collect()
     };
-    let access = |model: &Option<cohaptic_wan::LinkModel>| model.as_ref().is_some_and(|model| is_random(model));
+    let access = |model: &Option<cohaptic_wan::LinkModel>| model.as_ref().is_some_and(is_random);
     let queues = |model: &Option<cohaptic_wan::LinkModel>| model.as_ref().is_some_and(|model| !model.is_constant_delay());
     if let Some(peer) =
         scene.peers.iter().find(|peer| access(&peer.uplink) || access(&peer.downlink) || (!random.is_empty() && queues(&peer.downlink)))

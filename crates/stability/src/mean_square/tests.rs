@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::{Gains, Integrator, Plant};
+use cohaptic_peer::{Integrator, Plant};
 use cohaptic_scene::Scene;
 use faer::Mat;
 
@@ -96,7 +96,7 @@ impl Explicit {
     /// Where a state leads if exactly those links (by receiver and sender) lose.
     fn lead(&self, mut z: Vec<f64>, lost: &dyn Fn(usize, usize) -> bool) -> Vec<f64> {
         let step = Duration::from_millis(1);
-        let mass = 0.45 / self.peers as f64;
+        let mass = 0.45 / count(self.peers);
         let device = Plant { mass: 0.1, damping: 5.0, stiffness: 0.0 }.step(step, Integrator::Exact);
         let copy = Plant { mass, damping: 0.0, stiffness: 0.0 }.step(step, Integrator::Exact);
         let (kt, bt, kc, bc) = (1000.0, 5.0, 3500.0, 5.0);
@@ -118,7 +118,7 @@ impl Explicit {
             for to in 0..self.peers {
                 let [xh, vh, x, v] = [0, 1, 2, 3].map(|k| z[4 * to + k]);
                 let others: Vec<usize> = (0..self.peers).filter(|from| *from != to).map(|from| self.held(to, from)).collect();
-                let mean = |k: usize| others.iter().map(|held| z[held + k]).sum::<f64>() / others.len() as f64;
+                let mean = |k: usize| others.iter().map(|held| z[held + k]).sum::<f64>() / count(others.len());
                 let coupling = kc * (xh - x) + bc * (vh - v);
                 let coordination = kt * (x - mean(0)) + bt * (v - mean(1));
                 for (place, map, force) in [(0, &device, -coupling), (2, &copy, coupling - coordination)] {
