@@ -70,4 +70,37 @@ pub enum AnalysisError {
         /// How many are looked at at most.
         most: usize,
     },
+    /// A link does at random what has no second moment here.
+    #[error("the mean square of link {link} cannot be followed: {why}; simulate the scene with several seeds instead")]
+    ChanceWithoutMoments {
+        /// Which link, or whose access line.
+        link: String,
+        /// What it does.
+        why: &'static str,
+    },
+    /// The second moment takes too many numbers.
+    #[error(
+        "the second moment of this scene needs {} numbers, {} joint states of its links: expected at most {most}; simulate the scene with several seeds instead",
+        Many(*.unknowns), Many(*.joint)
+    )]
+    TooManyMoments {
+        /// How many joint states the chains of all links have; `None` beyond measure.
+        joint: Option<usize>,
+        /// How many numbers; `None` beyond measure.
+        unknowns: Option<usize>,
+        /// How many are possible.
+        most: usize,
+    },
+}
+
+/// A number that may be beyond measure, in words.
+struct Many(Option<usize>);
+
+impl std::fmt::Display for Many {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.0 {
+            Some(number) => write!(formatter, "{number}"),
+            None => formatter.write_str("far too many"),
+        }
+    }
 }

@@ -25,7 +25,6 @@ pub struct Part {
 
 /// What moves in a part of a scene.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum PartKind {
     /// The whole scene, by the general path.
     Whole,

@@ -88,6 +88,7 @@ impl<'a> PartDocument<'a> {
             PartKind::Whole => ("whole", None),
             PartKind::Together => ("together", None),
             PartKind::Apart { peer } => ("apart", Some(peer)),
+            PartKind::Mode { .. } => ("mode", None),
             PartKind::LooseDevice { peer } => ("loose-device", Some(peer)),
         };
         Self {

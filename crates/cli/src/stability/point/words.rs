@@ -85,6 +85,7 @@ fn name(scene: &Scene, part: &Part) -> String {
         PartKind::Whole => "the whole scene".to_owned(),
         PartKind::Together => "all, equal peers as their average".to_owned(),
         PartKind::Apart { peer: first } => format!("differences of peers equal to {}", peer(first)),
+        PartKind::Mode { weight } => format!("neighbours that do {weight:.6} of the same"),
         PartKind::LooseDevice { peer: first } => format!("the device of {}, which touches nothing", peer(first)),
     }
 }

@@ -1,0 +1,226 @@
+//! The frame of a scene's peers, event by event.
+
+use super::arrivals::{Hazard, Hazards, Outcome};
+use super::events::{Arrive, Events, Step};
+use super::law::LossChain;
+use crate::Matrix;
+use crate::lifted::node::{Scale, Scratch};
+use crate::lifted::{Lifted, Node};
+use crate::timetable::{Event, Timetable};
+
+/// A link of the scene.
+#[derive(Clone, Debug)]
+pub(crate) struct Line {
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+    /// `None`: what arrives when is in the timetable.
+    pub(crate) chance: Option<(Hazards, Option<LossChain>)>,
+}
+
+/// When each node samples and ticks in a frame \[ns\].
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Instants {
+    pub(crate) sends: Vec<Vec<u64>>,
+    pub(crate) ticks: Vec<Vec<u64>>,
+}
+
+impl Instants {
+    pub(crate) fn of(timetable: &Timetable, nodes: usize) -> Self {
+        let (mut sends, mut ticks) = (vec![Vec::new(); nodes], vec![Vec::new(); nodes]);
+        let mut sampled = vec![false; nodes];
+        for event in &timetable.events {
+            match *event {
+                Event::Sample { node } => sampled[node] = true,
+                Event::Deliver { .. } => {}
+                Event::Tick { node, at, .. } => {
+                    // A node samples at a tick of its own.
+                    if std::mem::take(&mut sampled[node]) {
+                        sends[node].push(at);
+                    }
+                    ticks[node].push(at);
+                }
+            }
+        }
+        Self { sends, ticks }
+    }
+}
+
+/// The frame of nodes over lines; those that are not there hold nothing.
+pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -> Events {
+    let nodes = lifted.nodes.len();
+    let unit = lifted.coordination.stiffness + lifted.coordination.damping / lifted.time;
+    let scale = Scale { time: lifted.time, compliance: lifted.nodes[0].compliance(lifted.time) };
+    let frame = u64::try_from(lifted.timetable.frame.as_nanos()).unwrap_or(u64::MAX);
+    let mut depth = lifted.timetable.depth.clone();
+    for line in lines {
+        if let Some((hazards, _)) = &line.chance {
+            depth[line.from] = depth[line.from].max(hazards.depth());
+        }
+    }
+    // Rows: states of nodes, samples of nodes, what is held.
+    let mut first = Vec::with_capacity(nodes);
+    let mut count = 0;
+    let mut made = Events::default();
+    let mut moved = Vec::new();
+    let translation = if unit > 0.0 { lifted.coordination.stiffness / unit } else { 0.0 };
+    for node in lifted.nodes {
+        let rows = node.rows(count);
+        first.push(count);
+        for row in count..count + node.states() {
+            made.kept.push((row, row));
+            moved.push(if row == rows.object || Some(row) == rows.device { 1.0 } else { 0.0 });
+        }
+        count += node.states();
+    }
+    let mut first_sample = Vec::with_capacity(nodes);
+    for node in 0..nodes {
+        let sent = lifted.timetable.sent[node];
+        for place in 0..depth[node] {
+            made.kept.push((count + place + sent, count + place));
+            moved.push(translation);
+        }
+        first_sample.push(count + depth[node]);
+        count += depth[node] + sent;
+    }
+    let held_row = |line: usize| count + line;
+    for line in 0..lines.len() {
+        made.kept.push((held_row(line), held_row(line)));
+        moved.push(translation);
+    }
+    made.rows = count + lines.len();
+    made.chains = lines.iter().map(chain_states).collect();
+    if !lifted.tied {
+        let reference = lifted.nodes[0].rows(0).object;
+        let place = made.kept.iter().position(|(row, _)| *row == reference).unwrap_or(0);
+        made.kept.remove(place);
+        moved.remove(place);
+        made.reference = Some((reference, moved));
+    }
+    let row_of = |node: usize, sample: i64| usize::try_from(i64::try_from(first_sample[node]).unwrap_or(i64::MAX) + sample).unwrap_or(0);
+
+    let mut pending: Vec<Option<Matrix>> = vec![None; nodes];
+    let (mut tick, mut sample) = (vec![0; nodes], vec![0; nodes]);
+    let (mut norm, mut ticks) = (1.0_f64, 0.0);
+    let held_of = |node: usize| -> Vec<(usize, f64)> {
+        let of = lines.iter().enumerate().filter(|(_, line)| line.to == node);
+        of.map(|(place, line)| (held_row(place), lifted.weights[(node, line.from)])).collect()
+    };
+    let flush = |pending: &mut Vec<Option<Matrix>>, steps: &mut Vec<Step>, node: usize| {
+        if let Some(map) = pending[node].take() {
+            steps.push(Step::Move { first: first[node], map, held: held_of(node) });
+        }
+    };
+    for event in &lifted.timetable.events {
+        match *event {
+            Event::Sample { node } => {
+                flush(&mut pending, &mut made.steps, node);
+                let object = lifted.nodes[node].rows(first[node]).object;
+                let (position, velocity) = if unit > 0.0 { (translation, lifted.coordination.damping / lifted.time / unit) } else { (0.0, 0.0) };
+                let row = first_sample[node] + sample[node];
+                made.steps.push(Step::Sample { row, of: [(object, position), (object + 1, velocity)] });
+                sample[node] += 1;
+            }
+            Event::Deliver { from, to, sample } => {
+                if let Some(link) = lines.iter().position(|line| (line.from, line.to) == (from, to)) {
+                    flush(&mut pending, &mut made.steps, to);
+                    let outcomes = vec![Arrive { from: 0, to: 0, take: Some(row_of(from, sample)), probability: 1.0 }];
+                    made.steps.push(Step::Deliver { link, row: held_row(link), outcomes });
+                }
+            }
+            Event::Tick { node, span, .. } => {
+                for (link, line) in lines.iter().enumerate().filter(|(_, line)| line.to == node) {
+                    for outcomes in outcomes(line, tick[node], &instants.sends[line.from], frame) {
+                        flush(&mut pending, &mut made.steps, node);
+                        let outcomes = outcomes.into_iter().map(|outcome| Arrive::new(outcome, |sample| row_of(line.from, sample))).collect();
+                        made.steps.push(Step::Deliver { link, row: held_row(link), outcomes });
+                    }
+                }
+                tick[node] += 1;
+                let states = lifted.nodes[node].states();
+                let map = pending[node].get_or_insert_with(|| identity(states));
+                move_on(&lifted.nodes[node], map, lifted, unit, span, scale);
+                norm = norm.max((0..states).map(|row| map.row(row).iter().map(|entry| entry.abs()).sum()).fold(0.0, f64::max));
+                ticks += 1.0;
+            }
+        }
+    }
+    for node in 0..nodes {
+        flush(&mut pending, &mut made.steps, node);
+    }
+    made.rounding = 16.0 * f64::EPSILON * ticks * norm * norm;
+    made
+}
+
+/// States and, last, what is held: the states as they are.
+fn identity(states: usize) -> Matrix {
+    Matrix::from_fn(states, states + 1, |row, column| if row == column { 1.0 } else { 0.0 })
+}
+
+fn move_on(node: &Node, map: &mut Matrix, lifted: &Lifted<'_>, unit: f64, span: std::time::Duration, scale: Scale) {
+    let mut scratch = Scratch::default();
+    scratch.resize(map.columns());
+    let mut target = vec![0.0; map.columns()];
+    target[map.columns() - 1] = unit;
+    node.tick(map, node.rows(0), lifted.coordination, &target, None, span, scale, &mut scratch);
+}
+
+/// How many states a link's chain has: its places, or those of its losses, with whether the sample under way is lost where that must be remembered.
+fn chain_states(line: &Line) -> usize {
+    match &line.chance {
+        None => 1,
+        Some((hazards, None)) => hazards.places,
+        Some((hazards, Some(_))) => 2 * if hazards.spread { 2 } else { 1 },
+    }
+}
+
+/// What may happen on a line at a tick of its receiver, one after the other.
+fn outcomes(line: &Line, tick: usize, sends: &[u64], frame: u64) -> Vec<Vec<Outcome>> {
+    match &line.chance {
+        None => Vec::new(),
+        Some((hazards, None)) if hazards.places == 1 && hazards.at[tick].is_empty() => Vec::new(),
+        Some((hazards, None)) => vec![hazards.outcomes(tick)],
+        Some((hazards, Some(chain))) => {
+            hazards.at[tick].iter().map(|hazard| chained(*hazard, *chain, hazards.spread, gap(hazard.sample, sends, frame))).collect()
+        }
+    }
+}
+
+/// How long before a sample the one before it was sent \[s\].
+fn gap(sample: i64, sends: &[u64], frame: u64) -> f64 {
+    let count = i64::try_from(sends.len()).unwrap_or(1);
+    let place = usize::try_from(sample.rem_euclid(count)).unwrap_or(0);
+    let before = if place == 0 { sends[sends.len() - 1].wrapping_sub(frame) } else { sends[place - 1] };
+    std::time::Duration::from_nanos(sends[place].wrapping_sub(before)).as_secs_f64()
+}
+
+/// The chain of losses moves when its sample may first arrive; a sample is lost or arrives with its hazard.
+fn chained(hazard: Hazard, chain: LossChain, spread: bool, gap: f64) -> Vec<Outcome> {
+    let Hazard { sample, hazard, first } = hazard;
+    // With a sample under way for several ticks: twice the state, and one more if it is lost.
+    let place = |state: usize, lost: bool| if spread { 2 * state + usize::from(lost) } else { state };
+    let mut outcomes = Vec::new();
+    let mut alive = |from: usize, to: usize, probability: f64| {
+        outcomes.push(Outcome { from, to, take: Some(sample), probability: probability * hazard });
+        outcomes.push(Outcome { from, to, take: None, probability: probability * (1.0 - hazard) });
+    };
+    let mut lost = Vec::new();
+    if first {
+        for (from, to, is_lost, probability) in chain.moves(gap) {
+            for before in [false, true].into_iter().take(if spread { 2 } else { 1 }) {
+                if is_lost {
+                    lost.push(Outcome { from: place(from, before), to: place(to, true), take: None, probability });
+                } else {
+                    alive(place(from, before), place(to, false), probability);
+                }
+            }
+        }
+    } else {
+        for state in 0..2 {
+            alive(place(state, false), place(state, false), 1.0);
+            lost.push(Outcome { from: place(state, true), to: place(state, true), take: None, probability: 1.0 });
+        }
+    }
+    outcomes.append(&mut lost);
+    outcomes.retain(|outcome| outcome.probability > 0.0);
+    outcomes
+}

@@ -1,0 +1,249 @@
+//! Any peers over any links: the second moment carried through a frame event by event.
+//!
+//! The only things left to chance are deliveries, and each concerns one scalar, what i holds of j. So the operator is a product of simple ones: motion and
+//! sampling act as X ← T·X·Tᵀ on the rows and columns of one peer, and a delivery mixes X with what it becomes when the row and column of h_ij are
+//! replaced by those of the sample. No matrix of n² × n² is formed.
+//!
+//! Where a link remembers (a chain of losses, or which sample is held when samples overtake) the moments are kept apart by the joint state of all chains,
+//! V_s = E\[z·zᵀ·1(state = s)\], and a delivery acts on the factor of its own link. Fewer numbers would not do for many links: what a peer's force does to
+//! E\[z·zᵀ·1(s_l)\] depends on all that it holds, whose next change depends on the chains of the other links, and so on until all are joined.
+
+use super::arrivals::Outcome;
+use super::positive::{Positive, is_definite, pack, unpack};
+use crate::Matrix;
+
+/// One frame.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct Events {
+    /// How many rows there are within a frame.
+    pub(crate) rows: usize,
+    pub(crate) steps: Vec<Step>,
+    /// How many states the chain of each link has.
+    pub(crate) chains: Vec<usize>,
+    /// For each state between frames, the row that it is at the end of one; and its row at the beginning.
+    pub(crate) kept: Vec<(usize, usize)>,
+    /// The row that positions are relative to, and how far each kept state moves with it.
+    pub(crate) reference: Option<(usize, Vec<f64>)>,
+    pub(crate) rounding: f64,
+}
+
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) enum Step {
+    /// The rows from `first` on become `map` times (those rows and, last, the mean of what is held).
+    Move { first: usize, map: Matrix, held: Vec<(usize, f64)> },
+    /// The row becomes that combination.
+    Sample { row: usize, of: [(usize, f64); 2] },
+    /// The row of what is held may become that of a sample: `take` is a row.
+    Deliver { link: usize, row: usize, outcomes: Vec<Arrive> },
+}
+
+/// An outcome with the row that it takes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Arrive {
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+    pub(crate) take: Option<usize>,
+    pub(crate) probability: f64,
+}
+
+impl Arrive {
+    pub(crate) fn new(outcome: Outcome, row_of: impl Fn(i64) -> usize) -> Self {
+        let Outcome { from, to, take, probability } = outcome;
+        Self { from, to, take: take.map(row_of), probability }
+    }
+}
+
+impl Events {
+    /// How many joint states the chains have; `None` beyond measure.
+    pub(crate) fn joint(&self) -> Option<usize> {
+        self.chains.iter().try_fold(1_usize, |product, states| product.checked_mul(*states))
+    }
+
+    fn states(&self) -> usize {
+        self.chains.iter().product()
+    }
+
+    fn deliver(&self, moments: Vec<Matrix>, link: usize, row: usize, outcomes: &[Arrive]) -> Vec<Matrix> {
+        let inner: usize = self.chains[link + 1..].iter().product();
+        let own = self.chains[link];
+        let mut after: Vec<Matrix> = Vec::with_capacity(moments.len());
+        for joint in 0..moments.len() {
+            let to = joint / inner % own;
+            let base = joint - to * inner;
+            let mut sum = Matrix::zeros(self.rows, self.rows);
+            let mut line = vec![0.0; self.rows];
+            let mut corner = 0.0;
+            for from in 0..own {
+                let source = &moments[base + from * inner];
+                let mut whole = 0.0;
+                for outcome in outcomes.iter().filter(|outcome| (outcome.from, outcome.to) == (from, to)) {
+                    let taken = outcome.take.unwrap_or(row);
+                    whole += outcome.probability;
+                    for (line, entry) in line.iter_mut().zip(source.row(taken)) {
+                        *line += outcome.probability * entry;
+                    }
+                    corner += outcome.probability * source[(taken, taken)];
+                }
+                if whole != 0.0 {
+                    add(&mut sum, source, whole);
+                }
+            }
+            line[row] = corner;
+            set_line(&mut sum, row, &line);
+            after.push(sum);
+        }
+        after
+    }
+
+    fn step(&self, mut moments: Vec<Matrix>, step: &Step) -> Vec<Matrix> {
+        match step {
+            Step::Move { first, map, held } => {
+                for moment in &mut moments {
+                    advance(moment, *first, map, held);
+                }
+                moments
+            }
+            Step::Sample { row, of: [(x, position), (v, velocity)] } => {
+                for moment in &mut moments {
+                    let mut line: Vec<f64> = moment.row(*x).iter().zip(moment.row(*v)).map(|(x, v)| position * x + velocity * v).collect();
+                    line[*row] = position * line[*x] + velocity * line[*v];
+                    set_line(moment, *row, &line);
+                }
+                moments
+            }
+            Step::Deliver { link, row, outcomes } => match (self.chains[*link], outcomes.as_slice()) {
+                // Nothing to keep apart: in place.
+                (1, _) => {
+                    for moment in &mut moments {
+                        let mut line = vec![0.0; self.rows];
+                        let mut corner = 0.0;
+                        for outcome in outcomes {
+                            let taken = outcome.take.unwrap_or(*row);
+                            line.iter_mut().zip(moment.row(taken)).for_each(|(line, entry)| *line += outcome.probability * entry);
+                            corner += outcome.probability * moment[(taken, taken)];
+                        }
+                        line[*row] = corner;
+                        set_line(moment, *row, &line);
+                    }
+                    moments
+                }
+                (_, outcomes) => self.deliver(moments, *link, *row, outcomes),
+            },
+        }
+    }
+
+    /// The states between frames at the end of one, relative to the reference.
+    fn at_end(&self, moment: &Matrix) -> Matrix {
+        let size = self.kept.len();
+        let with = |place: usize, other: usize| moment[(self.kept[place].0, self.kept[other].0)];
+        match &self.reference {
+            None => Matrix::from_fn(size, size, with),
+            Some((reference, moved)) => {
+                let line = moment.row(*reference);
+                let square = line[*reference];
+                Matrix::from_fn(size, size, |row, column| {
+                    with(row, column) - moved[row] * line[self.kept[column].0] - line[self.kept[row].0] * moved[column]
+                        + moved[row] * moved[column] * square
+                })
+            }
+        }
+    }
+}
+
+impl Positive for Events {
+    fn unknowns(&self) -> usize {
+        self.states() * self.kept.len() * (self.kept.len() + 1) / 2
+    }
+
+    fn base(&self) -> Vec<f64> {
+        let mut base = Vec::with_capacity(self.unknowns());
+        for _ in 0..self.states() {
+            pack(&Matrix::identity(self.kept.len()), &mut base);
+        }
+        base
+    }
+
+    fn apply(&self, element: &[f64]) -> Vec<f64> {
+        let mut moments = Vec::with_capacity(self.states());
+        let mut rest = element;
+        for _ in 0..self.states() {
+            let (packed, after) = unpack(self.kept.len(), rest);
+            rest = after;
+            let mut moment = Matrix::zeros(self.rows, self.rows);
+            for (row, (_, place)) in self.kept.iter().enumerate() {
+                for (column, (_, other)) in self.kept.iter().enumerate() {
+                    moment[(*place, *other)] = packed[(row, column)];
+                }
+            }
+            moments.push(moment);
+        }
+        for step in &self.steps {
+            moments = self.step(moments, step);
+        }
+        let mut packed = Vec::with_capacity(element.len());
+        for moment in &moments {
+            pack(&self.at_end(moment), &mut packed);
+        }
+        packed
+    }
+
+    fn is_definite(&self, element: &[f64]) -> bool {
+        let mut rest = element;
+        (0..self.states()).all(|_| {
+            let (moment, after) = unpack(self.kept.len(), rest);
+            rest = after;
+            is_definite(moment)
+        })
+    }
+
+    fn rounding(&self) -> f64 {
+        self.rounding
+    }
+}
+
+/// X ← T·X·Tᵀ for a T that changes a few rows.
+fn advance(moment: &mut Matrix, first: usize, map: &Matrix, held: &[(usize, f64)]) {
+    let (own, size) = (map.rows(), moment.rows());
+    // The rows that it depends on: its own and the mean of what is held.
+    let mut sources = Matrix::zeros(own + 1, size);
+    for place in 0..own {
+        sources.row_mut(place).copy_from_slice(moment.row(first + place));
+    }
+    for (row, weight) in held {
+        sources.row_mut(own).iter_mut().zip(moment.row(*row)).for_each(|(sum, entry)| *sum += weight * entry);
+    }
+    let lines = map.times(&sources);
+    // Of the new rows, the columns of the same rows change too.
+    let mut corner = Matrix::zeros(own, own + 1);
+    for row in 0..own {
+        for place in 0..own {
+            corner[(row, place)] = lines[(row, first + place)];
+        }
+        corner[(row, own)] = held.iter().map(|(column, weight)| weight * lines[(row, *column)]).sum();
+    }
+    let corner = corner.times(&map.transposed());
+    for row in 0..own {
+        for column in 0..size {
+            if !(first..first + own).contains(&column) {
+                moment[(first + row, column)] = lines[(row, column)];
+                moment[(column, first + row)] = lines[(row, column)];
+            }
+        }
+        for place in 0..own {
+            moment[(first + row, first + place)] = 0.5 * (corner[(row, place)] + corner[(place, row)]);
+        }
+    }
+}
+
+fn add(sum: &mut Matrix, matrix: &Matrix, factor: f64) {
+    for row in 0..sum.rows() {
+        sum.row_mut(row).iter_mut().zip(matrix.row(row)).for_each(|(sum, entry)| *sum += factor * entry);
+    }
+}
+
+fn set_line(moment: &mut Matrix, row: usize, line: &[f64]) {
+    moment.row_mut(row).copy_from_slice(line);
+    for (column, entry) in line.iter().enumerate() {
+        moment[(column, row)] = *entry;
+    }
+}

@@ -1,0 +1,238 @@
+//! What a link leaves to chance, as the second moment needs it: which samples are lost, and by when one that is not lost has arrived.
+
+use std::time::Duration;
+
+use cohaptic_wan::law::Law;
+use cohaptic_wan::{Chance, Checksum, Displacement, Flips, GilbertElliott, GilbertElliottInTime, Layout, LinkConfig, LinkModel, Loss, Order};
+
+use super::arrivals::Arrival;
+
+/// Delays outside the central 1 − 2·10⁻⁹ of a law count as at its ends: no law without an end can be followed to it.
+const TAIL: f64 = 1e-9;
+
+/// What a link does to samples.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct LinkLaw {
+    pub(crate) chain: Option<LossChain>,
+    /// The probability that a sample is lost, whatever happened to the others.
+    loss: f64,
+    /// The probability that a copy of it is thrown away for itself.
+    discarded: f64,
+    duplicated: f64,
+    netem: bool,
+    /// What is added to every delay \[ns\].
+    extra: i128,
+    mean: i128,
+    law: Option<Law>,
+    /// With this probability, the delay is replaced by none, or made so much longer \[ns\].
+    displaced: Option<(f64, Option<i128>)>,
+    pub(crate) correlated_delays: bool,
+    pub(crate) in_order: bool,
+    /// Whether delays are cut at the ends of a law.
+    pub(crate) cut: bool,
+}
+
+/// Losses that depend on what happened to the samples before: a chain that each sample moves.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum LossChain {
+    GilbertElliott(GilbertElliott),
+    InTime(GilbertElliottInTime),
+    Correlated(Chance),
+}
+
+/// A move of a chain of losses: from, to, whether the sample is lost, and how probable.
+pub(crate) type LossMove = (usize, usize, bool, f64);
+
+impl LossChain {
+    /// The moves of a sample sent so many seconds after the one before; all chains have two states, the second being the bad one.
+    pub(crate) fn moves(&self, gap: f64) -> Vec<LossMove> {
+        let mut moves = Vec::with_capacity(8);
+        for from in 0..2 {
+            let (to_bad, lost_from, lost_to) = match self {
+                // The state before the move decides.
+                Self::GilbertElliott(chain) => {
+                    let lost = [1.0 - chain.k.get(), 1.0 - chain.h.get()][from];
+                    ([chain.p.get(), 1.0 - chain.r.get()][from], Some(lost), [0.0; 2])
+                }
+                Self::InTime(chain) => {
+                    let (good, bad) = chain.mean_times();
+                    let (rate, share) = (1.0 / good.as_secs_f64() + 1.0 / bad.as_secs_f64(), chain.bad_fraction());
+                    let forgotten = -libm::expm1(-rate * gap);
+                    ([share * forgotten, 1.0 - (1.0 - share) * forgotten][from], None, [1.0 - chain.k.get(), 1.0 - chain.h.get()])
+                }
+                Self::Correlated(chance) => {
+                    let (p, rho) = (chance.probability().get(), chance.correlation());
+                    ([p * (1.0 - rho), p + rho * (1.0 - p)][from].clamp(0.0, 1.0), None, [0.0, 1.0])
+                }
+            };
+            for (to, way) in [1.0 - to_bad, to_bad].into_iter().enumerate() {
+                let lost = lost_from.unwrap_or(lost_to[to]);
+                moves.extend([(from, to, true, way * lost), (from, to, false, way * (1.0 - lost))]);
+            }
+        }
+        moves.retain(|(.., probability)| *probability > 0.0);
+        moves
+    }
+}
+
+impl LinkLaw {
+    /// The law of a link. `nominal` is the delay of all its packets if nothing is left to chance.
+    ///
+    /// # Errors
+    ///
+    /// What of it has no law here, in words.
+    pub(crate) fn of(model: &LinkModel, nominal: Duration) -> Result<Self, &'static str> {
+        let Some(config) = model.as_fixed() else {
+            return Err("it is modulated, or a kernel's netem");
+        };
+        refuse(config)?;
+        let (loss, chain) = match &config.loss {
+            Loss::None => (0.0, None),
+            Loss::Independent(probability) => (probability.get(), None),
+            Loss::Correlated(chance) if chance.correlation() == 0.0 => (chance.probability().get(), None),
+            Loss::Correlated(chance) => (0.0, Some(LossChain::Correlated(*chance))),
+            Loss::GilbertElliott(chain) => (0.0, Some(LossChain::GilbertElliott(*chain))),
+            Loss::GilbertElliottInTime(chain) => (0.0, Some(LossChain::InTime(*chain))),
+            _ => return Err("its losses are of four states, or chosen by a pattern beside something random"),
+        };
+        let discarded = match &config.corruption {
+            None => 0.0,
+            Some(corruption) => match (corruption.bits, corruption.checksum) {
+                (Flips::Bits { packets, count }, Checksum::Discards) if packets.correlation() == 0.0 && corruption.within.is_none() && count > 0 => {
+                    packets.probability().get()
+                }
+                _ => return Err("its packets are corrupted by rate, or are not discarded then"),
+            },
+        };
+        let netem = config.layout == Layout::Netem;
+        if config.duplication.correlation() != 0.0 || (netem && chain.is_some() && !config.duplication.is_never()) {
+            return Err("its duplicates depend on each other");
+        }
+        let displaced = match &config.reorder {
+            None => None,
+            Some(reorder) if reorder.packets.correlation() != 0.0 => return Err("its reordered packets depend on each other"),
+            Some(reorder) => match reorder.how {
+                Displacement::Jump { gap } if gap.get() == 1 => Some((reorder.packets.probability().get(), None)),
+                Displacement::Later { by } => Some((reorder.packets.probability().get(), Some(nanos(by)))),
+                _ => return Err("its packets are put behind others, or jump only now and then"),
+            },
+        };
+        let law = config.delay.law().cloned();
+        let correlated = config.delay.jitter().is_some_and(|jitter| jitter.correlation != cohaptic_wan::Correlation::None);
+        let cut = law.as_ref().is_some_and(|law| law.survival(law.mean() + 100.0 * law.sd()) > 0.0 || law.cdf(law.mean() - 7.0 * law.sd()) > 0.0);
+        Ok(Self {
+            chain,
+            loss,
+            discarded,
+            duplicated: config.duplication.probability().get(),
+            netem,
+            extra: nanos(nominal) - nanos(config.delay.mean()),
+            mean: nanos(config.delay.mean()),
+            law,
+            displaced,
+            correlated_delays: correlated,
+            in_order: config.order == Order::InOrder,
+            cut,
+        })
+    }
+
+    /// Whether nothing ever arrives.
+    pub(crate) fn is_silent(&self) -> bool {
+        self.chain.is_none() && self.within(i128::MAX) <= 0.0
+    }
+
+    /// The probability that the delay of a packet is at most that.
+    fn delay(&self, nanos: i128) -> f64 {
+        let Some(law) = &self.law else {
+            return if nanos >= self.mean { 1.0 } else { 0.0 };
+        };
+        if nanos < 0 {
+            return 0.0;
+        }
+        // Delays are rounded to nanoseconds.
+        let at = real(nanos) + 0.5;
+        let (below, above) = (law.cdf(at), law.survival(at));
+        if above < TAIL {
+            1.0
+        } else if below < TAIL {
+            0.0
+        } else {
+            below
+        }
+    }
+}
+
+impl Arrival for LinkLaw {
+    fn within(&self, nanos: i128) -> f64 {
+        let nanos = nanos.saturating_sub(self.extra);
+        if nanos < 0 {
+            return 0.0;
+        }
+        let way = match self.displaced {
+            None => self.delay(nanos),
+            Some((p, None)) => p + (1.0 - p) * self.delay(nanos),
+            Some((p, Some(by))) => p * self.delay(nanos.saturating_sub(by)) + (1.0 - p) * self.delay(nanos),
+        };
+        let one = (1.0 - self.discarded) * way;
+        let copied = |one: f64| (1.0 - self.duplicated) * one + self.duplicated * one * (2.0 - one);
+        // The copy of netem is lost for itself; otherwise there is none of a lost packet.
+        if self.netem { copied((1.0 - self.loss) * one) } else { (1.0 - self.loss) * copied(one) }
+    }
+
+    fn least(&self) -> i128 {
+        let delay = match (&self.law, self.displaced) {
+            (_, Some((_, None))) => 0,
+            (None, _) => self.mean,
+            (Some(law), _) => whole(law.quantile(TAIL * 0.5)) - 1,
+        };
+        self.extra + delay.max(0)
+    }
+}
+
+/// Refuses what has no law here.
+fn refuse(config: &LinkConfig) -> Result<(), &'static str> {
+    let queues = config.bottleneck.is_some() || config.token_bucket.is_some() || config.limit.is_some();
+    let spread = config.delay.jitter().is_some() || config.reorder.is_some() || !config.duplication.is_never();
+    if config.outages.random().is_some() {
+        return Err("it fails at random");
+    }
+    if config.slots.is_some() || config.trace.is_some() {
+        return Err("it has slots or a recorded path");
+    }
+    if queues && spread {
+        return Err("it has a queue beside jitter, reordering or duplicates");
+    }
+    if config.marks_instead_of_loss {
+        return Err("it marks packets instead of losing them");
+    }
+    Ok(())
+}
+
+/// Whether something about a link is left to chance.
+pub(crate) fn is_random(model: &LinkModel) -> bool {
+    match model {
+        LinkModel::Fixed(config) => {
+            // What never happens is not random.
+            let certain = config.loss == Loss::None || config.loss.mean() == Some(0.0) || matches!(config.loss, Loss::Pattern(_));
+            let LinkConfig { loss, .. } = LinkConfig::default();
+            let rest = LinkConfig { loss, ..config.clone() };
+            !certain || rest.has_chance()
+        }
+        LinkModel::Modulated(_) | LinkModel::Kernel(_) => true,
+        _ => false,
+    }
+}
+
+fn nanos(span: Duration) -> i128 {
+    i128::try_from(span.as_nanos()).unwrap_or(i128::MAX)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a span enters a law as a real number")]
+fn real(nanos: i128) -> f64 {
+    nanos as f64
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+fn whole(nanos: f64) -> i128 {
+    libm::floor(nanos) as i128
+}

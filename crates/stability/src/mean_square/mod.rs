@@ -1,0 +1,290 @@
+//! Stability in the mean square under random loss and random delay.
+//!
+//! With chance in the network the state of a frame is multiplied by a random matrix, z ← A·z. It is *stable in the mean square* if E z·zᵀ dies out whatever
+//! z is at the beginning, which is so if and only if the operator X ↦ E A·X·Aᵀ, or with a Markov chain V_j ↦ Σ p_ij·A_i·V_i·A_iᵀ, has a spectral radius below
+//! 1 (Costa, Fragoso & Marques 2005, Theorem 3.9). A packet carries all axes of a sample, and every axis obeys the same equations, so the operator on the moments
+//! of two axes is that of one, and the radius is that of a scene of one axis.
+//!
+//! Every sample enters a receiver's force as one number only, KT·x + BT·v, so each link adds one state, what its receiver holds.
+
+mod arrivals;
+mod build;
+mod events;
+mod law;
+mod positive;
+mod symmetric;
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use cohaptic_scene::Scene;
+
+use self::arrivals::Hazards;
+use self::build::{Instants, Line, events};
+use self::law::{LinkLaw, is_random};
+use self::positive::{Positive, radius_of_positive};
+use self::symmetric::Symmetric;
+use crate::analysis::{Combination, combinations};
+use crate::lifted::{Lifted, Node};
+use crate::network::{LinkTiming, NominalNetwork};
+use crate::parts::{PartKind, radius_of, reduced};
+use crate::structure::{Contacts, Structure, count};
+use crate::timetable::{NodeClock, Timetable};
+use crate::{AnalysisError, Matrix, Radius, Verdict};
+
+/// More unknowns of the second moment than this are refused.
+const MOST_UNKNOWNS: usize = 1 << 20;
+/// More peers than this are not looked at one by one.
+const MOST_PEERS: usize = 64;
+
+/// How the second moment of a scene was followed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum MeanSquareMethod {
+    /// Nothing is left to chance: the second moment is the square of the motion.
+    Nominal,
+    /// Equal peers over equal links that lose independently: by the symmetry of the scene, at a cost that does not depend on their number.
+    Symmetric,
+    /// Event by event over a frame, all peers and links one by one.
+    Events,
+}
+
+impl MeanSquareMethod {
+    /// The word in JSON.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Nominal => "nominal",
+            Self::Symmetric => "symmetric",
+            Self::Events => "events",
+        }
+    }
+}
+
+/// What is known about the second moment of a scene.
+#[derive(Clone, PartialEq, Debug)]
+pub struct MeanSquare {
+    /// By what a frame multiplies the second moment of the relative motion, in the long run: below 1 the scene is stable in the mean square.
+    pub radius: Radius,
+    /// The square of the spectral radius over a frame if nothing were left to chance: every delay its mean, nothing lost.
+    pub nominal_squared: Radius,
+    /// How it was reached; of several modes of contact, for the one with the largest radius.
+    pub method: MeanSquareMethod,
+    /// The span that the radii are over.
+    pub frame: Duration,
+    /// How many numbers describe the second moment.
+    pub unknowns: usize,
+    /// What it leaves out, in words.
+    pub notes: Vec<String>,
+}
+
+impl MeanSquare {
+    /// Stable or not in the mean square.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        self.radius.verdict()
+    }
+}
+
+/// The growth of the second moment of a scene as it begins; its timeline is left out.
+///
+/// Losses may be independent at any number of equal peers, or of up to 64 different ones. Losses in bursts, and delays so random that samples overtake, are
+/// followed through the joint states of all links, which is feasible for two peers or three.
+///
+/// # Errors
+///
+/// [`AnalysisError`] as [`analyse`](crate::analyse), and if a link does at random what has no second moment here, or there are too many joint states.
+pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
+    let network = NominalNetwork::of(scene)?;
+    let combinations = combinations(scene)?;
+    let mut notes = Vec::new();
+    let mut found: Option<MeanSquare> = None;
+    for combination in &combinations {
+        let one = of_contacts(scene, &network, combination, &mut notes)?;
+        found = Some(match found {
+            None => one,
+            Some(before) => {
+                let (radius, nominal_squared) = (before.radius.or(one.radius), before.nominal_squared.or(one.nominal_squared));
+                let larger = if one.radius.value > before.radius.value { one } else { before };
+                MeanSquare { radius, nominal_squared, ..larger }
+            }
+        });
+    }
+    if combinations.len() > 1 {
+        notes.push("every combination of contacts is analysed as if it lasted; changing between them is not covered".to_owned());
+    }
+    if !scene.timeline.is_empty() {
+        notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
+    }
+    notes.dedup();
+    let zero = Radius { value: 0.0, error: 0.0 };
+    let none =
+        MeanSquare { radius: zero, nominal_squared: zero, method: MeanSquareMethod::Nominal, frame: Duration::ZERO, unknowns: 0, notes: Vec::new() };
+    Ok(MeanSquare { notes, ..found.unwrap_or(none) })
+}
+
+/// The only model of all links, if there is but one.
+fn only_model(scene: &Scene) -> bool {
+    scene.links.is_uniform()
+}
+
+fn of_contacts(scene: &Scene, network: &NominalNetwork, combination: &Combination, notes: &mut Vec<String>) -> Result<MeanSquare, AnalysisError> {
+    let structure = Structure::of(&[scene], network, &combination.contacts)?;
+    let parts = reduced(&structure, scene, combination.axes).parts;
+    let nominal = radius_of(&parts);
+    let frame = structure.timetable.frame;
+    let nominal_squared = nominal.over(2);
+    let random = random_links(scene)?;
+    let gains = structure.coordination(scene);
+    if random.is_empty() || gains.stiffness + gains.damping <= 0.0 {
+        return Ok(MeanSquare { radius: nominal_squared, nominal_squared, method: MeanSquareMethod::Nominal, frame, unknowns: 0, notes: Vec::new() });
+    }
+    let alike = structure.classes.len() == 1 && only_model(scene);
+    let (mut radius, method, own_frame, unknowns) = match alike.then(|| symmetric(scene, network, &structure, notes)).transpose()?.flatten() {
+        Some((radius, unknowns)) => (radius, MeanSquareMethod::Symmetric, frame, unknowns),
+        None => one_by_one(scene, network, &structure, &combination.contacts, &random, notes)?,
+    };
+    // What nobody touches moves on its own.
+    for part in parts.iter().filter(|part| matches!(part.kind, PartKind::LooseDevice { .. })) {
+        let frames = own_frame.as_nanos() / frame.as_nanos().max(1);
+        radius = radius.or(part.radius.over(u32::try_from(2 * frames).unwrap_or(u32::MAX)));
+    }
+    Ok(MeanSquare { radius, nominal_squared, method, frame: own_frame, unknowns, notes: Vec::new() })
+}
+
+/// The links that leave something to chance; one stands for all if there is but one model.
+fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
+    let random = if only_model(scene) {
+        if is_random(scene.links.between(0, 1)) { vec![(0, 1)] } else { Vec::new() }
+    } else {
+        let peers = scene.peers.len();
+        if peers > MOST_PEERS {
+            return Err(AnalysisError::TooManyMoments { joint: None, unknowns: None, most: MOST_UNKNOWNS });
+        }
+        let pairs = (0..peers).flat_map(|to| (0..peers).filter(move |from| *from != to).map(move |from| (from, to)));
+        pairs.filter(|(from, to)| is_random(scene.links.between(*from, *to))).collect()
+    };
+    let access = |model: &Option<cohaptic_wan::LinkModel>| model.as_ref().is_some_and(is_random);
+    let queues = |model: &Option<cohaptic_wan::LinkModel>| model.as_ref().is_some_and(|model| !model.is_constant_delay());
+    if let Some(peer) =
+        scene.peers.iter().find(|peer| access(&peer.uplink) || access(&peer.downlink) || (!random.is_empty() && queues(&peer.downlink)))
+    {
+        return Err(AnalysisError::ChanceWithoutMoments {
+            link: peer.name.clone(),
+            why: "its access line ties what happens to several links together",
+        });
+    }
+    Ok(random)
+}
+
+/// The law of a random link and when its samples may arrive.
+fn hazards(
+    scene: &Scene,
+    network: &NominalNetwork,
+    (from, to): (usize, usize),
+    frame: Duration,
+    sends: &[u64],
+    ticks: &[u64],
+    notes: &mut Vec<String>,
+) -> Result<Option<(Hazards, LinkLaw)>, AnalysisError> {
+    let refuse = |why| AnalysisError::ChanceWithoutMoments { link: format!("{} → {}", scene.peers[from].name, scene.peers[to].name), why };
+    let LinkTiming::Constant(nominal) = network.timing(from, to) else {
+        return Err(refuse("its packets take different times even without chance"));
+    };
+    let law = LinkLaw::of(scene.links.between(from, to), *nominal).map_err(refuse)?;
+    if law.is_silent() {
+        return Ok(None);
+    }
+    let nanos = u64::try_from(frame.as_nanos()).unwrap_or(u64::MAX);
+    let hazards = Hazards::new(nanos, sends, ticks, &law).ok_or_else(|| refuse("its delays have no end"))?;
+    if hazards.spread && law.correlated_delays {
+        return Err(refuse("its delays depend on each other"));
+    }
+    if hazards.places > 1 && law.in_order {
+        return Err(refuse("its samples wait for each other (order = \"in-order\")"));
+    }
+    if hazards.places > 1 && law.chain.is_some() {
+        return Err(refuse("its losses come in bursts and its samples overtake each other"));
+    }
+    if hazards.spread && law.cut {
+        notes.push("delays outside the central 1 − 2·10⁻⁹ of their law count as at its ends".to_owned());
+    }
+    Ok(Some((hazards, law)))
+}
+
+/// The radius and the number of unknowns if links lose independently and nothing overtakes.
+fn symmetric(
+    scene: &Scene,
+    network: &NominalNetwork,
+    structure: &Structure,
+    notes: &mut Vec<String>,
+) -> Result<Option<(Radius, usize)>, AnalysisError> {
+    let timetable = Timetable::new(&[NodeClock::of(scene, 0)], &[])?;
+    let instants = Instants::of(&timetable, 1);
+    let Some((hazards, law)) = hazards(scene, network, (0, 1), timetable.frame, &instants.sends[0], &instants.ticks[0], notes)? else {
+        return Ok(None);
+    };
+    if hazards.places > 1 || law.chain.is_some() || timetable.frame != structure.timetable.frame {
+        return Ok(None);
+    }
+    let node = structure.node(scene, 0);
+    let lifted = structure.quotient(scene, std::slice::from_ref(&node));
+    let lifted = Lifted { timetable: &timetable, ..lifted };
+    let operator = Symmetric::new(scene.peers.len(), &lifted, &hazards);
+    if operator.unknowns() > MOST_UNKNOWNS {
+        return Err(AnalysisError::TooManyMoments { joint: Some(1), unknowns: Some(operator.unknowns()), most: MOST_UNKNOWNS });
+    }
+    Ok(Some((radius_of_positive(&operator), operator.unknowns())))
+}
+
+type Found = (Radius, MeanSquareMethod, Duration, usize);
+
+fn one_by_one(
+    scene: &Scene,
+    network: &NominalNetwork,
+    structure: &Structure,
+    contacts: &Contacts,
+    random: &[(usize, usize)],
+    notes: &mut Vec<String>,
+) -> Result<Found, AnalysisError> {
+    let peers = scene.peers.len();
+    if peers > MOST_PEERS {
+        return Err(AnalysisError::TooManyMoments { joint: None, unknowns: None, most: MOST_UNKNOWNS });
+    }
+    let clocks: Vec<NodeClock> = (0..peers).map(|place| NodeClock::of(scene, place)).collect();
+    let all_random = only_model(scene);
+    let pairs: Vec<(usize, usize)> = (0..peers).flat_map(|to| (0..peers).filter(move |from| *from != to).map(move |from| (from, to))).collect();
+    let certain = pairs.iter().filter(|pair| !all_random && !random.contains(pair));
+    let certain: Vec<(usize, usize, LinkTiming)> = certain.map(|(from, to)| (*from, *to, network.timing(*from, *to).clone())).collect();
+    let timetable = Timetable::new(&clocks, &certain)?;
+    let instants = Instants::of(&timetable, peers);
+    let mut lines = Vec::new();
+    let mut tied = structure.tied;
+    for (from, to) in pairs {
+        if let Some((_, _, timing)) = certain.iter().find(|(one, other, _)| (*one, *other) == (from, to)) {
+            // What never changes is a constant force.
+            if !matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)) {
+                lines.push(Line { from, to, chance: None });
+            }
+            continue;
+        }
+        match hazards(scene, network, (from, to), timetable.frame, &instants.sends[from], &instants.ticks[to], notes)? {
+            Some((hazards, law)) => lines.push(Line { from, to, chance: Some((hazards, law.chain)) }),
+            None => tied = true,
+        }
+    }
+    let class_of = |peer: usize| structure.classes.iter().position(|class| class.contains(&peer)).unwrap_or(0);
+    let nodes: Vec<Node> = (0..peers).map(|peer| structure.node(scene, class_of(peer))).collect();
+    debug_assert_eq!(nodes.iter().map(|node| node.device.is_some()).collect::<Vec<_>>(), contacts.touching);
+    let share = 1.0 / count(peers - 1);
+    let weights = Matrix::from_fn(peers, peers, |row, column| if row == column { 0.0 } else { share });
+    let quotient = structure.quotient(scene, &nodes);
+    let lifted = Lifted { nodes: &nodes, weights: &weights, timetable: &timetable, tied, ..quotient };
+    let operator = events(&lifted, &lines, &instants);
+    let joint = operator.joint().filter(|joint| *joint <= MOST_UNKNOWNS);
+    let unknowns = joint.map(|_| operator.unknowns());
+    if unknowns.is_none_or(|unknowns| unknowns > MOST_UNKNOWNS) {
+        return Err(AnalysisError::TooManyMoments { joint: operator.joint(), unknowns, most: MOST_UNKNOWNS });
+    }
+    Ok((radius_of_positive(&operator), MeanSquareMethod::Events, timetable.frame, operator.unknowns()))
+}

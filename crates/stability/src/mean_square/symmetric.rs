@@ -1,0 +1,337 @@
+//! Equal peers over equal links that lose independently: the second moment of any number of them, at the same cost.
+//!
+//! Start from a second moment that no permutation of the peers changes; then none ever does. Such a moment is given by what it says about one, two,
+//! three and four peers. With a_i the state of a peer (bodies, samples on the way) and h_ij what i holds of j:
+//!
+//! ```text
+//! A0 = E a_i a_iᵀ    A1 = E a_i a_jᵀ    r = E a_i h_ij    s = E a_i h_ji    o = E a_i h_jk
+//! h  = E of h_ij times: [0] h_ij  [1] h_ji  [2] h_ik  [3] h_kj  [4] h_jk (and h_ki)  [5] h_kl
+//! ```
+//!
+//! Every event is a few lines in these: with q the probability of missing a sample u_j = cᵀa_j and p = 1 − q, delivering on all links at once maps
+//! E h_ij h_kl to q²·E h_ij h_kl + q·p·(E h_ij u_l + E u_j h_kl) + p²·E u_j u_l for two links, and E h_ij² to q·E h_ij² + p·E u_j² for one and the same.
+//!
+//! The space decomposes under the permutations into the common motion (once), the differences of peers (N − 1 copies: a_i, and the sums of h over
+//! senders and over receivers) and two kinds of h whose sums are zero, symmetric and antisymmetric. A moment is positive definite if its block of each
+//! kind is, so these blocks are the coordinates: they have size 1 for any N, and no digits are lost between N = 2 and 100,000.
+
+use super::arrivals::Hazards;
+use super::positive::{Positive, is_definite, pack, unpack};
+use crate::Matrix;
+use crate::lifted::Lifted;
+use crate::lifted::node::{Scale, Scratch};
+use crate::timetable::Event;
+
+/// One frame of equal peers.
+#[derive(Clone, Debug)]
+pub(crate) struct Symmetric {
+    peers: f64,
+    count: usize,
+    steps: Vec<Step>,
+    /// The states of a peer at the beginning of a frame.
+    size: usize,
+    /// The translation of a peer's states and of what is held, if the whole may be moved; positions are relative to the mean over all copies.
+    translation: Option<(Vec<f64>, f64)>,
+    /// Where the position of the copy stands among the states.
+    position: usize,
+    rounding: f64,
+}
+
+#[derive(Clone, Debug)]
+enum Step {
+    /// a ← map·a + held·(mean of h).
+    Move { map: Matrix, held: Vec<f64> },
+    /// Each link takes in that state of its sender with that probability.
+    Deliver { state: usize, probability: f64 },
+}
+
+/// A second moment.
+#[derive(Clone, Debug)]
+struct Moment {
+    own: Matrix,
+    other: Matrix,
+    /// With what is held of a sender by the peer, of the peer by a receiver, and of others by others.
+    with: [Vec<f64>; 3],
+    held: [f64; 6],
+}
+
+impl Symmetric {
+    /// The frame of that many peers like the only node of `lifted`, whose timetable has no deliveries: those are in `hazards`.
+    pub(crate) fn new(peers: usize, lifted: &Lifted<'_>, hazards: &Hazards) -> Self {
+        let node = &lifted.nodes[0];
+        let unit = lifted.coordination.stiffness + lifted.coordination.damping / lifted.time;
+        let scale = Scale { time: lifted.time, compliance: node.compliance(lifted.time) };
+        let rows = node.rows(0);
+        let (states, depth, sent) = (node.states(), hazards.depth(), lifted.timetable.sent[0]);
+        let (size, full) = (states + depth, states + depth + sent);
+        // A map in the making: its columns are the states it begins with and, last, what is held.
+        let begin = |columns: usize| Matrix::from_fn(full, columns + 1, |row, column| if row == column && column < columns { 1.0 } else { 0.0 });
+        let mut map = begin(size);
+        let mut steps = Vec::new();
+        let (mut tick, mut sample, mut norm, mut events) = (0, 0, 1.0_f64, 0.0);
+        let flush = |map: &Matrix, order: &dyn Fn(usize) -> usize, rows: usize| {
+            let columns = map.columns() - 1;
+            let chosen = Matrix::from_fn(rows, columns, |row, column| map[(order(row), column)]);
+            let held = (0..rows).map(|row| map[(order(row), columns)]).collect();
+            Step::Move { map: chosen, held }
+        };
+        for event in &lifted.timetable.events {
+            match *event {
+                Event::Sample { .. } => {
+                    for column in 0..map.columns() {
+                        let (x, v) = (map[(rows.object, column)], map[(rows.object + 1, column)]);
+                        let gains = lifted.coordination;
+                        map[(states + depth + sample, column)] = gains.stiffness / unit * x + gains.damping / lifted.time / unit * v;
+                    }
+                    sample += 1;
+                }
+                Event::Deliver { .. } => {}
+                Event::Tick { span, .. } => {
+                    if !hazards.at[tick].is_empty() {
+                        steps.push(flush(&map, &|row| row, full));
+                        map = begin(full);
+                        for hazard in &hazards.at[tick] {
+                            let place = i64::try_from(states + depth).unwrap_or(i64::MAX) + hazard.sample;
+                            steps.push(Step::Deliver { state: usize::try_from(place).unwrap_or(0), probability: hazard.hazard });
+                        }
+                    }
+                    let mut scratch = Scratch::default();
+                    scratch.resize(map.columns());
+                    let mut target = vec![0.0; map.columns()];
+                    target[map.columns() - 1] = unit;
+                    node.tick(&mut map, rows, lifted.coordination, &target, None, span, scale, &mut scratch);
+                    events += 1.0;
+                    norm = norm.max((0..full).map(|row| map.row(row).iter().map(|entry| entry.abs()).sum()).fold(0.0, f64::max));
+                    tick += 1;
+                }
+            }
+        }
+        // What was sent in the frame is of an earlier one in the next.
+        steps.push(flush(&map, &|row| if row < states { row } else { row + sent }, size));
+        let translation = (!lifted.tied).then(|| {
+            let moved = lifted.coordination.stiffness / unit;
+            let mut states: Vec<f64> = (0..states).map(|row| if row == rows.object || Some(row) == rows.device { 1.0 } else { 0.0 }).collect();
+            states.resize(size, moved);
+            (states, moved)
+        });
+        let rounding = 16.0 * f64::EPSILON * events * norm * norm;
+        Self { peers: crate::structure::count(peers), count: peers, steps, size, translation, position: rows.object, rounding }
+    }
+
+    fn moved(&self, moment: &Moment, map: &Matrix, held: &[f64]) -> Moment {
+        let Moment { own, other, with: [r, s, o], held: h } = moment;
+        let n = self.peers;
+        let w = 1.0 / (n - 1.0);
+        let others: Vec<f64> = s.iter().zip(o).map(|(s, o)| w * (s + (n - 2.0) * o)).collect();
+        let own_held = w * (h[0] + (n - 2.0) * h[2]);
+        let other_held = w * w * (h[1] + 2.0 * (n - 2.0) * h[4] + (n - 2.0) * h[3] + (n - 2.0) * (n - 3.0) * h[5]);
+        let quadratic = |core: &Matrix, cross: &[f64], square: f64| {
+            let half = map.times(core);
+            let cross = map.times_column(cross);
+            let transposed = map.transposed();
+            let mut result = half.times(&transposed);
+            for row in 0..result.rows() {
+                for column in 0..result.columns() {
+                    result[(row, column)] += cross[row] * held[column] + held[row] * cross[column] + square * held[row] * held[column];
+                }
+            }
+            result
+        };
+        let linear =
+            |with: &[f64], mean: f64| -> Vec<f64> { map.times_column(with).iter().zip(held).map(|(with, held)| with + mean * held).collect() };
+        Moment {
+            own: quadratic(own, r, own_held),
+            other: quadratic(other, &others, other_held),
+            with: [
+                linear(r, own_held),
+                linear(s, w * (h[1] + (n - 2.0) * h[4])),
+                linear(o, w * (h[4] + h[3] + if self.count > 3 { (n - 3.0) * h[5] } else { 0.0 })),
+            ],
+            held: *h,
+        }
+    }
+
+    fn delivered(moment: &Moment, state: usize, probability: f64) -> Moment {
+        let (p, q) = (probability, 1.0 - probability);
+        let Moment { own, other, with: [r, s, o], held: h } = moment;
+        let blend = |with: &[f64], core: &Matrix| -> Vec<f64> { with.iter().zip(core.row(state)).map(|(with, core)| q * with + p * core).collect() };
+        let (own_square, other_square) = (own[(state, state)], other[(state, state)]);
+        let pair = |before: f64, cross: f64, square: f64| q * q * before + q * p * cross + p * p * square;
+        Moment {
+            with: [blend(r, other), blend(s, own), blend(o, other)],
+            held: [
+                q * h[0] + p * own_square,
+                pair(h[1], 2.0 * r[state], other_square),
+                pair(h[2], 2.0 * o[state], other_square),
+                pair(h[3], 2.0 * s[state], own_square),
+                pair(h[4], o[state] + r[state], other_square),
+                pair(h[5], 2.0 * o[state], other_square),
+            ],
+            own: own.clone(),
+            other: other.clone(),
+        }
+    }
+
+    /// Positions relative to the mean of all copies.
+    fn relative(&self, moment: &mut Moment) {
+        let Some((states, held)) = &self.translation else {
+            return;
+        };
+        let n = self.peers;
+        let at = self.position;
+        let Moment { own, other, with: [r, s, o], held: h } = moment;
+        let with_mean: Vec<f64> = own.row(at).iter().zip(other.row(at)).map(|(own, other)| (own + (n - 1.0) * other) / n).collect();
+        let held_mean = (r[at] + s[at] + (n - 2.0) * o[at]) / n;
+        let square = with_mean[at];
+        for core in [own, other] {
+            for row in 0..core.rows() {
+                for column in 0..core.columns() {
+                    core[(row, column)] += square * states[row] * states[column] - states[row] * with_mean[column] - with_mean[row] * states[column];
+                }
+            }
+        }
+        for with in [r, s, o] {
+            for (row, with) in with.iter_mut().enumerate() {
+                *with += states[row] * held * square - with_mean[row] * held - states[row] * held_mean;
+            }
+        }
+        for h in h {
+            *h += held * held * square - 2.0 * held * held_mean;
+        }
+    }
+
+    /// The blocks: of the common motion, of the differences, and of what is held with sums of zero, symmetric and antisymmetric.
+    fn blocks(&self, moment: &Moment) -> (Matrix, Matrix, f64, f64) {
+        let Moment { own, other, with: [r, s, o], held: h } = moment;
+        let n = self.peers;
+        let (n2, n3, size) = (n - 2.0, n - 3.0, self.size);
+        let (plus, minus) = (h[0] + h[1], h[0] - h[1]);
+        let (y, z) = (h[2] + h[3] + 2.0 * h[4], h[2] + h[3] - 2.0 * h[4]);
+        let common = Matrix::from_fn(size + 1, size + 1, |row, column| match (row < size, column < size) {
+            (true, true) => own[(row, column)] + (n - 1.0) * other[(row, column)],
+            (false, false) => plus + n2 * y + n2 * n3 * h[5],
+            _ => {
+                let row = row.min(column);
+                (n - 1.0).sqrt() * (r[row] + s[row] + n2 * o[row])
+            }
+        });
+        let extra = if self.count > 2 { 2 } else { 1 };
+        let apart = Matrix::from_fn(size + extra, size + extra, |row, column| {
+            let (low, high) = (row.min(column), row.max(column));
+            match (low < size, high < size) {
+                (true, true) => own[(row, column)] - other[(row, column)],
+                (true, false) if high == size => (0.5 * n).sqrt() * (r[low] - s[low]),
+                (true, false) => (0.5 * n2).sqrt() * (r[low] + s[low] - 2.0 * o[low]),
+                _ if high == size => minus + 0.5 * n2 * z,
+                _ if low == size => 0.5 * (n * n2).sqrt() * (h[2] - h[3]),
+                _ => plus + 0.5 * (n - 4.0) * y - 2.0 * n3 * h[5],
+            }
+        });
+        (common, apart, plus - y + 2.0 * h[5], minus - z)
+    }
+
+    /// The moment with those blocks.
+    fn moment(&self, common: &Matrix, apart: &Matrix, symmetric: f64, antisymmetric: f64) -> Moment {
+        let n = self.peers;
+        let n2 = n - 2.0;
+        let size = self.size;
+        let other = Matrix::from_fn(size, size, |row, column| (common[(row, column)] - apart[(row, column)]) / n);
+        let own = Matrix::from_fn(size, size, |row, column| apart[(row, column)] + other[(row, column)]);
+        let (mut r, mut s, mut o) = (vec![0.0; size], vec![0.0; size], vec![0.0; size]);
+        for row in 0..size {
+            let whole = common[(row, size)] / (n - 1.0).sqrt();
+            let difference = apart[(row, size)] / (0.5 * n).sqrt();
+            let rest = if self.count > 2 { apart[(row, size + 1)] / (0.5 * n2).sqrt() } else { 0.0 };
+            o[row] = if self.count > 2 { (whole - rest) / n } else { 0.0 };
+            let sum = if self.count > 2 { rest + 2.0 * o[row] } else { whole };
+            r[row] = 0.5 * (sum + difference);
+            s[row] = 0.5 * (sum - difference);
+        }
+        let whole = common[(size, size)];
+        let held = if self.count == 2 {
+            let minus = apart[(size, size)];
+            [0.5 * (whole + minus), 0.5 * (whole - minus), 0.0, 0.0, 0.0, 0.0]
+        } else {
+            let z = 2.0 * (apart[(size, size)] - antisymmetric) / n;
+            let minus = antisymmetric + z;
+            let rest = apart[(size + 1, size + 1)];
+            let (y, apart_four, plus) = if self.count == 3 {
+                let y = (whole - rest) / 1.5;
+                (y, 0.0, whole - y)
+            } else {
+                let (one, two) = (2.0 * (rest - symmetric) / n2, (whole - symmetric) / (n - 1.0));
+                let four = (two - one) / n;
+                let y = one + 4.0 * four;
+                (y, four, symmetric + y - 2.0 * four)
+            };
+            let difference = 2.0 * apart[(size, size + 1)] / (n * n2).sqrt();
+            let sum = 0.5 * (y + z);
+            [0.5 * (plus + minus), 0.5 * (plus - minus), 0.5 * (sum + difference), 0.5 * (sum - difference), 0.25 * (y - z), apart_four]
+        };
+        Moment { own, other, with: [r, s, o], held }
+    }
+
+    /// Without the position of the mean copy, which is zero, and without the kinds that so few peers do not have.
+    fn packed(&self, (common, apart, symmetric, antisymmetric): (Matrix, Matrix, f64, f64)) -> Vec<f64> {
+        let kept: Vec<usize> = (0..=self.size).filter(|row| self.translation.is_none() || *row != self.position).collect();
+        let common = Matrix::from_fn(kept.len(), kept.len(), |row, column| common[(kept[row], kept[column])]);
+        let mut packed = Vec::with_capacity(self.unknowns());
+        pack(&common, &mut packed);
+        pack(&apart, &mut packed);
+        packed.extend((self.count > 3).then_some(symmetric));
+        packed.extend((self.count > 2).then_some(antisymmetric));
+        packed
+    }
+
+    fn unpacked(&self, element: &[f64]) -> (Matrix, Matrix, f64, f64) {
+        let skipped = if self.translation.is_some() { self.position } else { usize::MAX };
+        let kept = self.size + usize::from(self.translation.is_none());
+        let (common, rest) = unpack(kept, element);
+        let place = |row: usize| if row > skipped { row - 1 } else { row };
+        let common = Matrix::from_fn(self.size + 1, self.size + 1, |row, column| {
+            if row == skipped || column == skipped { 0.0 } else { common[(place(row), place(column))] }
+        });
+        let (apart, rest) = unpack(self.size + if self.count > 2 { 2 } else { 1 }, rest);
+        match rest {
+            [symmetric, antisymmetric] => (common, apart, *symmetric, *antisymmetric),
+            [antisymmetric] => (common, apart, 0.0, *antisymmetric),
+            _ => (common, apart, 0.0, 0.0),
+        }
+    }
+}
+
+impl Positive for Symmetric {
+    fn unknowns(&self) -> usize {
+        let half = |size: usize| size * (size + 1) / 2;
+        half(self.size + usize::from(self.translation.is_none())) + half(self.size + if self.count > 2 { 2 } else { 1 }) + self.count.min(4) - 2
+    }
+
+    fn base(&self) -> Vec<f64> {
+        let apart = Matrix::identity(self.size + if self.count > 2 { 2 } else { 1 });
+        self.packed((Matrix::identity(self.size + 1), apart, 1.0, 1.0))
+    }
+
+    fn apply(&self, element: &[f64]) -> Vec<f64> {
+        let (common, apart, symmetric, antisymmetric) = self.unpacked(element);
+        let mut moment = self.moment(&common, &apart, symmetric, antisymmetric);
+        for step in &self.steps {
+            moment = match step {
+                Step::Move { map, held } => self.moved(&moment, map, held),
+                Step::Deliver { state, probability } => Self::delivered(&moment, *state, *probability),
+            };
+        }
+        self.relative(&mut moment);
+        self.packed(self.blocks(&moment))
+    }
+
+    fn is_definite(&self, element: &[f64]) -> bool {
+        let kept = self.size + usize::from(self.translation.is_none());
+        let (common, rest) = unpack(kept, element);
+        let (apart, rest) = unpack(self.size + if self.count > 2 { 2 } else { 1 }, rest);
+        rest.iter().all(|entry| *entry > 0.0) && is_definite(common) && is_definite(apart)
+    }
+
+    fn rounding(&self) -> f64 {
+        self.rounding
+    }
+}
