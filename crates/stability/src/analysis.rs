@@ -18,6 +18,9 @@ pub enum Method {
     /// Peers that are equal are treated together: see [`Part`]. For scenes with the strategies of this workspace.
     #[default]
     Reduced,
+    /// As [`Method::Reduced`], and where samples are on their way for frames, the roots of a small determinant instead of the eigenvalues of a large
+    /// matrix. Chosen where the matrix would be large.
+    Determinant,
     /// Unit vectors of the whole state are pushed through the code that simulates. For any linear strategy.
     Full,
 }
@@ -28,6 +31,7 @@ impl Method {
     pub const fn word(self) -> &'static str {
         match self {
             Self::Reduced => "reduced",
+            Self::Determinant => "determinant",
             Self::Full => "full",
         }
     }
@@ -83,12 +87,12 @@ pub struct ContactMode {
 pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError> {
     match method {
         Method::Full => push_through(scene, &combinations(scene)?, &FromScene),
-        Method::Reduced => {
+        Method::Reduced | Method::Determinant => {
             let network = NominalNetwork::of(scene)?;
             let combinations = combinations(scene)?;
             let modes = combinations.iter().map(|combination| {
                 let structure = Structure::of(&[scene], &network, &combination.contacts)?;
-                Ok(of_parts(combination, reduced(&structure, scene, combination.axes)))
+                Ok(of_parts(combination, reduced(&structure, scene, combination.axes, method)))
             });
             Ok(combine(modes.collect::<Result<_, AnalysisError>>()?, method, &network, scene))
         }
@@ -146,6 +150,17 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
     let radius = modes.iter().map(|mode| mode.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 });
     let largest = modes.iter().max_by(|one, other| one.radius.value.total_cmp(&other.radius.value));
     let (rigid_modes, dimension, frame) = largest.map_or((0, 0, Duration::ZERO), |mode| (mode.rigid_modes, mode.dimension, mode.frame));
+    let determinant = largest.is_some_and(|mode| mode.parts.iter().any(|part| part.method == Method::Determinant));
+    let method = match method {
+        Method::Full => Method::Full,
+        Method::Reduced | Method::Determinant => {
+            if determinant {
+                Method::Determinant
+            } else {
+                Method::Reduced
+            }
+        }
+    };
     let mut notes = network.notes.clone();
     if modes.len() > 1 {
         notes.push(

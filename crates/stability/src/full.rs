@@ -9,9 +9,8 @@ use cohaptic_peer::{Acting, Contact, Device as _, Hand, Held, ObjectCopy, Peer, 
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use crate::lifted::common_time;
 use crate::network::{LinkTiming, NominalNetwork};
-use crate::structure::{Contacts, arm, count};
+use crate::structure::{Contacts, arm, common_time, coordination, count};
 use crate::timetable::{Event, NodeClock, Timetable};
 use crate::{AnalysisError, Matrix, StateKind, StateName};
 
@@ -95,7 +94,8 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
         let tied = silent || (0..peers).any(|place| contacts.touching[place] && arm(&scene.peers[place]).stiffness > 0.0);
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);
-        let time = common_time(scene.peers.iter().map(|peer| peer.clock.tick));
+        let touching = contacts.touching.iter().copied().enumerate();
+        let time = common_time(scene, timetable.frame, coordination(scene), touching, false);
         let compliance = scene.peers.iter().map(|peer| time * peer.clock.tick.as_secs_f64() / scene.copy_mass()).collect();
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
         Ok(Self { samples: vec![Vec::new(); peers], members, names, timetable, layout, time, compliance, growth: 1.0 })

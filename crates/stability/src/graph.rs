@@ -9,10 +9,11 @@ use cohaptic_peer::Coordination;
 use cohaptic_scene::Scene;
 
 use crate::analysis::{Analysis, combinations, combine};
+use crate::lifted::Lifted;
 use crate::network::NominalNetwork;
-use crate::parts::{alone, lifted_radius};
+use crate::parts::{alone, lifted_part};
 use crate::structure::{Structure, count};
-use crate::{AnalysisError, ContactMode, Matrix, Method, Part, PartKind};
+use crate::{AnalysisError, ContactMode, Matrix, Method, PartKind};
 
 /// Who hears whom.
 #[derive(Clone, PartialEq, Debug)]
@@ -103,9 +104,9 @@ pub fn analyse_on(scene: &Scene, graph: &Graph) -> Result<Analysis, GraphError> 
         if !tied {
             rigid_modes += copies;
         }
-        let (radius, size) = lifted_radius(&crate::lifted::Lifted { weights: &weight, timetable, coordination, tied, ..quotient });
         let kind = if together { PartKind::Together } else { PartKind::Mode { weight: eigenvalue.value() } };
-        parts.push(Part { kind, size, copies: copies * combination.axes, radius });
+        let lifted = Lifted { weights: &weight, timetable, coordination, tied, ..quotient };
+        parts.push(lifted_part(&lifted, kind, copies * combination.axes, Method::Reduced));
     }
     let mut dimension = peers * (node[0].states() + 2 * structure.timetable.depth[0]);
     if let Some((part, rigid)) = alone(&structure, scene, 0, combination.axes) {

@@ -7,8 +7,8 @@ use cohaptic_scene::Scene;
 
 use crate::lifted::{Autonomous, Lifted, Node};
 use crate::spectrum::bounded_radius;
-use crate::structure::{Structure, arm, device_plant};
-use crate::{Matrix, Radius};
+use crate::structure::{Structure, device_plant};
+use crate::{Matrix, Method, Radius};
 
 /// A part of a scene that moves on its own.
 #[derive(Clone, PartialEq, Debug)]
@@ -21,6 +21,8 @@ pub struct Part {
     pub copies: usize,
     /// Its spectral radius over one frame.
     pub radius: Radius,
+    /// How it was found.
+    pub method: Method,
 }
 
 /// What moves in a part of a scene.
@@ -49,7 +51,7 @@ pub enum PartKind {
 
 impl Part {
     pub(crate) const fn whole(radius: Radius, size: usize) -> Self {
-        Self { kind: PartKind::Whole, size, copies: 1, radius }
+        Self { kind: PartKind::Whole, size, copies: 1, radius, method: Method::Full }
     }
 }
 
@@ -69,14 +71,13 @@ pub(crate) fn radius_of(parts: &[Part]) -> Radius {
 }
 
 /// Takes a scene apart along that many equal axes.
-pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize) -> Reduced {
+pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method: Method) -> Reduced {
     let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
     let quotient = structure.quotient(scene, &nodes);
     let mut parts = Vec::new();
     let mut rigid_modes = usize::from(!structure.tied);
     let mut dimension = 0;
-    let (radius, size) = lifted_radius(&quotient);
-    parts.push(Part { kind: PartKind::Together, size, copies: axes, radius });
+    parts.push(lifted_part(&quotient, PartKind::Together, axes, method));
     for (class, members) in structure.classes.iter().enumerate() {
         let node = &nodes[class];
         // Each sample is a position and a velocity.
@@ -84,11 +85,10 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize) -> Redu
         if let Some(timetable) = &structure.apart[class] {
             let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
             let apart = Lifted { nodes: &nodes[class..=class], weights: &weight, timetable, tied: true, ..quotient };
-            let (radius, size) = lifted_radius(&apart);
+            let part = lifted_part(&apart, PartKind::Apart { peer: members[0] }, (members.len() - 1) * axes, method);
             // A class on its own may repeat more often than the whole scene.
             let frames = structure.timetable.frame.as_nanos() / timetable.frame.as_nanos().max(1);
-            let radius = radius.over(u32::try_from(frames).unwrap_or(u32::MAX));
-            parts.push(Part { kind: PartKind::Apart { peer: members[0] }, size, copies: (members.len() - 1) * axes, radius });
+            parts.push(Part { radius: part.radius.over(u32::try_from(frames).unwrap_or(u32::MAX)), ..part });
         }
         if let Some((part, rigid)) = alone(structure, scene, class, axes) {
             parts.push(part);
@@ -99,11 +99,21 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize) -> Redu
     Reduced { parts, rigid_modes: rigid_modes * axes, dimension: (dimension - rigid_modes) * axes, frame: structure.timetable.frame }
 }
 
-/// The spectral radius of a lifted system, and how many states it has.
-pub(crate) fn lifted_radius(lifted: &Lifted<'_>) -> (Radius, usize) {
+/// From how many rows on a matrix is replaced by the determinant, whose cost grows with the number of signals and little with their delay.
+const LARGE: usize = 160;
+/// Up to how many signals the determinant is small.
+const FEW: usize = 32;
+
+/// The part of a scene that a lifted system is.
+pub(crate) fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: Method) -> Part {
     let frame = lifted.frame(&mut Autonomous);
-    let monodromy = frame.monodromy();
-    (bounded_radius(&monodromy, frame.error), monodromy.rows())
+    let size = frame.size();
+    let long = method == Method::Determinant && frame.history() > 0 || size > LARGE && frame.signals() <= FEW;
+    let delayed = if long { frame.delayed_loop().ok() } else { None };
+    match delayed {
+        Some(delayed) => Part { kind, size, copies, radius: delayed.bounded_radius(frame.error), method: Method::Determinant },
+        None => Part { kind, size, copies, radius: bounded_radius(&frame.monodromy(), frame.error), method: Method::Reduced },
+    }
 }
 
 /// The devices of a class if they touch nothing, and how many rigid-body modes they have along one axis.
@@ -111,7 +121,10 @@ pub(crate) fn alone(structure: &Structure, scene: &Scene, class: usize, axes: us
     let members = &structure.classes[class];
     (!structure.touching[class]).then(|| {
         let (radius, size) = loose_device(structure, scene, class);
-        (Part { kind: PartKind::LooseDevice { peer: members[0] }, size, copies: members.len() * axes, radius }, members.len() * (2 - size))
+        (
+            Part { kind: PartKind::LooseDevice { peer: members[0] }, size, copies: members.len() * axes, radius, method: Method::Reduced },
+            members.len() * (2 - size),
+        )
     })
 }
 
@@ -120,21 +133,48 @@ pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -
     let spec = &scene.peers[structure.classes[class][0]];
     let (short, long) = spec.clock.spans();
     let plant = device_plant(spec);
-    let ticks = structure.timetable.frame.as_nanos() / short.as_nanos().max(1);
-    let radius = [plant.step(short, scene.integrator), plant.step(long, scene.integrator)].iter().map(step_radius).fold(0.0, f64::max);
-    let ticks = crate::structure::count(usize::try_from(ticks).unwrap_or(usize::MAX));
-    let value = libm::pow(radius, ticks);
-    let size = if arm(spec).stiffness > 0.0 { 2 } else { 1 };
-    (Radius { value, error: 16.0 * f64::EPSILON * ticks * value }, size)
+    // A frame is so many ticks; of a clock that drifts, some are longer by a nanosecond. Their steps commute.
+    let frame = structure.timetable.frame.as_nanos();
+    let ticks = frame / short.as_nanos().max(1);
+    let longer = if long == short { 0 } else { frame - ticks * short.as_nanos() };
+    let time = (plant.mass / plant.stiffness).sqrt().min(structure.timetable.frame.as_secs_f64());
+    let step = |span| step_matrix(&plant.step(span, scene.integrator), time);
+    let (mut matrix, mut error) = power(&step(short), ticks - longer);
+    if longer > 0 {
+        let (other, other_error) = power(&step(long), longer);
+        error = error * other.frobenius_norm() + other_error * matrix.frobenius_norm();
+        matrix = matrix.times(&other);
+    }
+    let radius = bounded_radius(&matrix, error);
+    (radius, matrix.rows())
 }
 
-/// The spectral radius of one step of a body: of its velocity alone if nothing ties it to ground.
-fn step_radius(map: &StepMap) -> f64 {
+/// One step of a body, velocities multiplied by `time`: of its velocity alone if nothing ties it to ground.
+fn step_matrix(map: &StepMap, time: f64) -> Matrix {
     let ([[e00, e01], [e10, e11]], _) = map.coefficients();
     if map.is_free() {
-        return (1.0 + e11).abs();
+        return Matrix::from_fn(1, 1, |_, _| 1.0 + e11);
     }
-    let (half_trace, determinant) = (1.0 + 0.5 * (e00 + e11), (1.0 + e00) * (1.0 + e11) - e01 * e10);
-    let discriminant = half_trace * half_trace - determinant;
-    if discriminant < 0.0 { determinant.sqrt() } else { half_trace.abs() + discriminant.sqrt() }
+    let entries = [[1.0 + e00, e01 / time], [e10 * time, 1.0 + e11]];
+    Matrix::from_fn(2, 2, |row, column| entries[row][column])
+}
+
+/// A power by repeated squaring, and a bound of its rounding errors in the 2-norm: each product adds those of its factors times the norms of the others, and
+/// four roundings of its own.
+fn power(base: &Matrix, exponent: u128) -> (Matrix, f64) {
+    let times = |(one, one_error): &(Matrix, f64), (other, other_error): &(Matrix, f64)| {
+        let (norm, other_norm) = (one.frobenius_norm(), other.frobenius_norm());
+        (one.times(other), one_error * other_norm + norm * other_error + 4.0 * f64::EPSILON * norm * other_norm)
+    };
+    let mut total = (Matrix::identity(base.rows()), 0.0);
+    let mut square = (base.clone(), f64::EPSILON * base.frobenius_norm());
+    let mut left = exponent;
+    while left > 0 {
+        if left % 2 == 1 {
+            total = times(&total, &square);
+        }
+        square = times(&square, &square);
+        left /= 2;
+    }
+    total
 }

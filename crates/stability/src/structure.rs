@@ -5,10 +5,12 @@
 //! differences of a class add up to nothing, so each class of n > 1 members has n − 1 copies of one system of a single node with the weight −1/(N−1).
 //! The spectrum of the whole is that of these blocks, exactly.
 
+use std::time::Duration;
+
 use cohaptic_peer::{ArmConfig, Coordination, Gains, Hand, Plant};
 use cohaptic_scene::{PeerSpec, Scene};
 
-use crate::lifted::{Body, Lifted, Node, common_time};
+use crate::lifted::{Body, Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::timetable::{NodeClock, Timetable};
 use crate::{AnalysisError, Matrix};
@@ -96,13 +98,9 @@ impl Structure {
     }
 
     /// KT and BT of the average-position strategy that is the same as the scene's.
+    #[expect(clippy::unused_self, reason = "reads as what the structure is coordinated by")]
     pub(crate) fn coordination(&self, scene: &Scene) -> Gains {
-        let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(self.peers));
-        match scene.coordination.strategy {
-            Coordination::AveragePosition => gains,
-            Coordination::ProportionalDerivative => gains.scaled(count(self.peers - 1)),
-            _ => unreachable!("every strategy of this workspace is listed"),
-        }
+        coordination(scene)
     }
 
     /// The node that stands for a class.
@@ -130,7 +128,8 @@ impl Structure {
 
     /// The common time of the classes \[s\].
     pub(crate) fn time(&self, scene: &Scene) -> f64 {
-        common_time(self.classes.iter().map(|class| scene.peers[class[0]].clock.tick))
+        let peers = self.classes.iter().zip(&self.touching).map(|(class, touching)| (class[0], *touching));
+        common_time(scene, self.timetable.frame, self.coordination(scene), peers, self.at_wall)
     }
 
     /// The system of the classes' averages.
@@ -144,6 +143,35 @@ impl Structure {
             tied: self.tied,
         }
     }
+}
+
+/// KT and BT of the average-position strategy that is the same as the scene's.
+pub(crate) fn coordination(scene: &Scene) -> Gains {
+    let peers = scene.peers.len();
+    let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(peers));
+    match scene.coordination.strategy {
+        Coordination::AveragePosition => gains,
+        Coordination::ProportionalDerivative => gains.scaled(count(peers - 1)),
+        _ => unreachable!("every strategy of this workspace is listed"),
+    }
+}
+
+/// What velocities are multiplied by to be lengths like positions \[s\]: the time in which the stiffest of the bodies swings by a radian, from a tick to
+/// a frame. Positions and velocities then grow into each other by about 1, and errors in either weigh the same.
+pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, peers: impl Iterator<Item = (usize, bool)>, at_wall: bool) -> f64 {
+    let wall = scene.object.enclosure.filter(|_| at_wall).map_or(0.0, |wall| wall.stiffness);
+    let (mut fastest, mut tick) = (0.0_f64, frame);
+    for (place, touching) in peers {
+        let spec = &scene.peers[place];
+        let device = device_plant(spec);
+        let coupling = if touching { spec.coupling.stiffness * spec.coupling_scaling.coupling_factor(scene.peers.len()) } else { 0.0 };
+        fastest = fastest.max((coordination.stiffness + wall + coupling) / scene.copy_mass());
+        if touching {
+            fastest = fastest.max((coupling + device.stiffness) / device.mass);
+        }
+        tick = tick.min(spec.clock.tick);
+    }
+    (1.0 / fastest.sqrt()).clamp(tick.as_secs_f64(), frame.as_secs_f64())
 }
 
 /// The device and the arm that holds it.

@@ -30,7 +30,8 @@ pub(crate) enum StabilityCommand {
 pub(crate) struct PointArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// How the verdict is reached: peers that are equal taken together, or the whole state pushed through the code that simulates
+    /// How the verdict is reached: peers that are equal taken together; the same with long delays as roots of a determinant (chosen anyway where it
+    /// pays); or the whole state pushed through the code that simulates
     #[arg(long, value_enum, default_value_t = MethodName::Reduced)]
     pub(crate) method: MethodName,
 }
@@ -39,6 +40,7 @@ pub(crate) struct PointArguments {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum MethodName {
     Reduced,
+    Determinant,
     Full,
 }
 
@@ -46,6 +48,7 @@ impl From<MethodName> for Method {
     fn from(name: MethodName) -> Self {
         match name {
             MethodName::Reduced => Self::Reduced,
+            MethodName::Determinant => Self::Determinant,
             MethodName::Full => Self::Full,
         }
     }

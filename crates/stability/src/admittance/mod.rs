@@ -20,7 +20,7 @@ use crate::network::NominalNetwork;
 use crate::parts::{radius_of, reduced};
 use crate::structure::{Contacts, Structure, arm, count, device_plant};
 use crate::timetable::{Event, NodeClock, Timetable};
-use crate::{AnalysisError, Matrix, Radius, Verdict};
+use crate::{AnalysisError, Matrix, Method, Radius, Verdict};
 
 pub use error::AdmittanceError;
 pub use low_frequency::{Estimate, LowFrequencyFit};
@@ -82,7 +82,7 @@ impl Admittance {
 
     /// From classes of which the pushed peer is one by itself.
     fn of_classes(scene: &Scene, structure: Structure, peer: usize) -> Self {
-        let radius = radius_of(&reduced(&structure, scene, 1).parts);
+        let radius = radius_of(&reduced(&structure, scene, 1, Method::Reduced).parts);
         let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
         let (coordination, time) = (structure.coordination(scene), structure.time(scene));
         let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");

@@ -1,7 +1,5 @@
 //! One frame of the lifted system: where it leads, as a linear function of where it began.
 
-use std::time::Duration;
-
 use cohaptic_peer::Gains;
 
 use super::node::{Node, Rows, Scale, Scratch};
@@ -17,7 +15,7 @@ pub(crate) struct Lifted<'a> {
     pub(crate) timetable: &'a Timetable,
     /// KT and BT of average-position coordination.
     pub(crate) coordination: Gains,
-    /// What velocities are multiplied by, about a tick \[s\].
+    /// What velocities are multiplied by \[s\].
     pub(crate) time: f64,
     /// Whether something ties the motion to ground. If not, the whole may be moved without a force, and positions are taken relative to the first
     /// node's copy.
@@ -258,6 +256,11 @@ impl FrameMap {
         matrix
     }
 
+    /// How many samples of earlier frames are states.
+    pub(crate) fn history(&self) -> usize {
+        self.depth.iter().sum()
+    }
+
     /// The rows of `sent` that a node sent, in order of time.
     pub(crate) fn sent_by(&self, node: usize) -> std::ops::Range<usize> {
         let end = self.first_sent.get(node + 1).copied().unwrap_or(self.sent.rows());
@@ -294,9 +297,4 @@ fn norm(z: &Matrix, rows: Rows, count: usize) -> f64 {
 /// The rows from `first` on.
 fn tail(matrix: &Matrix, first: usize) -> Matrix {
     Matrix::from_fn(matrix.rows() - first, matrix.columns(), |row, column| matrix[(first + row, column)])
-}
-
-/// The common time: the shortest tick of the nodes \[s\].
-pub(crate) fn common_time(ticks: impl Iterator<Item = Duration>) -> f64 {
-    ticks.min().unwrap_or(Duration::from_millis(1)).as_secs_f64()
 }

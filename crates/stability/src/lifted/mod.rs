@@ -3,8 +3,9 @@
 //! Lifting turns a system with two rates into one with the slow rate, without approximation (Araki & Yamamoto 1986). A node is a peer, or what a class of
 //! equal peers has in common or apart; the weights are the averaging matrix, or one of its eigenvalues.
 
+mod delayed;
 pub(crate) mod frame;
 pub(crate) mod node;
 
-pub(crate) use frame::{Autonomous, FrameMap, Instrument, Lifted, common_time};
+pub(crate) use frame::{Autonomous, FrameMap, Instrument, Lifted};
 pub(crate) use node::{Body, Node};

@@ -31,7 +31,7 @@ use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
 use crate::structure::{Contacts, Structure, count};
 use crate::timetable::{NodeClock, Timetable};
-use crate::{AnalysisError, Matrix, Radius, Verdict};
+use crate::{AnalysisError, Matrix, Method, Radius, Verdict};
 
 /// More unknowns of the second moment than this are refused.
 const MOST_UNKNOWNS: usize = 1 << 20;
@@ -130,7 +130,7 @@ fn only_model(scene: &Scene) -> bool {
 
 fn of_contacts(scene: &Scene, network: &NominalNetwork, combination: &Combination, notes: &mut Vec<String>) -> Result<MeanSquare, AnalysisError> {
     let structure = Structure::of(&[scene], network, &combination.contacts)?;
-    let parts = reduced(&structure, scene, combination.axes).parts;
+    let parts = reduced(&structure, scene, combination.axes, Method::Reduced).parts;
     let nominal = radius_of(&parts);
     let frame = structure.timetable.frame;
     let nominal_squared = nominal.over(2);

@@ -4,4 +4,5 @@ mod admittance;
 mod anchors;
 mod graphs;
 mod reduction;
+mod reference;
 mod strategies;

@@ -93,6 +93,7 @@ fn name(scene: &Scene, part: &Part) -> String {
 fn method(method: Method) -> &'static str {
     match method {
         Method::Reduced => "reduced (equal peers taken together)",
+        Method::Determinant => "determinant (long delays as roots of a small determinant)",
         Method::Full => "full (the whole state, through the code that simulates)",
     }
 }

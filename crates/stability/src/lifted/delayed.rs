@@ -1,0 +1,76 @@
+//! A frame whose samples are long on their way, as a loop with delays instead of a large matrix.
+
+use super::frame::FrameMap;
+use crate::Matrix;
+use crate::determinant::{DelayedLoop, DelayedLoopError, Kernel};
+
+impl FrameMap {
+    /// The loop whose characteristic roots are the eigenvalues of [`FrameMap::monodromy`], but for some that are zero.
+    ///
+    /// Its signals are the relative states x; for each sample that is sent in a frame, its value V when the next frame begins, relative to where the
+    /// reference is then; and by how much d the reference moved in the frame before. A sample that was sent L frames ago is
+    ///
+    /// ```text
+    /// y(f) = V(f − L + 1) − t·(d(f) + d(f−1) + … + d(f − L + 2))
+    /// ```
+    ///
+    /// with t the displacement of a sample under a displacement of everything by 1: a delay, and the sum that remains of one in relative coordinates.
+    pub(crate) fn delayed_loop(&self) -> Result<DelayedLoop, DelayedLoopError> {
+        let states = self.state_unknowns();
+        let kept: Vec<usize> = (0..self.states.rows()).filter(|row| Some(*row) != self.reference()).collect();
+        let sent = self.sent.rows();
+        let size = states + sent + usize::from(self.reference().is_some());
+        let moved = size - 1;
+        // One row of the frame for each signal, in units of which `displaced` by the reference's motion is taken off.
+        let mut rows: Vec<(&[f64], f64)> = kept.iter().map(|row| (self.states.row(*row), if self.is_position(*row) { 1.0 } else { 0.0 })).collect();
+        rows.extend((0..sent).map(|row| (self.sent.row(row), self.translation)));
+        let reference = self.reference().map(|row| self.states.row(row));
+        if let Some(reference) = reference {
+            rows.push((reference, 0.0));
+        }
+        let coefficient = |row: usize, column: usize| {
+            let (entries, displaced) = rows[row];
+            entries[column] - reference.map_or(0.0, |reference| displaced * reference[column])
+        };
+        let mut now = Matrix::from_fn(size, size, |row, column| if column < states { coefficient(row, column) } else { 0.0 });
+        let mut terms: Vec<(Kernel, Matrix)> = Vec::new();
+        for (number, (node, age)) in self.used.iter().enumerate() {
+            let of_node = self.sent_by(*node);
+            let frames = age.div_ceil(of_node.len().max(1));
+            let column = states + of_node.start + of_node.len() * frames - age;
+            let mut add = |kernel: Kernel, column: usize, factor: f64| {
+                let matrix = if kernel.steps() == 0 {
+                    &mut now
+                } else {
+                    let place = terms.iter().position(|(known, _)| *known == kernel).unwrap_or_else(|| {
+                        terms.push((kernel, Matrix::zeros(size, size)));
+                        terms.len() - 1
+                    });
+                    &mut terms[place].1
+                };
+                for row in 0..size {
+                    matrix[(row, column)] += factor * coefficient(row, states + number);
+                }
+            };
+            let steps = |frames: usize| u32::try_from(frames).unwrap_or(u32::MAX);
+            add(Kernel::Delay(steps(frames - 1)), column, 1.0);
+            if reference.is_some() && frames >= 2 {
+                add(Kernel::Delay(0), moved, -self.translation);
+                if frames >= 3 {
+                    add(Kernel::Sum(steps(frames - 2)), moved, -self.translation);
+                }
+            }
+        }
+        DelayedLoop::new(now, terms)
+    }
+
+    /// How many rows the monodromy matrix has.
+    pub(crate) fn size(&self) -> usize {
+        self.state_unknowns() + self.history()
+    }
+
+    /// How many signals [`FrameMap::delayed_loop`] has.
+    pub(crate) fn signals(&self) -> usize {
+        self.state_unknowns() + self.sent.rows() + usize::from(self.reference().is_some())
+    }
+}
