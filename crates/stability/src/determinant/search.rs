@@ -33,8 +33,8 @@ impl DelayedLoop {
             return Radius { value: 1.0, error: f64::INFINITY };
         };
         let longest = longest.max(1);
-        // z^−j stays below 1e60.
-        let floor = libm::pow(10.0, -60.0 / f64::from(longest));
+        // z^−j stays below 1e60; and below a radius at which nothing could be told, nothing is tried again.
+        let mut floor = libm::pow(10.0, -60.0 / f64::from(longest));
         let mut low: f64 = 0.0;
         let mut trial = high;
         for _ in 0..HALVINGS {
@@ -42,27 +42,25 @@ impl DelayedLoop {
             match trip.turns.and_then(|turns| self.roots_beyond(turns)) {
                 Some(0) => high = high.min(trial),
                 Some(_) => low = low.max(trial),
-                None => {}
+                None => floor = floor.max(trial),
             }
-            // From outside, the root that seems nearest is usually the outermost.
+            // From outside, the root that seems nearest is usually the outermost; if it is not, at least none within it is.
             if low < trial
                 && let Some(root) = self.polished(trip.nearest)
             {
                 let modulus = root.norm();
-                if modulus >= low
-                    && modulus < high
-                    && let Some(sure) = self.certified_high(root, high, perturbation)
-                {
-                    low = low.max(self.certified_low(root, perturbation));
-                    return interval(low, high.min(sure), modulus);
+                if modulus >= low && modulus < high {
+                    let reached = low.max(self.certified_low(root, perturbation));
+                    if let Some(sure) = self.certified_high(root, high, perturbation) {
+                        return interval(reached, high.min(sure), modulus);
+                    }
+                    low = reached;
                 }
             }
             if high <= floor * (1.0 + 1e-9) || high - low <= 1e-12 * high {
                 break;
             }
-            let next = (low.max(floor) * high).sqrt();
-            // A trial that told nothing is not repeated.
-            trial = if (next - trial).abs() < 1e-12 * trial { 0.5 * (trial + high) } else { next };
+            trial = (low.max(floor) * high).sqrt();
         }
         interval(low, high, 0.5 * (low + high))
     }
