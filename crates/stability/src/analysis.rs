@@ -146,8 +146,14 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
     let radius = modes.iter().map(|mode| mode.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 });
     let largest = modes.iter().max_by(|one, other| one.radius.value.total_cmp(&other.radius.value));
     let (rigid_modes, dimension, frame) = largest.map_or((0, 0, Duration::ZERO), |mode| (mode.rigid_modes, mode.dimension, mode.frame));
-    let mut notes = network.notes.clone();
-    if modes.len() > 1 {
+    let notes = notes(&network.notes, modes.len(), scene);
+    Analysis { radius, rigid_modes, dimension, method, frame, modes, notes }
+}
+
+/// What a verdict leaves out, beside what is said already.
+pub(crate) fn notes(said: &[String], combinations: usize, scene: &Scene) -> Vec<String> {
+    let mut notes = said.to_vec();
+    if combinations > 1 {
         notes.push(
             "the scene is not linear: every combination of its contacts is analysed as if it lasted, and the verdict is that of the worst; changing \
              between them is not covered"
@@ -157,7 +163,7 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
     if !scene.timeline.is_empty() {
         notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
     }
-    Analysis { radius, rigid_modes, dimension, method, frame, modes, notes }
+    notes
 }
 
 /// Contacts that are closed together, and for how many axes they stand.
@@ -165,7 +171,7 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
 pub(crate) struct Combination {
     pub(crate) contacts: Contacts,
     pub(crate) axes: usize,
-    words: String,
+    pub(crate) words: String,
 }
 
 /// More combinations than this are refused.

@@ -63,6 +63,8 @@ pub struct WorstCase {
     pub products: u64,
     /// Whether the bounds are as close as was asked for.
     pub complete: bool,
+    /// The quadratic certificate in whose norms the search began; `None` if numbers overflowed.
+    pub certificate: Option<Certificate>,
 }
 
 impl Automaton {
@@ -73,14 +75,17 @@ impl Automaton {
     pub fn worst_case(&self, effort: &Effort) -> WorstCase {
         let exponent = self.exponent();
         let scaled = self.scaled(exponent);
-        let mut search = Search::new(&scaled, libm::ldexp(effort.accuracy, exponent));
+        let accuracy = libm::ldexp(effort.accuracy, exponent);
+        // Branching makes up for what the shapes are not.
+        let certificate = Certificate::find(self, accuracy.clamp(1e-6, 1e-2)).ok();
+        let mut search = Search::new(&scaled, certificate.as_ref(), accuracy);
         search.run(effort.products);
         let lower = libm::ldexp(search.lower, -exponent);
         let upper = libm::ldexp(search.upper(), -exponent);
         // Whatever is of the order of underflow says nothing.
         let lower = if lower > f64::MIN_POSITIVE { lower } else { 0.0 };
         let cycle = if lower > 0.0 { search.cycle } else { Vec::new() };
-        WorstCase { lower, upper, cycle, products: search.products, complete: upper - lower <= effort.accuracy }
+        WorstCase { lower, upper, cycle, products: search.products, complete: upper - lower <= effort.accuracy, certificate }
     }
 }
 
@@ -125,8 +130,8 @@ struct Search {
 }
 
 impl Search {
-    fn new(automaton: &Automaton, accuracy: f64) -> Self {
-        let steps = steps(automaton, accuracy);
+    fn new(automaton: &Automaton, certificate: Option<&Certificate>, accuracy: f64) -> Self {
+        let steps = steps(automaton, certificate);
         let mut from = vec![Vec::new(); automaton.pattern().nodes()];
         for (number, step) in steps.iter().enumerate() {
             from[step.edge.from].push(number);
@@ -225,12 +230,10 @@ impl Search {
     }
 }
 
-/// The edges on cycles in the coordinates of a certificate's shapes; of round ones, where that failed.
-fn steps(automaton: &Automaton, accuracy: f64) -> Vec<Step> {
+/// The edges on cycles in the coordinates of a certificate's shapes; of round ones, where there is none.
+fn steps(automaton: &Automaton, certificate: Option<&Certificate>) -> Vec<Step> {
     let identity = || vec![Matrix::identity(automaton.size()); automaton.pattern().nodes()];
-    // Branching makes up for what the shapes are not.
-    let found = Certificate::find(automaton, accuracy.clamp(1e-6, 1e-2));
-    let factors: Option<Vec<Matrix>> = found.ok().and_then(|certificate| certificate.shapes().iter().map(cholesky).collect());
+    let factors: Option<Vec<Matrix>> = certificate.and_then(|certificate| certificate.shapes().iter().map(cholesky).collect());
     let inverses = factors.as_ref().and_then(|factors| factors.iter().map(Inverse::of).collect::<Option<Vec<Inverse>>>());
     let (factors, inverses) = match (factors, inverses) {
         (Some(factors), Some(inverses)) => (factors, inverses),
