@@ -44,6 +44,7 @@
 mod channel;
 mod error;
 mod frames;
+mod prepared;
 #[cfg(test)]
 mod tests;
 mod words;
@@ -55,17 +56,13 @@ use rayon::prelude::*;
 
 pub use self::error::SceneWorstCaseError;
 
-use self::channel::{Channel, Link, Way};
-use self::frames::Block;
-use super::automaton::Automaton;
+use self::channel::{Channel, Link};
+use self::prepared::{Prepared, Search};
 use super::gripenberg::Effort;
-use super::pattern::Pattern;
 use crate::analysis::{Combination, combinations, notes};
-use crate::lifted::{Lifted, Node};
-use crate::network::{LinkTiming, NominalNetwork};
-use crate::parts::alone;
-use crate::structure::{Structure, clocks, links};
-use crate::{Matrix, PartKind};
+use crate::network::NominalNetwork;
+use crate::structure::Structure;
+use crate::{Part, PartKind};
 
 /// What the network may do.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -194,9 +191,6 @@ impl SceneWorstCase {
     }
 }
 
-/// The largest number of kinds of frame.
-const MOST_SYMBOLS: u128 = 64;
-
 /// Bounds of how fast a disturbance of the scene can grow under those patterns, as it begins and with the strategy that it names.
 ///
 /// The effort is spent on each part.
@@ -234,12 +228,18 @@ impl Patterns {
         }
     }
 
+    /// Whether they leave the network anything to choose.
+    fn choose(&self) -> bool {
+        self.losses_in_a_row > 0 || !self.width().is_zero()
+    }
+
+    /// How far delays may differ.
     fn width(&self) -> Duration {
         self.delay.map_or(Duration::ZERO, |(least, most)| most.saturating_sub(least))
     }
 }
 
-/// The parts of a linear scene.
+/// The worst cases of the parts of a linear scene.
 fn of_combination(
     scene: &Scene,
     network: &NominalNetwork,
@@ -247,105 +247,40 @@ fn of_combination(
     patterns: &Patterns,
     effort: &Effort,
 ) -> Result<Vec<WorstPart>, SceneWorstCaseError> {
-    if patterns.links == Links::Each {
-        // Known before there is anything for each of the links.
-        let links = scene.peers.len().saturating_mul(scene.peers.len() - 1);
-        few_enough(links, std::iter::repeat_n(2, links))?;
-    }
-    let structure = match patterns.links {
-        Links::Together => Structure::of(&[scene], network, &combination.contacts)?,
-        Links::Each => Structure::of_each(scene, network, &combination.contacts)?,
-    };
-    let channels = channels(scene, network, &structure, patterns)?;
-    let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
-    let quotient = structure.quotient(scene, &nodes);
-    let everything = |channel: &Channel| channel.links.iter().copied().enumerate().collect();
-    let whole = if patterns.links == Links::Together { PartKind::Together } else { PartKind::Whole };
-    let name = |channel: &Channel| {
-        let link =
-            |link: &Link| format!("{} to {}", scene.peers[structure.classes[link.from][0]].name, scene.peers[structure.classes[link.to][0]].name);
-        channel.links.first().map(link).unwrap_or_default()
-    };
-    let search = |kind: PartKind, block: &Block<'_>| -> Result<WorstPart, SceneWorstCaseError> {
-        let (matrices, rounding) = block.matrices(&channels);
-        let patterns_of: Vec<Pattern> = channels.iter().map(|channel| channel.pattern.clone()).collect();
-        let automaton = Automaton::product(&patterns_of, matrices)?;
-        let found = automaton.worst_case(effort);
+    let structure = prepared::structure(scene, network, &combination.contacts, patterns)?;
+    let Prepared { channels, searches, devices } = Prepared::of(scene, network, &structure, patterns)?;
+    let peer = |class: usize| scene.peers[structure.classes[class][0]].name.as_str();
+    let name = |channel: &Channel| channel.links.first().map(|link: &Link| format!("{} to {}", peer(link.from), peer(link.to))).unwrap_or_default();
+    let searched = |search: &Search| {
+        let found = search.automaton.worst_case(effort);
         let certificate = found.certificate.as_ref().map(super::Certificate::rate);
-        Ok(WorstPart {
-            kind,
+        WorstPart {
+            kind: search.kind,
             contacts: combination.words.clone(),
-            dimension: automaton.size(),
+            dimension: search.automaton.size(),
             lower: found.lower,
             upper: certificate.map_or(found.upper, |rate| found.upper.min(rate)),
             certificate,
             sequence: words::sequence(&found.cycle, &channels, patterns.delay.map(|(least, _)| least), name),
             period: found.cycle.len(),
             products: found.products,
-            rounding,
-        })
+            rounding: search.rounding,
+        }
     };
-    let mut parts = vec![search(whole, &Block { lifted: quotient, links: channels.iter().map(everything).collect() })?];
-    for class in 0..structure.classes.len() {
-        if let Some(timetable) = &structure.apart[class] {
-            let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
-            let lifted = Lifted { nodes: &nodes[class..=class], weights: &weight, timetable, tied: true, ..quotient };
-            let own = |(_, link): &(usize, Link)| (link.from, link.to) == (class, class);
-            let links = |channel: &Channel| {
-                let links = channel.links.iter().copied().enumerate().filter(own);
-                links.map(|(place, link)| (place, Link { from: 0, to: 0, ..link })).collect()
-            };
-            let kind = PartKind::Apart { peer: structure.classes[class][0] };
-            parts.push(search(kind, &Block { lifted, links: channels.iter().map(links).collect() })?);
+    let alone = |device: &Part| {
+        let (lower, upper) = ((device.radius.value - device.radius.error).max(0.0), device.radius.value + device.radius.error);
+        WorstPart {
+            kind: device.kind,
+            contacts: combination.words.clone(),
+            dimension: device.size,
+            lower,
+            upper,
+            certificate: Some(upper),
+            sequence: String::new(),
+            period: 0,
+            products: 0,
+            rounding: device.radius.error,
         }
-        if let Some((device, _)) = alone(&structure, scene, class, 1) {
-            let (lower, upper) = ((device.radius.value - device.radius.error).max(0.0), device.radius.value + device.radius.error);
-            parts.push(WorstPart {
-                kind: device.kind,
-                contacts: combination.words.clone(),
-                dimension: device.size,
-                lower,
-                upper,
-                certificate: Some(upper),
-                sequence: String::new(),
-                period: 0,
-                products: 0,
-                rounding: device.radius.error,
-            });
-        }
-    }
-    Ok(parts)
-}
-
-/// The channels of a scene: one of all links, or one of each.
-fn channels(scene: &Scene, network: &NominalNetwork, structure: &Structure, patterns: &Patterns) -> Result<Vec<Channel>, SceneWorstCaseError> {
-    let step = scene.coordination.update;
-    if structure.timetable.frame != step || structure.timetable.sent.iter().any(|sent| *sent != 1) {
-        return Err(SceneWorstCaseError::Frame { frame: structure.timetable.frame, step });
-    }
-    let name = |class: usize| scene.peers[structure.classes[class][0]].name.clone();
-    let mut ways = Vec::new();
-    for (from, to, timing) in links(&structure.classes, network) {
-        match timing {
-            LinkTiming::Constant(delay) => ways.push(Way { from, to, delay }),
-            LinkTiming::Pattern(_) => return Err(SceneWorstCaseError::Pattern { from: name(from), to: name(to) }),
-        }
-    }
-    let clocks = clocks(&structure.classes, scene);
-    let channel = |ways: &[Way]| Channel::new(ways, &clocks, patterns.width(), patterns.losses_in_a_row).map_err(SceneWorstCaseError::from);
-    let channels: Vec<Channel> = match patterns.links {
-        Links::Together => vec![channel(&ways)?],
-        Links::Each => ways.chunks(1).map(channel).collect::<Result<_, _>>()?,
     };
-    few_enough(ways.len(), channels.iter().map(|channel| channel.symbols.len()))?;
-    Ok(channels)
-}
-
-/// Refuses too many kinds of frame.
-fn few_enough(links: usize, mut symbols: impl Iterator<Item = usize>) -> Result<(), SceneWorstCaseError> {
-    let all = symbols.try_fold(1_u128, |all, own| all.checked_mul(own as u128));
-    match all {
-        Some(symbols) if symbols <= MOST_SYMBOLS => Ok(()),
-        symbols => Err(SceneWorstCaseError::TooMany { links, symbols, most: MOST_SYMBOLS }),
-    }
+    Ok(searches.par_iter().map(searched).chain(devices.par_iter().map(alone)).collect())
 }

@@ -57,11 +57,11 @@ fn rotated(fates: &[Vec<Fate>], mut said: Vec<String>) -> Vec<String> {
     said
 }
 
-/// Equal ones in a row are counted once they are more than three.
+/// Equal ones in a row are counted from three on.
 fn runs(said: &[String]) -> String {
     let mut words: Vec<String> = said
         .chunk_by(|one, next| one == next)
-        .flat_map(|run| if run.len() > 3 { vec![format!("{} times {}", run.len(), run[0])] } else { run.to_vec() })
+        .flat_map(|run| if run.len() >= 3 { vec![format!("{} times {}", run.len(), run[0])] } else { run.to_vec() })
         .collect();
     words.push("and again".to_owned());
     words.join(", ")
