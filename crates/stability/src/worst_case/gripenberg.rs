@@ -357,3 +357,28 @@ impl PartialEq for Leaf {
 }
 
 impl Eq for Leaf {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without room for a single product every path is multiplied again, and the bounds are the same to the rounding of their error terms.
+    #[test]
+    fn without_room_the_bounds_are_the_same() {
+        let matrices = [[0.5, 0.4, -0.3, 0.6], [0.4, -0.6, 0.5, 0.3]].map(|entries| Matrix::from_fn(2, 2, |i, j| entries[2 * i + j]));
+        let automaton = Automaton::runs(matrices.to_vec(), 1, 2).unwrap();
+        let bounds = |room: usize| {
+            let certificate = Certificate::find(&automaton, 1e-2).unwrap();
+            let mut search = Search::new(&automaton, Some(&certificate), 1e-6);
+            search.room = room;
+            search.run(3_000);
+            (search.lower, search.upper(), search.products)
+        };
+        let (lower, upper, products) = bounds(MOST_KEPT);
+        assert!(products > 100 && upper - lower < 1e-2, "{lower} {upper} {products}");
+        for room in [0, 17] {
+            let (other_lower, other_upper, _) = bounds(room);
+            assert!((other_lower - lower).abs() < 1e-12 && (other_upper - upper).abs() < 1e-12, "{other_lower} {other_upper}");
+        }
+    }
+}

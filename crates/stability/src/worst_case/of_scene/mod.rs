@@ -61,7 +61,6 @@ use self::prepared::{Prepared, Search};
 use super::gripenberg::Effort;
 use crate::analysis::{Combination, combinations, notes};
 use crate::network::NominalNetwork;
-use crate::structure::Structure;
 use crate::{Part, PartKind};
 
 /// What the network may do.

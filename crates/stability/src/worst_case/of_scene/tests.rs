@@ -6,6 +6,7 @@ use cohaptic_scene::Scene;
 
 use super::prepared::{Prepared, structure};
 use super::*;
+use crate::structure::Structure;
 use crate::worst_case::{Automaton, Certificate};
 use crate::{AnalysisError, Matrix, Method, analyse, radius};
 
