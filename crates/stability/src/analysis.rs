@@ -161,8 +161,14 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
             }
         }
     };
-    let mut notes = network.notes.clone();
-    if modes.len() > 1 {
+    let notes = notes(&network.notes, modes.len(), scene);
+    Analysis { radius, rigid_modes, dimension, method, frame, modes, notes }
+}
+
+/// What a verdict leaves out, beside what is said already.
+pub(crate) fn notes(said: &[String], combinations: usize, scene: &Scene) -> Vec<String> {
+    let mut notes = said.to_vec();
+    if combinations > 1 {
         notes.push(
             "the scene is not linear: every combination of its contacts is analysed as if it lasted, and the verdict is that of the worst; changing \
              between them is not covered"
@@ -172,7 +178,7 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
     if !scene.timeline.is_empty() {
         notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
     }
-    Analysis { radius, rigid_modes, dimension, method, frame, modes, notes }
+    notes
 }
 
 /// Contacts that are closed together, and for how many axes they stand.
@@ -180,7 +186,7 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
 pub(crate) struct Combination {
     pub(crate) contacts: Contacts,
     pub(crate) axes: usize,
-    words: String,
+    pub(crate) words: String,
 }
 
 /// More combinations than this are refused.

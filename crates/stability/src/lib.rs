@@ -42,4 +42,7 @@ pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
-pub use worst_case::{Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Pattern, PatternError, WorstCase};
+pub use worst_case::{
+    Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Links, Pattern, PatternError, Patterns, SceneWorstCase,
+    SceneWorstCaseError, WorstCase, WorstPart, WorstVerdict, worst_case,
+};

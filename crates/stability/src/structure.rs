@@ -69,16 +69,18 @@ impl Structure {
         if !network.is_uniform() {
             classes = split_by_links(classes, network);
         }
-        let clocks: Vec<NodeClock> = classes.iter().map(|class| NodeClock::of(scene, class[0])).collect();
-        let mut links: Vec<(usize, usize, LinkTiming)> = Vec::new();
-        for (to, receivers) in classes.iter().enumerate() {
-            for (from, senders) in classes.iter().enumerate() {
-                let pair = if from == to { senders.get(1).map(|second| (*second, receivers[0])) } else { Some((senders[0], receivers[0])) };
-                if let Some((sender, receiver)) = pair {
-                    links.push((from, to, network.timing(sender, receiver).clone()));
-                }
-            }
-        }
+        Self::of_classes(scene, classes, network, contacts)
+    }
+
+    /// Every peer by itself, whether or not it is like another.
+    pub(crate) fn of_each(scene: &Scene, network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
+        Self::of_classes(scene, (0..scene.peers.len()).map(|peer| vec![peer]).collect(), network, contacts)
+    }
+
+    fn of_classes(scene: &Scene, classes: Vec<Vec<usize>>, network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
+        let peers = scene.peers.len();
+        let clocks = clocks(&classes, scene);
+        let links = links(&classes, network);
         let timetable = Timetable::new(&clocks, &links)?;
         let apart = classes.iter().enumerate().map(|(class, members)| {
             let own = links.iter().find(|(from, to, _)| (*from, *to) == (class, class)).filter(|_| members.len() > 1);
@@ -172,6 +174,25 @@ pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, p
         tick = tick.min(spec.clock.tick);
     }
     (1.0 / fastest.sqrt()).clamp(tick.as_secs_f64(), frame.as_secs_f64())
+}
+
+/// The clock of each class.
+pub(crate) fn clocks(classes: &[Vec<usize>], scene: &Scene) -> Vec<NodeClock> {
+    classes.iter().map(|class| NodeClock::of(scene, class[0])).collect()
+}
+
+/// How samples of each class (first) get to each class (second), but for those of a class of one to itself.
+pub(crate) fn links(classes: &[Vec<usize>], network: &NominalNetwork) -> Vec<(usize, usize, LinkTiming)> {
+    let mut links = Vec::new();
+    for (to, receivers) in classes.iter().enumerate() {
+        for (from, senders) in classes.iter().enumerate() {
+            let pair = if from == to { senders.get(1).map(|second| (*second, receivers[0])) } else { Some((senders[0], receivers[0])) };
+            if let Some((sender, receiver)) = pair {
+                links.push((from, to, network.timing(sender, receiver).clone()));
+            }
+        }
+    }
+    links
 }
 
 /// The device and the arm that holds it.

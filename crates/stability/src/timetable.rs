@@ -31,6 +31,22 @@ impl NodeClock {
         Self { clock: spec.clock, phase: spec.phase, every: u64::try_from(every).unwrap_or(u64::MAX) }
     }
 
+    /// At which tick of `to`, counted from its first one in the frame, the first sample of the frame is there if it takes `delay`; and the longest
+    /// delay for which it is there at that tick.
+    pub(crate) fn arrival(&self, to: &Self, delay: Duration) -> (usize, Duration) {
+        let (phase, every) = (i128::from(self.phase), i128::from(self.every));
+        let sent = self.instant(phase + self.first_number() * every);
+        let tick = to.first_tick(sent.saturating_add(i128::try_from(delay.as_nanos()).unwrap_or(i128::MAX)));
+        let longest = Duration::from_nanos(u64::try_from(to.instant(tick) - sent).unwrap_or(u64::MAX));
+        (usize::try_from(tick - to.first_tick(0)).unwrap_or(usize::MAX), longest)
+    }
+
+    /// The number of the first sample of the frame, counted from the clock's own beginning.
+    fn first_number(&self) -> i128 {
+        let (first, every) = (self.first_tick(0) - i128::from(self.phase), i128::from(self.every));
+        first.div_euclid(every) + i128::from(first.rem_euclid(every) != 0)
+    }
+
     /// 10⁹ + drift, the denominator of the instants.
     fn speed(&self) -> u128 {
         u128::from(1_000_000_000_u64.saturating_add_signed(self.clock.drift.parts_per_billion()))
@@ -107,8 +123,6 @@ impl Timetable {
             let first = clock.first_tick(0);
             first_tick_at.push(clock.instant(first));
             let (phase, every) = (i128::from(clock.phase), i128::from(clock.every));
-            // The number of the first sample of this frame, counted from the clock's own beginning.
-            let number = (first - phase).div_euclid(every) + i128::from((first - phase).rem_euclid(every) != 0);
             let mut count = 0;
             let mut tick = first;
             loop {
@@ -125,7 +139,7 @@ impl Timetable {
                 tick += 1;
             }
             sent.push(count);
-            first_sample.push(number);
+            first_sample.push(clock.first_number());
         }
         let mut depth = vec![0; clocks.len()];
         let mut held = Vec::new();

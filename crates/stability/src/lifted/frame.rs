@@ -263,7 +263,7 @@ impl FrameMap {
 
     /// The rows of `sent` that a node sent, in order of time.
     pub(crate) fn sent_by(&self, node: usize) -> std::ops::Range<usize> {
-        let end = self.first_sent.get(node + 1).copied().unwrap_or(self.sent.rows());
+        let end = self.first_sent.get(node + 1).copied().unwrap_or_else(|| self.sent.rows());
         self.first_sent[node]..end
     }
 

@@ -152,8 +152,8 @@ impl Node {
         }
         advance(z, rows.object, self.object.map(span), on_object, scale.time);
         if let (Some(first), Some(device)) = (rows.device, &self.device) {
-            for column in 0..columns {
-                coupling[column] = -coupling[column];
+            for force in coupling.iter_mut() {
+                *force = -*force;
             }
             if let Some(hand) = hand {
                 for (force, hand) in coupling.iter_mut().zip(hand) {

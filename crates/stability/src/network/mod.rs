@@ -84,6 +84,12 @@ impl NominalNetwork {
         Ok(Self { timings: known.timings, places, notes: notes::notes(scene, links, uplinks, downlinks) })
     }
 
+    /// Every link takes that long and does nothing else.
+    pub(crate) fn uniform(delay: Duration) -> Self {
+        let places = Places::Each { peers: 0, places: Vec::new() };
+        Self { timings: vec![LinkTiming::Constant(delay)], places, notes: Vec::new() }
+    }
+
     /// The timing of a link, by the places of its ends; for a peer with itself the answer has no meaning.
     pub(crate) fn timing(&self, from: usize, to: usize) -> &LinkTiming {
         if self.is_uniform() {

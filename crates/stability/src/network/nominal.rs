@@ -54,23 +54,16 @@ impl Nominal {
     pub(crate) fn cycle(&self) -> Option<Duration> {
         let LinkConfig { outages, loss, bottleneck, trace, .. } = &self.config;
         let outage = outages.random().map(|random| random.up.mean() + random.down.mean());
-        let loss = match loss {
-            Loss::Pattern(pattern) if pattern.counts() == Counts::Nanoseconds => pattern.period().map(Duration::from_nanos),
-            _ => None,
-        };
-        let service = bottleneck.as_ref().and_then(|bottleneck| match &bottleneck.service {
-            Service::Recorded(recording) => Some(recording.period()),
-            _ => None,
-        });
+        let loss = pattern(loss, Counts::Nanoseconds).and_then(Pattern::period).map(Duration::from_nanos);
+        let service = bottleneck
+            .as_ref()
+            .and_then(|bottleneck| if let Service::Recorded(recording) = &bottleneck.service { Some(recording.period()) } else { None });
         [outage, loss, service, trace.as_ref().and_then(cohaptic_wan::PathTrace::period)].into_iter().flatten().max()
     }
 
     /// After how many packets a pattern of losses begins anew.
     pub(crate) fn packet_cycle(&self) -> u64 {
-        match &self.config.loss {
-            Loss::Pattern(pattern) if pattern.counts() == Counts::Packets => pattern.period().unwrap_or(1),
-            _ => 1,
-        }
+        pattern(&self.config.loss, Counts::Packets).and_then(Pattern::period).unwrap_or(1)
     }
 
     /// The least rate of its queues [bit/s] and what a sample of that size takes \[bit\] there.
@@ -161,21 +154,30 @@ fn outages(given: &Outages, replaced: &mut Vec<String>) -> Outages {
 }
 
 fn loss(given: Loss, replaced: &mut Vec<String>) -> Loss {
-    match given {
-        Loss::None => Loss::None,
-        Loss::Pattern(pattern) if pattern.period().is_some() => Loss::Pattern(pattern),
-        Loss::Pattern(_) => {
-            replaced.push("losses at given places are left out, because they end".to_owned());
-            Loss::None
-        }
-        // A loss of everything is not random.
-        random if random.mean() == Some(1.0) => everything(),
-        random if random.mean() == Some(0.0) => Loss::None,
-        _ => {
-            replaced.push("random loss is left out".to_owned());
-            Loss::None
-        }
+    if given == Loss::None {
+        return Loss::None;
     }
+    if let Loss::Pattern(pattern) = given {
+        if pattern.period().is_some() {
+            return Loss::Pattern(pattern);
+        }
+        replaced.push("losses at given places are left out, because they end".to_owned());
+        return Loss::None;
+    }
+    let mean = given.mean();
+    if mean == Some(1.0) {
+        // A loss of everything is not random.
+        return everything();
+    }
+    if mean != Some(0.0) {
+        replaced.push("random loss is left out".to_owned());
+    }
+    Loss::None
+}
+
+/// The pattern of losses, if that is what they are, that counts in those units.
+fn pattern(loss: &Loss, counts: Counts) -> Option<&Pattern> {
+    if let Loss::Pattern(pattern) = loss { Some(pattern).filter(|pattern| pattern.counts() == counts) } else { None }
 }
 
 fn everything() -> Loss {

@@ -124,11 +124,11 @@ impl Probe {
         // Instants come in order.
         let _ = self.network.handle_timeout(now);
         while let Some(event) = self.network.poll_event() {
-            let taken = match event.fate {
-                Fate::Delivered(_) => u64::try_from((event.at - event.sent).as_nanos()).unwrap_or(LOST),
-                _ if event.fate.is_end() => LOST,
-                _ => continue,
-            };
+            if !event.fate.is_end() {
+                continue;
+            }
+            let arrived = matches!(event.fate, Fate::Delivered(_));
+            let taken = if arrived { u64::try_from((event.at - event.sent).as_nanos()).unwrap_or(LOST) } else { LOST };
             let path = &mut self.taken[event.from.0 as usize * self.nodes + event.to.0 as usize];
             let Ok(place) = usize::try_from(event.sequence) else { continue };
             if path.len() <= place {

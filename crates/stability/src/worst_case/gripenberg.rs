@@ -12,8 +12,8 @@
 //! piece ends, the next begins in the norm in which the first was measured. Any family will do; this one is |x|_v = √(xᵀP_v x) with the shapes that a
 //! quadratic certificate has ([`Certificate::find`]), in which single steps already grow little.
 //!
-//! A leaf with σ <= lower + accuracy is never looked at again; the leaf with the largest σ is branched next, so that whenever the budget ends, the
-//! largest σ of all leaves is as good as any order could have made it with that many products.
+//! A leaf with σ <= lower + accuracy is never looked at again. The leaf with the largest σ is branched next: as long as it is there, U is no smaller. Whether
+//! another order would raise the lower bound sooner, and so have fewer leaves to branch, nobody knows beforehand.
 //!
 //! *Rounding.* Products are computed in coordinates in which the norms are 2-norms: X = R_to A Z for a shape P = RᵀR and a computed Z near R⁻¹. With
 //! G = I − RZ, the exact R_to A R⁻¹ is (R_to A Z)(I − G)⁻¹, within ‖R_to A Z‖·g/(1 − g) of R_to A Z for ‖G‖₂ <= g < 1, and X is within γ₍₂ₙ₎|R_to||A||Z| of that,
@@ -25,7 +25,7 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 use super::automaton::Automaton;
 use super::growth::{Approximate, radius_below};
-use super::norm::{Sharpness, frobenius_norm, norm_above};
+use super::norm::{Norms, Sharpness, frobenius_norm, norm_above};
 use super::pattern::Edge;
 use super::rounding::{gamma, outward, real, root_above};
 use super::symmetric::{cholesky, triangle_inverse};
@@ -37,7 +37,8 @@ use crate::Matrix;
 pub struct Effort {
     /// The distance of the bounds at which the search ends; the joint spectral radius of frames is of the order of 1.
     pub accuracy: f64,
-    /// The largest number of products looked at. Each edge is looked at even if this is less.
+    /// The largest number of products looked at. Each edge is looked at even if this is less. Each takes some tens of bytes to the end, beside the
+    /// matrices that are kept for later, which take up to 256 MiB.
     pub products: u64,
 }
 
@@ -63,6 +64,8 @@ pub struct WorstCase {
     pub products: u64,
     /// Whether the bounds are as close as was asked for.
     pub complete: bool,
+    /// The quadratic certificate in whose norms the search began; `None` if numbers overflowed.
+    pub certificate: Option<Certificate>,
 }
 
 impl Automaton {
@@ -73,16 +76,22 @@ impl Automaton {
     pub fn worst_case(&self, effort: &Effort) -> WorstCase {
         let exponent = self.exponent();
         let scaled = self.scaled(exponent);
-        let mut search = Search::new(&scaled, libm::ldexp(effort.accuracy, exponent));
+        let accuracy = libm::ldexp(effort.accuracy, exponent);
+        // Branching makes up for what the shapes are not.
+        let certificate = Certificate::find(self, accuracy.clamp(1e-6, 1e-2)).ok();
+        let mut search = Search::new(&scaled, certificate.as_ref(), accuracy);
         search.run(effort.products);
         let lower = libm::ldexp(search.lower, -exponent);
         let upper = libm::ldexp(search.upper(), -exponent);
         // Whatever is of the order of underflow says nothing.
         let lower = if lower > f64::MIN_POSITIVE { lower } else { 0.0 };
         let cycle = if lower > 0.0 { search.cycle } else { Vec::new() };
-        WorstCase { lower, upper, cycle, products: search.products, complete: upper - lower <= effort.accuracy }
+        WorstCase { lower, upper, cycle, products: search.products, complete: upper - lower <= effort.accuracy, certificate }
     }
 }
+
+/// The most numbers in products that are kept for leaves, 256 MiB of them; those of further leaves are computed again when their turn comes.
+const MOST_KEPT: usize = 1 << 25;
 
 /// An edge on a cycle, in the nodes' coordinates.
 struct Step {
@@ -101,7 +110,8 @@ struct Leaf {
     root: usize,
     node: usize,
     length: usize,
-    product: Approximate,
+    /// `None` if there was no room for it.
+    product: Option<Approximate>,
     norm: f64,
     /// Its last entry among the trails.
     trail: Option<usize>,
@@ -120,13 +130,16 @@ struct Search {
     products: u64,
     /// Paths as (the entry before, the step).
     trails: Vec<(Option<usize>, usize)>,
+    /// How many more numbers may be kept in products of leaves.
+    room: usize,
+    norms: Norms,
     /// Closed paths whose radius is known, from whichever of their nodes comes first in order.
     closed: BTreeSet<Vec<usize>>,
 }
 
 impl Search {
-    fn new(automaton: &Automaton, accuracy: f64) -> Self {
-        let steps = steps(automaton, accuracy);
+    fn new(automaton: &Automaton, certificate: Option<&Certificate>, accuracy: f64) -> Self {
+        let steps = steps(automaton, certificate);
         let mut from = vec![Vec::new(); automaton.pattern().nodes()];
         for (number, step) in steps.iter().enumerate() {
             from[step.edge.from].push(number);
@@ -141,6 +154,8 @@ impl Search {
             cycle: Vec::new(),
             products: 0,
             trails: Vec::new(),
+            room: MOST_KEPT,
+            norms: Norms::default(),
             closed: BTreeSet::new(),
         }
     }
@@ -151,16 +166,26 @@ impl Search {
             let (product, norm) = (step.image.clone(), step.norm);
             self.look_at(number, product, norm, step.edge.from, f64::INFINITY, 0, None);
         }
+        // A norm that is looser than the accuracy saves squarings and costs products.
+        let sharp = (0.25 * self.accuracy).clamp(1e-5, 5e-3);
         while self.products < budget && self.leaves.peek().is_some_and(|leaf| !self.is_settled(leaf.bound)) {
-            let Some(leaf) = self.leaves.pop() else { break };
+            let Some(mut leaf) = self.leaves.pop() else { break };
+            let above = match leaf.product.take() {
+                Some(product) => {
+                    self.room += product.matrix.entries().len();
+                    product
+                }
+                None => self.product(leaf.trail),
+            };
             for place in 0..self.from[leaf.node].len() {
                 let number = self.from[leaf.node][place];
                 let step = &self.steps[number];
-                let product = step.image.times(step.norm, &leaf.product, leaf.norm);
+                let product = step.image.times(step.norm, &above, leaf.norm);
                 let length = leaf.length + 1;
                 let enough = libm::pow(self.lower + self.accuracy, real(length)) * (1.0 - 1e-9);
-                // Only its root of order `length` counts.
-                let norm = norm_above(&product.matrix, Sharpness { enough, beyond: 0.005 * real(length) });
+                // Only its root of order `length` counts, and only if it is below the bound that the leaf has already.
+                let useless = libm::pow(leaf.bound, real(length)) * (1.0 + 1e-9);
+                let norm = self.norms.above(&product.matrix, Sharpness { enough, beyond: sharp * real(length), useless });
                 self.look_at(number, product, norm, leaf.root, leaf.bound, leaf.length, leaf.trail);
             }
         }
@@ -181,6 +206,11 @@ impl Search {
         if self.is_settled(bound) {
             self.settled = self.settled.max(bound);
         } else {
+            let entries = product.matrix.entries().len();
+            let product = (entries <= self.room).then_some(product);
+            if product.is_some() {
+                self.room -= entries;
+            }
             self.leaves.push(Leaf { bound, order: self.products, root, node, length, product, norm, trail });
         }
     }
@@ -195,9 +225,9 @@ impl Search {
         bound <= self.lower + self.accuracy
     }
 
-    /// Looks whether a closed path grows faster than the fastest so far.
-    fn close(&mut self, product: &Approximate, length: usize, trail: Option<usize>) {
-        let mut path = Vec::with_capacity(length);
+    /// The steps of a path, in order of time.
+    fn path(&self, trail: Option<usize>) -> Vec<usize> {
+        let mut path = Vec::new();
         let mut next = trail;
         while let Some(place) = next {
             let (before, number) = self.trails[place];
@@ -205,6 +235,25 @@ impl Search {
             next = before;
         }
         path.reverse();
+        path
+    }
+
+    /// The product of a path once more.
+    fn product(&mut self, trail: Option<usize>) -> Approximate {
+        let path = self.path(trail);
+        let mut product = self.steps[path[0]].image.clone();
+        for number in &path[1..] {
+            // Any bound of the norm gives a bound of the error.
+            let norm = self.norms.above(&product.matrix, Sharpness { enough: f64::INFINITY, beyond: 1.0, useless: 0.0 });
+            let step = &self.steps[*number];
+            product = step.image.times(step.norm, &product, norm);
+        }
+        product
+    }
+
+    /// Looks whether a closed path grows faster than the fastest so far.
+    fn close(&mut self, product: &Approximate, length: usize, trail: Option<usize>) {
+        let path = self.path(trail);
         // The same cycle from another of its nodes, or several times around, has the same radius.
         let rotated = |start: usize| path[start..].iter().chain(&path[..start]);
         let first = (1..length).fold(0, |first, start| if rotated(start).cmp(rotated(first)) == Ordering::Less { start } else { first });
@@ -225,12 +274,10 @@ impl Search {
     }
 }
 
-/// The edges on cycles in the coordinates of a certificate's shapes; of round ones, where that failed.
-fn steps(automaton: &Automaton, accuracy: f64) -> Vec<Step> {
+/// The edges on cycles in the coordinates of a certificate's shapes; of round ones, where there is none.
+fn steps(automaton: &Automaton, certificate: Option<&Certificate>) -> Vec<Step> {
     let identity = || vec![Matrix::identity(automaton.size()); automaton.pattern().nodes()];
-    // Branching makes up for what the shapes are not.
-    let found = Certificate::find(automaton, accuracy.clamp(1e-6, 1e-2));
-    let factors: Option<Vec<Matrix>> = found.ok().and_then(|certificate| certificate.shapes().iter().map(cholesky).collect());
+    let factors: Option<Vec<Matrix>> = certificate.and_then(|certificate| certificate.shapes().iter().map(cholesky).collect());
     let inverses = factors.as_ref().and_then(|factors| factors.iter().map(Inverse::of).collect::<Option<Vec<Inverse>>>());
     let (factors, inverses) = match (factors, inverses) {
         (Some(factors), Some(inverses)) => (factors, inverses),
@@ -241,7 +288,7 @@ fn steps(automaton: &Automaton, accuracy: f64) -> Vec<Step> {
     };
     let step = |edge: &Edge| {
         let image = image(&automaton.matrices()[edge.symbol], &factors[edge.to], &inverses[edge.from]);
-        let norm = norm_above(&image.matrix, Sharpness { enough: 0.0, beyond: 1e-4 });
+        let norm = norm_above(&image.matrix, Sharpness { enough: 0.0, beyond: 1e-4, useless: f64::INFINITY });
         Step { edge: *edge, image, norm }
     };
     automaton.recurrent().map(step).collect()
@@ -310,3 +357,28 @@ impl PartialEq for Leaf {
 }
 
 impl Eq for Leaf {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without room for a single product every path is multiplied again, and the bounds are the same to the rounding of their error terms.
+    #[test]
+    fn without_room_the_bounds_are_the_same() {
+        let matrices = [[0.5, 0.4, -0.3, 0.6], [0.4, -0.6, 0.5, 0.3]].map(|entries| Matrix::from_fn(2, 2, |i, j| entries[2 * i + j]));
+        let automaton = Automaton::runs(matrices.to_vec(), 1, 2).unwrap();
+        let bounds = |room: usize| {
+            let certificate = Certificate::find(&automaton, 1e-2).unwrap();
+            let mut search = Search::new(&automaton, Some(&certificate), 1e-6);
+            search.room = room;
+            search.run(3_000);
+            (search.lower, search.upper(), search.products)
+        };
+        let (lower, upper, products) = bounds(MOST_KEPT);
+        assert!(products > 100 && upper - lower < 1e-2, "{lower} {upper} {products}");
+        for room in [0, 17] {
+            let (other_lower, other_upper, _) = bounds(room);
+            assert!((other_lower - lower).abs() < 1e-12 && (other_upper - upper).abs() < 1e-12, "{other_lower} {other_upper}");
+        }
+    }
+}

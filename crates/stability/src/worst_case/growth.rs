@@ -62,7 +62,7 @@ pub(super) fn radius_below(product: &Approximate, length: usize, enough: f64) ->
     let mut power = base.clone();
     let (mut exponent, mut factors, mut best) = (base_exponent, 1.0, 0.0_f64);
     for _ in 0..MOST_SQUARINGS {
-        let norm = norm_above(&power.matrix, Sharpness { enough: 0.0, beyond: 0.02 });
+        let norm = norm_above(&power.matrix, Sharpness { enough: 0.0, beyond: 0.02, useless: f64::INFINITY });
         // ρ(M)ᵏ = ρ(Mᵏ) <= ‖Mᵏ‖.
         let above = root_above(power.norm(norm), exponent, factors * real(length));
         if above <= enough || norm == 0.0 {
@@ -107,7 +107,7 @@ fn trace_share(power: &Approximate) -> f64 {
 
 /// M, M², …, Mⁿ, with upper bounds of their computed norms.
 fn powers(base: &Approximate) -> Vec<(Approximate, f64)> {
-    let norm_of = |of: &Approximate| norm_above(&of.matrix, Sharpness { enough: 0.0, beyond: 0.02 });
+    let norm_of = |of: &Approximate| norm_above(&of.matrix, Sharpness { enough: 0.0, beyond: 0.02, useless: f64::INFINITY });
     let base_norm = norm_of(base);
     let mut powers = vec![(base.clone(), base_norm)];
     while powers.len() < base.matrix.rows() {

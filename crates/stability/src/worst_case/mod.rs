@@ -24,6 +24,7 @@ mod growth;
 mod join;
 mod lyapunov;
 mod norm;
+mod of_scene;
 mod pattern;
 mod rounding;
 mod symmetric;
@@ -33,5 +34,6 @@ mod verified;
 
 pub use automaton::{Automaton, AutomatonError};
 pub use gripenberg::{Effort, WorstCase};
+pub use of_scene::{Links, Patterns, SceneWorstCase, SceneWorstCaseError, WorstPart, WorstVerdict, worst_case};
 pub use pattern::{Edge, Pattern, PatternError};
 pub use verified::{Certificate, CertificateError};
