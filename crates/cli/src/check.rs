@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use cohaptic_harness::check::Judged;
 use cohaptic_harness::{Model, check as harness};
 use cohaptic_scene::{Scene, SceneError, scene_files};
+use cohaptic_stability::{Method, Verdict, has_chance, judge};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -81,11 +83,35 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
                     status: BAD_INPUT,
                 };
             }
-            let failures = harness::check(&scene, model, || !interrupt::asked());
+            let failures = harness::check_with(&scene, model, judged, || !interrupt::asked());
             let status = if failures.is_empty() { 0 } else { EXPECTATION };
             Checked { file: output::path(file), passed: failures.is_empty(), failures, expects: scene.expect.is_some(), status }
         }
     }
+}
+
+/// Whether a scene is as stable as it is expected to be, by analysis. One that is not linear, that changes on its way, or whose chance has no second
+/// moment that can be followed, is left to a simulation.
+fn judged(scene: &Scene, stable: bool) -> Judged {
+    if !scene.timeline.is_empty() {
+        return Judged::Unknown;
+    }
+    let Ok(judgement) = judge(scene, Method::Reduced) else {
+        return Judged::Unknown;
+    };
+    if judgement.analysis.modes.len() > 1 || (judgement.mean_square.is_none() && has_chance(scene)) {
+        return Judged::Unknown;
+    }
+    let (radius, what) = match &judgement.mean_square {
+        Some(mean_square) => (mean_square.radius, "mean-square radius"),
+        None => (judgement.analysis.radius, "spectral radius"),
+    };
+    let expected = if stable { Verdict::Stable } else { Verdict::Unstable };
+    if judgement.verdict == expected {
+        return Judged::AsExpected;
+    }
+    let (expected, found) = (expected.word(), judgement.verdict.word());
+    Judged::Otherwise(format!("expected {expected}, but it is {found}: the {what} is {} within {:.1e}", radius.value, radius.error))
 }
 
 impl Checked {

@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand};
 
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use scenes::{CheckArguments, ExplainArguments, RunArguments};
-pub(crate) use stability::{BoundaryArguments, GridSize, MapArguments, PointArguments, StabilityArguments, StabilityCommand};
+pub(crate) use stability::{BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, StabilityArguments, StabilityCommand};
 
 /// Several people feel and move one virtual object together, over a bad network.
 ///

@@ -2,6 +2,7 @@
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueEnum};
 use cohaptic_stability::Method;
@@ -34,6 +35,40 @@ pub(crate) struct PointArguments {
     /// pays); or the whole state pushed through the code that simulates
     #[arg(long, value_enum, default_value_t = MethodName::Reduced)]
     pub(crate) method: MethodName,
+    /// Let each peer hear only its neighbours: complete (as the scene is), ring, star, or a CSV file of mutual weights, one row a peer. The peers must
+    /// be equal
+    #[arg(long, value_name = "GRAPH", conflicts_with_all = ["method", "losses_in_a_row", "delay_within"])]
+    pub(crate) graph: Option<String>,
+    /// The worst case too: at most so many samples lost in a row
+    #[arg(long, value_name = "N")]
+    pub(crate) losses_in_a_row: Option<u32>,
+    /// The worst case too: every sample takes any time from LO to HI, such as 20ms..26ms
+    #[arg(long, value_name = "LO..HI", value_parser = delays)]
+    pub(crate) delay_within: Option<(Duration, Duration)>,
+    /// In the worst case, whether all links lose and delay together, or each on its own
+    #[arg(long, value_enum, value_name = "WHICH", default_value_t = LinksName::Together)]
+    pub(crate) links: LinksName,
+    /// How near the bounds of the worst case shall be
+    #[arg(long, value_name = "DISTANCE", default_value_t = 1e-3)]
+    pub(crate) accuracy: f64,
+    /// How many products of matrices the search for the worst case may look at
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    pub(crate) products: u64,
+}
+
+/// Which links share their fate.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub(crate) enum LinksName {
+    Together,
+    Each,
+}
+
+/// Two durations, as `20ms..26ms`.
+fn delays(text: &str) -> Result<(Duration, Duration), String> {
+    let (low, high) = text.split_once("..").ok_or("expected LO..HI, such as 20ms..26ms")?;
+    let parse = |text: &str| cohaptic_units::parse::duration(text.trim()).map_err(|error| error.to_string());
+    let (low, high) = (parse(low)?, parse(high)?);
+    if low <= high { Ok((low, high)) } else { Err("the shorter delay comes first".to_owned()) }
 }
 
 /// How a verdict is reached.

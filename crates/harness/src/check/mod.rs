@@ -17,9 +17,27 @@ use expectations::Watched;
 ///
 /// A scene that is [too large](crate::too_large) to be simulated gives the one line that says so.
 ///
-/// `keep_going` is asked about every thousand instants; when it says `false` the check ends with a line that says so.
+/// Whether the scene is stable is told by a simulation. `keep_going` is asked about every thousand instants; when it says `false` the check ends with a
+/// line that says so.
 #[must_use]
-pub fn check(scene: &Scene, model: Model, mut keep_going: impl FnMut() -> bool) -> Vec<String> {
+pub fn check(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) -> Vec<String> {
+    check_with(scene, model, |_, _| Judged::Unknown, keep_going)
+}
+
+/// What a caller knows of whether a scene is as stable as it is expected to be.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Judged {
+    /// It is.
+    AsExpected,
+    /// It is not, or that cannot be told: a line that says so.
+    Otherwise(String),
+    /// Nothing: a simulation tells.
+    Unknown,
+}
+
+/// [`check`], where `judge` is asked first whether the scene is stable (`true`) or unstable (`false`), as expected.
+#[must_use]
+pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) -> Judged, mut keep_going: impl FnMut() -> bool) -> Vec<String> {
     let Some(expect) = &scene.expect else {
         return Vec::new();
     };
@@ -35,7 +53,11 @@ pub fn check(scene: &Scene, model: Model, mut keep_going: impl FnMut() -> bool) 
         return failures;
     }
     if let Some(expected) = expect.stable {
-        failures.extend(stability(scene, model, &mut keep_going).failure(expected));
+        match judge(scene, expected) {
+            Judged::AsExpected => {}
+            Judged::Otherwise(failure) => failures.push(failure),
+            Judged::Unknown => failures.extend(stability(scene, model, &mut keep_going).failure(expected)),
+        }
     }
     failures.extend(watched.failures(scene, expect, &summary));
     failures

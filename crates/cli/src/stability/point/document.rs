@@ -1,18 +1,24 @@
 //! The JSON document of a verdict.
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Analysis, ContactMode, Part, PartKind};
+use cohaptic_stability::{Analysis, ContactMode, Judgement, Part, PartKind, SceneWorstCase};
 use serde::Serialize;
 
+use super::worst::WorstDocument;
 use super::{per_second, time_constant};
 
 /// What `cohaptic stability point --json` prints.
 #[derive(Serialize)]
 pub(super) struct Document<'a> {
     title: &'a str,
+    /// In the mean square where links leave something to chance.
     verdict: &'static str,
     spectral_radius: f64,
     error_bound: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean_square_radius: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean_square_error_bound: Option<f64>,
     rigid_modes: usize,
     dimension: usize,
     method: &'static str,
@@ -22,7 +28,9 @@ pub(super) struct Document<'a> {
     /// Of the mode of contact with the largest radius.
     parts: Vec<PartDocument<'a>>,
     modes: Vec<ModeDocument<'a>>,
-    notes: &'a [String],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_case: Option<WorstDocument<'a>>,
+    notes: Vec<&'a str>,
 }
 
 #[derive(Serialize)]
@@ -47,10 +55,14 @@ struct PartDocument<'a> {
 }
 
 impl<'a> Document<'a> {
-    pub(super) fn new(scene: &'a Scene, analysis: &'a Analysis) -> Self {
+    pub(super) fn new(scene: &'a Scene, judgement: &'a Judgement, worst: Option<&'a SceneWorstCase>) -> Self {
+        let Judgement { verdict, analysis, mean_square } = judgement;
+        let radius = mean_square.as_ref().map(|mean_square| mean_square.radius);
         Self {
             title: &scene.title,
-            verdict: analysis.verdict().word(),
+            verdict: verdict.word(),
+            mean_square_radius: radius.map(|radius| radius.value),
+            mean_square_error_bound: radius.map(|radius| radius.error),
             spectral_radius: analysis.radius.value,
             error_bound: analysis.radius.error,
             rigid_modes: analysis.rigid_modes,
@@ -61,7 +73,8 @@ impl<'a> Document<'a> {
             time_constant_s: time_constant(analysis),
             parts: worst_mode(analysis).map(|mode| parts(scene, mode)).unwrap_or_default(),
             modes: analysis.modes.iter().map(|mode| ModeDocument::new(scene, mode)).collect(),
-            notes: &analysis.notes,
+            worst_case: worst.map(WorstDocument::new),
+            notes: notes(judgement),
         }
     }
 }
@@ -100,6 +113,18 @@ impl<'a> PartDocument<'a> {
             error_bound: part.radius.error,
         }
     }
+}
+
+/// What is left out, by the analysis and by the mean square, each once.
+pub(super) fn notes(judgement: &Judgement) -> Vec<&str> {
+    let mean_square = judgement.mean_square.iter().flat_map(|mean_square| &mean_square.notes);
+    let mut notes: Vec<&str> = Vec::new();
+    for note in judgement.analysis.notes.iter().chain(mean_square) {
+        if !notes.contains(&note.as_str()) {
+            notes.push(note);
+        }
+    }
+    notes
 }
 
 /// The mode of contact with the largest radius.

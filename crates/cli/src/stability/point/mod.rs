@@ -1,12 +1,14 @@
 //! `cohaptic stability point`.
 
 mod document;
+mod graph;
 mod words;
+mod worst;
 
 use std::process::ExitCode;
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Analysis, analyse};
+use cohaptic_stability::{Analysis, judge};
 
 use super::not_analysed;
 use crate::arguments::PointArguments;
@@ -18,11 +20,15 @@ use document::Document;
 pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let path = &arguments.scene.scene;
     let scene = Scene::read(path, &arguments.scene.overrides.set)?;
-    let analysis = analyse(&scene, arguments.method.into()).map_err(|error| not_analysed(path, &error))?;
+    let judgement = match &arguments.graph {
+        Some(graph) => graph::on(&scene, graph, path)?,
+        None => judge(&scene, arguments.method.into()).map_err(|error| not_analysed(path, &error))?,
+    };
+    let worst = worst::of(&scene, arguments, path)?;
     if arguments.scene.json {
-        output::json(&Document::new(&scene, &analysis))?;
+        output::json(&Document::new(&scene, &judgement, worst.as_ref()))?;
     } else {
-        output::text(&words::describe(&scene, &analysis))?;
+        output::text(&words::describe(&scene, &judgement, worst.as_ref()))?;
     }
     Ok(ExitCode::SUCCESS)
 }

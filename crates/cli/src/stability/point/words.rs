@@ -3,21 +3,26 @@
 use std::fmt::Write as _;
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Analysis, ContactMode, Method, Part, PartKind, Radius, Verdict};
+use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, WorstVerdict};
 use cohaptic_units::print::Span;
 
-use super::document::worst_mode;
+use super::document::{notes, worst_mode};
 use super::{per_second, time_constant};
 
 /// The modes of contact that are listed at most; the worst is always among them.
 const MOST_MODES: usize = 16;
 
-pub(super) fn describe(scene: &Scene, analysis: &Analysis) -> String {
-    let mut text = format!("{}\n\n{}\n", scene.title, sentence(analysis));
+pub(super) fn describe(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>) -> String {
+    let Judgement { verdict, analysis, mean_square } = judgement;
+    let mut text = format!("{}\n\n{}\n", scene.title, sentence(*verdict, mean_square.is_some()));
     // Writing to a string does not fail.
     let mut line = |line: String| {
         let _ = writeln!(text, "  {line}");
     };
+    if let Some(mean_square) = mean_square {
+        line(format!("mean-square radius {} over a frame of {}", number(mean_square.radius), Span(mean_square.frame)));
+        line(format!("with nothing left to chance: {}", analysis.verdict().word()));
+    }
     line(format!("spectral radius {} over a frame of {}", number(analysis.radius), Span(analysis.frame)));
     line(speed(analysis));
     let rigid = match analysis.rigid_modes {
@@ -37,20 +42,47 @@ pub(super) fn describe(scene: &Scene, analysis: &Analysis) -> String {
             line(format!("  {:<44}{:>4} states, {:>4} times  {}", name(scene, part), part.size, part.copies, number(part.radius)));
         }
     }
-    if !analysis.notes.is_empty() {
+    if let Some(worst) = worst {
+        worst_case(worst, &mut line);
+    }
+    let notes = notes(judgement);
+    if !notes.is_empty() {
         line(String::new());
-        analysis.notes.iter().for_each(|note| line(format!("note: {note}")));
+        notes.iter().for_each(|note| line(format!("note: {note}")));
     }
     // Lines that are empty but for the indentation.
     text.replace("\n  \n", "\n\n")
 }
 
-fn sentence(analysis: &Analysis) -> &'static str {
-    match analysis.verdict() {
-        Verdict::Stable => "STABLE: every disturbance of the relative motion dies out",
-        Verdict::Marginal => "MARGINAL: the spectral radius cannot be told from 1 within its error",
-        Verdict::Unstable => "UNSTABLE: some disturbance of the relative motion grows without end",
+fn sentence(verdict: Verdict, mean_square: bool) -> &'static str {
+    match (verdict, mean_square) {
+        (Verdict::Stable, false) => "STABLE: every disturbance of the relative motion dies out",
+        (Verdict::Marginal, false) => "MARGINAL: the spectral radius cannot be told from 1 within its error",
+        (Verdict::Unstable, false) => "UNSTABLE: some disturbance of the relative motion grows without end",
+        (Verdict::Stable, true) => "STABLE in the mean square: the variance of every disturbance of the relative motion dies out",
+        (Verdict::Marginal, true) => "MARGINAL: the mean-square radius cannot be told from 1 within its error",
+        (Verdict::Unstable, true) => "UNSTABLE in the mean square: the variance of some disturbance of the relative motion grows without end",
     }
+}
+
+/// The worst case, with the pattern that makes it.
+fn worst_case(worst: &SceneWorstCase, line: &mut impl FnMut(String)) {
+    let verdict = match worst.verdict() {
+        WorstVerdict::Stable => "stable whatever the network does within these bounds",
+        WorstVerdict::Undecided => "not decided: 1 is between the bounds; --products and --accuracy may tell",
+        WorstVerdict::Unstable => "unstable under some pattern within these bounds",
+    };
+    line(String::new());
+    line(format!("worst case: {verdict}"));
+    line(format!("  growth a sending period between {:.6} and {:.6}", worst.lower, worst.upper));
+    if let Some(rate) = worst.certificate {
+        line(format!("  a quadratic certificate, checked, proves {rate:.6}"));
+    }
+    let part = worst.worst();
+    if !part.sequence.is_empty() {
+        line(format!("  the pattern that grows as the lower bound: {}", part.sequence));
+    }
+    worst.notes.iter().for_each(|note| line(format!("  note: {note}")));
 }
 
 /// How fast the slowest disturbance changes.
