@@ -1,6 +1,7 @@
 //! The Bode plot: magnitude over phase, over a logarithmic frequency, beside free masses (as Rakhsha & Constantinescu 2015, Figure 5).
 
 use cohaptic_harness::record::svg::{self, Drawing, DrawingResult};
+use cohaptic_stability::Verdict;
 use plotters::prelude::*;
 
 use super::axes::{Decades, Steps};
@@ -39,7 +40,7 @@ pub(super) fn svg(peer: &str, curves: &[Curve]) -> Result<String, Failure> {
 }
 
 /// Between two points of a line a frequency is this much higher at most: a resonance is round then, and a phase can be followed through its jumps.
-const FINEST: f64 = 1.05;
+const FINEST: f64 = 1.02;
 
 /// The frequencies that were asked for, rising, with so many between them that no two are far apart.
 fn filled(curve: &Curve) -> Vec<f64> {
@@ -56,11 +57,19 @@ fn responded(number: usize, curve: &Curve) -> Result<Line, Failure> {
     let response = curve.admittance.response(&filled(curve)).map_err(|error| Failure::Input(error.to_string()))?;
     let hz = || response.points.iter().map(|point| point.hz);
     Ok(Line {
-        name: curve.name.clone(),
+        name: named(curve),
         look: Look::of(number),
         magnitudes: hz().zip(response.magnitudes_db()).collect(),
         phases: hz().zip(response.phases_deg()).collect(),
     })
+}
+
+/// The name, and the verdict where it is no good one: such a curve is nothing that could be measured.
+fn named(curve: &Curve) -> String {
+    match curve.admittance.verdict() {
+        Verdict::Stable => curve.name.clone(),
+        verdict @ (Verdict::Marginal | Verdict::Unstable) => format!("{} ({})", curve.name, verdict.word().to_uppercase()),
+    }
 }
 
 /// The objects of all curves, as free masses: each mass once.
@@ -72,7 +81,8 @@ fn masses(curves: &[Curve]) -> Vec<Line> {
             continue;
         }
         // Straight over a logarithmic frequency.
-        let ends = extent(curve.response.points.iter().map(|point| point.hz)).map_or(Vec::new(), |(low, high)| vec![low, high]);
+        let ends = extent(curve.response.points.iter().map(|point| point.hz))
+            .map_or(Vec::new(), |(low, high)| if low < high { vec![low, high] } else { vec![low] });
         let magnitudes = ends.iter().map(|hz| (*hz, curve.ideal_db(*hz))).collect();
         lines.push(Line { name, look: Look::grey(), magnitudes, phases: ends.into_iter().map(|hz| (hz, -90.0)).collect() });
     }

@@ -76,13 +76,13 @@ fn the_text_has_a_table_and_says_what_is_felt() {
 #[test]
 fn several_curves_are_laid_over_each_other() {
     let desk = desk();
-    let curve = "--curve scene.title=b,coordination.strategy=proportional-derivative --curve 'link.delay=24ms, coordination.stiffness=500'";
+    let curve = "--curve scene.title=b,coordination.strategy=proportional-derivative --curve 'link.delay=24ms, coordination.stiffness=200'";
     let document = desk.json(&format!("admittance two.toml --peer left --json --points 40 --out out/a {curve}"));
-    let alone = desk.json("admittance two.toml --peer left --json --points 40 --set link.delay=24ms --set coordination.stiffness=500");
+    let alone = desk.json("admittance two.toml --peer left --json --points 40 --set link.delay=24ms --set coordination.stiffness=200");
     assert_eq!(document["curves"].as_array().map(Vec::len), Some(2));
     // For two peers both strategies are the same.
     assert_eq!((&document["curves"][0]["points"], &document["curves"][1]["points"]), (&document["points"], &alone["points"]));
-    assert_eq!(document["curves"][1]["name"], "link.delay=24ms, coordination.stiffness=500");
+    assert_eq!(document["curves"][1]["name"], "link.delay=24ms, coordination.stiffness=200");
     assert_eq!(document["files"], serde_json::json!(["out/a/admittance.csv", "out/a/admittance.svg"]));
     assert_eq!(desk.files("out/a"), ["admittance.csv", "admittance.svg"]);
 
@@ -99,14 +99,14 @@ fn several_curves_are_laid_over_each_other() {
             }
         }
     }
-    assert_eq!([&rows[0][0], &rows[80][0]], ["as it stands", "link.delay=24ms, coordination.stiffness=500"]);
+    assert_eq!([&rows[0][0], &rows[80][0]], ["as it stands", "link.delay=24ms, coordination.stiffness=200"]);
     let words = svg::words(&desk.read("out/a/admittance.svg"));
     for word in [
         "Two users: velocity over force of left",
         "f [Hz]",
         "degrees",
         "as it stands",
-        "link.delay=24ms, coordination.stiffness=500",
+        "link.delay=24ms, coordination.stiffness=200",
         "free mass of 0.45 kg",
         "Phase",
         "0.01",
@@ -125,9 +125,11 @@ fn an_unstable_scene_warns() {
     assert!(document["warning"].as_str().unwrap().contains("unstable") && number(&document["spectral_radius"]) > 1.0);
     assert_eq!((&document["verdict"], document["points"].as_array().map(Vec::len)), (&"unstable".into(), Some(1)));
     // One curve of several.
-    let document = desk.json("admittance two.toml --peer left --at 1 --curve coordination.stiffness=20000 --json");
+    let document = desk.json("admittance two.toml --peer left --at 1 --curve coordination.stiffness=20000 --json --out out");
     assert_eq!((&document["verdict"], &document["curves"][0]["verdict"]), (&"stable".into(), &"unstable".into()));
     assert!(document["warning"].is_null() && document["curves"][0]["warning"].is_string());
+    let words = svg::words(&desk.read("out/admittance.svg"));
+    assert!(["as it stands", "coordination.stiffness=20000 (UNSTABLE)"].iter().all(|name| words.iter().any(|word| word == name)), "{words:?}");
 }
 
 /// A point is the same whatever else is asked for, and its phase is between −180 and 180. The picture takes points in any order, and
