@@ -1,11 +1,13 @@
 //! Why a command ended without its result, and with which exit status.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use cohaptic_harness::record::RecordError;
 use cohaptic_scene::SceneError;
+
+use crate::output;
 
 /// An expectation failed.
 pub(crate) const EXPECTATION: u8 = 1;
@@ -63,14 +65,15 @@ impl Failure {
     }
 }
 
-/// Why the variant of a scene that can be read cannot be had.
-pub(crate) fn of_variant(error: SceneError, against: &[String]) -> Failure {
+/// Why the variant of a scene that can be read cannot be had, where an option other than `--set` said what is different.
+pub(crate) fn of_variant(error: SceneError, option: &'static str, overrides: &[String]) -> Failure {
     let text = error.diagnostic().and_then(cohaptic_scene::Diagnostic::override_text);
-    if text.is_some_and(|text| against.iter().any(|given| given == text)) {
-        Failure::Override { option: "--against", error }
-    } else {
-        Failure::Scene(error)
-    }
+    if text.is_some_and(|text| overrides.iter().any(|given| given == text)) { Failure::Override { option, error } } else { Failure::Scene(error) }
+}
+
+/// Why a scene that makes sense cannot be analysed.
+pub(crate) fn not_analysed(scene: &Path, error: &impl std::fmt::Display) -> Failure {
+    Failure::Input(format!("{}: {error}", output::path(scene)))
 }
 
 /// The exit status for a scene that could not be had.

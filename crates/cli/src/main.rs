@@ -3,12 +3,14 @@
 //! This is the only crate that prints. Results go to standard output, everything else to standard error. Exit status: 0 done, 1 an expectation
 //! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted.
 
+mod admittance;
 mod arguments;
 mod check;
 mod explain;
 mod failure;
 mod fit;
 mod interrupt;
+mod lines;
 mod link;
 mod output;
 mod output_file;
@@ -16,6 +18,7 @@ mod progress;
 mod run;
 mod stability;
 mod terminal_plot;
+mod variants;
 
 use std::process::ExitCode;
 
@@ -31,6 +34,7 @@ fn main() -> ExitCode {
         Command::Check(arguments) => check::check(&arguments),
         Command::Explain(arguments) => explain::explain(&arguments),
         Command::Stability(arguments) => stability::stability(&arguments),
+        Command::Admittance(arguments) => admittance::admittance(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),
     };

@@ -1,10 +1,22 @@
 //! A file that is written: under another name until it is whole.
 
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
+
+/// Writes a whole file, which has its name only then.
+pub(crate) fn write_file(path: &Path, content: &str) -> Result<(), Failure> {
+    let (file, mut to) = OutputFile::create(path)?;
+    let written = to.write_all(content.as_bytes()).and_then(|()| to.flush()).map(|()| to);
+    file.finish(written)
+}
+
+/// A field of a CSV file, quoted where it must be (RFC 4180).
+pub(crate) fn field(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
 
 /// A file on its way.
 #[derive(Debug)]

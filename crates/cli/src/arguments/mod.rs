@@ -1,5 +1,6 @@
 //! What can be said on the command line.
 
+mod admittance;
 mod links;
 mod scenes;
 mod stability;
@@ -8,6 +9,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub(crate) use admittance::AdmittanceArguments;
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use scenes::{CheckArguments, ExplainArguments, RunArguments};
 pub(crate) use stability::{BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, StabilityArguments, StabilityCommand};
@@ -34,6 +36,8 @@ pub(crate) enum Command {
     Explain(ExplainArguments),
     /// Says whether a scene is stable without simulating it, maps where it is, and finds where that changes
     Stability(StabilityArguments),
+    /// Says what the hand of one peer feels, frequency by frequency, without simulating it
+    Admittance(AdmittanceArguments),
     /// Sends a steady stream over one link and sets what it achieved beside what it was asked for
     Link(LinkArguments),
     /// Estimates the link that made a file of measurements, captures or fates

@@ -29,7 +29,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         None
     } else {
         let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
-        let mut variant = Scene::read(&arguments.scene.scene, &both).map_err(|error| failure::of_variant(error, &arguments.against))?;
+        let mut variant = Scene::read(&arguments.scene.scene, &both).map_err(|error| failure::of_variant(error, "--against", &arguments.against))?;
         variant.title = format!("{}, with {}", variant.title, arguments.against.join(", "));
         Some(variant)
     };

@@ -6,7 +6,7 @@ use cohaptic_scene::{Scene, SceneError};
 use cohaptic_stability::{Family, FamilyError, KeyRange};
 
 use super::rows_file::fingerprint;
-use crate::failure::Failure;
+use crate::failure::{Failure, not_analysed};
 use crate::output;
 
 /// The text of a scene.
@@ -44,7 +44,7 @@ impl Said<'_> {
                     None => Failure::Scene(error),
                 }
             }
-            FamilyError::Analysis(error) => super::not_analysed(self.file, &error),
+            FamilyError::Analysis(error) => not_analysed(self.file, &error),
             error @ (FamilyError::NoNumber { .. }
             | FamilyError::Keys { .. }
             | FamilyError::Twice { .. }

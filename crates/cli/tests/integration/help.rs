@@ -7,7 +7,9 @@ use crate::scenes::TWO;
 fn help_names_the_commands() {
     let text = Desk::new().text("--help");
     assert!(
-        ["run", "check", "explain", "stability", "link", "fit", "Exit status: 0 done", "130 interrupted"].iter().all(|word| text.contains(word)),
+        ["run", "check", "explain", "stability", "admittance", "link", "fit", "Exit status: 0 done", "130 interrupted"]
+            .iter()
+            .all(|word| text.contains(word)),
         "{text}"
     );
     assert!(Desk::new().text("--version").starts_with("cohaptic "));
@@ -39,6 +41,20 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
             &["[SPEC]...", "--from <FATES.csv>", "--packets <N>", "--every <TIME>", "--size <SIZE>", "--seed <N>", "--profile <PROFILE>", "--ecn"],
         ),
         ("fit", &["<FILE> [RECEIVER]", "--port <N>", "--skew", "--json", "--out <SCENE_LINK.toml>"]),
+        (
+            "admittance",
+            &[
+                "--peer <NAME>",
+                "--from <HZ>",
+                "--to <HZ>",
+                "--points <N>",
+                "--at <HZ,...>",
+                "--curve <KEY=VALUE,...>",
+                "--set <KEY=VALUE>",
+                "--json",
+                "--out <DIR>",
+            ],
+        ),
     ] {
         let text = Desk::new().text(&format!("{command} --help"));
         for part in options.iter().chain(&["Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output"]) {

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 #![expect(clippy::float_cmp, reason = "what is printed is what was computed, to the bit")]
 
+mod admittance;
 mod against;
 mod check;
 mod desk;

@@ -9,7 +9,7 @@ use super::picture::Picture;
 use super::words::crossing_in_words;
 use crate::failure::Failure;
 use crate::output;
-use crate::stability::map::{field, write_file};
+use crate::output_file::{field, write_file};
 use crate::stability::quantity::label;
 
 /// Writes `boundary.csv`, `samples.csv` and `boundary.svg`, and gives their paths.

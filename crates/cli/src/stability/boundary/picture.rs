@@ -3,7 +3,7 @@
 use cohaptic_harness::record::svg;
 use plotters::prelude::*;
 
-use crate::stability::lines::{Look, Sample, draw_legend, draw_line, legend_height};
+use crate::lines::{Look, Sample, draw_legend, draw_line, legend_height};
 
 /// What is shown.
 pub(super) struct Picture<'a> {

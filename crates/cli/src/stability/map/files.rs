@@ -1,13 +1,12 @@
 //! The files of a map: a table for each variant, and one picture.
 
-use std::io::Write as _;
 use std::path::Path;
 
 use super::picture::{Axis, Outline, Picture};
 use super::{Order, VariantMap};
 use crate::failure::Failure;
 use crate::output;
-use crate::output_file::OutputFile;
+use crate::output_file::{field, write_file};
 use crate::stability::quantity::label;
 
 /// Writes `map.csv`, `map-2.csv` ... and `map.svg`, and gives their paths.
@@ -25,13 +24,6 @@ pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap]) -> Re
     Ok(files)
 }
 
-/// Writes a whole file, which has its name only then.
-pub(in crate::stability) fn write_file(path: &Path, content: &str) -> Result<(), Failure> {
-    let (file, mut to) = OutputFile::create(path)?;
-    let written = to.write_all(content.as_bytes()).and_then(|()| to.flush()).map(|()| to);
-    file.finish(written)
-}
-
 /// One row a cell, x running fastest.
 fn table(order: &Order, VariantMap { map, verdicts, .. }: &VariantMap) -> String {
     let mut text = format!("{},{},spectral_radius,verdict\n", field(&order.x().key), field(&order.y().key));
@@ -41,11 +33,6 @@ fn table(order: &Order, VariantMap { map, verdicts, .. }: &VariantMap) -> String
         }
     }
     text
-}
-
-/// A field of a CSV file, quoted where it must be (RFC 4180).
-pub(in crate::stability) fn field(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
 fn picture(order: &Order, maps: &[VariantMap]) -> String {

@@ -14,12 +14,11 @@ use std::time::Instant as Clock;
 use cohaptic_stability::{Family, Grid, KeyRange, Map, MapError, Verdict};
 
 use super::source::{self, Said};
-use super::variants::Variant;
 use crate::arguments::MapArguments;
 use crate::failure::Failure;
 use crate::output;
+use crate::variants::Variant;
 use document::Document;
-pub(super) use files::{field, write_file};
 use filling::Filled;
 
 /// Everything that is asked for, checked: nothing is written before there is one.
@@ -73,7 +72,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
 impl Order {
     fn new(arguments: &MapArguments) -> Result<Self, Failure> {
         let ranges = [("--x", source::range("--x", &arguments.x)?), ("--y", source::range("--y", &arguments.y)?)];
-        let variants = Variant::all(arguments)?;
+        let variants = Variant::all(&arguments.curve, &arguments.against)?;
         let size = arguments.grid;
         if size.width.saturating_mul(size.height).saturating_mul(variants.len()) > crate::arguments::GridSize::MOST_CELLS {
             let most = crate::arguments::GridSize::MOST_CELLS;

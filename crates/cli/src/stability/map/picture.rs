@@ -4,7 +4,7 @@ use cohaptic_harness::record::svg;
 use cohaptic_stability::Polyline;
 use plotters::prelude::*;
 
-use crate::stability::lines::{Look, Sample, draw_legend, draw_line, legend_height};
+use crate::lines::{Look, Sample, draw_legend, draw_line, legend_height};
 
 /// What a map shows.
 pub(super) struct Picture<'a> {

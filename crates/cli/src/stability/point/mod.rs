@@ -10,9 +10,8 @@ use std::process::ExitCode;
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Analysis, judge};
 
-use super::not_analysed;
 use crate::arguments::PointArguments;
-use crate::failure::Failure;
+use crate::failure::{Failure, not_analysed};
 use crate::output;
 use document::Document;
 

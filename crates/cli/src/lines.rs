@@ -33,6 +33,11 @@ impl Look {
     pub(crate) const fn grey() -> Self {
         Self { style: ShapeStyle { color: RGBAColor(120, 120, 120, 1.0), filled: false, stroke_width: 1 }, dash: None }
     }
+
+    /// The colour without dashes, for what is no line.
+    pub(crate) const fn colour(self) -> RGBAColor {
+        self.style.color
+    }
 }
 
 /// Draws a line.

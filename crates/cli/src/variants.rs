@@ -1,9 +1,8 @@
-//! `--curve` and `--against`: the same map of a scene that differs.
+//! `--curve` and `--against`: the same map or curve of a scene that differs.
 
-use crate::arguments::MapArguments;
 use crate::failure::Failure;
 
-/// A scene that a map is made of.
+/// A scene that a picture is made of.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Variant {
     /// In the legend; of the scene as it stands "as it stands".
@@ -15,18 +14,18 @@ pub(crate) struct Variant {
 }
 
 impl Variant {
-    /// All maps of a picture: the scene as it stands first, then those of `--curve`, then that of `--against`.
-    pub(crate) fn all(arguments: &MapArguments) -> Result<Vec<Self>, Failure> {
+    /// All that a picture shows: the scene as it stands first, then those of `--curve`, then that of `--against`.
+    pub(crate) fn all(curves: &[String], against: &[String]) -> Result<Vec<Self>, Failure> {
         let mut all = vec![Self { name: "as it stands".to_owned(), overrides: Vec::new(), option: "--set" }];
-        for text in &arguments.curve {
+        for text in curves {
             let overrides = split(text);
             if let Some(wrong) = overrides.iter().find(|part| !part.contains('=')) {
                 return Err(Failure::Input(format!("--curve {text}: {wrong:?} has no =: expected KEY=VALUE, again after a comma if there are more")));
             }
             all.push(Self { name: overrides.join(", "), overrides, option: "--curve" });
         }
-        if !arguments.against.is_empty() {
-            all.push(Self { name: arguments.against.join(", "), overrides: arguments.against.clone(), option: "--against" });
+        if !against.is_empty() {
+            all.push(Self { name: against.join(", "), overrides: against.to_vec(), option: "--against" });
         }
         Ok(all)
     }

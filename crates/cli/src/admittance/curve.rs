@@ -1,0 +1,84 @@
+//! One curve: the scene as it stands, or with what `--curve` changes.
+
+use cohaptic_scene::Scene;
+use cohaptic_stability::{Admittance, FrequencyResponse, LowFrequencyFit, Verdict, ideal};
+
+use crate::arguments::AdmittanceArguments;
+use crate::failure::{self, Failure, not_analysed};
+use crate::variants::Variant;
+
+/// A scene of which the admittance is asked for.
+pub(super) struct Subject {
+    variant: Variant,
+    scene: Scene,
+    pub(super) admittance: Admittance,
+}
+
+/// The admittance in one scene.
+pub(super) struct Curve {
+    /// In the legend; of the scene as it stands "as it stands".
+    pub(super) name: String,
+    /// What differs from the scene as it stands.
+    pub(super) overrides: Vec<String>,
+    pub(super) title: String,
+    pub(super) admittance: Admittance,
+    pub(super) response: FrequencyResponse,
+    pub(super) fit: LowFrequencyFit,
+    /// The mass of the whole object \[kg\].
+    pub(super) mass: f64,
+}
+
+/// The scene as it stands, then that of every `--curve`.
+pub(super) fn subjects(arguments: &AdmittanceArguments) -> Result<Vec<Subject>, Failure> {
+    Variant::all(&arguments.curve, &[])?.into_iter().map(|variant| Subject::new(arguments, variant)).collect()
+}
+
+impl Subject {
+    fn new(arguments: &AdmittanceArguments, variant: Variant) -> Result<Self, Failure> {
+        let file = &arguments.scene.scene;
+        let overrides = variant.on_top_of(&arguments.scene.overrides.set);
+        let scene = Scene::read(file, &overrides).map_err(|error| failure::of_variant(error, variant.option, &variant.overrides))?;
+        let peer = place_of(&arguments.peer, &scene, &variant)?;
+        let admittance = Admittance::of(&scene, peer).map_err(|error| not_analysed(file, &error))?;
+        Ok(Self { variant, scene, admittance })
+    }
+}
+
+/// A message names this many peers at most.
+const MOST_NAMED: usize = 20;
+
+fn place_of(wanted: &str, scene: &Scene, variant: &Variant) -> Result<usize, Failure> {
+    scene.peers.iter().position(|peer| peer.name == wanted).ok_or_else(|| {
+        let names: Vec<&str> = scene.peers.iter().take(MOST_NAMED).map(|peer| peer.name.as_str()).collect();
+        let more = scene.peers.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let place = if variant.overrides.is_empty() { String::new() } else { format!(" with {} {}", variant.option, variant.name) };
+        Failure::Input(format!("--peer {wanted}: no such peer{place}: expected one of {}{more}", names.join(", ")))
+    })
+}
+
+impl Curve {
+    pub(super) fn of(Subject { variant, scene, admittance }: Subject, frequencies: &[f64]) -> Result<Self, Failure> {
+        let response = admittance.response(frequencies).map_err(|error| Failure::Input(error.to_string()))?;
+        let fit = admittance.fit_low_frequency();
+        Ok(Self { name: variant.name, overrides: variant.overrides, title: scene.title, admittance, response, fit, mass: scene.object.mass })
+    }
+
+    /// What the whole object alone would be at each frequency \[dB\].
+    pub(super) fn ideal_db(&self, hz: f64) -> f64 {
+        20.0 * ideal(self.mass, hz).norm().log10()
+    }
+
+    /// What the numbers must not be taken for, if there is a reason to.
+    pub(super) fn warning(&self) -> Option<&'static str> {
+        match self.admittance.verdict() {
+            Verdict::Stable => None,
+            Verdict::Marginal => {
+                Some("the scene cannot be told from an unstable one: whether it has a steady state is open, and only that could be measured")
+            }
+            Verdict::Unstable => {
+                Some("the scene is unstable and has no steady state: these numbers are what the formula says, and nothing that could be measured")
+            }
+        }
+    }
+}

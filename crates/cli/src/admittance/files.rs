@@ -1,0 +1,35 @@
+//! The files of `--out`: one table of all curves, and one picture.
+
+use std::path::Path;
+
+use super::bode;
+use super::curve::Curve;
+use crate::failure::Failure;
+use crate::output;
+use crate::output_file::{field, write_file};
+
+/// Writes `admittance.csv` and `admittance.svg` into a folder, which is made if it is not there, and gives their paths.
+pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve]) -> Result<Vec<String>, Failure> {
+    let contents = [("admittance.csv", table(curves)), ("admittance.svg", bode::svg(peer, curves)?)];
+    std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "write", path: folder.to_path_buf(), error })?;
+    let mut written = Vec::new();
+    for (name, content) in contents {
+        let path = folder.join(name);
+        write_file(&path, &content)?;
+        written.push(output::path(&path));
+    }
+    Ok(written)
+}
+
+/// One row a curve and frequency. Numbers have the fewest digits that read back the same.
+fn table(curves: &[Curve]) -> String {
+    let mut text = "curve,hz,magnitude_db,phase_deg,ideal_db\n".to_owned();
+    for curve in curves {
+        let name = field(&curve.name);
+        for point in &curve.response.points {
+            let (magnitude, phase, ideal) = (point.magnitude_db(), point.phase_deg(), curve.ideal_db(point.hz));
+            text.push_str(&format!("{name},{:?},{magnitude:?},{phase:?},{ideal:?}\n", point.hz));
+        }
+    }
+    text
+}

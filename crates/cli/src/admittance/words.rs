@@ -1,0 +1,96 @@
+//! An admittance in words.
+
+use std::fmt::Write as _;
+
+use cohaptic_stability::{Estimate, Verdict};
+
+use super::curve::Curve;
+
+/// All curves in words, each with its table.
+pub(super) fn describe(peer: &str, curves: &[Curve], files: &[String]) -> String {
+    let mut text = String::new();
+    for (number, curve) in curves.iter().enumerate() {
+        // Writing to a string does not fail.
+        let _ = if number == 0 { writeln!(text, "{}", curve.title) } else { writeln!(text, "\nWith {}", curve.name) };
+        if let Some(warning) = curve.warning() {
+            let _ = writeln!(text, "  WARNING: {warning}");
+        }
+        let _ = writeln!(text, "\n  velocity over force at the device of {peer}, beside that of a free mass of {} kg", curve.mass);
+        table(&mut text, curve);
+        let _ = writeln!(text, "\n  moved slowly, {peer} feels");
+        felt(&mut text, curve);
+        let _ = writeln!(text, "  {}", verdict(curve));
+        for note in curve.admittance.notes() {
+            let _ = writeln!(text, "  note: {note}");
+        }
+    }
+    if !files.is_empty() {
+        let _ = writeln!(text, "\nwritten: {}", files.join(", "));
+    }
+    text
+}
+
+fn table(text: &mut String, curve: &Curve) {
+    let _ = writeln!(text, "{:>14}{:>14}{:>14}{:>14}", "Hz", "dB", "degrees", "free mass dB");
+    for point in &curve.response.points {
+        let (magnitude, phase) = (point.magnitude_db(), point.phase_deg());
+        let _ = writeln!(text, "{:>14}{magnitude:>14.3}{phase:>14.2}{:>14.3}", significant(point.hz), curve.ideal_db(point.hz));
+    }
+}
+
+/// Five significant digits, without zeros at the end of decimals.
+fn significant(hz: f64) -> String {
+    if !(1e-4..1e6).contains(&hz) {
+        return format!("{hz:.4e}");
+    }
+    let whole = format!("{hz:.0}").len();
+    let decimals = if hz >= 1.0 { 5_usize.saturating_sub(whole) } else { 8 };
+    let text = format!("{hz:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// What a slow hand feels: a spring only where something ties the object to ground.
+fn felt(text: &mut String, curve: &Curve) {
+    let fit = curve.fit;
+    let tied = fit.stiffness.value != 0.0 || fit.stiffness.error != 0.0;
+    let rows =
+        [("a spring of", fit.stiffness, "N/m", tied), ("a viscosity of", fit.viscosity, "N·s/m", true), ("an inertia of", fit.inertia, "kg", true)];
+    for (what, estimate, unit, _) in rows.into_iter().filter(|(.., shown)| *shown) {
+        let _ = writeln!(text, "    {what:<16}{}", limit(estimate, unit));
+    }
+}
+
+fn limit(Estimate { value, error }: Estimate, unit: &str) -> String {
+    if value.is_finite() && error.is_finite() { format!("{value:.6} +- {error:.1e} {unit}") } else { "no definite size".to_owned() }
+}
+
+fn verdict(curve: &Curve) -> String {
+    let radius = curve.admittance.radius();
+    let word = match radius.verdict() {
+        Verdict::Stable => "stable",
+        Verdict::Marginal => "MARGINAL",
+        Verdict::Unstable => "UNSTABLE",
+    };
+    format!("the scene is {word}: spectral radius {:.12} +- {:.1e}", radius.value, radius.error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frequencies_have_five_digits_or_all_that_they_have() {
+        for (hz, shown) in [
+            (0.01, "0.01"),
+            (1.0, "1"),
+            (62.5, "62.5"),
+            (12.345_678, "12.346"),
+            (100.0, "100"),
+            (123_456.7, "123457"),
+            (0.011_689_3, "0.0116893"),
+            (1e-7, "1.0000e-7"),
+        ] {
+            assert_eq!(significant(hz), shown);
+        }
+    }
+}
