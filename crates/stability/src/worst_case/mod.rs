@@ -25,11 +25,11 @@ mod join;
 mod lyapunov;
 mod norm;
 mod pattern;
-mod rounding;
+pub(crate) mod rounding;
 mod symmetric;
 #[cfg(test)]
 mod tests;
-mod verified;
+pub(crate) mod verified;
 
 pub use automaton::{Automaton, AutomatonError};
 pub use gripenberg::{Effort, WorstCase};

@@ -3,5 +3,6 @@
 mod admittance;
 mod anchors;
 mod graphs;
+mod mean_square;
 mod reduction;
 mod strategies;
