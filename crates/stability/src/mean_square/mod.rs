@@ -181,7 +181,8 @@ fn of_contacts(scene: &Scene, network: &NominalNetwork, combination: &Combinatio
         found.radius = found.radius.or(part.radius.over(u32::try_from(2 * frames).unwrap_or(u32::MAX)));
     }
     let Found { radius, held, method, frame, unknowns } = found;
-    Ok(MeanSquare { radius: radius.or(held), held, nominal_squared, method, frame, unknowns, notes: Vec::new() })
+    let radius = if random.is_empty() { radius } else { radius.or(held) };
+    Ok(MeanSquare { radius, held, nominal_squared, method, frame, unknowns, notes: Vec::new() })
 }
 
 /// The links that leave something to chance; one stands for all if there is but one model.
@@ -220,8 +221,10 @@ fn hazards(
     notes: &mut Vec<String>,
 ) -> Result<Option<(Hazards, LinkLaw)>, AnalysisError> {
     let refuse = |why| AnalysisError::ChanceWithoutMoments { link: format!("{} → {}", scene.peers[from].name, scene.peers[to].name), why };
-    let LinkTiming::Constant(nominal) = network.timing(from, to) else {
-        return Err(refuse("its packets take different times even without chance"));
+    let nominal = match network.timing(from, to) {
+        LinkTiming::Constant(nominal) => nominal,
+        LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none) => return Ok(None),
+        LinkTiming::Pattern(_) => return Err(refuse("its packets take different times even without chance")),
     };
     let law = LinkLaw::of(scene.links.between(from, to), *nominal).map_err(refuse)?;
     if law.is_silent() {

@@ -42,7 +42,7 @@ const GOOD: f64 = 1e-11;
 /// Where the bounds are first looked for, relative to the radius.
 const NEAREST: f64 = 1e-12;
 /// How much farther each time.
-const FARTHER: f64 = 4.0;
+const FARTHER: f64 = 2.0;
 /// The guess is settled if it changed by no more than this, relative, since it was last looked at.
 const SETTLED: f64 = 1e-12;
 /// The numbers that a Krylov space may take in memory.

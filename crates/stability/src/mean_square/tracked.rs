@@ -19,6 +19,9 @@ use crate::lifted::{Lifted, Node};
 /// The roundings of a term in a tick: a dozen of the operations, and room for coefficients that are good to some units in the last place.
 const TICK: usize = 48;
 
+/// A share of the terms as small as this does not outgrow the entries: those of a tick are at most |T| + 2·I, and the diagonal of T is near 1.
+const SHARE: usize = 4;
+
 /// The columns are the states to begin with and, last, what is held.
 #[derive(Clone, Debug)]
 pub(crate) struct Tracked {
@@ -76,14 +79,15 @@ impl Tracked {
         self.events += 1;
     }
 
-    /// At least the size of each entry, and of the terms that it was added up from, on average over the events.
+    /// At least the size of each entry, and a [`SHARE`]-th of the terms that it was added up from, on average over the events. Little more than the former:
+    /// what is larger here grows from step to step.
     pub(crate) fn sizes(&self) -> Matrix {
-        let share = 1.0 / crate::structure::count(self.events.max(1));
+        let share = 1.0 / crate::structure::count(SHARE * self.events.max(1));
         Matrix::from_fn(self.value.rows(), self.value.columns(), |row, column| self.value[(row, column)].abs().max(self.terms[(row, column)] * share))
     }
 
     /// So many roundings of the [`sizes`](Self::sizes) cover all errors.
     pub(crate) const fn roundings(&self) -> usize {
-        TICK * self.events
+        SHARE * TICK * self.events
     }
 }
