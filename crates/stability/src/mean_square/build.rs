@@ -1,11 +1,16 @@
 //! The frame of a scene's peers, event by event.
 
+use std::time::Duration;
+
 use super::arrivals::{Hazard, Hazards, Outcome};
 use super::events::{Arrive, Events, Step};
+use super::held::staying;
 use super::law::LossChain;
-use crate::Matrix;
-use crate::lifted::node::{Scale, Scratch};
-use crate::lifted::{Lifted, Node};
+use super::nanoseconds;
+use super::tracked::Tracked;
+use crate::Radius;
+use crate::lifted::Lifted;
+use crate::lifted::node::Scale;
 use crate::timetable::{Event, Timetable};
 
 /// A link of the scene.
@@ -50,7 +55,7 @@ pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -
     let nodes = lifted.nodes.len();
     let unit = lifted.coordination.stiffness + lifted.coordination.damping / lifted.time;
     let scale = Scale { time: lifted.time, compliance: lifted.nodes[0].compliance(lifted.time) };
-    let frame = u64::try_from(lifted.timetable.frame.as_nanos()).unwrap_or(u64::MAX);
+    let frame = nanoseconds(lifted.timetable.frame);
     let mut depth = lifted.timetable.depth.clone();
     for line in lines {
         if let Some((hazards, _)) = &line.chance {
@@ -73,14 +78,13 @@ pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -
         count += node.states();
     }
     let mut first_sample = Vec::with_capacity(nodes);
-    for node in 0..nodes {
-        let sent = lifted.timetable.sent[node];
-        for place in 0..depth[node] {
+    for (depth, sent) in depth.iter().zip(&lifted.timetable.sent) {
+        for place in 0..*depth {
             made.kept.push((count + place + sent, count + place));
             moved.push(translation);
         }
-        first_sample.push(count + depth[node]);
-        count += depth[node] + sent;
+        first_sample.push(count + depth);
+        count += depth + sent;
     }
     let held_row = |line: usize| count + line;
     for line in 0..lines.len() {
@@ -98,22 +102,22 @@ pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -
     }
     let row_of = |node: usize, sample: i64| usize::try_from(i64::try_from(first_sample[node]).unwrap_or(i64::MAX) + sample).unwrap_or(0);
 
-    let mut pending: Vec<Option<Matrix>> = vec![None; nodes];
+    let mut pending: Vec<Option<Tracked>> = vec![None; nodes];
     let (mut tick, mut sample) = (vec![0; nodes], vec![0; nodes]);
-    let (mut norm, mut ticks) = (1.0_f64, 0.0);
     let held_of = |node: usize| -> Vec<(usize, f64)> {
         let of = lines.iter().enumerate().filter(|(_, line)| line.to == node);
         of.map(|(place, line)| (held_row(place), lifted.weights[(node, line.from)])).collect()
     };
-    let flush = |pending: &mut Vec<Option<Matrix>>, steps: &mut Vec<Step>, node: usize| {
+    let flush = |pending: &mut Vec<Option<Tracked>>, made: &mut Events, node: usize| {
         if let Some(map) = pending[node].take() {
-            steps.push(Step::Move { first: first[node], map, held: held_of(node) });
+            made.roundings += map.roundings();
+            made.steps.push(Step::Move { first: first[node], sizes: map.sizes(), map: map.value, held: held_of(node) });
         }
     };
     for event in &lifted.timetable.events {
         match *event {
             Event::Sample { node } => {
-                flush(&mut pending, &mut made.steps, node);
+                flush(&mut pending, &mut made, node);
                 let object = lifted.nodes[node].rows(first[node]).object;
                 let (position, velocity) = if unit > 0.0 { (translation, lifted.coordination.damping / lifted.time / unit) } else { (0.0, 0.0) };
                 let row = first_sample[node] + sample[node];
@@ -122,7 +126,7 @@ pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -
             }
             Event::Deliver { from, to, sample } => {
                 if let Some(link) = lines.iter().position(|line| (line.from, line.to) == (from, to)) {
-                    flush(&mut pending, &mut made.steps, to);
+                    flush(&mut pending, &mut made, to);
                     let outcomes = vec![Arrive { from: 0, to: 0, take: Some(row_of(from, sample)), probability: 1.0 }];
                     made.steps.push(Step::Deliver { link, row: held_row(link), outcomes });
                 }
@@ -130,38 +134,32 @@ pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -
             Event::Tick { node, span, .. } => {
                 for (link, line) in lines.iter().enumerate().filter(|(_, line)| line.to == node) {
                     for outcomes in outcomes(line, tick[node], &instants.sends[line.from], frame) {
-                        flush(&mut pending, &mut made.steps, node);
+                        flush(&mut pending, &mut made, node);
                         let outcomes = outcomes.into_iter().map(|outcome| Arrive::new(outcome, |sample| row_of(line.from, sample))).collect();
                         made.steps.push(Step::Deliver { link, row: held_row(link), outcomes });
                     }
                 }
                 tick[node] += 1;
                 let states = lifted.nodes[node].states();
-                let map = pending[node].get_or_insert_with(|| identity(states));
-                move_on(&lifted.nodes[node], map, lifted, unit, span, scale);
-                norm = norm.max((0..states).map(|row| map.row(row).iter().map(|entry| entry.abs()).sum()).fold(0.0, f64::max));
-                ticks += 1.0;
+                let map = pending[node].get_or_insert_with(|| Tracked::new(states, states));
+                map.tick(&lifted.nodes[node], lifted, unit, span, scale);
             }
         }
     }
     for node in 0..nodes {
-        flush(&mut pending, &mut made.steps, node);
+        flush(&mut pending, &mut made, node);
     }
-    made.rounding = 16.0 * f64::EPSILON * ticks * norm * norm;
     made
 }
 
-/// States and, last, what is held: the states as they are.
-fn identity(states: usize) -> Matrix {
-    Matrix::from_fn(states, states + 1, |row, column| if row == column { 1.0 } else { 0.0 })
-}
-
-fn move_on(node: &Node, map: &mut Matrix, lifted: &Lifted<'_>, unit: f64, span: std::time::Duration, scale: Scale) {
-    let mut scratch = Scratch::default();
-    scratch.resize(map.columns());
-    let mut target = vec![0.0; map.columns()];
-    target[map.columns() - 1] = unit;
-    node.tick(map, node.rows(0), lifted.coordination, &target, None, span, scale, &mut scratch);
+impl Line {
+    /// The probability, per frame in the long run, that nothing arrives; `None` where nothing is left to chance.
+    pub(crate) fn staying(&self, instants: &Instants, frame: Duration) -> Option<Radius> {
+        self.chance.as_ref()?;
+        let ticks = 0..instants.ticks[self.to].len();
+        let all: Vec<Vec<Outcome>> = ticks.flat_map(|tick| outcomes(self, tick, &instants.sends[self.from], nanoseconds(frame))).collect();
+        Some(staying(chain_states(self), &all))
+    }
 }
 
 /// How many states a link's chain has: its places, or those of its losses, with whether the sample under way is lost where that must be remembered.
@@ -169,7 +167,7 @@ fn chain_states(line: &Line) -> usize {
     match &line.chance {
         None => 1,
         Some((hazards, None)) => hazards.places,
-        Some((hazards, Some(_))) => 2 * if hazards.spread { 2 } else { 1 },
+        Some((hazards, Some(chain))) => chain.states() * if hazards.spread { 2 } else { 1 },
     }
 }
 
@@ -190,7 +188,7 @@ fn gap(sample: i64, sends: &[u64], frame: u64) -> f64 {
     let count = i64::try_from(sends.len()).unwrap_or(1);
     let place = usize::try_from(sample.rem_euclid(count)).unwrap_or(0);
     let before = if place == 0 { sends[sends.len() - 1].wrapping_sub(frame) } else { sends[place - 1] };
-    std::time::Duration::from_nanos(sends[place].wrapping_sub(before)).as_secs_f64()
+    Duration::from_nanos(sends[place].wrapping_sub(before)).as_secs_f64()
 }
 
 /// The chain of losses moves when its sample may first arrive; a sample is lost or arrives with its hazard.
@@ -215,7 +213,7 @@ fn chained(hazard: Hazard, chain: LossChain, spread: bool, gap: f64) -> Vec<Outc
             }
         }
     } else {
-        for state in 0..2 {
+        for state in 0..chain.states() {
             alive(place(state, false), place(state, false), 1.0);
             lost.push(Outcome { from: place(state, true), to: place(state, true), take: None, probability: 1.0 });
         }

@@ -9,8 +9,25 @@
 //! E\[z·zᵀ·1(s_l)\] depends on all that it holds, whose next change depends on the chains of the other links, and so on until all are joined.
 
 use super::arrivals::Outcome;
-use super::positive::{Positive, is_definite, pack, unpack};
+use super::positive::{Positive, pack, unpack};
 use crate::Matrix;
+
+/// Whether a computation keeps its signs, or adds up the sizes of all terms.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Signs {
+    Kept,
+    Dropped,
+}
+
+impl Signs {
+    /// What stands before a term that is subtracted.
+    pub(crate) const fn minus(self) -> f64 {
+        match self {
+            Self::Kept => -1.0,
+            Self::Dropped => 1.0,
+        }
+    }
+}
 
 /// One frame.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -24,13 +41,14 @@ pub(crate) struct Events {
     pub(crate) kept: Vec<(usize, usize)>,
     /// The row that positions are relative to, and how far each kept state moves with it.
     pub(crate) reference: Option<(usize, Vec<f64>)>,
-    pub(crate) rounding: f64,
+    /// How many roundings the maps of all steps have together.
+    pub(crate) roundings: usize,
 }
 
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) enum Step {
-    /// The rows from `first` on become `map` times (those rows and, last, the mean of what is held).
-    Move { first: usize, map: Matrix, held: Vec<(usize, f64)> },
+    /// The rows from `first` on become `map` times (those rows and, last, the mean of what is held); `sizes` are those of the terms of the map.
+    Move { first: usize, map: Matrix, sizes: Matrix, held: Vec<(usize, f64)> },
     /// The row becomes that combination.
     Sample { row: usize, of: [(usize, f64); 2] },
     /// The row of what is held may become that of a sample: `take` is a row.
@@ -95,9 +113,10 @@ impl Events {
         after
     }
 
-    fn step(&self, mut moments: Vec<Matrix>, step: &Step) -> Vec<Matrix> {
+    fn step(&self, mut moments: Vec<Matrix>, step: &Step, signs: Signs) -> Vec<Matrix> {
         match step {
-            Step::Move { first, map, held } => {
+            Step::Move { first, map, sizes, held } => {
+                let map = if signs == Signs::Kept { map } else { sizes };
                 for moment in &mut moments {
                     advance(moment, *first, map, held);
                 }
@@ -133,7 +152,8 @@ impl Events {
     }
 
     /// The states between frames at the end of one, relative to the reference.
-    fn at_end(&self, moment: &Matrix) -> Matrix {
+    fn at_end(&self, moment: &Matrix, signs: Signs) -> Matrix {
+        let minus = signs.minus();
         let size = self.kept.len();
         let with = |place: usize, other: usize| moment[(self.kept[place].0, self.kept[other].0)];
         match &self.reference {
@@ -142,11 +162,33 @@ impl Events {
                 let line = moment.row(*reference);
                 let square = line[*reference];
                 Matrix::from_fn(size, size, |row, column| {
-                    with(row, column) - moved[row] * line[self.kept[column].0] - line[self.kept[row].0] * moved[column]
+                    with(row, column)
+                        + minus * (moved[row] * line[self.kept[column].0] + line[self.kept[row].0] * moved[column])
                         + moved[row] * moved[column] * square
                 })
             }
         }
+    }
+
+    fn run(&self, element: &[f64], signs: Signs) -> Vec<f64> {
+        let mut moments = Vec::with_capacity(self.states());
+        for packed in self.matrices(element) {
+            let mut moment = Matrix::zeros(self.rows, self.rows);
+            for (row, (_, place)) in self.kept.iter().enumerate() {
+                for (column, (_, other)) in self.kept.iter().enumerate() {
+                    moment[(*place, *other)] = packed[(row, column)];
+                }
+            }
+            moments.push(moment);
+        }
+        for step in &self.steps {
+            moments = self.step(moments, step, signs);
+        }
+        let mut packed = Vec::with_capacity(element.len());
+        for moment in &moments {
+            pack(&self.at_end(moment, signs), &mut packed);
+        }
+        packed
     }
 }
 
@@ -164,40 +206,34 @@ impl Positive for Events {
     }
 
     fn apply(&self, element: &[f64]) -> Vec<f64> {
-        let mut moments = Vec::with_capacity(self.states());
-        let mut rest = element;
-        for _ in 0..self.states() {
-            let (packed, after) = unpack(self.kept.len(), rest);
-            rest = after;
-            let mut moment = Matrix::zeros(self.rows, self.rows);
-            for (row, (_, place)) in self.kept.iter().enumerate() {
-                for (column, (_, other)) in self.kept.iter().enumerate() {
-                    moment[(*place, *other)] = packed[(row, column)];
-                }
-            }
-            moments.push(moment);
-        }
-        for step in &self.steps {
-            moments = self.step(moments, step);
-        }
-        let mut packed = Vec::with_capacity(element.len());
-        for moment in &moments {
-            pack(&self.at_end(moment), &mut packed);
-        }
-        packed
+        self.run(element, Signs::Kept)
     }
 
-    fn is_definite(&self, element: &[f64]) -> bool {
+    fn sizes(&self, element: &[f64]) -> Vec<f64> {
+        self.run(element, Signs::Dropped)
+    }
+
+    /// All steps one after the other, as if every term went through all of them.
+    fn roundings(&self) -> usize {
+        let of = |step: &Step| match step {
+            // Twice a product with the map, of whose columns the last is a weighted sum, and the mean of the two triangles.
+            Step::Move { map, held, .. } => 2 * (map.columns() + 2 * held.len() + 2) + 2,
+            // Two products, a sum, and the factors' own: twice.
+            Step::Sample { .. } => 12,
+            Step::Deliver { outcomes, .. } => 2 * outcomes.len() + 4,
+        };
+        self.steps.iter().map(of).sum::<usize>() + 2 * self.roundings + 8
+    }
+
+    fn matrices(&self, element: &[f64]) -> Vec<Matrix> {
         let mut rest = element;
-        (0..self.states()).all(|_| {
+        let mut matrices = Vec::with_capacity(self.states());
+        for _ in 0..self.states() {
             let (moment, after) = unpack(self.kept.len(), rest);
             rest = after;
-            is_definite(moment)
-        })
-    }
-
-    fn rounding(&self) -> f64 {
-        self.rounding
+            matrices.push(moment);
+        }
+        matrices
     }
 }
 

@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use cohaptic_wan::law::Law;
-use cohaptic_wan::{Chance, Checksum, Displacement, Flips, GilbertElliott, GilbertElliottInTime, Layout, LinkConfig, LinkModel, Loss, Order};
+use cohaptic_wan::{
+    Chance, Checksum, Displacement, Flips, FourState, GilbertElliott, GilbertElliottInTime, Layout, LinkConfig, LinkModel, Loss, Order,
+};
 
 use super::arrivals::Arrival;
 
@@ -38,40 +40,73 @@ pub(crate) enum LossChain {
     GilbertElliott(GilbertElliott),
     InTime(GilbertElliottInTime),
     Correlated(Chance),
+    FourState(FourState),
 }
 
 /// A move of a chain of losses: from, to, whether the sample is lost, and how probable.
 pub(crate) type LossMove = (usize, usize, bool, f64);
 
 impl LossChain {
-    /// The moves of a sample sent so many seconds after the one before; all chains have two states, the second being the bad one.
+    /// The states that it is ever in: a link begins in the chain's stationary law, so one of probability zero is not among them.
+    fn live(&self) -> Vec<usize> {
+        let two = |bad: f64| vec![1.0 - bad, bad];
+        let stationary = match self {
+            // One that never moves begins, and stays, in the good one.
+            Self::GilbertElliott(chain) if chain.p.get() == 0.0 => two(0.0),
+            Self::GilbertElliott(chain) => two(chain.p.get() / (chain.p.get() + chain.r.get())),
+            Self::InTime(chain) => two(chain.bad_fraction()),
+            Self::Correlated(chance) => two(chance.probability().get()),
+            Self::FourState(chain) => chain.stationary().to_vec(),
+        };
+        (0..stationary.len()).filter(|state| stationary[*state] > 0.0).collect()
+    }
+
+    /// How many states there are.
+    pub(crate) fn states(&self) -> usize {
+        self.live().len()
+    }
+
+    /// Whether everything is lost.
+    fn loses_all(&self) -> bool {
+        self.moves(1.0).iter().all(|(_, _, lost, _)| *lost)
+    }
+
+    /// The moves of a sample sent so many seconds after the one before.
     pub(crate) fn moves(&self, gap: f64) -> Vec<LossMove> {
-        let mut moves = Vec::with_capacity(8);
-        for from in 0..2 {
-            let (to_bad, lost_from, lost_to) = match self {
-                // The state before the move decides.
-                Self::GilbertElliott(chain) => {
-                    let lost = [1.0 - chain.k.get(), 1.0 - chain.h.get()][from];
-                    ([chain.p.get(), 1.0 - chain.r.get()][from], Some(lost), [0.0; 2])
-                }
-                Self::InTime(chain) => {
-                    let (good, bad) = chain.mean_times();
-                    let (rate, share) = (1.0 / good.as_secs_f64() + 1.0 / bad.as_secs_f64(), chain.bad_fraction());
-                    let forgotten = -libm::expm1(-rate * gap);
-                    ([share * forgotten, 1.0 - (1.0 - share) * forgotten][from], None, [1.0 - chain.k.get(), 1.0 - chain.h.get()])
-                }
-                Self::Correlated(chance) => {
-                    let (p, rho) = (chance.probability().get(), chance.correlation());
-                    ([p * (1.0 - rho), p + rho * (1.0 - p)][from].clamp(0.0, 1.0), None, [0.0, 1.0])
-                }
-            };
-            for (to, way) in [1.0 - to_bad, to_bad].into_iter().enumerate() {
-                let lost = lost_from.unwrap_or(lost_to[to]);
+        let live = self.live();
+        let mut moves = Vec::with_capacity(2 * live.len() * live.len());
+        for (from, state) in live.iter().enumerate() {
+            for (to, next) in live.iter().enumerate() {
+                let (way, lost) = self.step(*state, *next, gap);
                 moves.extend([(from, to, true, way * lost), (from, to, false, way * (1.0 - lost))]);
             }
         }
         moves.retain(|(.., probability)| *probability > 0.0);
         moves
+    }
+
+    /// The probability of a move, and of a loss with it. The second state of two is the bad one.
+    fn step(&self, from: usize, to: usize, gap: f64) -> (f64, f64) {
+        let pick = |to_bad: f64| if to == 1 { to_bad } else { 1.0 - to_bad };
+        match self {
+            // The state before the move decides.
+            Self::GilbertElliott(chain) => {
+                let lost = [1.0 - chain.k.get(), 1.0 - chain.h.get()][from];
+                (pick([chain.p.get(), 1.0 - chain.r.get()][from]), lost)
+            }
+            Self::InTime(chain) => {
+                let (good, bad) = chain.mean_times();
+                let (rate, share) = (1.0 / good.as_secs_f64() + 1.0 / bad.as_secs_f64(), chain.bad_fraction());
+                let forgotten = -libm::expm1(-rate * gap);
+                (pick([share * forgotten, 1.0 - (1.0 - share) * forgotten][from]), [1.0 - chain.k.get(), 1.0 - chain.h.get()][to])
+            }
+            Self::Correlated(chance) => {
+                let (p, rho) = (chance.probability().get(), chance.correlation());
+                (pick([p * (1.0 - rho), p + rho * (1.0 - p)][from].clamp(0.0, 1.0)), [0.0, 1.0][to])
+            }
+            // The state after the move decides: lost within a burst or between bursts.
+            Self::FourState(chain) => (chain.transitions()[from][to], [0.0, 0.0, 1.0, 1.0][to]),
+        }
     }
 }
 
@@ -93,7 +128,9 @@ impl LinkLaw {
             Loss::Correlated(chance) => (0.0, Some(LossChain::Correlated(*chance))),
             Loss::GilbertElliott(chain) => (0.0, Some(LossChain::GilbertElliott(*chain))),
             Loss::GilbertElliottInTime(chain) => (0.0, Some(LossChain::InTime(*chain))),
-            _ => return Err("its losses are of four states, or chosen by a pattern beside something random"),
+            Loss::FourState(chain) => (0.0, Some(LossChain::FourState(*chain))),
+            Loss::Pattern(_) => return Err("its losses are chosen by a pattern beside something random"),
+            _ => return Err("its model of loss is not known here"),
         };
         let discarded = match &config.corruption {
             None => 0.0,
@@ -114,7 +151,9 @@ impl LinkLaw {
             Some(reorder) => match reorder.how {
                 Displacement::Jump { gap } if gap.get() == 1 => Some((reorder.packets.probability().get(), None)),
                 Displacement::Later { by } => Some((reorder.packets.probability().get(), Some(nanos(by)))),
-                _ => return Err("its packets are put behind others, or jump only now and then"),
+                Displacement::Jump { .. } => return Err("its packets jump only now and then"),
+                Displacement::Behind { .. } => return Err("its packets are put behind others"),
+                _ => return Err("its reordering is not known here"),
             },
         };
         let law = config.delay.law().cloned();
@@ -138,7 +177,7 @@ impl LinkLaw {
 
     /// Whether nothing ever arrives.
     pub(crate) fn is_silent(&self) -> bool {
-        self.chain.is_none() && self.within(i128::MAX) <= 0.0
+        self.within(i128::MAX) <= 0.0 || self.chain.is_some_and(|chain| chain.loses_all())
     }
 
     /// The probability that the delay of a packet is at most that.
@@ -218,8 +257,10 @@ pub(crate) fn is_random(model: &LinkModel) -> bool {
             let rest = LinkConfig { loss, ..config.clone() };
             !certain || rest.has_chance()
         }
+        LinkModel::Replay(_) => false,
         LinkModel::Modulated(_) | LinkModel::Kernel(_) => true,
-        _ => false,
+        // What is not known may be anything, and is refused as such.
+        _ => true,
     }
 }
 

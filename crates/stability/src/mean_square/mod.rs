@@ -5,16 +5,26 @@
 //! 1 (Costa, Fragoso & Marques 2005, Theorem 3.9). A packet carries all axes of a sample, and every axis obeys the same equations, so the operator on the moments
 //! of two axes is that of one, and the radius is that of a scene of one axis.
 //!
-//! Every sample enters a receiver's force as one number only, KT·x + BT·v, so each link adds one state, what its receiver holds.
+//! Every sample enters a receiver's force as one number only, KT·x + BT·v, so each link adds one state, what its receiver holds. The other combination of a
+//! held position and velocity is not felt, but it is there: it adds the probability that nothing arrives as an eigenvalue, known without any
+//! computation (`held`).
+//!
+//! # How sure the radii are
+//!
+//! The bounds are proven (`positive`) for the operator with the step maps and probabilities as they are stored. The errors of the step maps' products are
+//! counted among the roundings on the assumption that each term of a tick has no more than 48 of them, coefficients included (`tracked`). Not
+//! counted: rounding errors of the probabilities themselves, and numbers that underflow.
 
 mod arrivals;
 mod build;
 mod events;
+mod held;
 mod law;
 mod positive;
 mod symmetric;
 #[cfg(test)]
 mod tests;
+mod tracked;
 
 use std::time::Duration;
 
@@ -66,6 +76,9 @@ impl MeanSquareMethod {
 pub struct MeanSquare {
     /// By what a frame multiplies the second moment of the relative motion, in the long run: below 1 the scene is stable in the mean square.
     pub radius: Radius,
+    /// The part of it that acts on nothing: of a held sample only KT·x + BT·v is felt, and the other combination stays as long as nothing arrives. The
+    /// probability, per frame in the long run, that nothing does, of the random link where it is largest; the radius is at least that.
+    pub held: Radius,
     /// The square of the spectral radius over a frame if nothing were left to chance: every delay its mean, nothing lost.
     pub nominal_squared: Radius,
     /// How it was reached; of several modes of contact, for the one with the largest radius.
@@ -105,8 +118,9 @@ pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
             None => one,
             Some(before) => {
                 let (radius, nominal_squared) = (before.radius.or(one.radius), before.nominal_squared.or(one.nominal_squared));
+                let held = before.held.or(one.held);
                 let larger = if one.radius.value > before.radius.value { one } else { before };
-                MeanSquare { radius, nominal_squared, ..larger }
+                MeanSquare { radius, held, nominal_squared, ..larger }
             }
         });
     }
@@ -117,11 +131,23 @@ pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
         notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
     }
     notes.dedup();
-    let zero = Radius { value: 0.0, error: 0.0 };
-    let none =
-        MeanSquare { radius: zero, nominal_squared: zero, method: MeanSquareMethod::Nominal, frame: Duration::ZERO, unknowns: 0, notes: Vec::new() };
-    Ok(MeanSquare { notes, ..found.unwrap_or(none) })
+    let none = MeanSquare {
+        radius: NOTHING,
+        held: NOTHING,
+        nominal_squared: NOTHING,
+        method: MeanSquareMethod::Nominal,
+        frame: Duration::ZERO,
+        unknowns: 0,
+        notes: Vec::new(),
+    };
+    let found = found.unwrap_or(none);
+    if found.held.value > 0.0 && found.held.value >= found.radius.value {
+        notes.push("the radius is that of a held sample without force: it stays until the next one arrives, and moves nothing".to_owned());
+    }
+    Ok(MeanSquare { notes, ..found })
 }
+
+const NOTHING: Radius = Radius { value: 0.0, error: 0.0 };
 
 /// The only model of all links, if there is but one.
 fn only_model(scene: &Scene) -> bool {
@@ -136,20 +162,27 @@ fn of_contacts(scene: &Scene, network: &NominalNetwork, combination: &Combinatio
     let nominal_squared = nominal.over(2);
     let random = random_links(scene)?;
     let gains = structure.coordination(scene);
-    if random.is_empty() || gains.stiffness + gains.damping <= 0.0 {
-        return Ok(MeanSquare { radius: nominal_squared, nominal_squared, method: MeanSquareMethod::Nominal, frame, unknowns: 0, notes: Vec::new() });
-    }
+    let nothing = Found { radius: nominal_squared, held: NOTHING, method: MeanSquareMethod::Nominal, frame, unknowns: 0 };
     let alike = structure.classes.len() == 1 && only_model(scene);
-    let (mut radius, method, own_frame, unknowns) = match alike.then(|| symmetric(scene, network, &structure, notes)).transpose()?.flatten() {
-        Some((radius, unknowns)) => (radius, MeanSquareMethod::Symmetric, frame, unknowns),
-        None => one_by_one(scene, network, &structure, &combination.contacts, &random, notes)?,
+    let mut found = if random.is_empty() {
+        nothing
+    } else {
+        match alike.then(|| symmetric(scene, network, &structure, notes)).transpose()?.flatten() {
+            Some(found) => found,
+            None => one_by_one(scene, network, &structure, &combination.contacts, &random, notes)?,
+        }
     };
+    if gains.stiffness + gains.damping <= 0.0 {
+        found = Found { held: found.held, ..nothing };
+    }
     // What nobody touches moves on its own.
     for part in parts.iter().filter(|part| matches!(part.kind, PartKind::LooseDevice { .. })) {
-        let frames = own_frame.as_nanos() / frame.as_nanos().max(1);
-        radius = radius.or(part.radius.over(u32::try_from(2 * frames).unwrap_or(u32::MAX)));
+        let frames = found.frame.as_nanos() / frame.as_nanos().max(1);
+        found.radius = found.radius.or(part.radius.over(u32::try_from(2 * frames).unwrap_or(u32::MAX)));
     }
-    Ok(MeanSquare { radius, nominal_squared, method, frame: own_frame, unknowns, notes: Vec::new() })
+    let Found { radius, held, method, frame, unknowns } = found;
+    let radius = if random.is_empty() { radius } else { radius.or(held) };
+    Ok(MeanSquare { radius, held, nominal_squared, method, frame, unknowns, notes: Vec::new() })
 }
 
 /// The links that leave something to chance; one stands for all if there is but one model.
@@ -188,15 +221,16 @@ fn hazards(
     notes: &mut Vec<String>,
 ) -> Result<Option<(Hazards, LinkLaw)>, AnalysisError> {
     let refuse = |why| AnalysisError::ChanceWithoutMoments { link: format!("{} → {}", scene.peers[from].name, scene.peers[to].name), why };
-    let LinkTiming::Constant(nominal) = network.timing(from, to) else {
-        return Err(refuse("its packets take different times even without chance"));
+    let nominal = match network.timing(from, to) {
+        LinkTiming::Constant(nominal) => nominal,
+        LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none) => return Ok(None),
+        LinkTiming::Pattern(_) => return Err(refuse("its packets take different times even without chance")),
     };
     let law = LinkLaw::of(scene.links.between(from, to), *nominal).map_err(refuse)?;
     if law.is_silent() {
         return Ok(None);
     }
-    let nanos = u64::try_from(frame.as_nanos()).unwrap_or(u64::MAX);
-    let hazards = Hazards::new(nanos, sends, ticks, &law).ok_or_else(|| refuse("its delays have no end"))?;
+    let hazards = Hazards::new(nanoseconds(frame), sends, ticks, &law).ok_or_else(|| refuse("its delays have no end"))?;
     if hazards.spread && law.correlated_delays {
         return Err(refuse("its delays depend on each other"));
     }
@@ -212,32 +246,50 @@ fn hazards(
     Ok(Some((hazards, law)))
 }
 
-/// The radius and the number of unknowns if links lose independently and nothing overtakes.
-fn symmetric(
-    scene: &Scene,
-    network: &NominalNetwork,
-    structure: &Structure,
-    notes: &mut Vec<String>,
-) -> Result<Option<(Radius, usize)>, AnalysisError> {
-    let timetable = Timetable::new(&[NodeClock::of(scene, 0)], &[])?;
-    let instants = Instants::of(&timetable, 1);
-    let Some((hazards, law)) = hazards(scene, network, (0, 1), timetable.frame, &instants.sends[0], &instants.ticks[0], notes)? else {
-        return Ok(None);
-    };
-    if hazards.places > 1 || law.chain.is_some() || timetable.frame != structure.timetable.frame {
-        return Ok(None);
+/// What was found of what acts, and of what is held without acting.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    radius: Radius,
+    held: Radius,
+    method: MeanSquareMethod,
+    frame: Duration,
+    unknowns: usize,
+}
+
+impl Found {
+    fn of(operator: &impl Positive, held: Radius, method: MeanSquareMethod, frame: Duration) -> Self {
+        Self { radius: radius_of_positive(operator), held, method, frame, unknowns: operator.unknowns() }
     }
+}
+
+/// A link on which nothing ever arrives: what is held stays for certain.
+const SILENT: Radius = Radius { value: 1.0, error: 0.0 };
+
+/// Equal peers over equal links, if these lose independently and nothing overtakes.
+fn symmetric(scene: &Scene, network: &NominalNetwork, structure: &Structure, notes: &mut Vec<String>) -> Result<Option<Found>, AnalysisError> {
+    let timetable = Timetable::new(&[NodeClock::of(scene, 0)], &[])?;
+    let frame = timetable.frame;
+    let instants = Instants::of(&timetable, 1);
+    let hazards = hazards(scene, network, (0, 1), frame, &instants.sends[0], &instants.ticks[0], notes)?;
     let node = structure.node(scene, 0);
     let lifted = structure.quotient(scene, std::slice::from_ref(&node));
     let lifted = Lifted { timetable: &timetable, ..lifted };
+    let Some((hazards, law)) = hazards else {
+        // Nobody hears of anybody: each peer alone, pulled to where the others were at the beginning.
+        let alone = Lifted { tied: true, ..lifted };
+        return Ok(Some(Found::of(&events(&alone, &[], &instants), SILENT, MeanSquareMethod::Symmetric, frame)));
+    };
+    if hazards.places > 1 || law.chain.is_some() || frame != structure.timetable.frame {
+        return Ok(None);
+    }
     let operator = Symmetric::new(scene.peers.len(), &lifted, &hazards);
     if operator.unknowns() > MOST_UNKNOWNS {
         return Err(AnalysisError::TooManyMoments { joint: Some(1), unknowns: Some(operator.unknowns()), most: MOST_UNKNOWNS });
     }
-    Ok(Some((radius_of_positive(&operator), operator.unknowns())))
+    let line = Line { from: 0, to: 0, chance: Some((hazards, None)) };
+    let held = line.staying(&instants, frame).unwrap_or(NOTHING);
+    Ok(Some(Found::of(&operator, held, MeanSquareMethod::Symmetric, frame)))
 }
-
-type Found = (Radius, MeanSquareMethod, Duration, usize);
 
 fn one_by_one(
     scene: &Scene,
@@ -258,7 +310,7 @@ fn one_by_one(
     let certain: Vec<(usize, usize, LinkTiming)> = certain.map(|(from, to)| (*from, *to, network.timing(*from, *to).clone())).collect();
     let timetable = Timetable::new(&clocks, &certain)?;
     let instants = Instants::of(&timetable, peers);
-    let mut lines = Vec::new();
+    let (mut lines, mut held) = (Vec::new(), NOTHING);
     let mut tied = structure.tied;
     for (from, to) in pairs {
         if let Some((_, _, timing)) = certain.iter().find(|(one, other, _)| (*one, *other) == (from, to)) {
@@ -269,8 +321,15 @@ fn one_by_one(
             continue;
         }
         match hazards(scene, network, (from, to), timetable.frame, &instants.sends[from], &instants.ticks[to], notes)? {
-            Some((hazards, law)) => lines.push(Line { from, to, chance: Some((hazards, law.chain)) }),
-            None => tied = true,
+            Some((hazards, law)) => {
+                let line = Line { from, to, chance: Some((hazards, law.chain)) };
+                held = line.staying(&instants, timetable.frame).map_or(held, |stays| held.or(stays));
+                lines.push(line);
+            }
+            None => {
+                tied = true;
+                held = SILENT;
+            }
         }
     }
     let class_of = |peer: usize| structure.classes.iter().position(|class| class.contains(&peer)).unwrap_or(0);
@@ -286,5 +345,9 @@ fn one_by_one(
     if unknowns.is_none_or(|unknowns| unknowns > MOST_UNKNOWNS) {
         return Err(AnalysisError::TooManyMoments { joint: operator.joint(), unknowns, most: MOST_UNKNOWNS });
     }
-    Ok((radius_of_positive(&operator), MeanSquareMethod::Events, timetable.frame, operator.unknowns()))
+    Ok(Found::of(&operator, held, MeanSquareMethod::Events, timetable.frame))
+}
+
+fn nanoseconds(span: Duration) -> u64 {
+    u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }

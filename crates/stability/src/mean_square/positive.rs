@@ -1,14 +1,24 @@
 //! The spectral radius of a positive operator, between two bounds that are checked.
 //!
 //! L maps positive semidefinite matrices to positive semidefinite matrices. By the theorem of Krein & Rutman (1948) its spectral radius ρ is an
-//! eigenvalue. Let E be positive definite and γY − L(Y) = E + R with a remainder that leaves E + R positive definite.
+//! eigenvalue. Let Y be such that γY − L(Y) is positive definite.
 //!
 //! - If Y is positive definite, then L(Y) < γY, and L maps the interval −Y ≤ X ≤ Y into γ' times itself for a γ' < γ: **ρ < γ**.
-//! - If γ > ρ, then Y = Σ L^k(E + R)/γ^(k+1), which is positive definite. So if Y is not, **γ ≤ ρ**.
+//! - If γ > ρ, then Y = Σ L^k(γY − L(Y))/γ^(k+1), which is positive definite. So if Y is not, **γ ≤ ρ**.
 //!
-//! Both are decided by looking at signs, however Y was found and however ill-conditioned the eigenvectors of L are. Y is found in the Krylov space of E,
-//! which is the same for every γ: one Arnoldi factorisation answers for all of them.
+//! Both are decided by looking at signs, however Y was found and however ill-conditioned the eigenvectors of L are. Y is found as the Y for which
+//! γY − L(Y) is nearest to a fixed positive definite E, in the Krylov space of E, which is the same for every γ: one Arnoldi factorisation answers for all.
+//!
+//! # Rounding
+//!
+//! A computation of sums, products and constants changes each of its terms by at most as many roundings as the term goes through. If these are at most K
+//! (`roundings`) and S are the sizes of the terms of each entry, added up (`sizes`), then what is computed is within γ_K·S of the exact image (Higham 2002,
+//! Section 3.1). That γY − L(Y) is positive definite whatever these errors are is shown by Cholesky's factorisation with Rump's criterion
+//! (`worst_case::verified`). That Y is not is shown by an entry of its diagonal below zero, with no rounding at all. So the bounds hold for the operator with
+//! the coefficients as stored, and as far as the errors of these are counted among the roundings for the exact one; numbers that underflow are not counted.
 
+use crate::worst_case::rounding::{gamma, outward};
+use crate::worst_case::verified::is_positive;
 use crate::{Matrix, Radius};
 
 /// An operator on symmetric matrices, or tuples of them, that maps positive ones to positive ones. Elements are vectors of coordinates.
@@ -19,14 +29,22 @@ pub(crate) trait Positive: Sync {
     fn base(&self) -> Vec<f64>;
     /// The image of an element.
     fn apply(&self, element: &[f64]) -> Vec<f64>;
-    /// Whether an element is positive definite.
-    fn is_definite(&self, element: &[f64]) -> bool;
-    /// A bound of the rounding of `apply`, relative to the size of the element.
-    fn rounding(&self) -> f64;
+    /// The image of an element without signs if no coefficient had a sign: for each coordinate, the terms that [`apply`](Self::apply) adds up.
+    fn sizes(&self, element: &[f64]) -> Vec<f64>;
+    /// How many roundings a term of `apply` goes through at most, those of the coefficients included.
+    fn roundings(&self) -> usize;
+    /// The symmetric matrices that are all positive definite if and only if an element is.
+    fn matrices(&self, element: &[f64]) -> Vec<Matrix>;
 }
 
 /// Both bounds within this of each other, relative to the radius, are good enough.
 const GOOD: f64 = 1e-11;
+/// Where the bounds are first looked for, relative to the radius.
+const NEAREST: f64 = 1e-12;
+/// How much farther each time.
+const FARTHER: f64 = 2.0;
+/// The guess is settled if it changed by no more than this, relative, since it was last looked at.
+const SETTLED: f64 = 1e-12;
 /// The numbers that a Krylov space may take in memory.
 const MOST_NUMBERS: usize = 1 << 26;
 /// Its largest dimension.
@@ -42,27 +60,37 @@ pub(crate) fn radius_of_positive(operator: &impl Positive) -> Radius {
     }
     let most = (MOST_NUMBERS / unknowns).clamp(2, MOST_STEPS).min(unknowns);
     let mut krylov = Krylov::new(operator.base());
-    let mut best: Option<(f64, f64)> = None;
+    let (mut low, mut high) = (0.0_f64, f64::INFINITY);
     let mut next = 8;
+    let mut before = f64::NAN;
     while krylov.steps() < most {
         let going = krylov.step(operator);
         let steps = krylov.steps();
-        if going && steps < next && steps < most {
+        let last = !going || steps == most;
+        if steps < next && !last {
             continue;
         }
         next = steps + steps / 4 + 2;
         let Some(guess) = krylov.largest_real() else {
             return Radius { value: f64::INFINITY, error: f64::INFINITY };
         };
-        let (low, high) = krylov.bounds(operator, guess);
-        best = Some(best.map_or((low, high), |(before_low, before_high)| (before_low.max(low), before_high.min(high))));
-        if !going || best.is_some_and(|(low, high)| high - low <= 4.0 * GOOD * high) {
+        let settled = (guess - before).abs() <= SETTLED * guess;
+        before = guess;
+        if !(settled || last) {
+            continue;
+        }
+        let width = high - low;
+        let (below, above) = krylov.bounds(operator, guess);
+        (low, high) = (low.max(below), high.min(above));
+        // Where rounding sets the limit a larger space does not help.
+        let no_better = width.is_finite() && high - low > 0.5 * width;
+        if last || no_better || high - low <= GOOD * high {
             break;
         }
     }
-    let (low, high) = best.unwrap_or((0.0, f64::INFINITY));
     let value = if high.is_finite() { 0.5 * (low + high) } else { low };
-    Radius { value, error: (high - value).max(value - low) }
+    // The middle of the two rounds.
+    Radius { value, error: outward((high - value).max(value - low)) + f64::EPSILON * value }
 }
 
 /// An orthonormal basis of the space of E, L(E), L²(E), …, in which L is an upper Hessenberg matrix.
@@ -128,54 +156,44 @@ impl Krylov {
     /// The tightest bounds around a guess that can be checked in this space.
     fn bounds(&self, operator: &impl Positive, guess: f64) -> (f64, f64) {
         let mut low = 0.0;
-        let mut high = f64::INFINITY;
-        let mut apart = GOOD;
+        let mut apart = NEAREST;
         while apart < 1.0 && low == 0.0 {
-            if self.is_below(operator, guess * (1.0 - apart)) {
-                low = guess * (1.0 - apart);
+            let candidate = guess * (1.0 - apart);
+            if self.check(operator, candidate, &is_indefinite) {
+                low = candidate;
             }
-            apart *= 4.0;
+            apart *= FARTHER;
         }
-        apart = GOOD;
+        let mut high = f64::INFINITY;
+        apart = NEAREST;
         while apart < 1e3 && high == f64::INFINITY {
             // Where everything dies out within some frames, the guess is zero or rounding.
             let candidate = (guess * (1.0 + apart)).max(apart * 1e-3);
-            if self.is_above(operator, candidate) {
+            if self.check(operator, candidate, &is_definite) {
                 high = candidate;
             }
-            apart *= 4.0;
+            apart *= FARTHER;
         }
         (low, high)
     }
 
-    fn is_above(&self, operator: &impl Positive, candidate: f64) -> bool {
-        self.check(operator, candidate).is_some_and(|solution| operator.is_definite(&solution))
-    }
-
-    fn is_below(&self, operator: &impl Positive, candidate: f64) -> bool {
-        // Against a positive definite element a positive one has a positive product. Beyond rounding.
-        let negative = |solution: &Vec<f64>| {
-            let size = dot(solution, solution).sqrt();
-            dot(solution, &self.base) < -1e-9 * size * self.norm
+    /// Whether this space has a Y of that kind for which γY − L(Y) is positive definite whatever was rounded.
+    fn check(&self, operator: &impl Positive, candidate: f64, kind: &dyn Fn(&[Matrix]) -> bool) -> bool {
+        let Some(solution) = self.solve(candidate) else {
+            return false;
         };
-        self.check(operator, candidate).as_ref().is_some_and(negative)
-    }
-
-    /// A Y for which γY − L(Y) is positive definite beyond rounding, if this space has one.
-    fn check(&self, operator: &impl Positive, candidate: f64) -> Option<Vec<f64>> {
-        let solution = self.solve(candidate)?;
+        if !kind(&operator.matrices(&solution)) {
+            return false;
+        }
         let image = operator.apply(&solution);
-        let size = dot(&solution, &solution).sqrt();
-        let rounding = operator.rounding() * size;
-        let mut left: Vec<f64> = solution.iter().zip(&image).map(|(solution, image)| candidate * solution - image).collect();
-        // A remainder of rounding's size, times the number of its entries' root, may be hidden in each.
-        if !(rounding.is_finite() && rounding < 0.5) {
-            return None;
-        }
-        for (left, base) in left.iter_mut().zip(&self.base) {
-            *left -= rounding * base;
-        }
-        operator.is_definite(&left).then_some(solution)
+        let left: Vec<f64> = solution.iter().zip(&image).map(|(solution, image)| candidate * solution - image).collect();
+        let absolute: Vec<f64> = solution.iter().map(|entry| entry.abs()).collect();
+        // The product with γ and the difference round too; the sizes were computed with as many roundings.
+        let share = gamma(operator.roundings() + 2);
+        let sizes = operator.sizes(&absolute);
+        let error: Vec<f64> = absolute.iter().zip(&sizes).map(|(entry, size)| outward(share * (1.0 + share) * (candidate * entry + size))).collect();
+        let (left, error) = (operator.matrices(&left), operator.matrices(&error));
+        left.iter().zip(&error).all(|(left, error)| is_positive(left, error))
     }
 
     /// The combination of the basis for which γY − L(Y) − E is least: a least-squares problem with a Hessenberg matrix, by rotations.
@@ -222,23 +240,13 @@ fn dot(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(a, b)| a * b).sum()
 }
 
-/// Whether a symmetric matrix is positive definite: whether Cholesky's factorisation exists.
-pub(crate) fn is_definite(mut matrix: Matrix) -> bool {
-    let size = matrix.rows();
-    for pivot in 0..size {
-        let head = matrix[(pivot, pivot)];
-        if !(head > 0.0 && head.is_finite()) {
-            return false;
-        }
-        for row in pivot + 1..size {
-            let factor = matrix[(row, pivot)] / head;
-            for column in pivot + 1..=row {
-                let entry = factor * matrix[(column, pivot)];
-                matrix[(row, column)] -= entry;
-            }
-        }
-    }
-    true
+fn is_definite(matrices: &[Matrix]) -> bool {
+    matrices.iter().all(|matrix| is_positive(matrix, &Matrix::zeros(matrix.rows(), matrix.columns())))
+}
+
+/// Whether a diagonal has an entry below zero: eᵀYe < 0.
+fn is_indefinite(matrices: &[Matrix]) -> bool {
+    matrices.iter().any(|matrix| (0..matrix.rows()).any(|place| matrix[(place, place)] < 0.0))
 }
 
 /// The lower half of a symmetric matrix, row by row, appended.

@@ -13,13 +13,19 @@
 //!
 //! The space decomposes under the permutations into the common motion (once), the differences of peers (N − 1 copies: a_i, and the sums of h over
 //! senders and over receivers) and two kinds of h whose sums are zero, symmetric and antisymmetric. A moment is positive definite if its block of each
-//! kind is, so these blocks are the coordinates: they have size 1 for any N, and no digits are lost between N = 2 and 100,000.
+//! kind is, so these blocks are the coordinates.
+//!
+//! All receivers hold much the same of a sender, so the sums of h grow with N − 1, and their unit vectors' components with its root, while a_i does not:
+//! beside each other they would cost the more digits the more peers there are. In the blocks of the first two kinds h is therefore divided by √(N − 1), which
+//! makes of the sums the means that act on peers; then every coefficient of a frame is of size 1 for any N, and none is a difference of large numbers.
 
 use super::arrivals::Hazards;
-use super::positive::{Positive, is_definite, pack, unpack};
+use super::events::Signs;
+use super::positive::{Positive, pack, unpack};
+use super::tracked::Tracked;
 use crate::Matrix;
 use crate::lifted::Lifted;
-use crate::lifted::node::{Scale, Scratch};
+use crate::lifted::node::Scale;
 use crate::timetable::Event;
 
 /// One frame of equal peers.
@@ -34,15 +40,23 @@ pub(crate) struct Symmetric {
     translation: Option<(Vec<f64>, f64)>,
     /// Where the position of the copy stands among the states.
     position: usize,
-    rounding: f64,
+    /// How many roundings the maps of all steps have together.
+    roundings: usize,
 }
 
 #[derive(Clone, Debug)]
 enum Step {
-    /// a ← map·a + held·(mean of h).
-    Move { map: Matrix, held: Vec<f64> },
+    /// a ← map·a + held·(mean of h), with the sizes of the terms of both.
+    Move { map: Map, sizes: Map },
     /// Each link takes in that state of its sender with that probability.
     Deliver { state: usize, probability: f64 },
+}
+
+/// By what the states of a peer and the mean of what it holds are multiplied.
+#[derive(Clone, Debug)]
+struct Map {
+    own: Matrix,
+    held: Vec<f64>,
 }
 
 /// A second moment.
@@ -65,43 +79,37 @@ impl Symmetric {
         let (states, depth, sent) = (node.states(), hazards.depth(), lifted.timetable.sent[0]);
         let (size, full) = (states + depth, states + depth + sent);
         // A map in the making: its columns are the states it begins with and, last, what is held.
-        let begin = |columns: usize| Matrix::from_fn(full, columns + 1, |row, column| if row == column && column < columns { 1.0 } else { 0.0 });
-        let mut map = begin(size);
+        let mut map = Tracked::new(full, size);
         let mut steps = Vec::new();
-        let (mut tick, mut sample, mut norm, mut events) = (0, 0, 1.0_f64, 0.0);
-        let flush = |map: &Matrix, order: &dyn Fn(usize) -> usize, rows: usize| {
-            let columns = map.columns() - 1;
-            let chosen = Matrix::from_fn(rows, columns, |row, column| map[(order(row), column)]);
-            let held = (0..rows).map(|row| map[(order(row), columns)]).collect();
-            Step::Move { map: chosen, held }
+        let (mut tick, mut sample, mut roundings) = (0, 0, 0);
+        let mut flush = |map: &Tracked, order: &dyn Fn(usize) -> usize, rows: usize| {
+            let columns = map.value.columns() - 1;
+            let chosen = |matrix: &Matrix| Map {
+                own: Matrix::from_fn(rows, columns, |row, column| matrix[(order(row), column)]),
+                held: (0..rows).map(|row| matrix[(order(row), columns)]).collect(),
+            };
+            roundings += map.roundings();
+            Step::Move { map: chosen(&map.value), sizes: chosen(&map.sizes()) }
         };
         for event in &lifted.timetable.events {
             match *event {
                 Event::Sample { .. } => {
-                    for column in 0..map.columns() {
-                        let (x, v) = (map[(rows.object, column)], map[(rows.object + 1, column)]);
-                        let gains = lifted.coordination;
-                        map[(states + depth + sample, column)] = gains.stiffness / unit * x + gains.damping / lifted.time / unit * v;
-                    }
+                    let gains = lifted.coordination;
+                    let (position, velocity) = if unit > 0.0 { (gains.stiffness / unit, gains.damping / lifted.time / unit) } else { (0.0, 0.0) };
+                    map.combine(states + depth + sample, [(rows.object, position), (rows.object + 1, velocity)]);
                     sample += 1;
                 }
                 Event::Deliver { .. } => {}
                 Event::Tick { span, .. } => {
                     if !hazards.at[tick].is_empty() {
                         steps.push(flush(&map, &|row| row, full));
-                        map = begin(full);
+                        map = Tracked::new(full, full);
                         for hazard in &hazards.at[tick] {
                             let place = i64::try_from(states + depth).unwrap_or(i64::MAX) + hazard.sample;
                             steps.push(Step::Deliver { state: usize::try_from(place).unwrap_or(0), probability: hazard.hazard });
                         }
                     }
-                    let mut scratch = Scratch::default();
-                    scratch.resize(map.columns());
-                    let mut target = vec![0.0; map.columns()];
-                    target[map.columns() - 1] = unit;
-                    node.tick(&mut map, rows, lifted.coordination, &target, None, span, scale, &mut scratch);
-                    events += 1.0;
-                    norm = norm.max((0..full).map(|row| map.row(row).iter().map(|entry| entry.abs()).sum()).fold(0.0, f64::max));
+                    map.tick(node, lifted, unit, span, scale);
                     tick += 1;
                 }
             }
@@ -109,16 +117,15 @@ impl Symmetric {
         // What was sent in the frame is of an earlier one in the next.
         steps.push(flush(&map, &|row| if row < states { row } else { row + sent }, size));
         let translation = (!lifted.tied).then(|| {
-            let moved = lifted.coordination.stiffness / unit;
+            let moved = if unit > 0.0 { lifted.coordination.stiffness / unit } else { 0.0 };
             let mut states: Vec<f64> = (0..states).map(|row| if row == rows.object || Some(row) == rows.device { 1.0 } else { 0.0 }).collect();
             states.resize(size, moved);
             (states, moved)
         });
-        let rounding = 16.0 * f64::EPSILON * events * norm * norm;
-        Self { peers: crate::structure::count(peers), count: peers, steps, size, translation, position: rows.object, rounding }
+        Self { peers: crate::structure::count(peers), count: peers, steps, size, translation, position: rows.object, roundings }
     }
 
-    fn moved(&self, moment: &Moment, map: &Matrix, held: &[f64]) -> Moment {
+    fn moved(&self, moment: &Moment, Map { own: map, held }: &Map) -> Moment {
         let Moment { own, other, with: [r, s, o], held: h } = moment;
         let n = self.peers;
         let w = 1.0 / (n - 1.0);
@@ -173,11 +180,11 @@ impl Symmetric {
     }
 
     /// Positions relative to the mean of all copies.
-    fn relative(&self, moment: &mut Moment) {
+    fn relative(&self, moment: &mut Moment, signs: Signs) {
         let Some((states, held)) = &self.translation else {
             return;
         };
-        let n = self.peers;
+        let (n, minus) = (self.peers, signs.minus());
         let at = self.position;
         let Moment { own, other, with: [r, s, o], held: h } = moment;
         let with_mean: Vec<f64> = own.row(at).iter().zip(other.row(at)).map(|(own, other)| (own + (n - 1.0) * other) / n).collect();
@@ -186,87 +193,96 @@ impl Symmetric {
         for core in [own, other] {
             for row in 0..core.rows() {
                 for column in 0..core.columns() {
-                    core[(row, column)] += square * states[row] * states[column] - states[row] * with_mean[column] - with_mean[row] * states[column];
+                    core[(row, column)] +=
+                        square * states[row] * states[column] + minus * (states[row] * with_mean[column] + with_mean[row] * states[column]);
                 }
             }
         }
         for with in [r, s, o] {
             for (row, with) in with.iter_mut().enumerate() {
-                *with += states[row] * held * square - with_mean[row] * held - states[row] * held_mean;
+                *with += states[row] * held * square + minus * (with_mean[row] * held + states[row] * held_mean);
             }
         }
         for h in h {
-            *h += held * held * square - 2.0 * held * held_mean;
+            *h += held * held * square + minus * 2.0 * held * held_mean;
         }
     }
 
     /// The blocks: of the common motion, of the differences, and of what is held with sums of zero, symmetric and antisymmetric.
-    fn blocks(&self, moment: &Moment) -> (Matrix, Matrix, f64, f64) {
+    fn blocks(&self, moment: &Moment, signs: Signs) -> (Matrix, Matrix, f64, f64) {
         let Moment { own, other, with: [r, s, o], held: h } = moment;
-        let n = self.peers;
-        let (n2, n3, size) = (n - 2.0, n - 3.0, self.size);
-        let (plus, minus) = (h[0] + h[1], h[0] - h[1]);
-        let (y, z) = (h[2] + h[3] + 2.0 * h[4], h[2] + h[3] - 2.0 * h[4]);
+        let (n, minus) = (self.peers, signs.minus());
+        let (n1, n2, n3, size) = (n - 1.0, n - 2.0, n - 3.0, self.size);
+        // For three peers this factor is below zero by itself.
+        let n4 = if signs == Signs::Kept { n - 4.0 } else { (n - 4.0).abs() };
+        let (even, odd) = (h[0] + h[1], h[0] + minus * h[1]);
+        let (y, z) = (h[2] + h[3] + 2.0 * h[4], h[2] + h[3] + minus * 2.0 * h[4]);
         let common = Matrix::from_fn(size + 1, size + 1, |row, column| match (row < size, column < size) {
-            (true, true) => own[(row, column)] + (n - 1.0) * other[(row, column)],
-            (false, false) => plus + n2 * y + n2 * n3 * h[5],
+            (true, true) => own[(row, column)] + n1 * other[(row, column)],
+            (false, false) => (even + n2 * y + n2 * n3 * h[5]) / n1,
             _ => {
                 let row = row.min(column);
-                (n - 1.0).sqrt() * (r[row] + s[row] + n2 * o[row])
+                r[row] + s[row] + n2 * o[row]
             }
         });
         let extra = if self.count > 2 { 2 } else { 1 };
         let apart = Matrix::from_fn(size + extra, size + extra, |row, column| {
             let (low, high) = (row.min(column), row.max(column));
             match (low < size, high < size) {
-                (true, true) => own[(row, column)] - other[(row, column)],
-                (true, false) if high == size => (0.5 * n).sqrt() * (r[low] - s[low]),
-                (true, false) => (0.5 * n2).sqrt() * (r[low] + s[low] - 2.0 * o[low]),
-                _ if high == size => minus + 0.5 * n2 * z,
-                _ if low == size => 0.5 * (n * n2).sqrt() * (h[2] - h[3]),
-                _ => plus + 0.5 * (n - 4.0) * y - 2.0 * n3 * h[5],
+                (true, true) => own[(row, column)] + minus * other[(row, column)],
+                (true, false) if high == size => (0.5 * n / n1).sqrt() * (r[low] + minus * s[low]),
+                (true, false) => (0.5 * n2 / n1).sqrt() * (r[low] + s[low] + minus * 2.0 * o[low]),
+                _ if high == size => (odd + 0.5 * n2 * z) / n1,
+                _ if low == size => 0.5 * (n * n2).sqrt() * (h[2] + minus * h[3]) / n1,
+                _ => (even + 0.5 * n4 * y + minus * 2.0 * n3 * h[5]) / n1,
             }
         });
-        (common, apart, plus - y + 2.0 * h[5], minus - z)
+        (common, apart, even + minus * y + 2.0 * h[5], odd + minus * z)
     }
 
     /// The moment with those blocks.
-    fn moment(&self, common: &Matrix, apart: &Matrix, symmetric: f64, antisymmetric: f64) -> Moment {
-        let n = self.peers;
-        let n2 = n - 2.0;
-        let size = self.size;
-        let other = Matrix::from_fn(size, size, |row, column| (common[(row, column)] - apart[(row, column)]) / n);
+    fn moment(&self, (common, apart, symmetric, antisymmetric): &(Matrix, Matrix, f64, f64), signs: Signs) -> Moment {
+        let (n, minus) = (self.peers, signs.minus());
+        let (n1, n2, size) = (n - 1.0, n - 2.0, self.size);
+        let other = Matrix::from_fn(size, size, |row, column| (common[(row, column)] + minus * apart[(row, column)]) / n);
         let own = Matrix::from_fn(size, size, |row, column| apart[(row, column)] + other[(row, column)]);
         let (mut r, mut s, mut o) = (vec![0.0; size], vec![0.0; size], vec![0.0; size]);
         for row in 0..size {
-            let whole = common[(row, size)] / (n - 1.0).sqrt();
-            let difference = apart[(row, size)] / (0.5 * n).sqrt();
-            let rest = if self.count > 2 { apart[(row, size + 1)] / (0.5 * n2).sqrt() } else { 0.0 };
-            o[row] = if self.count > 2 { (whole - rest) / n } else { 0.0 };
+            let whole = common[(row, size)];
+            let difference = apart[(row, size)] / (0.5 * n / n1).sqrt();
+            let rest = if self.count > 2 { apart[(row, size + 1)] / (0.5 * n2 / n1).sqrt() } else { 0.0 };
+            o[row] = if self.count > 2 { (whole + minus * rest) / n } else { 0.0 };
             let sum = if self.count > 2 { rest + 2.0 * o[row] } else { whole };
             r[row] = 0.5 * (sum + difference);
-            s[row] = 0.5 * (sum - difference);
+            s[row] = 0.5 * (sum + minus * difference);
         }
-        let whole = common[(size, size)];
+        let whole = n1 * common[(size, size)];
         let held = if self.count == 2 {
-            let minus = apart[(size, size)];
-            [0.5 * (whole + minus), 0.5 * (whole - minus), 0.0, 0.0, 0.0, 0.0]
+            let odd = apart[(size, size)];
+            [0.5 * (whole + odd), 0.5 * (whole + minus * odd), 0.0, 0.0, 0.0, 0.0]
         } else {
-            let z = 2.0 * (apart[(size, size)] - antisymmetric) / n;
-            let minus = antisymmetric + z;
-            let rest = apart[(size + 1, size + 1)];
-            let (y, apart_four, plus) = if self.count == 3 {
-                let y = (whole - rest) / 1.5;
-                (y, 0.0, whole - y)
+            let z = 2.0 * (n1 * apart[(size, size)] + minus * antisymmetric) / n;
+            let odd = antisymmetric + z;
+            let rest = n1 * apart[(size + 1, size + 1)];
+            let (y, apart_four, even) = if self.count == 3 {
+                let y = (whole + minus * rest) / 1.5;
+                (y, 0.0, whole + minus * y)
             } else {
-                let (one, two) = (2.0 * (rest - symmetric) / n2, (whole - symmetric) / (n - 1.0));
-                let four = (two - one) / n;
+                let (one, two) = (2.0 * (rest + minus * symmetric) / n2, (whole + minus * symmetric) / n1);
+                let four = (two + minus * one) / n;
                 let y = one + 4.0 * four;
-                (y, four, symmetric + y - 2.0 * four)
+                (y, four, symmetric + y + minus * 2.0 * four)
             };
-            let difference = 2.0 * apart[(size, size + 1)] / (n * n2).sqrt();
+            let difference = 2.0 * n1 * apart[(size, size + 1)] / (n * n2).sqrt();
             let sum = 0.5 * (y + z);
-            [0.5 * (plus + minus), 0.5 * (plus - minus), 0.5 * (sum + difference), 0.5 * (sum - difference), 0.25 * (y - z), apart_four]
+            [
+                0.5 * (even + odd),
+                0.5 * (even + minus * odd),
+                0.5 * (sum + difference),
+                0.5 * (sum + minus * difference),
+                0.25 * (y + minus * z),
+                apart_four,
+            ]
         };
         Moment { own, other, with: [r, s, o], held }
     }
@@ -298,6 +314,18 @@ impl Symmetric {
             _ => (common, apart, 0.0, 0.0),
         }
     }
+
+    fn run(&self, element: &[f64], signs: Signs) -> Vec<f64> {
+        let mut moment = self.moment(&self.unpacked(element), signs);
+        for step in &self.steps {
+            moment = match step {
+                Step::Move { map, sizes } => self.moved(&moment, if signs == Signs::Kept { map } else { sizes }),
+                Step::Deliver { state, probability } => Self::delivered(&moment, *state, *probability),
+            };
+        }
+        self.relative(&mut moment, signs);
+        self.packed(self.blocks(&moment, signs))
+    }
 }
 
 impl Positive for Symmetric {
@@ -312,26 +340,28 @@ impl Positive for Symmetric {
     }
 
     fn apply(&self, element: &[f64]) -> Vec<f64> {
-        let (common, apart, symmetric, antisymmetric) = self.unpacked(element);
-        let mut moment = self.moment(&common, &apart, symmetric, antisymmetric);
-        for step in &self.steps {
-            moment = match step {
-                Step::Move { map, held } => self.moved(&moment, map, held),
-                Step::Deliver { state, probability } => Self::delivered(&moment, *state, *probability),
-            };
-        }
-        self.relative(&mut moment);
-        self.packed(self.blocks(&moment))
+        self.run(element, Signs::Kept)
     }
 
-    fn is_definite(&self, element: &[f64]) -> bool {
+    fn sizes(&self, element: &[f64]) -> Vec<f64> {
+        self.run(element, Signs::Dropped)
+    }
+
+    fn roundings(&self) -> usize {
+        let of = |step: &Step| match step {
+            // A product from both sides, and the sums over what is held.
+            Step::Move { map, .. } => 2 * map.own.columns() + 32,
+            Step::Deliver { .. } => 12,
+        };
+        // From blocks to a moment and back, and to relative positions.
+        self.steps.iter().map(of).sum::<usize>() + 2 * self.roundings + 64
+    }
+
+    fn matrices(&self, element: &[f64]) -> Vec<Matrix> {
         let kept = self.size + usize::from(self.translation.is_none());
         let (common, rest) = unpack(kept, element);
         let (apart, rest) = unpack(self.size + if self.count > 2 { 2 } else { 1 }, rest);
-        rest.iter().all(|entry| *entry > 0.0) && is_definite(common) && is_definite(apart)
-    }
-
-    fn rounding(&self) -> f64 {
-        self.rounding
+        let single = |entry: &f64| Matrix::from_fn(1, 1, |_, _| *entry);
+        [common, apart].into_iter().chain(rest.iter().map(single)).collect()
     }
 }

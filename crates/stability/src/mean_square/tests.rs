@@ -17,6 +17,9 @@ const PAPER: &str = r#"
     link         = { delay = "8ms" }
 "#;
 
+/// The widest bounds, relative to the radius, of up to five peers whose samples may arrive at many ticks; two or three of one delay have 10⁻⁹ to 10⁻⁸.
+const BOUND: f64 = 1e-7;
+
 fn scene(overrides: &[&str]) -> Scene {
     let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
     Scene::parse(PAPER, "paper.toml".as_ref(), &overrides).unwrap()
@@ -32,15 +35,17 @@ fn both_ways(overrides: &[&str]) -> (Radius, Radius) {
     let network = NominalNetwork::of(&scene).unwrap();
     let contacts = combinations(&scene).unwrap().remove(0).contacts;
     let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
-    let (one, _) = symmetric(&scene, &network, &structure, &mut Vec::new()).unwrap().unwrap();
-    let (other, ..) = one_by_one(&scene, &network, &structure, &contacts, &[], &mut Vec::new()).unwrap();
-    (one, other)
+    let one = symmetric(&scene, &network, &structure, &mut Vec::new()).unwrap().unwrap();
+    let other = one_by_one(&scene, &network, &structure, &contacts, &[], &mut Vec::new()).unwrap();
+    assert!((one.held.value - other.held.value).abs() <= one.held.error + other.held.error);
+    (one.radius, other.radius)
 }
 
 #[track_caller]
 fn close(one: Radius, value: f64) {
-    // The bounds are wider than the error is: they hold however the operator's eigenvectors are conditioned.
-    assert!((one.value - value).abs() < 1e-9 * value && one.error < 1e-7 * value, "{one:?} {value}");
+    // The bounds are wider than the error is: eight ticks of a peer are counted as 3·10³ roundings of 10⁻¹⁶, those of all peers together, and they count
+    // 10³ to 10⁴ times, since the eigenvectors are far from orthogonal.
+    assert!((one.value - value).abs() < 1e-11 * value && one.error < BOUND * value, "{one:?} {value}");
 }
 
 #[test]
@@ -59,8 +64,10 @@ fn without_chance_it_is_the_square_of_the_nominal_radius() {
 #[test]
 fn by_symmetry_and_one_by_one_agree() {
     for count in ["2", "3", "4", "5"] {
+        // From four on all formulas are the same; five tell n − 4 from 0.
+        let links = if count == "5" { 1 } else { usize::MAX };
         let count = format!("scene.count={count}");
-        for link in [
+        let given = [
             &["link.loss=0.1"][..],
             &["link.loss=0.6", "link.delay=0ms"],
             &["link.loss=0.05", "link.delay=19.4ms", "coordination.strategy=proportional-derivative"],
@@ -68,7 +75,8 @@ fn by_symmetry_and_one_by_one_agree() {
             &["link.jitter={ sd = '0.5ms' }", "link.delay=20ms", "object.damping=1.0"],
             &["link.loss=0.3", "peer.hand={ arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } }"],
             &["link.loss=0.3", "peer.contact=none"],
-        ] {
+        ];
+        for link in given.into_iter().take(links) {
             let (symmetric, events) = both_ways(&[link, &[count.as_str()]].concat());
             close(symmetric, events.value);
             close(events, symmetric.value);
@@ -173,8 +181,8 @@ fn radius_of(blocks: usize, terms: &[(usize, usize, f64, &Mat<f64>)]) -> f64 {
 }
 
 #[test]
-fn two_and_three_peers_have_the_radius_of_the_kronecker_products() {
-    for (peers, frames, loss) in [(2, 0, 0.1), (2, 1, 0.5), (2, 2, 0.25), (3, 0, 0.2)] {
+fn two_peers_have_the_radius_of_the_kronecker_products() {
+    for (peers, frames, loss) in [(2, 0, 0.1), (2, 1, 0.5)] {
         let explicit = Explicit { peers, frames };
         let links = peers * (peers - 1);
         let all = explicit.all();
@@ -193,27 +201,19 @@ fn loss_power(base: f64, exponent: u32) -> f64 {
     base.powi(i32::try_from(exponent).unwrap())
 }
 
-/// Two links, each with its own chain: four joint states and, from each, four outcomes of loss.
+/// Where states of four do the same, they are one: the radius is that of the chain of two with p = p13 and r = p31 + p32.
 #[test]
-fn bursts_at_two_peers_have_the_radius_of_all_joint_states() {
-    let (p, r, h, k) = (0.1, 0.4, 0.2, 0.95);
-    let explicit = Explicit { peers: 2, frames: 1 };
-    let all = explicit.all();
-    let step = |from: usize, to: usize| [[1.0 - p, p], [r, 1.0 - r]][from][to];
-    let lost = |state: usize, lost: usize| if lost == 1 { [1.0 - k, 1.0 - h][state] } else { [k, h][state] };
-    let mut terms = Vec::new();
-    for before in 0..4 {
-        for after in 0..4 {
-            for (bits, a) in all.iter().enumerate() {
-                let weight = |link: usize| step(before >> link & 1, after >> link & 1) * lost(before >> link & 1, bits >> link & 1);
-                terms.push((after, before, weight(0) * weight(1), a));
-            }
-        }
+fn four_states_that_do_the_work_of_two_have_their_radius() {
+    let two = found(&["scene.count=2", "link.loss={ gilbert-elliott = { p = 0.05, r = 0.4 } }"]);
+    for four in ["p13 = 0.05, p31 = 0.4, p32 = 0.0, p23 = 1.0, p14 = 0.0", "p13 = 0.05, p31 = 0.1, p32 = 0.3, p23 = 0.05, p14 = 0.0"] {
+        let four = found(&["scene.count=2", &format!("link.loss={{ states = {{ {four} }} }}")]);
+        close(four.radius, two.radius.value);
+        // Nothing arrives as long as the chain stays where everything is lost.
+        assert!((four.held.value - 0.6).abs() < 1e-12 && (two.held.value - 0.6).abs() < 1e-12, "{four:?}");
     }
-    let expected = radius_of(4, &terms);
-    let answer = found(&["scene.count=2", "link.loss={ gilbert-elliott = { p = 0.1, r = 0.4, h = 0.2, k = 0.95 } }"]);
-    assert_eq!(answer.method, MeanSquareMethod::Events);
-    close(answer.radius, expected);
+    // Losses between bursts make more of them.
+    let more = found(&["scene.count=2", "link.loss={ states = { p13 = 0.05, p31 = 0.1, p32 = 0.3, p23 = 0.05, p14 = 0.2 } }"]);
+    assert!(more.radius.value > two.radius.value + 1e-3, "{more:?}");
 }
 
 /// With p + r = 1 a chain forgets where it was: every packet is lost with p, whatever happened before. With jitter within a period too.
@@ -276,7 +276,7 @@ fn overtaking_is_followed_by_which_sample_is_held() {
     // And in a whole scene, between the radii of the two delays it mixes.
     let answer = found(&["scene.count=2", "link.delay=16ms", "link.reorder={ probability = 0.3 }"]);
     assert_eq!(answer.method, MeanSquareMethod::Events);
-    assert!(answer.radius.value > 0.0 && answer.radius.error < 1e-9, "{answer:?}");
+    assert!(answer.radius.value > 0.0 && answer.radius.error < BOUND, "{answer:?}");
 }
 
 #[test]
@@ -288,7 +288,7 @@ fn loss_may_stabilise_and_may_destabilise() {
     // Held too long at high gain, the loop is better opened now and then.
     let mut stabilised = false;
     let mut destabilised = false;
-    for stiffness in (4..60).map(|step| format!("coordination.stiffness={}", 100 * step)) {
+    for stiffness in (1..15).map(|step| format!("coordination.stiffness={}", 400 * step)) {
         for (delay, loss) in [("0ms", "0.3"), ("8ms", "0.3"), ("16ms", "0.5"), ("24ms", "0.5"), ("24ms", "0.8")] {
             let answer = verdicts(&[&stiffness, &format!("link.delay={delay}"), &format!("link.loss={loss}"), "scene.count=2"]);
             stabilised |= answer == (Verdict::Unstable, Verdict::Stable);
@@ -298,27 +298,80 @@ fn loss_may_stabilise_and_may_destabilise() {
     assert!(stabilised && destabilised, "{stabilised} {destabilised}");
 }
 
-/// The block of the differences and that of the common motion tend to limits as N grows, at one cost.
+/// Both the common motion and the differences tend to limits as N grows, with distances of order 1/N, at one cost and with the same bounds.
 #[test]
 fn a_hundred_thousand_peers_cost_what_ten_do() {
-    let few = scene(&["link.loss=0.1", "object.split-mass=false"]);
-    let network = NominalNetwork::of(&few).unwrap();
-    let contacts = combinations(&few).unwrap().remove(0).contacts;
-    let structure = Structure::of(&[&few], &network, &contacts).unwrap();
-    let node = structure.node(&few, 0);
-    let timetable = Timetable::new(&[NodeClock::of(&few, 0)], &[]).unwrap();
-    let instants = Instants::of(&timetable, 1);
-    let (hazards, _) = hazards(&few, &network, (0, 1), timetable.frame, &instants.sends[0], &instants.ticks[0], &mut Vec::new()).unwrap().unwrap();
-    let of = |peers: usize| {
-        let lifted = Lifted { timetable: &timetable, ..structure.quotient(&few, std::slice::from_ref(&node)) };
-        let operator = Symmetric::new(peers, &lifted, &hazards);
-        (radius_of_positive(&operator), operator.unknowns())
+    let of = |peers: usize, more: &[&str]| found(&[&[format!("scene.count={peers}").as_str(), "object.split-mass=false"], more].concat());
+    for more in [&["link.loss=0.1"][..], &["link.jitter={ sd = '1ms', distribution = 'uniform' }", "link.delay=12.2ms", "link.loss=0.3"]] {
+        let [few, thousand, many] = [10, 1000, 100_000].map(|peers| of(peers, more));
+        for answer in [&few, &thousand, &many] {
+            assert_eq!((answer.method, answer.unknowns), (MeanSquareMethod::Symmetric, few.unknowns));
+            assert!(answer.radius.error < BOUND, "{answer:?}");
+        }
+        let ratio = (thousand.radius.value - many.radius.value) / (few.radius.value - many.radius.value);
+        assert!((0.005..0.02).contains(&ratio), "{ratio} {few:?} {thousand:?} {many:?}");
+    }
+    // Nothing arrives: one peer stands for all.
+    let silent = of(100_000, &["link.loss=1.0"]);
+    assert_eq!((silent.radius.value.to_bits(), silent.verdict()), (1.0_f64.to_bits(), Verdict::Marginal));
+}
+
+/// E of the squares over many runs of the explicit frame, against the operator applied as often: not a rate, but every moment itself.
+#[test]
+fn the_mean_of_many_runs_is_what_the_operator_says() {
+    const RUNS: usize = 20_000;
+    let (loss, explicit) = (0.4, Explicit { peers: 2, frames: 1 });
+    let scene = scene(&["scene.count=2", "link.loss=0.4"]);
+    let network = NominalNetwork::of(&scene).unwrap();
+    let contacts = combinations(&scene).unwrap().remove(0).contacts;
+    let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
+    let timetable = Timetable::new(&[NodeClock::of(&scene, 0), NodeClock::of(&scene, 1)], &[]).unwrap();
+    let instants = Instants::of(&timetable, 2);
+    let line = |from: usize, to: usize| {
+        let found = hazards(&scene, &network, (from, to), timetable.frame, &instants.sends[from], &instants.ticks[to], &mut Vec::new());
+        Line { from, to, chance: Some((found.unwrap().unwrap().0, None)) }
     };
-    let ((ten, size), (many, same), (more, _)) = (of(10), of(100_000), of(200_000));
-    assert_eq!(size, same);
-    // The more peers, the wider the bounds: moments of one peer and sums over all of them stand side by side.
-    assert!(ten.error < 1e-7 && many.error < 1e-4, "{ten:?} {many:?}");
-    assert!((many.value - more.value).abs() < 1e-4, "{many:?} {more:?}");
+    let node = structure.node(&scene, 0);
+    let (nodes, weights) = ([node.clone(), node], Matrix::from_fn(2, 2, |row, column| if row == column { 0.0 } else { 1.0 }));
+    let lifted = Lifted { nodes: &nodes, weights: &weights, timetable: &timetable, ..structure.quotient(&scene, &nodes) };
+    let operator = events(&lifted, &[line(1, 0), line(0, 1)], &instants);
+    // All at rest and at the origin, but for the copy of the second peer, which nobody has heard of yet. In the operator, in order: device and copy of
+    // the first but for the copy's position, of the second, samples under way, what is held.
+    let kept = operator.kept.len();
+    let (device, copy) = (0, 5);
+    let mut moment = Matrix::zeros(kept, kept);
+    moment[(copy, copy)] = 1.0;
+    let mut element = Vec::new();
+    positive::pack(&moment, &mut element);
+
+    let mut starts = vec![vec![0.0; explicit.size()]; RUNS];
+    starts.iter_mut().for_each(|start| start[6] = 1.0);
+    let mut random = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut draw = || {
+        // Marsaglia 2003, xorshift with shifts 13, 7 and 17.
+        random ^= random << 13;
+        random ^= random >> 7;
+        random ^= random << 17;
+        random >> 11 < 3_602_879_701_896_397
+    };
+    assert!((3_602_879_701_896_397.0 / 2_f64.powi(53) - loss).abs() < 1e-15);
+    for frame in 1..=12 {
+        element = operator.apply(&element);
+        let expected = &operator.matrices(&element)[0];
+        for state in &mut starts {
+            let lost = [draw(), draw()];
+            *state = explicit.lead(std::mem::take(state), &|to, _| lost[to]);
+        }
+        for (what, place, explicit) in [("device", device, 0), ("copy", copy, 6)] {
+            let squares = || starts.iter().map(|state| state[explicit] * state[explicit]);
+            let mean = squares().sum::<f64>() / count(RUNS);
+            let variance = squares().map(|square| (square - mean) * (square - mean)).sum::<f64>() / count(RUNS - 1);
+            let off = mean - expected[(place, place)];
+            // 24 comparisons at five standard errors: one in 70,000 seeds fails. At first nothing has been left to chance.
+            let allowed = 5.0 * (variance / count(RUNS)).sqrt() + 1e-12;
+            assert!(off.abs() < allowed, "{what} after {frame} frames: {mean} instead of {}, {off} > {allowed}", expected[(place, place)]);
+        }
+    }
 }
 
 #[test]

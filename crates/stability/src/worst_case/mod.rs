@@ -26,11 +26,11 @@ mod lyapunov;
 mod norm;
 mod of_scene;
 mod pattern;
-mod rounding;
+pub(crate) mod rounding;
 mod symmetric;
 #[cfg(test)]
 mod tests;
-mod verified;
+pub(crate) mod verified;
 
 pub use automaton::{Automaton, AutomatonError};
 pub use gripenberg::{Effort, WorstCase};

@@ -5,29 +5,29 @@
 //! at most its number of operations times u, and [`outward`] adds more than that.
 
 /// Half the distance from 1 to the next number: the largest relative error of one rounding.
-pub(super) const UNIT: f64 = f64::EPSILON / 2.0;
+pub(crate) const UNIT: f64 = f64::EPSILON / 2.0;
 
 /// More than any underflow of a few operations on numbers near 1 can cost.
-pub(super) const UNDERFLOW: f64 = f64::MIN_POSITIVE;
+pub(crate) const UNDERFLOW: f64 = f64::MIN_POSITIVE;
 
 /// γₖ, itself rounded up.
-pub(super) fn gamma(operations: usize) -> f64 {
+pub(crate) fn gamma(operations: usize) -> f64 {
     let share = real(operations) * UNIT;
     if share < 0.5 { share / (1.0 - share) * (1.0 + 8.0 * UNIT) } else { f64::INFINITY }
 }
 
 /// A bound that a formula of at most fifty roundings of non-negative numbers gave, rounded up.
-pub(super) fn outward(bound: f64) -> f64 {
+pub(crate) fn outward(bound: f64) -> f64 {
     bound * (1.0 + 64.0 * UNIT)
 }
 
 /// At least (x·2^`exponent`)^(1/k): for a bound from above. `x` is not negative.
-pub(super) fn root_above(x: f64, exponent: f64, k: f64) -> f64 {
+pub(crate) fn root_above(x: f64, exponent: f64, k: f64) -> f64 {
     root(x, exponent, k, 1.0)
 }
 
 /// At most (x·2^`exponent`)^(1/k): for a bound from below. `x` is not negative.
-pub(super) fn root_below(x: f64, exponent: f64, k: f64) -> f64 {
+pub(crate) fn root_below(x: f64, exponent: f64, k: f64) -> f64 {
     root(x, exponent, k, -1.0)
 }
 
@@ -46,7 +46,7 @@ fn root(x: f64, exponent: f64, k: f64, side: f64) -> f64 {
 
 /// A count as a number.
 #[expect(clippy::cast_precision_loss, reason = "counts are far below 2^53")]
-pub(super) const fn real(count: usize) -> f64 {
+pub(crate) const fn real(count: usize) -> f64 {
     count as f64
 }
 

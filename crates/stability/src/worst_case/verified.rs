@@ -165,7 +165,7 @@ fn contracts(matrix: &Matrix, from: &Matrix, to: &Matrix, rate: f64) -> bool {
 }
 
 /// Whether every symmetric matrix within `error`, entry by entry, of this one is positive definite.
-fn is_positive(symmetric: &Matrix, error: &Matrix) -> bool {
+pub(crate) fn is_positive(symmetric: &Matrix, error: &Matrix) -> bool {
     let size = symmetric.rows();
     let diagonal: Vec<f64> = (0..size).map(|place| symmetric[(place, place)]).collect();
     // Written so that NaN fails.

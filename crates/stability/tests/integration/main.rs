@@ -5,6 +5,7 @@
 mod admittance;
 mod anchors;
 mod graphs;
+mod mean_square;
 mod reduction;
 mod reference;
 mod strategies;

@@ -116,6 +116,19 @@ impl FourState {
         )
     }
 
+    /// The probability that a packet moves the chain from one state (row) to another (column); a packet that moves it to the third or fourth is lost. In
+    /// order: the gap, received within a burst, lost within a burst, lost for itself (states 1 to 4).
+    #[must_use]
+    pub fn transitions(&self) -> [[f64; 4]; 4] {
+        let [p13, p31, p32, p23, p14] = [self.p13, self.p31, self.p32, self.p23, self.p14].map(Probability::get);
+        [
+            [1.0 - p13 - p14, 0.0, p13, p14], //
+            [0.0, 1.0 - p23, p23, 0.0],
+            [p31, p32, 1.0 - p31 - p32, 0.0],
+            [1.0, 0.0, 0.0, 0.0],
+        ]
+    }
+
     /// The long-run fraction of packets in each state, 1 to 4. Starting in the gap, a chain that can never leave a state stays there.
     #[must_use]
     pub fn stationary(&self) -> [f64; 4] {
