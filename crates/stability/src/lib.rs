@@ -5,6 +5,7 @@
 //! origin. This crate builds that matrix from the same plants and strategies that the simulator steps (lifting: Araki & Yamamoto 1986; Rakhsha &
 //! Constantinescu 2015, Section 3), reduces it where peers are alike, and says how sure it is of the answer.
 
+mod admittance;
 mod analysis;
 mod boundary;
 mod determinant;
@@ -26,6 +27,7 @@ mod structure;
 mod timetable;
 mod worst_case;
 
+pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, admittance, ideal};
 pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_with};
 pub use boundary::{Boundary, BoundaryError, BoundaryOptions, Crossing, Stretch};
 pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};

@@ -38,18 +38,25 @@ pub(crate) struct Structure {
     pub(crate) weights: Matrix,
     /// Whether something ties the object to ground: an arm's stiffness, a wall, or a peer that holds forever what it began with.
     pub(crate) tied: bool,
-    peers: usize,
+    pub(crate) peers: usize,
 }
 
 impl Structure {
     /// The classes of peers that are equal in every one of the scenes, which differ in numbers only.
     pub(crate) fn of(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
+        Self::with_alone(scenes, network, contacts, None)
+    }
+
+    /// The same with one peer in a class of its own, whoever is equal to it: that which is pushed moves unlike those that are not.
+    pub(crate) fn with_alone(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, alone: Option<usize>) -> Result<Self, AnalysisError> {
         let scene = scenes[0];
         let peers = scene.peers.len();
         let mut classes: Vec<Vec<usize>> = Vec::new();
         for place in 0..peers {
             let found = classes.iter().position(|class| {
-                contacts.touching[class[0]] == contacts.touching[place]
+                Some(place) != alone
+                    && Some(class[0]) != alone
+                    && contacts.touching[class[0]] == contacts.touching[place]
                     && scenes.iter().all(|scene| alike(&scene.peers[class[0]], &scene.peers[place], contacts.touching[place]))
             });
             match found {

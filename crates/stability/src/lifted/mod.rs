@@ -6,5 +6,5 @@
 pub(crate) mod frame;
 pub(crate) mod node;
 
-pub(crate) use frame::{Autonomous, Lifted, common_time};
+pub(crate) use frame::{Autonomous, FrameMap, Instrument, Lifted, common_time};
 pub(crate) use node::{Body, Node};

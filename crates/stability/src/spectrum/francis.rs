@@ -4,9 +4,13 @@ use num_complex::Complex64;
 
 use super::hessenberg::TINY_SQUARE;
 use super::square::Square;
+use super::triangle::precise;
 
-/// Sweeps for one eigenvalue before the iteration is given up. Two to four are usual.
-const SWEEPS: u32 = 60;
+/// Sweeps for one eigenvalue before the iteration is given up. Two to four are usual; several eigenvalues near zero in a badly scaled matrix took 150.
+const SWEEPS: u32 = 400;
+
+/// Sweeps for one eigenvalue after which an entry counts as zero beside the whole matrix.
+const PATIENCE: u32 = 6;
 
 /// Turns a Hessenberg matrix into a quasi-triangular one: blocks of one and two rows on the diagonal, zeros below.
 ///
@@ -29,7 +33,10 @@ pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
         while first > 0 {
             let below = matrix.at(first, first - 1).abs();
             let beside = matrix.at(first - 1, first - 1).abs() + matrix.at(first, first).abs();
-            if below <= f64::EPSILON * 0.5 * if beside > 0.0 { beside } else { norm } {
+            // Beside the eigenvalues that it stands between, first. Several eigenvalues at zero never let it sink so far, so later beside the matrix,
+            // which is no larger an error than those of the reduction.
+            let beside = if sweeps >= PATIENCE || beside == 0.0 { beside.max(norm / precise(size)) } else { beside };
+            if below <= f64::EPSILON * 0.5 * beside {
                 matrix.put(first, first - 1, 0.0);
                 break;
             }
@@ -53,8 +60,8 @@ pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
 #[inline]
 fn sweep<const FULL: bool, S: Square>(matrix: &mut S, first: usize, last: usize, count: u32) {
     let size = matrix.size();
-    // The shifts are the eigenvalues of a block of two: the last one, or every tenth time an arbitrary one, which breaks cycles.
-    let (x, y, w) = if count.is_multiple_of(10) {
+    // The shifts are the eigenvalues of a block of two: the last one, or, seldom, an arbitrary one, which breaks cycles. Often would undo slow progress.
+    let (x, y, w) = if count == 10 || count.is_multiple_of(40) {
         let size = matrix.at(last, last - 1).abs() + matrix.at(last - 1, last - 2).abs();
         let middle = 0.75 * size + matrix.at(last, last);
         (middle, middle, -0.4375 * size * size)

@@ -183,10 +183,8 @@ impl Workspace {
             return Radius { value: 0.0, error: norm + perturbation };
         }
         let own = BACKWARD_ERROR * precise(size) * f64::EPSILON;
-        let Some((mut value, mut interval)) = self.enclosed(matrix, perturbation + own * norm) else {
-            return Radius { value: norm, error: norm + perturbation };
-        };
-        if interval.width() > 1e-9 * value {
+        let mut found = self.enclosed(matrix, perturbation + own * norm);
+        if found.as_ref().is_none_or(|(value, interval)| interval.width() > 1e-9 * value) {
             // The matrix may be badly scaled: balanced, rounding hurts less, but the perturbation may grow by the ratio of the scales.
             let mut balanced = matrix.clone();
             let mut exponents = vec![0; size];
@@ -196,12 +194,15 @@ impl Workspace {
             if range > 0
                 && let Some((better, other)) = self.enclosed(&balanced, grown + own * balanced.frobenius_norm())
             {
-                if other.width() < interval.width() {
-                    value = better;
-                }
-                interval = interval.and(other);
+                found = Some(match found {
+                    Some((value, interval)) => (if other.width() < interval.width() { better } else { value }, interval.and(other)),
+                    None => (better, other),
+                });
             }
         }
+        let Some((value, interval)) = found else {
+            return Radius { value: self.radius(matrix), error: norm + perturbation };
+        };
         // The radius is never above the norm.
         let high = interval.high.min((norm + perturbation) * (1.0 + own));
         let value = value.clamp(interval.low.min(high), high);
@@ -234,7 +235,8 @@ impl Workspace {
         }
         self.eigenvalues.clear();
         self.large_eigenvalues(matrix);
-        self.eigenvalues.iter().fold(0.0, |largest: f64, value| largest.max(value.norm()))
+        let larger = |largest: f64, value: &Complex64| if value.norm() > largest || value.is_nan() { value.norm() } else { largest };
+        self.eigenvalues.iter().fold(0.0, larger)
     }
 
     /// Appends them in any order.
@@ -255,9 +257,9 @@ impl Workspace {
         }
         let mut large = self.large.take().filter(|large| large.size() == size).unwrap_or_else(|| Large::new(size));
         if !large.eigenvalues(matrix, |value| list.push(value)) {
-            // Nothing is known then but that all are below the norm.
+            // Neither iteration has converged, which was never seen. What is not known is not a number.
             list.clear();
-            list.resize(size, Complex64::from(matrix.frobenius_norm()));
+            list.resize(size, Complex64::new(f64::NAN, f64::NAN));
         }
         self.large = Some(large);
     }

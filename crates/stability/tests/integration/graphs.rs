@@ -7,7 +7,7 @@ use cohaptic_stability::{Graph, GraphError, Matrix, Method, analyse, analyse_on,
 use crate::anchors::scene;
 
 /// Average position over neighbours: a strategy of a user's own.
-struct Neighbours {
+pub(crate) struct Neighbours {
     /// Weights of the others, the peer itself left out; they add up to 1.
     weights: Vec<f64>,
     gains: Gains,
@@ -35,7 +35,7 @@ impl<const A: usize> Strategy<A> for Neighbours {
     }
 }
 
-struct OnGraph(Matrix);
+pub(crate) struct OnGraph(pub(crate) Matrix);
 
 impl Strategies for OnGraph {
     type Strategy<const A: usize> = Neighbours;
@@ -51,7 +51,7 @@ fn ring(peers: usize) -> Matrix {
     Matrix::from_fn(peers, peers, |row, column| if (row + 1) % peers == column || (column + 1) % peers == row { 1.0 } else { 0.0 })
 }
 
-fn star(peers: usize) -> Matrix {
+pub(crate) fn star(peers: usize) -> Matrix {
     Matrix::from_fn(peers, peers, |row, column| if (row == 0) != (column == 0) { 1.0 } else { 0.0 })
 }
 

@@ -1,5 +1,6 @@
 //! The analysis of whole scenes.
 
+mod admittance;
 mod anchors;
 mod graphs;
 mod reduction;

@@ -1,0 +1,251 @@
+//! The admittance that a hand meets: how fast a device moves for the force that pushes it, frequency by frequency.
+//!
+//! The loop has two rates, so a sine at one frequency makes velocities at many: at ω and at ω plus any multiple of the frame's frequency. The admittance
+//! is the *fundamental harmonic*, the part at ω, as if a sine were analysed that pushes with e^{jωt}, sampled and held as every hand force is. It is found
+//! without simulating (Rakhsha & Constantinescu 2015, Section 4, plot it for their controllers): in steady state one frame multiplies everything by
+//! e^{jωT}, which is one system of linear equations.
+
+mod error;
+mod harmonic;
+mod low_frequency;
+mod response;
+
+use cohaptic_peer::{Contact, Gains};
+use cohaptic_scene::Scene;
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use crate::lifted::{Body, Lifted, Node};
+use crate::network::NominalNetwork;
+use crate::parts::{radius_of, reduced};
+use crate::structure::{Contacts, Structure, arm, count, device_plant};
+use crate::timetable::{Event, NodeClock, Timetable};
+use crate::{AnalysisError, Matrix, Radius, Verdict};
+
+pub use error::AdmittanceError;
+pub use low_frequency::{Estimate, LowFrequencyFit};
+pub use response::{AdmittancePoint, FrequencyResponse, ideal};
+
+use harmonic::Harmonic;
+
+/// The admittance of one peer's device, with the hands of all others at rest: ready to be evaluated at any frequency.
+///
+/// Peers that are equal are treated together, so that it costs the same for any number of them. Arms are part of the scene and stay, that of the peer
+/// itself too: the force is what is added to what they do. A peer that touches nothing has the admittance of its bare device.
+///
+/// Where a scene is not linear, the linear scene is analysed in which every one-sided contact is closed and no copy is at a wall: see
+/// [`Admittance::notes`]. In a scene of several axes it is the admittance along the axis that the peer pushes along, or the first.
+#[derive(Clone, Debug)]
+pub struct Admittance {
+    nodes: Vec<Node>,
+    weights: Matrix,
+    timetable: Timetable,
+    coordination: Gains,
+    time: f64,
+    tied: bool,
+    /// Which of the nodes is pushed.
+    pushed: usize,
+    highest: f64,
+    radius: Radius,
+    notes: Vec<String>,
+}
+
+/// The admittance of the peer in that place of [`Scene::peers`] at those frequencies \[Hz\].
+///
+/// # Errors
+///
+/// As [`Admittance::of`] and [`Admittance::response`].
+pub fn admittance(scene: &Scene, peer: usize, frequencies: &[f64]) -> Result<FrequencyResponse, AdmittanceError> {
+    Admittance::of(scene, peer)?.response(frequencies)
+}
+
+impl Admittance {
+    /// Prepares the admittance of the peer in that place of [`Scene::peers`], as the scene begins.
+    ///
+    /// # Errors
+    ///
+    /// [`AdmittanceError`] if there is no such peer, or if the scene has no frame that repeats.
+    pub fn of(scene: &Scene, peer: usize) -> Result<Self, AdmittanceError> {
+        let spec = scene.peers.get(peer).ok_or(AdmittanceError::NoSuchPeer { peer, peers: scene.peers.len() })?;
+        let network = NominalNetwork::of(scene)?;
+        let (contacts, notes) = closed_contacts(scene, peer);
+        let structure = Structure::with_alone(&[scene], &network, &contacts, Some(peer))?;
+        let mut admittance = Self::of_classes(scene, structure, peer);
+        if !contacts.touching[peer] {
+            let device = Some(Body::new(device_plant(spec), scene.integrator, &spec.clock));
+            admittance.leave_bare(device, NodeClock::of(scene, peer), arm(spec).stiffness > 0.0)?;
+        }
+        admittance.highest = 0.5 * admittance.tick_rate();
+        admittance.notes = network.notes.iter().cloned().chain(notes).collect();
+        Ok(admittance)
+    }
+
+    /// From classes of which the pushed peer is one by itself.
+    fn of_classes(scene: &Scene, structure: Structure, peer: usize) -> Self {
+        let radius = radius_of(&reduced(&structure, scene, 1).parts);
+        let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
+        let (coordination, time) = (structure.coordination(scene), structure.time(scene));
+        let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
+        let Structure { timetable, weights, tied, .. } = structure;
+        Self { nodes, weights, timetable, coordination, time, tied, pushed, highest: 0.0, radius, notes: Vec::new() }
+    }
+
+    /// The admittance at a frequency \[Hz\].
+    ///
+    /// # Errors
+    ///
+    /// [`AdmittanceError::Frequency`] unless it is above 0 and at most [`Admittance::highest_frequency`].
+    pub fn at(&self, hz: f64) -> Result<AdmittancePoint, AdmittanceError> {
+        if !(hz > 0.0 && hz <= self.highest) {
+            return Err(AdmittanceError::Frequency { hz, highest: self.highest });
+        }
+        Ok(Harmonic::new(&self.lifted(), self.pushed, hz).point())
+    }
+
+    /// The admittance at each of those frequencies \[Hz\], in their order.
+    ///
+    /// # Errors
+    ///
+    /// As [`Admittance::at`], for the first frequency that is not one.
+    pub fn response(&self, frequencies: &[f64]) -> Result<FrequencyResponse, AdmittanceError> {
+        let points: Vec<Result<AdmittancePoint, AdmittanceError>> = frequencies.par_iter().map(|hz| self.at(*hz)).collect();
+        Ok(FrequencyResponse { points: points.into_iter().collect::<Result<_, _>>()? })
+    }
+
+    /// What the device feels like when it is moved slowly: see [`LowFrequencyFit`].
+    #[must_use]
+    pub fn fit_low_frequency(&self) -> LowFrequencyFit {
+        LowFrequencyFit::of(|hz| self.impedance(hz), self.highest.min(0.25 / self.timetable.frame.as_secs_f64()), self.tied)
+    }
+
+    /// The highest frequency that there is an admittance for, half the rate of the peer's ticks \[Hz\].
+    #[must_use]
+    pub const fn highest_frequency(&self) -> f64 {
+        self.highest
+    }
+
+    /// The spectral radius of the linear scene that is analysed, over one frame.
+    #[must_use]
+    pub const fn radius(&self) -> Radius {
+        self.radius
+    }
+
+    /// The verdict on that scene. An unstable one has no steady state: its admittance is what the formula says, and nothing that could be measured.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        self.radius.verdict()
+    }
+
+    /// What is left out or taken as closed, in words.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn lifted(&self) -> Lifted<'_> {
+        let Self { nodes, weights, timetable, coordination, time, tied, .. } = self;
+        Lifted { nodes, weights, timetable, coordination: *coordination, time: *time, tied: *tied }
+    }
+
+    /// Force over velocity, at a frequency that is one.
+    fn impedance(&self, hz: f64) -> Complex64 {
+        Harmonic::new(&self.lifted(), self.pushed, hz).point().value.inv()
+    }
+
+    /// Leaves nothing but the device of the pushed peer. A node has a copy, which then rests.
+    fn leave_bare(&mut self, device: Option<Body>, clock: NodeClock, tied: bool) -> Result<(), AnalysisError> {
+        let none = Gains { stiffness: 0.0, damping: 0.0 };
+        self.nodes = vec![Node { device, coupling: none, wall: None, compute_delay: false, ..self.nodes[self.pushed] }];
+        self.weights = Matrix::zeros(1, 1);
+        // It sends nothing, so that everything repeats with every tick.
+        self.timetable = Timetable::new(&[NodeClock { phase: 0, every: 1, ..clock }], &[])?;
+        self.coordination = none;
+        self.tied = tied;
+        self.pushed = 0;
+        Ok(())
+    }
+
+    /// The rate of the ticks of the pushed node, on average over a frame \[Hz\].
+    fn tick_rate(&self) -> f64 {
+        let own = |event: &&Event| matches!(event, Event::Tick { node, .. } if *node == self.pushed);
+        count(self.timetable.events.iter().filter(own).count()) / self.timetable.frame.as_secs_f64()
+    }
+}
+
+/// All one-sided contacts along the axis of the peer closed, no copy at a wall; and that in words.
+fn closed_contacts(scene: &Scene, peer: usize) -> (Contacts, Vec<String>) {
+    let pushes = |peer: usize| match scene.peers[peer].contact {
+        Contact::Push(direction) => Some(direction.axis),
+        Contact::Grasp | Contact::None => None,
+    };
+    let axis = pushes(peer).unwrap_or(0);
+    let touching = |peer: usize| scene.peers[peer].contact == Contact::Grasp || pushes(peer) == Some(axis);
+    let touching: Vec<bool> = (0..scene.peers.len()).map(touching).collect();
+    let mut notes = Vec::new();
+    if (0..scene.peers.len()).any(|peer| pushes(peer) == Some(axis)) {
+        notes.push("one-sided contacts are taken as closed: a hand that pulls would let go".to_owned());
+    }
+    if scene.object.enclosure.is_some() {
+        notes.push("the enclosure is left out: the object is away from its walls".to_owned());
+    }
+    if !scene.timeline.is_empty() {
+        notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
+    }
+    (Contacts { touching, at_wall: false }, notes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ONE_TOUCHES: &str = r#"
+        scene        = { duration = "1s", count = 50 }
+        object       = { mass = 0.45, split-mass = false }
+        coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+        peer         = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 }, contact = "none" }
+        link         = { delay = "8ms" }
+    "#;
+
+    fn fifty() -> Scene {
+        Scene::parse(ONE_TOUCHES, "many.toml".as_ref(), &["peers.peer1.contact=grasp".to_owned()]).unwrap()
+    }
+
+    /// The scene of 50 peers with any number of them: more than a scene may have.
+    fn with_peers(count: usize) -> Admittance {
+        let scene = fifty();
+        let network = NominalNetwork::of(&scene).unwrap();
+        let (contacts, _) = closed_contacts(&scene, 0);
+        let mut structure = Structure::with_alone(&[&scene], &network, &contacts, Some(0)).unwrap();
+        assert_eq!(structure.classes.len(), 2);
+        structure.peers = count;
+        let others = crate::structure::count(count - 1);
+        structure.weights = Matrix::from_fn(2, 2, |row, column| [[0.0, 1.0], [1.0 / others, (others - 1.0) / others]][row][column]);
+        let mut admittance = Admittance::of_classes(&scene, structure, 0);
+        admittance.highest = 0.5 * admittance.tick_rate();
+        admittance
+    }
+
+    /// The more peers, the less the mean of the others moves: in the limit the copy is held by a spring and a damper at rest, and is as far from that as 1/N.
+    #[test]
+    fn a_hundred_thousand_peers_cost_two_nodes_and_are_near_the_limit() {
+        let scene = fifty();
+        assert_eq!(with_peers(50).at(1.0).unwrap(), Admittance::of(&scene, 0).unwrap().at(1.0).unwrap());
+        let mut limit = with_peers(2);
+        limit.weights = Matrix::zeros(2, 2);
+        limit.tied = true;
+        for hz in [1.0, 8.0, 70.0] {
+            let held = limit.at(hz).unwrap().value;
+            let apart = |peers: usize| (with_peers(peers).at(hz).unwrap().value - held).norm() / held.norm() * count(peers - 1);
+            let (fifty, thousand, most) = (apart(50), apart(1000), apart(100_000));
+            assert!((thousand / most - 1.0).abs() < 0.02 && (fifty / most - 1.0).abs() < 0.3, "{hz} Hz: {fifty} {thousand} {most}");
+        }
+    }
+
+    /// b = bH + N·KT·(τ + δ), δ = BT·(Tc²/m)·(M² − 1)/12: see scenarios/README.md. Met far below the frequency KT/(2πb), 0.14 mHz here.
+    #[test]
+    fn the_viscosity_of_a_hundred_thousand_peers_follows_the_law() {
+        let fit = with_peers(100_000).fit_low_frequency();
+        let expected = 5.0 + 1e5 * 1000.0 * (0.0115 + 5.0 * 1e-6 / 0.45 * 63.0 / 12.0);
+        assert!((fit.viscosity.value / expected - 1.0).abs() < 0.005 && fit.viscosity.error < 1e-4 * expected, "{fit:?}, {expected}");
+    }
+}
