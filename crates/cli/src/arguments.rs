@@ -28,6 +28,8 @@ pub(crate) enum Command {
     Link(LinkArguments),
     /// Estimates the link that made a file of measurements, captures or fates
     Fit(FitArguments),
+    /// Computes every figure and claim of Rakhsha and Constantinescu (2015) again, and says which hold
+    Paper(PaperArguments),
 }
 
 /// What all commands on one scene take.
@@ -160,4 +162,18 @@ pub(crate) struct FitArguments {
     /// Write the link table of a scene into this file
     #[arg(long, value_name = "SCENE_LINK.toml")]
     pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_STATUS)]
+pub(crate) struct PaperArguments {
+    /// Write index.html, the figures (SVG), the data behind them (CSV) and claims.json into this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Coarser grids: some seconds, and areas to about a percent
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
 }
