@@ -99,8 +99,11 @@ fn document(reproduction: &Reproduction, has_files: bool) -> Document<'_> {
         scene: claim.scene.as_deref(),
         how: claim.how.as_deref(),
     });
-    let figures =
-        reproduction.figures.iter().map(|figure| Figure { id: &figure.id, file: has_files.then(|| format!("{}.svg", figure.id)), title: &figure.title });
+    let figures = reproduction.figures.iter().map(|figure| Figure {
+        id: &figure.id,
+        file: has_files.then(|| format!("{}.svg", figure.id)),
+        title: &figure.title,
+    });
     Document { claims: claims.collect(), figures: figures.collect(), wall_s: None }
 }
 

@@ -36,7 +36,8 @@ fn candidates() -> Vec<Case> {
                             // All touch, then one, then two of them, and so on.
                             for (t, touching) in std::iter::once(peers).chain(1..peers).enumerate() {
                                 let paper = Case::paper(Strategy::Ap, peers);
-                                let case = Case { delay_us, stiffness, coupling_stiffness, damping, coupling_damping: damping, mass, touching, ..paper };
+                                let case =
+                                    Case { delay_us, stiffness, coupling_stiffness, damping, coupling_damping: damping, mass, touching, ..paper };
                                 all.push((k + c + b + m + t, case));
                             }
                         }

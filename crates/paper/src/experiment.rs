@@ -75,10 +75,8 @@ const STABILITY_SCENES: [(Strategy, f64, bool, &str); 8] = [
     (Strategy::Pd, 1000.0, false, include_str!("../../../scenarios/paper/5-1-pd-1000-no-arm.toml")),
 ];
 
-const TRAVEL_SCENES: [(Strategy, &str); 2] = [
-    (Strategy::Ap, include_str!("../../../scenarios/paper/5-2-ap.toml")),
-    (Strategy::Pd, include_str!("../../../scenarios/paper/5-2-pd.toml")),
-];
+const TRAVEL_SCENES: [(Strategy, &str); 2] =
+    [(Strategy::Ap, include_str!("../../../scenarios/paper/5-2-ap.toml")), (Strategy::Pd, include_str!("../../../scenarios/paper/5-2-pd.toml"))];
 
 /// The scene of Section 5.2 with that strategy, as a file.
 pub(crate) fn travel_text(strategy: Strategy) -> &'static str {

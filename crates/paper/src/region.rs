@@ -82,7 +82,8 @@ pub(crate) fn share(part: usize, whole: usize) -> f64 {
 
 impl Atlas {
     fn wanted() -> Vec<(Setting, Strategy, usize)> {
-        let strategies = |setting| Strategy::BOTH.into_iter().flat_map(move |strategy| PEERS.into_iter().map(move |peers| (setting, strategy, peers)));
+        let strategies =
+            |setting| Strategy::BOTH.into_iter().flat_map(move |strategy| PEERS.into_iter().map(move |peers| (setting, strategy, peers)));
         Setting::all().into_iter().flat_map(strategies).collect()
     }
 

@@ -6,7 +6,10 @@ use crate::scenes::TWO;
 #[test]
 fn help_names_the_commands() {
     let text = Desk::new().text("--help");
-    assert!(["run", "check", "explain", "link", "fit", "Exit status: 0 done", "130 interrupted"].iter().all(|word| text.contains(word)), "{text}");
+    assert!(
+        ["run", "check", "explain", "link", "fit", "paper", "Exit status: 0 done", "130 interrupted"].iter().all(|word| text.contains(word)),
+        "{text}"
+    );
     assert!(Desk::new().text("--version").starts_with("cohaptic "));
 }
 
@@ -21,6 +24,7 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
             &["[SPEC]...", "--from <FATES.csv>", "--packets <N>", "--every <TIME>", "--size <SIZE>", "--seed <N>", "--profile <PROFILE>", "--ecn"],
         ),
         ("fit", &["<FILE> [RECEIVER]", "--port <N>", "--skew", "--json", "--out <SCENE_LINK.toml>"]),
+        ("paper", &["--out <DIR>", "--quick", "--json"]),
     ] {
         let text = Desk::new().text(&format!("{command} --help"));
         for part in options.iter().chain(&["Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output"]) {

@@ -69,8 +69,15 @@ fn less_time(travels: &[Travel]) -> Claim {
         viscosity(Strategy::Ap),
         viscosity(Strategy::Pd)
     );
-    let verdict = if ap.zip(pd).is_some_and(|(ap, pd)| ap < pd) { Verdict::Holds } else { Verdict::FailsAt(format!("{} and {}", seconds(ap), seconds(pd))) };
-    Claim::new("travel-order", "Pushed with 1.5 N, the object takes less time for 20 mm with AP than with PD", "Fig. 8: 1.22 s, 1.514 s", ours, verdict)
+    let verdict =
+        if ap.zip(pd).is_some_and(|(ap, pd)| ap < pd) { Verdict::Holds } else { Verdict::FailsAt(format!("{} and {}", seconds(ap), seconds(pd))) };
+    Claim::new(
+        "travel-order",
+        "Pushed with 1.5 N, the object takes less time for 20 mm with AP than with PD",
+        "Fig. 8: 1.22 s, 1.514 s",
+        ours,
+        verdict,
+    )
 }
 
 /// How far a time may be from the paper's: what is read from a plot, and what a motor and a person add.
@@ -88,7 +95,10 @@ fn times(travels: &[Travel]) -> Claim {
         lines.push(format!("{words}: {}{relative}, ρ = {:.4}", seconds(travel.time), travel.radius.value));
         if off.is_some_and(|off| off.abs() <= NEAR) { agree.push(words) } else { apart.push((words, travel)) }
     }
-    let ours = format!("{}. The paper's 48 ms is said to be the round trip; the printed parameters do not give both of its times with either reading.", lines.join("; "));
+    let ours = format!(
+        "{}. The paper's 48 ms is said to be the round trip; the printed parameters do not give both of its times with either reading.",
+        lines.join("; ")
+    );
     let worst = apart.first();
     let verdict = match worst {
         None => Verdict::Holds,
@@ -119,7 +129,8 @@ fn both_stable(travels: &[Travel]) -> Claim {
     let verdict = found.map_or(Verdict::Holds, |travel| {
         Verdict::FailsAt(format!("{} with {} ms one way: ρ = {:.4}", travel.strategy.word(), travel.delay_ms, travel.radius.value))
     });
-    let claim = Claim::new("both-stable", "At KT = 1000 N/m the cooperation of Section 5.2 is stable with both strategies", "Section 5.2", ours, verdict);
+    let claim =
+        Claim::new("both-stable", "At KT = 1000 N/m the cooperation of Section 5.2 is stable with both strategies", "Section 5.2", ours, verdict);
     match found {
         None => claim,
         Some(travel) => Claim {

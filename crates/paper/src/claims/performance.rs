@@ -83,7 +83,8 @@ fn law(responses: &Responses) -> Claim {
     } else {
         Verdict::FailsAt(format!("{} with AP, {} with PD", percent(five[0]), percent(five[1])))
     };
-    let claim = "The viscosity comes from the delay: b = bH + σ·KT·(Td + (M−1)·Tc/2), σ = N for AP and N(N−1) for PD, within 5 % and 12 % up to N = 5";
+    let claim =
+        "The viscosity comes from the delay: b = bH + σ·KT·(Td + (M−1)·Tc/2), σ = N for AP and N(N−1) for PD, within 5 % and 12 % up to N = 5";
     Claim::new("viscosity-law", claim, "no formula; “low packet update rate, delays … and the damping”", ours, verdict)
 }
 

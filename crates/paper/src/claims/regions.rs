@@ -100,7 +100,11 @@ fn unaffected(atlas: &Atlas, watch: &dyn Watch) -> Result<Vec<Claim>, PaperError
     let (holds, fails) = split(|setting| change(setting, Strategy::Ap).abs() <= UNAFFECTED);
     let line = |setting: Setting| format!("{}: {:+.0} %", setting.words(), 100.0 * change(setting, Strategy::Ap));
     let lines: Vec<String> = Setting::all().into_iter().map(line).collect();
-    let ours = format!("Largest change of AP's area from that of N = 2, up to N = 8; at most {:.0} % counts as unaffected. {}.", 100.0 * UNAFFECTED, lines.join(". "));
+    let ours = format!(
+        "Largest change of AP's area from that of N = 2, up to N = 8; at most {:.0} % counts as unaffected. {}.",
+        100.0 * UNAFFECTED,
+        lines.join(". ")
+    );
     let claim = "AP's stability region is largely unaffected by N, whatever the damping";
     let areas = Claim::new("ap-unaffected", claim, "Figs. 3, 4", ours, verdict(&holds, &fails));
     let one_more = smallest(watch, |case| Ok(is_stable(case)? && is_unstable(&one_more_peer(case))?))?;
@@ -109,7 +113,10 @@ fn unaffected(atlas: &Atlas, watch: &dyn Watch) -> Result<Vec<Claim>, PaperError
         Some(case) => {
             let more = one_more_peer(&case);
             let radii = format!("ρ = {:.4}, and {:.4} with N = {}", case.radius()?.value, more.radius()?.value, more.peers);
-            let how = format!("The simplest scene found in which one peer more makes AP unstable: {radii}. Run it as it is and with --set scene.count={}.", more.peers);
+            let how = format!(
+                "The simplest scene found in which one peer more makes AP unstable: {radii}. Run it as it is and with --set scene.count={}.",
+                more.peers
+            );
             areas.with_scene(&case, how)
         }
     };

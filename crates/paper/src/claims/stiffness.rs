@@ -66,11 +66,7 @@ fn frequency(ap: &[Found], scaled: &[Found]) -> Claim {
         PEERS.map(|peers| peers.to_string()).join(", "),
         hz(scaled)
     );
-    let verdict = if grows && stays {
-        Verdict::Holds
-    } else {
-        Verdict::FailsAt(format!("{} Hz unscaled, {} Hz scaled", hz(ap), hz(scaled)))
-    };
+    let verdict = if grows && stays { Verdict::Holds } else { Verdict::FailsAt(format!("{} Hz unscaled, {} Hz scaled", hz(ap), hz(scaled))) };
     let claim = "The copies are governed by (N/mO)·K_AP, so that a bounded stiffness is not enough for any N: gains have to be scaled with N";
     Claim::new("frequency-needs-scaling", claim, "Section 2, not used there", ours, verdict)
 }
@@ -97,8 +93,7 @@ fn one(strategy: Strategy, peers: usize, scaled: bool, watch: &dyn Watch) -> Res
 /// With forces held over a tick T, the distance d of two copies of the mass m obeys d₂ − 2d₁ + d₀ = −q·(d₁ + d₀) with q = κT²/2m, exactly; q is fitted to all ticks.
 fn swing(strategy: Strategy, peers: usize, scaled: bool) -> Result<f64, PaperError> {
     let case = Case { strategy, stiffness: STIFFNESS, damping: 0.0, delay_us: 0, touching: 0, scaled, ..Case::paper(strategy, peers) };
-    let overrides =
-        ["coordination.update=0.1ms", "peer.tick=0.1ms", "scene.duration=0.1s", "peers.peer1.position=0.001"].map(str::to_owned);
+    let overrides = ["coordination.update=0.1ms", "peer.tick=0.1ms", "scene.duration=0.1s", "peers.peer1.position=0.001"].map(str::to_owned);
     let scene = Scene::parse(&case.text(), Path::new("swing.toml"), &overrides)?;
     let mut distances = Distances::default();
     let Ok(_) = Simulation::new(&scene, Model::Least).run(&mut distances);

@@ -50,10 +50,7 @@ impl Responses {
         // From 0.01 Hz to 40 Hz, as far as the paper's figure goes.
         let frequencies: Vec<f64> = (0..count).map(|k| 0.01 * libm::pow(4000.0, f64::from(k) / f64::from(count - 1))).collect();
         let curves = curves().into_par_iter().map(|case| curve(case, &frequencies)).collect::<Result<_, _>>()?;
-        let fits = sweep()
-            .into_par_iter()
-            .map(|case| if watch.stops() { Err(PaperError::Stopped) } else { fit(case) })
-            .collect::<Result<_, _>>()?;
+        let fits = sweep().into_par_iter().map(|case| if watch.stops() { Err(PaperError::Stopped) } else { fit(case) }).collect::<Result<_, _>>()?;
         watch.one_more();
         Ok(Self { frequencies, curves, fits })
     }

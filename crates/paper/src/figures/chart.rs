@@ -110,13 +110,7 @@ where
         .y_label_area_size(58)
         .build_cartesian_2d(x, panel.y.0..panel.y.1)?;
     let faint = GREY.mix(0.25);
-    chart
-        .configure_mesh()
-        .x_desc(panel.x_label)
-        .y_desc(panel.y_label)
-        .bold_line_style(faint)
-        .light_line_style(TRANSPARENT)
-        .draw()?;
+    chart.configure_mesh().x_desc(panel.x_label).y_desc(panel.y_label).bold_line_style(faint).light_line_style(TRANSPARENT).draw()?;
     for line in &panel.lines {
         let style = COLOURS[line.colour % COLOURS.len()].stroke_width(if line.dashed { 1 } else { 2 });
         for run in &line.runs {

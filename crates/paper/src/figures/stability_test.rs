@@ -34,7 +34,8 @@ pub(super) fn figure(tests: &[StabilityTest], delay_ms: u32) -> Figure {
         }
         table.rows.push(vec![name(test), paper.to_owned(), format!("{:.4}", test.radius.value), verdict.to_owned()]);
     }
-    let differ = if differ.is_empty() { "All four verdicts are the paper's.".to_owned() } else { format!("Not as in the paper: {}.", differ.join(", ")) };
+    let differ =
+        if differ.is_empty() { "All four verdicts are the paper's.".to_owned() } else { format!("Not as in the paper: {}.", differ.join(", ")) };
     let caption = format!(
         "Two users move the object at 1 Hz; the third copy is touched by nobody. The force is that of the coordination on the local copy. What leaves the paper's ordinates is cut off. {differ} The \
          paper's motion is that of people; ours are arms of 0.3 kg, 10 N·s/m and 100 N/m that follow a sine, or forces of 2 N without arms."

@@ -71,7 +71,8 @@ fn write_claim(page: &mut String, claim: &Claim) {
     );
     if let Some(scene) = &claim.scene {
         let how = claim.how.as_deref().unwrap_or_default();
-        let _ = write!(page, "<details>\n<summary>The scene that shows it</summary>\n<p>{}</p>\n<pre>{}</pre>\n</details>\n", escape(how), escape(scene));
+        let _ =
+            write!(page, "<details>\n<summary>The scene that shows it</summary>\n<p>{}</p>\n<pre>{}</pre>\n</details>\n", escape(how), escape(scene));
     }
     page.push_str("</section>\n");
 }
