@@ -44,7 +44,7 @@ pub(crate) struct Case {
     pub(crate) delay_us: u32,
     /// How many peers touch the object.
     pub(crate) touching: usize,
-    /// Whether gains are scaled with the number of peers.
+    /// Whether all gains are scaled with the number of peers.
     pub(crate) scaled: bool,
 }
 
@@ -103,11 +103,12 @@ impl Case {
     pub(crate) fn text(&self) -> String {
         let Self { strategy, peers, mass, stiffness, damping, coupling_stiffness, coupling_damping, delay_us, touching, scaled } = *self;
         let scaling = if scaled { "\nscaling = \"inverse-n\"" } else { "" };
+        let coupling_scaling = if scaled { ", scaling = \"inverse-n\"" } else { "" };
         let split = mass == Mass::Split;
         let mut text = format!(
             "[scene]\ntitle = \"{}\"\nduration = \"7s\"\ncount = {peers}\n\n[object]\nmass = 0.45\nsplit-mass = {split}\n\n[coordination]\n\
              strategy = \"{}\"\nstiffness = {stiffness:?}\ndamping = {damping:?}\nupdate = \"8ms\"{scaling}\n\n[peer]\ncontact = \"none\"\n\
-             device = {{ mass = 0.1, damping = 5.0 }}\ncoupling = {{ stiffness = {coupling_stiffness:?}, damping = {coupling_damping:?} }}\n\n[link]\n\
+             device = {{ mass = 0.1, damping = 5.0 }}\ncoupling = {{ stiffness = {coupling_stiffness:?}, damping = {coupling_damping:?}{coupling_scaling} }}\n\n[link]\n\
              delay = \"{}ms\"\n",
             self.words(),
             strategy.key(),

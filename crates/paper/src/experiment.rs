@@ -6,7 +6,7 @@ use std::path::Path;
 use cohaptic_harness::{Model, Observer, Simulation, TickRow};
 use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Admittance, Method, Radius, analyse};
+use cohaptic_stability::{Admittance, Analysis, Method, PartKind, Radius, Verdict, analyse};
 use cohaptic_units::Instant;
 
 use crate::PaperError;
@@ -52,11 +52,22 @@ pub(crate) struct Travel {
     /// One way [ms].
     pub(crate) delay_ms: u32,
     pub(crate) radius: Radius,
+    /// The radius of what a push can excite: the pushed copy and the mean of the others.
+    pub(crate) excited: Radius,
+    /// The radius of how the two untouched copies swing against each other.
+    pub(crate) apart: Radius,
     /// When the pushed copy has gone 20 mm [s].
     pub(crate) time: Option<f64>,
     /// The viscosity that the hand meets at low speed, by the admittance [N·s/m].
     pub(crate) viscosity: f64,
     pub(crate) trace: Trace,
+}
+
+impl Travel {
+    /// Whether the push itself makes the object diverge.
+    pub(crate) fn diverges(&self) -> bool {
+        self.excited.verdict() == Verdict::Unstable
+    }
 }
 
 /// How far the object goes in Section 5.2 [m].
@@ -99,7 +110,7 @@ pub(crate) fn stability_tests(watch: &dyn Watch) -> Result<Vec<StabilityTest>, P
             let overrides: Vec<String> = faster.into_iter().chain([format!("link.delay={delay_ms}ms")]).collect();
             let scene = Scene::parse(text, Path::new("5-1.toml"), &overrides)?;
             let (trace, _) = simulate(&scene, f64::INFINITY, watch)?;
-            tests.push(StabilityTest { strategy, stiffness, arms, delay_ms, radius: away_from_walls(&scene)?, trace });
+            tests.push(StabilityTest { strategy, stiffness, arms, delay_ms, radius: away_from_walls(&scene)?.radius, trace });
         }
     }
     watch.one_more();
@@ -114,15 +125,22 @@ pub(crate) fn travels(watch: &dyn Watch) -> Result<Vec<Travel>, PaperError> {
             let scene = Scene::parse(text, Path::new("5-2.toml"), &[format!("link.delay={delay_ms}ms")])?;
             let (trace, time) = simulate(&scene, DISTANCE, watch)?;
             let viscosity = Admittance::of(&scene, 0)?.fit_low_frequency().viscosity.value;
-            travels.push(Travel { strategy, delay_ms, radius: away_from_walls(&scene)?, time, viscosity, trace });
+            let analysis = away_from_walls(&scene)?;
+            let part = |wanted: fn(PartKind) -> bool| {
+                let of = analysis.modes.iter().flat_map(|mode| &mode.parts).filter(|part| wanted(part.kind)).map(|part| part.radius);
+                of.fold(Radius { value: 0.0, error: 0.0 }, Radius::or)
+            };
+            let excited = part(|kind| kind == PartKind::Together);
+            let apart = part(|kind| matches!(kind, PartKind::Apart { .. }));
+            travels.push(Travel { strategy, delay_ms, radius: analysis.radius, excited, apart, time, viscosity, trace });
         }
     }
     watch.one_more();
     Ok(travels)
 }
 
-/// The radius while the object touches no wall and one-sided contacts are closed.
-fn away_from_walls(scene: &Scene) -> Result<Radius, PaperError> {
+/// What is known while the object touches no wall and one-sided contacts are closed.
+fn away_from_walls(scene: &Scene) -> Result<Analysis, PaperError> {
     let mut scene = scene.clone();
     scene.object.enclosure = None;
     for peer in &mut scene.peers {
@@ -130,7 +148,7 @@ fn away_from_walls(scene: &Scene) -> Result<Radius, PaperError> {
             peer.contact = Contact::Grasp;
         }
     }
-    Ok(analyse(&scene, Method::Reduced)?.radius)
+    Ok(analyse(&scene, Method::Reduced)?)
 }
 
 /// Every so many ticks are kept: every 4 ms.

@@ -92,8 +92,9 @@ fn times(travels: &[Travel]) -> Claim {
         let words = format!("{} with {} ms one way", travel.strategy.word(), travel.delay_ms);
         let off = travel.time.map(|time| time / paper - 1.0);
         let relative = off.map_or_else(String::new, |off| format!(" ({:+.0} %)", 100.0 * off));
-        lines.push(format!("{words}: {}{relative}, ρ = {:.4}", seconds(travel.time), travel.radius.value));
-        if off.is_some_and(|off| off.abs() <= NEAR) { agree.push(words) } else { apart.push((words, travel)) }
+        let diverging = if travel.diverges() { " while it diverges" } else { "" };
+        lines.push(format!("{words}: {}{relative}{diverging}", seconds(travel.time)));
+        if !travel.diverges() && off.is_some_and(|off| off.abs() <= NEAR) { agree.push(words) } else { apart.push((words, travel)) }
     }
     let ours = format!(
         "{}. The paper's 48 ms is said to be the round trip; the printed parameters do not give both of its times with either reading.",
@@ -119,12 +120,20 @@ fn times(travels: &[Travel]) -> Claim {
 
 fn both_stable(travels: &[Travel]) -> Claim {
     let unstable = |travel: &&Travel| travel.delay_ms == 24 && travel.radius.verdict() != cohaptic_stability::Verdict::Stable;
-    let radii: Vec<String> =
-        travels.iter().map(|travel| format!("{} {} ms {:.4}", travel.strategy.word(), travel.delay_ms, travel.radius.value)).collect();
-    let ours = format!(
-        "One touches, two do not, KT = 1000 N/m, one way: {}. The mode that grows with AP is that of the two untouched copies against each other; a symmetric push never excites it.",
-        radii.join(", ")
-    );
+    let radii: Vec<String> = travels
+        .iter()
+        .map(|travel| {
+            format!(
+                "{} {} ms {:.4} (what a push excites {:.4}, the untouched copies against each other {:.4})",
+                travel.strategy.word(),
+                travel.delay_ms,
+                travel.radius.value,
+                travel.excited.value,
+                travel.apart.value
+            )
+        })
+        .collect();
+    let ours = format!("One touches, two do not, KT = 1000 N/m, one way: {}.", radii.join(", "));
     let found = travels.iter().find(unstable);
     let verdict = found.map_or(Verdict::Holds, |travel| {
         Verdict::FailsAt(format!("{} with {} ms one way: ρ = {:.4}", travel.strategy.word(), travel.delay_ms, travel.radius.value))

@@ -20,10 +20,10 @@ pub(super) fn claims() -> Result<Vec<Claim>, PaperError> {
                 let analysis = analyse(&case.scene()?, Method::Reduced)?;
                 let largest = analysis.modes.iter().flat_map(|mode| &mode.parts).map(|part| part.size).max().unwrap_or(0);
                 sizes.push(largest);
-                radii.push(format!("{:.4} (N = {peers}, {} states)", analysis.radius.value, analysis.dimension));
+                radii.push(format!("{} (N = {peers}, {} states)", short(analysis.radius.value), analysis.dimension));
             }
             same &= sizes.iter().all(|size| *size == sizes[0]);
-            let gains = if scaled { "gains scaled with 4(N−1)/N²" } else { "gains as they are" };
+            let gains = if scaled { "all gains scaled with N" } else { "gains as they are" };
             lines.push(format!("{}, {gains}: {}; the largest block has {} states", strategy.word(), radii.join(", "), sizes[0]));
         }
     }
@@ -31,4 +31,9 @@ pub(super) fn claims() -> Result<Vec<Claim>, PaperError> {
     let verdict = if same { Verdict::Holds } else { Verdict::FailsAt("a block that grows with N".to_owned()) };
     let claim = "Stability of any number of equal peers is known at the cost of a few";
     Ok(vec![Claim::new("any-number", claim, "beyond the paper: up to five users, “arbitrary N” is future work", ours, verdict)])
+}
+
+/// A radius, in few letters where it is large.
+fn short(radius: f64) -> String {
+    if radius < 1000.0 { format!("{radius:.4}") } else { format!("{radius:.1e}") }
 }

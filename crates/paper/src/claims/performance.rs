@@ -13,10 +13,10 @@ pub(super) fn claims(responses: &Responses, _options: Options, watch: &dyn Watch
     Ok(vec![less_viscous(responses, watch)?, law(responses), grows(responses), nearer(responses)])
 }
 
-/// Fits of AP with those of PD of the same scene.
+/// Fits of AP with those of PD of the same scene, both stable: nobody can feel what diverges.
 fn pairs(responses: &Responses) -> impl Iterator<Item = (&Fit, &Fit)> {
     let of = |strategy: Strategy| responses.fits.iter().filter(move |fit| fit.case.strategy == strategy);
-    of(Strategy::Ap).zip(of(Strategy::Pd)).filter(|(ap, _)| ap.case.peers > 2)
+    of(Strategy::Ap).zip(of(Strategy::Pd)).filter(|(ap, pd)| ap.case.peers > 2 && ap.is_stable && pd.is_stable)
 }
 
 /// The viscosity of a case as far as it can be felt: of a stable scene.
@@ -34,7 +34,7 @@ fn less_viscous(responses: &Responses, watch: &dyn Watch) -> Result<Claim, Paper
         pair.map_or_else(String::new, |(ap, pd)| format!("N = {peers}: AP {:.1}, PD {:.1}", ap.viscosity, pd.viscosity))
     };
     let ours = format!(
-        "KT = 1000 N/m, 8 ms one way, one touching, in N·s/m: {}. AP's is the lower one in {less} of {} pairs of scenes (N up to 16, three delays, three gains).",
+        "KT = 1000 N/m, 8 ms one way, one touching, in N·s/m: {}. AP's is the lower one in {less} of {} pairs of stable scenes (N up to 16, three delays, three gains).",
         [3, 4, 5].map(printed).join("; "),
         all.len()
     );
@@ -61,7 +61,7 @@ fn less_viscous(responses: &Responses, watch: &dyn Watch) -> Result<Claim, Paper
 
 fn law(responses: &Responses) -> Claim {
     let worst = |strategy: Strategy, most: usize, law: fn(&Fit) -> f64| {
-        let of = responses.fits.iter().filter(|fit| fit.case.strategy == strategy && fit.case.peers <= most);
+        let of = responses.fits.iter().filter(|fit| fit.is_stable && fit.case.strategy == strategy && fit.case.peers <= most);
         of.map(|fit| (law(fit) / fit.viscosity - 1.0).abs()).fold(0.0, f64::max)
     };
     let plain: fn(&Fit) -> f64 = |fit| fit.law;
@@ -70,7 +70,7 @@ fn law(responses: &Responses) -> Claim {
     let (five, sixteen) = (of(5, plain), of(16, plain));
     let exact = of(16, whole);
     let ours = format!(
-        "Largest error of the law up to N = 5: AP {}, PD {}; up to N = 16: {}, {}. With the part of the damping, N = 16 included: {}, {}.",
+        "Largest error of the law in stable scenes up to N = 5: AP {}, PD {}; up to N = 16: {}, {}. With the part of the damping, N = 16 included: {}, {}.",
         percent(five[0]),
         percent(five[1]),
         percent(sixteen[0]),
@@ -91,11 +91,11 @@ fn law(responses: &Responses) -> Claim {
 fn grows(responses: &Responses) -> Claim {
     let mut shrinks = Vec::new();
     let mut looked_at = 0_usize;
-    for fit in &responses.fits {
+    for fit in responses.fits.iter().filter(|fit| fit.is_stable) {
         let like = |other: &&Fit| {
             let touches = (fit.case.touching == fit.case.peers) == (other.case.touching == other.case.peers);
             let same = Case { peers: fit.case.peers, touching: fit.case.touching, ..other.case } == fit.case;
-            other.case.peers > fit.case.peers && same && touches
+            other.is_stable && other.case.peers > fit.case.peers && same && touches
         };
         if let Some(next) = responses.fits.iter().find(like) {
             looked_at += 1;
@@ -106,10 +106,10 @@ fn grows(responses: &Responses) -> Claim {
     }
     let of = |strategy| {
         let one = responses.fits.iter().filter(|fit| fit.case == Case { touching: 1, ..Case::paper(strategy, fit.case.peers) });
-        one.map(|fit| format!("{:.0}", fit.viscosity)).collect::<Vec<_>>().join(", ")
+        one.map(|fit| format!("{:.0}{}", fit.viscosity, if fit.is_stable { "" } else { " (unstable)" })).collect::<Vec<_>>().join(", ")
     };
     let ours = format!(
-        "N = 2, 3, 4, 5, 8, 16 with KT = 1000 N/m, 8 ms one way, one touching: AP {} N·s/m, PD {}. More peers render more in {} of {looked_at} steps.",
+        "N = 2, 3, 4, 5, 8, 16 with KT = 1000 N/m, 8 ms one way, one touching: AP {} N·s/m, PD {}. More peers render more in {} of {looked_at} steps between stable scenes.",
         of(Strategy::Ap),
         of(Strategy::Pd),
         looked_at - shrinks.len()
@@ -122,11 +122,15 @@ fn nearer(responses: &Responses) -> Claim {
     let mut lines = Vec::new();
     let mut below = f64::INFINITY;
     let mut fails = false;
+    let mut unstable = Vec::new();
     for (one, word) in [(true, "one touching"), (false, "all touching")] {
         for peers in [3, 4, 5] {
             let touching = if one { 1 } else { peers };
             let curve = |strategy| responses.curve(strategy, peers, touching);
             let Some((ap, pd)) = curve(Strategy::Ap).zip(curve(Strategy::Pd)) else { continue };
+            unstable.extend(
+                [ap, pd].into_iter().filter(|curve| !curve.is_stable).map(|curve| format!("{} N = {peers}, {word}", curve.case.strategy.word())),
+            );
             let nearer: Vec<bool> = ap.distances.iter().zip(&pd.distances).map(|(ap, pd)| ap < pd).collect();
             let count = nearer.iter().filter(|nearer| **nearer).count();
             let first = nearer.iter().position(|nearer| !nearer).and_then(|first| responses.frequencies.get(first));
@@ -144,12 +148,13 @@ fn nearer(responses: &Responses) -> Claim {
     };
     let ours = format!(
         "Distance |ln(Y/Y0)| from the ideal 0.45 kg, 0.01 to 40 Hz; AP is the nearer one: {}. At 0.01 Hz, one touching: N = 2 {}, AP N = 3 {}, PD N = 3 {}, ideal {:.2} dB: both are far from a mass there, \
-         a damper.",
+         a damper. Curves of unstable scenes, which nobody could measure: {}.",
         lines.join("; "),
         of(Strategy::Ap, 2),
         of(Strategy::Ap, 3),
         of(Strategy::Pd, 3),
-        responses.ideal().first().copied().unwrap_or(f64::NAN)
+        responses.ideal().first().copied().unwrap_or(f64::NAN),
+        if unstable.is_empty() { "none".to_owned() } else { unstable.join("; ") }
     );
     let verdict = if fails { Verdict::HoldsWhere(format!("the frequency is below {below:.2} Hz")) } else { Verdict::Holds };
     Claim::new("nearer-to-mass", "AP's admittance is closer to that of a pure mass than PD's", "Fig. 5", ours, verdict)

@@ -32,7 +32,7 @@ fn verdict(holds: &[Setting], fails: &[Setting]) -> Verdict {
     if fails.is_empty() {
         Verdict::Holds
     } else if holds.is_empty() {
-        Verdict::FailsAt(list(fails))
+        Verdict::FailsAt(format!("each of the {} readings of the figures", fails.len()))
     } else {
         Verdict::HoldsWhere(list(holds))
     }

@@ -11,6 +11,7 @@ use crate::{Options, PaperError};
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Curve {
     pub(crate) case: Case,
+    pub(crate) is_stable: bool,
     /// At each frequency [dB].
     pub(crate) decibels: Vec<f64>,
     /// At each frequency [degrees].
@@ -81,13 +82,15 @@ fn curves() -> Vec<Case> {
 }
 
 fn curve(case: Case, frequencies: &[f64]) -> Result<Curve, PaperError> {
-    let response = Admittance::of(&case.scene()?, 0)?.response(frequencies)?;
+    let admittance = Admittance::of(&case.scene()?, 0)?;
+    let response = admittance.response(frequencies)?;
+    let is_stable = admittance.verdict() == Verdict::Stable;
     let distance = |point: &AdmittancePoint| {
         let ratio = point.value / ideal(MASS, point.hz);
         libm::hypot(libm::log(ratio.norm()), libm::atan2(ratio.im, ratio.re))
     };
     let distances = response.points.iter().map(distance).collect();
-    Ok(Curve { case, decibels: response.magnitudes_db(), phases: response.phases_deg(), distances })
+    Ok(Curve { case, is_stable, decibels: response.magnitudes_db(), phases: response.phases_deg(), distances })
 }
 
 /// Over what the viscosity is looked at: peers, delays, gains, who touches.

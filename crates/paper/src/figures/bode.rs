@@ -55,17 +55,18 @@ fn panel(responses: &Responses, one: bool, magnitude: bool) -> Panel {
 }
 
 fn table(responses: &Responses) -> Table {
-    let mut table = Table::new(&["curve", "the paper", "at 0.01 Hz", "at low frequency, viscosity"]);
+    let mut table = Table::new(&["curve", "the paper", "ours: the loop is", "at 0.01 Hz", "at low frequency, viscosity"]);
     for curve in &responses.curves {
-        let Curve { case, decibels, .. } = curve;
+        let Curve { case, is_stable, decibels, .. } = curve;
+        let stable = if *is_stable { "stable" } else { "unstable" };
         let fit = responses.fits.iter().find(|fit| fit.case == *case);
         let viscosity = fit.map_or_else(String::new, |fit| format!("{:.2} N·s/m", fit.viscosity));
         let first = decibels.first().map_or_else(String::new, |first| format!("{first:.2} dB"));
         let touch = if is_one(case) { "one touches" } else { "all touch" };
-        table.rows.push(vec![format!("{}, {touch}", name(case)), "curve only".to_owned(), first, viscosity]);
+        table.rows.push(vec![format!("{}, {touch}", name(case)), "curve only".to_owned(), stable.to_owned(), first, viscosity]);
     }
     let ideal = responses.ideal().first().map_or_else(String::new, |first| format!("{first:.2} dB"));
-    table.rows.push(vec!["ideal mass".to_owned(), "curve only".to_owned(), ideal, "0 N·s/m".to_owned()]);
+    table.rows.push(vec!["ideal mass".to_owned(), "curve only".to_owned(), "stable".to_owned(), ideal, "0 N·s/m".to_owned()]);
     table
 }
 

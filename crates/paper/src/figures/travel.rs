@@ -25,7 +25,13 @@ pub(super) fn figure(travels: &[Travel], delay_ms: u32) -> Figure {
         let viscosity = format!("{:.1} N·s/m", travel.viscosity);
         let radius = format!("{:.4} ({})", travel.radius.value, travel.radius.verdict().word());
         table.rows.push(vec![travel.strategy.word().to_owned(), (*paper).to_owned(), seconds(travel.time), radius, viscosity]);
-        let _ = write!(text, " {}: {}, the paper {paper}.", travel.strategy.word(), seconds(travel.time));
+        let _ = write!(
+            text,
+            " {}: {}{}, the paper {paper}.",
+            travel.strategy.word(),
+            seconds(travel.time),
+            if travel.diverges() { " while it diverges" } else { "" }
+        );
     }
     let caption = format!(
         "The grey line is where the object has gone 20 mm. Agrees where the loop is stable: the velocity saturates, sooner with PD, and AP is the less viscous.{text} The printed \
