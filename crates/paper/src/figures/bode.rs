@@ -27,7 +27,7 @@ fn name(case: &Case) -> String {
 }
 
 fn panel(responses: &Responses, one: bool, magnitude: bool) -> Panel {
-    let y = if magnitude { (-70.0, 40.0) } else { (-270.0, 60.0) };
+    let y = if magnitude { (-60.0, 60.0) } else { (-270.0, 60.0) };
     let points = |values: &[f64]| responses.frequencies.iter().copied().zip(values.iter().copied()).collect::<Vec<_>>();
     let mut lines: Vec<Line> = Vec::new();
     for curve in responses.curves.iter().filter(|curve| is_one(&curve.case) == one) {

@@ -40,6 +40,9 @@ pub(super) fn figure(travels: &[Travel], delay_ms: u32) -> Figure {
     Figure { id: format!("fig-8-{delay_ms}ms"), svg: draw(&panels, 2, &title), title, caption, table, csv: csv(&shown) }
 }
 
+/// How much of the scene is shown, a little more than in the paper [s].
+const SHOWN: f64 = 3.0;
+
 /// A quantity with its unit, its range, and how it is had from a trace.
 type Quantity = (&'static str, (f64, f64), fn(&PeerTrace) -> &[f64], f64);
 
@@ -51,18 +54,18 @@ const QUANTITIES: [Quantity; 3] = [
 
 fn panel(travel: &Travel, (label, y, values, scale): Quantity) -> Panel {
     let line = |(place, peer): (usize, &PeerTrace)| {
-        let points = travel.trace.times.iter().copied().zip(values(peer).iter().map(|value| scale * value));
+        let points = travel.trace.times.iter().copied().zip(values(peer).iter().map(|value| scale * value)).take_while(|(t, _)| *t <= SHOWN);
         Line::within(format!("copy {}", place + 1), place, points, y)
     };
     let mut lines: Vec<Line> = travel.trace.peers.iter().enumerate().map(line).collect();
     if label.starts_with("position") {
         let goal = 100.0 * (travel.trace.peers[0].position.first().copied().unwrap_or(0.0) - DISTANCE);
-        lines.push(Line { name: "20 mm".to_owned(), colour: 6, dashed: true, runs: vec![vec![(0.0, goal), (3.0, goal)]] });
+        lines.push(Line { name: "20 mm".to_owned(), colour: 6, dashed: true, runs: vec![vec![(0.0, goal), (SHOWN, goal)]] });
         if let Some(time) = travel.time {
             lines.push(Line { name: String::new(), colour: 6, dashed: true, runs: vec![vec![(time, y.0), (time, goal)]] });
         }
     }
-    Panel { title: travel.strategy.word().to_owned(), x_label: "t [s]", y_label: label, x: (0.0, 3.0), y, decades: false, lines }
+    Panel { title: travel.strategy.word().to_owned(), x_label: "t [s]", y_label: label, x: (0.0, SHOWN), y, decades: false, lines }
 }
 
 fn csv(travels: &[(&Travel, &str)]) -> String {
