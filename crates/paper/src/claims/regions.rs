@@ -139,7 +139,7 @@ fn decreases(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
             let (pd, more) = (case.with(Strategy::Pd), one_more_peer(&case.with(Strategy::Pd)));
             let radii = format!("ρ = {:.4}, and {:.4} with N = {}", pd.radius()?.value, more.radius()?.value, more.peers);
             let how = format!(
-                "Areas shrink, but not point by point. The simplest scene found in which one peer more makes PD stable: {radii}. Run it as it is and with --set scene.count={}.",
+                "The simplest scene found in which one peer more makes PD stable: {radii}. Run it as it is and with --set scene.count={}.",
                 more.peers
             );
             claim.with_scene(&pd, how)
