@@ -31,7 +31,10 @@ fn less_viscous(responses: &Responses, watch: &dyn Watch) -> Result<Claim, Paper
     let less = all.iter().filter(|(ap, pd)| ap.viscosity < pd.viscosity).count();
     let printed = |peers: usize| {
         let pair = all.iter().find(|(ap, _)| ap.case == Case { touching: 1, ..Case::paper(Strategy::Ap, peers) });
-        pair.map_or_else(String::new, |(ap, pd)| format!("N = {peers}: AP {:.1}, PD {:.1}", ap.viscosity, pd.viscosity))
+        pair.map_or_else(
+            || format!("N = {peers}: one of the two is unstable"),
+            |(ap, pd)| format!("N = {peers}: AP {:.1}, PD {:.1}", ap.viscosity, pd.viscosity),
+        )
     };
     let ours = format!(
         "KT = 1000 N/m, 8 ms one way, one touching, in N·s/m: {}. AP's is the lower one in {less} of {} pairs of stable scenes (N up to 16, three delays, three gains).",
