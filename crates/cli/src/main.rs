@@ -1,4 +1,5 @@
-//! `cohaptic`: runs, checks, explains and analyses scenes of people who move one object together over a bad network; drives and estimates links.
+//! `cohaptic`: runs, checks, explains and analyses scenes of people who move one object together over a bad network; drives and estimates links;
+//! reproduces a paper.
 //!
 //! This is the only crate that prints. Results go to standard output, everything else to standard error. Exit status: 0 done, 1 an expectation
 //! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted.
@@ -14,6 +15,7 @@ mod lines;
 mod link;
 mod output;
 mod output_file;
+mod paper;
 mod progress;
 mod run;
 mod stability;
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
         Command::Admittance(arguments) => admittance::admittance(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),
+        Command::Paper(arguments) => paper::paper(&arguments),
     };
     match done {
         Ok(code) => code,

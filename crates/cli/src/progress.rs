@@ -45,6 +45,13 @@ impl Progress {
         Self(bar)
     }
 
+    /// Progress through a number of steps.
+    pub(crate) fn through_steps(count: usize) -> Self {
+        let bar = bar(count as u64);
+        bar.set_style(style("{bar:30} {percent:>3} %  {elapsed} passed, {eta} left"));
+        Self(bar)
+    }
+
     pub(crate) fn reach_number(&self, number: u64) {
         self.0.set_position(number);
     }

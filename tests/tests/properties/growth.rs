@@ -1,5 +1,8 @@
 //! What a disturbance does in a simulation is what the monodromy matrix says: two computations of the same thing that share the bodies' steps and no more.
 
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "frames and nanoseconds of a second or two")]
+#![allow(clippy::wildcard_enum_match_arm, reason = "a kind of state that is not listed here ends the test")]
+
 use cohaptic_harness::Model;
 use cohaptic_peer::Contact;
 use cohaptic_stability::{Method, Monodromy, StateKind, analyse, monodromy};
@@ -109,6 +112,7 @@ fn dominant(monodromy: &Monodromy) -> (f64, Vec<(f64, f64)>) {
 fn age(kind: StateKind) -> usize {
     match kind {
         StateKind::SamplePosition { age, .. } | StateKind::SampleVelocity { age, .. } => age,
+        // Any other is of now.
         _ => 0,
     }
 }

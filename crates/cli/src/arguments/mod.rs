@@ -2,6 +2,7 @@
 
 mod admittance;
 mod links;
+mod paper;
 mod scenes;
 mod stability;
 
@@ -11,6 +12,7 @@ use clap::{Args, Parser, Subcommand};
 
 pub(crate) use admittance::AdmittanceArguments;
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
+pub(crate) use paper::PaperArguments;
 pub(crate) use scenes::{CheckArguments, ExplainArguments, RunArguments};
 pub(crate) use stability::{BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, StabilityArguments, StabilityCommand};
 
@@ -42,6 +44,8 @@ pub(crate) enum Command {
     Link(LinkArguments),
     /// Estimates the link that made a file of measurements, captures or fates
     Fit(FitArguments),
+    /// Computes every figure and claim of Rakhsha and Constantinescu (2015) again, and says which hold
+    Paper(PaperArguments),
 }
 
 /// What all commands on one scene take.

@@ -16,6 +16,7 @@ mod interrupt;
 mod link;
 mod output;
 mod overrides;
+mod paper;
 mod records;
 mod run;
 mod scenes;

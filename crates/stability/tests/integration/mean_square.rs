@@ -13,7 +13,6 @@ fn every_reference_radius_comes_out() {
         let number = |key: &str| word(key).parse::<f64>().unwrap();
         let (name, radius, nominal_squared) = (word("name"), number("mean_square_radius"), number("nominal_radius_squared"));
         let found = mean_square(&Scene::parse(word("scene"), "scene.toml".as_ref(), &[]).unwrap()).unwrap();
-        println!("{name}: {:e} {:e} error {:e} {:?}", found.radius.value, found.radius.value - radius, found.radius.error, found.method);
         assert!((found.radius.value - radius).abs() < 1e-11, "{name}: {radius} {found:?}");
         // The proven bounds: some thousand roundings, times the condition of the eigenvalue.
         assert!(found.radius.error < 5e-8, "{name}: {found:?}");

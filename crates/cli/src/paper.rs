@@ -1,0 +1,166 @@
+//! `cohaptic paper`.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant as Clock;
+
+use cohaptic_paper::{Options, PaperError, Reproduction, Watch, page, reproduce, steps};
+use serde::Serialize;
+
+use crate::arguments::PaperArguments;
+use crate::failure::{Failure, INTERRUPTED};
+use crate::output_file::OutputFile;
+use crate::progress::Progress;
+use crate::{interrupt, output};
+
+#[derive(Serialize)]
+struct Document<'a> {
+    claims: Vec<Claim<'a>>,
+    figures: Vec<Figure<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    wall_s: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct Claim<'a> {
+    id: &'a str,
+    claim: &'a str,
+    paper: &'a str,
+    ours: &'a str,
+    verdict: String,
+    scene: Option<&'a str>,
+    how: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct Figure<'a> {
+    id: &'a str,
+    /// In the folder of `--out`; `null` without one.
+    file: Option<String>,
+    title: &'a str,
+}
+
+struct Bar(Progress);
+
+impl Watch for Bar {
+    fn one_more(&self) {
+        self.0.one_more();
+    }
+
+    fn stops(&self) -> bool {
+        interrupt::asked()
+    }
+}
+
+/// Computes the paper again.
+pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
+    let options = Options { quick: arguments.quick };
+    if let Some(folder) = &arguments.out {
+        // A folder that cannot be had is found out before the work, not after it.
+        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
+    }
+    let bar = Bar(Progress::through_steps(steps(options)));
+    let start = Clock::now();
+    let reproduction = match reproduce(options, &bar) {
+        Ok(reproduction) => reproduction,
+        Err(PaperError::Stopped) => {
+            bar.0.clear();
+            return Ok(ExitCode::from(INTERRUPTED));
+        }
+        Err(error) => return Err(Failure::Input(error.to_string())),
+    };
+    let wall_s = start.elapsed().as_secs_f64();
+    bar.0.clear();
+    if let Some(folder) = &arguments.out {
+        write_files(folder, &reproduction)?;
+    }
+    let document = document(&reproduction, arguments.out.is_some());
+    if arguments.json {
+        output::json(&Document { wall_s: Some(wall_s), ..document })?;
+    } else {
+        let mut text = describe(&reproduction);
+        if let Some(folder) = &arguments.out {
+            let _ = writeln!(text, "{}", folder.join("index.html").display());
+        }
+        output::text(&text)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn document(reproduction: &Reproduction, has_files: bool) -> Document<'_> {
+    let claims = reproduction.claims.iter().map(|claim| Claim {
+        id: claim.id,
+        claim: claim.claim,
+        paper: claim.paper,
+        ours: &claim.ours,
+        verdict: claim.verdict.to_string(),
+        scene: claim.scene.as_deref(),
+        how: claim.how.as_deref(),
+    });
+    let figures = reproduction.figures.iter().map(|figure| Figure {
+        id: &figure.id,
+        file: has_files.then(|| format!("{}.svg", figure.id)),
+        title: &figure.title,
+    });
+    Document { claims: claims.collect(), figures: figures.collect(), wall_s: None }
+}
+
+fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure> {
+    for figure in &reproduction.figures {
+        write(&folder.join(format!("{}.svg", figure.id)), figure.svg.as_bytes())?;
+        write(&folder.join(format!("{}.csv", figure.id)), figure.csv.as_bytes())?;
+    }
+    for claim in &reproduction.claims {
+        if let Some(scene) = &claim.scene {
+            write(&folder.join(format!("{}.toml", claim.id)), scene.as_bytes())?;
+        }
+    }
+    // Without the time that it took: the same bytes every time.
+    let mut claims = serde_json::to_vec_pretty(&document(reproduction, true)).unwrap_or_default();
+    claims.push(b'\n');
+    write(&folder.join("claims.json"), &claims)?;
+    write(&folder.join("index.html"), page::html(reproduction).as_bytes())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let (file, mut to) = OutputFile::create(path)?;
+    let written = to.write_all(bytes).and_then(|()| to.flush());
+    file.finish(written.map(|()| to))
+}
+
+/// How wide the text is.
+const WIDTH: usize = 100;
+
+fn describe(reproduction: &Reproduction) -> String {
+    let mut text = String::new();
+    for claim in &reproduction.claims {
+        let _ = writeln!(text, "{}", claim.id);
+        for (name, value) in [("claim", claim.claim), ("paper", claim.paper), ("ours", &claim.ours), ("verdict", &claim.verdict.to_string())] {
+            wrap(&mut text, name, value);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// A cell of the table, broken between words, beside its name.
+fn wrap(text: &mut String, name: &str, value: &str) {
+    let indent = 12;
+    let _ = write!(text, "  {name:<width$}", width = indent - 2);
+    let mut column = indent;
+    for word in value.split_whitespace() {
+        let length = word.chars().count();
+        if column > indent && column + 1 + length > WIDTH {
+            let _ = write!(text, "\n{:indent$}", "");
+            column = indent;
+        } else if column > indent {
+            text.push(' ');
+            column += 1;
+        }
+        text.push_str(word);
+        column += length;
+    }
+    text.push('\n');
+}

@@ -1,0 +1,35 @@
+//! `cohaptic paper`: the paper again.
+
+use crate::desk::Desk;
+
+#[test]
+fn a_file_in_place_of_the_folder_is_refused_before_anything_is_computed() {
+    Desk::with("taken", "").cohaptic("paper --quick --out taken").assert_refused(3, &["cannot create taken"]);
+}
+
+#[test]
+fn it_takes_no_scene() {
+    Desk::new().cohaptic("paper scene.toml").assert_refused(2, &["scene.toml"]);
+}
+
+#[test]
+fn the_page_the_figures_and_the_data_lie_in_the_folder() {
+    let desk = Desk::new();
+    let document = desk.json("paper --quick --json --out again");
+    let claims = document["claims"].as_array().unwrap();
+    assert!(claims.len() > 10 && document["wall_s"].as_f64().unwrap() > 0.0);
+    for claim in claims {
+        assert!(["id", "claim", "paper", "ours", "verdict"].iter().all(|key| claim[*key].as_str().is_some_and(|text| !text.is_empty())), "{claim}");
+        if claim["scene"].is_string() {
+            let scene = format!("again/{}.toml", claim["id"].as_str().unwrap());
+            desk.text(&format!("explain {scene}"));
+        }
+    }
+    for figure in document["figures"].as_array().unwrap() {
+        let file = figure["file"].as_str().unwrap();
+        assert!(desk.read(&format!("again/{file}")).starts_with("<svg"));
+        assert!(desk.read(&format!("again/{}", file.replace(".svg", ".csv"))).lines().count() > 100);
+    }
+    assert!(desk.read("again/index.html").starts_with("<!DOCTYPE html>"));
+    assert!(!desk.read("again/claims.json").contains("wall_s"));
+}

@@ -1,0 +1,131 @@
+//! The effective coordination stiffness: equations (3) and (6), and what a scene on an ideal network does.
+
+use std::convert::Infallible;
+use std::path::Path;
+
+use cohaptic_harness::{Model, Observer, Simulation, TickRow};
+use cohaptic_scene::Scene;
+use cohaptic_stability::{Matrix, eigenvalues};
+
+use super::{Claim, Verdict};
+use crate::PaperError;
+use crate::case::{Case, Strategy};
+use crate::watch::Watch;
+
+/// The numbers of peers that are looked at.
+const PEERS: [usize; 8] = [2, 3, 4, 5, 8, 16, 32, 50];
+/// KT [N/m].
+const STIFFNESS: f64 = 1000.0;
+/// The tick and the period of sending: an ideal network is one without delay and with no limit to its rate [s].
+const TICK: f64 = 1e-4;
+
+/// What was found for one number of peers, KT being 1.
+struct Found {
+    peers: usize,
+    /// The largest eigenvalue of the stiffness matrix.
+    matrix: f64,
+    /// What the copies of a scene swing with.
+    scene: f64,
+    /// How fast they swing [Hz].
+    hz: f64,
+}
+
+pub(super) fn claims(watch: &dyn Watch) -> Result<Vec<Claim>, PaperError> {
+    let found = |strategy, scaled| PEERS.into_iter().map(|peers| one(strategy, peers, scaled, watch)).collect::<Result<Vec<Found>, PaperError>>();
+    let (ap, pd, scaled) = (found(Strategy::Ap, false)?, found(Strategy::Pd, false)?, found(Strategy::Ap, true)?);
+    Ok(vec![bounded(&ap, &pd), frequency(&ap, &scaled)])
+}
+
+fn bounded(ap: &[Found], pd: &[Found]) -> Claim {
+    let falls = ap.windows(2).all(|pair| pair[1].matrix < pair[0].matrix && pair[1].scene < pair[0].scene);
+    let rises = pd.windows(2).all(|pair| pair[1].matrix > pair[0].matrix && pair[1].scene > pair[0].scene);
+    let is_bounded = ap.iter().all(|found| found.matrix <= 2.0 + 1e-9 && found.scene <= 2.0 + 1e-6);
+    let apart = ap.iter().chain(pd).map(|found| (found.matrix - found.scene).abs() / found.matrix).fold(0.0, f64::max);
+    let list = |all: &[Found]| all.iter().map(|found| format!("{:.3} (N = {})", found.scene, found.peers)).collect::<Vec<_>>().join(", ");
+    let verdict = if falls && rises && is_bounded && apart < 1e-6 {
+        Verdict::Holds
+    } else {
+        Verdict::FailsAt(format!("a bound of 2·KT: AP has {}", list(ap)))
+    };
+    let ours = format!(
+        "In units of KT, as copies of a scene swing on an ideal network: AP {}; PD {}. Eigenvalues of the matrices differ from it by at most {apart:.0e}.",
+        list(ap),
+        list(pd)
+    );
+    let claim = "AP has a bounded effective coordination stiffness, which falls to KT as N grows; that of PD grows with N";
+    Claim::new("bounded-stiffness", claim, "AP N/(N−1)·KT (eq. 6), PD N·KT (eq. 3)", ours, verdict)
+}
+
+fn frequency(ap: &[Found], scaled: &[Found]) -> Claim {
+    let hz = |all: &[Found]| all.iter().map(|found| format!("{:.2}", found.hz)).collect::<Vec<_>>().join(", ");
+    let grows = ap.windows(2).all(|pair| pair[1].hz > pair[0].hz);
+    let stays = scaled.iter().all(|found| (found.hz / scaled[0].hz - 1.0).abs() < 1e-6);
+    let ours = format!(
+        "The copies swing apart at {} Hz for N = {} with the gains as they are, and at {} Hz with `scaling = \"inverse-n\"`.",
+        hz(ap),
+        PEERS.map(|peers| peers.to_string()).join(", "),
+        hz(scaled)
+    );
+    let verdict = if grows && stays { Verdict::Holds } else { Verdict::FailsAt(format!("{} Hz unscaled, {} Hz scaled", hz(ap), hz(scaled))) };
+    let claim = "The copies are governed by (N/mO)·K_AP, so that a bounded stiffness is not enough for any N: gains have to be scaled with N";
+    Claim::new("frequency-needs-scaling", claim, "Section 2, not used there", ours, verdict)
+}
+
+fn one(strategy: Strategy, peers: usize, scaled: bool, watch: &dyn Watch) -> Result<Found, PaperError> {
+    if watch.stops() {
+        return Err(PaperError::Stopped);
+    }
+    let n = crate::region::share(peers, 1);
+    // Equations (3) and (6), KT = 1.
+    let (own, other) = match strategy {
+        Strategy::Pd => (n - 1.0, -1.0),
+        Strategy::Ap => (1.0, -1.0 / (n - 1.0)),
+    };
+    let matrix = Matrix::from_fn(peers, peers, |row, column| if row == column { own } else { other });
+    let matrix = eigenvalues(&matrix).iter().map(|value| value.re).fold(0.0, f64::max);
+    let stiffness = swing(strategy, peers, scaled)?;
+    let hz = (stiffness * n / 0.45).sqrt() / std::f64::consts::TAU;
+    Ok(Found { peers, matrix, scene: stiffness / STIFFNESS, hz })
+}
+
+/// The stiffness with which one copy, moved away from the others, swings against them [N/m].
+///
+/// With forces held over a tick T, the distance d of two copies of the mass m obeys d₂ − 2d₁ + d₀ = −q·(d₁ + d₀) with q = κT²/2m, exactly; q is fitted to all ticks.
+fn swing(strategy: Strategy, peers: usize, scaled: bool) -> Result<f64, PaperError> {
+    let case = Case { strategy, stiffness: STIFFNESS, damping: 0.0, delay_us: 0, touching: 0, scaled, ..Case::paper(strategy, peers) };
+    let overrides = ["coordination.update=0.1ms", "peer.tick=0.1ms", "scene.duration=0.1s", "peers.peer1.position=0.001"].map(str::to_owned);
+    let scene = Scene::parse(&case.text(), Path::new("swing.toml"), &overrides)?;
+    let mut distances = Distances::default();
+    let Ok(_) = Simulation::new(&scene, Model::Least).run(&mut distances);
+    let (mut above, mut below) = (0.0, 0.0);
+    for d in distances.all.windows(3) {
+        above += (2.0 * d[1] - d[0] - d[2]) * (d[1] + d[0]);
+        below += (d[1] + d[0]) * (d[1] + d[0]);
+    }
+    let mass = 0.45 / crate::region::share(peers, 1);
+    Ok(above / below * 2.0 * mass / (TICK * TICK))
+}
+
+/// The distance between the first two copies at every tick.
+#[derive(Default)]
+struct Distances {
+    first: f64,
+    all: Vec<f64>,
+}
+
+impl Observer for Distances {
+    type Error = Infallible;
+
+    fn wants_ticks(&self) -> bool {
+        true
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
+        match row.peer {
+            0 => self.first = row.object.position[0],
+            1 => self.all.push(self.first - row.object.position[0]),
+            _ => {}
+        }
+        Ok(())
+    }
+}

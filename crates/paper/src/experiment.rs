@@ -1,0 +1,251 @@
+//! The experiments of Section 5, from the scenes that are shipped for them.
+
+use std::convert::Infallible;
+use std::path::Path;
+
+use cohaptic_harness::{Model, Observer, Simulation, TickRow};
+use cohaptic_peer::Contact;
+use cohaptic_scene::Scene;
+use cohaptic_stability::{Admittance, Analysis, Method, PartKind, Radius, Verdict, analyse};
+use cohaptic_units::Instant;
+
+use crate::PaperError;
+use crate::case::Strategy;
+use crate::watch::Watch;
+
+/// What is recorded of one peer: one entry for each time.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct PeerTrace {
+    /// [m]
+    pub(crate) position: Vec<f64>,
+    /// [m/s]
+    pub(crate) velocity: Vec<f64>,
+    /// [N]
+    pub(crate) force: Vec<f64>,
+}
+
+/// What happened in a simulation.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Trace {
+    /// [s]
+    pub(crate) times: Vec<f64>,
+    pub(crate) peers: Vec<PeerTrace>,
+}
+
+/// A run of Section 5.1: two move the object, a third one does not touch it.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct StabilityTest {
+    pub(crate) strategy: Strategy,
+    /// KT [N/m].
+    pub(crate) stiffness: f64,
+    pub(crate) arms: bool,
+    /// One way [ms].
+    pub(crate) delay_ms: u32,
+    pub(crate) radius: Radius,
+    pub(crate) trace: Trace,
+}
+
+/// A run of Section 5.2: one pushes with 1.5 N, two do not touch the object.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Travel {
+    pub(crate) strategy: Strategy,
+    /// One way [ms].
+    pub(crate) delay_ms: u32,
+    pub(crate) radius: Radius,
+    /// The radius of what a push can excite: the pushed copy and the mean of the others.
+    pub(crate) excited: Radius,
+    /// The radius of how the two untouched copies swing against each other.
+    pub(crate) apart: Radius,
+    /// When the pushed copy has gone 20 mm [s].
+    pub(crate) time: Option<f64>,
+    /// The viscosity that the hand meets at low speed, by the admittance [N·s/m].
+    pub(crate) viscosity: f64,
+    pub(crate) trace: Trace,
+}
+
+impl Travel {
+    /// Whether the push itself makes the object diverge.
+    pub(crate) fn diverges(&self) -> bool {
+        self.excited.verdict() == Verdict::Unstable
+    }
+}
+
+/// How far the object goes in Section 5.2 [m].
+pub(crate) const DISTANCE: f64 = 0.02;
+/// The delays that "48 ms" may mean, one way [ms]: that of a round trip, and as it stands.
+pub(crate) const DELAYS_MS: [u32; 2] = [24, 48];
+
+const STABILITY_SCENES: [(Strategy, f64, bool, &str); 8] = [
+    (Strategy::Ap, 2100.0, true, include_str!("../../../scenarios/paper/5-1-ap-2100.toml")),
+    (Strategy::Pd, 2100.0, true, include_str!("../../../scenarios/paper/5-1-pd-2100.toml")),
+    (Strategy::Ap, 1000.0, true, include_str!("../../../scenarios/paper/5-1-ap-1000.toml")),
+    (Strategy::Pd, 1000.0, true, include_str!("../../../scenarios/paper/5-1-pd-1000.toml")),
+    (Strategy::Ap, 2100.0, false, include_str!("../../../scenarios/paper/5-1-ap-2100-no-arm.toml")),
+    (Strategy::Pd, 2100.0, false, include_str!("../../../scenarios/paper/5-1-pd-2100-no-arm.toml")),
+    (Strategy::Ap, 1000.0, false, include_str!("../../../scenarios/paper/5-1-ap-1000-no-arm.toml")),
+    (Strategy::Pd, 1000.0, false, include_str!("../../../scenarios/paper/5-1-pd-1000-no-arm.toml")),
+];
+
+const TRAVEL_SCENES: [(Strategy, &str); 2] =
+    [(Strategy::Ap, include_str!("../../../scenarios/paper/5-2-ap.toml")), (Strategy::Pd, include_str!("../../../scenarios/paper/5-2-pd.toml"))];
+
+/// The scene of Section 5.2 with that strategy, as a file.
+pub(crate) fn travel_text(strategy: Strategy) -> &'static str {
+    TRAVEL_SCENES.iter().find(|(of, _)| *of == strategy).map_or("", |(_, text)| text)
+}
+
+/// The scene of Section 5.1 with that strategy and stiffness, as a file.
+pub(crate) fn stability_text(strategy: Strategy, stiffness: f64, arms: bool) -> &'static str {
+    let wanted = |scene: &&(Strategy, f64, bool, &str)| scene.0 == strategy && (scene.1 - stiffness).abs() < 0.5 && scene.2 == arms;
+    STABILITY_SCENES.iter().find(wanted).map_or("", |(.., text)| text)
+}
+
+/// Runs Section 5.1: both strategies, both stiffnesses, with and without arms, for both delays. The users move at about 1 Hz, as in Figure 7.
+pub(crate) fn stability_tests(watch: &dyn Watch) -> Result<Vec<StabilityTest>, PaperError> {
+    let mut tests = Vec::new();
+    for delay_ms in DELAYS_MS {
+        for (strategy, stiffness, arms, text) in STABILITY_SCENES {
+            let hand = if arms { "hand.follows" } else { "hand" };
+            let faster = ["left", "right"].map(|peer| format!("peers.{peer}.{hand}.sine.frequency=1.0"));
+            let overrides: Vec<String> = faster.into_iter().chain([format!("link.delay={delay_ms}ms")]).collect();
+            let scene = Scene::parse(text, Path::new("5-1.toml"), &overrides)?;
+            let (trace, _) = simulate(&scene, f64::INFINITY, watch)?;
+            tests.push(StabilityTest { strategy, stiffness, arms, delay_ms, radius: away_from_walls(&scene)?.radius, trace });
+        }
+    }
+    watch.one_more();
+    Ok(tests)
+}
+
+/// Runs Section 5.2: both strategies for both delays.
+pub(crate) fn travels(watch: &dyn Watch) -> Result<Vec<Travel>, PaperError> {
+    let mut travels = Vec::new();
+    for delay_ms in DELAYS_MS {
+        for (strategy, text) in TRAVEL_SCENES {
+            let scene = Scene::parse(text, Path::new("5-2.toml"), &[format!("link.delay={delay_ms}ms")])?;
+            let (trace, time) = simulate(&scene, DISTANCE, watch)?;
+            let viscosity = Admittance::of(&scene, 0)?.fit_low_frequency().viscosity.value;
+            let analysis = away_from_walls(&scene)?;
+            let part = |wanted: fn(PartKind) -> bool| {
+                let of = analysis.modes.iter().flat_map(|mode| &mode.parts).filter(|part| wanted(part.kind)).map(|part| part.radius);
+                of.fold(Radius { value: 0.0, error: 0.0 }, Radius::or)
+            };
+            let excited = part(|kind| kind == PartKind::Together);
+            let apart = part(|kind| matches!(kind, PartKind::Apart { .. }));
+            travels.push(Travel { strategy, delay_ms, radius: analysis.radius, excited, apart, time, viscosity, trace });
+        }
+    }
+    watch.one_more();
+    Ok(travels)
+}
+
+/// What is known while the object touches no wall and one-sided contacts are closed.
+fn away_from_walls(scene: &Scene) -> Result<Analysis, PaperError> {
+    let mut scene = scene.clone();
+    scene.object.enclosure = None;
+    for peer in &mut scene.peers {
+        if peer.contact != Contact::None {
+            peer.contact = Contact::Grasp;
+        }
+    }
+    Ok(analyse(&scene, Method::Reduced)?)
+}
+
+/// Every so many ticks are kept: every 4 ms.
+const KEPT: u64 = 4;
+
+/// Simulates a scene of equal ticks of 1 ms, and says when the first peer's copy has gone a distance [m].
+fn simulate(scene: &Scene, distance: f64, watch: &dyn Watch) -> Result<(Trace, Option<f64>), PaperError> {
+    let mut recorder = Recorder {
+        trace: Trace { times: Vec::new(), peers: vec![PeerTrace::default(); scene.peers.len()] },
+        distance,
+        start: scene.object.position[0],
+        last: (0.0, 0.0),
+        reached: None,
+        watch,
+    };
+    let Ok(_) = Simulation::new(scene, Model::Least).run(&mut recorder);
+    if watch.stops() { Err(PaperError::Stopped) } else { Ok((recorder.trace, recorder.reached)) }
+}
+
+struct Recorder<'a> {
+    trace: Trace,
+    distance: f64,
+    start: f64,
+    /// When the first peer's copy was looked at last, and how far it had gone.
+    last: (f64, f64),
+    reached: Option<f64>,
+    watch: &'a dyn Watch,
+}
+
+impl Observer for Recorder<'_> {
+    type Error = Infallible;
+
+    fn wants_ticks(&self) -> bool {
+        true
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
+        let t = row.at.as_secs_f64();
+        if row.peer == 0 {
+            let gone = (row.object.position[0] - self.start).abs();
+            if self.reached.is_none() && gone >= self.distance {
+                let (before, gone_before) = self.last;
+                self.reached = Some(before + (t - before) * (self.distance - gone_before) / (gone - gone_before));
+            }
+            self.last = (t, gone);
+        }
+        if row.at.as_nanos().is_multiple_of(KEPT * 1_000_000) {
+            if row.peer == 0 {
+                self.trace.times.push(t);
+            }
+            let peer = &mut self.trace.peers[row.peer];
+            peer.position.push(row.object.position[0]);
+            peer.velocity.push(row.object.velocity[0]);
+            peer.force.push(row.coordination_force[0]);
+        }
+        Ok(())
+    }
+
+    fn keep_going(&mut self, _now: Instant) -> bool {
+        !self.watch.stops()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Unwatched;
+
+    /// Radii from crates/stability/tests/reference/radii.json.
+    #[test]
+    fn section_5_1_has_the_radii_of_the_reference() {
+        let tests = stability_tests(&Unwatched).unwrap();
+        let radius = |strategy, stiffness: f64, arms| {
+            let wanted = |test: &&StabilityTest| {
+                test.strategy == strategy && (test.stiffness - stiffness).abs() < 1.0 && test.arms == arms && test.delay_ms == 24
+            };
+            tests.iter().find(wanted).unwrap().radius.value
+        };
+        for (found, expected) in [
+            (radius(Strategy::Ap, 2100.0, true), 0.992_453_875_8),
+            (radius(Strategy::Pd, 2100.0, true), 1.053_350_901_5),
+            (radius(Strategy::Ap, 1000.0, true), 0.986_240_717_1),
+            (radius(Strategy::Pd, 1000.0, true), 0.992_165_688_9),
+            (radius(Strategy::Ap, 2100.0, false), 1.014_391_773_5),
+            (radius(Strategy::Pd, 2100.0, false), 1.011_715_382_3),
+            (radius(Strategy::Ap, 1000.0, false), 1.002_672_697_2),
+            (radius(Strategy::Pd, 1000.0, false), 0.978_014_835_7),
+        ] {
+            assert!((found - expected).abs() < 2e-10, "{found} is not {expected}");
+        }
+    }
+
+    /// The law of momentum of scenarios/README.md gives 1.138 s and 2.255 s, to 2 %.
+    #[test]
+    fn section_5_2_takes_as_long_as_the_viscosity_law_says() {
+        let travels = travels(&Unwatched).unwrap();
+        let time = |strategy| travels.iter().find(|travel| travel.strategy == strategy && travel.delay_ms == 24).unwrap().time.unwrap();
+        assert!((time(Strategy::Ap) / 1.138 - 1.0).abs() < 0.02 && (time(Strategy::Pd) / 2.255 - 1.0).abs() < 0.02);
+    }
+}

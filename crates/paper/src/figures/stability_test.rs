@@ -1,0 +1,78 @@
+//! Figure 7: three users at KT = 2100 N/m.
+
+use std::fmt::Write as _;
+
+use super::chart::{Line, Panel, draw};
+use super::{Figure, Table};
+use crate::case::Strategy;
+use crate::experiment::{PeerTrace, StabilityTest};
+
+/// The paper's ordinates: ±3 cm and ±6 N.
+const POSITION_CM: (f64, f64) = (-4.0, 4.0);
+const FORCE_N: (f64, f64) = (-6.0, 6.0);
+
+pub(super) fn figure(tests: &[StabilityTest], delay_ms: u32) -> Figure {
+    let title = format!("Figure 7: three users at KT = 2100 N/m, {delay_ms} ms one way");
+    let shown: Vec<&StabilityTest> = [(Strategy::Pd, true), (Strategy::Ap, true), (Strategy::Pd, false), (Strategy::Ap, false)]
+        .iter()
+        .filter_map(|(strategy, arms)| {
+            tests.iter().find(|test| test.strategy == *strategy && test.arms == *arms && test.delay_ms == delay_ms && test.stiffness > 2000.0)
+        })
+        .collect();
+    let mut panels = Vec::new();
+    for pair in shown.chunks(2) {
+        panels.extend(pair.iter().map(|test| positions(test)));
+        panels.extend(pair.iter().map(|test| forces(test)));
+    }
+    let mut table = Table::new(&["KT = 2100 N/m", "the paper", "ours: ρ over 8 ms", "ours: verdict"]);
+    let mut differ = Vec::new();
+    for test in &shown {
+        let paper = if test.strategy == Strategy::Pd { "unstable" } else { "stable" };
+        let verdict = test.radius.verdict().word();
+        if verdict != paper {
+            differ.push(name(test));
+        }
+        table.rows.push(vec![name(test), paper.to_owned(), format!("{:.4}", test.radius.value), verdict.to_owned()]);
+    }
+    let differ =
+        if differ.is_empty() { "All four verdicts are the paper's.".to_owned() } else { format!("Not as in the paper: {}.", differ.join(", ")) };
+    let caption = format!(
+        "Two users move the object at 1 Hz; the third copy is touched by nobody. The force is that of the coordination on the local copy. What leaves the paper's ordinates is cut off. {differ} The \
+         paper's motion is that of people; ours are arms of 0.3 kg, 10 N·s/m and 100 N/m that follow a sine, or forces of 2 N without arms."
+    );
+    Figure { id: format!("fig-7-{delay_ms}ms"), svg: draw(&panels, 2, &title), title, caption, table, csv: csv(&shown) }
+}
+
+fn name(test: &StabilityTest) -> String {
+    format!("{} {} arms", test.strategy.word(), if test.arms { "with" } else { "without" })
+}
+
+fn positions(test: &StabilityTest) -> Panel {
+    let names = ["left", "right", "untouched"];
+    let line = |(place, peer): (usize, &PeerTrace)| {
+        let points = test.trace.times.iter().copied().zip(peer.position.iter().map(|x| 100.0 * x));
+        Line::within(names.get(place).copied().unwrap_or_default().to_owned(), place, points, POSITION_CM)
+    };
+    let lines = test.trace.peers.iter().enumerate().map(line).collect();
+    Panel { title: name(test), x_label: "t [s]", y_label: "position [cm]", x: (0.0, 7.0), y: POSITION_CM, decades: false, lines }
+}
+
+fn forces(test: &StabilityTest) -> Panel {
+    let points = test.trace.times.iter().copied().zip(test.trace.peers[0].force.iter().copied());
+    let lines = vec![Line::within(String::new(), 0, points, FORCE_N)];
+    Panel { title: name(test), x_label: "t [s]", y_label: "coordination force [N]", x: (0.0, 7.0), y: FORCE_N, decades: false, lines }
+}
+
+fn csv(tests: &[&StabilityTest]) -> String {
+    let mut csv = "strategy,arms,delay_ms,t,left,right,untouched,left_coordination_force\n".to_owned();
+    for test in tests {
+        for (tick, t) in test.trace.times.iter().enumerate() {
+            let _ = write!(csv, "{},{},{},{t:.3}", test.strategy.word(), test.arms, test.delay_ms);
+            for peer in &test.trace.peers {
+                let _ = write!(csv, ",{:.9e}", peer.position.get(tick).copied().unwrap_or(f64::NAN));
+            }
+            let _ = writeln!(csv, ",{:.9e}", test.trace.peers[0].force.get(tick).copied().unwrap_or(f64::NAN));
+        }
+    }
+    csv
+}

@@ -1,0 +1,22 @@
+//! How the page looks: in light and in dark, on a wide screen and on a narrow one.
+
+pub(super) const STYLE: &str = "\
+:root { color-scheme: light dark; --ground: #fff; --ink: #1b1b1b; --line: #bbb; --holds: #00603f; --partly: #7a4b00; --fails: #9b1c1c; }
+@media (prefers-color-scheme: dark) { :root { --ground: #16181b; --ink: #e6e6e6; --line: #555; --holds: #5fd3a6; --partly: #f0b84a; --fails: #ff8f8f; } }
+body { margin: 0; background: var(--ground); color: var(--ink); font: 1rem/1.5 system-ui, sans-serif; }
+main { max-width: 64rem; margin: 0 auto; padding: 1rem; }
+h1, h2, h3 { line-height: 1.25; }
+a { color: inherit; }
+section, figure { margin: 0 0 2rem; padding: 0; border-top: 1px solid var(--line); }
+dt { font-weight: 600; }
+dd { margin: 0 0 .5rem 1rem; overflow-wrap: anywhere; }
+b.holds { color: var(--holds); }
+b.partly { color: var(--partly); }
+b.fails { color: var(--fails); }
+.wide { overflow-x: auto; }
+.wide svg { width: 100%; min-width: 40rem; height: auto; }
+table { border-collapse: collapse; margin: 1rem 0; font-size: .9rem; }
+th, td { text-align: left; vertical-align: top; padding: .25rem .75rem .25rem 0; border-bottom: 1px solid var(--line); }
+tbody th { font-weight: 400; }
+pre { overflow-x: auto; padding: .5rem; border: 1px solid var(--line); }
+";

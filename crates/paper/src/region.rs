@@ -1,0 +1,132 @@
+//! Stability regions over KT × KC: the paper's Figures 3 and 4, for every reading of what they leave open.
+//!
+//! The paper says that each copy has the mass mO/N and that Td is a delay, and Section 5 that its delay is that of a round trip. So each region is there for both masses and
+//! for 8 ms and 4 ms one way. Cells are looked at in their middle, so that the share of stable cells is the midpoint rule for the area.
+
+use std::path::Path;
+
+use cohaptic_stability::{Family, Grid, KeyRange, Map};
+
+use crate::case::{Case, Mass, Strategy};
+use crate::watch::Watch;
+use crate::{Options, PaperError};
+
+/// The numbers of peers in the figures.
+pub(crate) const PEERS: [usize; 5] = [2, 3, 4, 5, 8];
+/// KT and KC go from 0 to this [N/m].
+pub(crate) const HIGHEST: f64 = 6000.0;
+
+/// What the regions of one panel have in common.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Setting {
+    /// BT = BC [N·s/m].
+    pub(crate) damping: f64,
+    pub(crate) mass: Mass,
+    /// One way [µs].
+    pub(crate) delay_us: u32,
+}
+
+/// One region.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Region {
+    pub(crate) setting: Setting,
+    pub(crate) strategy: Strategy,
+    pub(crate) peers: usize,
+    pub(crate) map: Map,
+}
+
+/// All regions.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Atlas {
+    pub(crate) regions: Vec<Region>,
+}
+
+impl Setting {
+    /// In the order of the figures.
+    pub(crate) fn all() -> Vec<Self> {
+        let mut all = Vec::new();
+        for damping in [0.0, 5.0] {
+            for mass in Mass::BOTH {
+                all.extend([8000, 4000].map(|delay_us| Self { damping, mass, delay_us }));
+            }
+        }
+        all
+    }
+
+    pub(crate) fn words(&self) -> String {
+        format!("BT = BC = {} N·s/m, {}, {} ms one way", self.damping, self.mass.words(), self.delay_us / 1000)
+    }
+
+    fn case(&self, strategy: Strategy, peers: usize) -> Case {
+        let Self { damping, mass, delay_us } = *self;
+        Case { damping, coupling_damping: damping, mass, delay_us, ..Case::paper(strategy, peers) }
+    }
+}
+
+impl Region {
+    /// The share of the square that is stable.
+    pub(crate) fn area(&self) -> f64 {
+        share(self.cells().filter(|stable| *stable).count(), self.cells().count())
+    }
+
+    fn cells(&self) -> impl Iterator<Item = bool> + '_ {
+        self.map.radius.iter().flatten().map(|radius| *radius < 1.0)
+    }
+}
+
+/// One count over another.
+pub(crate) fn share(part: usize, whole: usize) -> f64 {
+    let number = |count: usize| f64::from(u32::try_from(count).unwrap_or(u32::MAX));
+    number(part) / number(whole.max(1))
+}
+
+impl Atlas {
+    fn wanted() -> Vec<(Setting, Strategy, usize)> {
+        let strategies =
+            |setting| Strategy::BOTH.into_iter().flat_map(move |strategy| PEERS.into_iter().map(move |peers| (setting, strategy, peers)));
+        Setting::all().into_iter().flat_map(strategies).collect()
+    }
+
+    /// How many regions there are.
+    pub(crate) fn size(_options: Options) -> usize {
+        Self::wanted().len()
+    }
+
+    pub(crate) fn fill(options: Options, watch: &dyn Watch) -> Result<Self, PaperError> {
+        let cells: u32 = if options.quick { 30 } else { 150 };
+        let half = HIGHEST / (2.0 * f64::from(cells));
+        let range = |key: &str| KeyRange { key: key.to_owned(), low: half, high: HIGHEST - half, unit: String::new() };
+        let side = usize::try_from(cells).unwrap_or(1);
+        let mut regions: Vec<Region> = Vec::new();
+        for (setting, strategy, peers) in Self::wanted() {
+            let case = setting.case(strategy, peers);
+            let keys = vec![range("coordination.stiffness"), range("peer.coupling.stiffness")];
+            let family = Family::new(&case.text(), Path::new("paper.toml"), &[], keys)?;
+            let map = Map::fill(&family, Grid::new(side, side)?, |_| (), || watch.stops())?;
+            if !map.is_complete() {
+                return Err(PaperError::Stopped);
+            }
+            watch.one_more();
+            regions.push(Region { setting, strategy, peers, map });
+        }
+        Ok(Self { regions })
+    }
+
+    /// That of a strategy and a number of peers.
+    pub(crate) fn region(&self, setting: Setting, strategy: Strategy, peers: usize) -> Option<&Region> {
+        self.regions.iter().find(|region| region.setting == setting && region.strategy == strategy && region.peers == peers)
+    }
+
+    /// The share that is stable, for each number of peers.
+    pub(crate) fn areas(&self, setting: Setting, strategy: Strategy) -> Vec<f64> {
+        PEERS.iter().filter_map(|peers| self.region(setting, strategy, *peers)).map(Region::area).collect()
+    }
+
+    /// The share of the square that is stable with PD and not with AP.
+    pub(crate) fn only_pd(&self, setting: Setting, peers: usize) -> f64 {
+        match (self.region(setting, Strategy::Ap, peers), self.region(setting, Strategy::Pd, peers)) {
+            (Some(ap), Some(pd)) => share(ap.cells().zip(pd.cells()).filter(|(ap, pd)| *pd && !ap).count(), ap.cells().count()),
+            _ => 0.0,
+        }
+    }
+}
