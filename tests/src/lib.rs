@@ -13,6 +13,8 @@ mod book {
     mod emulator {}
     #[doc = include_str!("../../docs/extending.md")]
     mod extending {}
+    #[doc = include_str!("../../docs/stability.md")]
+    mod stability {}
 }
 
 mod draft;
