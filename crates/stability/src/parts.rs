@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::StepMap;
+use cohaptic_peer::{Plant, StepMap};
 use cohaptic_scene::Scene;
 
 use crate::lifted::{Autonomous, Lifted, Node};
@@ -121,20 +121,54 @@ pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -
     let (short, long) = spec.clock.spans();
     let plant = device_plant(spec);
     let ticks = structure.timetable.frame.as_nanos() / short.as_nanos().max(1);
-    let radius = [plant.step(short, scene.integrator), plant.step(long, scene.integrator)].iter().map(step_radius).fold(0.0, f64::max);
-    let ticks = crate::structure::count(usize::try_from(ticks).unwrap_or(usize::MAX));
-    let value = libm::pow(radius, ticks);
+    let radius = [short, long].map(|span| step_radius(&plant.step(span, scene.integrator), &plant, span)).into_iter().reduce(Radius::or);
     let size = if arm(spec).stiffness > 0.0 { 2 } else { 1 };
-    (Radius { value, error: 16.0 * f64::EPSILON * ticks * value }, size)
+    (radius.unwrap_or(Radius { value: 0.0, error: 0.0 }).over(u32::try_from(ticks).unwrap_or(u32::MAX)), size)
 }
 
 /// The spectral radius of one step of a body: of its velocity alone if nothing ties it to ground.
-fn step_radius(map: &StepMap) -> f64 {
+fn step_radius(map: &StepMap, plant: &Plant, span: Duration) -> Radius {
     let ([[e00, e01], [e10, e11]], _) = map.coefficients();
+    let h = span.as_secs_f64();
+    // Squaring the exponential of a step doubles its relative error for each factor of two that the step is longer than the body's own time.
+    let rounding = 32.0 * f64::EPSILON * (1.0 + plant.damping / plant.mass * h + h * (plant.stiffness / plant.mass).sqrt());
     if map.is_free() {
-        return (1.0 + e11).abs();
+        return Radius { value: (1.0 + e11).abs(), error: 2.0 * f64::EPSILON + rounding * e11.abs() };
     }
-    let (half_trace, determinant) = (1.0 + 0.5 * (e00 + e11), (1.0 + e00) * (1.0 + e11) - e01 * e10);
-    let discriminant = half_trace * half_trace - determinant;
-    if discriminant < 0.0 { determinant.sqrt() } else { half_trace.abs() + discriminant.sqrt() }
+    // The eigenvalues are 1 + middle ± √discriminant; nearly equal ones, of a body next to critical damping, are only as sure as the square root.
+    let (middle, half, product) = (1.0 + 0.5 * (e00 + e11), 0.5 * (e00 - e11), e01 * e10);
+    let modulus = |discriminant: f64| {
+        if discriminant < 0.0 { (middle * middle - discriminant).sqrt() } else { middle.abs() + discriminant.sqrt() }
+    };
+    let discriminant = half * half + product;
+    let doubt = rounding * ((e00.abs() + e11.abs()).powi(2) + product.abs());
+    let (below, above) = (modulus(discriminant - doubt), modulus(discriminant + doubt));
+    let value = modulus(discriminant);
+    let lowest = if discriminant.abs() <= doubt { middle.abs() } else { below.min(above) };
+    let error = (below.max(above) - value).max(value - lowest) + rounding * (e00.abs() + e11.abs()) + 4.0 * f64::EPSILON * value;
+    Radius { value, error }
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_peer::Integrator;
+
+    use super::*;
+
+    /// m = 1 kg, b² = 4·m·k to thirteen digits: e^(−b·h/2m ± √(b² − 4mk)·h/2m) within the bound, which is not more than a root of the rounding allows.
+    #[test]
+    fn a_body_next_to_critical_damping_is_within_its_bound() {
+        let span = Duration::from_millis(1);
+        for excess in [0.0_f64, 1e-12, 1e-9, -1e-9, 1e-3, -1e-3, 1.0] {
+            let plant = Plant { mass: 1.0, damping: 0.25 + excess, stiffness: 0.015_625 };
+            let found = step_radius(&plant.step(span, Integrator::Exact), &plant, span);
+            // b² − 4mk without cancellation, of the damping as rounded.
+            let excess = plant.damping - 0.25;
+            let square = 0.5 * excess + excess * excess;
+            let slowest = -0.5 * plant.damping + if square > 0.0 { 0.5 * square.sqrt() } else { 0.0 };
+            let expected = libm::exp(slowest * 1e-3);
+            assert!((found.value - expected).abs() <= found.error, "{excess:e}: {found:?} is not {expected}");
+            assert!(found.error < 1e-10, "{found:?}");
+        }
+    }
 }
