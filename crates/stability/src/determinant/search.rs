@@ -36,12 +36,15 @@ impl DelayedLoop {
         // z^−j stays below 1e60.
         let floor = libm::pow(10.0, -60.0 / f64::from(longest));
         let mut low: f64 = 0.0;
+        // The largest radius that told nothing: what lies below is no better known, so the search goes on above.
+        let mut unknown: f64 = 0.0;
         let mut trial = high;
         for _ in 0..HALVINGS {
             let trip = self.trip(Circle { centre: Complex64::default(), radius: trial }, perturbation);
             match trip.turns.and_then(|turns| self.roots_beyond(turns)) {
                 Some(0) => high = high.min(trial),
                 Some(_) => low = low.max(trial),
+                None if trial < high => unknown = unknown.max(trial),
                 None => {}
             }
             // From outside, the root that seems nearest is usually the outermost.
@@ -57,12 +60,11 @@ impl DelayedLoop {
                     return interval(low, high.min(sure), modulus);
                 }
             }
-            if high <= floor * (1.0 + 1e-9) || high - low <= 1e-12 * high {
+            let base = low.max(floor).max(unknown);
+            if high <= floor * (1.0 + 1e-9) || high - base <= 1e-12 * high {
                 break;
             }
-            let next = (low.max(floor) * high).sqrt();
-            // A trial that told nothing is not repeated.
-            trial = if (next - trial).abs() < 1e-12 * trial { 0.5 * (trial + high) } else { next };
+            trial = (base * high).sqrt();
         }
         interval(low, high, 0.5 * (low + high))
     }
