@@ -248,8 +248,7 @@ impl Triangle {
             total += self.amplification[block] / distances[self.starts[block]];
         }
         for block in blocks {
-            // Also if it is NaN.
-            if !(total < limit) {
+            if total.is_nan() || total >= limit {
                 return false;
             }
             if !single(&self.starts, block) {
@@ -269,8 +268,8 @@ impl Triangle {
         }
         // The same of the columns; a row's share is added to all columns beyond it at once.
         self.column[start..end].fill(1.0);
-        for column in start..end {
-            let bound = self.column[column] / distances[column];
+        for (column, distance) in distances.iter().enumerate().take(end).skip(start) {
+            let bound = self.column[column] / distance;
             columns = columns.max(bound);
             let beyond = self.moduli[column * size + column + 1..column * size + end].iter().zip(&mut self.column[column + 1..end]);
             for (entry, sum) in beyond {
