@@ -21,6 +21,16 @@ pub fn processor_time() -> Duration {
     clock_gettime(ClockId::ThreadCPUTime).try_into().expect("processor time is not negative")
 }
 
+/// The processor time that all threads of this process have used.
+///
+/// # Panics
+///
+/// Never: processor time is not negative.
+#[must_use]
+pub fn process_time() -> Duration {
+    clock_gettime(ClockId::ProcessCPUTime).try_into().expect("processor time is not negative")
+}
+
 /// The processor as Linux names it.
 #[must_use]
 pub fn processor() -> String {

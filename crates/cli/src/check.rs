@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use cohaptic_harness::check::Judged;
 use cohaptic_harness::{Model, check as harness};
 use cohaptic_scene::{Scene, SceneError, scene_files};
-use cohaptic_stability::{Method, Verdict, has_chance, judge};
+use cohaptic_stability::{Method, QUICK_UNKNOWNS, Verdict, has_chance, judge};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -96,7 +96,7 @@ fn judged(scene: &Scene, stable: bool) -> Judged {
     if !scene.timeline.is_empty() {
         return Judged::Unknown;
     }
-    let Ok(judgement) = judge(scene, Method::Reduced) else {
+    let Ok(judgement) = judge(scene, Method::Reduced, QUICK_UNKNOWNS) else {
         return Judged::Unknown;
     };
     if judgement.analysis.modes.len() > 1 || (judgement.mean_square.is_none() && has_chance(scene)) {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use cohaptic_peer::Contact;
 use cohaptic_scene::{FromScene, Scene, Strategies};
 
-use crate::full::full;
+use crate::full::{Trust, full};
 use crate::network::NominalNetwork;
 use crate::parts::{Part, radius_of, reduced};
 use crate::spectrum::bounded_radius;
@@ -86,7 +86,7 @@ pub struct ContactMode {
 /// [`AnalysisError`] if the scene has no frame that repeats, or cannot be taken apart into linear scenes.
 pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError> {
     match method {
-        Method::Full => push_through(scene, &combinations(scene)?, &FromScene),
+        Method::Full => push_through(scene, &combinations(scene)?, Trust::Linear, &FromScene),
         Method::Reduced | Method::Determinant => {
             let network = NominalNetwork::of(scene)?;
             let combinations = combinations(scene)?;
@@ -109,19 +109,19 @@ pub fn analyse_with(scene: &Scene, strategies: &impl Strategies) -> Result<Analy
     if combinations.iter().any(|combination| combination.axes != scene.axes.count()) {
         return Err(AnalysisError::MixedAxes);
     }
-    push_through(scene, &combinations, strategies)
+    push_through(scene, &combinations, Trust::Nothing, strategies)
 }
 
-fn push_through(scene: &Scene, combinations: &[Combination], strategies: &impl Strategies) -> Result<Analysis, AnalysisError> {
+fn push_through(scene: &Scene, combinations: &[Combination], trust: Trust, strategies: &impl Strategies) -> Result<Analysis, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
     // The walls of the simulator push and do not pull, so there is nothing linear to push through them.
     let modes = combinations.iter().filter(|combination| !combination.contacts.at_wall).map(|combination| {
         let contacts = &combination.contacts;
         // With one-sided contacts every axis has combinations of its own.
         let map = match combination.axes {
-            1 => full::<1, _>(scene, &network, contacts, |peer| strategies.strategy(scene, peer)),
-            2 => full::<2, _>(scene, &network, contacts, |peer| strategies.strategy(scene, peer)),
-            _ => full::<3, _>(scene, &network, contacts, |peer| strategies.strategy(scene, peer)),
+            1 => full::<1, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
+            2 => full::<2, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
+            _ => full::<3, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
         }?;
         let radius = bounded_radius(&map.monodromy, map.error);
         let part = Part::whole(radius, map.monodromy.rows());

@@ -3,7 +3,7 @@
 use cohaptic_scene::Scene;
 use cohaptic_wan::LinkModel;
 
-use crate::{Analysis, AnalysisError, MeanSquare, Method, Verdict, analyse, mean_square};
+use crate::{Analysis, AnalysisError, MeanSquare, Method, Verdict, analyse, mean_square_within};
 
 /// A verdict, and what it rests on.
 #[derive(Clone, PartialEq, Debug)]
@@ -16,17 +16,18 @@ pub struct Judgement {
     pub mean_square: Option<MeanSquare>,
 }
 
-/// Whether a scene is stable: with links that leave something to chance, in the mean square.
+/// Whether a scene is stable: with links that leave something to chance, in the mean square, as long as that takes no more than `most` unknowns (see
+/// [`crate::mean_square_within`]).
 ///
 /// # Errors
 ///
 /// As for [`analyse`].
-pub fn judge(scene: &Scene, method: Method) -> Result<Judgement, AnalysisError> {
+pub fn judge(scene: &Scene, method: Method, most: usize) -> Result<Judgement, AnalysisError> {
     let mut analysis = analyse(scene, method)?;
     if !has_chance(scene) {
         return Ok(Judgement { verdict: analysis.verdict(), analysis, mean_square: None });
     }
-    match mean_square(scene) {
+    match mean_square_within(scene, most) {
         Ok(mean_square) => Ok(Judgement { verdict: mean_square.verdict(), analysis, mean_square: Some(mean_square) }),
         Err(error) => {
             analysis.notes.push(format!("the verdict is nominal: {error}"));

@@ -39,7 +39,7 @@ pub use graph::{Graph, GraphError, analyse_on};
 pub use judgement::{Judgement, has_chance, judge};
 pub use map::{Grid, Map, MapError, Polyline};
 pub use matrix::Matrix;
-pub use mean_square::{MeanSquare, MeanSquareMethod, mean_square};
+pub use mean_square::{MeanSquare, MeanSquareMethod, QUICK_UNKNOWNS, mean_square, mean_square_within};
 pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use radius::{Radius, Verdict};

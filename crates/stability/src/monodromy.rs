@@ -6,7 +6,7 @@ use std::time::Duration;
 use cohaptic_scene::{FromScene, Scene, Strategies};
 
 use crate::analysis::combinations;
-use crate::full::{FullMap, full};
+use crate::full::{FullMap, Trust, full};
 use crate::network::NominalNetwork;
 use crate::{AnalysisError, Matrix};
 
@@ -98,7 +98,7 @@ impl fmt::Display for StateKind {
 ///
 /// [`AnalysisError`] as for [`crate::analyse`], and [`AnalysisError::SeveralModes`] if the scene is not linear because of one-sided contacts. Walls are left out.
 pub fn monodromy(scene: &Scene) -> Result<Monodromy, AnalysisError> {
-    monodromy_with(scene, &FromScene)
+    pushed(scene, Trust::Linear, &FromScene)
 }
 
 /// [`monodromy`] with strategies of the caller's own.
@@ -107,6 +107,10 @@ pub fn monodromy(scene: &Scene) -> Result<Monodromy, AnalysisError> {
 ///
 /// As for [`monodromy`], and if a strategy is not linear or remembers what it does not show.
 pub fn monodromy_with(scene: &Scene, strategies: &impl Strategies) -> Result<Monodromy, AnalysisError> {
+    pushed(scene, Trust::Nothing, strategies)
+}
+
+fn pushed(scene: &Scene, trust: Trust, strategies: &impl Strategies) -> Result<Monodromy, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
     let combinations = combinations(scene)?;
     let mut linear = combinations.iter().filter(|combination| !combination.contacts.at_wall);
@@ -115,9 +119,9 @@ pub fn monodromy_with(scene: &Scene, strategies: &impl Strategies) -> Result<Mon
     };
     let contacts = &combination.contacts;
     let FullMap { monodromy, error, rigid_modes, frame, states, time, relative } = match combination.axes {
-        1 => full::<1, _>(scene, &network, contacts, |peer| strategies.strategy(scene, peer)),
-        2 => full::<2, _>(scene, &network, contacts, |peer| strategies.strategy(scene, peer)),
-        _ => full::<3, _>(scene, &network, contacts, |peer| strategies.strategy(scene, peer)),
+        1 => full::<1, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
+        2 => full::<2, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
+        _ => full::<3, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
     }?;
     Ok(Monodromy { matrix: monodromy, states, frame, time, rigid_modes, error, relative })
 }

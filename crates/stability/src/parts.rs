@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::StepMap;
+use cohaptic_peer::{Plant, StepMap};
 use cohaptic_scene::Scene;
 
 use crate::lifted::{Autonomous, Lifted, Node};
 use crate::spectrum::bounded_radius;
-use crate::structure::{Structure, device_plant};
+use crate::structure::{Structure, arm, device_plant};
 use crate::{Matrix, Method, Radius};
 
 /// A part of a scene that moves on its own.
@@ -99,8 +99,9 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method:
     Reduced { parts, rigid_modes: rigid_modes * axes, dimension: (dimension - rigid_modes) * axes, frame: structure.timetable.frame }
 }
 
-/// From how many rows on a matrix is replaced by the determinant, whose cost grows with the number of signals and little with their delay.
-const LARGE: usize = 160;
+/// From how many rows on a matrix is replaced by the determinant, whose cost grows with the number of signals and little with their delay: between
+/// 300 and 1000, by docs/stability-speed.md.
+const LARGE: usize = 500;
 /// Up to how many signals the determinant is small.
 const FEW: usize = 32;
 
@@ -133,48 +134,60 @@ pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -
     let spec = &scene.peers[structure.classes[class][0]];
     let (short, long) = spec.clock.spans();
     let plant = device_plant(spec);
-    // A frame is so many ticks; of a clock that drifts, some are longer by a nanosecond. Their steps commute.
+    // A frame is so many ticks; of a clock that drifts, some are longer by a nanosecond. Their steps have the same eigenvectors.
     let frame = structure.timetable.frame.as_nanos();
     let ticks = frame / short.as_nanos().max(1);
     let longer = if long == short { 0 } else { frame - ticks * short.as_nanos() };
-    let time = (plant.mass / plant.stiffness).sqrt().min(structure.timetable.frame.as_secs_f64());
-    let step = |span| step_matrix(&plant.step(span, scene.integrator), time);
-    let (mut matrix, mut error) = power(&step(short), ticks - longer);
-    if longer > 0 {
-        let (other, other_error) = power(&step(long), longer);
-        error = error * other.frobenius_norm() + other_error * matrix.frobenius_norm();
-        matrix = matrix.times(&other);
-    }
-    let radius = bounded_radius(&matrix, error);
-    (radius, matrix.rows())
+    let over = |span, ticks: u128| step_radius(&plant.step(span, scene.integrator), &plant, span).over(u32::try_from(ticks).unwrap_or(u32::MAX));
+    let (some, others) = (over(short, ticks - longer), over(long, longer));
+    let value = some.value * others.value;
+    let error = some.error * (others.value + others.error) + some.value * others.error + f64::EPSILON * value;
+    (Radius { value, error }, if arm(spec).stiffness > 0.0 { 2 } else { 1 })
 }
 
-/// One step of a body, velocities multiplied by `time`: of its velocity alone if nothing ties it to ground.
-fn step_matrix(map: &StepMap, time: f64) -> Matrix {
+/// The spectral radius of one step of a body: of its velocity alone if nothing ties it to ground.
+fn step_radius(map: &StepMap, plant: &Plant, span: Duration) -> Radius {
     let ([[e00, e01], [e10, e11]], _) = map.coefficients();
+    let h = span.as_secs_f64();
+    // Squaring the exponential of a step doubles its relative error for each factor of two that the step is longer than the body's own time.
+    let rounding = 32.0 * f64::EPSILON * (1.0 + plant.damping / plant.mass * h + h * (plant.stiffness / plant.mass).sqrt());
     if map.is_free() {
-        return Matrix::from_fn(1, 1, |_, _| 1.0 + e11);
+        return Radius { value: (1.0 + e11).abs(), error: 2.0 * f64::EPSILON + rounding * e11.abs() };
     }
-    let entries = [[1.0 + e00, e01 / time], [e10 * time, 1.0 + e11]];
-    Matrix::from_fn(2, 2, |row, column| entries[row][column])
+    // The eigenvalues are 1 + middle ± √discriminant; nearly equal ones, of a body next to critical damping, are only as sure as the square root.
+    let (middle, half, product) = (1.0 + 0.5 * (e00 + e11), 0.5 * (e00 - e11), e01 * e10);
+    let modulus = |discriminant: f64| {
+        if discriminant < 0.0 { (middle * middle - discriminant).sqrt() } else { middle.abs() + discriminant.sqrt() }
+    };
+    let discriminant = half * half + product;
+    let doubt = rounding * ((e00.abs() + e11.abs()).powi(2) + product.abs());
+    let (below, above) = (modulus(discriminant - doubt), modulus(discriminant + doubt));
+    let value = modulus(discriminant);
+    let lowest = if discriminant.abs() <= doubt { middle.abs() } else { below.min(above) };
+    let error = (below.max(above) - value).max(value - lowest) + rounding * (e00.abs() + e11.abs()) + 4.0 * f64::EPSILON * value;
+    Radius { value, error }
 }
 
-/// A power by repeated squaring, and a bound of its rounding errors in the 2-norm: each product adds those of its factors times the norms of the others, and
-/// four roundings of its own.
-fn power(base: &Matrix, exponent: u128) -> (Matrix, f64) {
-    let times = |(one, one_error): &(Matrix, f64), (other, other_error): &(Matrix, f64)| {
-        let (norm, other_norm) = (one.frobenius_norm(), other.frobenius_norm());
-        (one.times(other), one_error * other_norm + norm * other_error + 4.0 * f64::EPSILON * norm * other_norm)
-    };
-    let mut total = (Matrix::identity(base.rows()), 0.0);
-    let mut square = (base.clone(), f64::EPSILON * base.frobenius_norm());
-    let mut left = exponent;
-    while left > 0 {
-        if left % 2 == 1 {
-            total = times(&total, &square);
+#[cfg(test)]
+mod tests {
+    use cohaptic_peer::Integrator;
+
+    use super::*;
+
+    /// m = 1 kg, b² = 4·m·k to thirteen digits: e^(−b·h/2m ± √(b² − 4mk)·h/2m) within the bound, which is not more than a root of the rounding allows.
+    #[test]
+    fn a_body_next_to_critical_damping_is_within_its_bound() {
+        let span = Duration::from_millis(1);
+        for excess in [0.0_f64, 1e-12, 1e-9, -1e-9, 1e-3, -1e-3, 1.0] {
+            let plant = Plant { mass: 1.0, damping: 0.25 + excess, stiffness: 0.015_625 };
+            let found = step_radius(&plant.step(span, Integrator::Exact), &plant, span);
+            // b² − 4mk without cancellation, of the damping as rounded.
+            let excess = plant.damping - 0.25;
+            let square = 0.5 * excess + excess * excess;
+            let slowest = -0.5 * plant.damping + if square > 0.0 { 0.5 * square.sqrt() } else { 0.0 };
+            let expected = libm::exp(slowest * 1e-3);
+            assert!((found.value - expected).abs() <= found.error, "{excess:e}: {found:?} is not {expected}");
+            assert!(found.error < 1e-10, "{found:?}");
         }
-        square = times(&square, &square);
-        left /= 2;
     }
-    total
 }

@@ -43,8 +43,10 @@ use crate::structure::{Contacts, Structure, count};
 use crate::timetable::{NodeClock, Timetable};
 use crate::{AnalysisError, Matrix, Method, Radius, Verdict};
 
-/// More unknowns of the second moment than this are refused.
+/// More unknowns of the second moment than this are refused, whatever the caller allows: they take minutes.
 const MOST_UNKNOWNS: usize = 1 << 20;
+/// Unknowns that take some seconds at most.
+pub const QUICK_UNKNOWNS: usize = 1 << 17;
 /// More peers than this are not looked at one by one.
 const MOST_PEERS: usize = 64;
 
@@ -108,12 +110,21 @@ impl MeanSquare {
 ///
 /// [`AnalysisError`] as [`analyse`](crate::analyse), and if a link does at random what has no second moment here, or there are too many joint states.
 pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
+    mean_square_within(scene, MOST_UNKNOWNS)
+}
+
+/// [`mean_square`], refused if it takes more than that many unknowns; of many joint states, 2^17 unknowns take seconds and 2^20 minutes.
+///
+/// # Errors
+///
+/// As for [`mean_square`].
+pub fn mean_square_within(scene: &Scene, most: usize) -> Result<MeanSquare, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
     let combinations = combinations(scene)?;
     let mut notes = Vec::new();
     let mut found: Option<MeanSquare> = None;
     for combination in &combinations {
-        let one = of_contacts(scene, &network, combination, &mut notes)?;
+        let one = of_contacts(scene, &network, combination, most.min(MOST_UNKNOWNS), &mut notes)?;
         found = Some(match found {
             None => one,
             Some(before) => {
@@ -154,7 +165,13 @@ fn only_model(scene: &Scene) -> bool {
     scene.links.is_uniform()
 }
 
-fn of_contacts(scene: &Scene, network: &NominalNetwork, combination: &Combination, notes: &mut Vec<String>) -> Result<MeanSquare, AnalysisError> {
+fn of_contacts(
+    scene: &Scene,
+    network: &NominalNetwork,
+    combination: &Combination,
+    most: usize,
+    notes: &mut Vec<String>,
+) -> Result<MeanSquare, AnalysisError> {
     let structure = Structure::of(&[scene], network, &combination.contacts)?;
     let parts = reduced(&structure, scene, combination.axes, Method::Reduced).parts;
     let nominal = radius_of(&parts);
@@ -169,7 +186,7 @@ fn of_contacts(scene: &Scene, network: &NominalNetwork, combination: &Combinatio
     } else {
         match alike.then(|| symmetric(scene, network, &structure, notes)).transpose()?.flatten() {
             Some(found) => found,
-            None => one_by_one(scene, network, &structure, &combination.contacts, &random, notes)?,
+            None => one_by_one(scene, network, &structure, &combination.contacts, &random, most, notes)?,
         }
     };
     if gains.stiffness + gains.damping <= 0.0 {
@@ -297,6 +314,7 @@ fn one_by_one(
     structure: &Structure,
     contacts: &Contacts,
     random: &[(usize, usize)],
+    most: usize,
     notes: &mut Vec<String>,
 ) -> Result<Found, AnalysisError> {
     let peers = scene.peers.len();
@@ -340,10 +358,10 @@ fn one_by_one(
     let quotient = structure.quotient(scene, &nodes);
     let lifted = Lifted { nodes: &nodes, weights: &weights, timetable: &timetable, tied, ..quotient };
     let operator = events(&lifted, &lines, &instants);
-    let joint = operator.joint().filter(|joint| *joint <= MOST_UNKNOWNS);
+    let joint = operator.joint().filter(|joint| *joint <= most);
     let unknowns = joint.map(|_| operator.unknowns());
-    if unknowns.is_none_or(|unknowns| unknowns > MOST_UNKNOWNS) {
-        return Err(AnalysisError::TooManyMoments { joint: operator.joint(), unknowns, most: MOST_UNKNOWNS });
+    if unknowns.is_none_or(|unknowns| unknowns > most) {
+        return Err(AnalysisError::TooManyMoments { joint: operator.joint(), unknowns, most });
     }
     Ok(Found::of(&operator, held, MeanSquareMethod::Events, timetable.frame))
 }

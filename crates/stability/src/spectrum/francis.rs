@@ -107,21 +107,8 @@ fn sweep<const FULL: bool, S: Square>(matrix: &mut S, first: usize, last: usize,
         let (top, right) = if FULL { (0, size) } else { (first, last + 1) };
         let bottom = (place + 3).min(last);
         if three {
-            let (f1, f2) = (factor * v1, factor * v2);
-            for column in place..right {
-                let (a, b, c) = (matrix.at(place, column), matrix.at(place + 1, column), matrix.at(place + 2, column));
-                let sum = a + v1 * b + v2 * c;
-                matrix.put(place, column, a - factor * sum);
-                matrix.put(place + 1, column, b - f1 * sum);
-                matrix.put(place + 2, column, c - f2 * sum);
-            }
-            for row in top..=bottom {
-                let (a, b, c) = (matrix.at(row, place), matrix.at(row, place + 1), matrix.at(row, place + 2));
-                let sum = a + v1 * b + v2 * c;
-                matrix.put(row, place, a - factor * sum);
-                matrix.put(row, place + 1, b - f1 * sum);
-                matrix.put(row, place + 2, c - f2 * sum);
-            }
+            matrix.reflect_rows(place, place..right, factor, v1, v2);
+            matrix.reflect_columns(place, top..bottom + 1, factor, v1, v2);
         } else {
             let f1 = factor * v1;
             for column in place..right {

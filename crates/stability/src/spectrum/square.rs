@@ -1,5 +1,7 @@
 //! What the small methods need of a square matrix, so that one source serves arrays of a size known to the compiler and matrices of any size.
 
+use std::ops::Range;
+
 use crate::Matrix;
 
 /// A square matrix that is worked on in place.
@@ -8,6 +10,32 @@ pub(super) trait Square {
     fn size(&self) -> usize;
     fn at(&self, row: usize, column: usize) -> f64;
     fn put(&mut self, row: usize, column: usize, entry: f64);
+
+    /// Reflects three rows from `top` on, in those columns: each less factor·(1, v1, v2) times (1, v1, v2) of them.
+    #[inline]
+    fn reflect_rows(&mut self, top: usize, columns: Range<usize>, factor: f64, v1: f64, v2: f64) {
+        let (f1, f2) = (factor * v1, factor * v2);
+        for column in columns {
+            let (a, b, c) = (self.at(top, column), self.at(top + 1, column), self.at(top + 2, column));
+            let sum = a + v1 * b + v2 * c;
+            self.put(top, column, a - factor * sum);
+            self.put(top + 1, column, b - f1 * sum);
+            self.put(top + 2, column, c - f2 * sum);
+        }
+    }
+
+    /// The same of three columns from `left` on, in those rows.
+    #[inline]
+    fn reflect_columns(&mut self, left: usize, rows: Range<usize>, factor: f64, v1: f64, v2: f64) {
+        let (f1, f2) = (factor * v1, factor * v2);
+        for row in rows {
+            let (a, b, c) = (self.at(row, left), self.at(row, left + 1), self.at(row, left + 2));
+            let sum = a + v1 * b + v2 * c;
+            self.put(row, left, a - factor * sum);
+            self.put(row, left + 1, b - f1 * sum);
+            self.put(row, left + 2, c - f2 * sum);
+        }
+    }
 }
 
 impl<const N: usize> Square for [[f64; N]; N] {
@@ -41,6 +69,20 @@ impl Square for Matrix {
     #[inline]
     fn put(&mut self, row: usize, column: usize, entry: f64) {
         self[(row, column)] = entry;
+    }
+
+    // The same to the bit, over slices, so that rows are worked on several entries at a time.
+    #[inline]
+    fn reflect_rows(&mut self, top: usize, columns: Range<usize>, factor: f64, v1: f64, v2: f64) {
+        let (f1, f2) = (factor * v1, factor * v2);
+        let (first, second, third) = self.three_rows_mut(top);
+        let others = second[columns.clone()].iter_mut().zip(&mut third[columns.clone()]);
+        for (a, (b, c)) in first[columns].iter_mut().zip(others) {
+            let sum = *a + v1 * *b + v2 * *c;
+            *a -= factor * sum;
+            *b -= f1 * sum;
+            *c -= f2 * sum;
+        }
     }
 }
 

@@ -30,6 +30,11 @@ pub(super) struct Triangle {
     solution: Vec<Complex64>,
     doubt: Vec<f64>,
     column: Vec<f64>,
+    /// Sizes of the entries within blocks of more than one row.
+    moduli: Vec<f64>,
+    /// |Re| + |Im| of every entry, and of what has been solved for.
+    weights: Vec<f64>,
+    solved: Vec<f64>,
 }
 
 impl Triangle {
@@ -137,6 +142,17 @@ impl Triangle {
         self.solution.resize(size * size, Complex64::default());
         self.doubt.resize(size * size, 0.0);
         self.column.resize(size, 0.0);
+        self.weights.clear();
+        self.weights.extend(self.entries.iter().map(Complex64::l1_norm));
+        self.solved.resize(size * size, 0.0);
+        self.moduli.resize(size * size, 0.0);
+        for block in self.starts.windows(2).filter(|block| block[1] - block[0] > 1) {
+            for row in block[0]..block[1] {
+                for column in row + 1..block[1] {
+                    self.moduli[row * size + column] = self.entries[row * size + column].norm_sqr().sqrt();
+                }
+            }
+        }
         for block in 0..self.starts.len() - 1 {
             let (start, end) = (self.starts[block], self.starts[block + 1]);
             let right = self.right(start, end);
@@ -153,16 +169,23 @@ impl Triangle {
         let mut sum = 0.0;
         for q in start..end {
             for row in (0..start).rev() {
-                let (mut value, mut carried, mut magnitude) = (-self.at(row, q), 0.0, self.at(row, q).l1_norm());
-                for p in row + 1..q {
-                    // Rows of T₁₁ to the right of this one with a minus, earlier columns of the block with a plus.
-                    let (known, entry) = if p < start { (p * size + q, -self.at(row, p)) } else { (row * size + p, self.at(p, q)) };
-                    let weight = entry.l1_norm();
-                    value += self.solution[known] * entry;
-                    carried += self.doubt[known] * weight;
-                    magnitude += self.solution[known].l1_norm() * weight;
+                let (mut value, mut carried, mut magnitude) = (-self.at(row, q), 0.0, self.weights[row * size + q]);
+                // Rows of T₁₁ to the right of this one with a minus; what is solved for in this column is kept in a row of its own.
+                let (beyond, column) = (row * size + row + 1..row * size + start, q * size + row + 1..q * size + start);
+                let known = self.solution[column.clone()].iter().zip(&self.doubt[column.clone()]).zip(&self.solved[column]);
+                for ((entry, weight), ((known, doubt), size)) in self.entries[beyond.clone()].iter().zip(&self.weights[beyond]).zip(known) {
+                    value -= known * entry;
+                    carried += doubt * weight;
+                    magnitude += size * weight;
                 }
-                sum += self.divide(row * size + q, value, carried, magnitude, self.at(row, row) - self.at(q, q));
+                // Earlier columns of the block with a plus.
+                for p in start..q {
+                    let weight = self.weights[p * size + q];
+                    value += self.solution[p * size + row] * self.at(p, q);
+                    carried += self.doubt[p * size + row] * weight;
+                    magnitude += self.solved[p * size + row] * weight;
+                }
+                sum += self.divide(q * size + row, value, carried, magnitude, self.at(row, row) - self.at(q, q));
             }
         }
         sum
@@ -174,13 +197,19 @@ impl Triangle {
         let mut sum = 0.0;
         for p in (start..end).rev() {
             for column in end..size {
-                let (mut value, mut carried, mut magnitude) = (self.at(p, column), 0.0, self.at(p, column).l1_norm());
-                for i in p + 1..column {
-                    let (known, entry) = if i < end { (i * size + column, self.at(p, i)) } else { (p * size + i, -self.at(i, column)) };
-                    let weight = entry.l1_norm();
-                    value += self.solution[known] * entry;
-                    carried += self.doubt[known] * weight;
-                    magnitude += self.solution[known].l1_norm() * weight;
+                let (mut value, mut carried, mut magnitude) = (self.at(p, column), 0.0, self.weights[p * size + column]);
+                // Of the block itself with a plus, beyond it with a minus.
+                for i in p + 1..end {
+                    let (entry, weight) = (self.at(p, i), self.weights[p * size + i]);
+                    value += self.solution[i * size + column] * entry;
+                    carried += self.doubt[i * size + column] * weight;
+                    magnitude += self.solved[i * size + column] * weight;
+                }
+                for i in end..column {
+                    let (entry, weight) = (self.at(i, column), self.weights[i * size + column]);
+                    value -= self.solution[p * size + i] * entry;
+                    carried += self.doubt[p * size + i] * weight;
+                    magnitude += self.solved[p * size + i] * weight;
                 }
                 sum += self.divide(p * size + column, value, carried, magnitude, self.at(column, column) - self.at(p, p));
             }
@@ -197,38 +226,55 @@ impl Triangle {
         let doubt = (carried + terms * COMPLEX_ROUNDING * magnitude) * scale.sqrt() + COMPLEX_ROUNDING * quotient.l1_norm();
         self.solution[place] = quotient;
         self.doubt[place] = doubt;
+        self.solved[place] = quotient.l1_norm();
         let size = quotient.norm_sqr().sqrt() + doubt;
         size * size
     }
 
-    /// A bound of |(z − T)⁻¹| for every z whose distance to each eigenvalue is at least the given one.
+    /// Whether |(z − T)⁻¹| is below `limit` for every z whose distance to each eigenvalue is at least the given one, as far as a bound of it can tell.
     ///
     /// Within a block, the inverse of a triangular matrix is at most, entry by entry, that of its comparison matrix (Higham 2002, Theorem 8.12), and
     /// |·|₂² ≤ |·|₁·|·|∞. It is a refinement of Henrici's bound Σ ν^j/d^(j+1) (1962), which uses only the norm ν of the strict triangle.
-    pub(super) fn resolvent(&mut self, distances: &[f64]) -> f64 {
+    pub(super) fn resolvent_below(&mut self, distances: &[f64], limit: f64) -> bool {
         if distances.iter().any(|distance| *distance <= 0.0) {
-            return f64::INFINITY;
+            return false;
         }
+        let limit = limit * (1.0 - 1e-12);
+        let blocks = 0..self.amplification.len();
+        let single = |starts: &[usize], block: usize| starts[block + 1] - starts[block] == 1;
+        // What is cheap first: it often is too much alone.
         let mut total = 0.0;
-        for block in 0..self.amplification.len() {
-            let (start, end) = (self.starts[block], self.starts[block + 1]);
-            let inner = if end - start == 1 { 1.0 / distances[start] } else { self.block_resolvent(start, end, distances) };
-            total += self.amplification[block] * inner;
+        for block in blocks.clone().filter(|block| single(&self.starts, *block)) {
+            total += self.amplification[block] / distances[self.starts[block]];
         }
-        total * (1.0 + 1e-12)
+        for block in blocks {
+            if total.is_nan() || total >= limit {
+                return false;
+            }
+            if !single(&self.starts, block) {
+                total += self.amplification[block] * self.block_resolvent(self.starts[block], self.starts[block + 1], distances);
+            }
+        }
+        total < limit
     }
 
     fn block_resolvent(&mut self, start: usize, end: usize, distances: &[f64]) -> f64 {
+        let size = self.size;
         let (mut rows, mut columns) = (0.0_f64, 0.0_f64);
         for row in (start..end).rev() {
-            let sum: f64 = (row + 1..end).map(|other| self.at(row, other).norm() * self.column[other]).sum();
-            self.column[row] = (1.0 + sum) / distances[row];
+            let beyond = self.moduli[row * size + row + 1..row * size + end].iter().zip(&self.column[row + 1..end]);
+            self.column[row] = (1.0 + beyond.map(|(entry, bound)| entry * bound).sum::<f64>()) / distances[row];
             rows = rows.max(self.column[row]);
         }
+        // The same of the columns; a row's share is added to all columns beyond it at once.
+        self.column[start..end].fill(1.0);
         for (column, distance) in distances.iter().enumerate().take(end).skip(start) {
-            let sum: f64 = (start..column).map(|other| self.at(other, column).norm() * self.column[other]).sum();
-            self.column[column] = (1.0 + sum) / distance;
-            columns = columns.max(self.column[column]);
+            let bound = self.column[column] / distance;
+            columns = columns.max(bound);
+            let beyond = self.moduli[column * size + column + 1..column * size + end].iter().zip(&mut self.column[column + 1..end]);
+            for (entry, sum) in beyond {
+                *sum += entry * bound;
+            }
         }
         rows.sqrt() * columns.sqrt()
     }

@@ -21,7 +21,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let scene = Scene::read(path, &arguments.scene.overrides.set)?;
     let judgement = match &arguments.graph {
         Some(graph) => graph::on(&scene, graph, path)?,
-        None => judge(&scene, arguments.method.into()).map_err(|error| not_analysed(path, &error))?,
+        None => judge(&scene, arguments.method.into(), usize::MAX).map_err(|error| not_analysed(path, &error))?,
     };
     let worst = worst::of(&scene, arguments, path)?;
     if arguments.scene.json {

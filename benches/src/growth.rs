@@ -1,0 +1,84 @@
+//! The spectral radius as a simulation shows it: by how much a disturbance grows from frame to frame.
+
+use std::time::Duration;
+
+use cohaptic_harness::{Model, Observer, Simulation, TickRow};
+use cohaptic_peer::Contact;
+use cohaptic_scene::Scene;
+
+/// Frames that are simulated.
+const FRAMES: u32 = 200;
+/// The largest displacement in these frames is compared with that in as many frames [`APART`] later.
+const WINDOW: std::ops::Range<usize> = 60..100;
+const APART: usize = 100;
+
+/// The estimate of the radius from 200 frames, as anyone would get it without the matrix: everybody begins displaced, and the largest relative
+/// displacement among 40 frames is compared with that of 100 frames later. `None` if it cannot be told.
+#[must_use]
+pub fn growth(scene: &Scene) -> Option<f64> {
+    let mut scene = scene.clone();
+    scene.duration = scene.coordination.update * FRAMES;
+    scene.timeline.clear();
+    for (place, peer) in scene.peers.iter_mut().enumerate() {
+        // Steps of the golden angle: no two alike.
+        let angle = 2.399_963 * place as f64;
+        (peer.position[0], peer.velocity[0]) = (1e-3 * angle.cos(), 0.1 * angle.sin());
+    }
+    let peers = scene.peers.len();
+    let touching = scene.peers.iter().map(|peer| peer.contact != Contact::None).collect();
+    let mut seen = Seen {
+        frame: scene.coordination.update,
+        tick: scene.peers[0].clock.tick.as_secs_f64(),
+        touching,
+        copies: vec![0.0; peers],
+        largest: vec![0.0; FRAMES as usize],
+    };
+    let Ok(_) = Simulation::new(&scene, Model::Least).run(&mut seen);
+    let largest = |frames: std::ops::Range<usize>| seen.largest[frames].iter().copied().fold(0.0, f64::max);
+    let (early, late) = (largest(WINDOW), largest(WINDOW.start + APART..WINDOW.end + APART));
+    let growth = (late / early).powf(1.0 / APART as f64);
+    (early > 0.0 && late > 0.0 && growth.is_finite()).then_some(growth)
+}
+
+/// The largest relative displacement of each frame.
+struct Seen {
+    frame: Duration,
+    tick: f64,
+    touching: Vec<bool>,
+    copies: Vec<f64>,
+    largest: Vec<f64>,
+}
+
+impl Observer for Seen {
+    type Error = std::convert::Infallible;
+
+    fn wants_ticks(&self) -> bool {
+        true
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Self::Error> {
+        self.copies[row.peer] = row.object.position[0];
+        let frame = (u128::from(row.at.as_nanos()) / self.frame.as_nanos()) as usize;
+        let apart = (row.object.position[0] - self.copies[0]).abs();
+        // A device that touches nothing has no place among the others, only a velocity.
+        let device = if self.touching[row.peer] { row.device.position[0] - row.object.position[0] } else { row.device.velocity[0] * self.tick };
+        if let Some(largest) = self.largest.get_mut(frame) {
+            *largest = largest.max(apart).max(device.abs());
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::references::references;
+
+    #[test]
+    fn a_disturbance_grows_by_about_the_radius() {
+        for reference in references().iter().filter(|reference| reference.scene.peers.len() < 10 && !reference.name.starts_with("thousand")) {
+            let found = growth(&reference.scene).unwrap();
+            assert!((found / reference.radius - 1.0).abs() < 0.01, "{}: {found} for {}", reference.name, reference.radius);
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! Writes `docs/stability-speed.md`: `cargo run --release -p cohaptic-benches --bin stability-table > docs/stability-speed.md`. Takes some minutes.
+#![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
+#![allow(clippy::cast_precision_loss, reason = "counts of verdicts")]
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use cohaptic_benches::bare_pair::BarePair;
+use cohaptic_benches::growth::growth;
+use cohaptic_benches::machine::{median, process_time, processor, time};
+use cohaptic_benches::references::{Reference, references};
+use cohaptic_benches::verdicts::{eight_different, equal, family, figure_3};
+use cohaptic_peer::Gains;
+use cohaptic_stability::{FamilyScratch, Grid, Map, Method, Radius, analyse};
+
+const ROUNDS: usize = 9;
+
+/// Something that is measured.
+type Subject<'a> = Box<dyn FnMut() + 'a>;
+
+fn main() {
+    println!("# Stability: speed and error\n");
+    println!("Processor time of verdicts on one core, but for the maps. This page is written by\n");
+    println!("    cargo run --release -p cohaptic-benches --bin stability-table > docs/stability-speed.md\n");
+    println!("and measured on: {}. Each figure is the median of {ROUNDS} rounds in which all rows or columns of a table alternate.\n", processor());
+    equal_peers();
+    figure();
+    different_peers();
+    long_delays();
+    speed_against_error();
+    println!("\nThe same work as criterion benches: `cargo bench -p cohaptic-benches --bench stability`.");
+}
+
+/// Time of each subject once, medians of alternating rounds of so many repetitions.
+fn medians(subjects: &mut [(u32, Subject<'_>)]) -> Vec<Duration> {
+    let mut rounds = vec![Vec::new(); subjects.len()];
+    for _ in 0..ROUNDS {
+        for ((repetitions, subject), times) in subjects.iter_mut().zip(&mut rounds) {
+            let took = time(|| (0..*repetitions).for_each(|_| subject()));
+            times.push(took / *repetitions);
+        }
+    }
+    rounds.into_iter().map(median).collect()
+}
+
+/// About a twentieth of a second of it, at least once.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 1 and a million")]
+fn repetitions(subject: &mut Subject<'_>) -> u32 {
+    subject();
+    let once = time(&mut *subject).as_secs_f64();
+    (0.05 / once.max(1e-7)).clamp(1.0, 1e6) as u32
+}
+
+fn measured(subjects: Vec<Subject<'_>>) -> Vec<Duration> {
+    let mut counted: Vec<(u32, Subject<'_>)> = subjects.into_iter().map(|mut subject| (repetitions(&mut subject), subject)).collect();
+    medians(&mut counted)
+}
+
+fn equal_peers() {
+    println!("## Equal peers, Td = Tn\n");
+    println!(
+        "Verdicts a second along the map KT × KC of N equal peers with average-position coordination, B = 5 N·s/m, both keys changing from verdict to"
+    );
+    println!(
+        "verdict. The *bare pair* (`benches/src/bare_pair.rs`) builds both blocks over fixed arrays, written by hand for this one kind of scene, and"
+    );
+    println!(
+        "takes their radii; *bounds* are computed ones on the error of the radius. A thousandth of 0.45 kg is so light that most of the map diverges at once:"
+    );
+    println!("radii beyond 10¹⁰, from badly scaled matrices.\n");
+    println!("| peers | a copy | radius | asked for | with bounds | asked for | bare pair | bare pair / radius |");
+    println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
+    for (peers, split) in [(3, true), (8, true), (1000, true), (1000, false), (100_000, false)] {
+        let family = family(peers, &[format!("object.split-mass={split}")]);
+        let pair = BarePair::new(&family.scene(&[1000.0, 3500.0]).expect("in the range"));
+        let (mut first, mut second, mut third) = (Walk::default(), Walk::default(), Walk::default());
+        let (mut one, mut other) = (FamilyScratch::default(), FamilyScratch::default());
+        let times = measured(vec![
+            Box::new(|| drop(black_box(family.radius(&first.next(), &mut one)))),
+            Box::new(|| drop(black_box(family.bounded_radius(&second.next(), &mut other)))),
+            Box::new(|| {
+                let [stiffness, coupling] = third.next();
+                black_box(pair.radius(Gains { stiffness, damping: 5.0 }, Gains { stiffness: coupling, damping: 5.0 }));
+            }),
+        ]);
+        let [radius, bounded, bare] = [0, 1, 2].map(|place: usize| 1.0 / times[place].as_secs_f64());
+        let mass = if split { "0.45 kg / N" } else { "0.45 kg" };
+        println!("| {peers} | {mass} | {radius:.0} | 150000 | {bounded:.0} | 60000 | {bare:.0} | {:.2} |", bare / radius);
+    }
+    println!(
+        "\nFor scale, from the project's requirements and not measured by this command: numpy, scipy and python-control on the full matrix 1,400 to 9,000."
+    );
+}
+
+/// Values of KT and KC that spread over the map without repeating.
+#[derive(Default)]
+struct Walk(u32);
+
+impl Walk {
+    fn next(&mut self) -> [f64; 2] {
+        self.0 += 1;
+        let share = |factor: f64| (f64::from(self.0) * factor).fract();
+        [6000.0 * share(0.618_033_988_749_894_9), 100.0 + 5900.0 * share(0.414_213_562_373_095_1)]
+    }
+}
+
+fn figure() {
+    let families = figure_3();
+    let grid = Grid::new(200, 200).expect("a grid");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
+    let mut rounds = (Vec::new(), Vec::new());
+    for _ in 0..ROUNDS {
+        let (wall, processor) = (Instant::now(), process_time());
+        for family in &families {
+            black_box(pool.install(|| Map::fill(family, grid, |_| {}, || false)).expect("a map"));
+        }
+        rounds.0.push(wall.elapsed());
+        rounds.1.push(process_time() - processor);
+    }
+    let cells = families.len() * 200 * 200;
+    println!("\n## The paper's Figure 3\n");
+    println!(
+        "{} curves, a map of 200 × 200 cells each: {cells} radii without bounds, on two threads of two cores that others use too.\n",
+        families.len()
+    );
+    println!("| wall | asked for | processor | processor a cell |");
+    println!("| ---: | ---: | ---: | ---: |");
+    let (wall, processor) = (median(rounds.0).as_secs_f64(), median(rounds.1).as_secs_f64());
+    println!("| {wall:.2} s | 5 s | {processor:.2} s | {:.2} µs |", processor / cells as f64 * 1e6);
+}
+
+fn different_peers() {
+    println!("\n## Eight peers, all different\n");
+    println!(
+        "From the scene to the verdict with its bounds, everything anew. *Reduced* finds no two peers equal, and only saves what nothing depends on.\n"
+    );
+    println!("| delay | states | full | asked for | reduced | states |");
+    println!("| --- | ---: | ---: | ---: | ---: | ---: |");
+    for (name, delay, asked) in [("Tn", 8, "350 µs"), ("6 Tn", 48, "20 ms")] {
+        let scene = eight_different(delay);
+        let of = |method| analyse(&scene, method).expect("an analysis");
+        let times = measured(vec![Box::new(|| drop(black_box(of(Method::Full)))), Box::new(|| drop(black_box(of(Method::Reduced))))]);
+        let states = |method| of(method).modes[0].parts[0].size;
+        let (full, reduced) = (states(Method::Full), states(Method::Reduced));
+        println!("| {name} | {full} | {} | {asked} | {} | {reduced} |", taken(times[0]), taken(times[1]));
+    }
+}
+
+fn long_delays() {
+    println!("\n## Long delays\n");
+    println!(
+        "Three equal peers, KT = 20 N/m, KC = 3500 N/m, samples that take D frames: the radius of both blocks as matrices of D + 3 and D + 4 rows,"
+    );
+    println!("and from their characteristic determinants of four rows (`DelayedLoop`), each with the error that it claims.\n");
+    println!("| D | matrix, no bounds | matrix with bounds | its error | determinant | its error | apart |");
+    println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
+    for frames in [10, 30, 100, 300, 1000_u32] {
+        let changes = [format!("link.delay={}ms", 8 * frames), "coordination.stiffness=20".into()];
+        let scene = equal(3, &changes);
+        let family = family(3, &changes[..1]);
+        let values = [20.0, 3500.0];
+        let mut scratch = FamilyScratch::default();
+        let of = || determinant(&scene, frames);
+        let plain = once_or_median(|| drop(black_box(family.radius(&values, &mut scratch))));
+        let mut bounded = None;
+        let with_bounds = once_or_median(|| bounded = analyse(&scene, Method::Reduced).ok().map(|analysis| analysis.radius));
+        let (matrix, found) = (bounded.expect("an analysis"), of());
+        let times = once_or_median(|| {
+            black_box(of());
+        });
+        println!(
+            "| {frames} | {} | {} | {:.0e} | {} | {:.0e} | {:.0e} |",
+            taken(plain),
+            taken(with_bounds),
+            matrix.error,
+            taken(times),
+            found.error,
+            (matrix.value - found.value).abs()
+        );
+    }
+}
+
+/// The median of some, or the only one if it takes long.
+fn once_or_median(mut work: impl FnMut()) -> Duration {
+    let first = time(&mut work);
+    if first > Duration::from_millis(500) {
+        return first;
+    }
+    measured(vec![Box::new(work)])[0]
+}
+
+fn determinant(scene: &cohaptic_scene::Scene, frames: u32) -> Radius {
+    let [apart, together] = BarePair::new(scene).loops(frames, scene.coordination.gains, scene.peers[0].coupling);
+    apart.bounded_radius(0.0).or(together.bounded_radius(0.0))
+}
+
+fn speed_against_error() {
+    println!("\n## Speed against error\n");
+    println!(
+        "Time of a verdict from the scene on, error of its radius against a reference of 50 digits (`crates/stability/tests/reference/radii.json`), and"
+    );
+    println!(
+        "the error that it claims. *Growth* is that of a disturbance in a simulation of 200 frames, which claims nothing; *determinant* is for equal"
+    );
+    println!("peers who grasp. A dash: the method is not for that scene, or takes more than a minute.\n");
+    println!("| scene | method | time | error | claimed |");
+    println!("| --- | --- | ---: | ---: | ---: |");
+    for reference in references() {
+        let Reference { name, scene, radius, frames } = &reference;
+        let peers = scene.peers.len();
+        let short = frames.is_none_or(|frames| frames < 100);
+        let row = |method: &str, found: Option<(Duration, f64, Option<f64>)>| match found {
+            Some((time, value, claimed)) => {
+                let claimed = claimed.map_or_else(|| "—".to_owned(), |claimed| format!("{claimed:.0e}"));
+                println!("| {name} | {method} | {} | {:.0e} | {claimed} |", taken(time), (value - radius).abs());
+            }
+            None => println!("| {name} | {method} | — | — | — |"),
+        };
+        let by_method = |method| {
+            let mut found = Radius { value: 0.0, error: 0.0 };
+            let time = once_or_median(|| found = analyse(scene, method).expect("an analysis").radius);
+            (time, found.value, Some(found.error))
+        };
+        row("full", (short && peers < 100).then(|| by_method(Method::Full)));
+        row("reduced", Some(by_method(Method::Reduced)));
+        let of_determinant = |frames| {
+            let mut found = Radius { value: 0.0, error: 0.0 };
+            let time = once_or_median(|| found = determinant(scene, frames));
+            (time, found.value, Some(found.error))
+        };
+        row("determinant", frames.map(of_determinant));
+        let of_growth = || {
+            let mut found = None;
+            let time = once_or_median(|| found = growth(scene));
+            found.map(|value| (time, value, None))
+        };
+        row("growth", (short && peers < 100).then(of_growth).flatten());
+    }
+}
+
+/// A time with three digits.
+fn taken(time: Duration) -> String {
+    let seconds = time.as_secs_f64();
+    let (value, unit) = if seconds < 1e-3 {
+        (seconds * 1e6, "µs")
+    } else if seconds < 1.0 {
+        (seconds * 1e3, "ms")
+    } else {
+        (seconds, "s")
+    };
+    let places = if value < 10.0 { 2 } else { usize::from(value < 100.0) };
+    format!("{value:.places$} {unit}")
+}
