@@ -99,7 +99,9 @@ fn judged(scene: &Scene, stable: bool) -> Judged {
     let Ok(judgement) = judge(scene, Method::Reduced, QUICK_UNKNOWNS) else {
         return Judged::Unknown;
     };
-    if judgement.analysis.modes.len() > 1 || (judgement.mean_square.is_none() && has_chance(scene)) {
+    // Without a second moment, whatever was replaced by something nominal is better simulated as it is.
+    let nominal = judgement.mean_square.is_none() && (has_chance(scene) || !judgement.analysis.notes.is_empty());
+    if judgement.analysis.modes.len() > 1 || nominal {
         return Judged::Unknown;
     }
     let (radius, what) = match &judgement.mean_square {

@@ -9,7 +9,7 @@ use crate::full::{Trust, full};
 use crate::network::NominalNetwork;
 use crate::parts::{Part, radius_of, reduced};
 use crate::spectrum::bounded_radius;
-use crate::structure::{Contacts, Structure};
+use crate::structure::{Contacts, Structure, average_position};
 use crate::{AnalysisError, Radius, Verdict};
 
 /// How a verdict is reached.
@@ -85,7 +85,10 @@ pub struct ContactMode {
 ///
 /// [`AnalysisError`] if the scene has no frame that repeats, or cannot be taken apart into linear scenes.
 pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError> {
+    let equivalent = average_position(scene).is_some();
     match method {
+        // A strategy that cannot be taken apart goes the way of a user's own.
+        _ if !equivalent => push_through(scene, &combinations(scene)?, Trust::Nothing, &FromScene),
         Method::Full => push_through(scene, &combinations(scene)?, Trust::Linear, &FromScene),
         Method::Reduced | Method::Determinant => {
             let network = NominalNetwork::of(scene)?;

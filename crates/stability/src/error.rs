@@ -37,6 +37,12 @@ pub enum AnalysisError {
         /// How many are looked at at most.
         most: u128,
     },
+    /// The strategy is not average-position coordination in another form.
+    #[error("{strategy} coordination cannot be taken apart by equal peers: only the general path follows it")]
+    OtherStrategy {
+        /// Its name.
+        strategy: &'static str,
+    },
     /// There is no one matrix.
     #[error("the scene is not linear: there is one matrix for each combination of contacts; expected contact = \"grasp\" or \"none\"")]
     SeveralModes,

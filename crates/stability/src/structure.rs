@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::{ArmConfig, Coordination, Gains, Hand, Plant};
+use cohaptic_peer::{ArmConfig, Gains, Hand, Plant};
 use cohaptic_scene::{PeerSpec, Scene};
 
 use crate::lifted::{Body, Lifted, Node};
@@ -53,6 +53,9 @@ impl Structure {
     pub(crate) fn with_alone(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, alone: Option<usize>) -> Result<Self, AnalysisError> {
         let scene = scenes[0];
         let peers = scene.peers.len();
+        if scenes.iter().any(|scene| average_position(scene).is_none()) {
+            return Err(AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() });
+        }
         let mut classes: Vec<Vec<usize>> = Vec::new();
         for place in 0..peers {
             let found = classes.iter().position(|class| {
@@ -74,6 +77,9 @@ impl Structure {
 
     /// Every peer by itself, whether or not it is like another.
     pub(crate) fn of_each(scene: &Scene, network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
+        if average_position(scene).is_none() {
+            return Err(AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() });
+        }
         Self::of_classes(scene, (0..scene.peers.len()).map(|peer| vec![peer]).collect(), network, contacts)
     }
 
@@ -100,9 +106,9 @@ impl Structure {
     }
 
     /// KT and BT of the average-position strategy that is the same as the scene's.
-    #[expect(clippy::unused_self, reason = "reads as what the structure is coordinated by")]
+    #[expect(clippy::unused_self, reason = "only a scene that has a structure has them for certain")]
     pub(crate) fn coordination(&self, scene: &Scene) -> Gains {
-        coordination(scene)
+        average_position(scene).expect("a structure is made only of scenes whose strategy is one")
     }
 
     /// The node that stands for a class.
@@ -147,15 +153,11 @@ impl Structure {
     }
 }
 
-/// KT and BT of the average-position strategy that is the same as the scene's.
-pub(crate) fn coordination(scene: &Scene) -> Gains {
+/// KT and BT of the average-position strategy that is the same as the scene's; `None` if there is none.
+pub(crate) fn average_position(scene: &Scene) -> Option<Gains> {
     let peers = scene.peers.len();
     let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(peers));
-    match scene.coordination.strategy {
-        Coordination::AveragePosition => gains,
-        Coordination::ProportionalDerivative => gains.scaled(count(peers - 1)),
-        _ => unreachable!("every strategy of this workspace is listed"),
-    }
+    scene.coordination.strategy.as_average_position(gains, peers)
 }
 
 /// What velocities are multiplied by to be lengths like positions \[s\]: the time in which the stiffest of the bodies swings by a radian, from a tick to

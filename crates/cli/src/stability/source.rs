@@ -77,6 +77,13 @@ pub(super) fn fingerprint_of(family: &Family) -> Result<u64, FamilyError> {
     Ok(fingerprint(&format!("{:?}", at_low(family)?)))
 }
 
+/// What the radii of a family leave out, where its links leave something to chance.
+pub(super) fn nominal(family: &Family) -> Vec<&'static str> {
+    let chance = at_low(family).is_ok_and(|scene| cohaptic_stability::has_chance(&scene));
+    let note = "links leave something to chance: these radii are those with nothing left to chance; stability point follows the second moment";
+    chance.then_some(note).into_iter().collect()
+}
+
 /// The scene with every open key at its lower end; it does not know the name of its file.
 pub(super) fn at_low(family: &Family) -> Result<Scene, FamilyError> {
     let low: Vec<f64> = family.keys().iter().map(|range| range.low).collect();

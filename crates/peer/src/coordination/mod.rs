@@ -97,6 +97,17 @@ impl Coordination {
         }
     }
 
+    /// The gains with which average-position coordination among that many peers is the same, force for force; `None` if there are none, and then the
+    /// stability analysis takes the general path.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
+    pub fn as_average_position(self, gains: Gains, peers: usize) -> Option<Gains> {
+        match self {
+            Self::AveragePosition => Some(gains),
+            Self::ProportionalDerivative => Some(gains.scaled(peers.saturating_sub(1) as f64)),
+        }
+    }
+
     /// Makes the strategy for one peer out of `peers`.
     #[must_use]
     pub fn strategy(self, gains: Gains, peers: usize) -> BuiltIn {
@@ -129,6 +140,20 @@ impl<const A: usize> Strategy<A> for BuiltIn {
         match self {
             Self::AveragePosition(strategy) => Strategy::<A>::set_gains(strategy, gains),
             Self::ProportionalDerivative(strategy) => Strategy::<A>::set_gains(strategy, gains),
+        }
+    }
+
+    fn memory(&self) -> &[f64] {
+        match self {
+            Self::AveragePosition(strategy) => Strategy::<A>::memory(strategy),
+            Self::ProportionalDerivative(strategy) => Strategy::<A>::memory(strategy),
+        }
+    }
+
+    fn set_memory(&mut self, memory: &[f64]) {
+        match self {
+            Self::AveragePosition(strategy) => Strategy::<A>::set_memory(strategy, memory),
+            Self::ProportionalDerivative(strategy) => Strategy::<A>::set_memory(strategy, memory),
         }
     }
 }

@@ -22,6 +22,7 @@ pub(super) struct Document<'a> {
     finest: f64,
     coarsest: f64,
     settled: bool,
+    notes: &'a [&'static str],
     files: &'a [String],
 }
 
@@ -57,6 +58,7 @@ impl<'a> Document<'a> {
             finest: found.finest,
             coarsest: found.coarsest,
             settled: found.is_settled(),
+            notes: &order.notes,
             files,
         }
     }

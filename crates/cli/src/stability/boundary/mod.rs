@@ -28,6 +28,8 @@ struct Order {
     family: Family,
     /// What values looked at belong to.
     header: Vec<String>,
+    /// What the radii leave out.
+    notes: Vec<&'static str>,
 }
 
 /// Finds every crossing along a key.
@@ -87,7 +89,8 @@ impl Order {
             format!("along {:?} of the scene {:016x}", arguments.along, source::fingerprint_of(&family).map_err(refused)?),
             "each row: its number, the value, the spectral radius and its error".to_owned(),
         ];
-        Ok(Self { title, range, options, family, header })
+        let notes = source::nominal(&family);
+        Ok(Self { title, range, options, family, header, notes })
     }
 }
 

@@ -35,6 +35,7 @@ pub(super) fn describe(order: &Order, found: &Boundary, files: &[String]) -> Str
     if !found.is_settled() {
         line("NOT SETTLED: it ended after the most values that it may look at; a larger tolerance or a shorter range decides".to_owned());
     }
+    order.notes.iter().for_each(|note| line(format!("note: {note}")));
     files.iter().for_each(|file| line(file.clone()));
     text
 }

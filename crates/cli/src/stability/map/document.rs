@@ -22,6 +22,7 @@ pub(super) struct Document<'a> {
     pub(super) wall_s: f64,
     pub(super) cells_per_s: f64,
     pub(super) cells_computed: usize,
+    notes: &'a [&'static str],
     pub(super) files: &'a [String],
 }
 
@@ -53,6 +54,7 @@ impl<'a> Document<'a> {
             wall_s,
             cells_per_s: share(cells, 1) / wall_s,
             cells_computed: cells,
+            notes: &order.notes,
             files,
         }
     }

@@ -30,6 +30,8 @@ struct Order {
     variants: Vec<Variant>,
     /// One for each variant.
     families: Vec<Family>,
+    /// What the radii leave out.
+    notes: Vec<&'static str>,
 }
 
 /// A map of one variant.
@@ -91,7 +93,8 @@ impl Order {
             Some(Ok(scene)) => scene.title,
             Some(Err(_)) | None => output::path(file),
         };
-        Ok(Self { text, title, ranges, grid, variants, families })
+        let notes = families.iter().map(source::nominal).find(|notes| !notes.is_empty()).unwrap_or_default();
+        Ok(Self { text, title, ranges, grid, variants, families, notes })
     }
 
     /// What went wrong with a map, in the words of the user's options.

@@ -33,6 +33,9 @@ pub(super) fn describe(order: &Order, maps: &[VariantMap], document: &Document<'
         );
     }
     let _ = writeln!(text, "\n{} cells computed in {:.3} s: {:.0} a second", document.cells_computed, document.wall_s, document.cells_per_s);
+    for note in &order.notes {
+        let _ = writeln!(text, "note: {note}");
+    }
     for file in document.files {
         let _ = writeln!(text, "  {file}");
     }
