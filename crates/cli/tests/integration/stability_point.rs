@@ -129,3 +129,71 @@ fn what_makes_no_sense_is_refused() {
     desk.cohaptic("stability point two.toml --set peers.left.clock.drift=0.0123456789").assert_refused(2, &["two.toml: ", "expected", "clocks"]);
     desk.cohaptic("stability").assert_refused(2, &["point"]);
 }
+
+/// With certain links the mean square is the square of the radius; a loss that is nearly never is next to it, and the verdict is then that of the mean square.
+#[test]
+fn links_that_leave_something_to_chance_have_a_mean_square() {
+    let desk = Desk::with("paper.toml", PAPER);
+    let certain = desk.json("stability point paper.toml --json");
+    assert!(certain.get("mean_square_radius").is_none(), "{certain:#}");
+    let document = desk.json("stability point paper.toml --json --set link.loss=1e-9");
+    let (mean_square, radius) = (number(&document, "mean_square_radius"), number(&certain, "spectral_radius"));
+    assert!((mean_square - radius * radius).abs() < 1e-7 && number(&document, "mean_square_error_bound") < 1e-6, "{document:#}");
+    let text = desk.text("stability point paper.toml --set link.loss=5%");
+    assert!(text.contains("STABLE in the mean square") && text.contains("with nothing left to chance: stable"), "{text}");
+    // What cannot be followed is said, and the verdict is nominal.
+    let refused = desk.json("stability point paper.toml --json --set scene.count=9 --set link.loss={gilbert-elliott={p=0.1,r=0.5}}");
+    assert!(refused.get("mean_square_radius").is_none());
+    let notes = refused["notes"].as_array().unwrap();
+    assert!(notes.iter().any(|note| note.as_str().unwrap().starts_with("the verdict is nominal")), "{refused:#}");
+}
+
+#[test]
+fn the_worst_case_is_bounded_from_both_sides() {
+    let desk = Desk::with("paper.toml", PAPER);
+    let nominal = number(&desk.json("stability point paper.toml --json"), "spectral_radius");
+    let document = desk.json("stability point paper.toml --json --losses-in-a-row 1");
+    let worst = &document["worst_case"];
+    let (lower, upper) = (number(worst, "lower"), number(worst, "upper"));
+    // Nothing lost is one of the patterns.
+    assert!(nominal <= upper && lower <= upper && lower > nominal - 2e-3, "{worst:#}");
+    assert!(worst["sequence"].as_str().is_some_and(|words| !words.is_empty()));
+    let text = desk.text("stability point paper.toml --losses-in-a-row 1 --delay-within 8ms..10ms");
+    assert!(text.contains("worst case: ") && text.contains("growth a sending period between"), "{text}");
+}
+
+#[test]
+fn peers_may_hear_only_their_neighbours() {
+    let desk = Desk::with("paper.toml", PAPER);
+    let radius = |options: &str| number(&desk.json(&format!("stability point paper.toml --json {options}")), "spectral_radius");
+    // Among three a ring is everybody; among five it is not.
+    assert!((radius("--graph ring") - radius("--graph complete")).abs() < 1e-12);
+    assert_ne!(radius("--set scene.count=5 --graph ring"), radius("--set scene.count=5"));
+    desk.write("ring.csv", "0,1,1\n1,0,1\n1,1,0\n");
+    assert!((radius("--graph ring.csv") - radius("--graph ring")).abs() < 1e-12);
+    desk.write("words.csv", "0,one\n1,0\n");
+    for (options, status, word) in [
+        ("--graph words.csv", 2, "words.csv:1: found \"one\""),
+        ("--graph none.csv", 3, "cannot read none.csv"),
+        ("--graph ring --set peers.peer2.device.mass=0.2", 2, "peer2"),
+        ("--delay-within 9ms..8ms", 2, "the shorter delay comes first"),
+        ("--losses-in-a-row 1 --accuracy 0", 2, "--accuracy 0"),
+    ] {
+        let outcome = desk.cohaptic(&format!("stability point paper.toml {options}"));
+        assert_eq!((outcome.status, outcome.stdout.as_str()), (Some(status), ""), "{options}");
+        assert!(outcome.stderr.contains(word), "{options}: {}", outcome.stderr);
+    }
+}
+
+/// Maps and boundaries are of radii with nothing left to chance, and say so.
+#[test]
+fn maps_of_random_links_say_that_they_are_nominal() {
+    let desk = Desk::with("paper.toml", PAPER);
+    for command in [
+        "map paper.toml --x coordination.stiffness=100..200 --y coordination.damping=1..2 --grid 2x2",
+        "boundary paper.toml --along coordination.stiffness=100..200",
+    ] {
+        let notes = |options: &str| desk.json(&format!("stability {command} --json {options}"))["notes"].as_array().unwrap().len();
+        assert_eq!((notes(""), notes("--set link.loss=5%")), (0, 1), "{command}");
+    }
+}

@@ -42,10 +42,10 @@ pub(super) fn describe(scene: &Scene, judgement: &Judgement, worst: Option<&Scen
             line(format!("  {:<44}{:>4} states, {:>4} times  {}", name(scene, part), part.size, part.copies, number(part.radius)));
         }
     }
-    if let Some(worst) = worst {
-        worst_case(worst, &mut line);
-    }
     let notes = notes(judgement);
+    if let Some(worst) = worst {
+        worst_case(worst, &notes, &mut line);
+    }
     if !notes.is_empty() {
         line(String::new());
         notes.iter().for_each(|note| line(format!("note: {note}")));
@@ -66,7 +66,7 @@ fn sentence(verdict: Verdict, mean_square: bool) -> &'static str {
 }
 
 /// The worst case, with the pattern that makes it.
-fn worst_case(worst: &SceneWorstCase, line: &mut impl FnMut(String)) {
+fn worst_case(worst: &SceneWorstCase, said: &[&str], line: &mut impl FnMut(String)) {
     let verdict = match worst.verdict() {
         WorstVerdict::Stable => "stable whatever the network does within these bounds",
         WorstVerdict::Undecided => "not decided: 1 is between the bounds; --products and --accuracy may tell",
@@ -82,7 +82,7 @@ fn worst_case(worst: &SceneWorstCase, line: &mut impl FnMut(String)) {
     if !part.sequence.is_empty() {
         line(format!("  the pattern that grows as the lower bound: {}", part.sequence));
     }
-    worst.notes.iter().for_each(|note| line(format!("  note: {note}")));
+    worst.notes.iter().filter(|note| !said.contains(&note.as_str())).for_each(|note| line(format!("  note: {note}")));
 }
 
 /// How fast the slowest disturbance changes.
