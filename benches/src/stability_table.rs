@@ -151,8 +151,11 @@ fn long_delays() {
     println!(
         "Three equal peers, KT = 20 N/m, KC = 3500 N/m, samples that take D frames: the radius of both blocks as matrices of D + 3 and D + 4 rows,"
     );
-    println!("and from their characteristic determinants of four rows (`DelayedLoop`), each with the error that it claims.\n");
-    println!("| D | matrix, no bounds | matrix with bounds | its error | determinant | its error | apart |");
+    println!(
+        "and from their characteristic determinants of four rows (`DelayedLoop`), each with the error that it claims. *Chosen* is what a verdict"
+    );
+    println!("takes: the matrix with bounds up to 500 rows, the determinant beyond.\n");
+    println!("| D | matrix, no bounds | chosen | its error | determinant | its error | apart |");
     println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     for frames in [10, 30, 100, 300, 1000_u32] {
         let changes = [format!("link.delay={}ms", 8 * frames), "coordination.stiffness=20".into()];
