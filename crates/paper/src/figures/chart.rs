@@ -2,7 +2,7 @@
 //!
 //! There is no background, and what is black in the drawing has the colour of the text around it, so that a figure can stand on a dark page.
 
-use plotters::coord::Shift;
+use cohaptic_harness::record::svg::{COLOURS, Drawing, DrawingResult};
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 
@@ -29,24 +29,11 @@ pub(crate) struct Panel {
     pub(crate) lines: Vec<Line>,
 }
 
-/// Colours that are told apart with any kind of colour vision (Okabe & Ito 2008), on white and on black.
-const COLOURS: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(128, 128, 128),
-];
 /// The width of a panel [px].
 const WIDTH: u32 = 480;
 /// The height of a panel [px].
 const HEIGHT: u32 = 300;
 const GREY: RGBColor = RGBColor(128, 128, 128);
-
-type Drawing<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type DrawingResult<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
 
 impl Line {
     /// A curve without gaps, cut where it leaves the range of y.

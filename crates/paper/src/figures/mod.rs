@@ -28,6 +28,14 @@ pub struct Figure {
     pub csv: String,
 }
 
+impl Figure {
+    /// The picture on a white ground, for a file of its own: on the page it takes the colours of the text around it.
+    #[must_use]
+    pub fn on_white(&self) -> String {
+        self.svg.replacen("<svg ", "<svg style=\"background:#fff;color:#000\" ", 1)
+    }
+}
+
 /// A small table.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Table {
