@@ -26,3 +26,12 @@ fn three_peers_who_touch_have_the_radius_computed_elsewhere() {
         assert_eq!(analysis.rigid_modes, 1);
     }
 }
+
+/// With a delay of one frame each peer has four states and one sample (a position and a velocity) on its way; the blocks need of a sample only the force
+/// that it makes: 4 + 1 rows for the difference, one fewer for the average without the rigid-body mode.
+#[test]
+fn nothing_is_a_state_that_decides_nothing() {
+    let analysis = analyse(&scene(&[]), Method::Reduced).unwrap();
+    let sizes: Vec<(usize, usize)> = analysis.modes[0].parts.iter().map(|part| (part.size, part.copies)).collect();
+    assert_eq!((analysis.dimension, sizes), (3 * (4 + 2) - 1, vec![(4, 1), (5, 2)]));
+}
