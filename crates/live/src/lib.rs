@@ -1,0 +1,50 @@
+//! Live sessions: a scene driven by the wall clock, in which some of the peers are other programs.
+//!
+//! Here is the [`door`]: what a datagram from outside must be before it may touch the scene, and how what goes out is made. It does no input or
+//! output and reads no clock; whoever drives it owns the sockets. [`client`] is the other side of it, for programs in Rust, and [`handshake`] the
+//! datagrams that both exchange. The protocol is written byte by byte in `docs/live-protocol.md`.
+//!
+//! It does not encrypt: a [`SessionKey`] keeps others from speaking, not from listening. Read [`Door`] first.
+//!
+//! ```
+//! use std::time::Duration;
+//!
+//! use cohaptic_live::client::Joining;
+//! use cohaptic_live::{Admission, Door, DoorConfig, Place, Seat, SessionKey, SystemEntropy};
+//! use cohaptic_peer::{State, wire};
+//! use cohaptic_units::Instant;
+//!
+//! let key = SessionKey::from_bytes([7; 32]);
+//! let seats = vec![Seat { place: Place(1), name: "right".to_owned() }];
+//! let (tick, update) = (Duration::from_millis(1), Duration::from_millis(8));
+//! let config = DoorConfig { key: Some(key.clone()), ..DoorConfig::new(42, 1, 2, tick, update, seats) };
+//! let mut door = Door::new(config, &mut SystemEntropy)?;
+//!
+//! // The other program asks, and is told what the session is like.
+//! let from = "127.0.0.1:9000".parse().expect("an address");
+//! let joining = Joining::draw(42, Place(1), &key, &mut SystemEntropy)?;
+//! let Admission::Reply { bytes: welcome, .. } = door.handle_datagram(Instant::ZERO, from, &joining.hello()) else { panic!("welcome") };
+//! let joined = joining.handle_welcome(&welcome)?;
+//!
+//! // Its first sample joins.
+//! let sample = wire::Sample { session: 42, sender: 1, sequence: 0, sent: Instant::ZERO, state: State { position: [0.02], velocity: [0.0] } };
+//! let mut plain = [0; wire::MAX_LEN];
+//! let len = sample.encode(1, &mut plain);
+//! let mut sealed = [0; cohaptic_live::MAX_DATAGRAM];
+//! let sealed_len = joined.seal(&plain[..len], &mut sealed).expect("a sample");
+//! let admission = door.handle_datagram(Instant::ZERO, from, &sealed[..sealed_len]);
+//! assert!(matches!(admission, Admission::Sample { place: Place(1), joined: true, .. }));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod client;
+pub mod door;
+mod entropy;
+pub mod handshake;
+mod key;
+mod seal;
+
+pub use door::{Admission, Admitted, Door, DoorConfig, DoorError, DoorStats, Limits, Place, Refusal, Seat};
+pub use entropy::{Entropy, EntropyError, SystemEntropy};
+pub use key::{KeyFileError, SessionKey};
+pub use seal::{MAX_DATAGRAM, NONCE_LEN, Nonce, SEAL_LEN, TAG_LEN};

@@ -1,0 +1,171 @@
+//! Whatever a stranger sends: nothing moves, nothing panics, nothing grows, and every datagram is counted once.
+
+use cohaptic_live::client::Joined;
+use cohaptic_live::{Admission, Door, MAX_DATAGRAM, Refusal};
+use proptest::prelude::*;
+
+use crate::support::{SEAT, address, admitted, assert_counts, at, cases, joining, keyed_door, keyless_door, sample, sealed, shake_hands};
+
+/// A door whose seat is taken from address 1, with the number 10.
+fn taken() -> (Door, Joined) {
+    let mut door = keyed_door();
+    let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
+    admitted(door.handle_datagram(at(0), address(1), &sealed(&joined, &sample(1, 10))));
+    (door, joined)
+}
+
+/// What a stranger must not be able to change, wherever it is kept: all that the door shows but its counters.
+fn shown(door: &Door) -> String {
+    door.seats(at(50)).map(|seat| format!("{seat:?}")).collect()
+}
+
+#[test]
+fn every_flipped_bit_of_a_sealed_sample_is_refused() {
+    let (mut door, joined) = taken();
+    let good = sealed(&joined, &sample(1, 11));
+    let before = shown(&door);
+    let mut forged = 0;
+    for bit in 0..8 * good.len() {
+        let mut bad = good.clone();
+        bad[bit / 8] ^= 1 << (bit % 8);
+        let Admission::Refused(cause) = door.handle_datagram(at(1), address(1), &bad) else { panic!("bit {bit} passed") };
+        // What the tag alone protects: the number, the send time, the state and the seal.
+        if (24..40).contains(&(bit / 8)) || bit / 8 >= 48 {
+            // Bit 62 of −1.5 is the one of its exponent that is not set: without it, a number that is none.
+            let nan = bit == 8 * 56 + 62;
+            assert_eq!(cause, if nan { Refusal::NotFinite } else { Refusal::Forged }, "bit {bit}");
+            forged += u32::from(!nan);
+        }
+    }
+    assert_eq!(forged, 8 * (16 + 48) - 1);
+    assert_eq!(shown(&door), before);
+    // By field: magic, version, axes, zero, session, sender (1 becomes 3, 0 and many others, of which 3 and 0 are no seats; none is 2), zeros.
+    let count = |cause: Refusal| door.stats().refused(cause);
+    assert_eq!([Refusal::Magic, Refusal::Version, Refusal::Axes].map(count), [32, 16, 8]);
+    assert_eq!([Refusal::Reserved, Refusal::ForeignSession, Refusal::UnknownSeat].map(count), [8 + 32 + 64, 64, 32]);
+    assert_eq!(door.stats().refused_in_all(), 8 * 96);
+    admitted(door.handle_datagram(at(1), address(1), &good));
+}
+
+#[test]
+fn every_flipped_bit_and_every_cut_of_a_hello_is_refused() {
+    let mut door = keyed_door();
+    let good = joining(1).hello();
+    for bit in 0..8 * good.len() {
+        let mut bad = good;
+        bad[bit / 8] ^= 1 << (bit % 8);
+        assert!(matches!(door.handle_datagram(at(0), address(1), &bad), Admission::Refused(_)), "bit {bit} passed");
+    }
+    for len in 0..good.len() {
+        assert!(matches!(door.handle_datagram(at(0), address(1), &good[..len]), Admission::Refused(_)), "{len} bytes passed");
+    }
+    assert_eq!(door.stats().refused_in_all(), 8 * 88 + 88);
+}
+
+#[test]
+fn every_cut_of_a_sealed_sample_is_refused() {
+    let (mut door, joined) = taken();
+    let good = sealed(&joined, &sample(1, 11));
+    for len in 0..good.len() {
+        door.handle_datagram(at(1), address(1), &good[..len]);
+    }
+    // 48 to 95 bytes are no sealed sample but for 64: a sample without its seal.
+    assert_counts(&door, 1, 1, &[(Refusal::TooShort, 48), (Refusal::Length, 47), (Refusal::Unsealed, 1)]);
+}
+
+/// One datagram of a stranger: noise, or something that was good once, changed.
+fn datagram() -> impl Strategy<Value = Vec<u8>> {
+    let noise = prop::collection::vec(any::<u8>(), 0..200);
+    let joined = {
+        let mut door = keyed_door();
+        shake_hands(&mut door, at(0), address(1), &joining(1))
+    };
+    let good = vec![sample(1, 11), sealed(&joined, &sample(1, 11)), joining(1).hello().to_vec()];
+    let changed = (prop::sample::select(good), prop::collection::vec((any::<prop::sample::Index>(), 1..=255_u8), 1..6), 0..3_usize).prop_map(
+        |(mut bytes, changes, more)| {
+            for (place, mask) in changes {
+                let place = place.index(bytes.len());
+                bytes[place] ^= mask;
+            }
+            bytes.extend(std::iter::repeat_n(0, more));
+            bytes
+        },
+    );
+    prop_oneof![noise, changed]
+}
+
+proptest! {
+    #![proptest_config(cases(300))]
+
+    /// 100 datagrams in each of 300 cases. Two changes of one byte can cancel out: then it is the good datagram, which a stranger can only repeat.
+    #[test]
+    fn strangers_change_nothing_at_a_door_with_a_key(datagrams in prop::collection::vec((datagram(), 1..4_u16), 100)) {
+        let (mut door, joined) = taken();
+        let before = shown(&door);
+        let good = [sealed(&joined, &sample(1, 11)), joining(1).hello().to_vec()];
+        for (bytes, port) in &datagrams {
+            if good.contains(bytes) {
+                continue;
+            }
+            let admission = door.handle_datagram(at(50), address(*port), bytes);
+            prop_assert!(matches!(admission, Admission::Refused(_)), "{admission:?}");
+        }
+        prop_assert_eq!(shown(&door), before);
+        prop_assert_eq!((door.stats().admitted, door.stats().joinings, door.stats().welcomed), (1, 1, 1));
+        prop_assert_eq!(door.stats().handled, 2 + door.stats().refused_in_all());
+    }
+
+    /// Without a key what is let in is a good sample of this session from a seat, with a number that was not there before.
+    #[test]
+    fn a_door_without_a_key_lets_in_good_samples_alone(datagrams in prop::collection::vec((datagram(), 1..4_u16, 0..60_u64), 100)) {
+        let mut door = keyless_door();
+        let mut now = at(0);
+        let mut newest = std::collections::BTreeMap::new();
+        for (bytes, port, later) in &datagrams {
+            now = now.saturating_add_nanos(later * 1_000_000);
+            match door.handle_datagram(now, address(*port), bytes) {
+                Admission::Sample { place, joined, sample } => {
+                    let inside = cohaptic_peer::wire::Sample::<1>::decode(sample.bytes(), 1).unwrap();
+                    let outside = cohaptic_peer::wire::Sample::<1>::decode(bytes, 1).unwrap();
+                    prop_assert_eq!((inside.sender, inside.session), (place.0, crate::support::SESSION));
+                    prop_assert!(inside.state == outside.state && inside.state.is_finite());
+                    if joined {
+                        let before = newest.insert(place, inside.sequence);
+                        prop_assert!(before.is_none_or(|before| inside.sequence > before));
+                    }
+                }
+                Admission::Refused(_) => {}
+                Admission::Reply { .. } => prop_assert!(false, "a welcome without a key"),
+            }
+        }
+        let stats = door.stats();
+        prop_assert_eq!(stats.handled, 100);
+        prop_assert_eq!(stats.handled, stats.admitted + stats.refused_in_all());
+    }
+
+    /// The client is as careful: nothing but what the door made opens, and nothing but its welcome is one.
+    #[test]
+    fn strangers_tell_a_client_nothing(datagrams in prop::collection::vec(datagram(), 100)) {
+        let (mut door, joined) = taken();
+        let mut out = [0; MAX_DATAGRAM];
+        door.seal(at(1), SEAT, &sample(0, 1), &mut out).unwrap();
+        for bytes in &datagrams {
+            prop_assert!(joined.open(bytes).is_err());
+            prop_assert!(joining(1).handle_welcome(bytes).is_err());
+        }
+    }
+}
+
+#[test]
+fn nothing_is_kept_of_who_has_tried() {
+    // The size of a door is that of its seats: it owns two vectors of fixed length, and the test above shows that they do not change.
+    let (mut door, _) = taken();
+    let before = format!("{door:?}");
+    for port in 2..60_000 {
+        door.handle_datagram(at(1), address(port), &sample(1, u64::from(port)));
+    }
+    let after = format!("{door:?}");
+    assert_eq!(door.stats().refused(Refusal::Unsealed), 59_998);
+    // But for the digits of its counters it prints the same.
+    assert!(after.len() < before.len() + 20, "{after}");
+}

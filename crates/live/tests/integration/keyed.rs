@@ -1,0 +1,208 @@
+//! A session with a key: hello, welcome, and samples under keys of their joining.
+
+use cohaptic_live::client::OpenError;
+use cohaptic_live::door::WELCOMES_PER_SECOND;
+use cohaptic_live::{Admission, Door, MAX_DATAGRAM, Place, Refusal, SessionKey};
+use cohaptic_peer::wire;
+
+use crate::support::{Counting, SEAT, SESSION, address, admitted, assert_counts, at, config, joining, keyed_door, sample, sealed, shake_hands};
+
+#[test]
+fn a_peer_says_hello_is_welcomed_and_joins_with_its_first_sample() {
+    let mut door = keyed_door();
+    let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
+    let welcome = joined.welcome();
+    assert_eq!((welcome.axes, welcome.peers, welcome.place, welcome.session), (1, 3, SEAT, SESSION));
+    assert_eq!((welcome.tick.as_micros(), welcome.update.as_micros()), (1000, 8000));
+    assert!(!door.seat(at(0), SEAT).unwrap().present, "a hello takes no seat");
+    let (first, passed) = admitted(door.handle_datagram(at(1), address(1), &sealed(&joined, &sample(1, 0))));
+    assert!(first);
+    assert_eq!(passed.bytes(), sample(1, 0), "the seal is off");
+    assert!(!admitted(door.handle_datagram(at(2), address(1), &sealed(&joined, &sample(1, 1)))).0);
+
+    let mut out = [0; MAX_DATAGRAM];
+    let (to, len) = door.seal(at(3), SEAT, &sample(0, 9), &mut out).unwrap();
+    assert_eq!((to, len), (address(1), 96));
+    assert_eq!(joined.open(&out[..len]), Ok(&sample(0, 9)[..]));
+    assert_counts(&door, 2, 1, &[]);
+}
+
+#[test]
+fn without_the_key_nothing_gets_in() {
+    let mut door = keyed_door();
+    let other_key = SessionKey::from_bytes([0xa4; 32]);
+    let stranger = cohaptic_live::client::Joining::new(SESSION, SEAT, &other_key, [1; 16]);
+    assert_eq!(door.handle_datagram(at(0), address(1), &stranger.hello()), Admission::Refused(Refusal::Forged));
+    assert_eq!(door.handle_datagram(at(0), address(1), &sample(1, 0)), Admission::Refused(Refusal::Unsealed));
+    let guess = [sample(1, 0), vec![0; 32]].concat();
+    assert_eq!(door.handle_datagram(at(0), address(1), &guess), Admission::Refused(Refusal::NotJoined));
+    assert_counts(&door, 0, 0, &[(Refusal::Forged, 1), (Refusal::Unsealed, 1), (Refusal::NotJoined, 1)]);
+}
+
+#[test]
+fn a_seal_is_good_for_one_address() {
+    let mut door = keyed_door();
+    let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
+    let first = sealed(&joined, &sample(1, 0));
+    assert_eq!(door.handle_datagram(at(0), address(2), &first), Admission::Refused(Refusal::NotJoined), "faster than its owner");
+    admitted(door.handle_datagram(at(0), address(1), &first));
+    assert_eq!(door.handle_datagram(at(0), address(2), &sealed(&joined, &sample(1, 1))), Admission::Refused(Refusal::Forged));
+    // An IPv4 address is the same where a socket of IPv6 shows it mapped, but for the comparison with the owner of the seat.
+    let mapped = std::net::SocketAddr::new("::ffff:192.0.2.1".parse().unwrap(), 1);
+    assert_eq!(door.handle_datagram(at(0), mapped, &sealed(&joined, &sample(1, 1))), Admission::Refused(Refusal::Forged));
+}
+
+#[test]
+fn what_the_door_sends_cannot_be_sent_back() {
+    let mut door = keyed_door();
+    let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
+    admitted(door.handle_datagram(at(0), address(1), &sealed(&joined, &sample(1, 0))));
+    let mut out = [0; MAX_DATAGRAM];
+    // A sample that says it is from the seat itself, which the door would never send there: only the tag can tell.
+    let (_, len) = door.seal(at(0), SEAT, &sample(1, 1), &mut out).unwrap();
+    assert_eq!(door.handle_datagram(at(0), address(1), &out[..len]), Admission::Refused(Refusal::Forged));
+    assert_eq!(joined.open(&sealed(&joined, &sample(1, 1))), Err(OpenError::Forged), "nor the other way round");
+    let Admission::Reply { bytes, .. } = door.handle_datagram(at(0), address(1), &joining(2).hello()) else { panic!("no welcome") };
+    assert_eq!(door.handle_datagram(at(0), address(1), &bytes), Admission::Refused(Refusal::Magic), "a welcome is no hello");
+}
+
+#[test]
+fn a_recording_of_an_earlier_joining_is_worthless() {
+    let mut door = keyed_door();
+    let mut recording = vec![joining(1).hello().to_vec()];
+    let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
+    for number in 0..50 {
+        recording.push(sealed(&joined, &sample(1, number)));
+        admitted(door.handle_datagram(at(number), address(1), recording.last().unwrap()));
+    }
+    // At once, from the same address: every number has been seen, and the hello is answered, which changes nothing.
+    for datagram in &recording {
+        door.handle_datagram(at(50), address(1), datagram);
+    }
+    assert_counts(&door, 50, 2, &[(Refusal::Replayed, 50)]);
+    assert_eq!(door.seat(at(50), SEAT).unwrap().heard, Some(at(49)));
+    // After the peer has gone: still.
+    for datagram in &recording {
+        door.handle_datagram(at(5000), address(1), datagram);
+    }
+    assert_counts(&door, 50, 3, &[(Refusal::Replayed, 100)]);
+    // After it has joined again.
+    let again = shake_hands(&mut door, at(6000), address(1), &joining(2));
+    assert!(admitted(door.handle_datagram(at(6000), address(1), &sealed(&again, &sample(1, 0)))).0);
+    for datagram in &recording {
+        door.handle_datagram(at(7000), address(1), datagram);
+    }
+    assert_counts(&door, 51, 5, &[(Refusal::Replayed, 100), (Refusal::Forged, 50)]);
+    // At another door with the same key and session.
+    let mut other = Counting::default();
+    cohaptic_live::Entropy::fill(&mut other, &mut [0; 64]).unwrap();
+    let mut door = Door::new(config().with_key(Some(crate::support::key())), &mut other).unwrap();
+    for datagram in &recording {
+        door.handle_datagram(at(0), address(1), datagram);
+    }
+    assert_counts(&door, 0, 1, &[(Refusal::NotJoined, 50)]);
+}
+
+#[test]
+fn a_present_peer_is_not_thrown_out_and_a_silent_one_is_replaced() {
+    let mut door = keyed_door();
+    let first = shake_hands(&mut door, at(0), address(1), &joining(1));
+    admitted(door.handle_datagram(at(0), address(1), &sealed(&first, &sample(1, 0))));
+    // A second program with the key and the same place.
+    let second = shake_hands(&mut door, at(10), address(2), &joining(2));
+    assert_eq!(door.handle_datagram(at(10), address(2), &sealed(&second, &sample(1, 0))), Admission::Refused(Refusal::SeatTaken));
+    admitted(door.handle_datagram(at(11), address(1), &sealed(&first, &sample(1, 1))));
+    let (joined, passed) = admitted(door.handle_datagram(at(111), address(2), &sealed(&second, &sample(1, 1))));
+    assert!(joined, "its welcome is still good: nobody has joined since");
+    assert_eq!(wire::Sample::<1>::decode(passed.bytes(), 1).unwrap().sequence, 1 << 40 | 1);
+    // The first one comes back too late: its joining is over, and it can tell nobody apart from a forger.
+    assert_eq!(door.handle_datagram(at(112), address(1), &sealed(&first, &sample(1, 2))), Admission::Refused(Refusal::Forged));
+    let mut out = [0; MAX_DATAGRAM];
+    let (to, len) = door.seal(at(113), SEAT, &sample(0, 0), &mut out).unwrap();
+    assert_eq!(to, address(2));
+    assert_eq!(first.open(&out[..len]), Err(OpenError::OtherJoining));
+}
+
+#[test]
+fn a_program_that_starts_again_at_its_address_joins_at_once() {
+    let mut door = keyed_door();
+    let first = shake_hands(&mut door, at(0), address(1), &joining(1));
+    admitted(door.handle_datagram(at(0), address(1), &sealed(&first, &sample(1, 500))));
+    let again = shake_hands(&mut door, at(1), address(1), &joining(2));
+    // Until the new keys are used the old ones are good.
+    admitted(door.handle_datagram(at(2), address(1), &sealed(&first, &sample(1, 501))));
+    assert!(admitted(door.handle_datagram(at(3), address(1), &sealed(&again, &sample(1, 0)))).0);
+    assert_eq!(door.handle_datagram(at(4), address(1), &sealed(&first, &sample(1, 502))), Admission::Refused(Refusal::Forged));
+}
+
+#[test]
+fn a_peer_that_was_silent_goes_on_under_its_keys() {
+    let mut door = keyed_door();
+    let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
+    admitted(door.handle_datagram(at(0), address(1), &sealed(&joined, &sample(1, 7))));
+    assert!(!door.seat(at(60_000), SEAT).unwrap().present);
+    assert_eq!(door.handle_datagram(at(60_000), address(1), &sealed(&joined, &sample(1, 7))), Admission::Refused(Refusal::Replayed));
+    let (anew, _) = admitted(door.handle_datagram(at(60_000), address(1), &sealed(&joined, &sample(1, 8))));
+    assert!(!anew);
+    assert!(door.seat(at(60_000), SEAT).unwrap().present);
+}
+
+#[test]
+fn a_flood_of_recorded_hellos_is_answered_so_many_times_a_second_and_changes_nothing() {
+    let mut door = keyed_door();
+    let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
+    admitted(door.handle_datagram(at(0), address(1), &sealed(&joined, &sample(1, 0))));
+    for number in 1..=30_000_u64 {
+        let now = cohaptic_units::Instant::from_nanos(number * 100_000);
+        let port = u16::try_from(number % 50_000).unwrap();
+        match door.handle_datagram(now, address(port), &joining(1).hello()) {
+            Admission::Reply { bytes, .. } => assert!(bytes.len() <= joining(1).hello().len(), "an answer amplifies nothing"),
+            Admission::Refused(cause) => assert_eq!(cause, Refusal::HandshakeLimit),
+            Admission::Sample { .. } => panic!("a hello is no sample"),
+        }
+    }
+    // Three seconds: 16 in each (the one that was answered at the start among them), and one at the beginning of the fourth.
+    let welcomed = 3 * u64::from(WELCOMES_PER_SECOND) + 1;
+    assert_counts(&door, 1, welcomed, &[(Refusal::HandshakeLimit, 30_001 - welcomed)]);
+    admitted(door.handle_datagram(at(3000), address(1), &sealed(&joined, &sample(1, 1))));
+    // The other seat has its own count.
+    let third = cohaptic_live::client::Joining::new(SESSION, Place(2), &crate::support::key(), [9; 16]);
+    assert!(matches!(door.handle_datagram(at(3000), address(3), &third.hello()), Admission::Reply { .. }));
+}
+
+#[test]
+fn each_fault_of_a_hello_has_its_own_count() {
+    let mut door = keyed_door();
+    let hello = |session: u64, place: u32| cohaptic_live::client::Joining::new(session, Place(place), &crate::support::key(), [1; 16]).hello();
+    let mut refuse = |cause: Refusal, bytes: &[u8]| {
+        assert_eq!(door.handle_datagram(at(0), address(1), bytes), Admission::Refused(cause), "{cause}");
+    };
+    let edited = |at: usize, byte: u8| {
+        let mut bytes = hello(SESSION, 1);
+        bytes[at] ^= byte;
+        bytes
+    };
+    refuse(Refusal::ForeignSession, &hello(43, 1));
+    refuse(Refusal::UnknownSeat, &hello(SESSION, 0));
+    refuse(Refusal::UnknownSeat, &hello(SESSION, u32::MAX));
+    refuse(Refusal::Version, &edited(4, 2));
+    refuse(Refusal::Reserved, &edited(6, 1));
+    refuse(Refusal::Reserved, &edited(23, 1));
+    refuse(Refusal::Reserved, &edited(71, 0x80));
+    refuse(Refusal::Forged, &edited(24, 1));
+    refuse(Refusal::Forged, &edited(87, 1));
+    refuse(Refusal::Length, &hello(SESSION, 1)[..87]);
+    refuse(Refusal::Length, &[&hello(SESSION, 1)[..], &[0]].concat());
+    assert_eq!(door.stats().welcomed, 0);
+}
+
+#[test]
+fn secrets_are_not_printed() {
+    let mut door = keyed_door();
+    let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
+    admitted(door.handle_datagram(at(0), address(1), &sealed(&joined, &sample(1, 0))));
+    let printed = format!("{door:?} {joined:?} {:?} {:?}", config().with_key(Some(crate::support::key())), joining(1));
+    // The key is 32 times 0xa5, 165.
+    assert!(!printed.contains("165, 165") && !printed.to_lowercase().contains("a5a5"), "{printed}");
+    assert!(printed.contains("SessionKey(secret)") && printed.contains("WayKey(secret)"));
+}

@@ -1,0 +1,12 @@
+//! The door against its peers and against strangers, and the example programs against the door.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, reason = "tests: what fails here fails the test, and exact values are compared")]
+#![allow(clippy::print_stderr, reason = "a test that cannot run here says so")]
+
+mod client;
+mod examples;
+mod hostile;
+mod key_files;
+mod keyed;
+mod keyless;
+mod support;
+mod vectors;

@@ -1,0 +1,110 @@
+//! Doors with two seats of three peers, and the datagrams of one peer.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use cohaptic_live::client::{Joined, Joining};
+use cohaptic_live::{Admission, Admitted, Door, DoorConfig, Entropy, EntropyError, MAX_DATAGRAM, Place, Refusal, Seat, SessionKey};
+use cohaptic_peer::{State, wire};
+use cohaptic_units::Instant;
+use proptest::prelude::ProptestConfig;
+
+pub(crate) const SESSION: u64 = 42;
+pub(crate) const STALE: Duration = Duration::from_millis(100);
+/// The seat that most tests use. Place 0 is a simulated peer.
+pub(crate) const SEAT: Place = Place(1);
+
+/// Bytes that nobody would call random, and that never repeat.
+#[derive(Default)]
+pub(crate) struct Counting(u64);
+
+impl Entropy for Counting {
+    fn fill(&mut self, bytes: &mut [u8]) -> Result<(), EntropyError> {
+        for chunk in bytes.chunks_mut(8) {
+            self.0 += 1;
+            chunk.copy_from_slice(&self.0.to_be_bytes()[..chunk.len()]);
+        }
+        Ok(())
+    }
+}
+
+/// A property test of that many cases that leaves no files behind.
+pub(crate) fn cases(count: u32) -> ProptestConfig {
+    ProptestConfig { cases: count, failure_persistence: None, ..ProptestConfig::default() }
+}
+
+pub(crate) fn key() -> SessionKey {
+    SessionKey::from_bytes([0xa5; 32])
+}
+
+pub(crate) fn config() -> DoorConfig {
+    let seats = [(2, "third"), (1, "right")].map(|(place, name)| Seat { place: Place(place), name: name.to_owned() });
+    let (tick, update) = (Duration::from_millis(1), Duration::from_millis(8));
+    DoorConfig { stale_after: STALE, ..DoorConfig::new(SESSION, 1, 3, tick, update, seats.to_vec()) }
+}
+
+pub(crate) fn keyless_door() -> Door {
+    Door::new(config(), &mut Counting::default()).unwrap()
+}
+
+pub(crate) fn keyed_door() -> Door {
+    Door::new(config().with_key(Some(key())), &mut Counting::default()).unwrap()
+}
+
+pub(crate) fn at(millis: u64) -> Instant {
+    Instant::from_nanos(millis * 1_000_000)
+}
+
+pub(crate) fn address(port: u16) -> SocketAddr {
+    SocketAddr::from(([192, 0, 2, 1], port))
+}
+
+/// A sample of one axis.
+pub(crate) fn sample(sender: u32, sequence: u64) -> Vec<u8> {
+    let state = State { position: [0.025], velocity: [-1.5] };
+    encode(&wire::Sample { session: SESSION, sender, sequence, sent: at(8 * (sequence % 1_000_000)), state })
+}
+
+pub(crate) fn encode(sample: &wire::Sample<1>) -> Vec<u8> {
+    let mut buffer = [0; wire::MAX_LEN];
+    let len = sample.encode(1, &mut buffer);
+    buffer[..len].to_vec()
+}
+
+pub(crate) fn joining(nonce: u8) -> Joining {
+    Joining::new(SESSION, SEAT, &key(), [nonce; 16])
+}
+
+/// Says hello and takes the welcome.
+pub(crate) fn shake_hands(door: &mut Door, now: Instant, from: SocketAddr, joining: &Joining) -> Joined {
+    let Admission::Reply { to, bytes } = door.handle_datagram(now, from, &joining.hello()) else { panic!("no welcome") };
+    assert_eq!(to, from);
+    joining.handle_welcome(&bytes).unwrap()
+}
+
+pub(crate) fn sealed(joined: &Joined, sample: &[u8]) -> Vec<u8> {
+    let mut out = [0; MAX_DATAGRAM];
+    let len = joined.seal(sample, &mut out).unwrap();
+    out[..len].to_vec()
+}
+
+pub(crate) fn admitted(admission: Admission) -> (bool, Admitted) {
+    match admission {
+        Admission::Sample { place, joined, sample } => {
+            assert_eq!(place, SEAT);
+            (joined, sample)
+        }
+        other @ (Admission::Reply { .. } | Admission::Refused(_)) => panic!("a sample was expected: {other:?}"),
+    }
+}
+
+/// Every counter is what is listed; those that are not listed are zero. And nothing was lost between them.
+pub(crate) fn assert_counts(door: &Door, admitted: u64, welcomed: u64, refused: &[(Refusal, u64)]) {
+    let stats = door.stats();
+    let found: Vec<_> = stats.refusals().filter(|&(_, count)| count > 0).collect();
+    let mut expected: Vec<_> = refused.iter().copied().filter(|&(_, count)| count > 0).collect();
+    expected.sort_unstable();
+    assert_eq!(found, expected);
+    assert_eq!((stats.admitted, stats.welcomed), (admitted, welcomed));
+    assert_eq!(stats.handled, admitted + welcomed + stats.refused_in_all());
+}
