@@ -12,7 +12,7 @@
 //! ```
 //!
 //! [`prepare_thread`] asks the system for what helps: no timer slack, `SCHED_FIFO`, locked memory; each is granted or refused with a plain message.
-//! Linux only. This crate knows nothing of links, peers or sockets but that something can become readable.
+//! [`udp`] has sockets that know when each datagram came in. Linux only. This crate knows nothing of links, peers, or what is in a datagram.
 //!
 //! ```
 //! use std::time::Duration;
@@ -38,6 +38,7 @@ mod lateness;
 mod pacer;
 mod thread;
 mod tolerance;
+pub mod udp;
 
 pub use clock::{Clock, KernelStamps, MonotonicClock};
 pub use lateness::{Lateness, LatenessSummary};

@@ -7,9 +7,21 @@ use std::collections::BTreeMap;
 pub(crate) struct Names {
     ordered: Vec<String>,
     places: BTreeMap<String, usize>,
+    /// What they are the names of, if not of peers.
+    noun: Option<&'static str>,
 }
 
 impl Names {
+    /// No names yet, of what messages call `noun`.
+    pub(crate) fn of(noun: &'static str) -> Self {
+        Self { noun: Some(noun), ..Self::default() }
+    }
+
+    /// What they are the names of: `peer`.
+    pub(crate) fn noun(&self) -> &'static str {
+        self.noun.unwrap_or("peer")
+    }
+
     /// Takes one more; `false` if it is there already.
     pub(crate) fn push(&mut self, name: &str) -> bool {
         if self.places.contains_key(name) {

@@ -26,16 +26,7 @@ impl Scene {
     ///
     /// [`SceneError::Read`] if the file, or one that it names, cannot be read; [`SceneError::Invalid`] for anything else.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
-        match core::str::from_utf8(&bytes) {
-            Ok(text) => Self::parse(text, path, overrides),
-            Err(error) => {
-                let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
-                // Up to the place, the text with replacements is the text itself.
-                let sources = Sources { file: path, text: &String::from_utf8_lossy(&bytes), overrides: &[] };
-                Err(invalid(sources.diagnostic(place, String::new(), "not UTF-8: expected a text file in TOML".to_owned())))
-            }
-        }
+        read_file(path, overrides, read_document)
     }
 
     /// Reads a scene from a text. `file` stands in messages, and its folder is where files that the scene names are looked for.
@@ -44,25 +35,49 @@ impl Scene {
     ///
     /// As [`Scene::read`]. Of several faults, the one that stands first in the text; faults in overrides come after those in the text.
     pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let sources = Sources { file, text, overrides };
-        let mut document = parse_toml(text, sources)?;
-        let faults = Faults::default();
-        let files = Files::default();
-        let context = Context { sources, faults: &faults, files: &files, axes: None, names: None, modulators: None, partial: false };
-        overrides::apply(&mut document, overrides, context);
-        let scene = read_document(&document, context);
-        match (faults.into_first(), scene) {
-            (Some(error), _) => Err(error),
-            (None, Some(scene)) => Ok(scene),
-            // Not reached: a reader that answers nothing has reported why. An error all the same, because text must never be able to cause a panic.
-            (None, None) => Err(invalid(sources.diagnostic(BEGINNING, String::new(), "the scene is refused: expected another one".to_owned()))),
-        }
+        parse_text(text, file, overrides, read_document)
     }
 
     /// The place of a peer in [`Scene::peers`], by its name.
     #[must_use]
     pub fn peer_index(&self, name: &str) -> Option<usize> {
         self.peers.iter().position(|peer| peer.name == name)
+    }
+}
+
+/// Reads a file that `read` takes.
+pub(crate) fn read_file<T>(path: &Path, overrides: &[String], read: impl FnOnce(&Node, Context<'_>) -> Option<T>) -> Result<T, SceneError> {
+    let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
+    match core::str::from_utf8(&bytes) {
+        Ok(text) => parse_text(text, path, overrides, read),
+        Err(error) => {
+            let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
+            // Up to the place, the text with replacements is the text itself.
+            let sources = Sources { file: path, text: &String::from_utf8_lossy(&bytes), overrides: &[] };
+            Err(invalid(sources.diagnostic(place, String::new(), "not UTF-8: expected a text file in TOML".to_owned())))
+        }
+    }
+}
+
+/// Reads a text that `read` takes.
+pub(crate) fn parse_text<T>(
+    text: &str,
+    file: &Path,
+    overrides: &[String],
+    read: impl FnOnce(&Node, Context<'_>) -> Option<T>,
+) -> Result<T, SceneError> {
+    let sources = Sources { file, text, overrides };
+    let mut document = parse_toml(text, sources)?;
+    let faults = Faults::default();
+    let files = Files::default();
+    let context = Context { sources, faults: &faults, files: &files, axes: None, names: None, modulators: None, partial: false };
+    overrides::apply(&mut document, overrides, context);
+    let whole = read(&document, context);
+    match (faults.into_first(), whole) {
+        (Some(error), _) => Err(error),
+        (None, Some(whole)) => Ok(whole),
+        // Not reached: a reader that answers nothing has reported why. An error all the same, because text must never be able to cause a panic.
+        (None, None) => Err(invalid(sources.diagnostic(BEGINNING, String::new(), "the file is refused: expected another one".to_owned()))),
     }
 }
 
@@ -121,7 +136,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<Scene> {
 }
 
 /// The name of the file without its ending.
-fn default_title(file: &Path) -> String {
+pub(crate) fn default_title(file: &Path) -> String {
     file.file_stem().map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 

@@ -178,11 +178,11 @@ impl Table {
     }
 }
 
-/// How an element of a list is called in a path: peers, modulators and their states by name, links by both ends, others by their place from 0.
+/// How an element of a list is called in a path: peers, programs, modulators and their states by name, links by both ends, others by their place from 0.
 fn element_name(list: &str, index: usize, element: &DeValue<'_>) -> String {
     let text = |key: &str| element.as_table().and_then(|table| table.get(key)).and_then(|value| value.get_ref().as_str());
     match list {
-        "peers" | "modulators" => text("name").map(str::to_owned),
+        "peers" | "programs" | "modulators" => text("name").map(str::to_owned),
         list if list.starts_with("modulators.") && list.ends_with(".states") => text("name").map(str::to_owned),
         "links" => text("from").zip(text("to")).map(|(from, to)| format!("{from}.{to}")),
         _ => None,

@@ -48,3 +48,5 @@ fn the_two_clocks_read_together_place_a_stamp_of_now_at_now() {
     assert!(placed <= before + Duration::from_millis(1) || placed <= clock.now());
     assert!(placed > cohaptic_units::Instant::ZERO);
 }
+
+mod udp;

@@ -3,7 +3,7 @@
 mod expect;
 mod hand;
 mod header;
-mod link;
+pub(crate) mod link;
 mod links;
 mod modulators;
 mod motion_file;
@@ -11,7 +11,7 @@ mod named_file;
 mod object;
 mod peer;
 mod peers;
-mod selector;
+pub(crate) mod selector;
 mod sojourn;
 mod timeline;
 

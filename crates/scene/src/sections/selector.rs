@@ -2,21 +2,22 @@
 
 use crate::context::Context;
 use crate::model::LinkSelector;
-use crate::names::one_of;
+use crate::names::{Names, one_of};
 use crate::table_reader::TableReader;
 use crate::tree::{Node, quote};
 use crate::values;
 
 /// The peer of that name, by its place.
 pub(crate) fn read_peer_name(node: &Node, context: Context<'_>) -> Option<usize> {
-    let name = values::text(node, context, "the name of a peer")?;
+    let expected = format!("the name of a {}", context.names.map_or("peer", Names::noun));
+    let name = values::text(node, context, &expected)?;
     // Without the list of names, the fault is there.
     let names = context.names?;
     let index = names.index(name);
     if index.is_none() {
         context.fault_with(node, || {
             let expected = one_of(names.as_slice().iter().map(String::as_str), name);
-            format!("there is no peer {}: expected {expected}", quote(name))
+            format!("there is no {} {}: expected {expected}", names.noun(), quote(name))
         });
     }
     index
@@ -43,11 +44,12 @@ pub(crate) fn check_axis(node: &Node, context: Context<'_>, axis: usize) -> Opti
 /// The two ends of a link, which differ: `from` and `to` of a table that may have other keys.
 pub(crate) fn read_ends(table: &mut TableReader<'_>, context: Context<'_>) -> Option<(usize, usize)> {
     let to_node = table.get("to");
-    let from = table.required("from", "the name of the peer that sends", read_peer_name);
-    let to = table.required("to", "the name of the peer that receives", read_peer_name);
+    let noun = context.names.map_or("peer", Names::noun);
+    let from = table.required("from", &format!("the name of the {noun} that sends"), read_peer_name);
+    let to = table.required("to", &format!("the name of the {noun} that receives"), read_peer_name);
     let (from, to) = (from?, to?);
     if from == to {
-        context.fault_at(to_node?, "a peer has no link to itself: expected the name of another peer");
+        context.fault_at(to_node?, format!("a {noun} has no link to itself: expected the name of another {noun}"));
         return None;
     }
     Some((from, to))

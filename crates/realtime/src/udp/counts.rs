@@ -1,0 +1,100 @@
+//! What a socket did, and why it did not do the rest.
+
+use std::io;
+
+use rustix::io::Errno;
+
+/// What a socket did so far.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct DoorCounts {
+    /// Datagrams that came in and were handed on.
+    pub received: u64,
+    /// Datagrams that came in and were dropped, because they were longer than this socket takes.
+    pub oversized: u64,
+    /// Errors on receiving: somebody said that an earlier datagram had not arrived. They do no harm.
+    pub receive_errors: u64,
+    /// Datagrams that the kernel took.
+    pub sent: u64,
+    /// Datagrams that were not sent.
+    pub failures: SendFailures,
+    /// Calls of the kernel to send: fewer than datagrams where several went in one.
+    pub send_calls: u64,
+}
+
+/// Datagrams that were not sent, by reason.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct SendFailures {
+    /// The kernel's buffer was full, and as many as may wait were waiting.
+    pub full: u64,
+    /// Nobody listens there. On loopback the kernel may say so of an earlier datagram.
+    pub refused: u64,
+    /// No route leads there, or the network is down.
+    pub unreachable: u64,
+    /// Longer than the way there takes in one piece.
+    pub too_large: u64,
+    /// A rule of this system forbids it.
+    pub forbidden: u64,
+    /// Anything else.
+    pub other: u64,
+}
+
+impl SendFailures {
+    /// All of them.
+    #[must_use]
+    pub const fn in_all(&self) -> u64 {
+        self.full + self.refused + self.unreachable + self.too_large + self.forbidden + self.other
+    }
+
+    /// Each reason with its name in JSON and how often.
+    #[must_use]
+    pub const fn by_reason(&self) -> [(&'static str, u64); 6] {
+        [
+            ("full", self.full),
+            ("refused", self.refused),
+            ("unreachable", self.unreachable),
+            ("too-large", self.too_large),
+            ("forbidden", self.forbidden),
+            ("other", self.other),
+        ]
+    }
+
+    /// One datagram was not sent, for this reason.
+    pub(super) fn count(&mut self, error: &io::Error) {
+        let counter = match Errno::from_io_error(error).unwrap_or(Errno::IO) {
+            Errno::AGAIN | Errno::NOBUFS | Errno::NOMEM => &mut self.full,
+            Errno::CONNREFUSED | Errno::CONNRESET => &mut self.refused,
+            Errno::NETUNREACH | Errno::HOSTUNREACH | Errno::NETDOWN | Errno::HOSTDOWN | Errno::ADDRNOTAVAIL => &mut self.unreachable,
+            Errno::MSGSIZE => &mut self.too_large,
+            Errno::PERM | Errno::ACCESS => &mut self.forbidden,
+            _ => &mut self.other,
+        };
+        *counter += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_error_of_the_kernel_is_counted_under_one_reason() {
+        let reasons = [
+            (Errno::AGAIN, "full"),
+            (Errno::NOBUFS, "full"),
+            (Errno::CONNREFUSED, "refused"),
+            (Errno::NETUNREACH, "unreachable"),
+            (Errno::HOSTUNREACH, "unreachable"),
+            (Errno::MSGSIZE, "too-large"),
+            (Errno::PERM, "forbidden"),
+            (Errno::ACCESS, "forbidden"),
+            (Errno::INVAL, "other"),
+        ];
+        for (errno, expected) in reasons {
+            let mut failures = SendFailures::default();
+            failures.count(&errno.into());
+            let counted: Vec<_> = failures.by_reason().into_iter().filter(|(_, count)| *count > 0).collect();
+            assert_eq!(counted, [(expected, 1)], "{errno}");
+            assert_eq!(failures.in_all(), 1);
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! Sockets on loopback: every datagram is there, whole, once and in order; nothing here depends on how fast.
+
+use std::net::{SocketAddr, UdpSocket};
+use std::os::fd::AsFd as _;
+use std::time::Duration;
+
+use cohaptic_realtime::udp::{DoorConfig, Ecn, ReceiveBuffers, UdpDoor};
+use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Pacing};
+use cohaptic_units::Instant;
+
+type Received = (SocketAddr, Vec<u8>, Option<Ecn>, Instant);
+
+const LOOPBACKS: [&str; 2] = ["127.0.0.1:0", "[::1]:0"];
+
+fn door(address: &str, config: DoorConfig) -> UdpDoor {
+    UdpDoor::bind(address.parse().unwrap(), config).unwrap()
+}
+
+/// Reads until there are so many; the wait is for a machine that is busy, and ends as soon as they are there.
+fn receive(door: &mut UdpDoor, clock: &MonotonicClock, count: usize) -> Vec<Received> {
+    let (mut buffers, mut received) = (ReceiveBuffers::new(), Vec::new());
+    let end = clock.now() + Duration::from_secs(20);
+    while received.len() < count && clock.now() < end {
+        Pacer::new(Pacing::Sleep).wait(clock, Some(end), &[door.as_fd()]).unwrap();
+        door.receive(&mut buffers, clock, |datagram| received.push((datagram.from, datagram.bytes.to_vec(), datagram.ecn, datagram.at))).unwrap();
+    }
+    received
+}
+
+#[test]
+fn what_goes_out_together_comes_in_one_by_one_in_order_with_its_congestion_bits() {
+    for address in LOOPBACKS {
+        let clock = MonotonicClock::start();
+        let (mut sender, mut receiver) = (door(address, DoorConfig::default()), door(address, DoorConfig::default()));
+        let lengths: Vec<usize> = (0..200).map(|n| [64, 64, 64, 64, 9, 0, 1232, 1232, 3000, 64][n % 10]).collect();
+        let ecn = |n: usize| [None, Some(Ecn::Ect0), Some(Ecn::Ect1), Some(Ecn::Ce)][n / 50];
+        let before = clock.now();
+        let mut received = Vec::new();
+        // In parts, so that the smallest buffer that a system may grant takes each of them.
+        for part in 0..10 {
+            for (n, length) in lengths.iter().enumerate().skip(part * 20).take(20) {
+                let content: Vec<u8> = (0..*length).map(|place| u8::try_from((n + place) % 256).unwrap()).collect();
+                sender.queue(receiver.local_address(), &content, ecn(n));
+            }
+            sender.flush();
+            received.extend(receive(&mut receiver, &clock, 20));
+        }
+        let after = clock.now();
+        assert_eq!(received.len(), 200);
+        for (n, (from, bytes, marks, at)) in received.iter().enumerate() {
+            assert_eq!((*from, bytes.len(), *marks), (sender.local_address(), lengths[n], ecn(n)), "{n}");
+            assert!(bytes.iter().enumerate().all(|(place, byte)| usize::from(*byte) == (n + place) % 256));
+            assert!((before..=after).contains(at));
+        }
+        assert_eq!((sender.counts().sent, sender.counts().failures.in_all(), receiver.counts().received), (200, 0, 200));
+        assert!(sender.counts().send_calls <= 200);
+        assert_eq!(receiver.kernel_drops().unwrap(), Some(0));
+    }
+}
+
+#[test]
+fn the_longest_datagram_is_whole_and_a_longer_one_than_asked_for_is_counted() {
+    let clock = MonotonicClock::start();
+    let mut wide = door("127.0.0.1:0", DoorConfig::default());
+    let mut narrow = door("127.0.0.1:0", DoorConfig { largest: 100, ..DoorConfig::default() });
+    let mut sender = door("127.0.0.1:0", DoorConfig::default());
+    // 65,535 bytes less the headers of IPv4 and UDP.
+    let longest: Vec<u8> = (0..65_507_u32).map(|n| u8::try_from(n % 251).unwrap()).collect();
+    sender.queue(wide.local_address(), &longest, None);
+    for length in [101, 100, 99] {
+        sender.queue(narrow.local_address(), &longest[..length], None);
+    }
+    sender.queue(wide.local_address(), &[0; 65_508], None);
+    sender.flush();
+    assert_eq!(receive(&mut wide, &clock, 1)[0].1, longest);
+    let lengths: Vec<usize> = receive(&mut narrow, &clock, 2).iter().map(|(_, bytes, ..)| bytes.len()).collect();
+    assert_eq!((lengths, narrow.counts().oversized), (vec![100, 99], 1));
+    assert_eq!((sender.counts().sent, sender.counts().failures.too_large), (4, 1));
+}
+
+#[test]
+fn one_that_cannot_be_sent_is_counted_and_the_others_go_on() {
+    let clock = MonotonicClock::start();
+    let (mut sender, mut receiver) = (door("127.0.0.1:0", DoorConfig::default()), door("127.0.0.1:0", DoorConfig::default()));
+    let there = receiver.local_address();
+    let nobody = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    sender.queue(there, b"first", None);
+    // No port 0 can be sent to.
+    sender.queue("127.0.0.1:0".parse().unwrap(), b"nowhere", None);
+    // An IPv6 address from an IPv4 socket.
+    sender.queue("[::1]:9".parse().unwrap(), b"nowhere", None);
+    // Nobody listens: the kernel takes it all the same.
+    sender.queue(nobody, b"nobody", None);
+    sender.queue(there, b"last", None);
+    sender.flush();
+    let texts: Vec<Vec<u8>> = receive(&mut receiver, &clock, 2).into_iter().map(|(_, bytes, ..)| bytes).collect();
+    assert_eq!(texts, [b"first".to_vec(), b"last".to_vec()]);
+    assert_eq!((sender.counts().sent, sender.counts().failures.in_all()), (3, 2));
+    assert!(!sender.has_waiting());
+}
+
+#[test]
+fn what_waits_is_bounded_and_what_the_kernel_drops_is_known() {
+    let mut sender = door("127.0.0.1:0", DoorConfig { waiting: 3, ..DoorConfig::default() });
+    // The least buffer that Linux grants takes a few datagrams.
+    let small = door("127.0.0.1:0", DoorConfig { receive_buffer: 1, ..DoorConfig::default() });
+    assert!(small.granted_receive_buffer() > 0);
+    for _ in 0..5 {
+        sender.queue(small.local_address(), &[0; 64], None);
+    }
+    assert!(sender.has_waiting());
+    sender.flush();
+    assert_eq!((sender.counts().sent, sender.counts().failures.full), (3, 2));
+    for _ in 0..100 {
+        sender.queue(small.local_address(), &[0; 1000], None);
+        sender.flush();
+    }
+    assert!(small.kernel_drops().unwrap().unwrap() > 0);
+}
+
+#[test]
+fn an_address_that_is_taken_is_refused_with_the_address() {
+    let first = door("[::1]:0", DoorConfig::default());
+    let error = UdpDoor::bind(first.local_address(), DoorConfig::default()).unwrap_err();
+    assert_eq!(error.address, first.local_address());
+    assert!(error.to_string().starts_with(&format!("cannot listen on {}: ", first.local_address())), "{error}");
+    // The same port of the other family is another socket.
+    let v4 = SocketAddr::new([127, 0, 0, 1].into(), first.local_address().port());
+    if let Err(error) = UdpDoor::bind(v4, DoorConfig::default()) {
+        // Somebody else may have it.
+        assert_eq!(error.source.kind(), std::io::ErrorKind::AddrInUse);
+    }
+}
