@@ -14,9 +14,12 @@ mod board;
 mod description;
 mod editor;
 mod http;
+mod metrics;
 mod server;
 mod snapshot;
 mod token;
+mod toml_text;
+mod views;
 
 pub use board::{Board, Latest};
 pub use description::{Description, Kind, LinkName, PeerName};
