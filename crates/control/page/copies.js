@@ -1,0 +1,176 @@
+// ---- The copies of the object, and the peers that hold them.
+
+/** What is drawn: it follows what was measured, so that ten states a second look like motion. */
+let bodies = [];
+let view = null;
+let trails = [];
+
+/** How long a trail is [ms], and how fast the picture follows [ms]. */
+const TRAIL = 2500;
+const FOLLOW = 60;
+
+function takePeers(peers) {
+  $('people').hidden = peers.length === 0;
+  const moving = peers.some((peer) => peer.position.length > 0);
+  $('copies').hidden = !moving;
+  if (bodies.length !== peers.length) {
+    bodies = [];
+    trails = [];
+    view = null;
+  }
+  bodies = peers.map((peer, i) => ({ peer, at: bodies[i] && bodies[i].at.length === peer.position.length ? bodies[i].at : [...peer.position] }));
+  showPeers(peers);
+}
+
+const PRESENCE = { here: 'here', present: 'present', stale: 'stale', absent: 'absent' };
+
+function showPeers(peers) {
+  const body = $('peers');
+  while (body.rows.length > peers.length) body.deleteRow(-1);
+  peers.forEach((peer, i) => {
+    let tr = body.rows[i];
+    if (!tr) {
+      tr = body.insertRow();
+      const name = make('th', 'name');
+      name.scope = 'row';
+      name.append(make('span', 'swatch'), make('span'));
+      const status = make('td');
+      status.append(make('span', 'pill'));
+      tr.append(name, status, make('td', 'n'), make('td', 'n'));
+    }
+    const [name, status, position, force] = tr.cells;
+    name.firstChild.style.background = colour(i);
+    put(name.lastChild, peer.name);
+    name.title = peer.kind;
+    const pill = status.firstChild;
+    const age = peer.age_s === null ? '' : ' · heard ' + span(peer.age_s, 2) + ' ago';
+    put(pill, PRESENCE[peer.status] + (peer.status === 'stale' ? age : ''));
+    pill.title = peer.kind + age;
+    pill.className = 'pill ' + peer.status;
+    tr.classList.toggle('old', peer.status === 'stale' || peer.status === 'absent');
+    put(position, peer.position.length ? peer.position.map(metres).join(', ') : '–');
+    put(force, peer.force.length ? peer.force.map((f) => f.toFixed(2)).join(', ') + ' N' : '–');
+  });
+}
+
+/** Draws the copies; called for each frame of the screen while there are any. */
+function drawCopies(passed) {
+  const canvas = $('copies');
+  if (canvas.hidden || $('people').hidden) return;
+  const { context, width, height } = prepare(canvas);
+  const known = bodies.filter((body) => body.peer.position.length > 0 && body.peer.position.every(Number.isFinite));
+  if (known.length === 0 || width === 0) return;
+  const flat = known.every((body) => body.peer.position.length === 1);
+  for (const body of known) {
+    body.at = body.at.map((at, axis) => at + (body.peer.position[axis] - at) * (1 - Math.exp(-passed / FOLLOW)));
+    if (!body.at.every(Number.isFinite)) body.at = [...body.peer.position];
+  }
+  const now = performance.now();
+  trails.push({ now, at: bodies.map((body) => body.at) });
+  while (trails.length > 0 && trails[0].now < now - TRAIL) trails.shift();
+  const area = { left: 16, right: width - 16, top: 14, bottom: height - 26 };
+  look(known, flat, area);
+  const x = (m) => (area.left + area.right) / 2 + (m - view.x) * view.scale;
+  const lane = (area.bottom - area.top) / bodies.length;
+  const y = (at, i) => (flat ? area.top + lane * (i + 0.5) : (area.top + area.bottom) / 2 - (at[1] - view.y) * view.scale);
+  axes(context, area, x, flat, height);
+  const size = Math.max(9, Math.min(30, (flat ? lane : height) * (flat ? 0.6 : 0.09)));
+  bodies.forEach((body, i) => {
+    if (!known.includes(body)) return;
+    context.strokeStyle = colour(i);
+    context.lineWidth = 2;
+    for (let k = 1; k < trails.length; k += 1) {
+      const [from, to] = [trails[k - 1].at[i], trails[k].at[i]];
+      if (!from || !to || from.length !== body.at.length || to.length !== body.at.length) continue;
+      context.globalAlpha = 0.5 * (1 - (now - trails[k].now) / TRAIL);
+      context.beginPath();
+      context.moveTo(x(from[0]), y(from, i));
+      context.lineTo(x(to[0]), y(to, i));
+      context.stroke();
+    }
+  });
+  bodies.forEach((body, i) => {
+    if (known.includes(body)) cube(context, x(body.at[0]), y(body.at, i), size, colour(i), body.peer);
+  });
+}
+
+/** Where the picture looks: wide enough for all trails, and steady. */
+function look(known, flat, area) {
+  const low = [Infinity, Infinity];
+  const high = [-Infinity, -Infinity];
+  for (const at of [...trails.flatMap((trail) => trail.at), ...known.map((body) => body.peer.position)]) {
+    at.slice(0, 2).forEach((value, axis) => {
+      if (!Number.isFinite(value)) return;
+      low[axis] = Math.min(low[axis], value);
+      high[axis] = Math.max(high[axis], value);
+    });
+  }
+  const inside = view && [0, 1].every((axis) => !Number.isFinite(low[axis]) || (low[axis] >= view.low[axis] && high[axis] <= view.high[axis]));
+  const wide = view && !flat ? Math.max(high[0] - low[0], high[1] - low[1]) : high[0] - low[0];
+  if (inside && wide > view.wide / 6 - 1e-12) {
+    fit(flat, area);
+    return;
+  }
+  const spread = Math.max(wide, high[0] - low[0], flat ? 0 : high[1] - low[1], 0.01);
+  const middle = low.map((value, axis) => (Number.isFinite(value) ? (value + high[axis]) / 2 : 0));
+  view = { x: middle[0], y: middle[1], low: middle.map((m) => m - spread), high: middle.map((m) => m + spread), wide: 2 * spread, scale: 1 };
+  fit(flat, area);
+}
+
+function fit(flat, area) {
+  const across = (area.right - area.left) / view.wide;
+  view.scale = flat ? across : Math.min(across, (area.bottom - area.top) / view.wide);
+}
+
+function axes(context, area, x, flat, height) {
+  const metresOfPoint = 1 / view.scale;
+  const step = round125(90 * metresOfPoint);
+  context.globalAlpha = 1;
+  context.strokeStyle = ink.line;
+  context.fillStyle = ink.soft;
+  context.textAlign = 'center';
+  context.lineWidth = 1;
+  const from = view.x - ((area.right - area.left) / 2) * metresOfPoint;
+  for (let k = Math.ceil(from / step); x(k * step) <= area.right; k += 1) {
+    const at = Math.round(x(k * step)) + 0.5;
+    context.beginPath();
+    context.moveTo(at, area.top - 8);
+    context.lineTo(at, area.bottom + 6);
+    context.stroke();
+    const value = Number((k * step).toPrecision(6));
+    context.fillText(step >= 0.5 ? value + ' m' : Number((value * 1e3).toPrecision(6)) + ' mm', at, height - 6);
+  }
+  if (flat) return;
+  const middle = (area.top + area.bottom) / 2;
+  context.textAlign = 'left';
+  const half = ((area.bottom - area.top) / 2) * metresOfPoint;
+  for (let k = Math.ceil((view.y - half) / step); k * step <= view.y + half; k += 1) {
+    const at = Math.round(middle - (k * step - view.y) * view.scale) + 0.5;
+    context.beginPath();
+    context.moveTo(area.left, at);
+    context.lineTo(area.right, at);
+    context.stroke();
+  }
+}
+
+/** One copy. One that is old is an outline. */
+function cube(context, x, y, size, style, peer) {
+  const old = peer.status === 'stale' || peer.status === 'absent';
+  context.globalAlpha = 1;
+  context.beginPath();
+  context.roundRect(x - size / 2, y - size / 2, size, size, size / 5);
+  context.lineWidth = 2;
+  context.strokeStyle = style;
+  context.setLineDash(old ? [4, 3] : []);
+  context.globalAlpha = old ? 0.15 : 0.85;
+  context.fillStyle = style;
+  context.fill();
+  context.globalAlpha = 1;
+  context.stroke();
+  context.setLineDash([]);
+  context.fillStyle = ink.text;
+  context.textAlign = 'left';
+  context.textBaseline = 'middle';
+  context.fillText(peer.name + (old ? ' (' + peer.status + ')' : ''), x + size / 2 + 6, y);
+  context.textBaseline = 'alphabetic';
+}

@@ -1,0 +1,165 @@
+// ---- Changes.
+
+/** From `from` to `to` in steps, both included. */
+function steps(...ranges) {
+  const values = [];
+  for (const [from, to, step] of ranges) {
+    const n = Math.round((to - from) / step);
+    for (let i = 0; i <= n; i += 1) values.push(Number((from + i * step).toPrecision(6)));
+  }
+  return values;
+}
+
+const SPANS = { ns: 1e-6, us: 1e-3, 'µs': 1e-3, ms: 1, s: 1e3, min: 6e4, h: 3.6e6 };
+const RATES = { bit: 1, kbit: 1e3, Mbit: 1e6, Gbit: 1e9, 'bit/s': 1, 'kbit/s': 1e3, 'Mbit/s': 1e6, 'Gbit/s': 1e9 };
+const DECADES = [1e4, 1e5, 1e6, 1e7, 1e8, 1e9].flatMap((decade) => [1, 1.5, 2, 3, 5, 7].map((n) => n * decade));
+
+/** What has a slider: every place of it is a value that somebody may want. */
+const SLIDERS = [
+  { key: 'delay', empty: '0ms', values: steps([0, 50, 1], [55, 200, 5], [250, 1000, 50]), units: SPANS, text: (ms) => ms + 'ms' },
+  { key: 'jitter', empty: '0ms', values: steps([0, 10, 0.5], [12, 50, 2], [60, 200, 10]), units: SPANS, text: (ms) => ms + 'ms' },
+  { key: 'loss', empty: '0%', values: steps([0, 1, 0.1], [1.5, 10, 0.5], [12, 20, 2], [25, 50, 5], [60, 100, 10]), units: { '%': 1, '': 100 }, text: (p) => p + '%' },
+  { key: 'rate', empty: 'unlimited', values: [...DECADES, 1e10, Infinity], units: RATES, text: rateText },
+];
+
+const OTHER_KEYS = ['order', 'mark-instead-of-loss', 'duplicate', 'corrupt', 'reorder', 'queue', 'overhead', 'cells', 'token-bucket', 'slots', 'mtu', 'limit', 'outage', 'trace', 'modulated', 'replay', 'netem', 'netem-profile'];
+
+function rateText(rate) {
+  if (rate === Infinity) return 'unlimited';
+  const [factor, unit] = [[1e9, 'Gbit'], [1e6, 'Mbit'], [1e3, 'kbit']].find(([from]) => rate >= from) || [1, 'bit'];
+  return rate / factor + unit;
+}
+
+/** The place of the nearest value. */
+function nearest(values, number) {
+  let best = 0;
+  values.forEach((value, i) => {
+    if (number === value || Math.abs(value - number) < Math.abs(values[best] - number)) best = i;
+  });
+  return best;
+}
+
+function makeSliders() {
+  for (const slider of SLIDERS) {
+    const row = make('div', 'slider');
+    const label = make('label', '', slider.key);
+    slider.range = make('input');
+    slider.range.type = 'range';
+    slider.range.id = 'slider-' + slider.key;
+    slider.range.min = '0';
+    slider.range.max = String(slider.values.length - 1);
+    label.htmlFor = slider.range.id;
+    slider.field = make('input');
+    slider.field.type = 'text';
+    slider.field.id = 'field-' + slider.key;
+    slider.field.spellcheck = false;
+    slider.field.autocomplete = 'off';
+    slider.field.setAttribute('aria-label', slider.key + ' as text; Enter sets it');
+    row.append(label, slider.range, slider.field);
+    $('sliders').append(row);
+    slider.range.addEventListener('input', () => {
+      slider.typing = false;
+      slider.field.value = slider.text(slider.values[Number(slider.range.value)]);
+      slider.range.setAttribute('aria-valuetext', slider.field.value);
+      submit({ [slider.key]: slider.field.value });
+    });
+    // A text that was begun is nobody else's to overwrite, until it is set or given up.
+    slider.field.addEventListener('input', () => { slider.typing = true; });
+    slider.field.addEventListener('keydown', (event) => {
+      if (event.key === 'Enter' && slider.field.value.trim() !== '') {
+        slider.typing = false;
+        submit({ [slider.key]: slider.field.value.trim() });
+      } else if (event.key === 'Escape') {
+        slider.typing = false;
+        showKeys();
+      }
+    });
+  }
+  $('known-keys').append(...OTHER_KEYS.map((key) => Object.assign(make('option'), { value: key })));
+  $('all').addEventListener('change', showTarget);
+  $('other').addEventListener('submit', (event) => {
+    event.preventDefault();
+    const key = $('other-key').value.trim();
+    if (key === '') $('other-key').focus();
+    else submit({ [key]: $('other-value').value.trim() });
+  });
+  $('other-key').addEventListener('change', () => {
+    const now = (keys[chosen] || {})[$('other-key').value.trim()];
+    if (now !== undefined && $('other-value').value === '') $('other-value').value = now;
+  });
+}
+
+function showTarget() {
+  const row = rows[chosen];
+  const name = row ? row.tr.querySelector('label').textContent : 'a link';
+  put($('target'), $('all').checked && rows.length > 1 ? 'all ' + rows.length + ' links' : name);
+  put($('drops-link'), name);
+}
+
+/** Puts sliders and texts where the chosen link is, but for what somebody is changing right now. */
+function showKeys() {
+  const now = keys[chosen];
+  if (!now) return;
+  for (const slider of SLIDERS) {
+    const text = now[slider.key] ?? slider.empty;
+    const number = text === 'unlimited' ? Infinity : measured(text, slider.units);
+    if (!slider.typing && !waiting && !sending) {
+      slider.field.value = text;
+      // A law or a table has no place on a slider.
+      slider.range.classList.toggle('elsewhere', number === null);
+      slider.range.value = String(nearest(slider.values, number ?? 0));
+      slider.range.setAttribute('aria-valuetext', text);
+    }
+  }
+  const others = Object.entries(now).filter(([key]) => !SLIDERS.some((slider) => slider.key === key));
+  const list = others.map(([key, value]) => {
+    const button = make('button', 'key', key + ' = ' + value);
+    button.type = 'button';
+    button.title = 'change it';
+    button.addEventListener('click', () => {
+      $('other-key').value = key;
+      $('other-value').value = value;
+      $('other-value').focus();
+    });
+    return button;
+  });
+  const box = $('keys-now');
+  if (box.textContent !== list.map((node) => node.textContent).join('')) box.replaceChildren(...list);
+}
+
+/** What waits to be sent while a request is on its way: of a slider that moves fast, the last place is what counts. */
+let waiting = null;
+let sending = false;
+
+function submit(change) {
+  const path = $('all').checked ? '/api/links' : '/api/links/' + chosen;
+  if (waiting && waiting.path === path) Object.assign(waiting.change, change);
+  else waiting = { path, change: { ...change } };
+  if (!sending) send();
+}
+
+async function send() {
+  sending = true;
+  while (waiting) {
+    const { path, change } = waiting;
+    waiting = null;
+    const words = Object.entries(change).map(([key, value]) => key + ' = ' + value).join(', ');
+    try {
+      const body = await ask(path, { method: 'PATCH', body: JSON.stringify(change) });
+      if (!waiting) sending = false;
+      takeKeys(body.links || [body]);
+      say(words + (body.links ? ' on all links' : ''), false);
+    } catch (error) {
+      if (!waiting) sending = false;
+      // What was refused stays to be mended; Escape gives it up.
+      for (const slider of SLIDERS) if (slider.key in change) slider.typing = true;
+      say(error.message, true);
+    }
+  }
+  sending = false;
+}
+
+function say(text, bad) {
+  put($('answer'), (bad ? '✗ ' : '✓ ') + text);
+  $('answer').className = bad ? 'bad' : 'good';
+}

@@ -1,0 +1,131 @@
+// ---- Lines over time.
+
+/** A canvas as sharp as the screen; gives its context and its size in points. */
+function prepare(canvas) {
+  const ratio = window.devicePixelRatio || 1;
+  const width = canvas.clientWidth;
+  const height = canvas.clientHeight;
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+  }
+  const context = canvas.getContext('2d');
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  context.font = '11px system-ui, sans-serif';
+  return { context, width, height };
+}
+
+/** The smallest of 1, 2, 5 times a power of ten that is not below. */
+function round125(number) {
+  const power = 10 ** Math.floor(Math.log10(number));
+  return [1, 2, 5, 10].map((n) => n * power).find((n) => n >= number * 0.999999);
+}
+
+/** More links than this are told apart by choosing one, not by colour. */
+const COLOURED = 8;
+
+const PLOTS = [
+  { canvas: 'delay-plot', key: 'delay', high: 'high', least: 1e-3, most: Infinity, word: (v) => span(v, 2) },
+  { canvas: 'loss-plot', key: 'loss', least: 0.01, most: 1, word: percent },
+  { canvas: 'rate-plot', key: 'rate', least: 1e3, most: Infinity, word: bits },
+];
+
+/** Draws one plot; `chosen` is drawn last and strong. */
+function drawPlot(plot, links, chosen) {
+  const { context, width, height } = prepare($(plot.canvas));
+  if (width === 0 || past.length === 0) return;
+  const left = 62;
+  const right = width - 8;
+  const top = 8;
+  const bottom = height - 20;
+  const now = past[past.length - 1].t;
+  let most = plot.least;
+  for (const row of past) {
+    if (row.gap || row.t < now - SHOWN) continue;
+    for (const value of row[plot.key]) if (value > most) most = value;
+    if (plot.high && row[plot.high][chosen] > most) most = row[plot.high][chosen];
+  }
+  const step = round125(most / 3);
+  const scale = Math.min(plot.most, Math.ceil((most * 1.02) / step) * step);
+  const x = (t) => right - ((now - t) / SHOWN) * (right - left);
+  const y = (value) => bottom - (value / scale) * (bottom - top);
+
+  context.lineWidth = 1;
+  context.strokeStyle = ink.line;
+  context.fillStyle = ink.soft;
+  context.textAlign = 'right';
+  context.textBaseline = 'middle';
+  for (let value = 0; value <= scale * 1.0001; value += step) {
+    const at = Math.round(y(value)) + 0.5;
+    context.beginPath();
+    context.moveTo(left, at);
+    context.lineTo(right, at);
+    context.stroke();
+    context.fillText(value === 0 ? '0' : plot.word(value), left - 6, at);
+  }
+  context.textBaseline = 'alphabetic';
+  for (const ago of [60, 40, 20, 0]) {
+    context.textAlign = ago === 0 ? 'right' : ago === 60 ? 'left' : 'center';
+    context.fillText(ago === 0 ? 'now' : '−' + ago + ' s', x(now - ago), height - 5);
+  }
+
+  context.save();
+  context.beginPath();
+  context.rect(left, top - 2, right - left, bottom - top + 4);
+  context.clip();
+  context.lineJoin = 'round';
+  const many = links > COLOURED;
+  for (let link = 0; link < links; link += 1) {
+    if (link === chosen) continue;
+    context.globalAlpha = many ? 0.35 : 0.8;
+    stroke(context, plot.key, link, x, y, many ? ink.faint : colour(link), many ? 1 : 1.5);
+  }
+  if (chosen >= 0 && chosen < links) {
+    context.globalAlpha = 0.16;
+    if (plot.high) band(context, plot, chosen, x, y);
+    context.globalAlpha = 1;
+    stroke(context, plot.key, chosen, x, y, colour(chosen), 2.5);
+  }
+  context.restore();
+}
+
+/** One line, broken where nothing is known. */
+function stroke(context, key, link, x, y, style, lineWidth) {
+  context.strokeStyle = style;
+  context.lineWidth = lineWidth;
+  context.beginPath();
+  let down = false;
+  for (const row of past) {
+    const value = row.gap ? null : row[key][link];
+    if (value === null || value === undefined) {
+      down = false;
+    } else if (down) {
+      context.lineTo(x(row.t), y(value));
+    } else {
+      context.moveTo(x(row.t), y(value));
+      down = true;
+    }
+  }
+  context.stroke();
+}
+
+/** From the median to the 99th percentile. */
+function band(context, plot, link, x, y) {
+  context.fillStyle = colour(link);
+  let run = [];
+  const fill = () => {
+    if (run.length > 1) {
+      context.beginPath();
+      for (const row of run) context.lineTo(x(row.t), y(row[plot.high][link]));
+      for (const row of run.reverse()) context.lineTo(x(row.t), y(row[plot.key][link]));
+      context.fill();
+    }
+    run = [];
+  };
+  for (const row of past) {
+    if (row.gap || row[plot.key][link] === null || row[plot.high][link] === null) fill();
+    else run.push(row);
+  }
+  fill();
+}

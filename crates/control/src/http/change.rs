@@ -1,0 +1,67 @@
+//! Changes of links.
+
+use std::sync::Arc;
+
+use axum::body::{Body, to_bytes};
+use axum::extract::rejection::PathRejection;
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
+use axum::response::Response;
+use serde_json::{Map, Value, json};
+
+use super::App;
+use super::answer::{Refusal, json as answer};
+use super::read::{named, with_keys};
+use crate::toml_text;
+
+/// Bodies beyond this are refused \[bytes\]. Every key of a link at its longest is a hundredth of it.
+const LARGEST_BODY: usize = 64 * 1024;
+
+/// Lays keys over those of one link.
+pub(super) async fn one(State(app): State<Arc<App>>, path: Result<Path<String>, PathRejection>, body: Body) -> Result<Response, Refusal> {
+    let link = named(&app, path)?;
+    let keys = keys(body).await?;
+    change(&app, &[link], &keys)?;
+    Ok(answer(&with_keys(&app, &[link]).pop().unwrap_or_default()))
+}
+
+/// Lays keys over those of all links, or of none if one of them cannot take them.
+pub(super) async fn all(State(app): State<Arc<App>>, body: Body) -> Result<Response, Refusal> {
+    let keys = keys(body).await?;
+    let links: Vec<usize> = (0..app.board.description().links.len()).collect();
+    if links.is_empty() {
+        return Err(unprocessable("there is no link to be changed"));
+    }
+    change(&app, &links, &keys)?;
+    Ok(answer(&json!({ "links": with_keys(&app, &links) })))
+}
+
+fn change(app: &App, links: &[usize], keys: &[(String, String)]) -> Result<(), Refusal> {
+    app.editor().change(links, keys).map_err(unprocessable)
+}
+
+/// The keys that a body asks for, with their values as TOML text.
+async fn keys(body: Body) -> Result<Vec<(String, String)>, Refusal> {
+    let body = to_bytes(body, LARGEST_BODY)
+        .await
+        .map_err(|_| Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, format!("expected a body of at most {LARGEST_BODY} bytes that arrives whole")))?;
+    let keys: Map<String, Value> = serde_json::from_slice(&body)
+        .map_err(|error| unprocessable(format!("expected a JSON object of link keys, such as {{\"delay\": \"40ms\", \"loss\": \"1%\"}}: {error}")))?;
+    if keys.is_empty() {
+        return Err(unprocessable("no keys: expected at least one, such as {\"delay\": \"40ms\"}"));
+    }
+    keys.into_iter().map(|(key, value)| pair(key, &value)).collect()
+}
+
+fn pair(key: String, value: &Value) -> Result<(String, String), Refusal> {
+    let bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
+    if key.is_empty() || !key.chars().all(bare) {
+        return Err(unprocessable(format!("{key:?} is no name of a link key: expected letters, digits, \"-\" and \"_\"")));
+    }
+    let value = toml_text::from_json(value).map_err(|reason| unprocessable(format!("{key}: {reason}")))?;
+    Ok((key, value))
+}
+
+fn unprocessable(reason: impl Into<String>) -> Refusal {
+    Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, reason)
+}

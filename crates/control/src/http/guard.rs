@@ -1,0 +1,90 @@
+//! Who is let in: requests that ask for this host and show the token; and what every answer says about itself.
+
+use std::net::{Ipv4Addr, Ipv6Addr};
+use std::sync::Arc;
+
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse as _, Response};
+
+use super::answer::Refusal;
+use super::{App, page};
+
+/// What every answer says about itself, unless it says something else.
+const HEADERS: [(HeaderName, &str); 7] = [
+    (header::CONTENT_SECURITY_POLICY, "default-src 'none'; frame-ancestors 'none'"),
+    (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (header::X_FRAME_OPTIONS, "DENY"),
+    (header::REFERRER_POLICY, "no-referrer"),
+    (header::CACHE_CONTROL, "no-store"),
+    (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+    (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
+];
+
+/// Lets a request through to its route, or refuses it.
+pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let mut answer = match check(&app, request.uri(), request.headers()) {
+        Ok(()) => next.run(request).await,
+        // A person with a browser gets a place to enter the token.
+        Err(refusal) if refusal.status == StatusCode::UNAUTHORIZED && request.uri().path() == "/" && accepts_html(request.headers()) => page::door(),
+        Err(refusal) => refusal.into_response(),
+    };
+    if answer.status() == StatusCode::UNAUTHORIZED {
+        answer.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+    }
+    for (name, value) in HEADERS {
+        answer.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));
+    }
+    answer
+}
+
+fn check(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<(), Refusal> {
+    let mut hosts = headers.get_all(header::HOST).iter();
+    let (Some(host), None) = (hosts.next(), hosts.next()) else {
+        return Err(Refusal::new(StatusCode::FORBIDDEN, "expected exactly one Host header"));
+    };
+    let known = |authority: &str| is_known(authority, &app.hosts);
+    if !host.to_str().is_ok_and(known) || !uri.authority().is_none_or(|authority| known(authority.as_str())) {
+        return Err(Refusal::new(
+            StatusCode::FORBIDDEN,
+            format!("the host {:?} is not known here: ask for localhost, for an address, or for a name that the server was started with", host),
+        ));
+    }
+    let in_header = headers.get_all(header::AUTHORIZATION).iter().filter_map(|value| bearer(value.as_bytes()));
+    let in_query = uri.query().unwrap_or_default().split('&').filter_map(|part| part.strip_prefix("token=")).map(str::as_bytes);
+    if !in_header.chain(in_query).any(|offered| app.token.is(offered)) {
+        return Err(Refusal::new(
+            StatusCode::UNAUTHORIZED,
+            "no token, or a wrong one: show it as \"Authorization: Bearer TOKEN\" or as ?token=TOKEN; it was printed when the server started",
+        ));
+    }
+    Ok(())
+}
+
+/// Whether a host, with or without a port, is one to be asked for.
+///
+/// Whoever points a name of theirs at this machine, so that a page of theirs may talk to it, has to ask by that name. So addresses are let in, and
+/// names that are known.
+fn is_known(authority: &str, names: &[String]) -> bool {
+    let (host, port) = match authority.strip_prefix('[') {
+        Some(inside) => inside.split_once(']').unwrap_or_default(),
+        None => authority.split_at(authority.find(':').unwrap_or(authority.len())),
+    };
+    let is_port = port.is_empty() || port.strip_prefix(':').is_some_and(|digits| digits.parse::<u16>().is_ok());
+    let is_host = if authority.starts_with('[') {
+        host.parse::<Ipv6Addr>().is_ok()
+    } else {
+        host.parse::<Ipv4Addr>().is_ok() || host.eq_ignore_ascii_case("localhost") || names.iter().any(|name| name.eq_ignore_ascii_case(host))
+    };
+    is_port && is_host
+}
+
+fn bearer(value: &[u8]) -> Option<&[u8]> {
+    let (scheme, token) = value.split_at_checked(7)?;
+    scheme.eq_ignore_ascii_case(b"bearer ").then(|| token.trim_ascii())
+}
+
+fn accepts_html(headers: &HeaderMap) -> bool {
+    headers.get(header::ACCEPT).and_then(|accept| accept.to_str().ok()).is_some_and(|accept| accept.contains("text/html"))
+}

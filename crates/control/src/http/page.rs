@@ -1,0 +1,66 @@
+//! The page, compiled in: one document, whose style and script are known to the browser by their hashes.
+
+use std::sync::LazyLock;
+
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use sha2::{Digest as _, Sha256};
+
+const STYLE: &str = include_str!("../../page/style.css");
+const SCRIPT: &str = concat!(
+    include_str!("../../page/server.js"),
+    include_str!("../../page/words.js"),
+    include_str!("../../page/history.js"),
+    include_str!("../../page/plot.js"),
+    include_str!("../../page/links.js"),
+    include_str!("../../page/editor.js"),
+    include_str!("../../page/copies.js"),
+    include_str!("../../page/facts.js"),
+    include_str!("../../page/main.js"),
+);
+
+static PAGE: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/page.html"), STYLE, SCRIPT));
+static DOOR: LazyLock<Document> = LazyLock::new(|| Document::new(include_str!("../../page/door.html"), STYLE, include_str!("../../page/door.js")));
+
+/// A document with what it may do.
+struct Document {
+    html: String,
+    policy: HeaderValue,
+}
+
+impl Document {
+    /// Puts style and script where the document names them.
+    fn new(html: &str, style: &str, script: &str) -> Self {
+        // A script is run in strict mode of its own: nothing of it is global.
+        let script = format!("(() => {{\n'use strict';\n{script}\n}})();");
+        let hash = |text: &str| STANDARD.encode(Sha256::digest(text.as_bytes()));
+        let policy = format!(
+            "default-src 'none'; script-src 'sha256-{}'; style-src 'sha256-{}'; connect-src 'self'; img-src data:; form-action 'self'; \
+             base-uri 'none'; frame-ancestors 'none'",
+            hash(&script),
+            hash(style)
+        );
+        Self {
+            html: html.replace("{{style}}", style).replace("{{script}}", &script),
+            policy: HeaderValue::try_from(policy).expect("base64 and ASCII words"),
+        }
+    }
+
+    fn answer(&'static self, status: StatusCode) -> Response {
+        let headers: [(HeaderName, HeaderValue); 2] =
+            [(header::CONTENT_TYPE, HeaderValue::from_static("text/html; charset=utf-8")), (header::CONTENT_SECURITY_POLICY, self.policy.clone())];
+        (status, headers, self.html.as_str()).into_response()
+    }
+}
+
+/// The page itself.
+pub(super) async fn page() -> Response {
+    PAGE.answer(StatusCode::OK)
+}
+
+/// For who has not shown the token: takes it from the tab, where the page left it, or asks for it.
+pub(super) fn door() -> Response {
+    DOOR.answer(StatusCode::UNAUTHORIZED)
+}

@@ -1,0 +1,86 @@
+//! Prometheus' text format, version 0.0.4
+//! (<https://prometheus.io/docs/instrumenting/exposition_formats/#text-based-format>).
+
+use core::fmt::Write as _;
+
+/// Writing to a `String` does not fail.
+const NO_FAILURE: &str = "a String takes what it is given";
+
+/// What a family measures.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Measure {
+    Counter,
+    Gauge,
+    Summary,
+}
+
+impl Measure {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Counter => "counter",
+            Self::Gauge => "gauge",
+            Self::Summary => "summary",
+        }
+    }
+}
+
+/// Text as it grows: families, each followed by its samples.
+#[derive(Debug, Default)]
+pub(super) struct Exposition {
+    text: String,
+    family: &'static str,
+}
+
+impl Exposition {
+    /// Begins a family.
+    pub(super) fn family(&mut self, name: &'static str, measure: Measure, help: &str) {
+        self.family = name;
+        let help = help.replace('\\', r"\\").replace('\n', r"\n");
+        writeln!(self.text, "# HELP {name} {help}\n# TYPE {name} {}", measure.name()).expect(NO_FAILURE);
+    }
+
+    /// A sample that is a count.
+    pub(super) fn count(&mut self, labels: &[(&str, &str)], count: u64) {
+        self.line("", labels, format_args!("{count}"));
+    }
+
+    /// A sample that is a number.
+    pub(super) fn number(&mut self, labels: &[(&str, &str)], number: f64) {
+        self.number_of("", labels, number);
+    }
+
+    /// How many observations a summary has.
+    pub(super) fn summary_count(&mut self, labels: &[(&str, &str)], count: u64) {
+        self.line("_count", labels, format_args!("{count}"));
+    }
+
+    /// The sum of the observations of a summary.
+    pub(super) fn summary_sum(&mut self, labels: &[(&str, &str)], sum: f64) {
+        self.number_of("_sum", labels, sum);
+    }
+
+    /// All of it.
+    pub(super) fn finish(self) -> String {
+        self.text
+    }
+
+    fn number_of(&mut self, suffix: &str, labels: &[(&str, &str)], number: f64) {
+        if number.is_infinite() {
+            let infinity = if number > 0.0 { "+Inf" } else { "-Inf" };
+            self.line(suffix, labels, format_args!("{infinity}"));
+        } else {
+            self.line(suffix, labels, format_args!("{number:?}"));
+        }
+    }
+
+    fn line(&mut self, suffix: &str, labels: &[(&str, &str)], value: core::fmt::Arguments<'_>) {
+        write!(self.text, "{}{suffix}", self.family).expect(NO_FAILURE);
+        for (place, (name, value)) in labels.iter().enumerate() {
+            let before = if place == 0 { '{' } else { ',' };
+            let value = value.replace('\\', r"\\").replace('"', "\\\"").replace('\n', r"\n");
+            write!(self.text, "{before}{name}=\"{value}\"").expect(NO_FAILURE);
+        }
+        let after = if labels.is_empty() { "" } else { "}" };
+        writeln!(self.text, "{after} {value}").expect(NO_FAILURE);
+    }
+}

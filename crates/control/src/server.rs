@@ -1,0 +1,162 @@
+//! The server: a thread with a runtime of its own.
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+use thiserror::Error;
+use tokio::runtime::Builder;
+use tokio::sync::oneshot;
+
+use crate::http::{self, App};
+use crate::{Board, LinkEditor, Token, TokenError};
+
+/// Where to listen and whom to let in.
+#[derive(Clone, Debug)]
+pub struct ServerConfig {
+    /// Where to listen. Port 0: any free one.
+    pub address: SocketAddr,
+    /// The secret that every request must show; `None`: a random one.
+    pub token: Option<Token>,
+    /// Whether an address may be given that other machines reach. What is sent, the token too, can then be read on the way.
+    pub allow_remote: bool,
+    /// Names by which the server may be asked for, beside `localhost` and addresses, such as `"lab-pc.example"`. Other names are refused, so that
+    /// no page of another site reaches the server by a name that it points here (DNS rebinding).
+    pub hosts: Vec<String>,
+}
+
+impl ServerConfig {
+    /// A random token, nothing but loopback.
+    #[must_use]
+    pub const fn new(address: SocketAddr) -> Self {
+        Self { address, token: None, allow_remote: false, hosts: Vec::new() }
+    }
+}
+
+/// Why there is no server.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ServeError {
+    /// Other machines would reach it.
+    #[error(
+        "live control would be open to other machines at {address}: listen on 127.0.0.1 or [::1] and reach it from elsewhere through `ssh -L`, or allow \
+         remote access; it is not encrypted"
+    )]
+    NotLoopback {
+        /// The address.
+        address: SocketAddr,
+    },
+    /// The system gives no such socket.
+    #[error("live control cannot listen on {address}: {source}; port 0 takes any that is free")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// There is no token.
+    #[error(transparent)]
+    Token(#[from] TokenError),
+    /// The system gives no thread, or no events.
+    #[error("live control cannot start its thread: {0}")]
+    Thread(io::Error),
+}
+
+/// A server that runs until it is stopped or dropped.
+#[derive(Debug)]
+pub struct Server {
+    address: SocketAddr,
+    token: Token,
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Starts a server on a thread of its own.
+///
+/// # Errors
+///
+/// [`ServeError`] if it may not or cannot listen there. When this returns `Ok`, connections are taken.
+pub fn serve(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor>) -> Result<Server, ServeError> {
+    let address = config.address;
+    if !address.ip().to_canonical().is_loopback() && !config.allow_remote {
+        return Err(ServeError::NotLoopback { address });
+    }
+    let token = match config.token {
+        Some(token) => token,
+        None => Token::random()?,
+    };
+    let listen = |source| ServeError::Listen { address, source };
+    let listener = TcpListener::bind(address).map_err(listen)?;
+    listener.set_nonblocking(true).map_err(listen)?;
+    let address = listener.local_addr().map_err(listen)?;
+    let app = App { board, editor: Mutex::new(editor), token: token.clone(), hosts: config.hosts };
+    let runtime = Builder::new_current_thread().enable_io().enable_time().build().map_err(ServeError::Thread)?;
+    let listener = {
+        let _inside = runtime.enter();
+        tokio::net::TcpListener::from_std(listener).map_err(listen)?
+    };
+    let (stop, stopped) = oneshot::channel();
+    let run = move || {
+        runtime.block_on(async {
+            let serving = tokio::spawn(async { axum::serve(listener, http::router(app)).await });
+            // An error means that the server was dropped, which is the same.
+            let _: Result<(), oneshot::error::RecvError> = stopped.await;
+            serving.abort();
+        });
+        // What is still being answered, such as events, ends with the runtime.
+        runtime.shutdown_background();
+    };
+    let thread = std::thread::Builder::new().name("live-control".to_owned()).spawn(run).map_err(ServeError::Thread)?;
+    Ok(Server { address, token, stop: Some(stop), thread: Some(thread) })
+}
+
+impl Server {
+    /// Where it listens.
+    #[must_use]
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// The address of the page, with the token: a secret.
+    #[must_use]
+    pub fn url(&self) -> String {
+        format!("http://{}/?token={}", self.reachable(), self.token.secret())
+    }
+
+    /// The secret that requests must show.
+    #[must_use]
+    pub const fn token(&self) -> &Token {
+        &self.token
+    }
+
+    /// Ends it, and every connection with it. Returns when its thread has ended.
+    pub fn stop(self) {
+        drop(self);
+    }
+
+    /// An unspecified address is where one listens, not where one calls.
+    fn reachable(&self) -> SocketAddr {
+        let mut address = self.address;
+        if address.ip().is_unspecified() {
+            address.set_ip(match address {
+                SocketAddr::V4(_) => core::net::Ipv4Addr::LOCALHOST.into(),
+                SocketAddr::V6(_) => core::net::Ipv6Addr::LOCALHOST.into(),
+            });
+        }
+        address
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        if let Some(stop) = self.stop.take() {
+            // Gone already if the thread ended by itself.
+            let _: Result<(), ()> = stop.send(());
+        }
+        if let Some(thread) = self.thread.take() {
+            // A panic in there was reported when it happened.
+            let _: std::thread::Result<()> = thread.join();
+        }
+    }
+}

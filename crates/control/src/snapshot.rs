@@ -1,0 +1,115 @@
+//! What changes while a run lasts: numbers, at one instant.
+
+use core::time::Duration;
+
+/// The numbers of a run at one instant. What belongs to links, peers and clocks stands in the order of the [`Description`](crate::Description).
+///
+/// A list that is shorter than that of the description is filled up with nothing counted yet, one that is longer is cut.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Snapshot {
+    /// Since the run began.
+    pub elapsed: Duration,
+    /// Why the run does not say what it claims to say, such as a tick that came too late; `None` while it does.
+    pub invalid: Option<String>,
+    /// How late each clock of the description was, since the run began.
+    pub lateness: Vec<Quantiles>,
+    /// Counters of each link, since the run began.
+    pub links: Vec<LinkCounters>,
+    /// Each participant.
+    pub peers: Vec<PeerView>,
+    /// How many datagrams were refused, by cause, since the run began.
+    pub refused: Vec<(&'static str, u64)>,
+}
+
+/// A distribution of spans in a few numbers. With a count of 0 the others say nothing.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Quantiles {
+    /// How many spans were seen.
+    pub count: u64,
+    /// Their sum.
+    pub sum: Duration,
+    /// Half of them are shorter.
+    pub p50: Duration,
+    /// 99 % of them are shorter.
+    pub p99: Duration,
+    /// 99.9 % of them are shorter.
+    pub p999: Duration,
+    /// The longest.
+    pub max: Duration,
+}
+
+/// What one link did so far. `offered + duplicated = delivered + Σ dropped + in flight`.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct LinkCounters {
+    /// Packets handed to the link.
+    pub offered: u64,
+    /// Extra copies that it made.
+    pub duplicated: u64,
+    /// Packets that came out of it, copies included.
+    pub delivered: u64,
+    /// Bytes of the packets that came out of it.
+    pub delivered_bytes: u64,
+    /// Packets dropped, by the name of the cause. Causes that never happened may be left out.
+    pub dropped: Vec<(&'static str, u64)>,
+    /// Packets that it marked: congestion experienced.
+    pub marked: u64,
+    /// Packets of which it flipped bits.
+    pub damaged: u64,
+    /// Packets inside it now.
+    pub in_flight: u64,
+    /// The mean time in the link of all that was delivered; `None` before the first delivery.
+    pub mean_delay: Option<Duration>,
+    /// The delays of what was delivered of late: in the last second or so, as the publisher likes. A count of 0: nothing was.
+    pub recent_delay: Quantiles,
+}
+
+impl LinkCounters {
+    /// Packets dropped for any reason.
+    #[must_use]
+    pub fn dropped_in_all(&self) -> u64 {
+        self.dropped.iter().fold(0, |sum, (_, count)| sum.saturating_add(*count))
+    }
+}
+
+/// One participant at one instant.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct PeerView {
+    /// Whether it takes part.
+    pub status: Presence,
+    /// How long ago it was last heard; `None` if it is here, or never was heard.
+    pub age: Option<Duration>,
+    /// Where its copy of the object is, for each axis \[m\]; empty if there is none.
+    pub position: Vec<f64>,
+    /// The force that its user feels, for each axis \[N\]; empty if it is not known.
+    pub force: Vec<f64>,
+}
+
+/// Whether a participant takes part.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
+pub enum Presence {
+    /// It runs in this program.
+    Here,
+    /// It runs elsewhere and was heard of late.
+    Present,
+    /// It runs elsewhere and was not heard for too long: what is known of it is old.
+    Stale,
+    /// It was never heard.
+    #[default]
+    Absent,
+}
+
+impl Presence {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Here, Self::Present, Self::Stale, Self::Absent];
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Here => "here",
+            Self::Present => "present",
+            Self::Stale => "stale",
+            Self::Absent => "absent",
+        }
+    }
+}

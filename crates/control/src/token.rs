@@ -1,0 +1,122 @@
+//! The secret that opens the server.
+
+use core::fmt;
+use core::str::FromStr;
+
+use subtle::ConstantTimeEq as _;
+use thiserror::Error;
+
+/// The bytes of a random token: 160 bits.
+const RANDOM_BYTES: usize = 20;
+/// Shorter tokens are refused: 22 random characters of 64 are 132 bits.
+const SHORTEST: usize = 22;
+/// Longer tokens are refused.
+const LONGEST: usize = 256;
+
+/// A secret that every request must show. It is compared in a time that does not tell how much of it was right, and [`fmt::Debug`] does not show it.
+#[derive(Clone)]
+pub struct Token(String);
+
+/// Why there is no token.
+#[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
+pub enum TokenError {
+    /// Too short to be secret, or too long to be carried.
+    #[error("a token of {found} characters: expected {SHORTEST} to {LONGEST}, random ones; leave it out to get one")]
+    Length {
+        /// How many characters it has.
+        found: usize,
+    },
+    /// A character that an address would have to escape.
+    #[error("a token with {found:?}: expected letters, digits, '-', '.', '_' and '~' only, so that it can stand in an address")]
+    Character {
+        /// The first such character.
+        found: char,
+    },
+    /// The system gave no random numbers.
+    #[error("the system gives no random numbers for a token ({0}): give a token of your own")]
+    NoRandomNumbers(String),
+}
+
+impl Token {
+    /// A token of 160 random bits of the system, in 40 hexadecimal digits.
+    ///
+    /// # Errors
+    ///
+    /// [`TokenError::NoRandomNumbers`] if the system has none.
+    pub fn random() -> Result<Self, TokenError> {
+        let mut bytes = [0; RANDOM_BYTES];
+        getrandom::fill(&mut bytes).map_err(|error| TokenError::NoRandomNumbers(error.to_string()))?;
+        Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
+    }
+
+    /// The token in clear, to be shown to the one who may have it.
+    #[must_use]
+    pub fn secret(&self) -> &str {
+        &self.0
+    }
+
+    /// Whether this is it. How long that takes depends on the length of what is offered alone.
+    pub(crate) fn is(&self, offered: &[u8]) -> bool {
+        self.0.as_bytes().ct_eq(offered).into()
+    }
+}
+
+impl FromStr for Token {
+    type Err = TokenError;
+
+    fn from_str(text: &str) -> Result<Self, TokenError> {
+        let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_' | '~');
+        if let Some(found) = text.chars().find(|c| !allowed(*c)) {
+            return Err(TokenError::Character { found });
+        }
+        if !(SHORTEST..=LONGEST).contains(&text.len()) {
+            return Err(TokenError::Length { found: text.len() });
+        }
+        Ok(Self(text.to_owned()))
+    }
+}
+
+impl fmt::Debug for Token {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Token(hidden)")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Token, TokenError};
+
+    #[test]
+    fn random_tokens_differ_and_can_be_given_again() {
+        let (one, other) = (Token::random().unwrap(), Token::random().unwrap());
+        assert_ne!(one.secret(), other.secret());
+        assert_eq!(one.secret().len(), 40);
+        let again: Token = one.secret().parse().unwrap();
+        assert!(again.is(one.secret().as_bytes()));
+        assert!(!again.is(other.secret().as_bytes()));
+    }
+
+    #[test]
+    fn a_part_or_more_of_a_token_is_not_it() {
+        let token: Token = "0123456789abcdef~._-XY".parse().unwrap();
+        assert!(token.is(b"0123456789abcdef~._-XY"));
+        for wrong in [&b""[..], b"0123456789abcdef~._-X", b"0123456789abcdef~._-XYZ", b"0123456789abcdef~._-Xy"] {
+            assert!(!token.is(wrong));
+        }
+    }
+
+    #[test]
+    fn what_is_no_token_is_refused() {
+        assert_eq!("short".parse::<Token>().unwrap_err(), TokenError::Length { found: 5 });
+        assert_eq!("a".repeat(257).parse::<Token>().unwrap_err(), TokenError::Length { found: 257 });
+        assert_eq!("0123456789abcdef&0123456".parse::<Token>().unwrap_err(), TokenError::Character { found: '&' });
+        assert_eq!("ä".repeat(22).parse::<Token>().unwrap_err(), TokenError::Character { found: 'ä' });
+    }
+
+    #[test]
+    fn a_token_is_not_printed_by_accident() {
+        let token: Token = "0123456789abcdef012345".parse().unwrap();
+        assert!(!format!("{token:?}").contains("0123"));
+    }
+}

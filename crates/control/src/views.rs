@@ -1,0 +1,110 @@
+//! The JSON shapes of the routes: spans in seconds, sizes in bytes, positions in metres, forces in newtons.
+
+use core::time::Duration;
+
+use serde_json::{Map, Value, json};
+
+use crate::{Description, Latest, LinkCounters, PeerView, Quantiles, Snapshot};
+
+/// Everything that changes by itself, with the names.
+pub(crate) fn state(description: &Description, latest: &Latest) -> Value {
+    let snapshot = &*latest.snapshot;
+    json!({
+        "kind": description.kind,
+        "title": description.title,
+        "number": latest.number,
+        "elapsed_s": snapshot.elapsed.as_secs_f64(),
+        "valid": snapshot.invalid.is_none(),
+        "invalid": snapshot.invalid,
+        "clocks": clocks(description, snapshot),
+        "links": (0..description.links.len()).map(|number| link(description, snapshot, number)).collect::<Vec<_>>(),
+        "peers": peers(description, snapshot),
+        "refused": counted(&snapshot.refused),
+    })
+}
+
+/// One link with its counters.
+pub(crate) fn link(description: &Description, snapshot: &Snapshot, number: usize) -> Value {
+    let none = LinkCounters::default();
+    let name = &description.links[number];
+    let counters = snapshot.links.get(number).unwrap_or(&none);
+    json!({
+        "link": number,
+        "name": name.name,
+        "from": name.from,
+        "to": name.to,
+        "offered": counters.offered,
+        "duplicated": counters.duplicated,
+        "delivered": counters.delivered,
+        "delivered_bytes": counters.delivered_bytes,
+        "dropped": counted(&counters.dropped),
+        "dropped_in_all": counters.dropped_in_all(),
+        "marked": counters.marked,
+        "damaged": counters.damaged,
+        "in_flight": counters.in_flight,
+        "mean_delay_s": counters.mean_delay.map(|delay| delay.as_secs_f64()),
+        "recent_delay": quantiles(&counters.recent_delay),
+    })
+}
+
+/// Distributions of lateness and of delay.
+pub(crate) fn histograms(description: &Description, latest: &Latest) -> Value {
+    let snapshot = &*latest.snapshot;
+    let links = description.links.iter().enumerate().map(|(number, name)| {
+        let delays = snapshot.links.get(number).map(|counters| counters.recent_delay).unwrap_or_default();
+        json!({ "link": number, "name": name.name, "recent_delay": quantiles(&delays) })
+    });
+    json!({
+        "number": latest.number,
+        "elapsed_s": snapshot.elapsed.as_secs_f64(),
+        "clocks": clocks(description, snapshot),
+        "links": links.collect::<Vec<_>>(),
+    })
+}
+
+fn clocks(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
+    let clock = |(number, name): (usize, &String)| {
+        let lateness = snapshot.lateness.get(number).copied().unwrap_or_default();
+        json!({ "name": name, "lateness": quantiles(&lateness) })
+    };
+    description.clocks.iter().enumerate().map(clock).collect()
+}
+
+fn peers(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
+    let none = PeerView::default();
+    let peer = |(number, name): (usize, &crate::PeerName)| {
+        let view = snapshot.peers.get(number).unwrap_or(&none);
+        json!({
+            "name": name.name,
+            "kind": name.kind,
+            "status": view.status.name(),
+            "age_s": view.age.map(|age| age.as_secs_f64()),
+            "position": view.position,
+            "force": view.force,
+        })
+    };
+    description.peers.iter().enumerate().map(peer).collect()
+}
+
+/// What is not known, because nothing was seen, is `null`.
+fn quantiles(quantiles: &Quantiles) -> Value {
+    let seconds = |span: Duration| (quantiles.count > 0).then(|| span.as_secs_f64());
+    json!({
+        "count": quantiles.count,
+        "sum_s": quantiles.sum.as_secs_f64(),
+        "p50_s": seconds(quantiles.p50),
+        "p99_s": seconds(quantiles.p99),
+        "p999_s": seconds(quantiles.p999),
+        "max_s": seconds(quantiles.max),
+    })
+}
+
+/// Counts by cause. A cause that is named twice counts as the sum.
+fn counted(causes: &[(&'static str, u64)]) -> Map<String, Value> {
+    let mut map = Map::new();
+    for (cause, count) in causes {
+        let before = map.get(*cause).and_then(Value::as_u64).unwrap_or_default();
+        map.insert((*cause).to_owned(), before.saturating_add(*count).into());
+    }
+    map
+}

@@ -1,0 +1,223 @@
+//! A browser of its own, without a window, and one page in it.
+
+use core::time::Duration;
+use std::ffi::OsString;
+use std::io::{BufRead as _, BufReader};
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc;
+use std::time::Instant;
+
+use base64::Engine as _;
+use serde_json::{Value, json};
+use tempfile::TempDir;
+use tungstenite::{Message, WebSocket};
+
+/// Every wait ends after this; a machine that is busy takes its time.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+
+const ARGUMENTS: [&str; 12] = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--remote-debugging-port=0",
+    "--window-size=1400,1100",
+    "about:blank",
+];
+
+/// A browser with one page, spoken to in the Chrome `DevTools` protocol (<https://chromedevtools.github.io/devtools-protocol/>).
+pub(crate) struct Browser {
+    child: Child,
+    _folder: TempDir,
+    socket: WebSocket<TcpStream>,
+    session: Option<String>,
+    asked: u64,
+    /// What the page complained about: exceptions, and what its policy forbade.
+    pub(crate) complaints: Vec<String>,
+}
+
+/// Where a browser is, if there is one.
+fn program() -> Option<PathBuf> {
+    if let Some(given) = std::env::var_os("CHROMIUM") {
+        return Some(given.into());
+    }
+    let path = std::env::var_os("PATH").unwrap_or_else(OsString::new);
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    std::env::split_paths(&path).flat_map(|folder| names.map(|name| folder.join(name))).find(|file| file.is_file())
+}
+
+impl Browser {
+    /// A browser, or `None` with a message where there is none.
+    pub(crate) fn start() -> Option<Self> {
+        let Some(program) = program() else {
+            eprintln!("skipped: no browser; install chromium, or name one in CHROMIUM");
+            return None;
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let mut child = Command::new(program)
+            .arg(format!("--user-data-dir={}", folder.path().display()))
+            .args(ARGUMENTS)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let stderr = child.stderr.take().unwrap();
+        let (found, address) = mpsc::channel();
+        // Reads to the end: a browser that cannot complain stops.
+        std::thread::spawn(move || {
+            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+                if let Some((_, address)) = line.split_once("DevTools listening on ") {
+                    // Nobody listens any more if the test was given up.
+                    let _sent = found.send(address.to_owned());
+                }
+            }
+        });
+        let mut unborn = Unborn(Some(child));
+        let address = address.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("the browser says no address"));
+        let host = address.strip_prefix("ws://").unwrap().split('/').next().unwrap();
+        let stream = TcpStream::connect(host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let (socket, _) = tungstenite::client(address.as_str(), stream).unwrap_or_else(|error| panic!("{error}"));
+        let child = unborn.0.take().unwrap();
+        let mut browser = Self { child, _folder: folder, socket, session: None, asked: 0, complaints: Vec::new() };
+        let target = browser.call("Target.createTarget", json!({ "url": "about:blank" }))["targetId"].clone();
+        let session = browser.call("Target.attachToTarget", json!({ "targetId": target, "flatten": true }));
+        browser.session = Some(session["sessionId"].as_str().unwrap().to_owned());
+        for domain in ["Page", "Runtime", "Log"] {
+            browser.call(&format!("{domain}.enable"), json!({}));
+        }
+        Some(browser)
+    }
+
+    /// Asks for something and waits for the answer.
+    pub(crate) fn call(&mut self, method: &str, parameters: Value) -> Value {
+        self.asked += 1;
+        let id = self.asked;
+        let mut message = json!({ "id": id, "method": method, "params": parameters });
+        if let Some(session) = &self.session {
+            message["sessionId"] = json!(session);
+        }
+        self.socket.send(Message::text(message.to_string())).unwrap();
+        loop {
+            let Message::Text(text) = self.socket.read().unwrap() else { continue };
+            let mut answer: Value = serde_json::from_str(&text).unwrap();
+            if answer["id"] == json!(id) {
+                assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
+                return answer["result"].take();
+            }
+            match answer["method"].as_str() {
+                Some("Runtime.exceptionThrown") => self.complaints.push(answer["params"]["exceptionDetails"].to_string()),
+                Some("Log.entryAdded") if answer["params"]["entry"]["level"] == "error" => {
+                    self.complaints.push(answer["params"]["entry"].to_string())
+                }
+                Some(_) | None => {}
+            }
+        }
+    }
+
+    /// The value of an expression on the page.
+    pub(crate) fn value(&mut self, expression: &str) -> Value {
+        let mut answer = self.call("Runtime.evaluate", json!({ "expression": expression, "returnByValue": true, "awaitPromise": true }));
+        assert!(answer["exceptionDetails"].is_null(), "{expression}: {}", answer["exceptionDetails"]);
+        answer["result"]["value"].take()
+    }
+
+    /// Waits until an expression holds. While what it speaks of is not there, it does not.
+    pub(crate) fn wait(&mut self, expression: &str) {
+        let guarded = format!("(() => {{ try {{ return !!({expression}); }} catch {{ return false; }} }})()");
+        self.wait_for(expression, |browser| browser.value(&guarded) == json!(true));
+    }
+
+    /// Waits until something holds.
+    pub(crate) fn wait_for(&mut self, what: &str, mut holds: impl FnMut(&mut Self) -> bool) {
+        let begin = Instant::now();
+        while !holds(self) {
+            if begin.elapsed() > PATIENCE {
+                let page = self.value("document.body.innerText");
+                panic!("{what}: not within {PATIENCE:?}; complaints {:?}; the page: {page}", self.complaints);
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// Opens an address and waits until its text has been read.
+    pub(crate) fn open(&mut self, address: &str) {
+        self.call("Page.navigate", json!({ "url": address }));
+        self.wait("location.href !== 'about:blank' && document.readyState === 'complete'");
+    }
+
+    /// Presses a key and lets it go, in what has the focus.
+    pub(crate) fn press(&mut self, key: &str, code: u32) {
+        for kind in ["rawKeyDown", "keyUp"] {
+            self.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code }));
+            if kind == "rawKeyDown" && key == "Enter" {
+                self.call("Input.dispatchKeyEvent", json!({ "type": "char", "key": key, "text": "\r" }));
+            }
+        }
+    }
+
+    /// Clicks into the middle of an element.
+    pub(crate) fn click(&mut self, selector: &str) {
+        self.value(&format!("document.querySelector({selector:?}).scrollIntoView({{ block: 'center' }})"));
+        let middle = format!(
+            "(() => {{ const r = document.querySelector({selector:?}).getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
+        );
+        let middle = self.value(&middle);
+        for kind in ["mousePressed", "mouseReleased"] {
+            self.call("Input.dispatchMouseEvent", json!({ "type": kind, "x": middle[0], "y": middle[1], "button": "left", "clickCount": 1 }));
+        }
+    }
+
+    /// Types a text into a field in place of what is there.
+    pub(crate) fn type_into(&mut self, selector: &str, text: &str) {
+        self.click(selector);
+        self.value(&format!("document.querySelector({selector:?}).select()"));
+        self.call("Input.insertText", json!({ "text": text }));
+    }
+
+    /// Saves what is seen as NAME.png, if `COHAPTIC_SCREENSHOTS` names a folder.
+    pub(crate) fn picture(&mut self, name: &str) {
+        let Some(folder) = std::env::var_os("COHAPTIC_SCREENSHOTS") else { return };
+        let size = self.call("Page.getLayoutMetrics", json!({}))["cssContentSize"].clone();
+        let clip = json!({ "x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1 });
+        let picture = self.call("Page.captureScreenshot", json!({ "format": "png", "clip": clip, "captureBeyondViewport": true }));
+        let bytes = base64::engine::general_purpose::STANDARD.decode(picture["data"].as_str().unwrap()).unwrap();
+        std::fs::write(PathBuf::from(folder).join(name).with_extension("png"), bytes).unwrap();
+    }
+}
+
+/// A browser that nobody speaks to yet ends with the test too.
+struct Unborn(Option<Child>);
+
+impl Drop for Unborn {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.0 {
+            let _ended = child.kill().and_then(|()| child.wait());
+        }
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // In order, so that its folder is left alone; otherwise by force. Nothing here may panic: a test may be failing.
+        self.session = None;
+        let close = json!({ "id": self.asked + 1, "method": "Browser.close" }).to_string();
+        let _asked = self.socket.send(Message::text(close));
+        let begin = Instant::now();
+        while begin.elapsed() < Duration::from_secs(10) {
+            if !matches!(self.child.try_wait(), Ok(None)) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let _ended = self.child.kill().and_then(|()| self.child.wait());
+    }
+}

@@ -1,0 +1,195 @@
+//! The page in a real browser: what a person sees and does.
+
+mod chromium;
+
+use chromium::Browser;
+use serde_json::json;
+
+use crate::run::Run;
+
+/// How many points of a canvas are near to a colour of the page.
+fn painted(browser: &mut Browser, canvas: &str, colour: &str) -> u64 {
+    let script = format!(
+        "(() => {{
+            const canvas = document.getElementById({canvas:?});
+            if (!canvas.width) return 0;
+            const probe = document.createElement('canvas').getContext('2d');
+            probe.fillStyle = getComputedStyle(document.documentElement).getPropertyValue({colour:?}).trim();
+            probe.fillRect(0, 0, 1, 1);
+            const wanted = probe.getImageData(0, 0, 1, 1).data;
+            const points = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+            let found = 0;
+            for (let i = 0; i < points.length; i += 4)
+                if (points[i + 3] > 100 && [0, 1, 2].every((k) => Math.abs(points[i + k] - wanted[k]) < 24)) found += 1;
+            return found;
+        }})()"
+    );
+    browser.value(&script).as_u64().unwrap()
+}
+
+fn wait_painted(browser: &mut Browser, canvas: &str, colour: &str) {
+    browser.wait_for(&format!("{canvas} has something in {colour}"), |browser| painted(browser, canvas, colour) > 20);
+}
+
+/// Waits until a canvas looks different.
+fn wait_moving(browser: &mut Browser, canvas: &str) {
+    let picture = format!("document.getElementById({canvas:?}).toDataURL()");
+    let before = browser.value(&picture);
+    browser.wait_for(&format!("{canvas} moves"), |browser| browser.value(&picture) != before);
+}
+
+fn wait_told(browser: &mut Browser, run: &Run, links: &[usize], key: &str, value: &str) {
+    let wanted = (links.to_vec(), vec![(key.to_owned(), value.to_owned())]);
+    browser.wait_for(&format!("the editor was told {wanted:?}"), |_| run.told.lock().unwrap().last() == Some(&wanted));
+}
+
+fn text(browser: &mut Browser, selector: &str) -> String {
+    browser.value(&format!("document.querySelector({selector:?}).innerText")).as_str().unwrap().to_owned()
+}
+
+fn in_dark(browser: &mut Browser, dark: bool) {
+    let scheme = if dark { "dark" } else { "light" };
+    browser.call("Emulation.setEmulatedMedia", json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] }));
+}
+
+#[test]
+fn a_person_sees_the_run_and_changes_it() {
+    let Some(mut browser) = Browser::start() else { return };
+    let run = Run::moving(6, 3, 1, 0);
+    browser.open(&run.server().url());
+    sees_the_run(&mut browser);
+    moves_a_slider(&mut browser, &run);
+    types_a_value(&mut browser, &run);
+    sets_another_key_of_all_links(&mut browser, &run);
+    is_told_what_was_wrong(&mut browser);
+    browser.picture("light");
+    in_dark(&mut browser, true);
+    wait_painted(&mut browser, "delay-plot", "--c0");
+    browser.picture("dark");
+    assert_eq!(browser.complaints, [""; 0]);
+    reloads(&mut browser);
+    assert!(browser.complaints.iter().all(|complaint| complaint.contains("401")), "{:?}", browser.complaints);
+    survives_the_server(browser, run);
+}
+
+fn sees_the_run(browser: &mut Browser) {
+    browser.wait("document.querySelectorAll('#links tr').length === 6");
+    let address = browser.value("location.href").to_string();
+    assert!(!address.contains("token"), "{address}: the token does not stay in the address");
+    browser.wait("document.querySelector('#links tr .delivered').textContent.length > 0");
+    browser.wait("document.querySelector('#links tr .asked').textContent.includes('delay 24ms')");
+    assert!(text(browser, "#links tr").contains("left → right"));
+    // Names are text, whatever they look like.
+    assert_eq!(text(browser, "h1"), "cohaptic live three people lift a <b>cube</b>");
+    assert_eq!(text(browser, "#valid"), "valid");
+    browser.wait("document.querySelector('#peers .pill.stale').textContent === 'stale · heard 2.3 s ago'");
+    browser.wait("document.querySelectorAll('#clocks tr').length === 2");
+    browser.wait("document.getElementById('refused').textContent.includes('wrong-magic')");
+    browser.wait("document.getElementById('drops').textContent.includes('queue-full')");
+    for canvas in ["delay-plot", "loss-plot", "rate-plot"] {
+        wait_painted(browser, canvas, "--c0");
+        wait_painted(browser, canvas, "--c5");
+        wait_moving(browser, canvas);
+    }
+    for colour in ["--c0", "--c1", "--c2"] {
+        wait_painted(browser, "copies", colour);
+    }
+    wait_moving(browser, "copies");
+}
+
+fn moves_a_slider(browser: &mut Browser, run: &Run) {
+    browser.wait("document.getElementById('field-delay').value === '24ms'");
+    browser.value("document.getElementById('slider-delay').focus()");
+    for _ in 0..3 {
+        browser.press("ArrowRight", 39);
+    }
+    wait_told(browser, run, &[0], "delay", "\"27ms\"");
+    browser.wait("document.querySelector('#links tr .asked').textContent.includes('delay 27ms')");
+    // The list of links is gone through by keys too.
+    browser.value("document.getElementById('link-0').focus()");
+    browser.press("ArrowDown", 40);
+    browser.wait("document.getElementById('link-1').checked && document.getElementById('field-delay').value === '25ms'");
+    browser.click("#slider-loss");
+    browser.wait_for("a click on the slider", |_| {
+        run.told.lock().unwrap().last().is_some_and(|(links, keys)| links == &[1] && keys[0].0 == "loss" && keys[0].1.ends_with("%\""))
+    });
+}
+
+fn types_a_value(browser: &mut Browser, run: &Run) {
+    browser.type_into("#field-rate", "1.2Mbit");
+    browser.press("Enter", 13);
+    wait_told(browser, run, &[1], "rate", "\"1.2Mbit\"");
+    browser.wait("document.getElementById('answer').textContent.includes('rate = 1.2Mbit')");
+}
+
+fn sets_another_key_of_all_links(browser: &mut Browser, run: &Run) {
+    browser.click("#all");
+    browser.wait("document.getElementById('target').textContent === 'all 6 links'");
+    browser.type_into("#other-key", "duplicate");
+    browser.type_into("#other-value", "{ probability = 0.01, correlation = 0.5 }");
+    browser.click("#other-set");
+    wait_told(browser, run, &[0, 1, 2, 3, 4, 5], "duplicate", "{ correlation = 0.5, probability = 0.01 }");
+    browser.wait("[...document.querySelectorAll('#links .asked')].every((cell) => cell.textContent.includes('duplicate'))");
+}
+
+fn is_told_what_was_wrong(browser: &mut Browser) {
+    browser.type_into("#other-key", "dlay");
+    browser.press("Enter", 13);
+    browser.wait("document.getElementById('answer').textContent.includes('did you mean \"delay\"?')");
+    assert_eq!(browser.value("document.getElementById('other-key').value"), json!("dlay"), "to be mended");
+    // That the browser notes an answer of 422 is as it should be.
+    browser.complaints.retain(|complaint| !complaint.contains("422"));
+}
+
+/// Without the token in the address the server asks for it, and the tab knows it.
+fn reloads(browser: &mut Browser) {
+    browser.value("document.getElementById('links').replaceChildren()");
+    browser.call("Page.reload", json!({}));
+    browser.wait("document.querySelectorAll('#links tr').length === 6");
+    assert!(!browser.value("location.href").to_string().contains("token"));
+}
+
+fn survives_the_server(mut browser: Browser, run: Run) {
+    browser.wait("document.querySelector('#links tr .delivered').textContent.length > 0");
+    browser.type_into("#other-value", "half a thou");
+    let port = run.stop();
+    browser.wait("document.getElementById('trouble').textContent.startsWith('The server does not answer')");
+    browser.wait("document.getElementById('server').textContent === 'disconnected'");
+    assert_eq!(browser.value("document.querySelectorAll('#links tr').length"), json!(6), "what was known is still shown");
+    browser.picture("away");
+    let _again = Run::moving(6, 3, 1, port);
+    browser.wait("document.getElementById('trouble').hidden && document.getElementById('server').textContent === 'live'");
+    wait_moving(&mut browser, "copies");
+    assert_eq!(browser.value("document.getElementById('other-value').value"), json!("half a thou"));
+}
+
+#[test]
+fn a_hundred_links_are_as_good_as_six() {
+    let Some(mut browser) = Browser::start() else { return };
+    let run = Run::moving(100, 4, 2, 0);
+    in_dark(&mut browser, false);
+    browser.open(&run.server().url());
+    browser.wait("document.querySelectorAll('#links tr').length === 100");
+    wait_painted(&mut browser, "copies", "--c3");
+    wait_moving(&mut browser, "copies");
+    browser.type_into("#filter", "robot → ");
+    browser.wait("[...document.querySelectorAll('#links tr')].filter((row) => !row.hidden).length === 10");
+    browser.click("#links tr:not([hidden])");
+    browser.wait("document.getElementById('target').textContent === 'robot → left'");
+    for canvas in ["delay-plot", "loss-plot", "rate-plot"] {
+        wait_painted(&mut browser, canvas, "--faint");
+    }
+    browser.picture("hundred");
+    assert_eq!(browser.complaints, [""; 0]);
+}
+
+#[test]
+fn one_link_without_peers_is_enough() {
+    let Some(mut browser) = Browser::start() else { return };
+    let run = Run::moving(1, 0, 0, 0);
+    browser.open(&run.server().url());
+    wait_painted(&mut browser, "delay-plot", "--c0");
+    assert_eq!(browser.value("document.getElementById('people').hidden"), json!(true));
+    browser.picture("one");
+    assert_eq!(browser.complaints, [""; 0]);
+}

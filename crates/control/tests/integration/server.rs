@@ -1,0 +1,126 @@
+//! Over a real socket: addresses, events, the end.
+
+use core::net::SocketAddr;
+use core::time::Duration;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
+use std::sync::Arc;
+
+use cohaptic_control::{Board, Description, Kind, LinkEditor, ServeError, ServerConfig, Snapshot, serve};
+
+use crate::run::{Run, TOKEN};
+
+/// Nothing here takes long; a wait without end would hide what went wrong.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+struct NoLinks;
+
+impl LinkEditor for NoLinks {
+    fn keys(&self, _link: usize) -> Vec<(String, String)> {
+        Vec::new()
+    }
+
+    fn change(&mut self, _links: &[usize], _keys: &[(String, String)]) -> Result<(), String> {
+        Err("there is nothing to change".to_owned())
+    }
+}
+
+fn empty_board() -> Arc<Board> {
+    let description = Description { kind: Kind::Router, title: String::new(), links: Vec::new(), peers: Vec::new(), clocks: Vec::new() };
+    Arc::new(Board::new(description))
+}
+
+fn send(address: SocketAddr, request: &str) -> TcpStream {
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    stream.write_all(request.as_bytes()).unwrap();
+    stream
+}
+
+/// The whole answer, as text.
+fn ask(run: &Run, method: &str, path: &str, body: &str) -> String {
+    let address = run.server().address();
+    let length = body.len();
+    let request = format!(
+        "{method} {path} HTTP/1.1\r\nHost: {address}\r\nAuthorization: Bearer {TOKEN}\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}"
+    );
+    let mut answer = String::new();
+    send(address, &request).read_to_string(&mut answer).unwrap();
+    answer
+}
+
+#[test]
+fn the_board_and_the_editor_are_behind_the_routes() {
+    let run = Run::still(2, 0);
+    run.board.publish(Arc::new(Snapshot { elapsed: Duration::from_millis(1500), ..Snapshot::default() })).unwrap();
+    let state = ask(&run, "GET", "/api/state", "");
+    assert!(state.starts_with("HTTP/1.1 200 OK\r\n") && state.contains("\"elapsed_s\":1.5"), "{state}");
+    let changed = ask(&run, "PATCH", "/api/links/1", "{\"delay\": \"40ms\"}");
+    assert!(changed.starts_with("HTTP/1.1 200 OK\r\n") && changed.contains("\"delay\":\"40ms\""), "{changed}");
+    assert_eq!(*run.told.lock().unwrap(), [(vec![1], vec![("delay".to_owned(), "\"40ms\"".to_owned())])]);
+    let refused = ask(&run, "PATCH", "/api/links", "{\"dlay\": \"40ms\"}");
+    assert!(refused.starts_with("HTTP/1.1 422 ") && refused.contains("did you mean"), "{refused}");
+    assert!(ask(&run, "GET", "/metrics", "").contains("\ncohaptic_run_elapsed_seconds 1.5\n"));
+    assert!(ask(&run, "GET", "/api/histograms", "").contains("\"clocks\":["));
+    assert!(ask(&run, "PATCH", "/api/links/0", &"x".repeat(65_537)).starts_with("HTTP/1.1 413 "));
+}
+
+#[test]
+fn events_come_for_what_is_published_and_end_with_the_server() {
+    let run = Run::still(1, 0);
+    let address = run.server().address();
+    let mut lines = BufReader::new(send(address, &format!("GET /api/events?token={TOKEN} HTTP/1.1\r\nHost: localhost\r\n\r\n"))).lines();
+    let mut line_with = |words: &str| lines.by_ref().map(Result::unwrap).find(|line| line.contains(words)).unwrap();
+    assert!(line_with("text/event-stream").to_lowercase().starts_with("content-type"));
+    assert!(line_with("data:").contains("\"number\":0"), "what there is comes at once");
+    assert!(line_with(": ").contains("nothing new"), "silence is told from the end");
+    run.board.publish(Arc::new(Snapshot { elapsed: Duration::from_secs(7), ..Snapshot::default() })).unwrap();
+    assert!(line_with("event:").contains("state"));
+    assert!(line_with("data:").contains("\"elapsed_s\":7.0"));
+    let port = run.stop();
+    // The stream ends, and the port is free.
+    assert!(lines.all(|line| line.is_err() || line.is_ok_and(|line| !line.contains("data:"))));
+    drop(std::net::TcpListener::bind(("127.0.0.1", port)).unwrap());
+}
+
+#[test]
+fn other_machines_are_let_in_only_on_demand() {
+    let everywhere: SocketAddr = "0.0.0.0:0".parse().unwrap();
+    let refused = serve(ServerConfig::new(everywhere), empty_board(), Box::new(NoLinks)).unwrap_err();
+    assert!(matches!(refused, ServeError::NotLoopback { address } if address == everywhere));
+    assert!(refused.to_string().contains("ssh -L"), "{refused}");
+    let allowed = ServerConfig { allow_remote: true, ..ServerConfig::new(everywhere) };
+    let server = serve(allowed, empty_board(), Box::new(NoLinks)).unwrap();
+    assert!(server.url().starts_with(&format!("http://127.0.0.1:{}/?token=", server.address().port())));
+    assert!(server.url().ends_with(server.token().secret()));
+    assert!(!format!("{server:?}").contains(server.token().secret()));
+}
+
+#[test]
+fn an_address_in_use_is_said() {
+    let run = Run::still(1, 0);
+    let refused = serve(ServerConfig::new(run.server().address()), empty_board(), Box::new(NoLinks)).unwrap_err();
+    assert!(matches!(refused, ServeError::Listen { .. }) && refused.to_string().contains("port 0"), "{refused}");
+}
+
+#[test]
+fn publishing_goes_on_while_others_read() {
+    let board = empty_board();
+    let reader = {
+        let board = Arc::clone(&board);
+        std::thread::spawn(move || while board.latest().number < 1000 {})
+    };
+    let mut published = 0;
+    while published < 1000 {
+        // A snapshot comes back if somebody reads; it is not lost.
+        match board.publish(Arc::new(Snapshot { elapsed: Duration::from_secs(published + 1), ..Snapshot::default() })) {
+            Ok(before) => {
+                assert_eq!(before.elapsed, Duration::from_secs(published));
+                published += 1;
+            }
+            Err(refused) => assert_eq!(refused.elapsed, Duration::from_secs(published + 1)),
+        }
+    }
+    reader.join().unwrap();
+    assert_eq!(board.latest().snapshot.elapsed, Duration::from_secs(1000));
+}
