@@ -26,16 +26,16 @@ impl Scene {
     ///
     /// [`SceneError::Read`] if the file, or one that it names, cannot be read; [`SceneError::Invalid`] for anything else.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
-        match core::str::from_utf8(&bytes) {
-            Ok(text) => Self::parse(text, path, overrides),
-            Err(error) => {
-                let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
-                // Up to the place, the text with replacements is the text itself.
-                let sources = Sources { file: path, text: &String::from_utf8_lossy(&bytes), overrides: &[] };
-                Err(invalid(sources.diagnostic(place, String::new(), "not UTF-8: expected a text file in TOML".to_owned())))
-            }
-        }
+        with_text(path, |text| Self::parse(text, path, overrides))
+    }
+
+    /// Reads a scene for a live session: as [`Scene::read`], but a peer of kind `udp`, which is another process, needs neither device nor coupling.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::read`].
+    pub fn read_live(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        with_text(path, |text| Self::parse_live(text, path, overrides))
     }
 
     /// Reads a scene from a text. `file` stands in messages, and its folder is where files that the scene names are looked for.
@@ -44,25 +44,52 @@ impl Scene {
     ///
     /// As [`Scene::read`]. Of several faults, the one that stands first in the text; faults in overrides come after those in the text.
     pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let sources = Sources { file, text, overrides };
-        let mut document = parse_toml(text, sources)?;
-        let faults = Faults::default();
-        let files = Files::default();
-        let context = Context { sources, faults: &faults, files: &files, axes: None, names: None, modulators: None, partial: false };
-        overrides::apply(&mut document, overrides, context);
-        let scene = read_document(&document, context);
-        match (faults.into_first(), scene) {
-            (Some(error), _) => Err(error),
-            (None, Some(scene)) => Ok(scene),
-            // Not reached: a reader that answers nothing has reported why. An error all the same, because text must never be able to cause a panic.
-            (None, None) => Err(invalid(sources.diagnostic(BEGINNING, String::new(), "the scene is refused: expected another one".to_owned()))),
-        }
+        parse_scene(Sources { file, text, overrides }, false).map(|(scene, _)| scene)
+    }
+
+    /// [`Scene::parse`] for a live session, as [`Scene::read_live`].
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::parse`].
+    pub fn parse_live(text: &str, file: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        parse_scene(Sources { file, text, overrides }, true).map(|(scene, _)| scene)
     }
 
     /// The place of a peer in [`Scene::peers`], by its name.
     #[must_use]
     pub fn peer_index(&self, name: &str) -> Option<usize> {
         self.peers.iter().position(|peer| peer.name == name)
+    }
+}
+
+/// What `read` makes of the text of a file.
+pub(crate) fn with_text<T>(path: &Path, read: impl FnOnce(&str) -> Result<T, SceneError>) -> Result<T, SceneError> {
+    let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
+    match core::str::from_utf8(&bytes) {
+        Ok(text) => read(text),
+        Err(error) => {
+            let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
+            // Up to the place, the text with replacements is the text itself.
+            let sources = Sources { file: path, text: &String::from_utf8_lossy(&bytes), overrides: &[] };
+            Err(invalid(sources.diagnostic(place, String::new(), "not UTF-8: expected a text file in TOML".to_owned())))
+        }
+    }
+}
+
+/// The scene, and the document that it was read from with the overrides in it.
+pub(crate) fn parse_scene(sources: Sources<'_>, live: bool) -> Result<(Scene, Node), SceneError> {
+    let mut document = parse_toml(sources.text, sources)?;
+    let faults = Faults::default();
+    let files = Files::default();
+    let context = Context { sources, faults: &faults, files: &files, axes: None, names: None, modulators: None, partial: false, live };
+    overrides::apply(&mut document, sources.overrides, context);
+    let scene = read_document(&document, context);
+    match (faults.into_first(), scene) {
+        (Some(error), _) => Err(error),
+        (None, Some(scene)) => Ok((scene, document)),
+        // Not reached: a reader that answers nothing has reported why. An error all the same, because text must never be able to cause a panic.
+        (None, None) => Err(invalid(sources.diagnostic(BEGINNING, String::new(), "the scene is refused: expected another one".to_owned()))),
     }
 }
 
