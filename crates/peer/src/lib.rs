@@ -24,6 +24,7 @@
 
 extern crate alloc;
 
+mod age;
 mod clock;
 mod config;
 pub mod coordination;
@@ -38,6 +39,7 @@ mod state;
 mod stepper;
 pub mod wire;
 
+pub use age::Age;
 pub use clock::{Clock, Drift, DriftError};
 pub use config::{ArmConfig, Contact, CopyConfig, DeviceConfig, Direction, Gains, Hand};
 pub use coordination::{Command, Context, Coordination, Strategy};

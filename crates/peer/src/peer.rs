@@ -5,7 +5,7 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 
 use crate::wire::{DecodeError, MAX_LEN, Sample};
-use crate::{Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
+use crate::{Age, Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
 
 /// What a peer is, apart from its device, its copy of the object and its strategy.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -154,11 +154,15 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// Step 3: computes the forces of this tick.
     #[inline(always)]
     pub fn compute(&mut self, now: Instant) -> Forces<A> {
-        if self.stale_mean {
-            self.held.refresh();
-            self.stale_mean = false;
-        }
         let own = self.object.state();
+        if self.stale_mean {
+            if self.held.has_ages() {
+                self.stale_mean = self.held.refresh_around(own);
+            } else {
+                self.held.refresh();
+                self.stale_mean = false;
+            }
+        }
         let coupling = self.coupling_force(own);
         let command = self.strategy.command(&Context { now, own, held: &self.held });
         //= Rakhsha & Constantinescu 2015, eq. (8): mO·aO = FC − FT − bO·vO
@@ -216,6 +220,41 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     pub fn hold(&mut self, other: usize, state: State<A>) {
         self.held.hold(other, state);
         self.stale_mean = true;
+    }
+
+    /// Sets how much of another peer's newest sample counts from the next tick on; the others count in order, with this peer left out. Until it is first
+    /// set it is [`Age::WHOLE`], and then forces are what they would be without ages, to the bit.
+    ///
+    /// Weight and share should change in small steps: a step of either is a step of the force.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    pub fn set_age(&mut self, other: usize, age: Age) {
+        self.held.set_age(other, age);
+        self.stale_mean = true;
+    }
+
+    /// From now on the first sample from another peer with that sequence number or a later one is its *return*: it is taken in as always, and what was held
+    /// before it, [`Age::share`] included, is kept as that from which the share counts. See [`Peer::take_return`].
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    pub fn await_return(&mut self, other: usize, sequence: u64) {
+        self.held.await_return(other, sequence);
+    }
+
+    /// Whether another peer has returned since this was last asked.
+    ///
+    /// Whoever is told so sets the age anew before the next tick: with a weight above zero, to a share of zero that rises from there.
+    pub fn take_return(&mut self, other: usize) -> bool {
+        self.held.take_return(other)
+    }
+
+    /// Changes KC and BC, from the next tick on.
+    pub const fn set_coupling(&mut self, coupling: Gains) {
+        self.config.coupling = coupling;
     }
 
     /// The forces computed at the latest tick, which act over the next one if forces are applied one tick late.

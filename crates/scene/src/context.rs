@@ -43,6 +43,8 @@ pub(crate) struct Context<'a> {
     pub(crate) modulators: Option<&'a Modulators>,
     /// Whether defaults are looked at on their own: then nothing can be missing.
     pub(crate) partial: bool,
+    /// Whether the scene is for a live session, where peers that live elsewhere need no model.
+    pub(crate) live: bool,
 }
 
 impl Context<'_> {

@@ -45,11 +45,12 @@ mod strategies;
 mod table_reader;
 #[cfg(test)]
 mod tests;
+mod toml_text;
 mod tree;
 mod values;
 
 pub use error::{Diagnostic, SceneError};
-pub use link_keys::link_from_keys;
+pub use link_keys::{LinkKeys, link_from_keys, link_keys, link_keys_of_text};
 pub use link_table::LinkTable;
 pub use model::*;
 pub use read::scene_files;

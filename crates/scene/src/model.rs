@@ -108,6 +108,8 @@ pub struct CoordinationSpec {
 pub struct PeerSpec {
     /// Its name, unique in the scene.
     pub name: String,
+    /// Where it lives.
+    pub kind: PeerKind,
     /// When it ticks: tick period Tc, offset and drift.
     pub clock: Clock,
     /// It sends at ticks k with (k − phase) a multiple of update/tick; below update/tick.
@@ -116,7 +118,8 @@ pub struct PeerSpec {
     pub compute_delay: bool,
     /// How it touches the object.
     pub contact: Contact,
-    /// Its device, mH and bH.
+    /// Its device, mH and bH. For a peer of kind `udp` that was given none, which only [`Scene::read_live`] lets pass, one that stands still: such a
+    /// peer touches nothing, and a live session never moves its device.
     pub device: DeviceConfig,
     /// Its virtual coupling, KC and BC as written, before scaling.
     pub coupling: Gains,
@@ -132,6 +135,87 @@ pub struct PeerSpec {
     pub uplink: Option<LinkModel>,
     /// The line that all it receives passes after the links, if it has one.
     pub downlink: Option<LinkModel>,
+}
+
+/// Where a peer lives. In virtual time every peer is simulated, whatever its kind; a live session (`cohaptic live`) goes by it.
+#[derive(Clone, PartialEq, Debug, Default)]
+#[non_exhaustive]
+pub enum PeerKind {
+    /// In this program: device, hand and copy are simulated.
+    #[default]
+    Simulated,
+    /// In another process, which sends and receives samples.
+    Udp(Silence),
+    /// The copy in this program, the device in somebody's hand: a Novint Falcon.
+    Falcon(Silence, FalconSpec),
+}
+
+impl PeerKind {
+    /// The name in a scene file.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Simulated => "simulated",
+            Self::Udp(_) => "udp",
+            Self::Falcon(..) => "falcon",
+        }
+    }
+
+    /// When its silence is noticed; `None` for a peer that is never silent.
+    #[must_use]
+    pub const fn silence(&self) -> Option<Silence> {
+        match self {
+            Self::Simulated => None,
+            Self::Udp(silence) | Self::Falcon(silence, _) => Some(*silence),
+        }
+    }
+}
+
+/// What becomes of the pull of a peer from which nothing is heard any more.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Silence {
+    /// After so long a silence its pull begins to fade; above zero.
+    pub after: Duration,
+    /// So long it takes to fade from all to nothing, and to come back; above zero.
+    pub fade: Duration,
+}
+
+impl Default for Silence {
+    fn default() -> Self {
+        Self { after: Duration::from_millis(100), fade: Duration::from_millis(250) }
+    }
+}
+
+/// Which Falcon a peer has, and how its counts become metres and newtons.
+#[derive(Clone, PartialEq, Debug)]
+pub struct FalconSpec {
+    /// Which one.
+    pub device: FalconDevice,
+    /// Motor counts for a newton metre at an arm's joint; above zero.
+    pub counts_per_newton_metre: f64,
+    /// No greater force is sent to the motors \[N\]; above zero.
+    pub force_limit: f64,
+    /// The place in the coordinates of the device that is the origin of the scene \[m\]. The first axes of both are the same.
+    pub origin: [f64; 3],
+}
+
+impl Default for FalconSpec {
+    /// The first one found; 10,000 counts, with which full scale is about what the maker names; 8 N, the maker's figure; the middle of the workspace.
+    fn default() -> Self {
+        Self { device: FalconDevice::First, counts_per_newton_metre: 10_000.0, force_limit: 8.0, origin: [0.0, 0.0, 0.125] }
+    }
+}
+
+/// Which Falcon is meant.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub enum FalconDevice {
+    /// The first that is found and that no other peer has.
+    #[default]
+    First,
+    /// One that is simulated down to its bytes.
+    Simulated,
+    /// The one with this serial number.
+    Serial(String),
 }
 
 /// Something that changes at an instant, before anything else happens at that instant.

@@ -26,7 +26,16 @@ impl Scene {
     ///
     /// [`SceneError::Read`] if the file, or one that it names, cannot be read; [`SceneError::Invalid`] for anything else.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        read_file(path, overrides, read_document)
+        with_text(path, |text| Self::parse(text, path, overrides))
+    }
+
+    /// Reads a scene for a live session: as [`Scene::read`], but a peer of kind `udp`, which is another process, needs neither device nor coupling.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::read`].
+    pub fn read_live(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        with_text(path, |text| Self::parse_live(text, path, overrides))
     }
 
     /// Reads a scene from a text. `file` stands in messages, and its folder is where files that the scene names are looked for.
@@ -35,7 +44,16 @@ impl Scene {
     ///
     /// As [`Scene::read`]. Of several faults, the one that stands first in the text; faults in overrides come after those in the text.
     pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        parse_text(text, file, overrides, read_document)
+        parse_scene(Sources { file, text, overrides }, false).map(|(scene, _)| scene)
+    }
+
+    /// [`Scene::parse`] for a live session, as [`Scene::read_live`].
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::parse`].
+    pub fn parse_live(text: &str, file: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        parse_scene(Sources { file, text, overrides }, true).map(|(scene, _)| scene)
     }
 
     /// The place of a peer in [`Scene::peers`], by its name.
@@ -45,11 +63,11 @@ impl Scene {
     }
 }
 
-/// Reads a file that `read` takes.
-pub(crate) fn read_file<T>(path: &Path, overrides: &[String], read: impl FnOnce(&Node, Context<'_>) -> Option<T>) -> Result<T, SceneError> {
+/// What `read` makes of the text of a file.
+pub(crate) fn with_text<T>(path: &Path, read: impl FnOnce(&str) -> Result<T, SceneError>) -> Result<T, SceneError> {
     let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
     match core::str::from_utf8(&bytes) {
-        Ok(text) => parse_text(text, path, overrides, read),
+        Ok(text) => read(text),
         Err(error) => {
             let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
             // Up to the place, the text with replacements is the text itself.
@@ -59,23 +77,26 @@ pub(crate) fn read_file<T>(path: &Path, overrides: &[String], read: impl FnOnce(
     }
 }
 
-/// Reads a text that `read` takes.
-pub(crate) fn parse_text<T>(
-    text: &str,
-    file: &Path,
-    overrides: &[String],
+/// The scene, and the document that it was read from with the overrides in it.
+pub(crate) fn parse_scene(sources: Sources<'_>, live: bool) -> Result<(Scene, Node), SceneError> {
+    parse_document(sources, live, read_document)
+}
+
+/// What `read` makes of a text, and the document that it is with the overrides in it.
+pub(crate) fn parse_document<T>(
+    sources: Sources<'_>,
+    live: bool,
     read: impl FnOnce(&Node, Context<'_>) -> Option<T>,
-) -> Result<T, SceneError> {
-    let sources = Sources { file, text, overrides };
-    let mut document = parse_toml(text, sources)?;
+) -> Result<(T, Node), SceneError> {
+    let mut document = parse_toml(sources.text, sources)?;
     let faults = Faults::default();
     let files = Files::default();
-    let context = Context { sources, faults: &faults, files: &files, axes: None, names: None, modulators: None, partial: false };
-    overrides::apply(&mut document, overrides, context);
+    let context = Context { sources, faults: &faults, files: &files, axes: None, names: None, modulators: None, partial: false, live };
+    overrides::apply(&mut document, sources.overrides, context);
     let whole = read(&document, context);
     match (faults.into_first(), whole) {
         (Some(error), _) => Err(error),
-        (None, Some(whole)) => Ok(whole),
+        (None, Some(whole)) => Ok((whole, document)),
         // Not reached: a reader that answers nothing has reported why. An error all the same, because text must never be able to cause a panic.
         (None, None) => Err(invalid(sources.diagnostic(BEGINNING, String::new(), "the file is refused: expected another one".to_owned()))),
     }

@@ -69,6 +69,13 @@ impl<'a> TableReader<'a> {
         }
     }
 
+    /// Notes that a key should be there if it is not.
+    pub(crate) fn require(&mut self, key: &'static str, expected: &str) {
+        if self.get(key).is_none() {
+            self.miss(key, expected);
+        }
+    }
+
     /// Notes that a key should be there.
     pub(crate) fn miss(&mut self, key: &'static str, expected: &str) {
         self.missing.push((key, expected.to_owned()));

@@ -1,6 +1,9 @@
 //! What is refused, and what is said about it.
 
 use std::path::Path;
+use std::time::Duration;
+
+use cohaptic_peer::Contact;
 
 use crate::{Scene, SceneError};
 
@@ -104,7 +107,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "name = \"left\"",
             "name = \"left\"\ncolour = 1",
-            "14:1: peers.left.colour: unknown key: expected one of name, tick, compute-delay, phase, contact",
+            "14:1: peers.left.colour: unknown key: expected one of name, kind, silence, falcon, tick, compute-delay, phase, contact",
         ),
         ("[peer]", "[peer]\nname = \"x\"", "10:1: peer.name: unknown key"),
         ("[link]", "[link]\nduplicat = 0.1", "17:1: link.duplicat: unknown key: expected one of delay, jitter"),
@@ -448,4 +451,52 @@ fn a_line_of_any_length_is_cut_around_the_place() {
     let lines: Vec<&str> = shown.lines().collect();
     let caret = lines[3].chars().position(|c| c == '^').unwrap();
     assert_eq!(lines[2].chars().nth(caret), Some('{'), "{shown}");
+}
+
+/// A process elsewhere can be simulated only from the model of a device; a live session does without.
+#[test]
+fn a_peer_of_another_process_needs_a_device_only_in_virtual_time() {
+    let udp = SCENE
+        .replace("device = { mass = 0.1, damping = 5.0 }\n", "")
+        .replace("coupling = { stiffness = 3500.0, damping = 5.0 }\n", "silence = { fade = \"1s\" }\n")
+        .replace("name = \"right\"", "name = \"right\"\ncontact = \"none\"\ndevice = { mass = 0.2 }")
+        .replace("name = \"left\"", "name = \"left\"\nkind = \"udp\"\nsilence.after = \"50ms\"");
+    check(&udp, "11:1: peers.left.device: missing key: expected a table such as { mass = 0.1, damping = 5.0 }, from which this peer of kind \"udp\"");
+    let scene = Scene::parse_live(&udp, Path::new("x.toml"), &[]).unwrap();
+    let silence = crate::Silence { after: Duration::from_millis(50), fade: Duration::from_secs(1) };
+    assert_eq!(scene.peers[0].kind, crate::PeerKind::Udp(silence));
+    assert_eq!((scene.peers[0].contact, scene.peers[1].kind.silence()), (Contact::None, None));
+    // With device and coupling it is simulated as any other.
+    let modelled = SCENE.replace("name = \"left\"", "name = \"left\"\nkind = \"udp\"");
+    let (virtual_time, live) = (parse(&modelled, &[]).unwrap(), Scene::parse_live(&modelled, Path::new("x.toml"), &[]).unwrap());
+    assert_eq!(virtual_time, live);
+    assert_eq!(virtual_time.peers[0].device, parse(SCENE, &[]).unwrap().peers[0].device);
+    let live_without_device = SCENE.replace("device = { mass = 0.1, damping = 5.0 }\n", "");
+    assert!(Scene::parse_live(&live_without_device, Path::new("x.toml"), &[]).is_err());
+}
+
+#[test]
+fn a_falcon_has_usable_defaults_and_its_keys_are_checked() {
+    let falcon = SCENE.replace("device = { mass = 0.1, damping = 5.0 }", "kind = \"falcon\"");
+    let scene = parse(&falcon, &[]).unwrap();
+    assert_eq!(scene.peers[0].kind, crate::PeerKind::Falcon(crate::Silence::default(), crate::FalconSpec::default()));
+    let overrides = ["peers.left.falcon={ device = \"A7001\", origin = [0, 0, 0.13] }", "peers.left.falcon.force-limit=4"];
+    let crate::PeerKind::Falcon(_, spec) = &parse(&falcon, &overrides).unwrap().peers[0].kind else { panic!("{scene:?}") };
+    assert_eq!(spec.device, crate::FalconDevice::Serial("A7001".to_owned()));
+    assert_eq!((spec.origin, spec.force_limit, spec.counts_per_newton_metre), ([0.0, 0.0, 0.13], 4.0, 10_000.0));
+    for fault in [
+        "peer.kind=tcp",
+        "peer.silence.after=0ms",
+        "peer.silence.fade=0ms",
+        "peer.silence.fad=1ms",
+        "peer.falcon.origin=[0, 0]",
+        "peer.falcon.origin=0",
+        "peer.falcon.force-limit=0",
+        "peer.falcon.counts-per-newton-metre=-1",
+        "peer.falcon.device=''",
+        "peer.falcon.device='a b'",
+    ] {
+        let error = refused(SCENE, &[fault]);
+        assert!(error.diagnostic().unwrap().message().contains("expected"), "{error}");
+    }
 }

@@ -42,6 +42,10 @@ pub(crate) const DISTANCE: Quantity = Quantity { range: Range::Positive, unit: "
 pub(crate) const VELOCITY: Quantity = Quantity { range: Range::Any, unit: "m/s" };
 /// Any \[N\].
 pub(crate) const FORCE: Quantity = Quantity { range: Range::Any, unit: "N" };
+/// Above zero \[N\].
+pub(crate) const POSITIVE_FORCE: Quantity = Quantity { range: Range::Positive, unit: "N" };
+/// Above zero [counts/(N·m)].
+pub(crate) const POSITIVE_COUNTS: Quantity = Quantity { range: Range::Positive, unit: "counts/(N·m)" };
 /// At least zero \[Hz\].
 pub(crate) const FREQUENCY: Quantity = Quantity { range: Range::NotNegative, unit: "Hz" };
 /// Any \[rad\].

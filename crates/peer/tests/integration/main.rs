@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may fail as tests do")]
 #![allow(clippy::float_cmp, reason = "what must agree to the bit is compared so")]
 
+mod ageing;
 mod late_samples;
 mod own_parts;
 mod step_map;

@@ -12,8 +12,9 @@ use cohaptic_units::{Bytes, Instant};
 use crate::context::Context;
 use crate::link_table::LinkTable;
 use crate::model::LinkChange;
-use crate::read::{default_title, parse_text, read_file};
+use crate::read::{default_title, parse_document, with_text};
 use crate::sections::{LinkClasses, read_links, read_modulators};
+use crate::source::Sources;
 use crate::table_reader::TableReader;
 use crate::tree::Node;
 use crate::{SceneError, values};
@@ -105,7 +106,7 @@ impl RelayFile {
     ///
     /// As [`Scene::read`](crate::Scene::read).
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        read_file(path, overrides, read_document)
+        with_text(path, |text| Self::parse(text, path, overrides))
     }
 
     /// Reads a text. `file` stands in messages, and its folder is where files that it names are looked for.
@@ -114,7 +115,7 @@ impl RelayFile {
     ///
     /// As [`Scene::parse`](crate::Scene::parse).
     pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        parse_text(text, file, overrides, read_document)
+        parse_document(Sources { file, text, overrides }, false, read_document).map(|(relay, _)| relay)
     }
 }
 

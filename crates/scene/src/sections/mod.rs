@@ -3,6 +3,7 @@
 mod expect;
 mod hand;
 mod header;
+mod kind;
 pub(crate) mod link;
 mod links;
 mod modulators;

@@ -8,23 +8,25 @@ use cohaptic_wan::LinkModel;
 
 use super::hand::read_hand;
 use super::header::read_scaling;
+use super::kind::{FALCON_DEVICE, STILL_DEVICE, read_kind};
 use super::link::read_link;
 use super::object::{read_position, read_velocity};
 use super::selector::check_axis;
 use crate::context::Context;
-use crate::model::Scaling;
+use crate::model::{PeerKind, Scaling};
 use crate::table_reader::TableReader;
 use crate::tree::{Node, Value, quote};
 use crate::values::{self, DAMPING, MASS, STIFFNESS};
 
 /// The keys whose tables are laid over each other key by key; every other key replaces the one below.
-pub(crate) const NESTED: [&str; 5] = ["device", "coupling", "clock", "uplink", "downlink"];
+pub(crate) const NESTED: [&str; 7] = ["silence", "falcon", "device", "coupling", "clock", "uplink", "downlink"];
 
 const COUPLING: &str = "a table such as { stiffness = 3500.0, damping = 5.0 }";
 
 /// What the keys of a peer say, without its name.
 #[derive(Clone, Debug)]
 pub(crate) struct PeerKeys {
+    pub(crate) kind: PeerKind,
     pub(crate) clock: Clock,
     pub(crate) phase: u64,
     pub(crate) compute_delay: bool,
@@ -41,8 +43,12 @@ pub(crate) struct PeerKeys {
 /// Reads the keys of a peer. `beside`: keys of the same table that somebody else reads. `update`: the period of sending and where it is written.
 pub(crate) fn read_peer(node: &Node, context: Context<'_>, beside: &[&'static str], update: Option<(Duration, &Node)>) -> Option<PeerKeys> {
     const DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }";
+    const UDP_DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }, from which this peer of kind \"udp\", another process, can be simulated; \
+        `cohaptic live` runs the scene without it, with the process itself";
     let mut table = TableReader::new(node, context, "a table of keys of a peer")?;
     table.know(beside);
+    let kind = read_kind(&mut table, context);
+    let elsewhere = matches!(kind, Some(PeerKind::Udp(_)));
     let tick_node = table.get("tick");
     let tick = table.optional("tick", Duration::from_millis(1), values::positive_duration);
     let compute_delay = table.optional("compute-delay", 0, |node, context| values::integer(node, context, 0..=1, "a number of ticks, 0 or 1"));
@@ -51,9 +57,26 @@ pub(crate) fn read_peer(node: &Node, context: Context<'_>, beside: &[&'static st
         values::integer(node, context, 0..=i64::MAX.unsigned_abs(), "a number of ticks, an integer from 0 to below coordination.update / tick")
     });
     let contact = table.optional("contact", Contact::Grasp, read_contact);
-    let device = table.required("device", DEVICE, |node, context| read_device(node, context, DEVICE));
+    let device = table.maybe("device", |node, context| read_device(node, context, DEVICE));
+    let absent = match &kind {
+        None => None,
+        Some(PeerKind::Simulated) => {
+            table.require("device", DEVICE);
+            None
+        }
+        Some(PeerKind::Udp(_)) => {
+            if !context.live {
+                table.require("device", UDP_DEVICE);
+            }
+            Some(STILL_DEVICE)
+        }
+        Some(PeerKind::Falcon(..)) => Some(FALCON_DEVICE),
+    };
+    // What lives elsewhere and has no device here touches nothing here.
+    let contact = if elsewhere && table.get("device").is_none() { Some(Contact::None) } else { contact };
     let coupling = table.maybe("coupling", read_coupling);
-    if table.get("coupling").is_none() && contact.is_some_and(|contact| contact != Contact::None) {
+    let needs_coupling = contact.is_some_and(|contact| contact != Contact::None) && !(elsewhere && context.live);
+    if table.get("coupling").is_none() && needs_coupling {
         table.miss("coupling", COUPLING);
     }
     let hand = table.optional("hand", None, read_hand);
@@ -79,11 +102,12 @@ pub(crate) fn read_peer(node: &Node, context: Context<'_>, beside: &[&'static st
     }
     let (offset, drift) = clock?;
     Some(PeerKeys {
+        kind: kind?,
         clock: Clock { tick: tick?, offset, drift },
         phase: phase?,
         compute_delay: compute_delay? == 1,
         contact: contact?,
-        device: device?,
+        device: device?.or(absent).unwrap_or(STILL_DEVICE),
         coupling: coupling?,
         hand: hand?,
         position: position?,

@@ -121,6 +121,7 @@ fn spec(name: &str, keys: PeerKeys, object: &ObjectSpec) -> PeerSpec {
     let (coupling, coupling_scaling) = keys.coupling.unwrap_or((Gains { stiffness: 0.0, damping: 0.0 }, Scaling::None));
     PeerSpec {
         name: name.to_owned(),
+        kind: keys.kind,
         clock: keys.clock,
         phase: keys.phase,
         compute_delay: keys.compute_delay,
