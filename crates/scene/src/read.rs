@@ -26,16 +26,7 @@ impl Scene {
     ///
     /// [`SceneError::Read`] if the file, or one that it names, cannot be read; [`SceneError::Invalid`] for anything else.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
-        match core::str::from_utf8(&bytes) {
-            Ok(text) => Self::parse(text, path, overrides),
-            Err(error) => {
-                let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
-                // Up to the place, the text with replacements is the text itself.
-                let sources = Sources { file: path, text: &String::from_utf8_lossy(&bytes), overrides: &[] };
-                Err(invalid(sources.diagnostic(place, String::new(), "not UTF-8: expected a text file in TOML".to_owned())))
-            }
-        }
+        with_text(path, |text| Self::parse(text, path, overrides))
     }
 
     /// Reads a scene from a text. `file` stands in messages, and its folder is where files that the scene names are looked for.
@@ -63,6 +54,20 @@ impl Scene {
     #[must_use]
     pub fn peer_index(&self, name: &str) -> Option<usize> {
         self.peers.iter().position(|peer| peer.name == name)
+    }
+}
+
+/// What `read` makes of the text of a file.
+pub(crate) fn with_text<T>(path: &Path, read: impl FnOnce(&str) -> Result<T, SceneError>) -> Result<T, SceneError> {
+    let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
+    match core::str::from_utf8(&bytes) {
+        Ok(text) => read(text),
+        Err(error) => {
+            let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
+            // Up to the place, the text with replacements is the text itself.
+            let sources = Sources { file: path, text: &String::from_utf8_lossy(&bytes), overrides: &[] };
+            Err(invalid(sources.diagnostic(place, String::new(), "not UTF-8: expected a text file in TOML".to_owned())))
+        }
     }
 }
 
@@ -125,12 +130,12 @@ fn default_title(file: &Path) -> String {
     file.file_stem().map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 
-fn invalid(diagnostic: Diagnostic) -> SceneError {
+pub(crate) fn invalid(diagnostic: Diagnostic) -> SceneError {
     SceneError::Invalid(Box::new(diagnostic))
 }
 
 /// The document as a tree. Of several faults of syntax, the first.
-fn parse_toml(text: &str, sources: Sources<'_>) -> Result<Node, SceneError> {
+pub(crate) fn parse_toml(text: &str, sources: Sources<'_>) -> Result<Node, SceneError> {
     let (table, errors) = DeTable::parse_recoverable(text);
     let first = errors.iter().min_by_key(|error| error.span().map_or(usize::MAX, |span| span.start));
     if let Some(error) = first {

@@ -8,3 +8,4 @@ mod link_keys;
 mod manual;
 mod many_peers;
 mod mutations;
+mod router_file;
