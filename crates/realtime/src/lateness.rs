@@ -1,0 +1,132 @@
+//! How late things were: a histogram of high dynamic range.
+
+use std::time::Duration;
+
+use hdrhistogram::Histogram;
+
+/// How late each tick or packet was.
+///
+/// A histogram with three significant digits from a nanosecond to an hour (later counts as an hour): 190 kB, and recording allocates nothing.
+#[derive(Clone, Debug)]
+pub struct Lateness {
+    nanos: Histogram<u64>,
+}
+
+/// An hour \[ns\].
+const MOST: u64 = 3_600_000_000_000;
+
+impl Default for Lateness {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Lateness {
+    /// Nothing recorded.
+    #[must_use]
+    #[expect(clippy::missing_panics_doc, reason = "the bounds are constants that the histogram takes")]
+    pub fn new() -> Self {
+        Self { nanos: Histogram::new_with_bounds(1, MOST, 3).expect("three digits from one nanosecond to an hour can be had") }
+    }
+
+    /// One thing was that late. On time is zero.
+    #[inline]
+    pub fn record(&mut self, lateness: Duration) {
+        self.nanos.saturating_record(u64::try_from(lateness.as_nanos()).unwrap_or(MOST).min(MOST));
+    }
+
+    /// Adds what another one has recorded.
+    #[expect(clippy::missing_panics_doc, reason = "all have the same bounds")]
+    pub fn merge(&mut self, other: &Self) {
+        self.nanos.add(&other.nanos).expect("all histograms of lateness have the same bounds");
+    }
+
+    /// How many were recorded.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        self.nanos.len()
+    }
+
+    /// How many were later than `limit`, to three digits of `limit`.
+    #[must_use]
+    pub fn count_later_than(&self, limit: Duration) -> u64 {
+        let limit = u64::try_from(limit.as_nanos()).unwrap_or(MOST).min(MOST);
+        self.nanos.len() - self.nanos.count_between(0, limit)
+    }
+
+    /// The lateness that a share of all, from 0 to 1, does not exceed; zero if nothing was recorded.
+    #[must_use]
+    pub fn quantile(&self, share: f64) -> Duration {
+        Duration::from_nanos(self.nanos.value_at_quantile(share))
+    }
+
+    /// The usual quantiles.
+    #[must_use]
+    pub fn summary(&self) -> LatenessSummary {
+        LatenessSummary {
+            count: self.count(),
+            p50: self.quantile(0.5),
+            p99: self.quantile(0.99),
+            p999: self.quantile(0.999),
+            max: Duration::from_nanos(self.nanos.max()),
+        }
+    }
+
+    /// Every value that was recorded, to three digits, with how often: from the least late on.
+    pub fn recorded(&self) -> impl Iterator<Item = (Duration, u64)> + '_ {
+        self.nanos.iter_recorded().map(|step| (Duration::from_nanos(step.value_iterated_to()), step.count_at_value()))
+    }
+}
+
+/// The usual quantiles of a [`Lateness`]; all zero if nothing was recorded.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct LatenessSummary {
+    /// How many were recorded.
+    pub count: u64,
+    /// The median.
+    pub p50: Duration,
+    /// 99 of 100 were at most that late.
+    pub p99: Duration,
+    /// 999 of 1000 were at most that late.
+    pub p999: Duration,
+    /// The latest.
+    pub max: Duration,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_right_to_three_digits() {
+        let mut lateness = Lateness::new();
+        for micros in 1..=10_000 {
+            lateness.record(Duration::from_micros(micros));
+        }
+        let summary = lateness.summary();
+        let near = |found: Duration, micros: u64| {
+            let wanted = Duration::from_micros(micros);
+            assert!(found.abs_diff(wanted) <= wanted / 1000, "{found:?} for {wanted:?}");
+        };
+        assert_eq!(summary.count, 10_000);
+        near(summary.p50, 5000);
+        near(summary.p99, 9900);
+        near(summary.p999, 9990);
+        near(summary.max, 10_000);
+        assert!(lateness.count_later_than(Duration::from_micros(9000)).abs_diff(1000) <= 10);
+        assert_eq!(lateness.recorded().map(|(_, count)| count).sum::<u64>(), 10_000);
+    }
+
+    #[test]
+    fn nothing_is_too_early_or_too_late_to_be_counted() {
+        let mut lateness = Lateness::new();
+        assert_eq!(lateness.summary(), LatenessSummary::default());
+        lateness.record(Duration::ZERO);
+        lateness.record(Duration::MAX);
+        let mut twice = lateness.clone();
+        twice.merge(&lateness);
+        assert_eq!((lateness.count(), twice.count()), (2, 4));
+        assert_eq!(twice.count_later_than(Duration::from_secs(3000)), 2);
+        assert_eq!(twice.quantile(0.25), Duration::ZERO);
+    }
+}

@@ -1,0 +1,46 @@
+//! Logical time driven by the wall clock.
+//!
+//! The state machines of this project are told the time. In virtual time a loop tells them; here a [`Clock`] does, and a [`Pacer`] waits until they want to
+//! be called. What they are told is always the instant at which a thing was due, never the one at which the program got round to it: a late wake-up makes
+//! one thing late and nothing after it. By how much is recorded ([`Lateness`]), and beyond a [`Tolerance`] a run says of itself that it was not valid.
+//!
+//! ```text
+//!            due                     woken
+//!  ───────────┼─────────────────────────┼──────────▶ wall time
+//!             │◀────── lateness ───────▶│
+//!   handle_timeout(due)         (not handle_timeout(woken))
+//! ```
+//!
+//! [`prepare_thread`] asks the system for what helps: no timer slack, `SCHED_FIFO`, locked memory; each is granted or refused with a plain message.
+//! Linux only. This crate knows nothing of links, peers or sockets but that something can become readable.
+//!
+//! ```
+//! use std::time::Duration;
+//!
+//! use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock, Pacer, Pacing};
+//!
+//! let clock = MonotonicClock::start();
+//! let pacer = Pacer::new(Pacing::Sleep);
+//! let mut lateness = Lateness::new();
+//! let mut due = clock.now();
+//! for _ in 0..10 {
+//!     due += Duration::from_millis(1);
+//!     pacer.wait(&clock, Some(due), &[])?;
+//!     lateness.record(clock.now().saturating_duration_since(due));
+//! }
+//! assert_eq!(lateness.summary().count, 10);
+//! assert!(clock.now() >= due);
+//! # Ok::<(), std::io::Error>(())
+//! ```
+
+mod clock;
+mod lateness;
+mod pacer;
+mod thread;
+mod tolerance;
+
+pub use clock::{Clock, KernelStamps, MonotonicClock};
+pub use lateness::{Lateness, LatenessSummary};
+pub use pacer::{Pacer, Pacing, Woken};
+pub use thread::{Prepared, Refused, Wish, Wishes, prepare_thread};
+pub use tolerance::{Tolerance, Validity};
