@@ -6,7 +6,7 @@
 //!
 //! It does not run a scene, and it does not apply the scaling of gains: what is in a [`Scene`] is what was written. Nothing here is printed.
 //!
-//! Read [`Scene::parse`] first, then [`Scene`].
+//! Read [`Scene::parse`] first, then [`Scene`]. The file of a router, which has links but no people, is a [`router_file::RouterFile`].
 //!
 //! ```
 //! use std::path::Path;
@@ -38,6 +38,7 @@ mod names;
 mod overrides;
 mod read;
 mod relay_file;
+pub mod router_file;
 mod scaling;
 mod sections;
 mod source;

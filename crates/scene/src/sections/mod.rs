@@ -18,6 +18,7 @@ mod timeline;
 
 pub(crate) use expect::read_expect;
 pub(crate) use header::{Header, read_coordination, read_header, read_integrator};
+pub(crate) use link::read_link;
 pub(crate) use links::{LinkClasses, read_links};
 pub(crate) use modulators::{Modulators, read_modulators};
 pub(crate) use named_file::Files;

@@ -9,3 +9,4 @@ mod manual;
 mod many_peers;
 mod mutations;
 mod relay_file;
+mod router_file;

@@ -1,0 +1,127 @@
+//! Addresses with the length of a prefix: `10.1.0.1/24`, `fd00::/64`.
+
+use core::fmt;
+use core::net::{IpAddr, Ipv4Addr, Ipv6Addr};
+use core::str::FromStr;
+
+/// An address and how many of its first bits say which network it is in.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub struct Network {
+    address: IpAddr,
+    prefix: u8,
+}
+
+/// The prefix has more bits than the address.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("a prefix of {prefix} bits is longer than an address of {bits}")]
+pub struct PrefixTooLong {
+    /// What was asked for.
+    pub prefix: u8,
+    /// What an address of this family has.
+    pub bits: u8,
+}
+
+impl Network {
+    /// The network of an address.
+    ///
+    /// # Errors
+    ///
+    /// [`PrefixTooLong`] beyond 32 bits for IPv4 and 128 for IPv6.
+    pub const fn new(address: IpAddr, prefix: u8) -> Result<Self, PrefixTooLong> {
+        let bits = if address.is_ipv4() { 32 } else { 128 };
+        if prefix > bits { Err(PrefixTooLong { prefix, bits }) } else { Ok(Self { address, prefix }) }
+    }
+
+    /// The address as it was given.
+    #[must_use]
+    pub const fn address(self) -> IpAddr {
+        self.address
+    }
+
+    /// The number of bits of the prefix.
+    #[must_use]
+    pub const fn prefix(self) -> u8 {
+        self.prefix
+    }
+
+    /// Whether the address lies in this network. One of the other family never does.
+    #[must_use]
+    pub fn contains(self, address: IpAddr) -> bool {
+        match (self.address, address) {
+            (IpAddr::V4(own), IpAddr::V4(other)) => {
+                let mask = u32::MAX.checked_shl(32 - u32::from(self.prefix)).unwrap_or(0);
+                (Ipv4Addr::to_bits(own) ^ Ipv4Addr::to_bits(other)) & mask == 0
+            }
+            (IpAddr::V6(own), IpAddr::V6(other)) => {
+                let mask = u128::MAX.checked_shl(128 - u32::from(self.prefix)).unwrap_or(0);
+                (Ipv6Addr::to_bits(own) ^ Ipv6Addr::to_bits(other)) & mask == 0
+            }
+            (IpAddr::V4(_), IpAddr::V6(_)) | (IpAddr::V6(_), IpAddr::V4(_)) => false,
+        }
+    }
+}
+
+impl fmt::Display for Network {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.address, self.prefix)
+    }
+}
+
+/// The text is no address, or its prefix makes no sense.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("no address: expected one with a prefix such as \"10.1.0.1/24\" or \"fd00::1/64\"")]
+pub struct NoNetwork;
+
+impl FromStr for Network {
+    type Err = NoNetwork;
+
+    /// An address alone has all its bits for a prefix.
+    fn from_str(text: &str) -> Result<Self, NoNetwork> {
+        let (address, prefix) = match text.split_once('/') {
+            Some((address, prefix)) => (address, Some(prefix)),
+            None => (text, None),
+        };
+        let address: IpAddr = address.parse().map_err(|_| NoNetwork)?;
+        let prefix = match prefix {
+            // A sign would be read as part of the number.
+            Some(digits) if digits.bytes().all(|byte| byte.is_ascii_digit()) => digits.parse().map_err(|_| NoNetwork)?,
+            Some(_) => return Err(NoNetwork),
+            None if address.is_ipv4() => 32,
+            None => 128,
+        };
+        Self::new(address, prefix).map_err(|_| NoNetwork)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contains(network: &str, address: &str) -> bool {
+        network.parse::<Network>().unwrap().contains(address.parse().unwrap())
+    }
+
+    #[test]
+    fn a_prefix_decides_and_the_rest_does_not() {
+        assert!(contains("10.1.0.1/24", "10.1.0.255"));
+        assert!(!contains("10.1.0.1/24", "10.1.1.0"));
+        assert!(contains("10.1.0.1", "10.1.0.1"));
+        assert!(!contains("10.1.0.1", "10.1.0.0"));
+        assert!(contains("0.0.0.0/0", "255.255.255.255"));
+        assert!(contains("128.0.0.0/1", "200.0.0.1") && !contains("128.0.0.0/1", "127.0.0.1"));
+        assert!(contains("fd00::/64", "fd00::ffff:ffff:ffff:ffff"));
+        assert!(!contains("fd00::/64", "fd00:0:0:1::"));
+        assert!(contains("::/0", "::1") && contains("::1", "::1") && !contains("::1/128", "::"));
+        assert!(!contains("0.0.0.0/0", "::1") && !contains("::/0", "1.2.3.4"));
+    }
+
+    #[test]
+    fn what_is_no_network_is_refused() {
+        for text in
+            ["", "/", "10.1.0.1/33", "::/129", "10.1.0/24", "10.1.0.1/", "10.1.0.1/+8", "10.1.0.1/24/1", "10.1.0.1/999", "host/24", " 10.1.0.1"]
+        {
+            assert_eq!(text.parse::<Network>(), Err(NoNetwork), "{text}");
+        }
+        assert_eq!(Network::new(IpAddr::from([10, 0, 0, 1]), 33), Err(PrefixTooLong { prefix: 33, bits: 32 }));
+    }
+}
