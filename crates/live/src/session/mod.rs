@@ -1,0 +1,229 @@
+//! The session itself: a [`LiveScene`] driven by the wall clock, with a socket behind its [`Door`].
+//!
+//! One thread does everything that has to be on time. It sleeps until something is due or a datagram comes in, and tells the scene the logical instant of
+//! either: that at which it was due, or that at which the kernel saw it. Files, live control and the terminal have threads of their own.
+
+mod config;
+mod lateness_file;
+mod outside;
+mod recording;
+mod releases;
+mod rows;
+mod status;
+mod watch;
+
+use std::time::Duration;
+
+use cohaptic_harness::live::{LiveDevice, LiveScene};
+use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Woken, prepare_thread};
+use cohaptic_scene::{LinkKeys, Scene};
+use cohaptic_units::Instant;
+use cohaptic_wan::LinkModel;
+
+use outside::Outside;
+use recording::{Recording, Stopped};
+use watch::Watch;
+
+pub use config::{SessionConfig, SessionError};
+pub use status::{LinkStatus, PeerStatus, Report, SocketCounts, Status};
+
+/// Who looks on while a session runs, changes links, and ends it. Called on the thread that has to be on time: calls must neither wait nor take long.
+pub trait Conductor {
+    /// Whether to go on. Asked at least 50 times a second.
+    fn keep_going(&mut self) -> bool;
+
+    /// The next change of a link, if somebody wants one.
+    fn next_change(&mut self) -> Option<LinkChange>;
+
+    /// The session as it stands, about 20 times a second, if [`Conductor::wants_status`].
+    fn show(&mut self, status: Status);
+
+    /// Whether anybody looks on.
+    fn wants_status(&self) -> bool {
+        true
+    }
+}
+
+/// A link from now on.
+#[derive(Clone, Debug)]
+pub struct LinkChange {
+    /// The sender's place in the scene.
+    pub from: usize,
+    /// The receiver's place in the scene.
+    pub to: usize,
+    /// All its keys.
+    pub keys: LinkKeys,
+    /// The model that they make.
+    pub model: LinkModel,
+}
+
+/// A session that is ready to begin: its socket is open and its files are made.
+#[derive(Debug)]
+pub struct Session {
+    live: LiveScene,
+    outside: Option<Outside>,
+    watch: Watch,
+    config: SessionConfig,
+    peers: usize,
+}
+
+/// So often the conductor is asked, and shown the session.
+const LOOK: Duration = Duration::from_millis(20);
+const SHOW_EVERY: u32 = 3;
+
+impl Session {
+    /// Opens what the session needs. `devices` gives the device of each peer of kind `falcon`, by its place; `None` is one that is never there.
+    ///
+    /// # Errors
+    ///
+    /// [`SessionError`] if the socket cannot be had or may not be, or a file cannot be made.
+    ///
+    /// # Panics
+    ///
+    /// If the scene is [`cohaptic_harness::too_large`].
+    pub fn open(scene: &Scene, config: SessionConfig, devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Result<Self, SessionError> {
+        let outside = Outside::open(scene, &config)?;
+        let recording = config.out.as_deref().map(|folder| Recording::create(folder, scene)).transpose()?;
+        let peers = scene.peers.len();
+        Ok(Self { live: LiveScene::new(scene, devices), outside, watch: Watch::new(peers, recording), config, peers })
+    }
+
+    /// Where the session listens; `None` in a scene without peers in other programs.
+    #[must_use]
+    pub fn address(&self) -> Option<std::net::SocketAddr> {
+        self.outside.as_ref().map(Outside::address)
+    }
+
+    /// Runs the session on the calling thread until the scene ends, diverges, or the conductor ends it. Time begins with this call.
+    ///
+    /// The thread asks the system for what the configuration wishes, and keeps what it is granted: give it one of its own.
+    ///
+    /// # Errors
+    ///
+    /// [`SessionError`] if the system does not let it go on, or the record cannot be written. What was recorded until then is kept as far as it can be.
+    pub fn run(mut self, conductor: &mut impl Conductor) -> Result<Report, SessionError> {
+        let prepared = prepare_thread(&self.config.wishes);
+        let clock = MonotonicClock::start();
+        let driven = self.drive(&clock, conductor);
+        let behind = clock.now().saturating_duration_since(self.live.open());
+        let summary = self.live.summary();
+        let files = match self.watch.take_recording() {
+            Some(recording) => recording.finish(&summary, &self.watch.ticks, &self.watch.releases)?,
+            None => Vec::new(),
+        };
+        driven?;
+        Ok(Report {
+            ticks: self.watch.ticks.summary(),
+            late_ticks: self.watch.ticks.count_later_than(self.config.tolerance.limit),
+            releases: self.watch.releases.summary(),
+            validity: self.validity(),
+            behind,
+            seats: (0..self.peers).map(|peer| self.live.seat_stats(peer)).collect(),
+            door: self.outside.as_ref().map(Outside::counts),
+            prepared,
+            files,
+            summary,
+        })
+    }
+
+    fn drive(&mut self, clock: &MonotonicClock, conductor: &mut impl Conductor) -> Result<(), SessionError> {
+        let pacer = Pacer::new(self.config.pacing);
+        let (mut next_look, mut looks) = (Instant::ZERO, 0_u32);
+        while let Some(due) = self.live.poll_timeout() {
+            let woken = {
+                let readable = self.outside.as_ref().map(Outside::readable);
+                pacer.wait(clock, Some(due), readable.as_slice())?
+            };
+            let now = clock.now();
+            self.watch.woken = now;
+            let happened = match woken {
+                Woken::Deadline => self.receive(clock)?.and_then(|()| self.live.handle_timeout(due, &mut self.watch)),
+                Woken::Readable => self.receive(clock)?,
+                Woken::Early => Ok(()),
+            };
+            let sent = happened.and_then(|()| self.send(clock));
+            if sent == Err(Stopped) {
+                // The record cannot be written: its end says why.
+                return Ok(());
+            }
+            if now >= next_look {
+                next_look = now + LOOK;
+                looks = looks.wrapping_add(1);
+                if self.look(conductor, clock, looks.is_multiple_of(SHOW_EVERY)) == Err(Stopped) {
+                    return Ok(());
+                }
+            }
+        }
+        if conductor.wants_status() {
+            conductor.show(self.status());
+        }
+        Ok(())
+    }
+
+    /// Everything that has come in, each at the instant at which the kernel saw it.
+    fn receive(&mut self, clock: &MonotonicClock) -> Result<Result<(), Stopped>, SessionError> {
+        let Self { outside: Some(outside), live, watch, .. } = self else { return Ok(Ok(())) };
+        let mut taken = Ok(());
+        outside.receive(clock, |at, peer, sample| {
+            if taken.is_ok() {
+                // A sample that the scene refuses is counted there.
+                taken = live.handle_sample(at, peer, sample, watch).map(drop);
+            }
+        })?;
+        Ok(taken)
+    }
+
+    /// Sends on what the network has delivered.
+    fn send(&mut self, clock: &MonotonicClock) -> Result<(), Stopped> {
+        let Self { outside, live, watch, .. } = self;
+        let Some(outside) = outside else { return Ok(()) };
+        while let Some(transmit) = live.poll_transmit() {
+            if let Some(release) = outside.queue(clock, &transmit) {
+                watch.released(release)?;
+            }
+        }
+        outside.flush();
+        Ok(())
+    }
+
+    fn look(&mut self, conductor: &mut impl Conductor, clock: &MonotonicClock, show: bool) -> Result<(), Stopped> {
+        while let Some(LinkChange { from, to, keys, model }) = conductor.next_change() {
+            self.live.set_link(clock.now(), (from, to), &keys, &model, &mut self.watch)?;
+        }
+        if !conductor.keep_going() {
+            self.live.stop(clock.now(), &mut self.watch)?;
+        } else if show && conductor.wants_status() {
+            conductor.show(self.status());
+        }
+        Ok(())
+    }
+
+    fn validity(&self) -> cohaptic_realtime::Validity {
+        let mut all = self.watch.ticks.clone();
+        all.merge(&self.watch.releases);
+        self.config.tolerance.judge(&all)
+    }
+
+    fn status(&self) -> Status {
+        let places = 0..self.peers;
+        let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
+        let link = |(from, to): (usize, usize)| {
+            let carried = &self.watch.links[from * self.peers + to];
+            let stats = self.live.link_stats(from, to)?;
+            Some(LinkStatus { from, to, stats, delivered_bytes: carried.bytes, recent: carried.recent().to_vec() })
+        };
+        let peer = |place| {
+            let state = self.live.peer(place)?;
+            Some(PeerStatus { state, force: self.watch.forces[place], seat: self.live.seat_stats(place) })
+        };
+        Status {
+            elapsed: self.live.open().saturating_duration_since(Instant::ZERO),
+            ticks: self.watch.ticks.summary(),
+            releases: self.watch.releases.summary(),
+            validity: self.validity(),
+            peers: places.clone().filter_map(peer).collect(),
+            links: pairs.filter_map(link).collect(),
+            door: self.outside.as_ref().map(|outside| *outside.door_stats()),
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Peers in other programs: the socket and the door behind it.
+
+use std::net::SocketAddr;
+use std::os::fd::BorrowedFd;
+use std::time::Duration;
+
+use cohaptic_harness::live::Transmit;
+use cohaptic_realtime::udp::{self, ReceiveBuffers, UdpDoor};
+use cohaptic_realtime::{Clock as _, MonotonicClock};
+use cohaptic_scene::{PeerKind, Scene};
+use cohaptic_units::Instant;
+
+use super::releases::Release;
+use super::status::SocketCounts;
+use super::{SessionConfig, SessionError};
+use crate::{Admission, Door, DoorConfig, DoorStats, Limits, MAX_DATAGRAM, Place, Seat, SystemEntropy};
+
+/// The way to peers in other programs.
+#[derive(Debug)]
+pub(super) struct Outside {
+    socket: UdpDoor,
+    buffers: ReceiveBuffers,
+    door: Door,
+    sealed: [u8; MAX_DATAGRAM],
+}
+
+/// Nobody at a desk moves a copy farther or faster than this; what says so is no motion but a fault, and would throw every other copy out of the room.
+const LIMITS: Limits = Limits { position: 10.0, velocity: 100.0 };
+/// A sample longer than what the door takes is refused by it, and counted there.
+const LARGEST: usize = 2048;
+/// Datagrams of a few peers at 125 Hz: a second of a thousand of them.
+const RECEIVE_BUFFER: usize = 1 << 20;
+/// More than come in between two ticks of a session in order: what is beyond waits for the next, so that a flood cannot keep the loop from its ticks.
+const BATCHES: usize = 4;
+
+impl Outside {
+    /// `None` in a scene without peers in other programs.
+    pub(super) fn open(scene: &Scene, config: &SessionConfig) -> Result<Option<Self>, SessionError> {
+        let seats: Vec<(Seat, Duration)> = scene.peers.iter().zip(0..).filter_map(|(peer, place)| {
+            let PeerKind::Udp(silence) = peer.kind else { return None };
+            Some((Seat { place: Place(place), name: peer.name.clone() }, silence.after))
+        }).collect();
+        // A seat is free to be taken again once every peer counts as silent that was not heard for so long.
+        let Some(stale_after) = seats.iter().map(|(_, after)| *after).max() else { return Ok(None) };
+        let address = config.listen;
+        if !address.ip().to_canonical().is_loopback() && config.key.is_none() && !config.allow_remote {
+            return Err(SessionError::NotLoopback { address });
+        }
+        let peers = u32::try_from(scene.peers.len()).expect("a scene that runs has few peers");
+        let tick = scene.peers[0].clock.tick;
+        let seats = seats.into_iter().map(|(seat, _)| seat).collect();
+        let door = DoorConfig {
+            stale_after,
+            limits: Some(LIMITS),
+            ..DoorConfig::new(scene.seed, scene.axes.count(), peers, tick, scene.coordination.update, seats)
+        };
+        let door = Door::new(door.with_key(config.key.clone()), &mut SystemEntropy)?;
+        let socket = UdpDoor::bind(address, udp::DoorConfig { receive_buffer: RECEIVE_BUFFER, largest: LARGEST, ..udp::DoorConfig::default() })?;
+        Ok(Some(Self { socket, buffers: ReceiveBuffers::new(), door, sealed: [0; MAX_DATAGRAM] }))
+    }
+
+    pub(super) const fn address(&self) -> SocketAddr {
+        self.socket.local_address()
+    }
+
+    pub(super) fn readable(&self) -> BorrowedFd<'_> {
+        std::os::fd::AsFd::as_fd(&self.socket)
+    }
+
+    /// Hands on the samples that have come in and may, with the instant at which the kernel saw them, and answers who asks to join.
+    pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<()> {
+        let Self { socket, buffers, door, .. } = self;
+        let mut replies = Vec::new();
+        for _ in 0..BATCHES {
+            let count = socket.receive(buffers, clock, |datagram| match door.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
+                Admission::Sample { place, sample, .. } => take(datagram.at, place.0 as usize, sample.bytes()),
+                Admission::Reply { to, bytes } => replies.push((to, bytes)),
+                Admission::Refused(_) => {}
+            })?;
+            if count < UdpDoor::BATCH {
+                break;
+            }
+        }
+        for (to, bytes) in replies {
+            socket.queue(to, &bytes, None);
+        }
+        Ok(())
+    }
+
+    /// Makes a datagram ready for the program that has the seat; `None` if nobody has it.
+    pub(super) fn queue(&mut self, clock: &MonotonicClock, transmit: &Transmit) -> Option<Release> {
+        let place = Place(u32::try_from(transmit.to).ok()?);
+        let now = clock.now();
+        let (to, len) = self.door.seal(now, place, &transmit.datagram, &mut self.sealed)?;
+        self.socket.queue(to, &self.sealed[..len], None);
+        Some(Release { to: transmit.to, due: transmit.at, late: now.saturating_duration_since(transmit.at) })
+    }
+
+    pub(super) fn flush(&mut self) {
+        self.socket.flush();
+    }
+
+    pub(super) const fn door_stats(&self) -> &DoorStats {
+        self.door.stats()
+    }
+
+    pub(super) fn counts(&self) -> (DoorStats, SocketCounts) {
+        let kernel_drops = self.socket.kernel_drops().ok().flatten();
+        (*self.door.stats(), SocketCounts { address: self.address(), counts: *self.socket.counts(), kernel_drops })
+    }
+}

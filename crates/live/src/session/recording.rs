@@ -1,0 +1,115 @@
+//! Writing records without making the 1 kHz loop wait for a disk.
+//!
+//! The loop puts rows of fixed size into a queue that was allocated at the start; a thread of its own takes them out and writes them. If the disk falls so
+//! far behind that the queue is full, the loop waits: nothing is lost, and the wait shows in the lateness.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::{self, JoinHandle};
+
+use cohaptic_harness::record::{InputRecorder, RecordError, Recorder};
+use cohaptic_harness::{Observer as _, PacketRow, Summary, TickRow};
+use cohaptic_harness::live::InputRow;
+use cohaptic_scene::Scene;
+use cohaptic_realtime::Lateness;
+
+use super::lateness_file;
+use super::releases::{Release, Releases};
+use super::rows::{InputCopy, TickCopy};
+
+/// How many rows may wait: of three peers, ten seconds.
+const ROWS: usize = 65_536;
+
+/// Records a live session into a folder: the files of `cohaptic run --out`, what came from outside, and how late everything was.
+#[derive(Debug)]
+pub(crate) struct Recording {
+    folder: PathBuf,
+    rows: SyncSender<Row>,
+    writer: JoinHandle<Result<Files, RecordError>>,
+}
+
+#[derive(Debug)]
+enum Row {
+    Tick(TickCopy),
+    Packet(PacketRow),
+    Input(InputCopy),
+    Release(Release),
+}
+
+/// The files that grow while the session lasts.
+#[derive(Debug)]
+struct Files {
+    recorder: Recorder,
+    inputs: InputRecorder,
+    releases: Releases,
+}
+
+/// The writer could not write; [`Recording::finish`] says why.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Stopped;
+
+impl Recording {
+    /// Begins to record.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if the folder or a file in it cannot be made.
+    pub(crate) fn create(folder: &Path, scene: &Scene) -> Result<Self, RecordError> {
+        let recorder = Recorder::create(folder, scene)?;
+        let files = Files { recorder, inputs: InputRecorder::create(folder, scene)?, releases: Releases::create(folder, scene)? };
+        let axes = scene.axes.count();
+        let (rows, waiting) = sync_channel(ROWS);
+        let writer = thread::spawn(move || files.write(&waiting, axes));
+        Ok(Self { folder: folder.to_path_buf(), rows, writer })
+    }
+
+    /// Writes what is left and gives every file its name; gives the files.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if a file could not be written, now or before.
+    pub(crate) fn finish(self, summary: &Summary, ticks: &Lateness, releases: &Lateness) -> Result<Vec<PathBuf>, RecordError> {
+        drop(self.rows);
+        let files = self.writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        let mut written = files.recorder.finish(summary)?;
+        written.push(files.inputs.finish()?);
+        written.push(files.releases.finish()?);
+        written.push(lateness_file::write(&self.folder, ticks, releases)?);
+        Ok(written)
+    }
+
+    pub(crate) fn tick(&self, row: &TickRow<'_>) -> Result<(), Stopped> {
+        self.put(Row::Tick(TickCopy::of(row)))
+    }
+
+    pub(crate) fn packet(&self, row: &PacketRow) -> Result<(), Stopped> {
+        self.put(Row::Packet(*row))
+    }
+
+    pub(crate) fn input(&self, row: &InputRow<'_>) -> Result<(), Stopped> {
+        self.put(Row::Input(InputCopy::of(row)))
+    }
+
+    pub(crate) fn release(&self, release: Release) -> Result<(), Stopped> {
+        self.put(Row::Release(release))
+    }
+
+    fn put(&self, row: Row) -> Result<(), Stopped> {
+        // The writer takes rows until it cannot write.
+        self.rows.send(row).map_err(|_| Stopped)
+    }
+}
+
+impl Files {
+    fn write(mut self, rows: &Receiver<Row>, axes: usize) -> Result<Self, RecordError> {
+        for row in rows {
+            match row {
+                Row::Tick(row) => self.recorder.on_tick(&row.borrowed(axes))?,
+                Row::Packet(row) => self.recorder.on_packet(&row)?,
+                Row::Input(row) => self.inputs.on_input(&row.borrowed(axes))?,
+                Row::Release(row) => self.releases.write(&row)?,
+            }
+        }
+        Ok(self)
+    }
+}

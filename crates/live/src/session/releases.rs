@@ -1,0 +1,45 @@
+//! `releases.csv`: when each datagram to another program was due, and how late it was sent.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use cohaptic_harness::record::{PartialFile, RecordError};
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+use cohaptic_units::print::Seconds;
+
+/// A datagram that was sent to a peer in another program.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Release {
+    /// The receiver.
+    pub(crate) to: usize,
+    /// When the network had delivered it: when it was due.
+    pub(crate) due: Instant,
+    /// From then until it was handed to the system.
+    pub(crate) late: Duration,
+}
+
+/// Columns `peer,due,late_us`, in the order of sending. It left at `due + late_us`.
+#[derive(Debug)]
+pub(super) struct Releases {
+    file: PartialFile,
+    names: Vec<String>,
+}
+
+impl Releases {
+    pub(super) fn create(folder: &Path, scene: &Scene) -> Result<Self, RecordError> {
+        let mut file = PartialFile::create(folder.join("releases.csv"))?;
+        file.write(b"peer,due,late_us\n")?;
+        Ok(Self { file, names: scene.peers.iter().map(|peer| peer.name.clone()).collect() })
+    }
+
+    pub(super) fn write(&mut self, row: &Release) -> Result<(), RecordError> {
+        let nanos = row.late.as_nanos();
+        let line = format!("{},{},{}.{:03}\n", self.names[row.to], Seconds(row.due), nanos / 1000, nanos % 1000);
+        self.file.write(line.as_bytes())
+    }
+
+    pub(super) fn finish(self) -> Result<PathBuf, RecordError> {
+        self.file.finish()
+    }
+}

@@ -1,0 +1,100 @@
+//! Rows of a session with numbers of their own, so that another thread can write them.
+
+use cohaptic_harness::live::{Input, InputRow};
+use cohaptic_harness::{StateRow, TickRow};
+use cohaptic_peer::wire::MAX_LEN;
+use cohaptic_scene::LinkKeys;
+use cohaptic_units::Instant;
+
+/// Position and velocity, the axes that the scene does not have at zero.
+type Numbers = [[f64; 3]; 2];
+
+/// A [`TickRow`].
+#[derive(Debug)]
+pub(super) struct TickCopy {
+    at: Instant,
+    peer: usize,
+    device: Numbers,
+    object: Numbers,
+    target: Numbers,
+    forces: Numbers,
+}
+
+impl TickCopy {
+    pub(super) fn of(row: &TickRow<'_>) -> Self {
+        Self {
+            at: row.at,
+            peer: row.peer,
+            device: state(row.device),
+            object: state(row.object),
+            target: state(row.target),
+            forces: [padded(row.coupling_force), padded(row.coordination_force)],
+        }
+    }
+
+    pub(super) fn borrowed(&self, axes: usize) -> TickRow<'_> {
+        TickRow {
+            at: self.at,
+            peer: self.peer,
+            device: row(&self.device, axes),
+            object: row(&self.object, axes),
+            target: row(&self.target, axes),
+            coupling_force: &self.forces[0][..axes],
+            coordination_force: &self.forces[1][..axes],
+        }
+    }
+}
+
+/// An [`InputRow`].
+#[derive(Debug)]
+pub(super) struct InputCopy {
+    at: Instant,
+    what: What,
+}
+
+#[derive(Debug)]
+enum What {
+    Sample { peer: usize, bytes: [u8; MAX_LEN], len: usize },
+    Device { peer: usize, state: Option<Numbers> },
+    /// The only one that allocates: somebody moved a slider.
+    Link { from: usize, to: usize, keys: Box<LinkKeys> },
+    End,
+}
+
+impl InputCopy {
+    pub(super) fn of(row: &InputRow<'_>) -> Self {
+        let what = match row.what {
+            Input::Sample { peer, datagram } => {
+                let (mut bytes, len) = ([0; MAX_LEN], datagram.len().min(MAX_LEN));
+                bytes[..len].copy_from_slice(&datagram[..len]);
+                What::Sample { peer, bytes, len }
+            }
+            Input::Device { peer, state: read } => What::Device { peer, state: read.map(state) },
+            Input::Link { from, to, keys } => What::Link { from, to, keys: Box::new(keys.clone()) },
+            Input::End => What::End,
+        };
+        Self { at: row.at, what }
+    }
+
+    pub(super) fn borrowed(&self, axes: usize) -> InputRow<'_> {
+        let what = match &self.what {
+            What::Sample { peer, bytes, len } => Input::Sample { peer: *peer, datagram: &bytes[..*len] },
+            What::Device { peer, state } => Input::Device { peer: *peer, state: state.as_ref().map(|numbers| row(numbers, axes)) },
+            What::Link { from, to, keys } => Input::Link { from: *from, to: *to, keys },
+            What::End => Input::End,
+        };
+        InputRow { at: self.at, what }
+    }
+}
+
+fn state(row: StateRow<'_>) -> Numbers {
+    [padded(row.position), padded(row.velocity)]
+}
+
+fn row(numbers: &Numbers, axes: usize) -> StateRow<'_> {
+    StateRow { position: &numbers[0][..axes], velocity: &numbers[1][..axes] }
+}
+
+fn padded(values: &[f64]) -> [f64; 3] {
+    std::array::from_fn(|axis| values.get(axis).copied().unwrap_or(0.0))
+}
