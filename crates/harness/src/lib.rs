@@ -2,7 +2,7 @@
 //!
 //! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that really send their datagrams through a [`cohaptic_wan::Network`]. An
 //! [`Observer`] sees every tick and every packet; [`record`] has observers that write CSV files and plots while the scene runs. [`check`] compares a
-//! run with the scene's expectations, [`mod@explain`] says what a scene makes the program model.
+//! run with the scene's expectations, [`mod@explain`] says what a scene makes the program model. [`live`] runs a scene some of whose peers live elsewhere.
 //!
 //! Nothing here reads a clock: the same scene and seed give the same bytes, whatever the machine.
 //!
@@ -28,6 +28,7 @@ pub mod check;
 mod datagrams;
 mod disturbance;
 pub mod explain;
+pub mod live;
 mod observer;
 mod plan;
 pub mod record;

@@ -3,6 +3,8 @@
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::Fate;
 
+use crate::live::InputRow;
+
 /// Sees what happens in a run, while it happens, in the order in which it happens.
 ///
 /// Peers are named by their place in [`cohaptic_scene::Scene::peers`]. The rows borrow from the running scene: copy what you keep. By default an
@@ -36,6 +38,15 @@ pub trait Observer {
     ///
     /// Ends the run.
     fn on_packet(&mut self, _row: &PacketRow) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// Something has come into a [live session](crate::live) from outside: what is seen here, in this order, is what a replay needs.
+    ///
+    /// # Errors
+    ///
+    /// Ends the run.
+    fn on_input(&mut self, _row: &InputRow<'_>) -> Result<(), Self::Error> {
         Ok(())
     }
 
@@ -120,6 +131,11 @@ impl<A: Observer, B: Observer<Error = A::Error>> Observer for (A, B) {
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), Self::Error> {
         self.0.on_packet(row)?;
         self.1.on_packet(row)
+    }
+
+    fn on_input(&mut self, row: &InputRow<'_>) -> Result<(), Self::Error> {
+        self.0.on_input(row)?;
+        self.1.on_input(row)
     }
 
     fn keep_going(&mut self, now: Instant) -> bool {

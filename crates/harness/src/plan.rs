@@ -55,7 +55,7 @@ impl Plan {
             },
             Model::Least => Self {
                 axes: scene.axes,
-                ticking: ticking(&scene.peers),
+                ticking: ticking(scene.peers.iter()),
                 devices: (0..scene.peers.len()).map(|peer| device(scene, peer, ticks_are_observed)).collect(),
                 general_links: false,
             },
@@ -63,9 +63,11 @@ impl Plan {
     }
 }
 
-fn ticking(peers: &[PeerSpec]) -> Ticking {
-    let together = |peer: &PeerSpec| peer.clock.offset.is_zero() && peer.clock.drift == Drift::default() && peer.clock.tick == peers[0].clock.tick;
-    if peers.iter().all(together) { Ticking::Lockstep } else { Ticking::EventDriven }
+/// How peers tick that have nothing to do with the ticks of any others.
+pub(crate) fn ticking<'a>(peers: impl Iterator<Item = &'a PeerSpec> + Clone) -> Ticking {
+    let first = peers.clone().next().map(|peer| peer.clock.tick);
+    let together = |peer: &PeerSpec| peer.clock.offset.is_zero() && peer.clock.drift == Drift::default() && Some(peer.clock.tick) == first;
+    if first.is_some() && peers.clone().all(together) { Ticking::Lockstep } else { Ticking::EventDriven }
 }
 
 fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice {

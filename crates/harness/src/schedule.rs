@@ -37,8 +37,9 @@ impl Event for Tick {
 }
 
 impl Schedule {
-    pub(crate) fn new<'a>(ticking: Ticking, clocks: impl IntoIterator<Item = &'a Clock>) -> Self {
-        let mut clocks = clocks.into_iter().enumerate();
+    /// The ticks of peers with these places and clocks; in lockstep at least one.
+    pub(crate) fn new<'a>(ticking: Ticking, clocks: impl IntoIterator<Item = (usize, &'a Clock)>) -> Self {
+        let mut clocks = clocks.into_iter();
         match ticking {
             Ticking::Lockstep => {
                 let tick = clocks.next().map_or(Duration::MAX, |(_, clock)| clock.tick);

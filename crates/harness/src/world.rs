@@ -1,5 +1,7 @@
 //! The running scene: its peers, its network, its clock, with A simulated axes.
 
+mod elsewhere;
+
 use std::time::Duration;
 
 use cohaptic_peer::wire::{MAX_LEN, Sample};
@@ -10,10 +12,13 @@ use cohaptic_wan::{AccessLine, Damage, Fate, LinkModel, Network, NetworkConfig, 
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
+use crate::live::{Attendance, Datagram, HandDevice};
 use crate::observer::{Observer, PacketRow, StateRow, TickRow};
 use crate::plan::{DeviceChoice, Plan};
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
+
+use elsewhere::attend;
 
 /// A scene in the middle of a run.
 pub(crate) struct World<const A: usize, S> {
@@ -33,10 +38,16 @@ pub(crate) struct World<const A: usize, S> {
     latest: Vec<[f64; A]>,
     max_discrepancy: f64,
     finite: bool,
-    /// Who ticks at the present instant, if not all.
+    /// Who ticks at the present instant, if not all who live here.
     ticking: Vec<usize>,
+    /// The first of those who live here, by whose ticks all of them tick in lockstep.
+    lead: usize,
     /// In lockstep, the next tick at which anybody sends.
     earliest_send: u64,
+    /// Those who live elsewhere; `None` in virtual time.
+    attendance: Option<Box<Attendance>>,
+    /// When something came in from outside whose consequences have not been looked at.
+    undrained: Option<Instant>,
 }
 
 /// A peer with its clock.
@@ -57,6 +68,8 @@ struct Member<const A: usize, S> {
 enum DeviceModel<const A: usize> {
     Resting(RestingDevice<A>),
     Simulated(SimulatedDevice<A>),
+    /// In somebody's hand.
+    Hand(HandDevice<A>),
 }
 
 impl<const A: usize> Device<A> for DeviceModel<A> {
@@ -65,6 +78,7 @@ impl<const A: usize> Device<A> for DeviceModel<A> {
         match self {
             Self::Resting(device) => device.state(),
             Self::Simulated(device) => device.state(),
+            Self::Hand(device) => device.state(),
         }
     }
 
@@ -73,6 +87,7 @@ impl<const A: usize> Device<A> for DeviceModel<A> {
         match self {
             Self::Resting(device) => device.advance(now, span, coupling_force),
             Self::Simulated(device) => device.advance(now, span, coupling_force),
+            Self::Hand(device) => device.advance(now, span, coupling_force),
         }
     }
 }
@@ -105,7 +120,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
             members,
             network: network(scene, plan),
             datagrams: Datagrams::default(),
-            schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock)),
+            schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock).enumerate()),
             changes: scene.timeline.iter().rev().cloned().collect(),
             coordination_factor: scene.coordination.scaling.coordination_factor(scene.peers.len()),
             end: Instant::ZERO.saturating_add(scene.duration),
@@ -113,13 +128,21 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
             max_discrepancy: 0.0,
             finite: true,
             ticking: (0..scene.peers.len()).collect(),
+            lead: 0,
             earliest_send: 0,
+            attendance: None,
+            undrained: None,
         }
     }
 
     /// The instant of the latest step.
     pub(crate) fn now(&self) -> Instant {
         self.now
+    }
+
+    /// The end of the scene.
+    pub(crate) fn end(&self) -> Instant {
+        self.end
     }
 
     /// Everything that happens at the next instant at which a peer ticks, or the end of the scene.
@@ -130,6 +153,13 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
         if !self.finite {
             return Ok(Step::Ended(Ending::Diverged(now)));
         }
+        self.tick(now, observer, watch)?;
+        Ok(Step::Ticked)
+    }
+
+    /// Everything that happens at an instant at which a peer ticks.
+    #[inline]
+    fn tick<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
         self.now = now;
         if !self.changes.is_empty() {
             self.change(now);
@@ -139,7 +169,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
         self.deliver(now, observer, watch)?;
         self.compute_and_move(now, observer, watch)?;
         self.measure_discrepancy();
-        Ok(Step::Ticked)
+        Ok(())
     }
 
     /// What came out, up to `ending`.
@@ -193,7 +223,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
                 ChangeKind::Contact { peer, contact } => self.members[peer].peer.set_contact(contact),
                 ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
                     DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
-                    DeviceModel::Resting(_) => {}
+                    DeviceModel::Resting(_) | DeviceModel::Hand(_) => {}
                 },
                 ChangeKind::Coordination(gains) => {
                     for member in &mut self.members {
@@ -211,7 +241,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
 
     /// Step 1: those whose time it is send their sample to everybody else.
     fn send(&mut self, now: Instant) {
-        if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[0].tick < self.earliest_send {
+        if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.lead].tick < self.earliest_send {
             return;
         }
         let others = self.members.len() - 1;
@@ -236,17 +266,31 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
         self.network.handle_timeout(now).expect("instants come in order");
         while let Some(event) = self.network.poll_event() {
             if let Fate::Delivered(_) = event.fate {
-                let receiver = &mut self.members[event.to.0 as usize];
+                let (from, to) = (event.from.0 as usize, event.to.0 as usize);
                 let sample = self.datagrams.sample(event.payload);
-                let received = match &event.damage {
-                    None => receiver.peer.handle_sample(sample),
-                    Some(damage) => receiver.peer.handle_datagram(damaged(sample, self.axes, damage, &mut [0; MAX_LEN])),
-                };
-                match received {
-                    Ok(Reception::Newest) => {}
-                    Ok(Reception::Stale) => receiver.stale_samples += 1,
-                    Err(_) if event.damage.is_some() => receiver.refused_samples += 1,
-                    Err(error) => unreachable!("peers of one scene understand each other: {error}"),
+                if let Some(attendance) = self.attendance.as_mut().filter(|attendance| attendance.is_process(to)) {
+                    let mut bytes = [0; MAX_LEN];
+                    let len = sample.encode(self.axes, &mut bytes);
+                    if let Some(damage) = &event.damage {
+                        damage.apply(&mut bytes[..len]);
+                    }
+                    attendance.send_out(to, event.at, Datagram::new(bytes, len));
+                } else {
+                    let receiver = &mut self.members[to];
+                    let received = match &event.damage {
+                        None => receiver.peer.handle_sample(sample),
+                        Some(damage) => receiver.peer.handle_datagram(damaged(sample, self.axes, damage, &mut [0; MAX_LEN])),
+                    };
+                    match received {
+                        Ok(Reception::Newest) => {
+                            if let Some(attendance) = &mut self.attendance {
+                                attendance.arrived(from, to, now, &mut receiver.peer);
+                            }
+                        }
+                        Ok(Reception::Stale) => receiver.stale_samples += 1,
+                        Err(_) if event.damage.is_some() => receiver.refused_samples += 1,
+                        Err(error) => unreachable!("peers of one scene understand each other: {error}"),
+                    }
                 }
             }
             if event.fate == Fate::Duplicated {
@@ -273,12 +317,15 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
             }
             Schedule::EventDriven(_) => None,
         };
-        if let (Some(span), false) = (lockstep, watch.ticks) {
+        if let (Some(span), false, None) = (lockstep, watch.ticks, &self.attendance) {
             self.move_together(now, span);
             return Ok(());
         }
         for &place in &self.ticking {
             let member = &mut self.members[place];
+            if let Some(attendance) = &mut self.attendance {
+                attend(attendance, now, place, member, self.axes, observer)?;
+            }
             let forces = member.peer.compute(now);
             let object = member.peer.object().state();
             self.latest[place] = object.position;

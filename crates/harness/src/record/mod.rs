@@ -5,6 +5,7 @@
 //! | `trajectory.csv` | one row a peer and tick: the state at t and the forces computed at t |
 //! | `packets.csv` | one row a packet, in the order of arrival or drop |
 //! | `links.csv` | one row a link or access line: its counters at the end |
+//! | `inputs.csv` | of a live session: one row a thing that came in from outside |
 //! | `positions.svg`, `forces.svg`, `network.svg` | plots over time |
 //!
 //! A file is written under the name `….partial` and takes its own name when it is whole. Numbers are written with the fewest digits that read back
@@ -12,6 +13,7 @@
 
 mod band;
 mod file;
+mod inputs;
 mod links;
 mod packets;
 mod plot;
@@ -21,4 +23,5 @@ mod trajectory;
 
 pub use band::Bands;
 pub use file::RecordError;
+pub use inputs::InputRecorder;
 pub use recorder::{Recorder, SANE_POSITION};

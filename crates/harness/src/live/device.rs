@@ -1,0 +1,83 @@
+//! A device in somebody's hand.
+
+use std::time::Duration;
+
+use cohaptic_peer::{Device, State};
+use cohaptic_units::Instant;
+
+/// What a live session needs of a device. Components beyond the axes of the scene are zero, and are not looked at.
+pub trait LiveDevice: Send {
+    /// Position and velocity in the coordinates of the scene, at the tick at `now`; called once a tick. `None` if that cannot be told: there is no device, it
+    /// does not answer, it is not homed. A peer whose device is silent for long lets go of the object, and takes it up again, little by little.
+    fn read(&mut self, now: Instant) -> Option<State<3>>;
+
+    /// Holds a force until the next tick, `span` after `now`: FC \[N\], which the hand feels with the opposite sign. Called once a tick, after
+    /// [`LiveDevice::read`], and with zero forces when the session ends.
+    fn hold(&mut self, now: Instant, span: Duration, coupling_force: [f64; 3]);
+}
+
+/// The device of a peer, where it was when it was last read.
+pub(crate) struct HandDevice<const A: usize> {
+    device: Option<Box<dyn LiveDevice>>,
+    read: State<A>,
+    /// What was felt when it came back, and how far it has come from there.
+    before: State<A>,
+    share: f64,
+}
+
+impl<const A: usize> HandDevice<A> {
+    /// `None` is a device that is never there.
+    pub(crate) const fn new(device: Option<Box<dyn LiveDevice>>, state: State<A>) -> Self {
+        Self { device, read: state, before: state, share: 1.0 }
+    }
+
+    /// Reads the device, and says whether that could be done.
+    pub(crate) fn read(&mut self, now: Instant) -> Option<State<A>> {
+        let State { position, velocity } = self.device.as_mut()?.read(now).filter(State::is_finite)?;
+        let first = |values: [f64; 3]| core::array::from_fn(|axis| values.get(axis).copied().unwrap_or(0.0));
+        Some(State { position: first(position), velocity: first(velocity) })
+    }
+
+    /// Takes what was read.
+    pub(crate) const fn set(&mut self, state: State<A>) {
+        self.read = state;
+    }
+
+    /// What is felt until now is that from which the share counts.
+    pub(crate) fn keep(&mut self) {
+        self.before = self.state();
+    }
+
+    pub(crate) const fn set_share(&mut self, share: f64) {
+        self.share = share;
+    }
+
+    pub(crate) fn let_go(&mut self, now: Instant) {
+        if let Some(device) = &mut self.device {
+            device.hold(now, Duration::ZERO, [0.0; 3]);
+        }
+    }
+}
+
+impl<const A: usize> Device<A> for HandDevice<A> {
+    fn state(&self) -> State<A> {
+        if self.share < 1.0 {
+            let mix = |from: [f64; A], to: [f64; A]| core::array::from_fn(|axis| from[axis] + self.share * (to[axis] - from[axis]));
+            State { position: mix(self.before.position, self.read.position), velocity: mix(self.before.velocity, self.read.velocity) }
+        } else {
+            self.read
+        }
+    }
+
+    fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
+        if let Some(device) = &mut self.device {
+            device.hold(now, span, core::array::from_fn(|axis| coupling_force.get(axis).copied().unwrap_or(0.0)));
+        }
+    }
+}
+
+impl<const A: usize> core::fmt::Debug for HandDevice<A> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("HandDevice").field("there", &self.device.is_some()).field("read", &self.read).finish_non_exhaustive()
+    }
+}

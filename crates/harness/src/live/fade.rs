@@ -1,0 +1,108 @@
+//! Numbers that go from 0 to 1 and back at a given speed.
+
+use std::time::Duration;
+
+use cohaptic_peer::Age;
+use cohaptic_units::Instant;
+
+/// A number from 0 to 1 that moves towards one end, by 1 in the time `over`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Ramp {
+    from: f64,
+    since: Instant,
+    rises: bool,
+    over: Duration,
+}
+
+impl Ramp {
+    /// At 0, where it stays.
+    pub(crate) const fn down(over: Duration) -> Self {
+        Self { from: 0.0, since: Instant::ZERO, rises: false, over }
+    }
+
+    /// At 1, where it stays.
+    pub(crate) const fn up(over: Duration) -> Self {
+        Self { from: 1.0, since: Instant::ZERO, rises: true, over }
+    }
+
+    pub(crate) fn value(&self, now: Instant) -> f64 {
+        let way = now.saturating_duration_since(self.since).as_secs_f64() / self.over.as_secs_f64();
+        if self.rises { (self.from + way).min(1.0) } else { (self.from - way).max(0.0) }
+    }
+
+    /// From its value at `at` it rises, or falls.
+    pub(crate) fn turn(&mut self, at: Instant, rises: bool) {
+        if self.rises != rises {
+            *self = Self { from: self.value(at), since: at, rises, ..*self };
+        }
+    }
+
+    /// From 0 at `at` it rises.
+    pub(crate) fn restart(&mut self, at: Instant) {
+        *self = Self { from: 0.0, since: at, rises: true, ..*self };
+    }
+}
+
+/// How much of one peer's pull another one feels, over time.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Fade {
+    weight: Ramp,
+    share: Ramp,
+}
+
+impl Fade {
+    /// Of somebody who has never been heard.
+    pub(crate) const fn unheard(over: Duration) -> Self {
+        Self { weight: Ramp::down(over), share: Ramp::up(over) }
+    }
+
+    pub(crate) fn fall(&mut self, at: Instant) {
+        self.weight.turn(at, false);
+    }
+
+    pub(crate) fn rise(&mut self, at: Instant) {
+        self.weight.turn(at, true);
+    }
+
+    /// What is held has moved to another place: the way there begins now, unless nobody feels it.
+    pub(crate) fn moved(&mut self, at: Instant) {
+        if self.weight.value(at) > 0.0 {
+            self.share.restart(at);
+        } else {
+            self.share = Ramp::up(self.share.over);
+        }
+    }
+
+    pub(crate) fn age(&self, now: Instant) -> Age {
+        Age { weight: self.weight.value(now), share: self.share.value(now) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(millis: u64) -> Instant {
+        Instant::from_nanos(millis * 1_000_000)
+    }
+
+    /// With a fade of 256 ms steps of 64 ms are quarters, exactly.
+    #[test]
+    fn the_weight_is_linear_both_ways_and_turns_where_it_is() {
+        let mut fade = Fade::unheard(Duration::from_millis(256));
+        assert_eq!(fade.age(at(999)), Age::GONE);
+        fade.moved(at(1000));
+        fade.rise(at(1000));
+        assert_eq!(fade.age(at(1064)), Age { weight: 0.25, share: 1.0 });
+        fade.rise(at(1100));
+        fade.fall(at(1192));
+        assert_eq!(fade.age(at(1192)).weight, 0.75);
+        assert_eq!(fade.age(at(1256)).weight, 0.5);
+        fade.moved(at(1256));
+        fade.rise(at(1256));
+        assert_eq!(fade.age(at(1320)), Age { weight: 0.75, share: 0.25 });
+        assert_eq!(fade.age(at(1512)), Age::WHOLE);
+        fade.fall(at(2000));
+        assert_eq!(fade.age(at(2300)), Age::GONE);
+    }
+}

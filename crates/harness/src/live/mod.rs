@@ -1,0 +1,27 @@
+//! A scene some of whose peers live elsewhere: in other processes, or with their device in somebody's hand.
+//!
+//! [`LiveScene`] is a state machine. Whoever drives it hands in what comes from outside with the instant at which it came, lets time pass, and sends on what
+//! the network has delivered. It reads no clock and touches no socket: driven by the clock of the wall it is a live session, driven by the recorded
+//! [`Inputs`] of one, with [`replay`], it is the same session in virtual time, with the same fates and the same motion.
+//!
+//! What a peer's silence does to the others is written in `docs/model.md`.
+
+mod attendance;
+mod device;
+mod fade;
+mod inputs;
+mod replay;
+mod rows;
+mod scene;
+mod seat;
+
+pub(crate) use attendance::{Attendance, other};
+pub(crate) use device::HandDevice;
+
+pub use attendance::{Datagram, Transmit};
+pub use device::LiveDevice;
+pub use inputs::{Input, InputRow, Inputs, InputsError};
+pub use replay::replay;
+pub use rows::{HEADER, InputLine};
+pub use scene::{LiveScene, PeerState};
+pub use seat::{Presence, SampleError, SeatStats};

@@ -1,0 +1,265 @@
+//! The live scene as a state machine.
+
+use std::fmt;
+use std::time::Duration;
+
+use cohaptic_peer::State;
+use cohaptic_peer::coordination::BuiltIn;
+use cohaptic_scene::{Axes, LinkKeys, Scene};
+use cohaptic_units::Instant;
+use cohaptic_wan::{LinkModel, LinkStats};
+
+use super::attendance::Transmit;
+use super::device::LiveDevice;
+use super::inputs::{Input, InputRow};
+use super::seat::{Presence, SampleError, SeatStats};
+use crate::observer::Observer;
+use crate::plan::{Model, Plan};
+use crate::simulation::{Simulation, too_large};
+use crate::summary::{Ending, Summary};
+use crate::world::{Step, Watch, World};
+
+const NANOSECOND: Duration = Duration::from_nanos(1);
+
+/// A scene in the middle of a session, some of whose peers may live elsewhere.
+///
+/// The driver hands in samples with [`LiveScene::handle_sample`], each with the logical instant at which it came, asks with [`LiveScene::poll_timeout`] when to
+/// come back, calls [`LiveScene::handle_timeout`] then, and after every call drains [`LiveScene::poll_transmit`]. Being late costs nothing but lateness: what
+/// was due happens instant by instant, in the order that `docs/model.md` lays down, and comes out with the instant at which it was due. In which steps the
+/// driver lets time pass changes nothing but when it learns of things.
+///
+/// Time is *open* from some instant on: everything before it has happened. What comes in counts at its own instant, before anything else at that instant, or,
+/// if that has passed, at the first one that is open.
+#[derive(Debug)]
+pub struct LiveScene {
+    world: AnyWorld,
+    session: u64,
+    open: Instant,
+    ended: Option<Ending>,
+}
+
+/// A world with as many axes as the scene has.
+enum AnyWorld {
+    One(Box<World<1, BuiltIn>>),
+    Two(Box<World<2, BuiltIn>>),
+    Three(Box<World<3, BuiltIn>>),
+}
+
+macro_rules! each {
+    ($any:expr, $world:ident => $what:expr) => {
+        match $any {
+            AnyWorld::One($world) => $what,
+            AnyWorld::Two($world) => $what,
+            AnyWorld::Three($world) => $what,
+        }
+    };
+}
+
+/// One peer as it stands, for display. Components beyond the axes of the scene are zero.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PeerState {
+    /// Whether it is there.
+    pub presence: Presence,
+    /// Its device at its latest tick; `None` for a peer in another process.
+    pub device: Option<State<3>>,
+    /// Its copy of the object; for a peer in another process, what its newest sample says of it (where it begins, before the first).
+    pub object: State<3>,
+}
+
+impl LiveScene {
+    /// The scene at its beginning. `devices` gives the device of each peer of kind `falcon`, by its place; `None` is one that is never there.
+    ///
+    /// # Panics
+    ///
+    /// If the scene is [`too_large`].
+    #[must_use]
+    pub fn new(scene: &Scene, devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
+        assert!(too_large(scene).is_none(), "a scene with more peers than a simulation takes is not run");
+        // Who watches is not known yet, and may change.
+        let plan = Plan::new(scene, Model::Least, true);
+        let simulation = Simulation::new(scene, Model::Least);
+        let world = match plan.axes {
+            Axes::One => AnyWorld::One(Box::new(simulation.world(&plan).with_attendance(scene, devices))),
+            Axes::Two => AnyWorld::Two(Box::new(simulation.world(&plan).with_attendance(scene, devices))),
+            Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan).with_attendance(scene, devices))),
+        };
+        // The session that peers of the scene have: see `Scene::peer_config`.
+        Self { world, session: scene.seed, open: Instant::ZERO, ended: None }
+    }
+
+    /// Takes a sample of a peer of kind `udp`, which came at `at`, and sends it on over the links of that peer. Gives the instant at which it counts: `at`, or
+    /// the first that is open.
+    ///
+    /// The datagram is one of that peer for certain: whoever calls has made sure where it came from. It is checked all the same. What is refused is counted
+    /// and changes nothing. The peer's samples must have rising numbers; after a silence they may begin anew. For the others they are numbered on.
+    ///
+    /// # Errors
+    ///
+    /// The outer error is that of the observer, which sees what is due before `at`, and the sample if it is taken; the inner one says why the sample was refused.
+    pub fn handle_sample<O: Observer>(
+        &mut self,
+        at: Instant,
+        peer: usize,
+        datagram: &[u8],
+        observer: &mut O,
+    ) -> Result<Result<Instant, SampleError>, O::Error> {
+        let Some(counts) = self.come_in(at, observer)? else { return Ok(Err(SampleError::Ended)) };
+        let session = self.session;
+        if let Err(error) = each!(&mut self.world, world => world.take_sample(counts, peer, datagram, session)) {
+            return Ok(Err(error));
+        }
+        let late = counts.saturating_duration_since(at);
+        // What comes at the very instant that was just handled is not late, but it counts behind it.
+        if late > NANOSECOND {
+            each!(&mut self.world, world => world.note_late(peer, late));
+        }
+        observer.on_input(&InputRow { at: counts, what: Input::Sample { peer, datagram } })?;
+        Ok(Ok(counts))
+    }
+
+    /// Changes a link from `at` on, or from the first instant that is open, which it gives; `None` if there is no such link or the session has ended. `model` is
+    /// that of `keys`: see [`LinkKeys::model`]. What is on the way keeps its delay.
+    ///
+    /// # Errors
+    ///
+    /// That of the observer, which sees what is due before `at`, and the change.
+    pub fn set_link<O: Observer>(
+        &mut self,
+        at: Instant,
+        ends: (usize, usize),
+        keys: &LinkKeys,
+        model: &LinkModel,
+        observer: &mut O,
+    ) -> Result<Option<Instant>, O::Error> {
+        let (from, to) = ends;
+        if self.link_stats(from, to).is_none() {
+            return Ok(None);
+        }
+        let Some(at) = self.come_in(at, observer)? else { return Ok(None) };
+        each!(&mut self.world, world => world.take_link(at, from, to, model));
+        observer.on_input(&InputRow { at, what: Input::Link { from, to, keys } })?;
+        Ok(Some(at))
+    }
+
+    /// Lets everything happen that is due up to and including `now`.
+    ///
+    /// # Errors
+    ///
+    /// That of the observer.
+    pub fn handle_timeout<O: Observer>(&mut self, now: Instant, observer: &mut O) -> Result<(), O::Error> {
+        self.let_happen(now, observer)?;
+        self.open = self.open.max(now.saturating_add(NANOSECOND));
+        Ok(())
+    }
+
+    /// When [`LiveScene::handle_timeout`] must be called next; `None` once the session has ended.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        if self.ended.is_some() { None } else { Some(each!(&self.world, world => world.next_instant())) }
+    }
+
+    /// The next datagram that the network has delivered to a peer of kind `udp`, whether or not that is there; in the order of arrival. Until it is fetched it
+    /// takes memory.
+    pub fn poll_transmit(&mut self) -> Option<Transmit> {
+        each!(&mut self.world, world => world.next_transmit())
+    }
+
+    /// Ends the session after everything that is due up to and including `now`.
+    ///
+    /// # Errors
+    ///
+    /// That of the observer.
+    pub fn stop<O: Observer>(&mut self, now: Instant, observer: &mut O) -> Result<(), O::Error> {
+        self.handle_timeout(now, observer)?;
+        if self.ended.is_none() {
+            // With a `now` that has passed, the last instant that has not.
+            let at = Instant::from_nanos(self.open.as_nanos() - 1);
+            observer.on_input(&InputRow { at, what: Input::End })?;
+            self.end(Ending::Interrupted(at));
+        }
+        Ok(())
+    }
+
+    /// How the session has ended; `None` if it has not.
+    #[must_use]
+    pub const fn ended(&self) -> Option<Ending> {
+        self.ended
+    }
+
+    /// The first instant that is open: everything before it has happened.
+    #[must_use]
+    pub const fn open(&self) -> Instant {
+        self.open
+    }
+
+    /// Whether a peer is there; `None` beyond the last peer.
+    #[must_use]
+    pub fn presence(&self, peer: usize) -> Option<Presence> {
+        each!(&self.world, world => world.presence(peer, self.open))
+    }
+
+    /// What came in at a peer that lives elsewhere; `None` for one that is simulated here.
+    #[must_use]
+    pub fn seat_stats(&self, peer: usize) -> Option<SeatStats> {
+        each!(&self.world, world => world.seat_stats(peer))
+    }
+
+    /// The counters of a link; `None` if there is none.
+    #[must_use]
+    pub fn link_stats(&self, from: usize, to: usize) -> Option<LinkStats> {
+        each!(&self.world, world => world.link_stats(from, to))
+    }
+
+    /// One peer as it stands; `None` beyond the last.
+    #[must_use]
+    pub fn peer(&self, peer: usize) -> Option<PeerState> {
+        let presence = self.presence(peer)?;
+        each!(&self.world, world => {
+            let (device, object) = world.states(peer)?;
+            Some(PeerState { presence, device: device.map(|state| widen(&state)), object: widen(&object) })
+        })
+    }
+
+    /// What has come out so far; as if it were interrupted now, unless it has ended.
+    #[must_use]
+    pub fn summary(&self) -> Summary {
+        each!(&self.world, world => world.summary(self.ended.unwrap_or_else(|| Ending::Interrupted(world.now()))))
+    }
+
+    /// Lets everything before `at` happen, and gives the instant at which what comes in at `at` counts; `None` if the session has ended by then.
+    fn come_in<O: Observer>(&mut self, at: Instant, observer: &mut O) -> Result<Option<Instant>, O::Error> {
+        let at = at.max(self.open);
+        if let Some(before) = at.as_nanos().checked_sub(1) {
+            self.let_happen(Instant::from_nanos(before), observer)?;
+        }
+        self.open = at;
+        let is_open = self.ended.is_none() && at < each!(&self.world, world => world.end());
+        Ok(is_open.then_some(at))
+    }
+
+    fn let_happen<O: Observer>(&mut self, now: Instant, observer: &mut O) -> Result<(), O::Error> {
+        let watch = Watch::of(observer);
+        while let Some(at) = self.poll_timeout().filter(|at| *at <= now) {
+            if let Step::Ended(ending) = each!(&mut self.world, world => world.happen(at, observer, watch))? {
+                self.end(ending);
+            }
+        }
+        Ok(())
+    }
+
+    fn end(&mut self, ending: Ending) {
+        self.ended = Some(ending);
+        each!(&mut self.world, world => world.let_go(world.now()));
+    }
+}
+
+fn widen<const A: usize>(state: &State<A>) -> State<3> {
+    let widen = |values: &[f64; A]| core::array::from_fn(|axis| values.get(axis).copied().unwrap_or(0.0));
+    State { position: widen(&state.position), velocity: widen(&state.velocity) }
+}
+
+impl fmt::Debug for AnyWorld {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        each!(self, world => write!(f, "a scene at {}", world.now()))
+    }
+}

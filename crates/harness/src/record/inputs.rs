@@ -1,0 +1,52 @@
+//! `inputs.csv`.
+
+use std::path::{Path, PathBuf};
+
+use cohaptic_scene::Scene;
+
+use super::file::{PartialFile, create_folder, push_display};
+use crate::Observer;
+use crate::live::{HEADER, InputLine, InputRow};
+use crate::record::RecordError;
+
+/// Writes `inputs.csv`: what comes into a [live session](crate::live) from outside, one line each, from which it can be [replayed](crate::live::replay).
+#[derive(Debug)]
+pub struct InputRecorder {
+    file: PartialFile,
+    names: Vec<String>,
+    line: Vec<u8>,
+}
+
+impl InputRecorder {
+    /// Begins to record into a folder, which is made if there is none.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if the folder or the file cannot be made.
+    pub fn create(folder: &Path, scene: &Scene) -> Result<Self, RecordError> {
+        create_folder(folder)?;
+        let mut file = PartialFile::create(folder.join("inputs.csv"))?;
+        file.write(format!("{HEADER}\n").as_bytes())?;
+        Ok(Self { file, names: scene.peers.iter().map(|peer| peer.name.clone()).collect(), line: Vec::new() })
+    }
+
+    /// Writes what is left and gives the file its name.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if that cannot be done.
+    pub fn finish(self) -> Result<PathBuf, RecordError> {
+        self.file.finish()
+    }
+}
+
+impl Observer for InputRecorder {
+    type Error = RecordError;
+
+    fn on_input(&mut self, row: &InputRow<'_>) -> Result<(), RecordError> {
+        self.line.clear();
+        push_display(&mut self.line, InputLine { row, names: &self.names });
+        self.line.push(b'\n');
+        self.file.write(&self.line)
+    }
+}

@@ -1,0 +1,19 @@
+//! Live sessions, driven by a made-up clock: against virtual time, against their own replays, and against what the manual promises.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
+#![allow(clippy::float_cmp, reason = "what must agree to the bit is compared so")]
+
+mod hands;
+mod records;
+mod remote;
+mod replays;
+mod scenes;
+mod seats;
+mod silence;
+mod virtual_time;
+
+use proptest::prelude::ProptestConfig;
+
+/// A property test of that many cases that leaves no files behind.
+fn cases(count: u32) -> ProptestConfig {
+    ProptestConfig { cases: count, failure_persistence: None, max_shrink_iters: 200, ..ProptestConfig::default() }
+}

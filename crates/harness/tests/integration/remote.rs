@@ -1,0 +1,19 @@
+//! A process elsewhere, made up: what it sends, and when.
+
+use cohaptic_peer::State;
+use cohaptic_peer::wire::{MAX_LEN, Sample};
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+
+pub(crate) fn millis(millis: u64) -> Instant {
+    Instant::from_nanos(millis * 1_000_000)
+}
+
+/// A sample of a peer of a scene, as its process writes it.
+pub(crate) fn sample(scene: &Scene, peer: usize, sequence: u64, x: f64, v: f64) -> Vec<u8> {
+    let state = State { position: [x, -x, x / 2.0], velocity: [v, v, -v] };
+    let sample = Sample { session: scene.seed, sender: u32::try_from(peer).unwrap(), sequence, sent: millis(sequence), state };
+    let mut bytes = [0; MAX_LEN];
+    let len = sample.encode(scene.axes.count(), &mut bytes);
+    bytes[..len].to_vec()
+}
