@@ -43,8 +43,10 @@ mod entropy;
 pub mod handshake;
 mod key;
 mod seal;
+pub mod session;
 
 pub use door::{Admission, Admitted, Door, DoorConfig, DoorError, DoorStats, Limits, Place, Refusal, Seat};
 pub use entropy::{Entropy, EntropyError, SystemEntropy};
 pub use key::{KeyFileError, SessionKey};
 pub use seal::{MAX_DATAGRAM, NONCE_LEN, Nonce, SEAL_LEN, TAG_LEN};
+pub use session::{Conductor, LinkChange, Report, Session, SessionConfig, SessionError, Status};

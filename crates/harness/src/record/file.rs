@@ -17,14 +17,19 @@ pub struct RecordError {
 
 /// A file being written under the name `….partial`.
 #[derive(Debug)]
-pub(crate) struct PartialFile {
+pub struct PartialFile {
     path: PathBuf,
     partial: PathBuf,
     writer: BufWriter<File>,
 }
 
 impl PartialFile {
-    pub(crate) fn create(path: PathBuf) -> Result<Self, RecordError> {
+    /// Begins a file of that name.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if it cannot be made.
+    pub fn create(path: PathBuf) -> Result<Self, RecordError> {
         let mut name = path.file_name().unwrap_or_default().to_os_string();
         name.push(".partial");
         let partial = path.with_file_name(name);
@@ -32,12 +37,21 @@ impl PartialFile {
         Ok(Self { path, partial, writer: BufWriter::with_capacity(1 << 16, file) })
     }
 
-    pub(crate) fn write(&mut self, bytes: &[u8]) -> Result<(), RecordError> {
+    /// Adds to it.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if that cannot be written.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), RecordError> {
         self.writer.write_all(bytes).map_err(|source| RecordError { path: self.partial.clone(), source })
     }
 
     /// Writes what is left and gives the file its name.
-    pub(crate) fn finish(self) -> Result<PathBuf, RecordError> {
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if that cannot be done.
+    pub fn finish(self) -> Result<PathBuf, RecordError> {
         let Self { path, partial, mut writer } = self;
         writer.flush().and_then(|()| fs::rename(&partial, &path)).map_err(|source| RecordError { path: partial, source })?;
         Ok(path)

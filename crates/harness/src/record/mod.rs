@@ -22,6 +22,6 @@ pub mod svg;
 mod trajectory;
 
 pub use band::Bands;
-pub use file::RecordError;
+pub use file::{PartialFile, RecordError};
 pub use inputs::InputRecorder;
 pub use recorder::{Recorder, SANE_POSITION};

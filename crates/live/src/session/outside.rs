@@ -36,10 +36,15 @@ const BATCHES: usize = 4;
 impl Outside {
     /// `None` in a scene without peers in other programs.
     pub(super) fn open(scene: &Scene, config: &SessionConfig) -> Result<Option<Self>, SessionError> {
-        let seats: Vec<(Seat, Duration)> = scene.peers.iter().zip(0..).filter_map(|(peer, place)| {
-            let PeerKind::Udp(silence) = peer.kind else { return None };
-            Some((Seat { place: Place(place), name: peer.name.clone() }, silence.after))
-        }).collect();
+        let seats: Vec<(Seat, Duration)> = scene
+            .peers
+            .iter()
+            .zip(0..)
+            .filter_map(|(peer, place)| {
+                let PeerKind::Udp(silence) = peer.kind else { return None };
+                Some((Seat { place: Place(place), name: peer.name.clone() }, silence.after))
+            })
+            .collect();
         // A seat is free to be taken again once every peer counts as silent that was not heard for so long.
         let Some(stale_after) = seats.iter().map(|(_, after)| *after).max() else { return Ok(None) };
         let address = config.listen;

@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
+use cohaptic_harness::live::InputRow;
 use cohaptic_harness::record::{InputRecorder, RecordError, Recorder};
 use cohaptic_harness::{Observer as _, PacketRow, Summary, TickRow};
-use cohaptic_harness::live::InputRow;
-use cohaptic_scene::Scene;
 use cohaptic_realtime::Lateness;
+use cohaptic_scene::Scene;
 
 use super::lateness_file;
 use super::releases::{Release, Releases};

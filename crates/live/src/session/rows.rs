@@ -54,10 +54,21 @@ pub(super) struct InputCopy {
 
 #[derive(Debug)]
 enum What {
-    Sample { peer: usize, bytes: [u8; MAX_LEN], len: usize },
-    Device { peer: usize, state: Option<Numbers> },
+    Sample {
+        peer: usize,
+        bytes: [u8; MAX_LEN],
+        len: usize,
+    },
+    Device {
+        peer: usize,
+        state: Option<Numbers>,
+    },
     /// The only one that allocates: somebody moved a slider.
-    Link { from: usize, to: usize, keys: Box<LinkKeys> },
+    Link {
+        from: usize,
+        to: usize,
+        keys: Box<LinkKeys>,
+    },
     End,
 }
 
