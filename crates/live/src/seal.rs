@@ -54,12 +54,24 @@ pub(crate) struct JoiningKeys {
 impl JoiningKeys {
     /// The keys of the joining that these two nonces are of.
     pub(crate) fn derive(key: &SessionKey, session: u64, place: Place, client_nonce: Nonce, server_nonce: Nonce) -> Self {
-        let way = |label: &[u8]| WayKey(mac(key.as_bytes(), &[label, &session.to_le_bytes(), &place.0.to_le_bytes(), &client_nonce, &server_nonce]));
+        let way = |label| WayKey::derive(label, key, session, place, &client_nonce, &server_nonce);
         Self { to_door: way(TO_DOOR), to_peer: way(TO_PEER), client_nonce }
+    }
+
+    /// The keys of the joining that this sample is of, if it was sealed under them with that nonce of the server.
+    pub(crate) fn of_sample(key: &SessionKey, session: u64, place: Place, sealed: Sealed<'_>, server_nonce: &Nonce) -> Option<Self> {
+        // Half the work is enough for a sample that is forged.
+        let way = |label| WayKey::derive(label, key, session, place, sealed.client_nonce, server_nonce);
+        let to_door = way(TO_DOOR);
+        to_door.verify(sealed.body, sealed.tag).then(|| Self { to_door, to_peer: way(TO_PEER), client_nonce: *sealed.client_nonce })
     }
 }
 
 impl WayKey {
+    fn derive(label: &[u8], key: &SessionKey, session: u64, place: Place, client_nonce: &Nonce, server_nonce: &Nonce) -> Self {
+        Self(mac(key.as_bytes(), &[label, &session.to_le_bytes(), &place.0.to_le_bytes(), client_nonce, server_nonce]))
+    }
+
     /// Writes `sample`, the nonce and the tag, and gives the length; `None` if `sample` is longer than a sample can be.
     pub(crate) fn seal(&self, client_nonce: &Nonce, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<usize> {
         if sample.len() > wire::MAX_LEN {

@@ -269,11 +269,9 @@ impl Door {
         {
             return Ok(Under::Present);
         }
-        let keys = JoiningKeys::derive(key, self.session, seat.place(), *sealed.client_nonce, self.server_nonce(index, from));
-        if keys.to_door.verify(sealed.body, sealed.tag) {
-            return Ok(Under::New(keys));
-        }
-        Err(if seat.occupant().is_some() { Refusal::Forged } else { Refusal::NotJoined })
+        let keys = JoiningKeys::of_sample(key, self.session, seat.place(), sealed, &self.server_nonce(index, from));
+        let otherwise = if seat.occupant().is_some() { Refusal::Forged } else { Refusal::NotJoined };
+        keys.map(Under::New).ok_or(otherwise)
     }
 
     /// The nonce for whoever asks for that seat from that address, until the seat is taken the next time.
