@@ -48,8 +48,8 @@ function showPeers(peers) {
     pill.title = peer.kind + age;
     pill.className = 'pill ' + peer.status;
     tr.classList.toggle('old', peer.status === 'stale' || peer.status === 'absent');
-    put(position, peer.position.length ? peer.position.map(metres).join(', ') : '–');
-    put(force, peer.force.length ? peer.force.map((f) => f.toFixed(2)).join(', ') + ' N' : '–');
+    put(position, peer.position.length ? place(peer.position) : '–');
+    put(force, peer.force.length ? peer.force.map((f) => (f === null ? '–' : signed(f.toFixed(2)))).join(', ') + ' N' : '–');
   });
 }
 
@@ -57,6 +57,7 @@ function showPeers(peers) {
 function drawCopies(passed) {
   const canvas = $('copies');
   if (canvas.hidden || $('people').hidden) return;
+  canvas.classList.toggle('plane', bodies.some((body) => body.peer.position.length > 1));
   const { context, width, height } = prepare(canvas);
   const known = bodies.filter((body) => body.peer.position.length > 0 && body.peer.position.every(Number.isFinite));
   if (known.length === 0 || width === 0) return;
@@ -90,7 +91,7 @@ function drawCopies(passed) {
     }
   });
   bodies.forEach((body, i) => {
-    if (known.includes(body)) cube(context, x(body.at[0]), y(body.at, i), size, colour(i), body.peer);
+    if (known.includes(body)) cube(context, x(body.at[0]), y(body.at, i), size, colour(i), body.peer, flat && lane >= 13);
   });
 }
 
@@ -138,7 +139,7 @@ function axes(context, area, x, flat, height) {
     context.lineTo(at, area.bottom + 6);
     context.stroke();
     const value = Number((k * step).toPrecision(6));
-    context.fillText(step >= 0.5 ? value + ' m' : Number((value * 1e3).toPrecision(6)) + ' mm', at, height - 6);
+    context.fillText(signed(step >= 0.5 ? value + ' m' : Number((value * 1e3).toPrecision(6)) + ' mm'), at, height - 6);
   }
   if (flat) return;
   const middle = (area.top + area.bottom) / 2;
@@ -153,8 +154,8 @@ function axes(context, area, x, flat, height) {
   }
 }
 
-/** One copy. One that is old is an outline. */
-function cube(context, x, y, size, style, peer) {
+/** One copy. One that is old is an outline. In a plane copies lie on one another, so there only what is old is named; colours stand in the table. */
+function cube(context, x, y, size, style, peer, named) {
   const old = peer.status === 'stale' || peer.status === 'absent';
   context.globalAlpha = 1;
   context.beginPath();
@@ -171,6 +172,6 @@ function cube(context, x, y, size, style, peer) {
   context.fillStyle = ink.text;
   context.textAlign = 'left';
   context.textBaseline = 'middle';
-  context.fillText(peer.name + (old ? ' (' + peer.status + ')' : ''), x + size / 2 + 6, y);
+  if (named || old) context.fillText(peer.name + (old ? ' (' + peer.status + ')' : ''), x + size / 2 + 6, y);
   context.textBaseline = 'alphabetic';
 }

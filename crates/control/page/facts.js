@@ -38,16 +38,14 @@ function showCauses(list, causes, none) {
     let item = list.children[i];
     if (!item) {
       item = make('li');
-      item.append(make('span', 'cause'), make('meter'), make('span', 'n'));
+      item.append(make('span', 'cause'), make('span', 'bar'), make('span', 'n'));
       list.append(item);
     }
     const [word, bar, number] = item.children;
     item.className = n === null ? 'none' : '';
     put(word, cause);
     bar.hidden = n === null;
-    bar.max = most;
-    bar.value = n || 0;
-    bar.setAttribute('aria-label', cause);
+    bar.style.setProperty('--share', (100 * (n || 0)) / most + '%');
     put(number, n === null ? '' : count(n));
   });
 }

@@ -26,9 +26,11 @@ function remember(state) {
     row.bytes.push(link.delivered_bytes);
     row.delay.push(link.recent_delay.p50_s);
     row.high.push(link.recent_delay.p99_s);
-    const offered = from ? row.offered[i] - from.offered[i] : 0;
+    // Over too little time one packet looks like a storm.
+    const long = from !== null && t >= from.t + OVER / 2;
+    const offered = long ? row.offered[i] - from.offered[i] : 0;
     row.loss.push(offered > 0 ? Math.min(1, (row.dropped[i] - from.dropped[i]) / offered) : null);
-    row.rate.push(from && t > from.t ? ((row.bytes[i] - from.bytes[i]) * 8) / (t - from.t) : null);
+    row.rate.push(long ? ((row.bytes[i] - from.bytes[i]) * 8) / (t - from.t) : null);
   });
   past.push(row);
 }

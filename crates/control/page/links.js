@@ -18,7 +18,6 @@ function makeRows(links) {
     pick.checked = i === chosen;
     pick.addEventListener('change', () => choose(i));
     const swatch = make('span', 'swatch');
-    if (links.length <= COLOURED) swatch.style.background = colour(i);
     const first = make('td', 'pick');
     first.append(pick, swatch);
     const name = make('th', 'name');
@@ -35,10 +34,11 @@ function makeRows(links) {
       pick.checked = true;
       if (chosen !== i) choose(i);
     });
-    return { name: link.name, words: (link.name + ' ' + link.from + ' ' + link.to).toLowerCase(), tr, pick, swatch, cells, asked };
+    return { name: link.name, words: (link.name + ' ' + label.textContent).toLowerCase(), tr, pick, swatch, cells, asked };
   });
   $('links').replaceChildren(...rows.map((row) => row.tr));
   $('filter-label').hidden = rows.length <= 8;
+  $('all-label').hidden = rows.length < 2;
   put($('link-count'), rows.length > 1 ? String(rows.length) : '');
   filterRows();
   choose(chosen);
@@ -47,8 +47,7 @@ function makeRows(links) {
 /** Takes up the colours of a page that became light or dark. */
 function recolourRows() {
   rows.forEach((row, i) => {
-    if (rows.length <= COLOURED || i === chosen) row.swatch.style.background = colour(i);
-    else row.swatch.style.background = '';
+    row.swatch.style.background = rows.length <= COLOURED || i === chosen ? linkColour(i, rows.length) : '';
   });
 }
 

@@ -9,6 +9,7 @@ function take(state) {
   const another = latest === null || latest.links.length !== state.links.length;
   if (latest === null || latest.number !== state.number) heard = performance.now();
   latest = state;
+  if (another) showTrouble();
   remember(state);
   showRun(state);
   makeRows(state.links);
@@ -41,23 +42,22 @@ function showTrouble() {
   const silent = latest && trouble === null ? (performance.now() - heard) / 1000 : 0;
   let words = '';
   if (trouble !== null) words = trouble + (latest ? '. What is shown is from ' + clock(latest.elapsed_s) + ' of the run. Trying again …' : '. Trying again …');
-  else if (silent > 2) words = 'The run has reported nothing for ' + silent.toFixed(0) + ' s: it has ended, or it hangs.';
+  // In few steps: a screen reader says each of them.
+  else if (silent > 2) words = 'The run has reported nothing for ' + [60, 10, 2].find((s) => silent > s) + ' s or more: it has ended, or it hangs.';
   put($('trouble'), words);
   $('trouble').hidden = words === '';
   document.body.classList.toggle('stale', words !== '');
-  put($('server'), trouble !== null ? 'disconnected' : latest ? 'live' : 'connecting');
-  $('server').className = 'pill ' + (trouble !== null ? 'bad' : 'good');
+  put($('server'), trouble !== null ? 'disconnected' : latest ? 'connected' : 'connecting');
+  $('server').className = 'pill ' + (trouble !== null ? 'bad' : latest ? 'good' : '');
 }
 
 readInk();
 makeSliders();
-for (const query of ['(prefers-color-scheme: dark)', '(prefers-contrast: more)']) {
-  matchMedia(query).addEventListener('change', () => {
-    readInk();
-    recolourRows();
-    redraw();
-  });
-}
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+  readInk();
+  recolourRows();
+  redraw();
+});
 $('filter').addEventListener('input', filterRows);
 addEventListener('resize', redraw);
 document.addEventListener('visibilitychange', redraw);

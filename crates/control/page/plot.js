@@ -22,13 +22,10 @@ function round125(number) {
   return [1, 2, 5, 10].map((n) => n * power).find((n) => n >= number * 0.999999);
 }
 
-/** More links than this are told apart by choosing one, not by colour. */
-const COLOURED = 8;
-
 const PLOTS = [
   { canvas: 'delay-plot', key: 'delay', high: 'high', least: 1e-3, most: Infinity, word: (v) => span(v, 2) },
   { canvas: 'loss-plot', key: 'loss', least: 0.01, most: 1, word: percent },
-  { canvas: 'rate-plot', key: 'rate', least: 1e3, most: Infinity, word: bits },
+  { canvas: 'rate-plot', key: 'rate', least: 1e3, most: Infinity, word: (v) => bits(v, 2) },
 ];
 
 /** Draws one plot; `chosen` is drawn last and strong. */
@@ -40,15 +37,17 @@ function drawPlot(plot, links, chosen) {
   const top = 8;
   const bottom = height - 20;
   const now = past[past.length - 1].t;
+  // A run that is young has the whole width.
+  const shown = Math.min(SHOWN, Math.max(12, Math.ceil((now - past[0].t) / 6) * 6));
   let most = plot.least;
   for (const row of past) {
-    if (row.gap || row.t < now - SHOWN) continue;
+    if (row.gap || row.t < now - shown) continue;
     for (const value of row[plot.key]) if (value > most) most = value;
     if (plot.high && row[plot.high][chosen] > most) most = row[plot.high][chosen];
   }
   const step = round125(most / 3);
   const scale = Math.min(plot.most, Math.ceil((most * 1.02) / step) * step);
-  const x = (t) => right - ((now - t) / SHOWN) * (right - left);
+  const x = (t) => right - ((now - t) / shown) * (right - left);
   const y = (value) => bottom - (value / scale) * (bottom - top);
 
   context.lineWidth = 1;
@@ -65,8 +64,8 @@ function drawPlot(plot, links, chosen) {
     context.fillText(value === 0 ? '0' : plot.word(value), left - 6, at);
   }
   context.textBaseline = 'alphabetic';
-  for (const ago of [60, 40, 20, 0]) {
-    context.textAlign = ago === 0 ? 'right' : ago === 60 ? 'left' : 'center';
+  for (const ago of [shown, (shown * 2) / 3, shown / 3, 0]) {
+    context.textAlign = ago === 0 ? 'right' : ago === shown ? 'left' : 'center';
     context.fillText(ago === 0 ? 'now' : '−' + ago + ' s', x(now - ago), height - 5);
   }
 
@@ -83,9 +82,9 @@ function drawPlot(plot, links, chosen) {
   }
   if (chosen >= 0 && chosen < links) {
     context.globalAlpha = 0.16;
-    if (plot.high) band(context, plot, chosen, x, y);
+    if (plot.high) band(context, plot, chosen, x, y, linkColour(chosen, links));
     context.globalAlpha = 1;
-    stroke(context, plot.key, chosen, x, y, colour(chosen), 2.5);
+    stroke(context, plot.key, chosen, x, y, linkColour(chosen, links), 2.5);
   }
   context.restore();
 }
@@ -111,8 +110,8 @@ function stroke(context, key, link, x, y, style, lineWidth) {
 }
 
 /** From the median to the 99th percentile. */
-function band(context, plot, link, x, y) {
-  context.fillStyle = colour(link);
+function band(context, plot, link, x, y, style) {
+  context.fillStyle = style;
   let run = [];
   const fill = () => {
     if (run.length > 1) {

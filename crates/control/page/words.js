@@ -29,8 +29,12 @@ function inUnits(number, units, digits = 3) {
 }
 
 const span = (s, digits) => (s === 0 ? '0 ms' : inUnits(s, [[1, 's'], [1e-3, 'ms'], [1e-6, 'µs'], [1e-9, 'ns']], digits));
-const bits = (rate) => inUnits(rate, [[1e9, 'Gbit/s'], [1e6, 'Mbit/s'], [1e3, 'kbit/s'], [1, 'bit/s']]);
-const metres = (m) => (Math.abs(m) < 1e-6 ? '0.00 mm' : Math.abs(m) < 1 ? (m * 1e3).toFixed(2) + ' mm' : m.toFixed(3) + ' m');
+const bits = (rate, digits) => inUnits(rate, [[1e9, 'Gbit/s'], [1e6, 'Mbit/s'], [1e3, 'kbit/s'], [1, 'bit/s']], digits);
+const signed = (text) => text.replace('-', '\u2212');
+const place = (position) => {
+  const large = position.some((m) => Math.abs(m) >= 1);
+  return position.map((m) => (m === null ? '–' : signed(large ? m.toFixed(3) : (m * 1e3).toFixed(2)))).join(', ') + (large ? ' m' : ' mm');
+};
 const percent = (p) => (p === null || p === undefined || Number.isNaN(p) ? '–' : significant(p * 100, p !== 0 && p < 0.1 ? 2 : 3) + ' %');
 const count = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, '\u202f');
 
@@ -55,7 +59,10 @@ let ink = {};
 function readInk() {
   const style = getComputedStyle(document.documentElement);
   const of = (name) => style.getPropertyValue(name).trim();
-  ink = { text: of('--ink'), soft: of('--soft'), line: of('--line'), faint: of('--faint'), ground: of('--card'), series: [] };
+  ink = { text: of('--ink'), accent: of('--accent'), soft: of('--soft'), line: of('--line'), faint: of('--faint'), ground: of('--card'), series: [] };
   for (let i = 0; i < 8; i += 1) ink.series.push(of('--c' + i));
 }
 const colour = (i) => ink.series[i % ink.series.length];
+/** Of links: many are told apart by choosing one, not by colour. */
+const COLOURED = 8;
+const linkColour = (i, links) => (links > COLOURED ? ink.accent : colour(i));

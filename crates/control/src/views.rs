@@ -88,7 +88,7 @@ fn peers(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
 
 /// What is not known, because nothing was seen, is `null`.
 fn quantiles(quantiles: &Quantiles) -> Value {
-    let seconds = |span: Duration| (quantiles.count > 0).then(|| span.as_secs_f64());
+    let seconds = |span: Duration| (quantiles.count > 0).then_some(span.as_secs_f64());
     json!({
         "count": quantiles.count,
         "sum_s": quantiles.sum.as_secs_f64(),

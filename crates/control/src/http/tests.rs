@@ -15,7 +15,9 @@ use crate::{Board, Description, Kind, LinkCounters, LinkEditor, LinkName, Snapsh
 
 const TOKEN: &str = "a-token-of-more-than-22-characters";
 
-type Calls = Arc<Mutex<Vec<(Vec<usize>, Vec<(String, String)>)>>>;
+/// Links, and keys with values.
+type Call = (Vec<usize>, Vec<(String, String)>);
+type Calls = Arc<Mutex<Vec<Call>>>;
 
 /// Writes down what it is asked for, and refuses the key `bad`.
 struct Recorder(Calls);
@@ -79,7 +81,7 @@ impl Site {
         self.send(request(method, path).header("authorization", format!("Bearer {TOKEN}")).body(body.into()).unwrap())
     }
 
-    fn calls(&self) -> Vec<(Vec<usize>, Vec<(String, String)>)> {
+    fn calls(&self) -> Vec<Call> {
         core::mem::take(&mut self.calls.lock().unwrap())
     }
 }

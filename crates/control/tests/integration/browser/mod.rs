@@ -158,7 +158,7 @@ fn survives_the_server(mut browser: Browser, run: Run) {
     assert_eq!(browser.value("document.querySelectorAll('#links tr').length"), json!(6), "what was known is still shown");
     browser.picture("away");
     let _again = Run::moving(6, 3, 1, port);
-    browser.wait("document.getElementById('trouble').hidden && document.getElementById('server').textContent === 'live'");
+    browser.wait("document.getElementById('trouble').hidden && document.getElementById('server').textContent === 'connected'");
     wait_moving(&mut browser, "copies");
     assert_eq!(browser.value("document.getElementById('other-value').value"), json!("half a thou"));
 }
@@ -177,7 +177,7 @@ fn a_hundred_links_are_as_good_as_six() {
     browser.click("#links tr:not([hidden])");
     browser.wait("document.getElementById('target').textContent === 'robot → left'");
     for canvas in ["delay-plot", "loss-plot", "rate-plot"] {
-        wait_painted(&mut browser, canvas, "--faint");
+        wait_painted(&mut browser, canvas, "--accent");
     }
     browser.picture("hundred");
     assert_eq!(browser.complaints, [""; 0]);
@@ -191,5 +191,10 @@ fn one_link_without_peers_is_enough() {
     wait_painted(&mut browser, "delay-plot", "--c0");
     assert_eq!(browser.value("document.getElementById('people').hidden"), json!(true));
     browser.picture("one");
+    // A run that stands still is told from one that goes on.
+    let silent = Run::still(1, 0);
+    browser.open(&silent.server().url());
+    browser.wait("document.getElementById('trouble').textContent.startsWith('The run has reported nothing')");
+    browser.wait("document.getElementById('server').textContent === 'connected'");
     assert_eq!(browser.complaints, [""; 0]);
 }
