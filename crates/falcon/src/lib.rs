@@ -4,9 +4,12 @@
 pub mod boot;
 pub mod calibration;
 mod clock;
+pub mod device;
+pub mod driver;
 pub mod ftdi;
 pub mod kinematics;
 pub mod protocol;
 pub mod safety;
+pub mod simulator;
 pub mod transport;
 pub mod usb;

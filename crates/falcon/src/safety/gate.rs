@@ -13,6 +13,8 @@ pub struct Moment {
     pub now: Instant,
     /// Whether the device is homed, beyond doubt.
     pub homed: bool,
+    /// Whether the user has switched forces on, by pulling the grip out.
+    pub armed: bool,
     /// When the device last reported.
     pub reading_at: Option<Instant>,
     /// When the force was asked for.
@@ -28,6 +30,8 @@ pub enum ZeroCause {
     Stopped,
     /// The device is not homed: where the grip is means nothing.
     NotHomed,
+    /// The user has not switched forces on.
+    NotArmed,
     /// The last report is too old, or there was none.
     StaleReading,
     /// The last setpoint is too old, or there was none.
@@ -42,8 +46,8 @@ pub enum ZeroCause {
 
 impl ZeroCause {
     /// All of them, in their order.
-    pub const ALL: [Self; 7] =
-        [Self::Stopped, Self::NotHomed, Self::StaleReading, Self::StaleSetpoint, Self::LoopLate, Self::NotFinite, Self::NoTorques];
+    pub const ALL: [Self; 8] =
+        [Self::Stopped, Self::NotHomed, Self::NotArmed, Self::StaleReading, Self::StaleSetpoint, Self::LoopLate, Self::NotFinite, Self::NoTorques];
 
     /// Its place among [`ZeroCause::ALL`].
     #[must_use]
@@ -51,11 +55,12 @@ impl ZeroCause {
         match self {
             Self::Stopped => 0,
             Self::NotHomed => 1,
-            Self::StaleReading => 2,
-            Self::StaleSetpoint => 3,
-            Self::LoopLate => 4,
-            Self::NotFinite => 5,
-            Self::NoTorques => 6,
+            Self::NotArmed => 2,
+            Self::StaleReading => 3,
+            Self::StaleSetpoint => 4,
+            Self::LoopLate => 5,
+            Self::NotFinite => 6,
+            Self::NoTorques => 7,
         }
     }
 
@@ -65,6 +70,7 @@ impl ZeroCause {
         match self {
             Self::Stopped => "stopped",
             Self::NotHomed => "not homed",
+            Self::NotArmed => "not armed",
             Self::StaleReading => "stale reading",
             Self::StaleSetpoint => "stale setpoint",
             Self::LoopLate => "loop late",
@@ -166,6 +172,7 @@ impl ForceGate {
         let checks = [
             (self.stopped, ZeroCause::Stopped),
             (!moment.homed, ZeroCause::NotHomed),
+            (!moment.armed, ZeroCause::NotArmed),
             (!fresh(moment.reading_at, self.limits.reading_age), ZeroCause::StaleReading),
             (!fresh(moment.setpoint_at, self.limits.setpoint_age), ZeroCause::StaleSetpoint),
             (late, ZeroCause::LoopLate),

@@ -16,7 +16,7 @@ fn at(milliseconds: u64) -> Instant {
 
 /// A moment at which everything is well.
 fn well(now: Instant) -> Moment {
-    Moment { now, homed: true, reading_at: Some(now), setpoint_at: Some(now), position: Some(CENTRE) }
+    Moment { now, homed: true, armed: true, reading_at: Some(now), setpoint_at: Some(now), position: Some(CENTRE) }
 }
 
 fn gate(limits: Limits) -> ForceGate {
@@ -83,6 +83,7 @@ fn each_reason_alone_makes_zero_at_once() {
     let now = at(2);
     let moments = [
         (Moment { homed: false, ..well(now) }, ZeroCause::NotHomed),
+        (Moment { armed: false, ..well(now) }, ZeroCause::NotArmed),
         (Moment { reading_at: None, ..well(now) }, ZeroCause::StaleReading),
         (Moment { now: at(13), setpoint_at: Some(at(13)), ..well(now) }, ZeroCause::StaleReading),
         (Moment { reading_at: Some(at(3)), ..well(now) }, ZeroCause::StaleReading),
@@ -132,6 +133,7 @@ fn moments() -> impl Strategy<Value = (Triple, Moment, u64, bool)> {
             let moment = Moment {
                 now: Instant::ZERO,
                 homed: dice % 16 != 0,
+                armed: dice % 16 != 5,
                 reading_at: reading.map(Instant::from_nanos),
                 setpoint_at: setpoint.map(Instant::from_nanos),
                 position: (dice % 16 != 1).then_some(place),
@@ -172,6 +174,7 @@ proptest! {
             prop_assert!(change <= allowed * (1.0 + 1e-9) + 1e-12 || admitted.force == [0.0; 3]);
             let reason_for_none = stopped
                 || !moment.homed
+                || !moment.armed
                 || ages[0].is_none_or(|age| age > 10_000_000)
                 || ages[1].is_none_or(|age| age > 50_000_000)
                 || !wanted.iter().all(|part| part.is_finite());
