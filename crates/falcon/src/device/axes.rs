@@ -1,0 +1,97 @@
+//! Which axes of the device are those of the peer.
+
+use thiserror::Error;
+
+use crate::kinematics::Triple;
+
+/// An axis of the device.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Axis {
+    /// To the right of the user.
+    X,
+    /// Up.
+    Y,
+    /// Out of the device, towards the user.
+    Z,
+}
+
+impl Axis {
+    /// Its place in a triple.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        match self {
+            Self::X => 0,
+            Self::Y => 1,
+            Self::Z => 2,
+        }
+    }
+}
+
+/// The axes of the device in the order of the peer's.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Axes<const A: usize>([Axis; A]);
+
+impl<const A: usize> Axes<A> {
+    /// These axes, in this order.
+    ///
+    /// # Errors
+    ///
+    /// [`AxesError`] if one is named twice, or none is.
+    pub fn new(axes: [Axis; A]) -> Result<Self, AxesError> {
+        let repeated = axes.iter().enumerate().find(|(place, axis)| axes[..*place].contains(axis));
+        match repeated {
+            Some((_, axis)) => Err(AxesError::Twice(*axis)),
+            None if A == 0 => Err(AxesError::None),
+            None => Ok(Self(axes)),
+        }
+    }
+
+    /// The components of a vector of the device that the peer sees.
+    #[must_use]
+    pub fn of_device(&self, vector: Triple) -> [f64; A] {
+        self.0.map(|axis| vector[axis.index()])
+    }
+
+    /// A vector of the peer as one of the device; zero along axes that the peer does not use.
+    #[must_use]
+    pub fn to_device(&self, vector: [f64; A]) -> Triple {
+        let mut spread = [0.0; 3];
+        for (axis, part) in self.0.iter().zip(vector) {
+            spread[axis.index()] = part;
+        }
+        spread
+    }
+
+    /// Which axes of the device the peer does not use.
+    #[must_use]
+    pub fn unused(&self) -> [bool; 3] {
+        [Axis::X, Axis::Y, Axis::Z].map(|axis| !self.0.contains(&axis))
+    }
+}
+
+/// Axes that cannot be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
+pub enum AxesError {
+    /// One is named twice.
+    #[error("the axis {0:?} is named twice: each axis of the device can be one of the peer's")]
+    Twice(Axis),
+    /// None is named.
+    #[error("no axis is named: a peer has one to three")]
+    None,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_go_there_and_back() {
+        let axes = Axes::new([Axis::Z, Axis::X]).unwrap();
+        assert_eq!(axes.of_device([1.0, 2.0, 3.0]), [3.0, 1.0]);
+        assert_eq!(axes.to_device([3.0, 1.0]), [1.0, 0.0, 3.0]);
+        assert_eq!(axes.unused(), [false, true, false]);
+        assert_eq!(Axes::new([Axis::X, Axis::X]), Err(AxesError::Twice(Axis::X)));
+        assert_eq!(Axes::new([]), Err(AxesError::None));
+    }
+}

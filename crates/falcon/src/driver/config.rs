@@ -1,0 +1,104 @@
+//! What a driver is told at the beginning.
+
+use core::time::Duration;
+
+use thiserror::Error;
+
+use crate::calibration::Calibration;
+use crate::safety::{Limits, LimitsError};
+
+/// How a device is driven.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct DriverConfig {
+    /// Gain of the motors and origin.
+    pub calibration: Calibration,
+    /// Limits of force.
+    pub limits: Limits,
+    /// How long an exchange waits for its report.
+    pub patience: Duration,
+    /// Silence after which the device is given up.
+    pub longest_silence: Duration,
+    /// Bandwidth of the velocity estimate \[Hz\].
+    pub velocity_bandwidth: f64,
+    /// Reports in a row that must say that all encoders are homed until it is believed. One such report may be a bit that flipped on the wire.
+    pub homing_confirmations: u32,
+    /// The fastest that an encoder can turn \[counts per ms\]; what is faster is taken for a byte that changed on the wire.
+    pub fastest_encoder: u16,
+    /// How far from the base the grip must be pulled \[m, frame of the device\] to switch forces on after homing; `None` switches them on at once.
+    pub arm_beyond: Option<f64>,
+}
+
+impl DriverConfig {
+    /// 3 ms for a report, 1 s of silence, 30 Hz, ten confirmations, 200 counts per ms (about 6 m/s), forces on beyond 170 mm, as existing programs have it.
+    pub const DEFAULT: Self = Self {
+        calibration: Calibration::DEFAULT,
+        limits: Limits::DEFAULT,
+        patience: Duration::from_millis(3),
+        longest_silence: Duration::from_secs(1),
+        velocity_bandwidth: 30.0,
+        homing_confirmations: 10,
+        fastest_encoder: 200,
+        arm_beyond: Some(0.170),
+    };
+
+    /// The same, if it makes sense.
+    ///
+    /// # Errors
+    ///
+    /// [`DriverConfigError`] names what does not.
+    pub fn checked(self) -> Result<Self, DriverConfigError> {
+        self.limits.checked()?;
+        for (name, span, most) in [
+            ("patience of an exchange", self.patience, Duration::from_millis(100)),
+            ("longest silence", self.longest_silence, Duration::from_secs(60)),
+        ] {
+            if span.is_zero() || span > most {
+                return Err(DriverConfigError::Span { name, span, most });
+            }
+        }
+        if !(self.velocity_bandwidth > 0.0 && self.velocity_bandwidth <= 500.0) {
+            return Err(DriverConfigError::Bandwidth(self.velocity_bandwidth));
+        }
+        if self.homing_confirmations == 0 || self.fastest_encoder == 0 {
+            return Err(DriverConfigError::Zero);
+        }
+        match self.arm_beyond {
+            Some(z) if !(0.08..=0.18).contains(&z) => Err(DriverConfigError::Arming(z)),
+            Some(_) | None => Ok(self),
+        }
+    }
+}
+
+impl Default for DriverConfig {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// A configuration that makes no sense.
+#[derive(Clone, Copy, PartialEq, Debug, Error)]
+#[non_exhaustive]
+pub enum DriverConfigError {
+    /// A limit of force.
+    #[error(transparent)]
+    Limits(#[from] LimitsError),
+    /// A time.
+    #[error("the {name} is {span:?}, not within 0 to {most:?}")]
+    Span {
+        /// Which.
+        name: &'static str,
+        /// What was given.
+        span: Duration,
+        /// What is allowed.
+        most: Duration,
+    },
+    /// The bandwidth of the velocity.
+    #[error("the bandwidth of the velocity is {0} Hz, not within 0 to 500: half the rate of the loop is the most it can have")]
+    Bandwidth(f64),
+    /// A count that must not be zero.
+    #[error("homing confirmations and the fastest encoder must not be zero")]
+    Zero,
+    /// A place that the grip cannot reach.
+    #[error("forces are to be on beyond {0} m from the base, not within 0.08 to 0.18: the grip cannot be pulled there")]
+    Arming(f64),
+}

@@ -1,0 +1,67 @@
+//! Lengths, angles and counts of the device.
+
+use core::f64::consts::PI;
+
+use libm::{cos, sin};
+
+/// Length of an arm, from the motor's drum to the knee \[m\].
+pub(super) const ARM: f64 = 0.060;
+/// Length of the shin, the parallelogram \[m\].
+pub(super) const SHIN: f64 = 0.1025;
+/// Half the width of the grip's plate, to the end of the shin \[m\].
+pub(super) const C: f64 = 0.01443;
+/// The pieces at both ends of the shin, together \[m\]: d + e.
+pub(super) const ENDS: f64 = 0.01125 + 0.01125;
+/// The shin's end is off the plane of the arm by this \[m\].
+pub(super) const F: f64 = -0.025;
+/// The axis of an arm is off the middle by this, along and across the leg \[m\].
+pub(super) const R: f64 = 0.0400;
+/// See [`R`].
+pub(super) const S: f64 = -0.02309;
+
+/// Where the legs top, right and left stand around the middle \[degrees\], clockwise from the front.
+pub const AZIMUTHS: [f64; 3] = [105.0, -15.0, -135.0];
+/// What the index of an encoder stands at \[degrees\].
+pub const HOME_ANGLE: f64 = 35.0;
+/// Counts of one turn of an arm: 320 slots, four counts each, drums of 110 mm and 14.25 mm.
+pub const COUNTS_PER_TURN: f64 = 320.0 * 4.0 * 110.0 / 14.25;
+/// How far an arm turns with each count \[degrees\]: 0.036434659…
+pub const DEGREES_PER_COUNT: f64 = 360.0 / COUNTS_PER_TURN;
+
+/// The angle of an arm \[rad\] at a count. The count may have a fraction.
+#[must_use]
+pub fn angle_of_count(count: f64) -> f64 {
+    (count * DEGREES_PER_COUNT + HOME_ANGLE) * (PI / 180.0)
+}
+
+/// The count, with its fraction, at an angle of the arm \[rad\].
+#[must_use]
+pub fn count_of_angle(angle: f64) -> f64 {
+    (angle * (180.0 / PI) - HOME_ANGLE) / DEGREES_PER_COUNT
+}
+
+/// Cosine and sine of a leg's azimuth.
+pub(super) fn azimuth(place: usize) -> (f64, f64) {
+    let angle = AZIMUTHS[place] * (PI / 180.0);
+    (cos(angle), sin(angle))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drums_and_slots_give_the_published_step() {
+        // Published as 9880.70 counts and 0.036434659 degrees.
+        assert!((COUNTS_PER_TURN - 9880.70).abs() < 0.005);
+        assert!((DEGREES_PER_COUNT - 0.036_434_659).abs() < 0.51e-9);
+    }
+
+    #[test]
+    fn counts_and_angles_are_inverses() {
+        for count in [-2000.0, -516.32, 0.0, 1.0, 1500.0] {
+            assert!((count_of_angle(angle_of_count(count)) - count).abs() < 1e-10);
+        }
+        assert!((angle_of_count(0.0) - 35.0_f64.to_radians()).abs() < 1e-15);
+    }
+}

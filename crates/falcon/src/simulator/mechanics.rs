@@ -1,0 +1,142 @@
+//! The grip as a mass: motors, hand, friction and end stops.
+
+use core::time::Duration;
+
+use cohaptic_units::Instant;
+
+use super::{Hand, MechanicsConfig};
+use crate::kinematics::{ANGLE_LIMITS, Jacobian, Triple, count_of_angle, inverse};
+
+/// The longest step. The stiffest thing, an end stop, swings in 14 ms.
+const STEP: Duration = Duration::from_micros(100);
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mechanics {
+    config: MechanicsConfig,
+    at: Instant,
+    position: Triple,
+    velocity: Triple,
+    /// The angles of the arms there.
+    angles: Triple,
+}
+
+impl Mechanics {
+    /// At rest at a position, or in the middle if the grip cannot be there.
+    pub(super) fn new(config: MechanicsConfig, position: Triple) -> Self {
+        let middle = [0.0, 0.0, 0.11];
+        let (position, angles) = inverse(position).map_or_else(|| (middle, inverse(middle).unwrap_or_default()), |angles| (position, angles));
+        Self { config, at: Instant::ZERO, position, velocity: [0.0; 3], angles }
+    }
+
+    pub(super) const fn at(&self) -> Instant {
+        self.at
+    }
+
+    pub(super) const fn position(&self) -> Triple {
+        self.position
+    }
+
+    pub(super) const fn velocity(&self) -> Triple {
+        self.velocity
+    }
+
+    /// Where the arms stand, in counts with their fractions.
+    pub(super) fn counts(&self) -> Triple {
+        self.angles.map(count_of_angle)
+    }
+
+    /// The force on the grip that torques make where it is.
+    pub(super) fn force_of(&self, torques: Triple) -> Triple {
+        Jacobian::at(self.position).map_or([0.0; 3], |jacobian| jacobian.force(torques))
+    }
+
+    /// The next step on the way to `to`; `None` when that is reached.
+    pub(super) fn next_step(&self, to: Instant) -> Option<Duration> {
+        to.checked_duration_since(self.at).filter(|rest| !rest.is_zero()).map(|rest| rest.min(STEP))
+    }
+
+    /// Semi-implicit Euler; dry friction as an impulse that stops the grip but never turns it back.
+    pub(super) fn step(&mut self, span: Duration, motors: Triple, hand: &mut dyn Hand) {
+        let config = self.config;
+        let seconds = span.as_secs_f64();
+        let pull = hand.force(self.at, self.position, self.velocity);
+        self.at += span;
+        let Some(jacobian) = Jacobian::at(self.position) else { return self.velocity = [0.0; 3] };
+        let turning = jacobian.turning(self.velocity);
+        let torques = core::array::from_fn(|arm| motors[arm] + self.stop(arm, turning[arm]));
+        let arms = jacobian.force(torques);
+        let mut velocity: Triple = core::array::from_fn(|axis| {
+            let force = arms[axis] + pull[axis];
+            // The viscous part implicitly: stable for any damping.
+            (self.velocity[axis] + force * seconds / config.mass) / (1.0 + config.damping * seconds / config.mass)
+        });
+        let speed = libm::hypot(libm::hypot(velocity[0], velocity[1]), velocity[2]);
+        let lost = config.coulomb * seconds / config.mass;
+        velocity = if speed > lost { velocity.map(|part| part * (1.0 - lost / speed)) } else { [0.0; 3] };
+        let position = core::array::from_fn(|axis| self.position[axis] + velocity[axis] * seconds);
+        // A hand that pulls with a force no device was built for ends at a wall.
+        match inverse(position).filter(|_| Jacobian::at(position).is_some() && velocity.iter().all(|part| part.is_finite())) {
+            Some(angles) => (self.position, self.velocity, self.angles) = (position, velocity, angles),
+            None => self.velocity = [0.0; 3],
+        }
+    }
+
+    /// The torque of an arm's end stop.
+    fn stop(&self, arm: usize, turning: f64) -> f64 {
+        let [lowest, highest] = ANGLE_LIMITS;
+        let beyond = self.angles[arm] - self.angles[arm].clamp(lowest, highest);
+        if beyond == 0.0 {
+            return 0.0;
+        }
+        let torque = -self.config.stop_stiffness * beyond - self.config.stop_damping * turning;
+        // A stop pushes; it does not hold back what leaves it.
+        if beyond > 0.0 { torque.min(0.0) } else { torque.max(0.0) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulator::StillHand;
+
+    fn run(mechanics: &mut Mechanics, milliseconds: u64, hand: &mut dyn Hand) {
+        let to = mechanics.at + Duration::from_millis(milliseconds);
+        while let Some(step) = mechanics.next_step(to) {
+            mechanics.step(step, [0.0; 3], hand);
+        }
+    }
+
+    #[test]
+    fn a_constant_force_ends_in_a_constant_speed() {
+        let mut mechanics = Mechanics::new(MechanicsConfig { coulomb: 0.0, ..MechanicsConfig::DEFAULT }, [0.0, 0.0, 0.12]);
+        // v(t) = F/b·(1 − e^(−b·t/m)); m/b is 20 ms.
+        run(&mut mechanics, 20, &mut |_, _, _| [0.5, 0.0, 0.0]);
+        let expected = 0.1 * (1.0 - (-1.0_f64).exp());
+        // First order: half a step of 100 us in 20 ms.
+        assert!((mechanics.velocity[0] - expected).abs() < 0.1 * 0.0025 + 1e-9, "{}", mechanics.velocity[0]);
+        run(&mut mechanics, 300, &mut |_, _, _| [0.5, 0.0, 0.0]);
+        assert!((mechanics.velocity[0] - 0.1).abs() < 1e-6);
+    }
+
+    #[test]
+    fn dry_friction_holds_what_is_weaker() {
+        let mut mechanics = Mechanics::new(MechanicsConfig::DEFAULT, [0.0, 0.0, 0.12]);
+        run(&mut mechanics, 500, &mut |_, _, _| [0.1, 0.1, 0.1]);
+        assert_eq!(mechanics.position, [0.0, 0.0, 0.12]);
+        run(&mut mechanics, 500, &mut |_, _, _| [0.0, 0.0, 0.3]);
+        assert!(mechanics.position[2] > 0.121);
+        run(&mut mechanics, 500, &mut StillHand);
+        assert_eq!(mechanics.velocity, [0.0; 3]);
+    }
+
+    #[test]
+    fn no_hand_gets_past_the_stops() {
+        for force in [[0.0, 0.0, 30.0], [0.0, 0.0, -30.0], [40.0, -10.0, 5.0], [1e9, 1e9, 1e9], [f64::NAN, 0.0, 0.0]] {
+            let mut mechanics = Mechanics::new(MechanicsConfig::DEFAULT, [0.0, 0.0, 0.12]);
+            run(&mut mechanics, 1000, &mut |_, _, _| force);
+            assert!(mechanics.position.iter().chain(&mechanics.velocity).all(|part| part.is_finite()), "{force:?}: {mechanics:?}");
+            assert!(mechanics.position.iter().all(|part| part.abs() < 0.25), "{force:?}: {mechanics:?}");
+            assert!(inverse(mechanics.position).is_some());
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! What the driver needs of the way to a device, be it USB or simulated.
+
+use core::fmt;
+use core::time::Duration;
+
+use cohaptic_units::Instant;
+use thiserror::Error;
+
+use crate::ftdi::Request;
+
+/// Bytes to and from a device behind an FT232R, and a clock.
+pub trait Transport {
+    /// The time on the transport's own clock, which shows zero when it was made and never goes back.
+    fn now(&self) -> Instant;
+
+    /// Waits until then; not at all if that has passed.
+    fn sleep_until(&mut self, until: Instant);
+
+    /// A control transfer to the chip: vendor request to the device, index 0, no data.
+    ///
+    /// # Errors
+    ///
+    /// [`TransportError`].
+    fn control(&mut self, request: Request, value: u16) -> Result<(), TransportError>;
+
+    /// Sends all of the bytes.
+    ///
+    /// # Errors
+    ///
+    /// [`TransportError`].
+    fn write(&mut self, bytes: &[u8]) -> Result<(), TransportError>;
+
+    /// Takes bytes that have come, without the chip's status bytes, as many as there is room for; the rest stays for the next call. Waits at
+    /// most `patience` for the first. May give 0 earlier, because the chip says now and then that it has nothing, but never without time passing.
+    ///
+    /// # Errors
+    ///
+    /// [`TransportError`].
+    fn read(&mut self, into: &mut [u8], patience: Duration) -> Result<usize, TransportError>;
+}
+
+/// What was being done.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Operation {
+    /// A control transfer.
+    Control,
+    /// A bulk transfer out.
+    Write,
+    /// A bulk transfer in.
+    Read,
+}
+
+impl fmt::Display for Operation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Control => "setting up the serial chip",
+            Self::Write => "writing to the device",
+            Self::Read => "reading from the device",
+        })
+    }
+}
+
+/// What a transfer failed of.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Fault {
+    /// It took too long.
+    TimedOut,
+    /// The endpoint stalled.
+    Stalled,
+    /// A fault of the wire or of the protocol.
+    Wire,
+    /// The operating system refused the request.
+    Refused,
+    /// Another error, with the operating system's number.
+    Other(u32),
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TimedOut => f.write_str("it took too long"),
+            Self::Stalled => f.write_str("the endpoint stalled"),
+            Self::Wire => f.write_str("a fault of the wire or of the protocol"),
+            Self::Refused => f.write_str("the operating system refused it"),
+            Self::Other(code) => write!(f, "error {code} of the operating system"),
+        }
+    }
+}
+
+/// A transfer that failed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
+pub enum TransportError {
+    /// The device is gone, and will not come back on this transport.
+    #[error("the device was unplugged; plug it in again and start anew")]
+    Unplugged,
+    /// It is still there, but a transfer failed.
+    #[error("{during} failed: {fault}")]
+    Io {
+        /// What was being done.
+        during: Operation,
+        /// What went wrong.
+        fault: Fault,
+    },
+}

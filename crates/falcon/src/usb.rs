@@ -1,0 +1,276 @@
+//! The way to a real device, through `nusb`.
+//!
+//! Never tried on a Falcon: there was none. What it does is what the [driver](crate::driver) was tested with on the [simulator](crate::simulator).
+
+use core::fmt;
+use core::time::Duration;
+
+use cohaptic_units::Instant;
+use nusb::transfer::{Buffer, Bulk, Completion, ControlOut, ControlType, In, Out, Recipient, TransferError};
+use nusb::{DeviceInfo, Endpoint, Interface, MaybeFuture};
+use thiserror::Error;
+
+use crate::clock::WallClock;
+use crate::ftdi::{ENDPOINT_IN, ENDPOINT_OUT, INTERFACE, PACKET, PAYLOAD, PRODUCT, Request, VENDOR, strip_status};
+use crate::transport::{Fault, Operation, Transport, TransportError};
+
+/// A control transfer that takes longer has failed.
+const CONTROL_PATIENCE: Duration = Duration::from_millis(500);
+/// A bulk transfer out that takes longer has failed: sixteen bytes take a tenth of a millisecond.
+const WRITE_PATIENCE: Duration = Duration::from_millis(100);
+/// How long a transfer that was taken back may still be on the way.
+const CANCEL_PATIENCE: Duration = Duration::from_secs(1);
+
+/// A Falcon that is plugged in.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Listed {
+    /// Its serial number, if the system tells.
+    pub serial: Option<String>,
+    /// What it calls itself: `FALCON HAPTIC`, by what is known.
+    pub product: Option<String>,
+    /// The bus it is on, as the system names it.
+    pub bus: String,
+    /// Its address on the bus.
+    pub address: u8,
+}
+
+impl fmt::Display for Listed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { serial, product, bus, address } = self;
+        let text = |text: &Option<String>| text.clone().unwrap_or_else(|| "unknown".to_owned());
+        write!(f, "bus {bus} address {address}: {}, serial {}", text(product), text(serial))
+    }
+}
+
+/// The Falcons that are plugged in, in the order of the system. Nothing is opened.
+///
+/// # Errors
+///
+/// [`UsbError::System`] if the system does not list its devices.
+pub fn list() -> Result<Vec<Listed>, UsbError> {
+    Ok(falcons()?.iter().map(listed).collect())
+}
+
+fn falcons() -> Result<Vec<DeviceInfo>, UsbError> {
+    let devices = nusb::list_devices().wait().map_err(|error| UsbError::system("listing USB devices", error))?;
+    Ok(devices.filter(|device| device.vendor_id() == VENDOR && device.product_id() == PRODUCT).collect())
+}
+
+fn listed(info: &DeviceInfo) -> Listed {
+    Listed {
+        serial: info.serial_number().map(str::to_owned),
+        product: info.product_string().map(str::to_owned),
+        bus: info.bus_id().to_owned(),
+        address: info.device_address(),
+    }
+}
+
+/// A device that was opened.
+#[derive(Debug)]
+pub struct UsbTransport {
+    clock: WallClock,
+    interface: Interface,
+    output: Endpoint<Bulk, Out>,
+    input: Endpoint<Bulk, In>,
+    /// The buffer of writes while none is on the way.
+    written: Option<Buffer>,
+    /// Payload that has come and was not taken.
+    payload: [u8; PAYLOAD],
+    taken: usize,
+    count: usize,
+}
+
+impl UsbTransport {
+    /// Opens the Falcon with that serial number, or the only one there is, and claims its interface.
+    ///
+    /// # Errors
+    ///
+    /// [`UsbError`] says which Falcons there are, and what to do if the system refuses.
+    pub fn open(serial: Option<&str>) -> Result<Self, UsbError> {
+        let mut found = falcons()?;
+        if let Some(serial) = serial {
+            let others = found.iter().map(listed).collect();
+            found.retain(|info| info.serial_number() == Some(serial));
+            if found.is_empty() {
+                return Err(UsbError::NoSuchSerial { serial: serial.to_owned(), others });
+            }
+        }
+        match found.as_slice() {
+            [] => Err(UsbError::NoDevice),
+            [info] => Self::of(info),
+            several => Err(UsbError::Several(several.iter().map(listed).collect())),
+        }
+    }
+
+    fn of(info: &DeviceInfo) -> Result<Self, UsbError> {
+        let device = info.open().wait().map_err(|error| UsbError::system("opening the device", error))?;
+        let interface = device.detach_and_claim_interface(INTERFACE).wait().map_err(|error| UsbError::system("claiming the interface", error))?;
+        let output = interface.endpoint(ENDPOINT_OUT).map_err(|error| UsbError::system("opening the endpoint out", error))?;
+        let mut input: Endpoint<Bulk, In> = interface.endpoint(ENDPOINT_IN).map_err(|error| UsbError::system("opening the endpoint in", error))?;
+        // One transfer is always asked for; the chip holds what comes meanwhile.
+        input.submit(Buffer::new(PACKET));
+        let written = Some(Buffer::new(PACKET));
+        Ok(Self { clock: WallClock::new(), interface, output, input, written, payload: [0; PAYLOAD], taken: 0, count: 0 })
+    }
+
+    /// Takes a packet in and asks for the next.
+    fn take_in(&mut self, completion: Completion) -> Result<(), TransportError> {
+        let Completion { mut buffer, actual_len, status } = completion;
+        let outcome = status.map_err(|error| transport_error(Operation::Read, error));
+        if outcome.is_ok() {
+            let arrived = buffer.get(..actual_len.min(buffer.len())).unwrap_or(&[]);
+            self.count = strip_status(arrived, &mut self.payload);
+            self.taken = 0;
+        }
+        if outcome != Err(TransportError::Unplugged) {
+            buffer.clear();
+            buffer.set_requested_len(PACKET);
+            self.input.submit(buffer);
+        }
+        outcome
+    }
+}
+
+impl Transport for UsbTransport {
+    fn now(&self) -> Instant {
+        self.clock.now()
+    }
+
+    fn sleep_until(&mut self, until: Instant) {
+        self.clock.sleep_until(until);
+    }
+
+    fn control(&mut self, request: Request, value: u16) -> Result<(), TransportError> {
+        if request == Request::Reset {
+            // What lies here would otherwise outlive the purge.
+            (self.taken, self.count) = (0, 0);
+        }
+        let setup =
+            ControlOut { control_type: ControlType::Vendor, recipient: Recipient::Device, request: request.number(), value, index: 0, data: &[] };
+        self.interface.control_out(setup, CONTROL_PATIENCE).wait().map_err(|error| transport_error(Operation::Control, error))
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        for piece in bytes.chunks(PACKET) {
+            let mut buffer = self.written.take().unwrap_or_else(|| Buffer::new(PACKET));
+            buffer.clear();
+            buffer.extend_from_slice(piece);
+            self.output.submit(buffer);
+            let mut timed_out = false;
+            let completion = self.output.wait_next_complete(WRITE_PATIENCE).or_else(|| {
+                timed_out = true;
+                self.output.cancel_all();
+                self.output.wait_next_complete(CANCEL_PATIENCE)
+            });
+            let failed = |fault| TransportError::Io { during: Operation::Write, fault };
+            let Some(Completion { buffer, actual_len, status }) = completion else {
+                return Err(failed(Fault::TimedOut));
+            };
+            self.written = Some(buffer);
+            status.map_err(|error| transport_error(Operation::Write, error))?;
+            if timed_out || actual_len != piece.len() {
+                return Err(failed(Fault::TimedOut));
+            }
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, into: &mut [u8], patience: Duration) -> Result<usize, TransportError> {
+        if self.taken == self.count {
+            match self.input.wait_next_complete(patience) {
+                Some(completion) => self.take_in(completion)?,
+                None => return Ok(0),
+            }
+        }
+        let rest = &self.payload[self.taken..self.count];
+        let count = rest.len().min(into.len());
+        into[..count].copy_from_slice(&rest[..count]);
+        self.taken += count;
+        Ok(count)
+    }
+}
+
+fn transport_error(during: Operation, error: TransferError) -> TransportError {
+    let fault = match error {
+        TransferError::Disconnected => return TransportError::Unplugged,
+        TransferError::Cancelled => Fault::TimedOut,
+        TransferError::Stall => Fault::Stalled,
+        TransferError::Fault => Fault::Wire,
+        TransferError::InvalidArgument => Fault::Refused,
+        TransferError::Unknown(code) => Fault::Other(code),
+    };
+    TransportError::Io { during, fault }
+}
+
+/// No device could be opened.
+#[derive(Clone, Debug, Error)]
+#[non_exhaustive]
+pub enum UsbError {
+    /// None is plugged in.
+    #[error("no Novint Falcon (USB 0403:cb48) is plugged in: check the cable and the power supply")]
+    NoDevice,
+    /// There are Falcons, but not that one.
+    #[error("no Falcon has the serial number {serial:?}; there are: {}", names(others))]
+    NoSuchSerial {
+        /// What was asked for.
+        serial: String,
+        /// Those that are plugged in.
+        others: Vec<Listed>,
+    },
+    /// More than one, and none was named.
+    #[error("several Falcons are plugged in: name one by its serial number. There are: {}", names(.0))]
+    Several(Vec<Listed>),
+    /// The system refused.
+    #[error("{doing} failed: {error}{}", advice(error.kind()))]
+    System {
+        /// What was being done.
+        doing: &'static str,
+        /// What the system said.
+        error: nusb::Error,
+    },
+}
+
+impl UsbError {
+    const fn system(doing: &'static str, error: nusb::Error) -> Self {
+        Self::System { doing, error }
+    }
+}
+
+fn names(listed: &[Listed]) -> String {
+    if listed.is_empty() {
+        return "none".to_owned();
+    }
+    listed.iter().map(Listed::to_string).collect::<Vec<_>>().join("; ")
+}
+
+const fn advice(kind: nusb::ErrorKind) -> &'static str {
+    match kind {
+        nusb::ErrorKind::PermissionDenied => ": a udev rule must give you the right to it, see docs/falcon.md",
+        nusb::ErrorKind::Busy => ": another program has it, close that first",
+        nusb::ErrorKind::Disconnected => ": it was unplugged",
+        nusb::ErrorKind::NotFound | nusb::ErrorKind::Unsupported | nusb::ErrorKind::Other | _ => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unplugged_device_is_told_from_a_failed_transfer() {
+        assert_eq!(transport_error(Operation::Read, TransferError::Disconnected), TransportError::Unplugged);
+        for error in
+            [TransferError::Cancelled, TransferError::Stall, TransferError::Fault, TransferError::InvalidArgument, TransferError::Unknown(71)]
+        {
+            assert!(matches!(transport_error(Operation::Write, error), TransportError::Io { during: Operation::Write, .. }));
+        }
+    }
+
+    #[test]
+    fn errors_name_what_there_is() {
+        let one = Listed { serial: Some("AB12".to_owned()), product: None, bus: "001".to_owned(), address: 7 };
+        let text = UsbError::NoSuchSerial { serial: "XY".to_owned(), others: vec![one.clone()] }.to_string();
+        assert!(text.contains("\"XY\"") && text.contains("bus 001 address 7: unknown, serial AB12"), "{text}");
+        assert!(UsbError::Several(vec![one.clone(), one]).to_string().contains("serial number"));
+    }
+}
