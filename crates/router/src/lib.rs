@@ -1,0 +1,55 @@
+//! Any IP traffic through the emulator in real time.
+//!
+//! A [`Router`] stands between two devices: TUN devices, which are ends of the network for their hosts, or two Ethernet interfaces, which it joins like a
+//! cable. What comes in at one goes through the link that the first matching rule names, and leaves at the other one at the instant that the link says: its
+//! *logical* departure, so that lateness never adds up. A seeded link does to the same packets at the same instants what it does in virtual time.
+//!
+//! ```text
+//!   device ── Packet ──▶ Engine ── Departure ──▶ device        Engine: rules, links, counters; knows no clock
+//!                          ▲                                   Router: the devices, the clock, lateness
+//!                        instant
+//! ```
+//!
+//! It does not answer, fragment or route packets, and does not count hops: hosts see a wire. What is no IP (ARP) crosses at once. Linux only. Nothing here
+//! prints.
+//!
+//! Read [`Engine`] first, then [`Router`]. The file is [`cohaptic_scene::router_file::RouterFile`].
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use cohaptic_router::{Engine, Framing, Packet};
+//! use cohaptic_scene::router_file::{RouterFile, Side};
+//! use cohaptic_units::Instant;
+//!
+//! let text = r#"
+//!     router = { default = "wan" }
+//!     left   = { tun = "left0" }
+//!     right  = { tun = "right0" }
+//!     links  = { wan = { delay = "24ms" } }
+//! "#;
+//! let mut engine = Engine::new(&RouterFile::parse(text, Path::new("router.toml"), &[])?);
+//!
+//! // A packet of UDP from 10.0.0.1 to 10.0.0.2 that carries nothing.
+//! let bytes = [[0x45, 0, 0, 28], [0, 0, 0, 0], [64, 17, 0x66, 0xcf], [10, 0, 0, 1], [10, 0, 0, 2], [0, 7, 0, 8], [0, 8, 0, 0]].concat();
+//! engine.handle_packet(Instant::ZERO, Side::Left, Packet::new(bytes.clone(), Framing::Ip));
+//!
+//! let due = engine.poll_timeout().expect("the packet is on the way");
+//! engine.handle_timeout(due);
+//! let departure = engine.poll_departure().expect("it has arrived");
+//! assert_eq!((departure.at.as_nanos(), departure.to), (24_000_000, Side::Right));
+//! assert_eq!(departure.packet.bytes(), bytes);
+//! # Ok::<(), cohaptic_scene::SceneError>(())
+//! ```
+
+mod engine;
+mod packet;
+mod rules;
+mod run;
+mod side;
+
+pub use engine::{Count, Counters, Departure, Engine, LaneSnapshot, NoSuchLink, Received};
+pub use packet::{Content, Ecn, Framing, Headers, Malformed, Packet};
+pub use rules::{Decided, Rules};
+pub use run::{Report, Router, RunError, Written};
+pub use side::{AnyDevice, Device, Failed, Interface, OpenError, Sent, Tun};

@@ -1,0 +1,77 @@
+//! The checksum of the Internet protocols (RFC 1071), and how it follows a change (RFC 1624).
+
+use core::net::IpAddr;
+
+use cohaptic_scene::router_file::Protocol;
+
+use super::Headers;
+
+/// The sum of all words in ones' complement, folded to 16 bits; an odd byte at the end is the high one of its word.
+pub(super) fn sum(bytes: &[u8]) -> u16 {
+    let (words, odd) = bytes.as_chunks::<2>();
+    let whole: u64 = words.iter().map(|word| u64::from(u16::from_be_bytes(*word))).sum();
+    fold(whole + odd.first().map_or(0, |byte| u64::from(*byte) << 8))
+}
+
+fn fold(mut sum: u64) -> u16 {
+    while sum > 0xffff {
+        sum = (sum & 0xffff) + (sum >> 16);
+    }
+    u16::try_from(sum).unwrap_or(u16::MAX)
+}
+
+/// Corrects the checksum at `at` for a word, or a sum, that was `old` and is `new` now: HC' = ~(~HC + ~m + m') (RFC 1624, equation 3).
+pub(super) fn change(bytes: &mut [u8], at: usize, old: u16, new: u16) {
+    let Some(field) = bytes.get_mut(at..).and_then(|rest| rest.first_chunk_mut::<2>()) else { return };
+    let before = u16::from_be_bytes(*field);
+    *field = (!fold(u64::from(!before) + u64::from(!old) + u64::from(new))).to_be_bytes();
+}
+
+/// Where the checksum of the transport protocol stands, counted from the begin of the packet; `None` if it has none that is known, or if it is not here.
+pub(super) fn transport_field(packet: &[u8], headers: &Headers) -> Option<usize> {
+    let at = headers.transport()? + offset(headers.protocol())?;
+    let field: &[u8; 2] = packet.get(at..headers.length())?.first_chunk()?;
+    // UDP without a checksum (RFC 768).
+    (headers.protocol() != Protocol::UDP || *field != [0, 0]).then_some(at)
+}
+
+fn offset(protocol: Protocol) -> Option<usize> {
+    match protocol {
+        Protocol::TCP => Some(16),
+        Protocol::UDP => Some(6),
+        Protocol::ICMP | Protocol::ICMPV6 => Some(2),
+        _ => None,
+    }
+}
+
+/// Computes the checksum of TCP or UDP where the sender has left that to its network device.
+///
+/// Linux then leaves the sum of the pseudo-header in the field. A packet whose right checksum happens to be that sum is given it again, so nothing needs
+/// to tell the two apart.
+pub(super) fn complete(packet: &mut [u8], headers: &Headers) {
+    if !headers.is_whole() || !headers.protocol().has_ports() {
+        return;
+    }
+    let (Some(begin), Some(field)) = (headers.transport(), transport_field(packet, headers)) else { return };
+    let pseudo = pseudo_header(headers, begin);
+    if u16::from_be_bytes([packet[field], packet[field + 1]]) != pseudo {
+        return;
+    }
+    // The field holds the sum of the pseudo-header: with it, the sum of the segment is that of both.
+    let checksum = match !sum(&packet[begin..headers.length()]) {
+        // Zero would say that there is none.
+        0 if headers.protocol() == Protocol::UDP => 0xffff,
+        checksum => checksum,
+    };
+    packet[field..field + 2].copy_from_slice(&checksum.to_be_bytes());
+}
+
+/// The sum of addresses, protocol and length (RFC 9293, section 3.1; RFC 8200, section 8.1).
+fn pseudo_header(headers: &Headers, begin: usize) -> u16 {
+    let address = |address| match address {
+        IpAddr::V4(address) => sum(&address.octets()),
+        IpAddr::V6(address) => sum(&address.octets()),
+    };
+    let length = (headers.length() - begin) as u64;
+    fold(u64::from(address(headers.source())) + u64::from(address(headers.destination())) + u64::from(headers.protocol().0) + length)
+}

@@ -1,0 +1,49 @@
+//! Network namespaces: a device is opened in the one that it belongs to, and keeps working from outside.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use nix::sched::{CloneFlags, setns};
+
+use super::Failed;
+
+/// The namespace of the calling thread.
+const OWN: &str = "/proc/thread-self/ns/net";
+
+/// Where `ip netns` keeps the namespaces that it has given a name.
+const NAMED: &str = "/run/netns";
+
+/// Does something in a namespace, with this thread alone, and comes back. `None`: here.
+pub(super) fn within<T>(namespace: Option<&str>, does: impl FnOnce() -> Result<T, Failed>) -> Result<T, Failed> {
+    let Some(namespace) = namespace else { return does() };
+    let path = path(namespace);
+    let open = |path: &Path| File::open(path).map_err(Failed::system(format!("open the network namespace {}", path.display())));
+    let (own, other) = (open(Path::new(OWN))?, open(&path)?);
+    let enter = |to: &File, what: String| setns(to, CloneFlags::CLONE_NEWNET).map_err(|error| Failed::system(what)(error.into()));
+    enter(&other, format!("enter the network namespace {}", path.display()))?;
+    let done = does();
+    enter(&own, "return to the network namespace of the program".to_owned())?;
+    done
+}
+
+/// A name is one that `ip netns` gave; what has a slash is a path.
+fn path(namespace: &str) -> PathBuf {
+    if namespace.contains('/') { PathBuf::from(namespace) } else { Path::new(NAMED).join(namespace) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_looked_for_where_ip_netns_puts_it_and_a_path_is_a_path() {
+        assert_eq!(path("blue"), Path::new("/run/netns/blue"));
+        assert_eq!(path("/proc/1/ns/net"), Path::new("/proc/1/ns/net"));
+    }
+
+    #[test]
+    fn a_namespace_that_is_not_there_is_named() {
+        let error = within(Some("/no/such/namespace"), || Ok(())).unwrap_err();
+        assert!(error.to_string().starts_with("cannot open the network namespace /no/such/namespace: "), "{error}");
+    }
+}

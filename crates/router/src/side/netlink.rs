@@ -1,0 +1,139 @@
+//! The few requests of rtnetlink (rtnetlink(7)) that a device needs: switched on, its length of packets, its addresses, and that it hears everything.
+
+use core::net::IpAddr;
+use std::io;
+use std::os::fd::{AsRawFd as _, OwnedFd};
+
+use cohaptic_scene::router_file::Network;
+use nix::sys::socket::{AddressFamily, MsgFlags, NetlinkAddr, SockFlag, SockProtocol, SockType, bind, recv, send, socket};
+
+/// A socket to the kernel. It speaks of the network namespace in which it was opened.
+#[derive(Debug)]
+pub(super) struct Netlink {
+    socket: OwnedFd,
+}
+
+const NEW_LINK: u16 = 16;
+const NEW_ADDRESS: u16 = 20;
+/// Request, and answer it.
+const REQUEST: u16 = 0x1 | 0x4;
+/// Make it, and do not mind if it is there.
+const CREATE: u16 = 0x400 | 0x100;
+const ATTRIBUTE_MTU: u16 = 4;
+const ATTRIBUTE_ADDRESS: u16 = 1;
+const ATTRIBUTE_LOCAL: u16 = 2;
+const FLAG_UP: u32 = 0x1;
+const FLAG_PROMISCUOUS: u32 = 0x100;
+
+impl Netlink {
+    pub(super) fn open() -> io::Result<Self> {
+        let socket = socket(AddressFamily::Netlink, SockType::Raw, SockFlag::SOCK_CLOEXEC, SockProtocol::NetlinkRoute)?;
+        bind(socket.as_raw_fd(), &NetlinkAddr::new(0, 0))?;
+        Ok(Self { socket })
+    }
+
+    /// Switches a device on.
+    pub(super) fn up(&self, index: u32) -> io::Result<()> {
+        self.ask(NEW_LINK, REQUEST, &link(index, FLAG_UP, FLAG_UP))
+    }
+
+    /// Lets a device hear what is meant for others, or not.
+    pub(super) fn promiscuous(&self, index: u32, hears_all: bool) -> io::Result<()> {
+        self.ask(NEW_LINK, REQUEST, &link(index, if hears_all { FLAG_PROMISCUOUS } else { 0 }, FLAG_PROMISCUOUS))
+    }
+
+    /// The largest packet that a device takes.
+    pub(super) fn mtu(&self, index: u32, mtu: u16) -> io::Result<()> {
+        let mut body = link(index, 0, 0);
+        attribute(&mut body, ATTRIBUTE_MTU, &u32::from(mtu).to_ne_bytes());
+        self.ask(NEW_LINK, REQUEST, &body)
+    }
+
+    /// Gives a device an address.
+    pub(super) fn address(&self, index: u32, network: Network) -> io::Result<()> {
+        let family = if network.address().is_ipv4() { AddressFamily::Inet } else { AddressFamily::Inet6 };
+        // struct ifaddrmsg: family, prefix, flags, scope, index.
+        let mut body = vec![u8::try_from(family as i32).map_err(io::Error::other)?, network.prefix(), 0, 0];
+        body.extend(index.to_ne_bytes());
+        match network.address() {
+            IpAddr::V4(address) => [ATTRIBUTE_LOCAL, ATTRIBUTE_ADDRESS].map(|kind| attribute(&mut body, kind, &address.octets())),
+            IpAddr::V6(address) => [ATTRIBUTE_LOCAL, ATTRIBUTE_ADDRESS].map(|kind| attribute(&mut body, kind, &address.octets())),
+        };
+        self.ask(NEW_ADDRESS, REQUEST | CREATE, &body)
+    }
+
+    /// Sends a request and waits for the answer.
+    fn ask(&self, kind: u16, flags: u16, body: &[u8]) -> io::Result<()> {
+        send(self.socket.as_raw_fd(), &message(kind, flags, body), MsgFlags::empty())?;
+        let mut answer = [0; 4096];
+        let length = recv(self.socket.as_raw_fd(), &mut answer, MsgFlags::empty())?;
+        verdict(&answer[..length])
+    }
+}
+
+/// A message: its length, its kind, its flags, a number, and nobody in particular who asks (struct nlmsghdr).
+fn message(kind: u16, flags: u16, body: &[u8]) -> Vec<u8> {
+    const HEADER: u32 = 16;
+    let length = HEADER + u32::try_from(body.len()).unwrap_or(u32::MAX - HEADER);
+    let mut message = Vec::with_capacity(body.len() + 16);
+    message.extend(length.to_ne_bytes());
+    message.extend(kind.to_ne_bytes());
+    message.extend(flags.to_ne_bytes());
+    message.extend([1_u32, 0].map(u32::to_ne_bytes).concat());
+    message.extend(body);
+    message
+}
+
+/// struct ifinfomsg: no family, no type, the index, flags, and which of them are meant.
+fn link(index: u32, flags: u32, meant: u32) -> Vec<u8> {
+    [0, index, flags, meant].map(u32::to_ne_bytes).concat()
+}
+
+/// struct rtattr: length, kind, value. All values here are multiples of four bytes, so nothing is padded.
+fn attribute(body: &mut Vec<u8>, kind: u16, value: &[u8]) {
+    let length = 4 + u16::try_from(value.len()).unwrap_or(u16::MAX - 4);
+    body.extend([length, kind].map(u16::to_ne_bytes).concat());
+    body.extend(value);
+}
+
+/// The error in an answer: zero is none, others are negative numbers of errors.
+fn verdict(answer: &[u8]) -> io::Result<()> {
+    const ERROR: u16 = 2;
+    let strange = || io::Error::new(io::ErrorKind::InvalidData, "the kernel's answer is none that is known");
+    let kind: [u8; 2] = answer.get(4..).and_then(|rest| rest.first_chunk()).copied().ok_or_else(strange)?;
+    let code: [u8; 4] = answer.get(16..).and_then(|rest| rest.first_chunk()).copied().ok_or_else(strange)?;
+    match (u16::from_ne_bytes(kind), i32::from_ne_bytes(code)) {
+        (ERROR, 0) => Ok(()),
+        (ERROR, code @ ..0) => Err(io::Error::from_raw_os_error(code.saturating_neg())),
+        _ => Err(strange()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_has_the_layout_of_the_manual() {
+        let mut body = link(7, FLAG_UP, FLAG_UP);
+        attribute(&mut body, ATTRIBUTE_MTU, &1400_u32.to_ne_bytes());
+        let message = message(NEW_LINK, REQUEST, &body);
+        assert_eq!(message.len(), 16 + 16 + 8);
+        assert_eq!(message[..4], 40_u32.to_ne_bytes());
+        assert_eq!(message[4..8], [16_u16, 5].map(u16::to_ne_bytes).concat());
+        assert_eq!(message[20..24], 7_u32.to_ne_bytes());
+        assert_eq!(message[32..36], [8_u16, 4].map(u16::to_ne_bytes).concat());
+    }
+
+    #[test]
+    fn an_answer_is_a_yes_or_an_error() {
+        let answer = |code: i32| [vec![0; 4], 2_u16.to_ne_bytes().to_vec(), vec![0; 10], code.to_ne_bytes().to_vec()].concat();
+        assert!(verdict(&answer(0)).is_ok());
+        assert_eq!(verdict(&answer(-1)).unwrap_err().raw_os_error(), Some(1));
+        assert_eq!(verdict(&answer(1)).unwrap_err().kind(), io::ErrorKind::InvalidData);
+        assert_eq!(verdict(&answer(i32::MIN)).unwrap_err().raw_os_error(), Some(i32::MAX));
+        for length in 0..20 {
+            assert_eq!(verdict(&answer(0)[..length]).unwrap_err().kind(), io::ErrorKind::InvalidData);
+        }
+    }
+}

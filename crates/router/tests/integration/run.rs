@@ -1,0 +1,196 @@
+//! The loop by a clock that is made up: it moves when it is read and when it is waited for, and packets come at instants of a script.
+
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io;
+use std::os::fd::{AsFd as _, BorrowedFd};
+use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use cohaptic_realtime::{Clock, Pacing};
+use cohaptic_router::{Device, Framing, Router, RunError, Sent};
+use cohaptic_scene::link_from_keys;
+use cohaptic_scene::router_file::Side;
+use cohaptic_units::Instant;
+
+use crate::support::{file, udp_bytes};
+
+/// The time, and what will come at which side.
+struct World {
+    now: Cell<u64>,
+    /// How long it takes to read the clock \[ns\].
+    step: u64,
+    /// How late the system wakes \[ns\].
+    late: u64,
+    coming: [RefCell<VecDeque<(u64, Vec<u8>)>>; 2],
+}
+
+impl World {
+    fn next(&self) -> Option<u64> {
+        self.coming.iter().filter_map(|coming| coming.borrow().front().map(|(at, _)| *at)).min()
+    }
+}
+
+#[derive(Clone)]
+struct Watch(Rc<World>);
+
+impl Clock for Watch {
+    fn now(&self) -> Instant {
+        self.0.now.set(self.0.now.get() + self.0.step);
+        Instant::from_nanos(self.0.now.get())
+    }
+
+    fn block(&self, until: Option<Instant>, _readable: &[BorrowedFd<'_>]) -> io::Result<bool> {
+        let until = until.expect("the loop never waits for ever").as_nanos();
+        let readable = self.0.next().is_some_and(|next| next <= until);
+        let wake = if readable { self.0.next().unwrap() } else { until };
+        self.0.now.set(self.0.now.get().max(wake) + self.0.late);
+        Ok(readable)
+    }
+}
+
+struct Wire {
+    side: usize,
+    world: Rc<World>,
+    sent: Rc<RefCell<Vec<(u64, Vec<u8>)>>>,
+    takes: Sent,
+    fd: File,
+}
+
+impl Device for Wire {
+    fn framing(&self) -> Framing {
+        Framing::Ip
+    }
+
+    fn readable(&self) -> BorrowedFd<'_> {
+        self.fd.as_fd()
+    }
+
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
+        let mut coming = self.world.coming[self.side].borrow_mut();
+        let Some((_, bytes)) = coming.pop_front_if(|(at, _)| *at <= self.world.now.get()) else { return Ok(None) };
+        if bytes.is_empty() {
+            return Err(io::Error::other("unplugged"));
+        }
+        buffer[..bytes.len()].copy_from_slice(&bytes);
+        Ok(Some(bytes.len()))
+    }
+
+    fn send(&mut self, packet: &[u8]) -> Sent {
+        if self.takes == Sent::Sent {
+            self.sent.borrow_mut().push((self.world.now.get(), packet.to_vec()));
+        }
+        self.takes
+    }
+}
+
+type Log = Rc<RefCell<Vec<(u64, Vec<u8>)>>>;
+
+fn router(text: &str, step: u64, late: u64, coming: [Vec<(u64, Vec<u8>)>; 2], takes: Sent, pacing: Pacing) -> (Router<Wire, Watch>, [Log; 2]) {
+    let coming = coming.map(|coming| RefCell::new(coming.into()));
+    let world = Rc::new(World { now: Cell::new(0), step, late, coming });
+    let logs = [Log::default(), Log::default()];
+    let wire = |side: usize| Wire { side, world: Rc::clone(&world), sent: Rc::clone(&logs[side]), takes, fd: File::open("/dev/null").unwrap() };
+    (Router::with(&file(text), [wire(0), wire(1)], Watch(Rc::clone(&world)), pacing), logs)
+}
+
+const DELAY: &str = "router = { default = \"x\" }\nlinks = { x = { delay = \"5ms\" } }";
+const SECOND: u64 = 1_000_000_000;
+
+fn every_millisecond(count: u64) -> Vec<(u64, Vec<u8>)> {
+    (0..count).map(|number| (number * 1_000_000 + 500_000, udp_bytes([number as u16, 9], &[]))).collect()
+}
+
+fn run(router: &mut Router<Wire, Watch>) {
+    router.run(&AtomicBool::new(false), Some(Instant::from_nanos(SECOND)), Duration::from_millis(100), |_| ()).unwrap();
+}
+
+#[test]
+fn a_late_system_makes_packets_late_but_lateness_does_not_add_up() {
+    let (mut router, logs) = router(DELAY, 0, 80_000, [every_millisecond(100), Vec::new()], Sent::Sent, Pacing::Sleep);
+    run(&mut router);
+    let left = logs[1].borrow();
+    assert_eq!(left.len(), 100);
+    for (number, (at, bytes)) in left.iter().enumerate() {
+        // Read 80 µs after it came, which is its instant, and written at most 80 µs after its departure.
+        let came = number as u64 * 1_000_000 + 500_000;
+        assert!((came + 5_080_000..=came + 5_160_000).contains(at), "{number} left at {at}");
+        assert_eq!(u16::from_be_bytes([bytes[20], bytes[21]]), number as u16);
+    }
+    let error = router.release_error();
+    assert_eq!(error.count, 100);
+    // To the three digits of the histogram.
+    assert!(error.max <= Duration::from_nanos(80_100), "{error:?}");
+    assert_eq!(router.report().written[1].packets, 100);
+    assert_eq!((router.report().packets(), router.report().dropped()), (100, 0));
+}
+
+/// While it spins, the router reads what comes at once, and departures are on time to a few readings of the clock.
+#[test]
+fn spinning_neither_makes_departures_late_nor_packets_wait() {
+    let margin = Duration::from_micros(120);
+    // A packet comes 60 µs before the departure of the first one: in the middle of the margin.
+    let coming = vec![(1_000_000, udp_bytes([1, 9], &[])), (5_950_000, udp_bytes([2, 9], &[]))];
+    let (mut router, logs) = router(DELAY, 50, 10_000, [coming, Vec::new()], Sent::Sent, Pacing::Spin { margin });
+    run(&mut router);
+    let left: Vec<u64> = logs[1].borrow().iter().map(|(at, _)| *at).collect();
+    assert!((6_010_000..6_012_000).contains(&left[0]) && (10_950_000..10_953_000).contains(&left[1]), "{left:?}");
+    assert!(router.release_error().max < Duration::from_micros(1), "{:?}", router.release_error());
+}
+
+#[test]
+fn a_device_without_room_is_not_waited_for() {
+    for (takes, expected) in [(Sent::Full, [1, 0, 0]), (Sent::TooLong, [0, 1, 0]), (Sent::Refused, [0, 0, 1])] {
+        let (mut router, _) = router(DELAY, 0, 0, [every_millisecond(1), Vec::new()], takes, Pacing::Sleep);
+        run(&mut router);
+        let report = router.report();
+        let written = report.written[1];
+        assert_eq!(([written.full, written.too_long, written.refused], written.packets, report.dropped()), (expected, 0, 1));
+    }
+}
+
+#[test]
+fn a_device_that_is_gone_ends_the_run_and_is_named() {
+    let (mut router, _) = router(DELAY, 0, 0, [Vec::new(), vec![(1_000, Vec::new())]], Sent::Sent, Pacing::Sleep);
+    let error = router.run(&AtomicBool::new(false), None, SECOND_LONG, |_| ()).unwrap_err();
+    assert!(matches!(error, RunError::Device { side: Side::Right, .. }));
+    assert_eq!(error.to_string(), "right: cannot read the device: unplugged");
+}
+
+const SECOND_LONG: Duration = Duration::from_secs(1);
+
+#[test]
+fn it_looks_up_as_often_as_asked_and_links_can_be_changed_then() {
+    let (mut router, logs) = router(DELAY, 0, 0, [every_millisecond(100), Vec::new()], Sent::Sent, Pacing::Sleep);
+    let mut looks = Vec::new();
+    let until = Some(Instant::from_nanos(SECOND / 5));
+    router
+        .run(&AtomicBool::new(false), until, Duration::from_millis(50), |router| {
+            looks.push(router.report().elapsed.as_nanos());
+            if looks.len() == 1 {
+                router.set_link("x", Some(Side::Left), &link_from_keys(&["loss=100%".to_owned()]).unwrap()).unwrap();
+            }
+        })
+        .unwrap();
+    assert_eq!(looks, [50_000_000, 100_000_000, 150_000_000, 200_000_000, 200_000_000].into_iter().take(looks.len()).collect::<Vec<_>>());
+    assert!(looks.len() >= 4);
+    // Of 100 packets, 50 came before the change.
+    assert_eq!(logs[1].borrow().len(), 50);
+    assert_eq!(router.report().dropped(), 50);
+}
+
+#[test]
+fn a_stop_is_noticed() {
+    let (mut router, _) = router(DELAY, 0, 0, [Vec::new(), Vec::new()], Sent::Sent, Pacing::Sleep);
+    let stop = AtomicBool::new(false);
+    let mut looks = 0;
+    router
+        .run(&stop, None, Duration::from_millis(10), |_| {
+            looks += 1;
+            stop.store(looks == 3, Ordering::Relaxed);
+        })
+        .unwrap();
+    assert!(looks >= 4, "and a last look at the end");
+}
