@@ -182,14 +182,16 @@ impl UdpDoor {
         }
     }
 
-    /// Takes a datagram to be sent with the next [`UdpDoor::flush`]; beyond [`DoorConfig::waiting`] it is dropped and counted.
+    /// Takes a datagram to be sent with the next [`UdpDoor::flush`], and says so; beyond [`DoorConfig::waiting`] it is dropped and counted.
     #[inline]
-    pub fn queue(&mut self, to: SocketAddr, bytes: &[u8], ecn: Option<Ecn>) {
-        if self.outbox.len() >= self.config.waiting {
+    pub fn queue(&mut self, to: SocketAddr, bytes: &[u8], ecn: Option<Ecn>) -> bool {
+        let has_room = self.outbox.len() < self.config.waiting;
+        if has_room {
+            self.outbox.push(to, bytes, ecn);
+        } else {
             self.counts.failures.full += 1;
-            return;
         }
-        self.outbox.push(to, bytes, ecn);
+        has_room
     }
 
     /// Sends what was queued, in that order, until the kernel's buffer is full; what is left waits for the next call. A datagram that cannot be sent is
@@ -199,21 +201,33 @@ impl UdpDoor {
     /// offload): on loopback a datagram of 64 bytes took 1.9 µs alone, 1.1 µs of two together, 0.5 µs of eight, 0.3 µs of sixteen; with `sendmmsg`, which
     /// takes any datagrams, 1.5 µs of sixteen, which is why that is not used beside it.
     pub fn flush(&mut self) {
+        self.flush_with(|| (), |(), _| ());
+    }
+
+    /// The same. `before` is asked before every call of the kernel, such as for the time; `done` is told its answer and how many datagrams the call has
+    /// settled, in the order in which they were queued. Those that wait are told of later.
+    pub fn flush_with<T>(&mut self, mut before: impl FnMut() -> T, mut done: impl FnMut(T, usize)) {
         let most = self.state.max_gso_segments();
-        while let Some(run) = self.outbox.next_run(most) {
+        while self.outbox.len() > 0 {
+            let asked = before();
+            let Some(run) = self.outbox.next_run(most) else { return };
             self.counts.send_calls += 1;
+            let mut settled = run.count;
             match send(&self.socket, &self.state, &run) {
                 Ok(()) => {
                     self.counts.sent += run.count as u64;
-                    let count = run.count;
-                    self.outbox.take(count);
+                    self.outbox.take(settled);
                 }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
                     self.outbox.close_up();
                     return;
                 }
-                Err(error) => self.cannot_send(&error),
+                Err(error) => {
+                    settled = 1;
+                    self.cannot_send(&error);
+                }
             }
+            done(asked, settled);
         }
     }
 

@@ -1,0 +1,323 @@
+//! The sockets of a relay: what they take in goes to the engine, what the engine lets go leaves through them.
+
+use core::fmt;
+use std::collections::VecDeque;
+use std::io;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
+
+use cohaptic_realtime::udp::{BindError, DoorConfig, DoorCounts, ReceiveBuffers, UdpDoor};
+use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock};
+use cohaptic_units::Instant;
+use rustix::buffer::spare_capacity;
+use rustix::event::{Timespec, epoll};
+use rustix::io::Errno;
+
+use super::PortReport;
+use crate::config::{Form, RelayConfig};
+use crate::engine::{Arrival, Engine, Intake, Port};
+
+/// All sockets.
+pub(super) struct Doors {
+    /// Those of a mesh are its programs'; those of a proxy the one that listens, and then the clients'.
+    doors: Vec<Option<Door>>,
+    layout: Layout,
+    config: DoorConfig,
+    /// Readable when one of them is.
+    epoll: OwnedFd,
+    events: Vec<epoll::Event>,
+    buffers: ReceiveBuffers,
+    /// New clients.
+    opened: Vec<u32>,
+    /// Those in which something is queued.
+    dirty: Vec<usize>,
+    /// What the ports of clients that have left did.
+    left: Tally,
+    /// Clients that were sent away because no socket could be had.
+    without_socket: u64,
+}
+
+#[derive(Debug)]
+struct Door {
+    socket: UdpDoor,
+    /// When what waits in it to be sent should leave.
+    departures: VecDeque<Instant>,
+    is_dirty: bool,
+}
+
+#[derive(Debug)]
+enum Layout {
+    Mesh(Vec<String>),
+    Proxy { clients: SocketAddr },
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
+    counts: DoorCounts,
+    kernel_drops: u64,
+}
+
+/// So many sockets are asked one by one whether something has come; of more, the kernel is asked which.
+const ASKED_ONE_BY_ONE: usize = 2;
+
+/// So many batches are read from one socket before the others, and what is due, have their turn.
+const BATCHES: usize = 8;
+
+/// So many datagrams leave before what has come in has its turn.
+const RELEASES: usize = 1024;
+
+impl Doors {
+    /// Opens the ports that are there from the beginning.
+    pub(super) fn open(config: &RelayConfig, door: DoorConfig) -> Result<Self, BindError> {
+        let (ports, layout): (Vec<SocketAddr>, _) = match &config.form {
+            Form::Mesh(mesh) => {
+                let names = mesh.programs.iter().map(|program| program.name.clone()).collect();
+                (mesh.programs.iter().map(|program| program.port).collect(), Layout::Mesh(names))
+            }
+            Form::Proxy(proxy) => (vec![proxy.listen], Layout::Proxy { clients: beside(proxy.to) }),
+        };
+        let nowhere = SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0));
+        let failed = |address: SocketAddr| move |error: Errno| BindError { address, source: error.into() };
+        let epoll = epoll::create(epoll::CreateFlags::CLOEXEC).map_err(failed(nowhere))?;
+        let mut doors = Self {
+            doors: Vec::new(),
+            layout,
+            config: door,
+            epoll,
+            events: Vec::with_capacity(64),
+            buffers: ReceiveBuffers::new(),
+            opened: Vec::new(),
+            dirty: Vec::new(),
+            left: Tally::default(),
+            without_socket: 0,
+        };
+        for (place, port) in ports.into_iter().enumerate() {
+            doors.open_at(place, port)?;
+        }
+        Ok(doors)
+    }
+
+    /// What becomes readable when something has come.
+    pub(super) fn readable(&self) -> BorrowedFd<'_> {
+        self.epoll.as_fd()
+    }
+
+    /// Hands what has come in to the engine. Says up to when all has been: time must not be let pass beyond, or what came earlier would be late.
+    pub(super) fn receive(&mut self, engine: &mut Engine, clock: &MonotonicClock) -> io::Result<Heard> {
+        let mut heard = Heard { count: 0, until: clock.now() };
+        if self.doors.len() <= ASKED_ONE_BY_ONE {
+            for place in 0..self.doors.len() {
+                self.receive_at(place, engine, clock, &mut heard)?;
+            }
+        } else {
+            self.events.clear();
+            match epoll::wait(&self.epoll, spare_capacity(&mut self.events), Some(&Timespec::default())) {
+                Ok(_) | Err(Errno::INTR) => {}
+                Err(error) => return Err(error.into()),
+            }
+            for event in 0..self.events.len() {
+                let place = usize::try_from(self.events[event].data.u64()).unwrap_or(usize::MAX);
+                self.receive_at(place, engine, clock, &mut heard)?;
+            }
+        }
+        if heard.count > 0 {
+            engine.offer_staged();
+        }
+        Ok(heard)
+    }
+
+    fn receive_at(&mut self, place: usize, engine: &mut Engine, clock: &MonotonicClock, heard: &mut Heard) -> io::Result<()> {
+        let Some(Some(door)) = self.doors.get_mut(place) else { return Ok(()) };
+        let port = match (&self.layout, u32::try_from(place).unwrap_or(u32::MAX)) {
+            (Layout::Mesh(_), place) => Port::Program(place),
+            (Layout::Proxy { .. }, 0) => Port::Listen,
+            (Layout::Proxy { .. }, place) => Port::Client(place - 1),
+        };
+        let (opened, mut last) = (&mut self.opened, None);
+        for batch in 1..=BATCHES {
+            let count = door.socket.receive(&mut self.buffers, clock, |datagram| {
+                last = Some(datagram.at);
+                let intake = engine.stage(Arrival { at: datagram.at, port, from: datagram.from, bytes: datagram.bytes, ecn: datagram.ecn });
+                if let Intake::FromNewClient(slot) = intake {
+                    opened.push(slot);
+                }
+            })?;
+            heard.count += count;
+            if count < UdpDoor::BATCH {
+                break;
+            }
+            if batch == BATCHES {
+                // There may be more, which came after this one.
+                heard.until = last.map_or(heard.until, |last| last.min(heard.until));
+            }
+        }
+        Ok(())
+    }
+
+    /// Closes the ports of clients that have left, and opens those of clients that have come.
+    #[inline]
+    pub(super) fn follow_clients(&mut self, engine: &mut Engine) {
+        if let Layout::Proxy { clients } = self.layout {
+            self.follow(engine, clients);
+        }
+    }
+
+    fn follow(&mut self, engine: &mut Engine, clients: SocketAddr) {
+        while let Some(slot) = engine.poll_closed() {
+            if let Some(door) = self.doors.get_mut(slot as usize + 1).and_then(Option::take) {
+                self.left.add(&door.socket);
+            }
+        }
+        while let Some(slot) = self.opened.pop() {
+            if self.open_at(slot as usize + 1, clients).is_err() {
+                self.without_socket += 1;
+                engine.close_client(slot);
+            }
+        }
+    }
+
+    fn open_at(&mut self, place: usize, address: SocketAddr) -> Result<(), BindError> {
+        let socket = UdpDoor::bind(address, self.config)?;
+        epoll::add(&self.epoll, &socket, epoll::EventData::new_u64(place as u64), epoll::EventFlags::IN)
+            .map_err(|error| BindError { address, source: error.into() })?;
+        while self.doors.len() <= place {
+            self.doors.push(None);
+        }
+        self.doors[place] = Some(Door { socket, departures: VecDeque::new(), is_dirty: false });
+        Ok(())
+    }
+
+    /// Takes from the engine what leaves now, and says whether there is more.
+    #[inline]
+    pub(super) fn take_releases(&mut self, engine: &mut Engine) -> bool {
+        for _ in 0..RELEASES {
+            let Some(release) = engine.poll_release() else { return false };
+            let place = match release.port {
+                Port::Program(place) => place as usize,
+                Port::Listen => 0,
+                Port::Client(slot) => slot as usize + 1,
+            };
+            // Always there: clients without a socket have been sent away.
+            let Some(Some(door)) = self.doors.get_mut(place) else { continue };
+            if door.socket.queue(release.to, release.bytes, release.ecn) {
+                door.departures.push_back(release.at);
+                if !core::mem::replace(&mut door.is_dirty, true) {
+                    self.dirty.push(place);
+                }
+            }
+        }
+        true
+    }
+
+    /// Sends what was taken, and records how late each is: the time before the call of the kernel, less when it should leave.
+    #[inline]
+    pub(super) fn send(&mut self, clock: &MonotonicClock, lateness: &mut Lateness) {
+        let doors = &mut self.doors;
+        self.dirty.retain(|place| {
+            let Some(Some(Door { socket, departures, is_dirty })) = doors.get_mut(*place) else { return false };
+            socket.flush_with(
+                || clock.now(),
+                |before, count| departures.drain(..count.min(departures.len())).for_each(|at| lateness.record(before.saturating_duration_since(at))),
+            );
+            *is_dirty = socket.has_waiting();
+            *is_dirty
+        });
+    }
+
+    /// Whether the kernel did not take all that should leave.
+    pub(super) fn has_waiting(&self) -> bool {
+        !self.dirty.is_empty()
+    }
+
+    /// Each port that stands for a program, or that listens, with its name.
+    pub(super) fn addresses(&self) -> impl Iterator<Item = (&str, SocketAddr)> {
+        let count = match &self.layout {
+            Layout::Mesh(names) => names.len(),
+            Layout::Proxy { .. } => 1,
+        };
+        let name = |place: usize| match &self.layout {
+            Layout::Mesh(names) => names.get(place).map_or("", String::as_str),
+            Layout::Proxy { .. } => "listen",
+        };
+        let doors = self.doors.iter().take(count).enumerate();
+        doors.filter_map(move |(place, door)| Some((name(place), door.as_ref()?.socket.local_address())))
+    }
+
+    /// Clients that were sent away because no socket could be had.
+    pub(super) const fn without_socket(&self) -> u64 {
+        self.without_socket
+    }
+
+    /// What each port did; those of all clients together.
+    pub(super) fn report(&self) -> Vec<PortReport> {
+        let mut ports: Vec<PortReport> = Vec::new();
+        for (place, (name, address)) in self.addresses().enumerate() {
+            if let Some(Some(Door { socket, .. })) = self.doors.get(place) {
+                ports.push(PortReport {
+                    name: name.to_owned(),
+                    address: Some(address),
+                    counts: *socket.counts(),
+                    receive_buffer: socket.granted_receive_buffer(),
+                    kernel_drops: socket.kernel_drops().ok().flatten(),
+                });
+            }
+        }
+        if let Layout::Proxy { .. } = self.layout {
+            let mut tally = self.left;
+            self.doors.iter().skip(1).flatten().for_each(|door| tally.add(&door.socket));
+            let granted = self.doors.iter().skip(1).flatten().map(|door| door.socket.granted_receive_buffer()).min();
+            ports.push(PortReport {
+                name: "clients".to_owned(),
+                address: None,
+                counts: tally.counts,
+                receive_buffer: granted.unwrap_or(0),
+                kernel_drops: Some(tally.kernel_drops),
+            });
+        }
+        ports
+    }
+}
+
+impl fmt::Debug for Doors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Doors").field("layout", &self.layout).field("config", &self.config).finish_non_exhaustive()
+    }
+}
+
+/// What was heard.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Heard {
+    /// So many datagrams.
+    pub(super) count: usize,
+    /// All that came up to then.
+    pub(super) until: Instant,
+}
+
+impl Tally {
+    fn add(&mut self, socket: &UdpDoor) {
+        let (sum, more) = (&mut self.counts, socket.counts());
+        sum.received += more.received;
+        sum.oversized += more.oversized;
+        sum.receive_errors += more.receive_errors;
+        sum.sent += more.sent;
+        sum.send_calls += more.send_calls;
+        let (sum, more) = (&mut sum.failures, more.failures);
+        sum.full += more.full;
+        sum.refused += more.refused;
+        sum.unreachable += more.unreachable;
+        sum.too_large += more.too_large;
+        sum.forbidden += more.forbidden;
+        sum.other += more.other;
+        self.kernel_drops += socket.kernel_drops().ok().flatten().unwrap_or(0);
+    }
+}
+
+/// A free port from which that address can be reached; on loopback nobody else reaches it.
+fn beside(to: SocketAddr) -> SocketAddr {
+    match (to.is_ipv6(), to.ip().is_loopback()) {
+        (true, true) => (Ipv6Addr::LOCALHOST, 0).into(),
+        (true, false) => (Ipv6Addr::UNSPECIFIED, 0).into(),
+        (false, true) => (Ipv4Addr::LOCALHOST, 0).into(),
+        (false, false) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+    }
+}

@@ -1,0 +1,221 @@
+//! The relay in real time: one thread that waits for sockets and for the next release.
+
+mod doors;
+mod report;
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::mpsc::Receiver;
+
+use cohaptic_realtime::udp::{BindError, DoorConfig};
+use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock, Pacer, Pacing, Tolerance, Wishes, Woken, prepare_thread};
+use cohaptic_units::Instant;
+use cohaptic_wan::{LinkModel, NodeId};
+
+use crate::config::{ConfigError, RelayConfig};
+use crate::engine::Engine;
+use doors::{Doors, Heard};
+pub use report::{LinkReport, PortReport, Report, View};
+
+/// Why there is no relay, or why it stopped.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RelayError {
+    /// There is no such relay.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A port could not be had.
+    #[error(transparent)]
+    Bind(#[from] BindError),
+    /// The system refused to wait or to read.
+    #[error("the relay cannot go on: {0}")]
+    System(#[from] io::Error),
+}
+
+/// How to run.
+#[derive(Clone, Copy, Debug)]
+pub struct RunOptions {
+    /// How to wait for the next release.
+    pub pacing: Pacing,
+    /// What the thread asks of the system.
+    pub wishes: Wishes,
+    /// How late releases may be for the run to be valid.
+    pub tolerance: Tolerance,
+    /// When to end by itself.
+    pub duration: Option<Duration>,
+    /// How often it is looked at.
+    pub look_every: Duration,
+}
+
+impl Default for RunOptions {
+    /// Sleeping, with priority and locked memory if the system grants them, 1 ms, until it is stopped, looked at 20 times a second.
+    fn default() -> Self {
+        Self {
+            pacing: Pacing::Sleep,
+            wishes: Wishes::default(),
+            tolerance: Tolerance { limit: Duration::from_millis(1) },
+            duration: None,
+            look_every: Duration::from_millis(50),
+        }
+    }
+}
+
+/// What may be said to a relay while it runs.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum Control {
+    /// A link becomes another one, from when it is heard on.
+    SetLink {
+        /// Its sender.
+        from: NodeId,
+        /// Its receiver.
+        to: NodeId,
+        /// What it becomes.
+        model: Box<LinkModel>,
+    },
+}
+
+/// A relay whose ports are open: what comes to them waits until it runs.
+#[derive(Debug)]
+pub struct Relay {
+    engine: Engine,
+    doors: Doors,
+    release: Lateness,
+    refused_changes: u64,
+}
+
+/// So long before a release, spinning, what leaves then is made ready, and sockets are not looked at any more: reading a batch takes that long.
+const MADE_READY: Duration = Duration::from_micros(8);
+
+/// What the kernel did not take is offered to it again after this.
+const AGAIN: Duration = Duration::from_micros(500);
+
+impl Relay {
+    /// Opens the ports.
+    ///
+    /// # Errors
+    ///
+    /// [`RelayError`] if there is no such relay, or a port cannot be had.
+    pub fn bind(config: RelayConfig, door: DoorConfig) -> Result<Self, RelayError> {
+        let doors = Doors::open(&config, door)?;
+        Ok(Self { engine: Engine::new(config)?, doors, release: Lateness::new(), refused_changes: 0 })
+    }
+
+    /// Where it listens: each program's name and the port that stands for it; of a proxy, `listen`.
+    pub fn ports(&self) -> impl Iterator<Item = (&str, SocketAddr)> {
+        self.doors.addresses()
+    }
+
+    /// Runs, in this thread, until `stop` is set (which is looked at as often as `look` is called), or until its end. `control` is looked at without
+    /// waiting; `look` is called from time to time, and what it takes makes releases late.
+    ///
+    /// # Errors
+    ///
+    /// [`RelayError::System`] if the system refuses to wait or to read.
+    pub fn run(
+        mut self,
+        options: &RunOptions,
+        control: &Receiver<Control>,
+        stop: &AtomicBool,
+        mut look: impl FnMut(&View<'_>),
+    ) -> Result<Report, RelayError> {
+        let prepared = prepare_thread(&options.wishes);
+        let clock = MonotonicClock::start();
+        let end = options.duration.map(|duration| Instant::ZERO.saturating_add(duration));
+        let (mut look_at, mut heard) = (Instant::ZERO, None);
+        loop {
+            // What came in first: then nothing that has not been read came before what is let pass.
+            let until = match heard.take() {
+                Some(Heard { until, .. }) => until,
+                None => self.doors.receive(&mut self.engine, &clock)?.until,
+            };
+            self.doors.follow_clients(&mut self.engine);
+            self.take_control(control, until);
+            self.engine.handle_timeout(until);
+            let is_more = self.doors.take_releases(&mut self.engine);
+            self.doors.send(&clock, &mut self.release);
+            let now = clock.now();
+            let is_over = end.is_some_and(|end| now >= end);
+            if now >= look_at || is_over {
+                look(&View { now, engine: &self.engine, release: &self.release });
+                look_at = now + options.look_every;
+                if is_over || stop.load(Ordering::Relaxed) {
+                    break;
+                }
+            }
+            if !is_more {
+                heard = self.wait(&clock, options.pacing, end.map_or(look_at, |end| end.min(look_at)))?;
+            }
+        }
+        let elapsed = clock.now().saturating_duration_since(Instant::ZERO);
+        Ok(Report {
+            elapsed,
+            prepared,
+            links: report::links(&self.engine),
+            ports: self.doors.report(),
+            intake: *self.engine.counts(),
+            clamped: self.engine.clamped().clone(),
+            held: self.engine.held(),
+            without_socket: self.doors.without_socket(),
+            refused_changes: self.refused_changes,
+            validity: options.tolerance.judge(&self.release),
+            release: self.release,
+        })
+    }
+
+    fn take_control(&mut self, control: &Receiver<Control>, now: Instant) {
+        while let Ok(Control::SetLink { from, to, model }) = control.try_recv() {
+            let changed = self.engine.set_link(now, from, to, *model);
+            self.refused_changes += u64::from(changed.is_err());
+        }
+    }
+
+    /// Waits until something is due or can be read; tells what was heard if it has listened meanwhile.
+    fn wait(&mut self, clock: &MonotonicClock, pacing: Pacing, look_at: Instant) -> io::Result<Option<Heard>> {
+        let due = self.engine.poll_timeout();
+        let mut until = due.map_or(look_at, |due| due.min(look_at));
+        if self.doors.has_waiting() {
+            until = until.min(clock.now() + AGAIN);
+        }
+        match pacing {
+            Pacing::Spin { margin } if due == Some(until) => self.spin(clock, until, margin),
+            Pacing::Sleep | Pacing::Spin { .. } => {
+                Pacer::new(Pacing::Sleep).wait(clock, Some(until), &[self.doors.readable()])?;
+                Ok(None)
+            }
+        }
+    }
+
+    /// Waits until `due`, when something leaves: sleeps, then looks at the sockets again and again, then makes ready what leaves, looks at nothing but the
+    /// clock, and sends it.
+    fn spin(&mut self, clock: &MonotonicClock, due: Instant, margin: Duration) -> io::Result<Option<Heard>> {
+        let before = |span: Duration| Instant::from_nanos(due.as_nanos().saturating_sub(u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)));
+        let (asleep_until, ready_at) = (before(margin), before(MADE_READY));
+        let mut now = clock.now();
+        if now < asleep_until {
+            if Pacer::new(Pacing::Sleep).wait(clock, Some(asleep_until), &[self.doors.readable()])? != Woken::Deadline {
+                return Ok(None);
+            }
+            now = clock.now();
+        }
+        while now < ready_at {
+            let heard = self.doors.receive(&mut self.engine, clock)?;
+            if heard.count > 0 {
+                return Ok(Some(heard));
+            }
+            now = clock.now();
+        }
+        if now < due {
+            // Nothing is due earlier, so that all of it leaves then. What comes in until then is as if it came then.
+            self.engine.handle_timeout(due);
+            self.doors.take_releases(&mut self.engine);
+            while clock.now() < due {
+                core::hint::spin_loop();
+            }
+            self.doors.send(clock, &mut self.release);
+        }
+        Ok(None)
+    }
+}
