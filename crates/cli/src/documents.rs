@@ -1,0 +1,140 @@
+//! Parts that the JSON documents of several commands share.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use cohaptic_harness::{AccessSummary, Ending, LinkSummary, PeerSummary};
+use cohaptic_realtime::LatenessSummary;
+use cohaptic_scene::Scene;
+use cohaptic_wan::{DropCause, LinkStats};
+use serde::Serialize;
+
+/// A peer at the end of a run.
+#[derive(Serialize)]
+pub(crate) struct PeerDocument {
+    name: String,
+    position_m: Components,
+    velocity_m_s: Components,
+    stale_samples: u64,
+    refused_samples: u64,
+}
+
+/// A number in a scene of one axis, a list with more.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Components {
+    One(f64),
+    More(Vec<f64>),
+}
+
+/// A link between two peers at the end of a run.
+#[derive(Serialize)]
+pub(crate) struct LinkDocument {
+    pub(crate) from: String,
+    pub(crate) to: String,
+    #[serde(flatten)]
+    pub(crate) counters: Counters,
+}
+
+/// An access line at the end of a run.
+#[derive(Serialize)]
+pub(crate) struct AccessDocument {
+    peer: String,
+    line: &'static str,
+    #[serde(flatten)]
+    counters: Counters,
+}
+
+/// What a link or an access line did.
+#[derive(Serialize)]
+pub(crate) struct Counters {
+    offered: u64,
+    duplicated: u64,
+    delivered: u64,
+    dropped: BTreeMap<&'static str, u64>,
+    in_flight: u64,
+    marked: u64,
+    damaged: u64,
+    mean_delay_s: Option<f64>,
+}
+
+/// How late things were, in microseconds.
+#[derive(Serialize)]
+pub(crate) struct LatenessDocument {
+    count: u64,
+    p50: f64,
+    p99: f64,
+    p999: f64,
+    max: f64,
+}
+
+impl PeerDocument {
+    pub(crate) fn new(peer: &PeerSummary) -> Self {
+        Self {
+            name: peer.name.clone(),
+            position_m: Components::new(&peer.position),
+            velocity_m_s: Components::new(&peer.velocity),
+            stale_samples: peer.stale_samples,
+            refused_samples: peer.refused_samples,
+        }
+    }
+}
+
+impl Components {
+    fn new(values: &[f64]) -> Self {
+        match values {
+            [value] => Self::One(*value),
+            values => Self::More(values.to_vec()),
+        }
+    }
+}
+
+impl LinkDocument {
+    pub(crate) fn new(scene: &Scene, link: &LinkSummary) -> Self {
+        let name = |peer: usize| scene.peers[peer].name.clone();
+        Self { from: name(link.from), to: name(link.to), counters: Counters::new(&link.stats) }
+    }
+}
+
+impl AccessDocument {
+    pub(crate) fn new(scene: &Scene, line: &AccessSummary) -> Self {
+        let name = if line.uplink { "uplink" } else { "downlink" };
+        Self { peer: scene.peers[line.peer].name.clone(), line: name, counters: Counters::new(&line.stats) }
+    }
+}
+
+impl Counters {
+    pub(crate) fn new(stats: &LinkStats) -> Self {
+        Self {
+            offered: stats.offered(),
+            duplicated: stats.duplicated(),
+            delivered: stats.delivered(),
+            dropped: DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause))).collect(),
+            in_flight: stats.in_flight(),
+            marked: stats.marked(),
+            damaged: stats.damaged(),
+            mean_delay_s: stats.mean_delay().map(|delay| delay.as_secs_f64()),
+        }
+    }
+}
+
+impl LatenessDocument {
+    pub(crate) fn new(lateness: &LatenessSummary) -> Self {
+        let LatenessSummary { count, p50, p99, p999, max } = *lateness;
+        Self { count, p50: micros(p50), p99: micros(p99), p999: micros(p999), max: micros(max) }
+    }
+}
+
+/// A span in microseconds.
+pub(crate) fn micros(span: Duration) -> f64 {
+    span.as_secs_f64() * 1e6
+}
+
+/// How a run ended, in one word.
+pub(crate) const fn ending_name(ending: Ending) -> &'static str {
+    match ending {
+        Ending::Complete => "complete",
+        Ending::Diverged(_) => "diverged",
+        Ending::Interrupted(_) => "interrupted",
+    }
+}
