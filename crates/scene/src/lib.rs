@@ -51,7 +51,7 @@ mod tree;
 mod values;
 
 pub use error::{Diagnostic, SceneError};
-pub use link_keys::{LinkKeys, link_from_keys, link_keys, link_keys_of_text};
+pub use link_keys::{LinkKeys, link_from_keys, link_keys, link_keys_of_text, relay_link_keys, router_link_keys};
 pub use link_table::LinkTable;
 pub use model::*;
 pub use read::scene_files;

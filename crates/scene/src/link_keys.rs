@@ -9,8 +9,10 @@ use cohaptic_wan::LinkModel;
 use toml::de::DeTable;
 
 use crate::SceneError;
+use crate::link_table::pairs;
 use crate::model::Scene;
-use crate::read::{parse_scene, with_text};
+use crate::read::{parse_document, parse_scene, with_text};
+use crate::{relay_file, router_file};
 use crate::source::{BEGINNING, Sources};
 use crate::toml_text::{key_text, value_text};
 use crate::tree::{Node, Table, Value};
@@ -120,23 +122,57 @@ pub fn link_keys(path: &Path, overrides: &[String]) -> Result<BTreeMap<(usize, u
 /// As [`Scene::parse_live`].
 pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<BTreeMap<(usize, usize), LinkKeys>, SceneError> {
     let (scene, document) = parse_scene(Sources { file, text, overrides }, true)?;
-    let part = |name: &str| document.as_table().and_then(|table| table.get(name)).map(|entry| &*entry.node);
-    let modulators: Arc<str> = part("modulators").map_or_else(String::new, value_text).into();
+    Ok(keys_of_mesh(&document, scene.peers.len(), |name| scene.peer_index(name)))
+}
+
+/// The keys of every directed link of a relay file, as [`link_keys`] gives those of a scene: by the places of its programs.
+///
+/// # Errors
+///
+/// As [`RelayFile::read`].
+pub fn relay_link_keys(path: &Path, overrides: &[String]) -> Result<BTreeMap<(usize, usize), LinkKeys>, SceneError> {
+    let (relay, document) = with_text(path, |text| parse_document(Sources { file: path, text, overrides }, false, relay_file::read_document))?;
+    let place = |name: &str| relay.programs.iter().position(|program| program.name == name);
+    Ok(keys_of_mesh(&document, relay.programs.len(), place))
+}
+
+/// The keys of every link of a router file, in the order of [`RouterFile::links`](crate::router_file::RouterFile::links).
+///
+/// # Errors
+///
+/// As [`RouterFile::read`](crate::router_file::RouterFile::read).
+pub fn router_link_keys(path: &Path, overrides: &[String]) -> Result<Vec<LinkKeys>, SceneError> {
+    let (router, document) = with_text(path, |text| parse_document(Sources { file: path, text, overrides }, false, router_file::read_document))?;
+    let (modulators, links) = (modulators_of(&document), part(&document, "links").and_then(Node::as_table));
+    let node = |name: &str| links.and_then(|links| links.get(name)).and_then(|entry| entry.node.as_table());
+    let keys = |name: &str| LinkKeys { keys: node(name).map_or_else(Vec::new, keys_of), modulators: Arc::clone(&modulators) };
+    Ok(router.links.iter().map(|link| keys(&link.name)).collect())
+}
+
+/// The keys of all links between so many ends, of a document with `[link]` and `[[links]]`.
+fn keys_of_mesh(document: &Node, ends: usize, place: impl Fn(&str) -> Option<usize>) -> BTreeMap<(usize, usize), LinkKeys> {
+    let modulators = modulators_of(document);
     let nothing = Node::empty_table(BEGINNING, "link".to_owned());
-    let usual = part("link").unwrap_or(&nothing);
+    let usual = part(document, "link").unwrap_or(&nothing);
     let keys = |node: &Node| LinkKeys { keys: node.as_table().map_or_else(Vec::new, keys_of), modulators: Arc::clone(&modulators) };
-    let places = 0..scene.peers.len();
-    let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
     let shared = keys(usual);
-    let mut links: BTreeMap<(usize, usize), LinkKeys> = pairs.map(|pair| (pair, shared.clone())).collect();
-    let Some(Value::List(entries)) = part("links").map(|node| &node.value) else { return Ok(links) };
+    let mut links: BTreeMap<(usize, usize), LinkKeys> = pairs(ends).map(|pair| (pair, shared.clone())).collect();
+    let Some(Value::List(entries)) = part(document, "links").map(|node| &node.value) else { return links };
     for entry in entries {
-        let end = |key: &str| entry.as_table().and_then(|table| table.get(key)).and_then(|end| scene.peer_index(end.node.as_text()?));
+        let end = |key: &str| entry.as_table().and_then(|table| table.get(key)).and_then(|end| place(end.node.as_text()?));
         if let (Some(from), Some(to)) = (end("from"), end("to")) {
             links.insert((from, to), keys(&entry.without(&["from", "to"]).over(usual, &[])));
         }
     }
-    Ok(links)
+    links
+}
+
+fn part<'a>(document: &'a Node, name: &str) -> Option<&'a Node> {
+    document.as_table().and_then(|table| table.get(name)).map(|entry| &*entry.node)
+}
+
+fn modulators_of(document: &Node) -> Arc<str> {
+    part(document, "modulators").map_or_else(String::new, value_text).into()
 }
 
 fn keys_of(table: &Table) -> Vec<(String, String)> {

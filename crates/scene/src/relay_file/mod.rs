@@ -129,7 +129,7 @@ struct Header {
     limits: Option<RelayLimits>,
 }
 
-fn read_document(document: &Node, context: Context<'_>) -> Option<RelayFile> {
+pub(crate) fn read_document(document: &Node, context: Context<'_>) -> Option<RelayFile> {
     let mut root = TableReader::new(document, context, "a table")?;
     root.know(&["relay", "programs", "modulators", "link", "links", "timeline"]);
     let defaults = Header { title: Some(None), seed: Some(0), allow_remote: Some(false), limits: Some(RelayLimits::default()) };

@@ -26,6 +26,7 @@
 mod address;
 mod model;
 mod read;
+pub(crate) use read::read_document;
 mod rules;
 mod sides;
 

@@ -43,7 +43,7 @@ impl RouterFile {
 }
 
 /// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
-fn read_document(document: &Node, context: Context<'_>) -> Option<RouterFile> {
+pub(crate) fn read_document(document: &Node, context: Context<'_>) -> Option<RouterFile> {
     let mut root = TableReader::new(document, context, "a table")?;
     root.know(&["router", "left", "right", "links", "rules", "modulators"]);
     let modulators = read_modulators(root.get("modulators"), context);
