@@ -120,7 +120,7 @@ impl Counters {
 
 impl LatenessDocument {
     pub(crate) fn new(lateness: &LatenessSummary) -> Self {
-        let LatenessSummary { count, p50, p99, p999, max } = *lateness;
+        let LatenessSummary { count, p50, p99, p999, max, sum: _ } = *lateness;
         Self { count, p50: micros(p50), p99: micros(p99), p999: micros(p999), max: micros(max) }
     }
 }

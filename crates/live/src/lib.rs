@@ -40,6 +40,7 @@
 pub mod client;
 pub mod door;
 mod entropy;
+pub mod falcons;
 pub mod handshake;
 mod key;
 mod seal;

@@ -10,6 +10,7 @@ use hdrhistogram::Histogram;
 #[derive(Clone, Debug)]
 pub struct Lateness {
     nanos: Histogram<u64>,
+    sum: Duration,
 }
 
 /// An hour \[ns\].
@@ -26,18 +27,20 @@ impl Lateness {
     #[must_use]
     #[expect(clippy::missing_panics_doc, reason = "the bounds are constants that the histogram takes")]
     pub fn new() -> Self {
-        Self { nanos: Histogram::new_with_bounds(1, MOST, 3).expect("three digits from one nanosecond to an hour can be had") }
+        Self { nanos: Histogram::new_with_bounds(1, MOST, 3).expect("three digits from one nanosecond to an hour can be had"), sum: Duration::ZERO }
     }
 
     /// One thing was that late. On time is zero.
     #[inline]
     pub fn record(&mut self, lateness: Duration) {
+        self.sum = self.sum.saturating_add(lateness);
         self.nanos.saturating_record(u64::try_from(lateness.as_nanos()).unwrap_or(MOST).min(MOST));
     }
 
     /// Adds what another one has recorded.
     #[expect(clippy::missing_panics_doc, reason = "all have the same bounds")]
     pub fn merge(&mut self, other: &Self) {
+        self.sum = self.sum.saturating_add(other.sum);
         self.nanos.add(&other.nanos).expect("all histograms of lateness have the same bounds");
     }
 
@@ -65,6 +68,7 @@ impl Lateness {
     pub fn summary(&self) -> LatenessSummary {
         LatenessSummary {
             count: self.count(),
+            sum: self.sum,
             p50: self.quantile(0.5),
             p99: self.quantile(0.99),
             p999: self.quantile(0.999),
@@ -83,6 +87,8 @@ impl Lateness {
 pub struct LatenessSummary {
     /// How many were recorded.
     pub count: u64,
+    /// How late they were together.
+    pub sum: Duration,
     /// The median.
     pub p50: Duration,
     /// 99 of 100 were at most that late.
@@ -109,6 +115,7 @@ mod tests {
             assert!(found.abs_diff(wanted) <= wanted / 1000, "{found:?} for {wanted:?}");
         };
         assert_eq!(summary.count, 10_000);
+        assert_eq!(summary.sum, Duration::from_micros(10_000 * 10_001 / 2));
         near(summary.p50, 5000);
         near(summary.p99, 9900);
         near(summary.p999, 9990);

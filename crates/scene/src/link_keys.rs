@@ -12,10 +12,10 @@ use crate::SceneError;
 use crate::link_table::pairs;
 use crate::model::Scene;
 use crate::read::{parse_document, parse_scene, with_text};
-use crate::{relay_file, router_file};
 use crate::source::{BEGINNING, Sources};
 use crate::toml_text::{key_text, value_text};
 use crate::tree::{Node, Table, Value};
+use crate::{relay_file, router_file};
 
 /// The least scene that has a link.
 const AROUND: &str = "scene = { duration = \"1s\", count = 2 }\nobject = { mass = 1.0 }\n\

@@ -200,9 +200,9 @@ pub struct FalconSpec {
 }
 
 impl Default for FalconSpec {
-    /// The first one found; 10,000 counts, with which full scale is about what the maker names; 8 N, the maker's figure; the middle of the workspace.
+    /// The first one found; 10,000 counts, with which full scale is about what the maker names; 4 N, half of what the device is said to give; the middle of the workspace.
     fn default() -> Self {
-        Self { device: FalconDevice::First, counts_per_newton_metre: 10_000.0, force_limit: 8.0, origin: [0.0, 0.0, 0.125] }
+        Self { device: FalconDevice::First, counts_per_newton_metre: 10_000.0, force_limit: 4.0, origin: [0.0, 0.0, 0.125] }
     }
 }
 

@@ -45,7 +45,7 @@ fn read_silence(node: &Node, context: Context<'_>) -> Option<Silence> {
 }
 
 fn read_falcon(node: &Node, context: Context<'_>) -> Option<FalconSpec> {
-    let mut table = TableReader::new(node, context, "a table such as { device = \"first\", force-limit = 8.0 }")?;
+    let mut table = TableReader::new(node, context, "a table such as { device = \"first\", force-limit = 4.0 }")?;
     let usual = FalconSpec::default();
     let device = table.optional("device", usual.device, read_device);
     let counts = table.optional("counts-per-newton-metre", usual.counts_per_newton_metre, |node, context| POSITIVE_COUNTS.read(node, context));
