@@ -172,6 +172,6 @@ function cube(context, x, y, size, style, peer, named) {
   context.fillStyle = ink.text;
   context.textAlign = 'left';
   context.textBaseline = 'middle';
-  if (named || old) context.fillText(peer.name + (old ? ' (' + peer.status + ')' : ''), x + size / 2 + 6, y);
+  if (named || old) context.fillText(peer.name + (old ? ' (' + peer.status + ')' : ''), x + size / 2 + 6, named ? y - 9 : y);
   context.textBaseline = 'alphabetic';
 }

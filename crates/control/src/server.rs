@@ -99,10 +99,9 @@ pub fn serve(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor
     let (stop, stopped) = oneshot::channel();
     let run = move || {
         runtime.block_on(async {
-            let serving = tokio::spawn(async { axum::serve(listener, http::router(app)).await });
+            tokio::spawn(http::answer_all(listener, http::router(app)));
             // An error means that the server was dropped, which is the same.
             let _: Result<(), oneshot::error::RecvError> = stopped.await;
-            serving.abort();
         });
         // What is still being answered, such as events, ends with the runtime.
         runtime.shutdown_background();

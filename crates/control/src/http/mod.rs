@@ -2,6 +2,7 @@
 
 mod answer;
 mod change;
+mod connections;
 mod events;
 mod guard;
 mod page;
@@ -16,6 +17,8 @@ use axum::middleware::from_fn_with_state;
 use axum::routing::get;
 
 use crate::{Board, LinkEditor, Token};
+
+pub(crate) use connections::answer_all;
 
 /// What all answers are made from.
 pub(crate) struct App {

@@ -193,6 +193,17 @@ fn a_link_of_which_nothing_was_published_has_seen_nothing() {
 }
 
 #[test]
+fn the_book_has_every_metric() {
+    let book = include_str!("../../../../docs/live-control.md");
+    let (description, latest) = example("c");
+    let families = parse(&text(&description, &latest));
+    for (name, family) in &families {
+        assert!(book.contains(&format!("| `{name}` | {} |", family.kind)), "{name} is not in docs/live-control.md");
+    }
+    assert_eq!(book.matches("| `cohaptic_").count(), families.len(), "docs/live-control.md has a metric that is not there");
+}
+
+#[test]
 fn strange_names_are_escaped() {
     let strange = "a\"b\\c\nd}, {e=\"f\" # HELP";
     let (description, latest) = example(strange);

@@ -2,8 +2,8 @@
 
 use core::net::SocketAddr;
 use core::time::Duration;
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
-use std::net::TcpStream;
+use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
+use std::net::{Shutdown, TcpStream};
 use std::sync::Arc;
 
 use cohaptic_control::{Board, Description, Kind, LinkEditor, ServeError, ServerConfig, Snapshot, serve};
@@ -123,4 +123,43 @@ fn publishing_goes_on_while_others_read() {
     }
     reader.join().unwrap();
     assert_eq!(board.latest().snapshot.elapsed, Duration::from_secs(1000));
+}
+
+#[test]
+fn no_more_than_64_connections_are_open() {
+    let run = Run::still(1, 0);
+    let address = run.server().address();
+    let request = format!("GET /api/events?token={TOKEN} HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    let mut answered = [0; 12];
+    // Each was taken: it is being answered, without an end.
+    let mut open: Vec<TcpStream> = (0..64).map(|_| send(address, &request)).collect();
+    for stream in &mut open {
+        stream.read_exact(&mut answered).unwrap();
+        assert_eq!(&answered, b"HTTP/1.1 200");
+    }
+    let mut waiting = send(address, &request);
+    waiting.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
+    let silence = waiting.read_exact(&mut answered).unwrap_err();
+    assert!(matches!(silence.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut), "{silence}");
+    waiting.set_read_timeout(Some(PATIENCE)).unwrap();
+    drop(open.pop());
+    waiting.read_exact(&mut answered).unwrap();
+    assert_eq!(&answered, b"HTTP/1.1 200");
+}
+
+#[test]
+fn what_is_no_http_does_no_harm() {
+    let run = Run::still(1, 0);
+    let address = run.server().address();
+    for nonsense in
+        ["\r\n\r\n", "GET\r\n\r\n", "\0\u{1}\u{2}\r\n\r\n", "GET / HTTP/9.9\r\n\r\n", "PATCH /api/links/0 HTTP/1.1\r\nContent-Length: -1\r\n\r\n"]
+    {
+        let mut stream = send(address, nonsense);
+        stream.shutdown(Shutdown::Write).unwrap();
+        let mut answer = Vec::new();
+        // An answer or a closed connection: both are an end.
+        let _read = stream.read_to_end(&mut answer);
+        assert!(answer.is_empty() || answer.starts_with(b"HTTP/1.1 4"), "{nonsense:?}: {}", String::from_utf8_lossy(&answer));
+    }
+    assert!(ask(&run, "GET", "/api/state", "").starts_with("HTTP/1.1 200 OK"));
 }

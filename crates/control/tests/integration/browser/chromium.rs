@@ -96,8 +96,13 @@ impl Browser {
         Some(browser)
     }
 
-    /// Asks for something and waits for the answer.
+    /// Asks for something that is done, and waits for the answer.
     pub(crate) fn call(&mut self, method: &str, parameters: Value) -> Value {
+        self.attempt(method, parameters).unwrap_or_else(|error| panic!("{method}: {error}"))
+    }
+
+    /// Asks for something, and waits for the answer or for why there is none.
+    fn attempt(&mut self, method: &str, parameters: Value) -> Result<Value, Value> {
         self.asked += 1;
         let id = self.asked;
         let mut message = json!({ "id": id, "method": method, "params": parameters });
@@ -109,8 +114,7 @@ impl Browser {
             let Message::Text(text) = self.socket.read().unwrap() else { continue };
             let mut answer: Value = serde_json::from_str(&text).unwrap();
             if answer["id"] == json!(id) {
-                assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
-                return answer["result"].take();
+                return if answer["error"].is_null() { Ok(answer["result"].take()) } else { Err(answer["error"].take()) };
             }
             match answer["method"].as_str() {
                 Some("Runtime.exceptionThrown") => self.complaints.push(answer["params"]["exceptionDetails"].to_string()),
@@ -129,10 +133,12 @@ impl Browser {
         answer["result"]["value"].take()
     }
 
-    /// Waits until an expression holds. While what it speaks of is not there, it does not.
+    /// Waits until an expression holds. While what it speaks of is not there, or the page is just being left, it does not.
     pub(crate) fn wait(&mut self, expression: &str) {
-        let guarded = format!("(() => {{ try {{ return !!({expression}); }} catch {{ return false; }} }})()");
-        self.wait_for(expression, |browser| browser.value(&guarded) == json!(true));
+        let question = json!({ "expression": format!("!!({expression})"), "returnByValue": true });
+        self.wait_for(expression, |browser| {
+            browser.attempt("Runtime.evaluate", question.clone()).is_ok_and(|answer| answer["result"]["value"] == json!(true))
+        });
     }
 
     /// Waits until something holds.

@@ -5,7 +5,7 @@ mod chromium;
 use chromium::Browser;
 use serde_json::json;
 
-use crate::run::Run;
+use crate::run::{Run, TOKEN};
 
 /// How many points of a canvas are near to a colour of the page.
 fn painted(browser: &mut Browser, canvas: &str, colour: &str) -> u64 {
@@ -183,6 +183,22 @@ fn a_hundred_links_are_as_good_as_six() {
     assert_eq!(browser.complaints, [""; 0]);
 }
 
+/// Who has the address alone is asked for the token, and again if it is wrong.
+fn enters_the_token(browser: &mut Browser, run: &Run) {
+    browser.value("sessionStorage.clear()");
+    browser.open(&format!("http://{}/", run.server().address()));
+    for (token, then) in
+        [("not the token", "document.getElementById('token').value === ''"), (TOKEN, "document.querySelectorAll('#links tr').length === 1")]
+    {
+        browser.wait("document.getElementById('token')");
+        browser.picture("door");
+        browser.type_into("#token", token);
+        browser.press("Enter", 13);
+        browser.wait(then);
+    }
+    browser.complaints.retain(|complaint| !complaint.contains("401"));
+}
+
 #[test]
 fn one_link_without_peers_is_enough() {
     let Some(mut browser) = Browser::start() else { return };
@@ -191,6 +207,8 @@ fn one_link_without_peers_is_enough() {
     wait_painted(&mut browser, "delay-plot", "--c0");
     assert_eq!(browser.value("document.getElementById('people').hidden"), json!(true));
     browser.picture("one");
+    enters_the_token(&mut browser, &run);
+    assert_eq!(browser.complaints, [""; 0]);
     // A run that stands still is told from one that goes on.
     let silent = Run::still(1, 0);
     browser.open(&silent.server().url());
