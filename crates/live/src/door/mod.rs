@@ -45,8 +45,9 @@ use window::Window;
 
 /// The numbers that a peer may give its samples are below this.
 pub const SEQUENCE_END: u64 = 1 << SEQUENCE_BITS;
-/// How many hellos for one seat are answered within a second.
-pub const WELCOMES_PER_SECOND: u32 = 16;
+/// How many hellos for one seat are answered within a second. Enough for its peer to be answered while somebody repeats recorded ones, and little
+/// enough work for the door: some milliseconds.
+pub const WELCOMES_PER_SECOND: u32 = 1000;
 
 const SEQUENCE_BITS: u32 = 40;
 const JOININGS_END: u64 = 1 << (64 - SEQUENCE_BITS);
