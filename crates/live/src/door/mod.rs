@@ -126,8 +126,8 @@ impl core::fmt::Debug for Secret {
 enum Under {
     /// Those of the present joining, or of none where there is no key.
     Present,
-    /// New ones, made for this address.
-    New(JoiningKeys),
+    /// New ones, made for this address. Where they lie they stay, so that no copies of them are left behind.
+    New(Box<JoiningKeys>),
 }
 
 impl Door {
@@ -272,7 +272,7 @@ impl Door {
         }
         let keys = JoiningKeys::of_sample(key, self.session, seat.place(), sealed, &self.server_nonce(index, from));
         let otherwise = if seat.occupant().is_some() { Refusal::Forged } else { Refusal::NotJoined };
-        keys.map(Under::New).ok_or(otherwise)
+        keys.map(|keys| Under::New(Box::new(keys))).ok_or(otherwise)
     }
 
     /// The nonce for whoever asks for that seat from that address, until the seat is taken the next time.

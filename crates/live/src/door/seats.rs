@@ -46,7 +46,7 @@ pub(super) struct SeatState {
 pub(super) struct Occupant {
     pub(super) address: SocketAddr,
     /// `None` in a session without a key.
-    pub(super) keys: Option<JoiningKeys>,
+    pub(super) keys: Option<Box<JoiningKeys>>,
     heard: Instant,
     window: Window,
 }
