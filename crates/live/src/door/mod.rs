@@ -102,7 +102,6 @@ pub struct Door {
     session: u64,
     axes: usize,
     peers: u32,
-    tick: Duration,
     update: Duration,
     key: Option<SessionKey>,
     stale_after: Duration,
@@ -141,11 +140,11 @@ impl Door {
         config.check()?;
         let mut secret = Zeroizing::new([0; 32]);
         entropy.fill(&mut secret[..])?;
-        let DoorConfig { session, axes, peers, tick, update, mut seats, key, stale_after, limits } = config;
+        let DoorConfig { session, axes, peers, update, mut seats, key, stale_after, limits } = config;
         seats.sort_by_key(|seat| seat.place);
         let seats = seats.into_iter().map(SeatState::free).collect();
         let secret = Secret(secret);
-        Ok(Self { session, axes, peers, tick, update, key, stale_after, limits, secret, seats, stats: DoorStats::default() })
+        Ok(Self { session, axes, peers, update, key, stale_after, limits, secret, seats, stats: DoorStats::default() })
     }
 
     /// Decides about a datagram that was received from `from`.
@@ -221,8 +220,9 @@ impl Door {
         if !seat.may_welcome(now) {
             return Err(Refusal::HandshakeLimit);
         }
+        let tick = seat.tick();
         let axes = u8::try_from(self.axes).expect("at most three");
-        let Self { peers, tick, update, .. } = *self;
+        let Self { peers, update, .. } = *self;
         let welcome = Welcome { axes, session, place, peers, client_nonce, server_nonce, tick, update };
         Ok(Admission::Reply { to: from, bytes: welcome.encode(key) })
     }

@@ -60,6 +60,10 @@ impl SeatState {
         self.seat.place
     }
 
+    pub(super) const fn tick(&self) -> Duration {
+        self.seat.tick
+    }
+
     pub(super) const fn joinings(&self) -> u64 {
         self.joinings
     }
