@@ -15,9 +15,8 @@
 //! use cohaptic_units::Instant;
 //!
 //! let key = SessionKey::from_bytes([7; 32]);
-//! let seats = vec![Seat { place: Place(1), name: "right".to_owned() }];
-//! let (tick, update) = (Duration::from_millis(1), Duration::from_millis(8));
-//! let config = DoorConfig { key: Some(key.clone()), ..DoorConfig::new(42, 1, 2, tick, update, seats) };
+//! let seats = vec![Seat { place: Place(1), name: "right".to_owned(), tick: Duration::from_millis(1) }];
+//! let config = DoorConfig { key: Some(key.clone()), ..DoorConfig::new(42, 1, 2, Duration::from_millis(8), seats) };
 //! let mut door = Door::new(config, &mut SystemEntropy)?;
 //!
 //! // The other program asks, and is told what the session is like.

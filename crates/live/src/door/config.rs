@@ -22,6 +22,8 @@ pub struct Seat {
     pub place: Place,
     /// Its name in the scene.
     pub name: String,
+    /// Tc of this peer, which a welcome tells.
+    pub tick: Duration,
 }
 
 /// How far and how fast a copy can be without being refused. A sample can be finite and still throw every other copy out of the room.
@@ -42,8 +44,6 @@ pub struct DoorConfig {
     pub axes: usize,
     /// How many peers the scene has, simulated ones among them.
     pub peers: u32,
-    /// Tc, which a welcome tells.
-    pub tick: Duration,
     /// Tn, which a welcome tells.
     pub update: Duration,
     /// The peers that are other programs, in any order.
@@ -59,8 +59,8 @@ pub struct DoorConfig {
 impl DoorConfig {
     /// Without a key and limits, and with a second until a silent peer counts as gone.
     #[must_use]
-    pub const fn new(session: u64, axes: usize, peers: u32, tick: Duration, update: Duration, seats: Vec<Seat>) -> Self {
-        Self { session, axes, peers, tick, update, seats, key: None, stale_after: Duration::from_secs(1), limits: None }
+    pub const fn new(session: u64, axes: usize, peers: u32, update: Duration, seats: Vec<Seat>) -> Self {
+        Self { session, axes, peers, update, seats, key: None, stale_after: Duration::from_secs(1), limits: None }
     }
 
     /// With that key, or none.
@@ -73,7 +73,8 @@ impl DoorConfig {
         if !(1..=3).contains(&self.axes) {
             return Err(DoorError::Axes { found: self.axes });
         }
-        for (span, name) in [(self.tick, "tick"), (self.update, "update"), (self.stale_after, "stale_after")] {
+        let ticks = self.seats.iter().map(|seat| (seat.tick, "tick"));
+        for (span, name) in ticks.chain([(self.update, "update"), (self.stale_after, "stale_after")]) {
             if span.is_zero() || u64::try_from(span.as_nanos()).is_err() {
                 return Err(DoorError::Span { name, found: span });
             }

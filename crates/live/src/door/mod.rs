@@ -45,8 +45,9 @@ use window::Window;
 
 /// The numbers that a peer may give its samples are below this.
 pub const SEQUENCE_END: u64 = 1 << SEQUENCE_BITS;
-/// How many hellos for one seat are answered within a second.
-pub const WELCOMES_PER_SECOND: u32 = 16;
+/// How many hellos for one seat are answered within a second. Enough for its peer to be answered while somebody repeats recorded ones, and little
+/// enough work for the door: some milliseconds.
+pub const WELCOMES_PER_SECOND: u32 = 1000;
 
 const SEQUENCE_BITS: u32 = 40;
 const JOININGS_END: u64 = 1 << (64 - SEQUENCE_BITS);
@@ -101,7 +102,6 @@ pub struct Door {
     session: u64,
     axes: usize,
     peers: u32,
-    tick: Duration,
     update: Duration,
     key: Option<SessionKey>,
     stale_after: Duration,
@@ -125,8 +125,8 @@ impl core::fmt::Debug for Secret {
 enum Under {
     /// Those of the present joining, or of none where there is no key.
     Present,
-    /// New ones, made for this address.
-    New(JoiningKeys),
+    /// New ones, made for this address. Where they lie they stay, so that no copies of them are left behind.
+    New(Box<JoiningKeys>),
 }
 
 impl Door {
@@ -140,11 +140,11 @@ impl Door {
         config.check()?;
         let mut secret = Zeroizing::new([0; 32]);
         entropy.fill(&mut secret[..])?;
-        let DoorConfig { session, axes, peers, tick, update, mut seats, key, stale_after, limits } = config;
+        let DoorConfig { session, axes, peers, update, mut seats, key, stale_after, limits } = config;
         seats.sort_by_key(|seat| seat.place);
         let seats = seats.into_iter().map(SeatState::free).collect();
         let secret = Secret(secret);
-        Ok(Self { session, axes, peers, tick, update, key, stale_after, limits, secret, seats, stats: DoorStats::default() })
+        Ok(Self { session, axes, peers, update, key, stale_after, limits, secret, seats, stats: DoorStats::default() })
     }
 
     /// Decides about a datagram that was received from `from`.
@@ -220,8 +220,9 @@ impl Door {
         if !seat.may_welcome(now) {
             return Err(Refusal::HandshakeLimit);
         }
+        let tick = seat.tick();
         let axes = u8::try_from(self.axes).expect("at most three");
-        let Self { peers, tick, update, .. } = *self;
+        let Self { peers, update, .. } = *self;
         let welcome = Welcome { axes, session, place, peers, client_nonce, server_nonce, tick, update };
         Ok(Admission::Reply { to: from, bytes: welcome.encode(key) })
     }
@@ -271,7 +272,7 @@ impl Door {
         }
         let keys = JoiningKeys::of_sample(key, self.session, seat.place(), sealed, &self.server_nonce(index, from));
         let otherwise = if seat.occupant().is_some() { Refusal::Forged } else { Refusal::NotJoined };
-        keys.map(Under::New).ok_or(otherwise)
+        keys.map(|keys| Under::New(Box::new(keys))).ok_or(otherwise)
     }
 
     /// The nonce for whoever asks for that seat from that address, until the seat is taken the next time.

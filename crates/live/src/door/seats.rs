@@ -46,7 +46,7 @@ pub(super) struct SeatState {
 pub(super) struct Occupant {
     pub(super) address: SocketAddr,
     /// `None` in a session without a key.
-    pub(super) keys: Option<JoiningKeys>,
+    pub(super) keys: Option<Box<JoiningKeys>>,
     heard: Instant,
     window: Window,
 }
@@ -58,6 +58,10 @@ impl SeatState {
 
     pub(super) const fn place(&self) -> Place {
         self.seat.place
+    }
+
+    pub(super) const fn tick(&self) -> Duration {
+        self.seat.tick
     }
 
     pub(super) const fn joinings(&self) -> u64 {

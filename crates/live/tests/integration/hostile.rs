@@ -1,10 +1,12 @@
 //! Whatever a stranger sends: nothing moves, nothing panics, nothing grows, and every datagram is counted once.
 
-use cohaptic_live::client::Joined;
+use cohaptic_live::client::{Client, ClientConfig, Heard, Joined};
 use cohaptic_live::{Admission, Door, MAX_DATAGRAM, Refusal};
 use proptest::prelude::*;
 
-use crate::support::{SEAT, address, admitted, assert_counts, at, cases, joining, keyed_door, keyless_door, sample, sealed, shake_hands};
+use crate::support::{
+    Counting, SEAT, SESSION, address, admitted, assert_counts, at, cases, joining, key, keyed_door, keyless_door, sample, sealed, shake_hands,
+};
 
 /// A door whose seat is taken from address 1, with the number 10.
 fn taken() -> (Door, Joined) {
@@ -127,7 +129,7 @@ proptest! {
                 Admission::Sample { place, joined, sample } => {
                     let inside = cohaptic_peer::wire::Sample::<1>::decode(sample.bytes(), 1).unwrap();
                     let outside = cohaptic_peer::wire::Sample::<1>::decode(bytes, 1).unwrap();
-                    prop_assert_eq!((inside.sender, inside.session), (place.0, crate::support::SESSION));
+                    prop_assert_eq!((inside.sender, inside.session), (place.0, SESSION));
                     prop_assert!(inside.state == outside.state && inside.state.is_finite());
                     if joined {
                         let before = newest.insert(place, inside.sequence);
@@ -149,9 +151,12 @@ proptest! {
         let (mut door, joined) = taken();
         let mut out = [0; MAX_DATAGRAM];
         door.seal(at(1), SEAT, &sample(0, 1), &mut out).unwrap();
+        let mut client = Client::new(ClientConfig::Keyed { session: SESSION, place: SEAT, key: key() }, at(0));
+        client.poll_hello(at(0), &mut Counting::default()).unwrap().unwrap();
         for bytes in &datagrams {
             prop_assert!(joined.open(bytes).is_err());
             prop_assert!(joining(1).handle_welcome(bytes).is_err());
+            prop_assert_eq!(client.handle_datagram(at(1), bytes), Heard::Ignored);
         }
     }
 }

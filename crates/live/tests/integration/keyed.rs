@@ -161,7 +161,7 @@ fn a_flood_of_recorded_hellos_is_answered_so_many_times_a_second_and_changes_not
             Admission::Sample { .. } => panic!("a hello is no sample"),
         }
     }
-    // Three seconds: 16 in each (the one that was answered at the start among them), and one at the beginning of the fourth.
+    // Three seconds: 1000 in each (the one that was answered at the start among them), and one at the beginning of the fourth.
     let welcomed = 3 * u64::from(WELCOMES_PER_SECOND) + 1;
     assert_counts(&door, 1, welcomed, &[(Refusal::HandshakeLimit, 30_001 - welcomed)]);
     admitted(door.handle_datagram(at(3000), address(1), &sealed(&joined, &sample(1, 1))));

@@ -5,7 +5,7 @@ use cohaptic_live::{Admission, DoorConfig, DoorError, Limits, MAX_DATAGRAM, Plac
 use cohaptic_peer::{State, wire};
 use std::time::Duration;
 
-use crate::support::{Counting, SEAT, SESSION, STALE, address, admitted, assert_counts, at, config, encode, keyless_door, sample};
+use crate::support::{Counting, SEAT, SESSION, STALE, address, admitted, assert_counts, at, config, encode, keyless_door, sample, seat};
 
 #[test]
 fn the_first_sample_takes_the_seat_and_passes_unchanged() {
@@ -130,9 +130,12 @@ fn a_configuration_that_makes_no_sense_makes_no_door() {
     assert_eq!(refuse(DoorConfig { axes: 0, ..config() }), DoorError::Axes { found: 0 });
     assert_eq!(refuse(DoorConfig { axes: 4, ..config() }), DoorError::Axes { found: 4 });
     assert_eq!(refuse(DoorConfig { peers: 2, ..config() }), DoorError::Beyond { place: Place(2), peers: 2 });
-    let twice = vec![Seat { place: SEAT, name: "a".into() }, Seat { place: SEAT, name: "b".into() }];
+    let twice = vec![seat(SEAT, "a"), seat(SEAT, "b")];
     assert_eq!(refuse(DoorConfig { seats: twice, ..config() }), DoorError::Twice { place: SEAT });
-    assert_eq!(refuse(DoorConfig { tick: Duration::ZERO, ..config() }), DoorError::Span { name: "tick", found: Duration::ZERO });
+    assert_eq!(
+        refuse(DoorConfig { seats: vec![Seat { tick: Duration::ZERO, ..seat(SEAT, "a") }], ..config() }),
+        DoorError::Span { name: "tick", found: Duration::ZERO }
+    );
     assert_eq!(refuse(DoorConfig { update: Duration::MAX, ..config() }), DoorError::Span { name: "update", found: Duration::MAX });
     let limits = Limits { position: f64::INFINITY, velocity: 0.0 };
     assert_eq!(refuse(DoorConfig { limits: Some(limits), ..config() }), DoorError::Limits { found: limits });

@@ -3,6 +3,7 @@
 #![allow(clippy::print_stderr, reason = "a test that cannot run here says so")]
 
 mod client;
+mod conversation;
 mod examples;
 mod hostile;
 mod key_files;

@@ -37,10 +37,13 @@ pub(crate) fn key() -> SessionKey {
     SessionKey::from_bytes([0xa5; 32])
 }
 
+pub(crate) fn seat(place: Place, name: &str) -> Seat {
+    Seat { place, name: name.to_owned(), tick: Duration::from_millis(1) }
+}
+
 pub(crate) fn config() -> DoorConfig {
-    let seats = [(2, "third"), (1, "right")].map(|(place, name)| Seat { place: Place(place), name: name.to_owned() });
-    let (tick, update) = (Duration::from_millis(1), Duration::from_millis(8));
-    DoorConfig { stale_after: STALE, ..DoorConfig::new(SESSION, 1, 3, tick, update, seats.to_vec()) }
+    let seats = [(2, "third"), (1, "right")].map(|(place, name)| seat(Place(place), name));
+    DoorConfig { stale_after: STALE, ..DoorConfig::new(SESSION, 1, 3, Duration::from_millis(8), seats.to_vec()) }
 }
 
 pub(crate) fn keyless_door() -> Door {

@@ -1,7 +1,7 @@
-//! The other side of the [`door`](crate::door), for programs in Rust: it makes and checks datagrams, and leaves sockets and clocks to its user.
+//! The datagrams of one joining in a session with a key.
 //!
 //! [`Joining::hello`] → send, again every quarter of a second until → [`Joining::handle_welcome`] → [`Joined::seal`] what is sent, [`Joined::open`] what
-//! is received. Whoever hears nothing new for a second begins again with a new [`Joining`]: the session may have been started anew.
+//! is received.
 
 use cohaptic_peer::wire;
 
