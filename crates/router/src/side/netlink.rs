@@ -20,6 +20,7 @@ const REQUEST: u16 = 0x1 | 0x4;
 /// Make it, and do not mind if it is there.
 const CREATE: u16 = 0x400 | 0x100;
 const ATTRIBUTE_MTU: u16 = 4;
+const ATTRIBUTE_QUEUE: u16 = 13;
 const ATTRIBUTE_ADDRESS: u16 = 1;
 const ATTRIBUTE_LOCAL: u16 = 2;
 const FLAG_UP: u32 = 0x1;
@@ -44,8 +45,17 @@ impl Netlink {
 
     /// The largest packet that a device takes.
     pub(super) fn mtu(&self, index: u32, mtu: u16) -> io::Result<()> {
+        self.number(index, ATTRIBUTE_MTU, mtu.into())
+    }
+
+    /// How many packets wait in a device. The older way to say so, an ioctl, takes root over the whole machine.
+    pub(super) fn waiting(&self, index: u32, packets: u32) -> io::Result<()> {
+        self.number(index, ATTRIBUTE_QUEUE, packets)
+    }
+
+    fn number(&self, index: u32, kind: u16, value: u32) -> io::Result<()> {
         let mut body = link(index, 0, 0);
-        attribute(&mut body, ATTRIBUTE_MTU, &u32::from(mtu).to_ne_bytes());
+        attribute(&mut body, kind, &value.to_ne_bytes());
         self.ask(NEW_LINK, REQUEST, &body)
     }
 

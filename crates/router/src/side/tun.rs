@@ -36,13 +36,7 @@ impl Tun {
             return Err(Failed::NoDevice { namespace });
         }
         let builder = DeviceBuilder::new().name(name).enable(false);
-        let builder = if spec.existing {
-            builder.inherit_enable_state()
-        } else {
-            builder.with(|options| {
-                options.tx_queue_len(WAITING);
-            })
-        };
+        let builder = if spec.existing { builder.inherit_enable_state() } else { builder };
         let device = builder.build_sync().map_err(Failed::system("open it through /dev/net/tun"))?;
         device.set_nonblocking(true).map_err(Failed::system("read it without waiting"))?;
         let tun = Self { device, name: name.to_owned() };
@@ -55,6 +49,7 @@ impl Tun {
     fn configure(&self, spec: &TunSpec) -> Result<(), Failed> {
         let index = self.device.if_index().map_err(Failed::system("look up its number"))?;
         let netlink = Netlink::open().map_err(Failed::system("speak to the kernel through rtnetlink"))?;
+        netlink.waiting(index, WAITING).map_err(Failed::system("let packets wait in it"))?;
         if let Some(mtu) = spec.mtu {
             netlink.mtu(index, mtu).map_err(Failed::system(format!("set its mtu to {mtu}")))?;
         }

@@ -17,6 +17,11 @@ use cohaptic_units::Instant;
 
 use crate::support::{file, udp_bytes};
 
+/// An instant \[ns\] and what came or left then.
+type At = (u64, Vec<u8>);
+
+type Log = Rc<RefCell<Vec<At>>>;
+
 /// The time, and what will come at which side.
 struct World {
     now: Cell<u64>,
@@ -24,7 +29,7 @@ struct World {
     step: u64,
     /// How late the system wakes \[ns\].
     late: u64,
-    coming: [RefCell<VecDeque<(u64, Vec<u8>)>>; 2],
+    coming: [RefCell<VecDeque<At>>; 2],
 }
 
 impl World {
@@ -54,7 +59,7 @@ impl Clock for Watch {
 struct Wire {
     side: usize,
     world: Rc<World>,
-    sent: Rc<RefCell<Vec<(u64, Vec<u8>)>>>,
+    sent: Log,
     takes: Sent,
     fd: File,
 }
@@ -70,7 +75,10 @@ impl Device for Wire {
 
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
         let mut coming = self.world.coming[self.side].borrow_mut();
-        let Some((_, bytes)) = coming.pop_front_if(|(at, _)| *at <= self.world.now.get()) else { return Ok(None) };
+        if coming.front().is_none_or(|(at, _)| *at > self.world.now.get()) {
+            return Ok(None);
+        }
+        let (_, bytes) = coming.pop_front().unwrap();
         if bytes.is_empty() {
             return Err(io::Error::other("unplugged"));
         }
@@ -86,9 +94,7 @@ impl Device for Wire {
     }
 }
 
-type Log = Rc<RefCell<Vec<(u64, Vec<u8>)>>>;
-
-fn router(text: &str, step: u64, late: u64, coming: [Vec<(u64, Vec<u8>)>; 2], takes: Sent, pacing: Pacing) -> (Router<Wire, Watch>, [Log; 2]) {
+fn router(text: &str, step: u64, late: u64, coming: [Vec<At>; 2], takes: Sent, pacing: Pacing) -> (Router<Wire, Watch>, [Log; 2]) {
     let coming = coming.map(|coming| RefCell::new(coming.into()));
     let world = Rc::new(World { now: Cell::new(0), step, late, coming });
     let logs = [Log::default(), Log::default()];
@@ -99,7 +105,7 @@ fn router(text: &str, step: u64, late: u64, coming: [Vec<(u64, Vec<u8>)>; 2], ta
 const DELAY: &str = "router = { default = \"x\" }\nlinks = { x = { delay = \"5ms\" } }";
 const SECOND: u64 = 1_000_000_000;
 
-fn every_millisecond(count: u64) -> Vec<(u64, Vec<u8>)> {
+fn every_millisecond(count: u64) -> Vec<At> {
     (0..count).map(|number| (number * 1_000_000 + 500_000, udp_bytes([number as u16, 9], &[]))).collect()
 }
 

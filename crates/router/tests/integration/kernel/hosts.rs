@@ -1,0 +1,98 @@
+//! Hosts, each a thread in a network namespace of its own, and a router that runs between them.
+
+use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use cohaptic_realtime::Pacing;
+use cohaptic_router::{Report, Router};
+use cohaptic_scene::router_file::{RouterFile, Side};
+use nix::sched::{CloneFlags, unshare};
+use nix::unistd::gettid;
+
+/// What is waited for takes milliseconds; this is how long a machine may be busy with something else.
+pub(super) const PATIENCE: Duration = Duration::from_secs(20);
+
+/// A thread in a network namespace of its own. Sockets that it opens belong there, whoever uses them.
+pub(super) struct Host {
+    work: Sender<Box<dyn FnOnce() + Send>>,
+    /// The path of the namespace.
+    pub(super) namespace: String,
+}
+
+impl Host {
+    pub(super) fn new() -> Self {
+        let (work, todo) = channel::<Box<dyn FnOnce() + Send>>();
+        let (ready, is_ready) = channel();
+        thread::spawn(move || {
+            unshare(CloneFlags::CLONE_NEWNET).unwrap();
+            ready.send(format!("/proc/{}/task/{}/ns/net", std::process::id(), gettid())).unwrap();
+            todo.into_iter().for_each(|work| work());
+        });
+        Self { work, namespace: is_ready.recv_timeout(PATIENCE).unwrap() }
+    }
+
+    /// Does something on this host.
+    pub(super) fn does<T: Send + 'static>(&self, work: impl FnOnce() -> T + Send + 'static) -> T {
+        let (done, is_done) = channel();
+        self.work.send(Box::new(move || drop(done.send(work())))).unwrap();
+        is_done.recv_timeout(PATIENCE).unwrap()
+    }
+
+    pub(super) fn udp(&self, address: IpAddr, port: u16) -> UdpSocket {
+        let socket = self.does(move || UdpSocket::bind(SocketAddr::new(address, port)).unwrap());
+        socket.set_read_timeout(Some(PATIENCE)).unwrap();
+        socket
+    }
+}
+
+/// A router that runs until it is stopped.
+pub(super) struct Running {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Report>>,
+}
+
+impl Running {
+    pub(super) fn begin(text: &str) -> Self {
+        let file = RouterFile::parse(text, Path::new("router.toml"), &[]).unwrap_or_else(|error| panic!("{error}"));
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let (ready, is_ready) = channel();
+        let thread = thread::spawn(move || {
+            let mut router = Router::open(&file, Pacing::Sleep).unwrap_or_else(|error| panic!("{error}"));
+            ready.send(()).unwrap();
+            router.run(&stopped, None, Duration::from_millis(100), |_| ()).unwrap();
+            router.report()
+        });
+        is_ready.recv_timeout(PATIENCE).unwrap();
+        Self { stop, thread: Some(thread) }
+    }
+
+    /// Stops it and looks whether everything was counted.
+    pub(super) fn end(mut self) -> Report {
+        self.stop.store(true, Ordering::Relaxed);
+        let report = self.thread.take().unwrap().join().unwrap();
+        for side in Side::BOTH {
+            let received = report.counters.received[side.index()];
+            let lanes = report.counters.lanes.iter().filter(|lane| lane.from == side);
+            let into_links: u64 = lanes.clone().map(|lane| lane.stats.offered() + lane.overload).sum();
+            assert_eq!(received.all.packets, received.not_ip + received.malformed + received.passed + received.dropped + into_links);
+            let delivered: u64 = lanes.map(|lane| lane.stats.delivered()).sum();
+            let written = report.written[side.opposite().index()];
+            assert_eq!(written.packets + written.lost(), received.not_ip + received.passed + delivered);
+        }
+        let written: u64 = report.written.iter().map(|written| written.packets + written.lost()).sum();
+        assert_eq!(report.release.count, written);
+        report
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}

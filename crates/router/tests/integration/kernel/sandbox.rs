@@ -1,0 +1,55 @@
+//! A process in namespaces of its own.
+
+use std::env;
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Set in the process inside.
+const INSIDE: &str = "COHAPTIC_ROUTER_TEST_INSIDE";
+
+/// A test that takes longer has hung.
+const LONGEST: Duration = Duration::from_secs(60);
+
+/// Ends the process, whatever happens to the test.
+struct Killed(Child);
+
+impl Drop for Killed {
+    fn drop(&mut self) {
+        drop(self.0.kill());
+        drop(self.0.wait());
+    }
+}
+
+/// Runs the test of that name again in a process with a network and a user of its own, where `body` is done.
+pub(super) fn inside(name: &str, body: impl FnOnce()) {
+    if env::var_os(INSIDE).is_some() {
+        if let Err(error) = std::fs::OpenOptions::new().read(true).write(true).open("/dev/net/tun") {
+            println!("skipped: /dev/net/tun cannot be opened: {error}");
+            return;
+        }
+        body();
+        return;
+    }
+    let Some(namespaces) = ["-Urn", "-n"].into_iter().find(|namespaces| allows(namespaces)) else {
+        println!("skipped: this system allows no network namespaces (`unshare -Urn true` fails)");
+        return;
+    };
+    let mut command = Command::new("unshare");
+    command.args([namespaces, "--"]).arg(env::current_exe().unwrap()).args([name, "--exact", "--nocapture"]).env(INSIDE, "1");
+    let mut child = Killed(command.spawn().unwrap());
+    let begin = Instant::now();
+    loop {
+        if let Some(status) = child.0.try_wait().unwrap() {
+            assert!(status.success(), "{name} failed inside: {status}");
+            return;
+        }
+        assert!(begin.elapsed() < LONGEST, "{name} has hung");
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+fn allows(namespaces: &str) -> bool {
+    let status = Command::new("unshare").args([namespaces, "true"]).stderr(Stdio::null()).status();
+    status.is_ok_and(|status| status.success())
+}
