@@ -1,6 +1,7 @@
 //! The sockets of a relay: what they take in goes to the engine, what the engine lets go leaves through them.
 
 use core::fmt;
+use core::mem::MaybeUninit;
 use std::collections::VecDeque;
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -9,7 +10,6 @@ use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
 use cohaptic_realtime::udp::{BindError, DoorConfig, DoorCounts, ReceiveBuffers, UdpDoor};
 use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock};
 use cohaptic_units::Instant;
-use rustix::buffer::spare_capacity;
 use rustix::event::{Timespec, epoll};
 use rustix::io::Errno;
 
@@ -25,7 +25,6 @@ pub(super) struct Doors {
     config: DoorConfig,
     /// Readable when one of them is.
     epoll: OwnedFd,
-    events: Vec<epoll::Event>,
     buffers: ReceiveBuffers,
     /// New clients.
     opened: Vec<u32>,
@@ -84,7 +83,6 @@ impl Doors {
             layout,
             config: door,
             epoll,
-            events: Vec::with_capacity(64),
             buffers: ReceiveBuffers::new(),
             opened: Vec::new(),
             dirty: Vec::new(),
@@ -110,13 +108,14 @@ impl Doors {
                 self.receive_at(place, engine, clock, &mut heard)?;
             }
         } else {
-            self.events.clear();
-            match epoll::wait(&self.epoll, spare_capacity(&mut self.events), Some(&Timespec::default())) {
-                Ok(_) | Err(Errno::INTR) => {}
+            let mut events = [MaybeUninit::uninit(); 64];
+            let ready = match epoll::wait(&self.epoll, &mut events, Some(&Timespec::default())) {
+                Ok((ready, _)) => &*ready,
+                Err(Errno::INTR) => &[],
                 Err(error) => return Err(error.into()),
-            }
-            for event in 0..self.events.len() {
-                let place = usize::try_from(self.events[event].data.u64()).unwrap_or(usize::MAX);
+            };
+            for event in ready {
+                let place = usize::try_from(event.data.u64()).unwrap_or(usize::MAX);
                 self.receive_at(place, engine, clock, &mut heard)?;
             }
         }

@@ -1,0 +1,128 @@
+//! Writes `docs/relay-speed.md`: `cargo run --release -p cohaptic-benches-realtime --bin relay-table > docs/relay-speed.md`. Takes about two minutes; a
+//! number of seconds as argument replaces the ten of each run.
+#![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
+#![allow(clippy::cast_precision_loss, reason = "counts of packets")]
+
+mod machine;
+mod subjects;
+mod traffic;
+
+use std::error::Error;
+use std::time::Duration;
+
+use cohaptic_realtime::{LatenessSummary, Pacing};
+use subjects::{Outcome, bare_thread, relay, tokio_forwarder};
+
+/// Packets a second of the first table.
+const RATE: u64 = 5000;
+
+/// Packets a second of the second.
+const RATES: [u64; 6] = [50_000, 100_000, 150_000, 250_000, 300_000, 400_000];
+
+/// How the bare thread spins: as the relay does.
+const SPIN: Pacing = Pacing::SPIN;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let seconds = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(10);
+    let span = Duration::from_secs(seconds);
+    println!("# The relay: how late and how fast\n");
+    println!("What [`cohaptic relay`](relay.md) does on loopback. This page is written by\n");
+    println!("    cargo run --release -p cohaptic-benches-realtime --bin relay-table > docs/relay-speed.md\n");
+    println!("and measured on: {}. Each row is a run of {seconds} s, all of them one after the other in one process, with the", machine::name());
+    println!("generator and the sink in it, on the same cores. Datagrams carry {} bytes.\n", traffic::SIZE);
+    release_error(span)?;
+    rates(span)
+}
+
+fn release_error(span: Duration) -> Result<(), Box<dyn Error>> {
+    println!("## Release error\n");
+    println!(
+        "{RATE} packets a second through a link of {} ms. The *release error* is the time just before a datagram is handed to",
+        subjects::DELAY.as_millis()
+    );
+    println!("the kernel, less the instant at which it should leave.\n");
+    println!("| what | p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] | reordered | asked for: p50, p99 |");
+    println!("| --- | ---: | ---: | ---: | ---: | ---: | --- |");
+    let row = |name: &str, error: LatenessSummary, reordered: Option<f64>, asked: &str| {
+        let reordered = reordered.map_or_else(String::new, |share| format!("{:.1} %", share * 100.0));
+        let [p50, p99, p999, max] = [error.p50, error.p99, error.p999, error.max].map(micros);
+        println!("| {name} | {p50} | {p99} | {p999} | {max} | {reordered} | {asked} |");
+    };
+    let share = |outcome: &Outcome| Some(outcome.received.reordered as f64 / outcome.received.count.max(1) as f64);
+    let sleeping = relay(Pacing::Sleep, RATE, span)?;
+    row("relay, sleeping", sleeping.error, share(&sleeping), "40, 150");
+    let spinning = relay(Pacing::SPIN, RATE, span)?;
+    row("relay, spinning", spinning.error, share(&spinning), "0.5, 60");
+    let tokio = tokio_forwarder(RATE, span)?;
+    row("`tokio::time::sleep_until`, a task a packet", tokio.error, share(&tokio), "");
+    row("a bare thread, `clock_nanosleep`", bare_thread(Pacing::Sleep, RATE, span)?, None, "");
+    row("a bare thread, spinning", bare_thread(SPIN, RATE, span)?, None, "");
+    println!(
+        "\nProcessor time of all but generator and sink, a packet: relay sleeping {}, spinning {}, tokio {}.",
+        of(&sleeping),
+        of(&spinning),
+        of(&tokio)
+    );
+    println!("The bare threads receive nothing: they wait for an instant every {} µs, and send.", 1_000_000 / RATE);
+    match sleeping.refused.as_slice() {
+        [] => println!("The relay and the bare threads had `SCHED_FIFO`, as they ask for; the others did not.\n"),
+        refused => println!("The relay had to do without: {}.\n", refused.join("; ")),
+    }
+    Ok(())
+}
+
+fn rates(span: Duration) -> Result<(), Box<dyn Error>> {
+    println!("## Rates\n");
+    println!(
+        "The same link, the relay sleeping. *At the socket*: dropped by the kernel because the forwarder did not read in time. *Overload*: dropped by"
+    );
+    println!("the relay because too much was on its way. *Delivered*: of the packets sent. Asked for: 250,000 a second with p99 below 2 ms.\n");
+    println!(
+        "| packets/s | what | sent/s | delivered | at the socket | overload | p50 \\[µs\\] | p99 \\[µs\\] | reordered | processor/packet | memory \\[MB\\] |"
+    );
+    println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | --- |");
+    let mut highest = [("relay", 0), ("tokio", 0)];
+    for rate in RATES {
+        for (name, highest) in &mut highest {
+            let outcome = if *name == "relay" { relay(Pacing::Sleep, rate, span)? } else { tokio_forwarder(rate, span)? };
+            row(rate, name, &outcome);
+            if is_sustained(rate, &outcome) {
+                *highest = rate;
+            }
+        }
+    }
+    let [relay, tokio] = highest.map(|(_, rate)| rate);
+    println!(
+        "\nSustained means: the generator reached 99 % of the rate, 99.99 % were delivered, and p99 was below 2 ms. The highest of these rates that was"
+    );
+    println!("sustained: relay {relay} packets/s, tokio {tokio} packets/s. Memory is what the process holds before and after the run.");
+    Ok(())
+}
+
+fn row(rate: u64, name: &str, outcome: &Outcome) {
+    let Outcome { sent, received, error, at_socket, overload, memory: (before, after), .. } = outcome;
+    let per_second = sent.count as f64 / sent.elapsed.as_secs_f64();
+    let delivered = received.count as f64 / sent.count.max(1) as f64 * 100.0;
+    let reordered = received.reordered as f64 / received.count.max(1) as f64 * 100.0;
+    let (p50, p99) = (micros(error.p50), micros(error.p99));
+    let [before, after] = [before, after].map(|kilobytes| *kilobytes as f64 / 1000.0);
+    println!(
+        "| {rate} | {name} | {per_second:.0} | {delivered:.2} % | {at_socket} | {overload} | {p50} | {p99} | {reordered:.1} % | {} | {before:.1} → {after:.1} |",
+        of(outcome)
+    );
+}
+
+fn is_sustained(rate: u64, outcome: &Outcome) -> bool {
+    let Outcome { sent, received, error, .. } = outcome;
+    let reached = sent.count as f64 / sent.elapsed.as_secs_f64() >= 0.99 * rate as f64;
+    reached && received.count as f64 >= 0.9999 * sent.count as f64 && error.p99 < Duration::from_millis(2)
+}
+
+fn of(outcome: &Outcome) -> String {
+    format!("{:.2} µs", outcome.processor.as_secs_f64() * 1e6)
+}
+
+fn micros(span: Duration) -> String {
+    let micros = span.as_secs_f64() * 1e6;
+    if micros < 10.0 { format!("{micros:.2}") } else { format!("{micros:.0}") }
+}

@@ -1,0 +1,150 @@
+//! What is measured: the relay, a forwarder with a task a packet, and bare threads.
+
+use std::error::Error;
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::channel;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use cohaptic_realtime::udp::DoorConfig;
+use cohaptic_realtime::{Clock as _, Lateness, LatenessSummary, MonotonicClock, Pacer, Pacing, Wishes, prepare_thread};
+use cohaptic_relay::{Form, Limits, Mesh, Program, Relay, RelayConfig, RunOptions};
+use cohaptic_scene::LinkTable;
+use cohaptic_wan::{Delay, LinkConfig};
+
+use crate::machine;
+use crate::traffic::{Received, SIZE, Sent, Sink, generate, wide};
+
+/// The delay of the link.
+pub(crate) const DELAY: Duration = Duration::from_millis(24);
+
+/// What came out of one run.
+#[derive(Debug)]
+pub(crate) struct Outcome {
+    pub(crate) sent: Sent,
+    pub(crate) received: Received,
+    pub(crate) error: LatenessSummary,
+    /// Dropped by the kernel at the forwarder's socket.
+    pub(crate) at_socket: u64,
+    pub(crate) overload: u64,
+    /// Of all but generator and sink, a packet.
+    pub(crate) processor: Duration,
+    /// Before and after \[kB\].
+    pub(crate) memory: (u64, u64),
+    /// What the system refused the forwarder.
+    pub(crate) refused: Vec<String>,
+}
+
+type Done = Result<Outcome, Box<dyn Error>>;
+
+/// Sends through something, and gathers what came of it.
+fn measure(
+    source: &UdpSocket,
+    to: SocketAddr,
+    rate: u64,
+    span: Duration,
+    sink: Sink,
+    end: impl FnOnce() -> Result<(LatenessSummary, u64, u64, Vec<String>), Box<dyn Error>>,
+) -> Done {
+    let (memory, start) = (machine::memory(), machine::process_time());
+    let sent = generate(source, to, rate, span);
+    // What is on its way arrives.
+    std::thread::sleep(DELAY + Duration::from_millis(200));
+    let after = machine::memory();
+    let (error, at_socket, overload, refused) = end()?;
+    let received = sink.end();
+    let used = (machine::process_time() - start).saturating_sub(sent.processor + received.processor);
+    let processor = used / u32::try_from(sent.count.max(1)).unwrap_or(u32::MAX);
+    Ok(Outcome { sent, received, error, at_socket, overload, processor, memory: (memory, after), refused })
+}
+
+/// The relay.
+pub(crate) fn relay(pacing: Pacing, rate: u64, span: Duration) -> Done {
+    let (source, sink) = (wide("127.0.0.1:0")?, Sink::start()?);
+    let free = "127.0.0.1:0".parse()?;
+    let program = |name: &str, address| Program { name: name.to_owned(), port: free, address: Some(address) };
+    let programs = vec![program("source", source.local_addr()?), program("sink", sink.address)];
+    let link = LinkConfig { delay: Delay::constant(DELAY), ..LinkConfig::default() };
+    let form = Form::Mesh(Mesh { programs, links: LinkTable::uniform(2, link) });
+    let config = RelayConfig { seed: 1, form, limits: Limits::default(), changes: Vec::new() };
+    let relay = Relay::bind(config, DoorConfig::default())?;
+    let to = relay.ports().nth(1).map(|(_, address)| address).ok_or("no port")?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let is_over = Arc::clone(&stop);
+    let thread = std::thread::spawn(move || {
+        let (_control, changes) = channel();
+        // Locked memory would stay with the process and count as memory of the others.
+        let options = RunOptions { pacing, wishes: Wishes { lock_memory: false, ..Wishes::default() }, ..RunOptions::default() };
+        relay.run(&options, &changes, &is_over, |_| ())
+    });
+    measure(&source, to, rate, span, sink, || {
+        stop.store(true, Ordering::Relaxed);
+        let report = thread.join().map_err(|_| "the relay panicked")??;
+        let refused = report.prepared.refused.iter().map(ToString::to_string).collect();
+        let dropped = report.ports.iter().filter_map(|port| port.kernel_drops).sum();
+        Ok((report.release.summary(), dropped, report.intake.overload, refused))
+    })
+}
+
+/// What one writes in a quarter of an hour: a task for each packet, which sleeps until it is due.
+pub(crate) fn tokio_forwarder(rate: u64, span: Duration) -> Done {
+    let (source, sink) = (wide("127.0.0.1:0")?, Sink::start()?);
+    let inside = wide("127.0.0.1:0")?;
+    inside.set_nonblocking(true)?;
+    let (to, target) = (inside.local_addr()?, sink.address);
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    let (errors, taken) = (Arc::new(Mutex::new(Lateness::new())), Arc::new(AtomicU64::new(0)));
+    let (recorded, counted) = (Arc::clone(&errors), Arc::clone(&taken));
+    runtime.spawn(async move {
+        let Ok(socket) = tokio::net::UdpSocket::from_std(inside) else { return };
+        let socket = Arc::new(socket);
+        let mut bytes = [0; 2048];
+        while let Ok((length, _)) = socket.recv_from(&mut bytes).await {
+            let due = tokio::time::Instant::now() + DELAY;
+            counted.fetch_add(1, Ordering::Relaxed);
+            let (socket, packet, recorded) = (Arc::clone(&socket), bytes[..length].to_vec(), Arc::clone(&recorded));
+            tokio::spawn(async move {
+                tokio::time::sleep_until(due).await;
+                let late = due.elapsed();
+                // A packet that cannot be sent shows as one that was not received.
+                let _ = socket.send_to(&packet, target).await;
+                if let Ok(mut recorded) = recorded.lock() {
+                    recorded.record(late);
+                }
+            });
+        }
+    });
+    let mut outcome = measure(&source, to, rate, span, sink, || {
+        runtime.shutdown_timeout(Duration::from_secs(1));
+        let summary = errors.lock().map_err(|_| "a task panicked")?.summary();
+        Ok((summary, 0, 0, Vec::new()))
+    })?;
+    // What the generator sent and no task ever saw.
+    outcome.at_socket = outcome.sent.count.saturating_sub(taken.load(Ordering::Relaxed));
+    Ok(outcome)
+}
+
+/// A thread that does nothing but wait for each packet's time and send it: what the system gives at best.
+pub(crate) fn bare_thread(pacing: Pacing, rate: u64, span: Duration) -> Result<LatenessSummary, Box<dyn Error>> {
+    let (socket, sink) = (UdpSocket::bind("127.0.0.1:0")?, Sink::start()?);
+    let target = sink.address;
+    let thread = std::thread::spawn(move || -> std::io::Result<LatenessSummary> {
+        let _ = prepare_thread(&Wishes { lock_memory: false, ..Wishes::default() });
+        let clock = MonotonicClock::start();
+        let (pacer, mut errors) = (Pacer::new(pacing), Lateness::new());
+        let period = Duration::from_nanos(1_000_000_000 / rate);
+        let mut due = clock.now();
+        let end = due + span;
+        while due < end {
+            due += period;
+            pacer.wait(&clock, Some(due), &[])?;
+            errors.record(clock.now().saturating_duration_since(due));
+            socket.send_to(&[0; SIZE], target)?;
+        }
+        Ok(errors.summary())
+    });
+    let summary = thread.join().map_err(|_| "the thread panicked")??;
+    sink.end();
+    Ok(summary)
+}
