@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use cohaptic_units::{Instant, parse};
 use cohaptic_wan::LinkModel;
 use toml::de::DeTable;
 
@@ -103,13 +104,15 @@ impl fmt::Display for LinkKeys {
     }
 }
 
-/// The keys of every directed link of a scene file as it begins, by the places of sender and receiver: what an entry `[[links]]` says is laid over
-/// `[link]`. Changes in the timeline are not in it.
+/// The keys of directed links, by the places of sender and receiver.
+pub type KeysOfLinks = BTreeMap<(usize, usize), LinkKeys>;
+
+/// The keys of every directed link of a scene file as it begins: what an entry `[[links]]` says is laid over `[link]`.
 ///
 /// # Errors
 ///
 /// As [`Scene::read_live`].
-pub fn link_keys(path: &Path, overrides: &[String]) -> Result<BTreeMap<(usize, usize), LinkKeys>, SceneError> {
+pub fn link_keys(path: &Path, overrides: &[String]) -> Result<KeysOfLinks, SceneError> {
     with_text(path, |text| link_keys_of_text(text, path, overrides))
 }
 
@@ -118,25 +121,77 @@ pub fn link_keys(path: &Path, overrides: &[String]) -> Result<BTreeMap<(usize, u
 /// # Errors
 ///
 /// As [`Scene::parse_live`].
-pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<BTreeMap<(usize, usize), LinkKeys>, SceneError> {
+pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<KeysOfLinks, SceneError> {
     let (scene, document) = parse_scene(Sources { file, text, overrides }, true)?;
-    let part = |name: &str| document.as_table().and_then(|table| table.get(name)).map(|entry| &*entry.node);
-    let modulators: Arc<str> = part("modulators").map_or_else(String::new, value_text).into();
+    Ok(keys_at_the_beginning(&scene, &document))
+}
+
+/// What the timeline of a scene file makes of the keys of links: when, and all keys of each link that it changes then. In order of time, as in
+/// [`Scene::timeline`]. What somebody has changed by hand in between does not count: the timeline says what a link is.
+///
+/// # Errors
+///
+/// As [`Scene::read_live`].
+pub fn link_key_changes(path: &Path, overrides: &[String]) -> Result<Vec<(Instant, KeysOfLinks)>, SceneError> {
+    with_text(path, |text| link_key_changes_of_text(text, path, overrides))
+}
+
+/// [`link_key_changes`] of a scene that is a text.
+///
+/// # Errors
+///
+/// As [`Scene::parse_live`].
+pub fn link_key_changes_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<Vec<(Instant, KeysOfLinks)>, SceneError> {
+    let (scene, document) = parse_scene(Sources { file, text, overrides }, true)?;
+    let mut links = keys_at_the_beginning(&scene, &document);
+    let Some(Value::List(entries)) = part(&document, "timeline").map(|node| &node.value) else { return Ok(Vec::new()) };
+    let value = |entry: &Node, key: &str| entry.as_table().and_then(|table| table.get(key)).map(|entry| Arc::clone(&entry.node));
+    let planned = entries.iter().filter_map(|entry| {
+        let span = parse::duration(value(entry, "at")?.as_text()?).ok()?;
+        Some((Instant::ZERO.checked_add(span)?, value(entry, "link")?, value(entry, "set")?))
+    });
+    let mut planned: Vec<_> = planned.collect();
+    // Stable: equal instants stay in the order of the file.
+    planned.sort_by_key(|(at, ..)| *at);
+    let mut changes = Vec::new();
+    for (at, link, set) in planned {
+        let ends = ends_of(&link, &scene);
+        let concerned = links.iter_mut().filter(|(pair, _)| ends.is_none_or(|ends| ends == **pair));
+        let changed = concerned.map(|(pair, keys)| {
+            *keys = set.as_table().map_or_else(Vec::new, keys_of).iter().fold(keys.clone(), |keys, (key, value)| keys.with(key, value));
+            (*pair, keys.clone())
+        });
+        changes.push((at, changed.collect()));
+    }
+    Ok(changes)
+}
+
+fn keys_at_the_beginning(scene: &Scene, document: &Node) -> KeysOfLinks {
+    let modulators: Arc<str> = part(document, "modulators").map_or_else(String::new, value_text).into();
     let nothing = Node::empty_table(BEGINNING, "link".to_owned());
-    let usual = part("link").unwrap_or(&nothing);
+    let usual = part(document, "link").unwrap_or(&nothing);
     let keys = |node: &Node| LinkKeys { keys: node.as_table().map_or_else(Vec::new, keys_of), modulators: Arc::clone(&modulators) };
     let places = 0..scene.peers.len();
     let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
     let shared = keys(usual);
-    let mut links: BTreeMap<(usize, usize), LinkKeys> = pairs.map(|pair| (pair, shared.clone())).collect();
-    let Some(Value::List(entries)) = part("links").map(|node| &node.value) else { return Ok(links) };
+    let mut links: KeysOfLinks = pairs.map(|pair| (pair, shared.clone())).collect();
+    let Some(Value::List(entries)) = part(document, "links").map(|node| &node.value) else { return links };
     for entry in entries {
-        let end = |key: &str| entry.as_table().and_then(|table| table.get(key)).and_then(|end| scene.peer_index(end.node.as_text()?));
-        if let (Some(from), Some(to)) = (end("from"), end("to")) {
-            links.insert((from, to), keys(&entry.without(&["from", "to"]).over(usual, &[])));
+        if let Some(ends) = ends_of(entry, scene) {
+            links.insert(ends, keys(&entry.without(&["from", "to"]).over(usual, &[])));
         }
     }
-    Ok(links)
+    links
+}
+
+fn part<'a>(document: &'a Node, name: &str) -> Option<&'a Node> {
+    document.as_table().and_then(|table| table.get(name)).map(|entry| &*entry.node)
+}
+
+/// The peers that `from` and `to` of a table name; `None` if it has no such keys.
+fn ends_of(table: &Node, scene: &Scene) -> Option<(usize, usize)> {
+    let end = |key: &str| scene.peer_index(table.as_table()?.get(key)?.node.as_text()?);
+    Some((end("from")?, end("to")?))
 }
 
 fn keys_of(table: &Table) -> Vec<(String, String)> {
@@ -228,6 +283,50 @@ mod tests {
         }
         assert_eq!(keys[&(0, 2)].get("delay"), Some("\"7ms\""));
         assert_eq!(keys[&(1, 2)].iter().map(|(key, _)| key).collect::<Vec<_>>(), ["delay", "jitter", "loss", "rate"]);
+    }
+
+    /// The timeline's keys make the links that it makes, one change after the other, also where the file is not in order of time.
+    #[test]
+    fn the_keys_of_a_timeline_make_its_links() {
+        let text = format!(
+            "{AROUND}{}",
+            r#"
+            [link]
+            delay = "24ms"
+            loss = "1%"
+            [[timeline]]
+            at = "800ms"
+            link = { from = "peer2", to = "peer1" }
+            set = { netem = "delay 3ms loss 2%" }
+            [[timeline]]
+            at = "100ms"
+            link = "all"
+            set = { delay = "8ms", rate = "1Mbit" }
+            [[timeline]]
+            at = "500ms"
+            peer = "peer1"
+            set = { contact = "none" }
+        "#
+        );
+        let file = Path::new("x.toml");
+        let scene = Scene::parse(&text, file, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let changes = link_key_changes_of_text(&text, file, &[]).unwrap();
+        let linked: Vec<_> = scene.timeline.iter().filter(|change| !matches!(change.what, crate::ChangeKind::Contact { .. })).collect();
+        assert_eq!((changes.len(), linked.len()), (2, 2));
+        for ((at, links), change) in changes.iter().zip(linked) {
+            assert_eq!(*at, change.at);
+            match &change.what {
+                crate::ChangeKind::AllLinks(table) => {
+                    assert_eq!(links.len(), 2);
+                    assert!(links.iter().all(|((from, to), keys)| keys.model(Path::new("")).unwrap() == *table.between(*from, *to)));
+                }
+                crate::ChangeKind::Link(link) => {
+                    assert_eq!(links.len(), 1);
+                    assert_eq!(links[&(link.from, link.to)].model(Path::new("")).unwrap(), *link.config);
+                }
+                other => panic!("{other:?}"),
+            }
+        }
     }
 
     #[test]

@@ -83,6 +83,13 @@ fn what_the_network_delivers_to_a_process_comes_out_at_its_arrival() {
     assert_eq!(live.poll_timeout(), Some(Instant::from_nanos(5_200_000)));
 }
 
+/// A driver may keep a session in a thread of its own.
+#[test]
+fn a_session_can_be_sent_to_another_thread() {
+    fn can_be_sent<T: Send>(_: &T) {}
+    can_be_sent(&LiveScene::new(&trio().scene, |_| None));
+}
+
 #[test]
 fn what_is_handed_in_late_counts_at_the_first_open_instant_and_is_counted() {
     let Written { scene, .. } = trio();
