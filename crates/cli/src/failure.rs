@@ -39,6 +39,8 @@ pub(crate) enum Failure {
         error: io::Error,
     },
     StandardOutput(io::Error),
+    /// The system, a device or the network refuses something, in words.
+    System(String),
     /// The user asked for the end before there was a result; how to go on, in words.
     Interrupted(String),
 }
@@ -56,6 +58,7 @@ impl Failure {
             Self::Input(message) => (message.clone(), BAD_INPUT),
             Self::File { verb, path, error } => (format!("cannot {verb} {}: {error}", path.display()), INPUT_OUTPUT),
             Self::Interrupted(message) => (message.clone(), INTERRUPTED),
+            Self::System(message) => (message.clone(), INPUT_OUTPUT),
             Self::StandardOutput(error) => (format!("cannot write to standard output: {error}"), INPUT_OUTPUT),
         };
         // If standard error cannot be written to either, the exit status is all that is left to say it with.

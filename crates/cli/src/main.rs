@@ -1,5 +1,5 @@
-//! `cohaptic`: runs, checks, explains and analyses scenes of people who move one object together over a bad network; drives and estimates links;
-//! reproduces a paper.
+//! `cohaptic`: runs, checks, explains and analyses scenes of people who move one object together over a bad network, in virtual time and by the
+//! wall clock; drives and estimates links; reproduces a paper.
 //!
 //! This is the only crate that prints. Results go to standard output, everything else to standard error. Exit status: 0 done, 1 an expectation
 //! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted.
@@ -7,16 +7,19 @@
 mod admittance;
 mod arguments;
 mod check;
+mod documents;
 mod explain;
 mod failure;
 mod fit;
 mod interrupt;
 mod lines;
 mod link;
+mod live;
 mod output;
 mod output_file;
 mod paper;
 mod progress;
+mod realtime;
 mod run;
 mod stability;
 mod terminal_plot;
@@ -37,6 +40,7 @@ fn main() -> ExitCode {
         Command::Explain(arguments) => explain::explain(&arguments),
         Command::Stability(arguments) => stability::stability(&arguments),
         Command::Admittance(arguments) => admittance::admittance(&arguments),
+        Command::Live(arguments) => live::live(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),
         Command::Paper(arguments) => paper::paper(&arguments),

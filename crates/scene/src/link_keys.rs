@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use cohaptic_units::{Instant, parse};
 use cohaptic_wan::LinkModel;
 use toml::de::DeTable;
 
@@ -105,13 +106,15 @@ impl fmt::Display for LinkKeys {
     }
 }
 
-/// The keys of every directed link of a scene file as it begins, by the places of sender and receiver: what an entry `[[links]]` says is laid over
-/// `[link]`. Changes in the timeline are not in it.
+/// The keys of directed links, by the places of sender and receiver.
+pub type KeysOfLinks = BTreeMap<(usize, usize), LinkKeys>;
+
+/// The keys of every directed link of a scene file as it begins: what an entry `[[links]]` says is laid over `[link]`.
 ///
 /// # Errors
 ///
 /// As [`Scene::read_live`].
-pub fn link_keys(path: &Path, overrides: &[String]) -> Result<BTreeMap<(usize, usize), LinkKeys>, SceneError> {
+pub fn link_keys(path: &Path, overrides: &[String]) -> Result<KeysOfLinks, SceneError> {
     with_text(path, |text| link_keys_of_text(text, path, overrides))
 }
 
@@ -120,9 +123,49 @@ pub fn link_keys(path: &Path, overrides: &[String]) -> Result<BTreeMap<(usize, u
 /// # Errors
 ///
 /// As [`Scene::parse_live`].
-pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<BTreeMap<(usize, usize), LinkKeys>, SceneError> {
+pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<KeysOfLinks, SceneError> {
     let (scene, document) = parse_scene(Sources { file, text, overrides }, true)?;
     Ok(keys_of_mesh(&document, scene.peers.len(), |name| scene.peer_index(name)))
+}
+
+/// What the timeline of a scene file makes of the keys of links: when, and all keys of each link that it changes then. In order of time, as in
+/// [`Scene::timeline`]. What somebody has changed by hand in between does not count: the timeline says what a link is.
+///
+/// # Errors
+///
+/// As [`Scene::read_live`].
+pub fn link_key_changes(path: &Path, overrides: &[String]) -> Result<Vec<(Instant, KeysOfLinks)>, SceneError> {
+    with_text(path, |text| link_key_changes_of_text(text, path, overrides))
+}
+
+/// [`link_key_changes`] of a scene that is a text.
+///
+/// # Errors
+///
+/// As [`Scene::parse_live`].
+pub fn link_key_changes_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<Vec<(Instant, KeysOfLinks)>, SceneError> {
+    let (scene, document) = parse_scene(Sources { file, text, overrides }, true)?;
+    let mut links = keys_of_mesh(&document, scene.peers.len(), |name| scene.peer_index(name));
+    let Some(Value::List(entries)) = part(&document, "timeline").map(|node| &node.value) else { return Ok(Vec::new()) };
+    let value = |entry: &Node, key: &str| entry.as_table().and_then(|table| table.get(key)).map(|entry| Arc::clone(&entry.node));
+    let planned = entries.iter().filter_map(|entry| {
+        let span = parse::duration(value(entry, "at")?.as_text()?).ok()?;
+        Some((Instant::ZERO.checked_add(span)?, value(entry, "link")?, value(entry, "set")?))
+    });
+    let mut planned: Vec<_> = planned.collect();
+    // Stable: equal instants stay in the order of the file.
+    planned.sort_by_key(|(at, ..)| *at);
+    let mut changes = Vec::new();
+    for (at, link, set) in planned {
+        let ends = ends_of(&link, &|name| scene.peer_index(name));
+        let concerned = links.iter_mut().filter(|(pair, _)| ends.is_none_or(|ends| ends == **pair));
+        let changed = concerned.map(|(pair, keys)| {
+            *keys = set.as_table().map_or_else(Vec::new, keys_of).iter().fold(keys.clone(), |keys, (key, value)| keys.with(key, value));
+            (*pair, keys.clone())
+        });
+        changes.push((at, changed.collect()));
+    }
+    Ok(changes)
 }
 
 /// The keys of every directed link of a relay file, as [`link_keys`] gives those of a scene: by the places of its programs.
@@ -130,7 +173,7 @@ pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Resul
 /// # Errors
 ///
 /// As [`RelayFile::read`].
-pub fn relay_link_keys(path: &Path, overrides: &[String]) -> Result<BTreeMap<(usize, usize), LinkKeys>, SceneError> {
+pub fn relay_link_keys(path: &Path, overrides: &[String]) -> Result<KeysOfLinks, SceneError> {
     let (relay, document) = with_text(path, |text| parse_document(Sources { file: path, text, overrides }, false, relay_file::read_document))?;
     let place = |name: &str| relay.programs.iter().position(|program| program.name == name);
     Ok(keys_of_mesh(&document, relay.programs.len(), place))
@@ -150,18 +193,17 @@ pub fn router_link_keys(path: &Path, overrides: &[String]) -> Result<Vec<LinkKey
 }
 
 /// The keys of all links between so many ends, of a document with `[link]` and `[[links]]`.
-fn keys_of_mesh(document: &Node, ends: usize, place: impl Fn(&str) -> Option<usize>) -> BTreeMap<(usize, usize), LinkKeys> {
+fn keys_of_mesh(document: &Node, ends: usize, place: impl Fn(&str) -> Option<usize>) -> KeysOfLinks {
     let modulators = modulators_of(document);
     let nothing = Node::empty_table(BEGINNING, "link".to_owned());
     let usual = part(document, "link").unwrap_or(&nothing);
     let keys = |node: &Node| LinkKeys { keys: node.as_table().map_or_else(Vec::new, keys_of), modulators: Arc::clone(&modulators) };
     let shared = keys(usual);
-    let mut links: BTreeMap<(usize, usize), LinkKeys> = pairs(ends).map(|pair| (pair, shared.clone())).collect();
+    let mut links: KeysOfLinks = pairs(ends).map(|pair| (pair, shared.clone())).collect();
     let Some(Value::List(entries)) = part(document, "links").map(|node| &node.value) else { return links };
     for entry in entries {
-        let end = |key: &str| entry.as_table().and_then(|table| table.get(key)).and_then(|end| place(end.node.as_text()?));
-        if let (Some(from), Some(to)) = (end("from"), end("to")) {
-            links.insert((from, to), keys(&entry.without(&["from", "to"]).over(usual, &[])));
+        if let Some(ends) = ends_of(entry, &place) {
+            links.insert(ends, keys(&entry.without(&["from", "to"]).over(usual, &[])));
         }
     }
     links
@@ -173,6 +215,12 @@ fn part<'a>(document: &'a Node, name: &str) -> Option<&'a Node> {
 
 fn modulators_of(document: &Node) -> Arc<str> {
     part(document, "modulators").map_or_else(String::new, value_text).into()
+}
+
+/// The places of those that `from` and `to` of a table name; `None` if it has no such keys.
+fn ends_of(table: &Node, place: &impl Fn(&str) -> Option<usize>) -> Option<(usize, usize)> {
+    let end = |key: &str| place(table.as_table()?.get(key)?.node.as_text()?);
+    Some((end("from")?, end("to")?))
 }
 
 fn keys_of(table: &Table) -> Vec<(String, String)> {
@@ -264,6 +312,50 @@ mod tests {
         }
         assert_eq!(keys[&(0, 2)].get("delay"), Some("\"7ms\""));
         assert_eq!(keys[&(1, 2)].iter().map(|(key, _)| key).collect::<Vec<_>>(), ["delay", "jitter", "loss", "rate"]);
+    }
+
+    /// The timeline's keys make the links that it makes, one change after the other, also where the file is not in order of time.
+    #[test]
+    fn the_keys_of_a_timeline_make_its_links() {
+        let text = format!(
+            "{AROUND}{}",
+            r#"
+            [link]
+            delay = "24ms"
+            loss = "1%"
+            [[timeline]]
+            at = "800ms"
+            link = { from = "peer2", to = "peer1" }
+            set = { netem = "delay 3ms loss 2%" }
+            [[timeline]]
+            at = "100ms"
+            link = "all"
+            set = { delay = "8ms", rate = "1Mbit" }
+            [[timeline]]
+            at = "500ms"
+            peer = "peer1"
+            set = { contact = "none" }
+        "#
+        );
+        let file = Path::new("x.toml");
+        let scene = Scene::parse(&text, file, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let changes = link_key_changes_of_text(&text, file, &[]).unwrap();
+        let linked: Vec<_> = scene.timeline.iter().filter(|change| !matches!(change.what, crate::ChangeKind::Contact { .. })).collect();
+        assert_eq!((changes.len(), linked.len()), (2, 2));
+        for ((at, links), change) in changes.iter().zip(linked) {
+            assert_eq!(*at, change.at);
+            match &change.what {
+                crate::ChangeKind::AllLinks(table) => {
+                    assert_eq!(links.len(), 2);
+                    assert!(links.iter().all(|((from, to), keys)| keys.model(Path::new("")).unwrap() == *table.between(*from, *to)));
+                }
+                crate::ChangeKind::Link(link) => {
+                    assert_eq!(links.len(), 1);
+                    assert_eq!(links[&(link.from, link.to)].model(Path::new("")).unwrap(), *link.config);
+                }
+                crate::ChangeKind::Contact { .. } | crate::ChangeKind::Hand { .. } | crate::ChangeKind::Coordination(_) => panic!("{change:?}"),
+            }
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod admittance;
 mod links;
 mod paper;
+mod realtime;
 mod scenes;
 mod stability;
 
@@ -13,6 +14,7 @@ use clap::{Args, Parser, Subcommand};
 pub(crate) use admittance::AdmittanceArguments;
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use paper::PaperArguments;
+pub(crate) use realtime::{LiveArguments, RealTimeArguments};
 pub(crate) use scenes::{CheckArguments, ExplainArguments, RunArguments};
 pub(crate) use stability::{BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, StabilityArguments, StabilityCommand};
 
@@ -40,6 +42,8 @@ pub(crate) enum Command {
     Stability(StabilityArguments),
     /// Says what the hand of one peer feels, frequency by frequency, without simulating it
     Admittance(AdmittanceArguments),
+    /// Runs a scene by the wall clock, with other programs and Falcons attached, all through the emulated links
+    Live(LiveArguments),
     /// Sends a steady stream over one link and sets what it achieved beside what it was asked for
     Link(LinkArguments),
     /// Estimates the link that made a file of measurements, captures or fates

@@ -27,9 +27,9 @@ impl LiveControl {
             }
         };
         let config = ServerConfig { token, allow_remote: arguments.allow_remote, ..ServerConfig::new(address) };
-        let server = serve(config, Arc::clone(&board), editor).map_err(|error| match error {
-            ServeError::Listen { .. } | ServeError::Thread(_) => Failure::System(error.to_string()),
-            other => Failure::Input(other.to_string()),
+        let server = serve(config, Arc::clone(&board), editor).map_err(|error| {
+            let is_of_system = matches!(error, ServeError::Listen { .. } | ServeError::Thread(_));
+            if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
         })?;
         // What cannot be said does not keep the run from beginning.
         let _ = writeln!(io::stderr(), "live control: {}", server.url());

@@ -12,7 +12,7 @@ use crate::arguments::RealTimeArguments;
 pub(crate) use control::{LiveControl, Look};
 pub(crate) use editor::{Edit, KeyedLinks};
 pub(crate) use snapshot::{counters, quantiles, quantiles_of};
-pub(crate) use words::{late, notes};
+pub(crate) use words::{late, loading, notes};
 
 impl RealTimeArguments {
     pub(crate) const fn pacing(&self) -> Pacing {

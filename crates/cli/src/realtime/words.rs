@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use cohaptic_falcon::boot::Progress;
 use cohaptic_realtime::{LatenessSummary, Prepared, Wish};
 
 use crate::documents::micros;
@@ -27,4 +28,15 @@ pub(crate) fn notes(prepared: &Prepared) -> String {
         let _ = writeln!(text, "  {refused}");
     }
     text
+}
+
+/// How far the loading of a Falcon's firmware is; `None` for what comes too often to be said.
+pub(crate) fn loading(progress: Progress) -> Option<String> {
+    match progress {
+        Progress::Attempt(attempt) => Some(format!("loading the firmware, attempt {attempt}")),
+        Progress::Greeted(_) => Some("the boot loader answers".to_owned()),
+        Progress::Loaded { done, of } => (done == of).then(|| format!("{of} bytes are over")),
+        Progress::Failed(error) => Some(error.to_string()),
+        Progress::Running => Some("its firmware runs".to_owned()),
+    }
 }

@@ -1,7 +1,7 @@
 //! `cohaptic run`.
 
 mod document;
-mod words;
+pub(crate) mod words;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -50,12 +50,12 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
 /// The summary for people names this many peers at most.
 const MOST_PEERS: usize = 8;
 
-fn length(metres: f64) -> String {
+pub(crate) fn length(metres: f64) -> String {
     if metres.abs() < 1e4 { format!("{:.3} mm", metres * 1e3) } else { format!("{metres:.3e} m") }
 }
 
 /// What became of all packets, end to end.
-fn packets(summary: &Summary) -> String {
+pub(crate) fn packets(summary: &Summary) -> String {
     let has_line = |peer: usize, uplink: bool| summary.access_lines.iter().any(|line| line.peer == peer && line.uplink == uplink);
     let lines = |uplink: bool| summary.access_lines.iter().filter(move |line| line.uplink == uplink).map(|line| line.stats);
     // A packet enters at the uplink of its sender, or at the link, and leaves at the downlink of its receiver, or at the link.

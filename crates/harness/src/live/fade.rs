@@ -96,8 +96,8 @@ mod tests {
         assert_eq!(fade.age(at(1064)), Age { weight: 0.25, share: 1.0 });
         fade.rise(at(1100));
         fade.fall(at(1192));
-        assert_eq!(fade.age(at(1192)).weight, 0.75);
-        assert_eq!(fade.age(at(1256)).weight, 0.5);
+        assert_eq!(fade.age(at(1192)), Age { weight: 0.75, share: 1.0 });
+        assert_eq!(fade.age(at(1256)), Age { weight: 0.5, share: 1.0 });
         fade.moved(at(1256));
         fade.rise(at(1256));
         assert_eq!(fade.age(at(1320)), Age { weight: 0.75, share: 0.25 });

@@ -14,10 +14,13 @@ use crate::scenes::{Written, read};
 
 const COUPLING: f64 = 900.0;
 
+/// The forces that a device was made to hold.
+type HeldForces = Arc<Mutex<Vec<(Instant, [f64; 3])>>>;
+
 /// A device that shows what it is told to at each millisecond, and writes down what it is made to hold.
 struct Told {
     shows: fn(u64) -> Option<f64>,
-    held: Arc<Mutex<Vec<(Instant, [f64; 3])>>>,
+    held: HeldForces,
 }
 
 impl LiveDevice for Told {

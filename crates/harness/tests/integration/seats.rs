@@ -1,10 +1,13 @@
 //! Joining, leaving, coming back, and what is refused.
 
+use std::convert::Infallible;
+
 use cohaptic_harness::live::{Inputs, InputsError, LiveScene, Presence, SampleError};
-use cohaptic_harness::{Ending, NoObserver};
+use cohaptic_harness::{Ending, NoObserver, Observer, PacketRow};
 use cohaptic_peer::ReceiveError;
 use cohaptic_peer::wire::{DecodeError, Sample};
 use cohaptic_units::Instant;
+use cohaptic_wan::Fate;
 use proptest::prelude::*;
 
 use crate::records::session;
@@ -81,6 +84,13 @@ fn what_the_network_delivers_to_a_process_comes_out_at_its_arrival() {
     // The sample arrives elsewhere at 5.2 ms, a step of its own though nobody ticks then.
     pass(&mut live, millis(5));
     assert_eq!(live.poll_timeout(), Some(Instant::from_nanos(5_200_000)));
+}
+
+/// A driver may keep a session in a thread of its own.
+#[test]
+fn a_session_can_be_sent_to_another_thread() {
+    fn can_be_sent<T: Send>(_: &T) {}
+    can_be_sent(&LiveScene::new(&trio().scene, |_| None));
 }
 
 #[test]
@@ -238,4 +248,49 @@ proptest! {
         pass(&mut live, millis(40));
         prop_assert!(matches!(live.ended(), None | Some(Ending::Diverged(_))));
     }
+}
+
+/// Counts the packets that were dropped.
+#[derive(Default)]
+struct Drops(usize);
+
+impl Observer for Drops {
+    type Error = Infallible;
+
+    fn wants_packets(&self) -> bool {
+        true
+    }
+
+    fn on_packet(&mut self, row: &PacketRow) -> Result<(), Infallible> {
+        self.0 += usize::from(matches!(row.fate, Fate::Dropped(_)));
+        Ok(())
+    }
+}
+
+/// With nobody here nobody ticks: silence and drops are noticed all the same, when something comes in and at once.
+#[test]
+fn a_session_of_nothing_but_processes_goes_without_ticks() {
+    let Written { scene, .. } = read(
+        "scene = { duration = \"2s\" }\nobject = { mass = 0.3 }\n\
+         coordination = { strategy = \"average-position\", stiffness = 1000.0, update = \"8ms\" }\n\
+         peers = [{ name = \"a\", kind = \"udp\" }, { name = \"b\", kind = \"udp\" }]\n\
+         link = { delay = \"3ms\" }\nlinks = [{ from = \"b\", to = \"a\", loss = 1 }]\n"
+            .to_owned(),
+    );
+    let mut live = LiveScene::new(&scene, |_| None);
+    let mut drops = Drops::default();
+    assert_eq!(live.poll_timeout(), Some(millis(2000)));
+    let Ok(taken) = live.handle_sample(millis(10), 0, &sample(&scene, 0, 40, 0.1, 0.0), &mut drops);
+    assert_eq!(taken, Ok(millis(10)));
+    let Ok(taken) = live.handle_sample(millis(11), 1, &sample(&scene, 1, 0, 0.1, 0.0), &mut drops);
+    assert_eq!((taken, live.poll_timeout()), (Ok(millis(11)), Some(millis(11))));
+    let Ok(()) = live.handle_timeout(millis(11), &mut drops);
+    assert_eq!((drops.0, live.poll_timeout()), (1, Some(millis(13))));
+    let Ok(()) = live.handle_timeout(millis(13), &mut drops);
+    assert_eq!(live.poll_transmit().map(|transmit| (transmit.to, transmit.at)), Some((1, millis(13))));
+    // Nothing happens in between: only the sample itself can find that its peer was silent.
+    let Ok(taken) = live.handle_sample(millis(500), 0, &sample(&scene, 0, 0, 0.2, 0.0), &mut drops);
+    assert_eq!((taken, live.seat_stats(0).unwrap().joined), (Ok(millis(500)), 2));
+    let Ok(()) = live.handle_timeout(millis(2000), &mut drops);
+    assert_eq!((live.ended(), live.summary().ticks), (Some(Ending::Complete), 0));
 }

@@ -88,7 +88,8 @@ mod tests {
         let mut hand = SceneHand::new(Some(cohaptic_peer::Hand::Arm { arm, follows }), ORIGIN, beginning.clone());
         let mut homing = Waypoints::homing(Duration::ZERO);
         let at = |millis: u64| Instant::from_nanos(millis * 1_000_000);
-        assert_eq!(hand.force(at(500), ORIGIN, [0.0; 3]), homing.force(at(500), ORIGIN, [0.0; 3]));
+        let bits = |force: [f64; 3]| force.map(f64::to_bits);
+        assert_eq!(bits(hand.force(at(500), ORIGIN, [0.0; 3])), bits(homing.force(at(500), ORIGIN, [0.0; 3])));
         beginning.begin(at(6000));
         beginning.begin(at(9000));
         assert_eq!(beginning.since(at(6500)), Some(at(500)));

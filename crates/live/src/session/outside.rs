@@ -42,7 +42,7 @@ impl Outside {
             .zip(0..)
             .filter_map(|(peer, place)| {
                 let PeerKind::Udp(silence) = peer.kind else { return None };
-                Some((Seat { place: Place(place), name: peer.name.clone() }, silence.after))
+                Some((Seat { place: Place(place), name: peer.name.clone(), tick: peer.clock.tick }, silence.after))
             })
             .collect();
         // A seat is free to be taken again once every peer counts as silent that was not heard for so long.
@@ -52,12 +52,11 @@ impl Outside {
             return Err(SessionError::NotLoopback { address });
         }
         let peers = u32::try_from(scene.peers.len()).expect("a scene that runs has few peers");
-        let tick = scene.peers[0].clock.tick;
         let seats = seats.into_iter().map(|(seat, _)| seat).collect();
         let door = DoorConfig {
             stale_after,
             limits: Some(LIMITS),
-            ..DoorConfig::new(scene.seed, scene.axes.count(), peers, tick, scene.coordination.update, seats)
+            ..DoorConfig::new(scene.seed, scene.axes.count(), peers, scene.coordination.update, seats)
         };
         let door = Door::new(door.with_key(config.key.clone()), &mut SystemEntropy)?;
         let socket = UdpDoor::bind(address, udp::DoorConfig { receive_buffer: RECEIVE_BUFFER, largest: LARGEST, ..udp::DoorConfig::default() })?;

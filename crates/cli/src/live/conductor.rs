@@ -1,0 +1,45 @@
+//! Between a session and those who look on: nothing here waits.
+
+use std::sync::mpsc::Receiver;
+
+use cohaptic_live::{Conductor, LinkChange, Status};
+
+use super::status::snapshot;
+use crate::interrupt;
+use crate::realtime::{Edit, Look};
+
+/// Publishes the session and hands in what live control changes.
+pub(super) struct Host {
+    look: Option<Look>,
+    wanted: Receiver<Edit>,
+    /// The links in the order of the description.
+    pairs: Vec<(usize, usize)>,
+}
+
+impl Host {
+    pub(super) const fn new(look: Option<Look>, wanted: Receiver<Edit>, pairs: Vec<(usize, usize)>) -> Self {
+        Self { look, wanted, pairs }
+    }
+}
+
+impl Conductor for Host {
+    fn keep_going(&mut self) -> bool {
+        !interrupt::asked()
+    }
+
+    fn next_change(&mut self) -> Option<LinkChange> {
+        let Edit { link, keys, model } = self.wanted.try_recv().ok()?;
+        let (from, to) = *self.pairs.get(link)?;
+        Some(LinkChange { from, to, keys, model })
+    }
+
+    fn show(&mut self, status: Status) {
+        if let Some(look) = &self.look {
+            look.publish(snapshot(&status));
+        }
+    }
+
+    fn wants_status(&self) -> bool {
+        self.look.is_some()
+    }
+}

@@ -1,0 +1,118 @@
+//! `cohaptic live`.
+
+mod conductor;
+mod document;
+mod prepare;
+mod status;
+mod words;
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::mpsc::channel;
+use std::thread;
+use std::time::Duration;
+
+use cohaptic_control::Description;
+use cohaptic_live::{Report, Session, SessionConfig, SessionError, SessionKey, SystemEntropy};
+use cohaptic_scene::{LinkKeys, Scene, link_keys};
+use cohaptic_units::Instant;
+
+use crate::arguments::LiveArguments;
+use crate::failure::{Failure, INTERRUPTED};
+use crate::progress::Progress;
+use crate::realtime::{KeyedLinks, LiveControl};
+use crate::{interrupt, output};
+use conductor::Host;
+use document::Document;
+use prepare::ready_falcons;
+
+/// Runs a scene by the wall clock with whoever is attached, and says how it went.
+pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {
+    let (path, new_key) = (arguments.scene.as_deref(), arguments.new_key.as_deref());
+    match (path, new_key) {
+        (_, Some(file)) => make_key(file),
+        (Some(path), None) => run(arguments, path),
+        (None, None) => Err(Failure::Input("no scene was given".to_owned())),
+    }
+}
+
+fn make_key(file: &Path) -> Result<ExitCode, Failure> {
+    SessionKey::generate_to(file, &mut SystemEntropy).map_err(|error| Failure::System(error.to_string()))?;
+    output::text(&format!("{}: a new session key; only its owner can read it. Whoever has it can take part\n", output::path(file)))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
+    let overrides = &arguments.overrides.set;
+    let mut scene = Scene::read_live(path, overrides)?;
+    if let Some(length) = arguments.length {
+        scene.duration = length;
+    }
+    if scene.duration.is_zero() {
+        return Err(Failure::Input("--for 0s: expected more than nothing".to_owned()));
+    }
+    if let Some(reason) = cohaptic_harness::too_large(&scene) {
+        return Err(Failure::Input(format!("{}: {reason}", path.display())));
+    }
+    let keys = link_keys(path, overrides)?.into_values().collect();
+    let session = open(arguments, &scene)?;
+    let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
+    prepare::announce(&scene, session.address(), arguments.key_file.is_some());
+    let report = conduct(arguments, &scene, session, keys, path)?;
+    if arguments.json {
+        output::json(&Document::new(&scene, &report))?;
+    } else {
+        output::text(&words::describe(&scene, &report))?;
+    }
+    Ok(if interrupt::asked() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// Everything that must be had before time begins; `None` if the user did not want to wait for it.
+fn open(arguments: &LiveArguments, scene: &Scene) -> Result<Option<Session>, Failure> {
+    let real_time = &arguments.real_time;
+    let key = match &arguments.key_file {
+        None => None,
+        Some(file) => Some(SessionKey::read_from(file).map_err(|error| Failure::Input(error.to_string()))?),
+    };
+    let config = SessionConfig {
+        allow_remote: real_time.allow_remote,
+        key,
+        pacing: real_time.pacing(),
+        wishes: real_time.wishes(),
+        tolerance: real_time.tolerance(),
+        out: arguments.out.clone(),
+        ..SessionConfig::new(arguments.listen)
+    };
+    let Some(mut falcons) = ready_falcons(scene, arguments.firmware.as_deref(), real_time.wishes())? else { return Ok(None) };
+    Session::open(scene, config, |peer| falcons.take(peer)).map(Some).map_err(failure)
+}
+
+fn conduct(arguments: &LiveArguments, scene: &Scene, session: Session, keys: Vec<LinkKeys>, path: &Path) -> Result<Report, Failure> {
+    let pairs = status::pairs(scene);
+    let description: Description = status::description(scene, &pairs);
+    let (changes, wanted) = channel();
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let control = LiveControl::open(&arguments.real_time, description, Box::new(KeyedLinks { keys, folder, changes }))?;
+    let mut host = Host::new(control.look(), wanted, pairs);
+    let progress = Progress::through_scene(&scene.title, scene.duration);
+    let report = thread::scope(|scope| {
+        let running = thread::Builder::new().name("live".to_owned()).spawn_scoped(scope, move || session.run(&mut host));
+        let running = running.map_err(|error| Failure::System(format!("the session gets no thread: {error}")))?;
+        while !running.is_finished() {
+            // Not the thread that has to be on time.
+            thread::sleep(Duration::from_millis(50));
+            progress.reach(Instant::ZERO.saturating_add(control.latest().elapsed));
+        }
+        running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(failure)
+    });
+    progress.clear();
+    report
+}
+
+fn failure(error: SessionError) -> Failure {
+    match error {
+        SessionError::Record(error) => error.into(),
+        error if matches!(error, SessionError::Bind(_) | SessionError::System(_)) => Failure::System(error.to_string()),
+        error => Failure::Input(error.to_string()),
+    }
+}

@@ -1,0 +1,58 @@
+//! A session as live control shows it.
+
+use cohaptic_control::{Description, Kind, LinkCounters, LinkName, PeerName, PeerView, Presence as Shown, Snapshot};
+use cohaptic_harness::live::Presence;
+use cohaptic_live::session::{LinkStatus, PeerStatus};
+use cohaptic_live::{Refusal, Status};
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+
+use crate::realtime::{counters, quantiles, quantiles_of};
+
+/// Every directed link, by sender, then receiver.
+pub(super) fn pairs(scene: &Scene) -> Vec<(usize, usize)> {
+    let places = 0..scene.peers.len();
+    places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to).collect()
+}
+
+pub(super) fn description(scene: &Scene, pairs: &[(usize, usize)]) -> Description {
+    let name = |peer: usize| scene.peers[peer].name.clone();
+    Description {
+        kind: Kind::Live,
+        title: scene.title.clone(),
+        links: pairs
+            .iter()
+            .map(|(from, to)| LinkName { name: format!("{}->{}", name(*from), name(*to)), from: name(*from), to: name(*to) })
+            .collect(),
+        peers: scene.peers.iter().map(|peer| PeerName { name: peer.name.clone(), kind: peer.kind.name().to_owned() }).collect(),
+        clocks: vec!["tick".to_owned(), "release".to_owned()],
+    }
+}
+
+pub(super) fn snapshot(status: &Status) -> Snapshot {
+    Snapshot {
+        elapsed: status.elapsed,
+        invalid: (!status.validity.is_valid()).then(|| status.validity.to_string()),
+        lateness: vec![quantiles(&status.ticks), quantiles(&status.releases)],
+        links: status.links.iter().map(link).collect(),
+        peers: status.peers.iter().map(|peer| view(peer, Instant::ZERO.saturating_add(status.elapsed))).collect(),
+        refused: status.door.map_or_else(Vec::new, |door| {
+            let refused = door.refusals().filter(|(_, count)| *count > 0);
+            refused.map(|(cause, count): (Refusal, u64)| (cause.name(), count)).collect()
+        }),
+    }
+}
+
+fn link(link: &LinkStatus) -> LinkCounters {
+    LinkCounters { delivered_bytes: link.delivered_bytes, recent_delay: quantiles_of(&link.recent), ..counters(&link.stats) }
+}
+
+fn view(peer: &PeerStatus, now: Instant) -> PeerView {
+    let (status, age) = match peer.state.presence {
+        Presence::Here => (Shown::Here, None),
+        Presence::Absent => (Shown::Absent, None),
+        Presence::Present => (Shown::Present, None),
+        Presence::Stale(since) => (Shown::Stale, Some(now.saturating_duration_since(since))),
+    };
+    PeerView { status, age, position: peer.state.object.position.to_vec(), force: peer.force.to_vec() }
+}

@@ -1,0 +1,66 @@
+//! A session in words.
+
+use std::fmt::Write as _;
+
+use cohaptic_harness::Ending;
+use cohaptic_harness::live::SeatStats;
+use cohaptic_live::Report;
+use cohaptic_scene::Scene;
+use cohaptic_units::print::Span;
+
+use crate::documents::micros;
+use crate::realtime::{late, notes};
+use crate::run::words::{length, packets};
+
+pub(super) fn describe(scene: &Scene, report: &Report) -> String {
+    let mut text = format!("{}\n", scene.title);
+    // Writing to a string does not fail.
+    let mut line = |line: String| {
+        let _ = writeln!(text, "  {line}");
+    };
+    let summary = &report.summary;
+    let lasted = Span(summary.duration);
+    match summary.ending {
+        Ending::Complete => line(format!("{lasted}, {} ticks", summary.ticks)),
+        Ending::Diverged(at) => line(format!("DIVERGED: at {at} a position or a velocity is no finite number any more")),
+        Ending::Interrupted(_) => line(format!("ended after {lasted} of {}, {} ticks", Span(scene.duration), summary.ticks)),
+    }
+    line(format!("the run is {}", report.validity));
+    line(format!("lateness of ticks: {}", late(&report.ticks)));
+    if report.releases.count > 0 {
+        line(format!("lateness of {} datagrams to other programs: {}", report.releases.count, late(&report.releases)));
+    }
+    line(format!("at the end logical time was {:.1} µs behind the clock", micros(report.behind)));
+    line(format!("largest discrepancy between two copies: {}", length(summary.max_discrepancy)));
+    for ((peer, spec), seat) in summary.peers.iter().zip(&scene.peers).zip(&report.seats) {
+        let position: Vec<String> = peer.position.iter().map(|x| length(*x)).collect();
+        let seat = seat.as_ref().map(came).unwrap_or_default();
+        line(format!("{} ({}) ends at {}{seat}", peer.name, spec.kind.name(), position.join(", ")));
+    }
+    line(packets(summary));
+    if let Some((door, socket)) = &report.door {
+        line(format!("door at {}: {} samples let in, {} sent", socket.address, door.admitted, door.sent));
+        let refused: Vec<String> = door.refusals().filter(|(_, count)| *count > 0).map(|(cause, count)| format!("{count} {cause}")).collect();
+        if !refused.is_empty() {
+            line(format!("refused: {}", refused.join(", ")));
+        }
+        let lost = socket.counts.failures.in_all() + socket.counts.oversized + socket.kernel_drops.unwrap_or(0);
+        if lost > 0 {
+            line(format!("{lost} datagrams were lost at the socket"));
+        }
+    }
+    for file in report.files.iter().filter(|file| file.extension().is_some_and(|extension| extension == "svg")) {
+        line(format!("plot: {}", file.display()));
+    }
+    text.push_str(&notes(&report.prepared));
+    text
+}
+
+fn came(seat: &SeatStats) -> String {
+    let late = if seat.late > 0 { format!(", {} of them {:.0} µs late at most", seat.late, micros(seat.most_late)) } else { String::new() };
+    match seat.joined {
+        0 => "; it never came".to_owned(),
+        1 => format!("; {} samples taken{late}", seat.taken),
+        joined => format!("; it came {joined} times, {} samples taken{late}", seat.taken),
+    }
+}
