@@ -110,9 +110,9 @@ fn conduct(arguments: &LiveArguments, scene: &Scene, session: Session, keys: Vec
 }
 
 fn failure(error: SessionError) -> Failure {
-    match error {
-        SessionError::Record(error) => error.into(),
-        error if matches!(error, SessionError::Bind(_) | SessionError::System(_)) => Failure::System(error.to_string()),
-        error => Failure::Input(error.to_string()),
+    if let SessionError::Record(error) = error {
+        return error.into();
     }
+    let is_of_system = matches!(error, SessionError::Bind(_) | SessionError::System(_));
+    if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
 }
