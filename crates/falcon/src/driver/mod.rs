@@ -27,6 +27,8 @@ const BETWEEN_FAREWELLS: Duration = Duration::from_millis(2);
 const PATIENCE_WITH_FAULTS: u32 = 10;
 /// Implausible reports in a row after which they are believed, and homing is confirmed anew.
 const STUBBORN: u32 = 3;
+/// However long nothing was heard, an encoder may not have turned further than within this. A hand that did turn it further is believed at its third report.
+const LONGEST_LEAP: Duration = Duration::from_millis(3);
 /// Answers that may be on their way from packets before.
 const MOST_OWED: usize = 4;
 
@@ -296,9 +298,9 @@ impl<T: Transport> Driver<T> {
     /// A homed device cannot have moved so far: a byte was changed on its way into another that can be there.
     fn is_implausible(&self, report: &Report, now: Instant) -> bool {
         let Some(heard_at) = self.heard_at.filter(|_| self.homed_in_row > 0 && report.all_homed()) else { return false };
-        let milliseconds = u32::try_from(now.saturating_duration_since(heard_at).as_millis()).unwrap_or(u32::MAX);
-        let farthest = u64::from(self.config.fastest_encoder) * (u64::from(milliseconds) + 1);
-        report.encoders.iter().zip(self.status.encoders).any(|(new, old)| u64::from(new.abs_diff(old)) > farthest)
+        let passed = now.saturating_duration_since(heard_at).min(LONGEST_LEAP).as_micros();
+        let farthest = (u128::from(self.config.fastest_encoder) * passed).div_ceil(1000);
+        report.encoders.iter().zip(self.status.encoders).any(|(new, old)| u128::from(new.abs_diff(old)) > farthest)
     }
 
     fn locate(&mut self, report: &Report, now: Instant) {

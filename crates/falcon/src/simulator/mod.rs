@@ -78,7 +78,10 @@ impl Simulator {
     /// Lets time pass until `to`; nothing happens if that has passed.
     pub fn advance(&mut self, to: Instant) {
         while let Some((at, byte)) = self.chip.next_for_device(to) {
-            self.move_until(at);
+            // The grip need not be moved to where it is at a byte that nothing follows from.
+            if self.program.may_answer(byte) {
+                self.move_until(at);
+            }
             if self.plugged {
                 self.hear(at, byte);
             }

@@ -1,0 +1,154 @@
+//! What goes wrong on the way, and what becomes of it.
+
+use cohaptic_falcon::driver::{DriverConfig, DriverError, Phase};
+use cohaptic_falcon::protocol::Leds;
+use cohaptic_falcon::safety::ZeroCause;
+use cohaptic_falcon::simulator::{Faults, Simulator, SimulatorConfig};
+use cohaptic_falcon::transport::TransportError;
+
+use crate::common::{Bench, MILLISECOND, distance, in_device, running, seconds};
+
+fn active() -> Bench {
+    Bench::active(running(), [0.01, 0.0, 0.01], 0.5, DriverConfig::DEFAULT)
+}
+
+/// A weak spring, so that there is force to lose.
+fn spring(bench: &mut Bench, span: f64) -> Result<(), DriverError> {
+    bench.run(seconds(span), |_, status| Some(status.reading.map_or([0.0; 3], |reading| reading.position.map(|part| -100.0 * part))))
+}
+
+#[test]
+fn fragments_cost_time_and_nothing_else() {
+    let mut bench = active();
+    bench.simulator.with(|device| device.set_faults(Faults { fragment: 0.3, ..Faults::NONE }));
+    spring(&mut bench, 3.0).unwrap();
+    let statistics = *bench.driver.statistics();
+    assert_eq!((statistics.garbage_bytes, statistics.implausible, statistics.unhomed), (0, 0, 0));
+    assert!(statistics.reports > 1000);
+    assert_eq!(bench.driver.status().phase, Phase::Active);
+}
+
+#[test]
+fn garbage_is_counted_and_passed_by() {
+    for seed in 0..8 {
+        let mut bench = Bench::active(SimulatorConfig { seed, ..running() }, [0.01, 0.0, 0.01], 0.5, DriverConfig::DEFAULT);
+        let faults = Faults {
+            drop_to_host: 0.003,
+            garble_to_host: 0.003,
+            insert_to_host: 0.01,
+            drop_to_device: 0.002,
+            garble_to_device: 0.002,
+            ..Faults::NONE
+        };
+        bench.simulator.with(|device| device.set_faults(faults));
+        let simulator = bench.simulator.clone();
+        let (mut far, mut ticks) = (0, 0);
+        bench
+            .run(seconds(3.0), |_, status| {
+                ticks += 1;
+                if let Some(reading) = status.reading {
+                    // A bit that flips in a number may move an encoder by up to 300 counts, and be believed: that is 15 mm.
+                    let error = distance(in_device(reading.position), simulator.with(|device| device.position()));
+                    assert!(error < 0.02, "{error}");
+                    far += u32::from(error > 0.001);
+                }
+                Some([0.0, 0.0, 0.5])
+            })
+            .unwrap();
+        let statistics = *bench.driver.statistics();
+        // One packet in twelve is hurt on one way or the other.
+        assert!(statistics.garbage_bytes > 100 && statistics.timeouts > 20, "{statistics:?}");
+        assert!(statistics.reports > 1000, "{statistics:?}");
+        // Wrong and believed: rare.
+        assert!(far * 20 < ticks, "{far} of {ticks}");
+        bench.simulator.with(|device| device.set_faults(Faults::NONE));
+        spring(&mut bench, 0.2).unwrap();
+        let garbage = bench.driver.statistics().garbage_bytes;
+        spring(&mut bench, 0.5).unwrap();
+        assert_eq!(bench.driver.statistics().garbage_bytes, garbage);
+    }
+}
+
+#[test]
+fn a_lost_byte_does_not_lose_the_place() {
+    let mut bench = active();
+    for _ in 0..50 {
+        bench.simulator.with(|device| device.set_faults(Faults { drop_to_host: 0.2, ..Faults::NONE }));
+        bench.run(2 * MILLISECOND, |_, _| None).unwrap();
+        bench.simulator.with(|device| device.set_faults(Faults::NONE));
+        bench.run(10 * MILLISECOND, |_, _| None).unwrap();
+        let before = *bench.driver.statistics();
+        bench.run(10 * MILLISECOND, |_, _| None).unwrap();
+        let after = *bench.driver.statistics();
+        // Aligned again, and no answer late any more: one report for each exchange.
+        assert_eq!((after.garbage_bytes, after.timeouts), (before.garbage_bytes, before.timeouts));
+        assert_eq!(after.reports - before.reports, after.exchanges - before.exchanges);
+    }
+}
+
+#[test]
+fn unplugging_is_noticed_at_once_and_for_good() {
+    let mut bench = active();
+    spring(&mut bench, 0.2).unwrap();
+    assert!(bench.driver.status().motors.get() != [0; 3]);
+    bench.simulator.with(Simulator::unplug);
+    assert_eq!(spring(&mut bench, 0.1), Err(DriverError::Transport(TransportError::Unplugged)));
+    assert_eq!((bench.driver.status().phase, bench.driver.status().force), (Phase::Stopped, [0.0; 3]));
+    assert_eq!(bench.simulator.with(|device| device.motor_force()), [0.0; 3]);
+    // Plugged in again, it is another device: nothing goes to its motors.
+    bench.simulator.with(Simulator::power_cycle);
+    let _ = spring(&mut bench, 0.1);
+    assert_eq!(bench.driver.status().force, [0.0; 3]);
+    assert_eq!(bench.simulator.with(|device| device.observed().largest_count), 0);
+}
+
+#[test]
+fn a_device_that_falls_silent_gets_no_force_and_is_given_up() {
+    let mut bench = active();
+    spring(&mut bench, 0.2).unwrap();
+    bench.simulator.with(|device| device.set_faults(Faults { mute: true, ..Faults::NONE }));
+    let begin = bench.driver.now();
+    let error = spring(&mut bench, 5.0).unwrap_err();
+    assert!(matches!(error, DriverError::Silent { silence } if silence > seconds(1.0) && silence < seconds(1.1)), "{error:?}");
+    assert!(bench.driver.now() - begin < seconds(1.1));
+    assert!(bench.driver.statistics().zeroed_by(ZeroCause::StaleReading) > 100);
+    assert_eq!(bench.simulator.with(|device| device.motor_force()), [0.0; 3]);
+}
+
+#[test]
+fn losing_one_encoder_ends_force_until_it_is_homed_and_armed_again() {
+    for encoder in 0..3 {
+        let mut bench = active();
+        bench.run(seconds(0.2), |_, _| Some([0.0, 0.0, 1.0])).unwrap();
+        bench.simulator.with(|device| device.lose_homing(encoder));
+        // The packet that is on its way was made before the device said so; the next knows.
+        bench.run(3 * MILLISECOND, |_, _| Some([0.0, 0.0, 1.0])).unwrap();
+        bench
+            .run(seconds(0.2), |_, status| {
+                assert_eq!((status.force, status.phase, status.reading), ([0.0; 3], Phase::Homing, None));
+                Some([0.0, 0.0, 1.0])
+            })
+            .unwrap();
+        assert_eq!(bench.simulator.with(|device| device.leds()), Leds::RED);
+        assert_eq!(bench.driver.statistics().unhomed, 1);
+        // Through the index again, without going out: homed, not armed.
+        let now = bench.driver.now().as_nanos();
+        let path = [(1, 0.125), (500, 0.085), (1000, 0.125)].map(|(ms, z)| (core::time::Duration::from_nanos(now + ms * 1_000_000), [0.0, 0.0, z]));
+        bench.simulator.with(|device| device.set_hand(cohaptic_falcon::simulator::Waypoints::new(path)));
+        bench
+            .run(seconds(1.5), |_, status| {
+                assert_eq!(status.force, [0.0; 3]);
+                Some([0.0, 0.0, 1.0])
+            })
+            .unwrap();
+        assert_eq!(bench.driver.status().phase, Phase::Homed);
+        assert!(bench.driver.statistics().zeroed_by(ZeroCause::NotArmed) > 100);
+    }
+}
+
+#[test]
+fn a_device_without_firmware_is_silent() {
+    let mut bench = Bench::new(SimulatorConfig::default(), cohaptic_falcon::simulator::StillHand, DriverConfig::DEFAULT);
+    assert!(matches!(bench.run(seconds(3.0), |_, _| None), Err(DriverError::Silent { .. })));
+    assert_eq!(bench.driver.statistics().reports, 0);
+}
