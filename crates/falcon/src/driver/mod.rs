@@ -2,10 +2,12 @@
 
 mod config;
 mod statistics;
+mod status;
 mod velocity;
 
 pub use config::{DriverConfig, DriverConfigError};
 pub use statistics::Statistics;
+pub use status::{Phase, Reading, Setpoint, Status};
 pub use velocity::VelocityFilter;
 
 use core::time::Duration;
@@ -15,8 +17,8 @@ use thiserror::Error;
 
 use crate::ftdi::{self, PAYLOAD};
 use crate::kinematics::{Triple, angles_of_counts, forward_from};
-use crate::protocol::{Buttons, Command, Framer, Leds, Report};
-use crate::safety::{ForceGate, Moment, MotorCounts, Verdict, ZeroCause};
+use crate::protocol::{Command, Framer, Report};
+use crate::safety::{ForceGate, Moment, MotorCounts, Verdict};
 use crate::transport::{Transport, TransportError};
 
 /// How often zero force is sent when it stops.
@@ -31,87 +33,6 @@ const STUBBORN: u32 = 3;
 const LONGEST_LEAP: Duration = Duration::from_millis(3);
 /// Answers that may be on their way from packets before.
 const MOST_OWED: usize = 4;
-
-/// Where a device stands on its way to giving force.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Phase {
-    /// No report has come yet.
-    #[default]
-    Silent,
-    /// Not homed: pull the grip fully out, then push it fully in. Red.
-    Homing,
-    /// Homed, and forces are off: pull the grip out to switch them on. Blue.
-    Homed,
-    /// Homed, and forces asked for go out. Green.
-    Active,
-    /// Stopped: no force any more. Red.
-    Stopped,
-}
-
-impl Phase {
-    /// In a word.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Silent => "silent",
-            Self::Homing => "homing",
-            Self::Homed => "homed",
-            Self::Active => "active",
-            Self::Stopped => "stopped",
-        }
-    }
-
-    /// The lights that show it.
-    #[must_use]
-    pub const fn leds(self) -> Leds {
-        match self {
-            Self::Silent | Self::Homing | Self::Stopped => Leds::RED,
-            Self::Homed => Leds::BLUE,
-            Self::Active => Leds::GREEN,
-        }
-    }
-}
-
-/// A force that somebody wants, and when.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Setpoint {
-    /// The force on the grip \[N\].
-    pub force: Triple,
-    /// When it was asked for, on the transport's clock.
-    pub at: Instant,
-}
-
-/// Where the grip was.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Reading {
-    /// When the report came, on the transport's clock.
-    pub at: Instant,
-    /// Position \[m\] from the calibration's origin.
-    pub position: Triple,
-    /// Velocity \[m/s\], estimated by a [`VelocityFilter`].
-    pub velocity: Triple,
-}
-
-/// What is known after an exchange.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Status {
-    /// Where the device stands.
-    pub phase: Phase,
-    /// Which encoders the device says are homed; none before its first report.
-    pub homed: [bool; 3],
-    /// The last counts of the encoders.
-    pub encoders: [i16; 3],
-    /// Which buttons are pressed.
-    pub buttons: Buttons,
-    /// Where the grip is; `None` unless the device is homed beyond doubt.
-    pub reading: Option<Reading>,
-    /// The force that went out \[N\].
-    pub force: Triple,
-    /// Its motor counts.
-    pub motors: MotorCounts,
-    /// What became of the force that was asked for.
-    pub verdict: Verdict,
-}
 
 /// The driver of a device whose firmware runs: see [`crate::boot`].
 ///
@@ -151,23 +72,13 @@ impl<T: Transport> Driver<T> {
         let gate = ForceGate::new(config.limits, config.calibration).map_err(DriverConfigError::from)?;
         ftdi::set_up_running(&mut transport)?;
         let alive_at = transport.now();
-        let status = Status {
-            phase: Phase::Silent,
-            homed: [false; 3],
-            encoders: [0; 3],
-            buttons: Buttons::NONE,
-            reading: None,
-            force: [0.0; 3],
-            motors: MotorCounts::ZERO,
-            verdict: Verdict::Zero(ZeroCause::NotHomed),
-        };
         Ok(Self {
             transport,
             gate,
             framer: Framer::new(),
             filter: VelocityFilter::new(config.velocity_bandwidth),
             statistics: Statistics::default(),
-            status,
+            status: Status::UNKNOWN,
             heard_at: None,
             alive_at,
             position: None,
@@ -193,7 +104,7 @@ impl<T: Transport> Driver<T> {
         let outcome = self.exchange_once(wanted);
         if outcome.is_err() {
             self.gate.stop();
-            self.status.phase = Phase::Stopped;
+            (self.status.phase, self.status.armed) = (Phase::Stopped, false);
             (self.status.force, self.status.motors) = ([0.0; 3], MotorCounts::ZERO);
         }
         outcome.map(|()| &self.status)
@@ -267,6 +178,7 @@ impl<T: Transport> Driver<T> {
             }
         }
         self.status.phase = self.phase();
+        self.status.armed = self.armed && self.is_homed() && !self.gate.is_stopped();
         Ok(())
     }
 
@@ -374,7 +286,7 @@ impl<T: Transport> Driver<T> {
             return;
         }
         self.gate.stop();
-        self.status.phase = Phase::Stopped;
+        (self.status.phase, self.status.armed) = (Phase::Stopped, false);
         (self.status.force, self.status.motors) = ([0.0; 3], MotorCounts::ZERO);
         let packet = Command { motors: MotorCounts::ZERO, leds: Phase::Stopped.leds(), homing: true }.encode();
         for _ in 0..FAREWELLS {

@@ -191,3 +191,10 @@ mod threaded {
         assert!(FalconDevice::start(transport(), bad).unwrap_err().to_string().contains("bandwidth"));
     }
 }
+
+#[test]
+fn a_device_may_be_handed_to_another_thread() {
+    fn sent<D: Device<1> + Send>() {}
+    sent::<FalconDevice<1>>();
+    sent::<SteppedFalcon<SimulatedTransport, 1>>();
+}
