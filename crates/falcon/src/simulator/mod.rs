@@ -209,7 +209,12 @@ impl Simulator {
         self.hand = Box::new(hand);
     }
 
-    /// Loses the homing of one encoder, top, right or left, as if it had slipped.
+    /// Shifts the counts of one encoder, top, right or left, of which the device notices nothing.
+    pub fn slip(&mut self, encoder: usize, counts: i16) {
+        self.encoders.slip(encoder, counts);
+    }
+
+    /// Loses the homing of one encoder, top, right or left, and says so.
     pub const fn lose_homing(&mut self, encoder: usize) {
         self.encoders.lose(encoder);
     }

@@ -147,6 +147,32 @@ fn losing_one_encoder_ends_force_until_it_is_homed_and_armed_again() {
 }
 
 #[test]
+fn a_leap_is_not_believed_at_once_and_ends_force_when_it_is() {
+    let mut bench = active();
+    let pull = [0.0, 0.0, 1.0];
+    bench.run(seconds(0.2), |_, _| Some(pull)).unwrap();
+    let place = bench.driver.status().reading.unwrap().position;
+    bench.simulator.with(|device| device.slip(0, 700));
+    let mut seen = vec![];
+    bench
+        .run(seconds(0.1), |_, status| {
+            seen.push((status.reading.map(|reading| reading.position), status.force));
+            Some(pull)
+        })
+        .unwrap();
+    assert_eq!(bench.driver.statistics().implausible, 3);
+    // While it is not believed the old place stands; then there is none, and no force, until ten reports agree.
+    let leap = seen.iter().position(|(position, _)| position.is_none()).unwrap();
+    assert!(leap >= 3 && seen[..leap].iter().all(|(position, _)| distance(position.unwrap(), place) < 0.002));
+    let back = leap + seen[leap..].iter().position(|(position, _)| position.is_some()).unwrap();
+    assert_eq!(back - leap, 9);
+    // The force of an exchange is made before its report comes.
+    assert!(seen[leap + 1..back].iter().all(|(_, force)| *force == [0.0; 3]));
+    assert!(seen[back..].iter().all(|(position, _)| distance(position.unwrap(), place) > 0.01));
+    assert_eq!(seen.last().unwrap().1, pull);
+}
+
+#[test]
 fn a_device_without_firmware_is_silent() {
     let mut bench = Bench::new(SimulatorConfig::default(), cohaptic_falcon::simulator::StillHand, DriverConfig::DEFAULT);
     assert!(matches!(bench.run(seconds(3.0), |_, _| None), Err(DriverError::Silent { .. })));
