@@ -1,11 +1,13 @@
 //! One exchange after the other: a packet out, a report in, and everything in between that keeps a hand safe.
 
 mod config;
+mod error;
 mod statistics;
 mod status;
 mod velocity;
 
 pub use config::{DriverConfig, DriverConfigError};
+pub use error::DriverError;
 pub use statistics::Statistics;
 pub use status::{Phase, Reading, Setpoint, Status};
 pub use velocity::VelocityFilter;
@@ -13,7 +15,6 @@ pub use velocity::VelocityFilter;
 use core::time::Duration;
 
 use cohaptic_units::Instant;
-use thiserror::Error;
 
 use crate::ftdi::{self, PAYLOAD};
 use crate::kinematics::{Triple, angles_of_counts, forward_from};
@@ -31,8 +32,10 @@ const PATIENCE_WITH_FAULTS: u32 = 10;
 const STUBBORN: u32 = 3;
 /// However long nothing was heard, an encoder may not have turned further than within this. A hand that did turn it further is believed at its third report.
 const LONGEST_LEAP: Duration = Duration::from_millis(3);
-/// Answers that may be on their way from packets before.
-const MOST_OWED: usize = 4;
+/// Answers that may be on their way from packets before: what the chip's 256 bytes hold.
+const MOST_OWED: usize = 16;
+/// Exchanges that wait for answers still owed, until those are taken for lost.
+const WAITS: u32 = 3;
 
 /// The driver of a device whose firmware runs: see [`crate::boot`].
 ///
@@ -59,6 +62,7 @@ pub struct Driver<T: Transport> {
     implausible_in_row: u32,
     faults_in_row: u32,
     owed: usize,
+    waits: u32,
 }
 
 impl<T: Transport> Driver<T> {
@@ -88,6 +92,7 @@ impl<T: Transport> Driver<T> {
             implausible_in_row: 0,
             faults_in_row: 0,
             owed: 0,
+            waits: 0,
             config,
         })
     }
@@ -159,18 +164,17 @@ impl<T: Transport> Driver<T> {
             for byte in &bytes[..count] {
                 if let Some(report) = self.framer.push::<Report>(*byte) {
                     reports += 1;
-                    newest = Some(report);
+                    newest = Some((report, self.transport.now()));
                 }
             }
         }
         self.statistics.garbage_bytes = self.framer.garbage();
         self.statistics.reports += reports as u64;
         match newest {
-            Some(report) => {
-                // Answers still owed now never come; one that did not come in time makes all later ones late until it is read.
-                self.owed = 0;
+            Some((report, at)) => {
+                self.settle(reports);
                 self.faults_in_row = 0;
-                self.take(report);
+                self.take(report, at);
             }
             None => {
                 self.owed = (self.owed + 1).min(MOST_OWED);
@@ -182,8 +186,16 @@ impl<T: Transport> Driver<T> {
         Ok(())
     }
 
-    fn take(&mut self, report: Report) {
-        let now = self.transport.now();
+    /// An answer that did not come in time makes all later ones late until it is read; one that is lost is not waited for for ever.
+    fn settle(&mut self, reports: usize) {
+        self.owed = (self.owed + 1).saturating_sub(reports);
+        self.waits = if self.owed == 0 { 0 } else { self.waits + 1 };
+        if self.waits == WAITS {
+            (self.owed, self.waits) = (0, 0);
+        }
+    }
+
+    fn take(&mut self, report: Report, now: Instant) {
         self.alive_at = now;
         if self.is_implausible(&report, now) {
             self.statistics.implausible += 1;
@@ -328,22 +340,4 @@ impl<T: Transport> Drop for Driver<T> {
     fn drop(&mut self) {
         self.stop();
     }
-}
-
-/// The driver cannot go on.
-#[derive(Clone, Copy, PartialEq, Debug, Error)]
-#[non_exhaustive]
-pub enum DriverError {
-    /// A number of the configuration makes no sense.
-    #[error(transparent)]
-    Config(#[from] DriverConfigError),
-    /// The transport failed.
-    #[error(transparent)]
-    Transport(#[from] TransportError),
-    /// The device does not answer.
-    #[error("the device has not answered for {silence:?}: is its firmware loaded, and its power supply plugged in?")]
-    Silent {
-        /// For how long.
-        silence: Duration,
-    },
 }

@@ -62,7 +62,7 @@ pub struct Reading {
     pub at: Instant,
     /// Position \[m\] from the calibration's origin.
     pub position: Triple,
-    /// Velocity \[m/s\], estimated by a [`VelocityFilter`].
+    /// Velocity \[m/s\], estimated by a [`VelocityFilter`](super::VelocityFilter).
     pub velocity: Triple,
 }
 

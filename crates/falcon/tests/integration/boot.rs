@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::io::Write;
 
 use cohaptic_falcon::boot::{BootError, BootOptions, Firmware, Progress, ensure_loaded, is_loaded, load};
-use cohaptic_falcon::simulator::{Activity, Faults, SimulatedTransport, Simulator, SimulatorConfig, StillHand};
+use cohaptic_falcon::simulator::{Activity, Faults, SimulatedTransport, Simulator, SimulatorConfig, StillHand, Waypoints};
 use cohaptic_falcon::transport::{Transport, TransportError};
 
 /// As long as the image that everybody uses, and none of it.
@@ -125,4 +125,40 @@ fn an_unplugged_device_ends_it_at_once() {
         Progress::Loaded { .. } | Progress::Greeted(_) | Progress::Failed(_) | Progress::Running => {}
     });
     assert_eq!((outcome, attempts), (Err(BootError::Transport(TransportError::Unplugged)), 1));
+}
+
+#[test]
+fn a_broken_answer_does_not_spoil_the_next() {
+    for seed in 0..20 {
+        let faults = Faults { insert_to_host: 0.3, ..Faults::NONE };
+        let mut transport = transport(SimulatorConfig { seed, faults, ..switched_on() });
+        let simulator = transport.simulator();
+        let mut greetings = 0;
+        load(&mut transport, &Firmware::new(image()).unwrap(), &BootOptions::DEFAULT, &mut |progress| {
+            if let Progress::Greeted(count) = progress {
+                greetings = count;
+                simulator.with(|device| device.set_faults(Faults::NONE));
+            }
+        })
+        .unwrap();
+        // Four bytes stay whole with 0.7⁴ = 0.24; sixty greetings fail with less than 1e-7.
+        assert!(greetings <= 60, "seed {seed}: {greetings}");
+    }
+}
+
+#[test]
+fn asking_whether_firmware_runs_does_not_lose_the_homing() {
+    let config = SimulatorConfig { running: true, ..SimulatorConfig::default() };
+    let mut transport = SimulatedTransport::in_virtual_time(Simulator::new(config, Waypoints::homing(Duration::ZERO)));
+    let simulator = transport.simulator();
+    for _ in 0..100 {
+        // A look every 30 ms, while the hand moves the grip out and in.
+        assert_eq!(is_loaded(&mut transport, &BootOptions::DEFAULT), Ok(true));
+        let next = transport.now() + Duration::from_millis(30);
+        transport.sleep_until(next);
+    }
+    simulator.with(|device| {
+        assert_eq!(device.homed(), [true; 3]);
+        assert_eq!(device.observed().largest_count, 0);
+    });
 }

@@ -1,7 +1,7 @@
 //! What goes wrong on the way, and what becomes of it.
 
 use cohaptic_falcon::driver::{DriverConfig, DriverError, Phase};
-use cohaptic_falcon::protocol::Leds;
+use cohaptic_falcon::protocol::{Buttons, Leds};
 use cohaptic_falcon::safety::ZeroCause;
 use cohaptic_falcon::simulator::{Faults, Simulator, SimulatorConfig};
 use cohaptic_falcon::transport::TransportError;
@@ -87,6 +87,24 @@ fn a_lost_byte_does_not_lose_the_place() {
 }
 
 #[test]
+fn an_answer_that_came_late_makes_no_other_late() {
+    let config = DriverConfig { patience: 2 * MILLISECOND, ..DriverConfig::DEFAULT };
+    let mut bench = Bench::active(running(), [0.0; 3], 0.0, config);
+    for round in 0..40_u8 {
+        bench.simulator.with(|device| device.set_faults(Faults { fragment: 0.9, ..Faults::NONE }));
+        bench.run(20 * MILLISECOND, |_, _| None).unwrap();
+        bench.simulator.with(|device| device.set_faults(Faults::NONE));
+        bench.run(10 * MILLISECOND, |_, _| None).unwrap();
+        // What the device is like when a packet reaches it is in the report of that very exchange.
+        let buttons = Buttons::from_bits(round);
+        bench.simulator.with(|device| device.press(buttons));
+        assert_eq!(bench.driver.exchange(None).unwrap().buttons, buttons, "round {round}");
+    }
+    let timeouts = bench.driver.statistics().timeouts;
+    assert!(timeouts > 20, "{timeouts}");
+}
+
+#[test]
 fn unplugging_is_noticed_at_once_and_for_good() {
     let mut bench = active();
     spring(&mut bench, 0.2).unwrap();
@@ -113,6 +131,11 @@ fn a_device_that_falls_silent_gets_no_force_and_is_given_up() {
     assert!(bench.driver.now() - begin < seconds(1.1));
     assert!(bench.driver.statistics().zeroed_by(ZeroCause::StaleReading) > 100);
     assert_eq!(bench.simulator.with(|device| device.motor_force()), [0.0; 3]);
+    // It answers again, homed as it was: what was given up stays so.
+    bench.simulator.with(|device| device.set_faults(Faults::NONE));
+    spring(&mut bench, 0.2).unwrap();
+    assert_eq!(bench.driver.status().homed, [true; 3]);
+    assert_eq!((bench.driver.status().phase, bench.driver.status().force), (Phase::Stopped, [0.0; 3]));
 }
 
 #[test]
@@ -157,6 +180,8 @@ fn a_leap_is_not_believed_at_once_and_ends_force_when_it_is() {
     bench
         .run(seconds(0.1), |_, status| {
             seen.push((status.reading.map(|reading| reading.position), status.force));
+            // The leap is no motion: the hand moves at some centimetres a second.
+            assert!(status.reading.is_none_or(|reading| distance(reading.velocity, [0.0; 3]) < 0.2), "{status:?}");
             Some(pull)
         })
         .unwrap();
