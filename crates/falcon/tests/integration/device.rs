@@ -112,8 +112,9 @@ mod threaded {
 
     /// Homed and active without waiting for a hand.
     fn quick() -> (FalconDevice<1>, cohaptic_falcon::simulator::SharedSimulator) {
-        let path = [(0, 0.10), (60, 0.115), (120, 0.125)].map(|(ms, z)| (Duration::from_millis(ms), [0.0, 0.0, z]));
-        let transport = SimulatedTransport::in_real_time(Simulator::new(running(), Waypoints::new(path)));
+        // It sways across the index for ever: however late the thread begins, it will be homed.
+        let hand = Waypoints::new([(Duration::ZERO, [0.0, 0.0, 0.110])]).swaying([0.0, 0.0, 0.010], 2.0);
+        let transport = SimulatedTransport::in_real_time(Simulator::new(running(), hand));
         let simulator = transport.simulator();
         let driver = DriverConfig { arm_beyond: None, longest_silence: seconds(60.0), ..DriverConfig::DEFAULT };
         let falcon = FalconDevice::start(transport, DeviceConfig { driver, ..config([Axis::Z]) }).unwrap();
