@@ -27,6 +27,8 @@ pub struct Snapshot {
     pub at: Instant,
     /// Where the device stands.
     pub phase: Phase,
+    /// Whether the device is homed and the user has switched forces on since.
+    pub armed: bool,
     /// Which encoders are homed.
     pub homed: [bool; 3],
     /// The counts of the encoders.
@@ -48,14 +50,14 @@ pub(super) const WORDS: usize = 5 + 9 + 12 + ZeroCause::ALL.len() + 3;
 
 impl Snapshot {
     pub(super) fn new(at: Instant, status: &Status, statistics: &Statistics, timing: LoopStatistics) -> Self {
-        let Status { phase, homed, encoders, buttons, reading, force, motors: _, verdict: _ } = *status;
-        Self { at, phase, homed, encoders, buttons, reading, force, statistics: *statistics, timing }
+        let Status { phase, armed, homed, encoders, buttons, reading, force, motors: _, verdict: _ } = *status;
+        Self { at, phase, armed, homed, encoders, buttons, reading, force, statistics: *statistics, timing }
     }
 
-    /// Whether forces that are asked for go out, or would.
+    /// Whether a peer may begin: it is known where the grip is, and forces that are asked for go out.
     #[must_use]
     pub const fn is_ready(&self) -> bool {
-        matches!(self.phase, Phase::Homed | Phase::Active) && self.reading.is_some()
+        self.armed && self.reading.is_some()
     }
 
     pub(super) fn to_words(self) -> [u64; WORDS] {
@@ -85,7 +87,7 @@ impl Snapshot {
             saturated,
             farewells,
         } = self.statistics;
-        let flags = phase | homed << 8 | u64::from(self.buttons.bits()) << 16 | u64::from(self.reading.is_some()) << 24;
+        let flags = phase | homed << 8 | u64::from(self.buttons.bits()) << 16 | u64::from(self.reading.is_some()) << 24 | u64::from(self.armed) << 32;
         let vectors = [reading.position, reading.velocity, self.force];
         let counters = [exchanges, reports, timeouts, garbage_bytes, faults, implausible, unlocated, unhomed, limited, slewed, saturated, farewells];
         let worst = u64::try_from(self.timing.worst.as_nanos()).unwrap_or(u64::MAX);
@@ -130,6 +132,7 @@ impl Snapshot {
                 4 => Phase::Stopped,
                 _ => Phase::Silent,
             },
+            armed: byte(32) == 1,
             homed: [0, 1, 2].map(|bit| byte(8) >> bit & 1 == 1),
             encoders: [0, 16, 32].map(|shift| {
                 let [low, high, ..] = (encoders >> shift).to_le_bytes();
@@ -175,6 +178,7 @@ mod tests {
             let snapshot = Snapshot {
                 at: Instant::from_nanos(9),
                 phase,
+                armed: phase == Phase::Homed,
                 homed: [true, false, true],
                 encoders: [-1, i16::MIN, 77],
                 buttons: Buttons::from_bits(0xA),

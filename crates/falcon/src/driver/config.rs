@@ -29,7 +29,7 @@ pub struct DriverConfig {
 }
 
 impl DriverConfig {
-    /// 3 ms for a report, 1 s of silence, 30 Hz, ten confirmations, 200 counts per ms (about 6 m/s), forces on beyond 170 mm, as existing programs have it.
+    /// 3 ms for a report, 1 s of silence, 30 Hz, ten confirmations, 100 counts per ms (about 3 m/s), forces on beyond 170 mm, as existing programs have it.
     pub const DEFAULT: Self = Self {
         calibration: Calibration::DEFAULT,
         limits: Limits::DEFAULT,
@@ -37,7 +37,7 @@ impl DriverConfig {
         longest_silence: Duration::from_secs(1),
         velocity_bandwidth: 30.0,
         homing_confirmations: 10,
-        fastest_encoder: 200,
+        fastest_encoder: 100,
         arm_beyond: Some(0.170),
     };
 

@@ -1,22 +1,25 @@
 //! One exchange after the other: a packet out, a report in, and everything in between that keeps a hand safe.
 
 mod config;
+mod error;
 mod statistics;
+mod status;
 mod velocity;
 
 pub use config::{DriverConfig, DriverConfigError};
+pub use error::DriverError;
 pub use statistics::Statistics;
+pub use status::{Phase, Reading, Setpoint, Status};
 pub use velocity::VelocityFilter;
 
 use core::time::Duration;
 
 use cohaptic_units::Instant;
-use thiserror::Error;
 
 use crate::ftdi::{self, PAYLOAD};
 use crate::kinematics::{Triple, angles_of_counts, forward_from};
-use crate::protocol::{Buttons, Command, Framer, Leds, Report};
-use crate::safety::{ForceGate, Moment, MotorCounts, Verdict, ZeroCause};
+use crate::protocol::{Command, Framer, Report};
+use crate::safety::{ForceGate, Moment, MotorCounts, Verdict};
 use crate::transport::{Transport, TransportError};
 
 /// How often zero force is sent when it stops.
@@ -27,89 +30,12 @@ const BETWEEN_FAREWELLS: Duration = Duration::from_millis(2);
 const PATIENCE_WITH_FAULTS: u32 = 10;
 /// Implausible reports in a row after which they are believed, and homing is confirmed anew.
 const STUBBORN: u32 = 3;
-/// Answers that may be on their way from packets before.
-const MOST_OWED: usize = 4;
-
-/// Where a device stands on its way to giving force.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Phase {
-    /// No report has come yet.
-    #[default]
-    Silent,
-    /// Not homed: pull the grip fully out, then push it fully in. Red.
-    Homing,
-    /// Homed, and forces are off: pull the grip out to switch them on. Blue.
-    Homed,
-    /// Homed, and forces asked for go out. Green.
-    Active,
-    /// Stopped: no force any more. Red.
-    Stopped,
-}
-
-impl Phase {
-    /// In a word.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Silent => "silent",
-            Self::Homing => "homing",
-            Self::Homed => "homed",
-            Self::Active => "active",
-            Self::Stopped => "stopped",
-        }
-    }
-
-    /// The lights that show it.
-    #[must_use]
-    pub const fn leds(self) -> Leds {
-        match self {
-            Self::Silent | Self::Homing | Self::Stopped => Leds::RED,
-            Self::Homed => Leds::BLUE,
-            Self::Active => Leds::GREEN,
-        }
-    }
-}
-
-/// A force that somebody wants, and when.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Setpoint {
-    /// The force on the grip \[N\].
-    pub force: Triple,
-    /// When it was asked for, on the transport's clock.
-    pub at: Instant,
-}
-
-/// Where the grip was.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Reading {
-    /// When the report came, on the transport's clock.
-    pub at: Instant,
-    /// Position \[m\] from the calibration's origin.
-    pub position: Triple,
-    /// Velocity \[m/s\], estimated by a [`VelocityFilter`].
-    pub velocity: Triple,
-}
-
-/// What is known after an exchange.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Status {
-    /// Where the device stands.
-    pub phase: Phase,
-    /// Which encoders the device says are homed; none before its first report.
-    pub homed: [bool; 3],
-    /// The last counts of the encoders.
-    pub encoders: [i16; 3],
-    /// Which buttons are pressed.
-    pub buttons: Buttons,
-    /// Where the grip is; `None` unless the device is homed beyond doubt.
-    pub reading: Option<Reading>,
-    /// The force that went out \[N\].
-    pub force: Triple,
-    /// Its motor counts.
-    pub motors: MotorCounts,
-    /// What became of the force that was asked for.
-    pub verdict: Verdict,
-}
+/// However long nothing was heard, an encoder may not have turned further than within this. A hand that did turn it further is believed at its third report.
+const LONGEST_LEAP: Duration = Duration::from_millis(3);
+/// Answers that may be on their way from packets before: what the chip's 256 bytes hold.
+const MOST_OWED: usize = 16;
+/// Exchanges that wait for answers still owed, until those are taken for lost.
+const WAITS: u32 = 3;
 
 /// The driver of a device whose firmware runs: see [`crate::boot`].
 ///
@@ -136,6 +62,7 @@ pub struct Driver<T: Transport> {
     implausible_in_row: u32,
     faults_in_row: u32,
     owed: usize,
+    waits: u32,
 }
 
 impl<T: Transport> Driver<T> {
@@ -149,23 +76,13 @@ impl<T: Transport> Driver<T> {
         let gate = ForceGate::new(config.limits, config.calibration).map_err(DriverConfigError::from)?;
         ftdi::set_up_running(&mut transport)?;
         let alive_at = transport.now();
-        let status = Status {
-            phase: Phase::Silent,
-            homed: [false; 3],
-            encoders: [0; 3],
-            buttons: Buttons::NONE,
-            reading: None,
-            force: [0.0; 3],
-            motors: MotorCounts::ZERO,
-            verdict: Verdict::Zero(ZeroCause::NotHomed),
-        };
         Ok(Self {
             transport,
             gate,
             framer: Framer::new(),
             filter: VelocityFilter::new(config.velocity_bandwidth),
             statistics: Statistics::default(),
-            status,
+            status: Status::UNKNOWN,
             heard_at: None,
             alive_at,
             position: None,
@@ -175,6 +92,7 @@ impl<T: Transport> Driver<T> {
             implausible_in_row: 0,
             faults_in_row: 0,
             owed: 0,
+            waits: 0,
             config,
         })
     }
@@ -191,7 +109,7 @@ impl<T: Transport> Driver<T> {
         let outcome = self.exchange_once(wanted);
         if outcome.is_err() {
             self.gate.stop();
-            self.status.phase = Phase::Stopped;
+            (self.status.phase, self.status.armed) = (Phase::Stopped, false);
             (self.status.force, self.status.motors) = ([0.0; 3], MotorCounts::ZERO);
         }
         outcome.map(|()| &self.status)
@@ -246,18 +164,17 @@ impl<T: Transport> Driver<T> {
             for byte in &bytes[..count] {
                 if let Some(report) = self.framer.push::<Report>(*byte) {
                     reports += 1;
-                    newest = Some(report);
+                    newest = Some((report, self.transport.now()));
                 }
             }
         }
         self.statistics.garbage_bytes = self.framer.garbage();
         self.statistics.reports += reports as u64;
         match newest {
-            Some(report) => {
-                // Answers still owed now never come; one that did not come in time makes all later ones late until it is read.
-                self.owed = 0;
+            Some((report, at)) => {
+                self.settle(reports);
                 self.faults_in_row = 0;
-                self.take(report);
+                self.take(report, at);
             }
             None => {
                 self.owed = (self.owed + 1).min(MOST_OWED);
@@ -265,11 +182,20 @@ impl<T: Transport> Driver<T> {
             }
         }
         self.status.phase = self.phase();
+        self.status.armed = self.armed && self.is_homed() && !self.gate.is_stopped();
         Ok(())
     }
 
-    fn take(&mut self, report: Report) {
-        let now = self.transport.now();
+    /// An answer that did not come in time makes all later ones late until it is read; one that is lost is not waited for for ever.
+    fn settle(&mut self, reports: usize) {
+        self.owed = (self.owed + 1).saturating_sub(reports);
+        self.waits = if self.owed == 0 { 0 } else { self.waits + 1 };
+        if self.waits == WAITS {
+            (self.owed, self.waits) = (0, 0);
+        }
+    }
+
+    fn take(&mut self, report: Report, now: Instant) {
         self.alive_at = now;
         if self.is_implausible(&report, now) {
             self.statistics.implausible += 1;
@@ -296,9 +222,9 @@ impl<T: Transport> Driver<T> {
     /// A homed device cannot have moved so far: a byte was changed on its way into another that can be there.
     fn is_implausible(&self, report: &Report, now: Instant) -> bool {
         let Some(heard_at) = self.heard_at.filter(|_| self.homed_in_row > 0 && report.all_homed()) else { return false };
-        let milliseconds = u32::try_from(now.saturating_duration_since(heard_at).as_millis()).unwrap_or(u32::MAX);
-        let farthest = u64::from(self.config.fastest_encoder) * (u64::from(milliseconds) + 1);
-        report.encoders.iter().zip(self.status.encoders).any(|(new, old)| u64::from(new.abs_diff(old)) > farthest)
+        let passed = now.saturating_duration_since(heard_at).min(LONGEST_LEAP).as_micros();
+        let farthest = (u128::from(self.config.fastest_encoder) * passed).div_ceil(1000);
+        report.encoders.iter().zip(self.status.encoders).any(|(new, old)| u128::from(new.abs_diff(old)) > farthest)
     }
 
     fn locate(&mut self, report: &Report, now: Instant) {
@@ -372,7 +298,7 @@ impl<T: Transport> Driver<T> {
             return;
         }
         self.gate.stop();
-        self.status.phase = Phase::Stopped;
+        (self.status.phase, self.status.armed) = (Phase::Stopped, false);
         (self.status.force, self.status.motors) = ([0.0; 3], MotorCounts::ZERO);
         let packet = Command { motors: MotorCounts::ZERO, leds: Phase::Stopped.leds(), homing: true }.encode();
         for _ in 0..FAREWELLS {
@@ -414,22 +340,4 @@ impl<T: Transport> Drop for Driver<T> {
     fn drop(&mut self) {
         self.stop();
     }
-}
-
-/// The driver cannot go on.
-#[derive(Clone, Copy, PartialEq, Debug, Error)]
-#[non_exhaustive]
-pub enum DriverError {
-    /// A number of the configuration makes no sense.
-    #[error(transparent)]
-    Config(#[from] DriverConfigError),
-    /// The transport failed.
-    #[error(transparent)]
-    Transport(#[from] TransportError),
-    /// The device does not answer.
-    #[error("the device has not answered for {silence:?}: is its firmware loaded, and its power supply plugged in?")]
-    Silent {
-        /// For how long.
-        silence: Duration,
-    },
 }

@@ -1,8 +1,6 @@
 //! Lengths, angles and counts of the device.
 
-use core::f64::consts::PI;
-
-use libm::{cos, sin};
+use core::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// Length of an arm, from the motor's drum to the knee \[m\].
 pub(super) const ARM: f64 = 0.060;
@@ -40,11 +38,9 @@ pub fn count_of_angle(angle: f64) -> f64 {
     (angle * (180.0 / PI) - HOME_ANGLE) / DEGREES_PER_COUNT
 }
 
-/// Cosine and sine of a leg's azimuth.
-pub(super) fn azimuth(place: usize) -> (f64, f64) {
-    let angle = AZIMUTHS[place] * (PI / 180.0);
-    (cos(angle), sin(angle))
-}
+/// Cosine and sine of each leg's azimuth.
+pub(super) const DIRECTIONS: [(f64, f64); 3] =
+    [(-0.258_819_045_102_520_74, 0.965_925_826_289_068_3), (0.965_925_826_289_068_3, -0.258_819_045_102_520_74), (-FRAC_1_SQRT_2, -FRAC_1_SQRT_2)];
 
 #[cfg(test)]
 mod tests {
@@ -55,6 +51,13 @@ mod tests {
         // Published as 9880.70 counts and 0.036434659 degrees.
         assert!((COUNTS_PER_TURN - 9880.70).abs() < 0.005);
         assert!((DEGREES_PER_COUNT - 0.036_434_659).abs() < 0.51e-9);
+    }
+
+    #[test]
+    fn directions_are_those_of_the_azimuths() {
+        for (azimuth, (cosine, sine)) in AZIMUTHS.into_iter().zip(DIRECTIONS) {
+            assert!((azimuth.to_radians().cos() - cosine).abs() < 3e-16 && (azimuth.to_radians().sin() - sine).abs() < 3e-16);
+        }
     }
 
     #[test]

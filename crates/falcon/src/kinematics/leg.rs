@@ -3,7 +3,7 @@
 use libm::{acos, atan2, cos, hypot, sin, sqrt};
 
 use super::Triple;
-use super::geometry::{ARM, C, ENDS, F, R, S, SHIN, azimuth};
+use super::geometry::{ARM, C, DIRECTIONS, ENDS, F, R, S, SHIN};
 
 /// The grip as one leg sees it.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +20,7 @@ pub(super) struct Leg {
 
 impl Leg {
     pub(super) fn at(place: usize, [x, y, z]: Triple) -> Self {
-        let (cos_azimuth, sin_azimuth) = azimuth(place);
+        let (cos_azimuth, sin_azimuth) = DIRECTIONS[place];
         let u = cos_azimuth * x + sin_azimuth * y - R;
         let v = -sin_azimuth * x + cos_azimuth * y - S;
         Self { across: u + C, out: z, cos_tilt: (v + F) / SHIN, cos_azimuth, sin_azimuth }

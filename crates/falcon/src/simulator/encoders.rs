@@ -12,6 +12,8 @@ pub(super) struct Encoders {
     counts: Triple,
     offsets: [i64; 3],
     homed: [bool; 3],
+    /// Counts by which each has slipped since, unnoticed.
+    slipped: [i64; 3],
 }
 
 impl Encoders {
@@ -22,7 +24,7 @@ impl Encoders {
             if dice.byte().is_multiple_of(2) { size } else { -size }
         };
         let offsets = [offset(), offset(), offset()];
-        Self { index, counts, offsets, homed: [false; 3] }
+        Self { index, counts, offsets, homed: [false; 3], slipped: [0; 3] }
     }
 
     /// The arms have turned. An encoder that passes its index while the host asks for homing is homed.
@@ -38,7 +40,7 @@ impl Encoders {
     #[expect(clippy::cast_possible_truncation, reason = "a counter of sixteen bits wraps")]
     pub(super) fn read(&self) -> [i16; 3] {
         core::array::from_fn(|encoder| {
-            let offset = if self.homed[encoder] { 0 } else { self.offsets[encoder] };
+            let offset = if self.homed[encoder] { self.slipped[encoder] } else { self.offsets[encoder] };
             (libm::rint(self.counts[encoder]) as i64 + offset) as i16
         })
     }
@@ -49,6 +51,12 @@ impl Encoders {
 
     pub(super) const fn forget(&mut self) {
         self.homed = [false; 3];
+    }
+
+    pub(super) fn slip(&mut self, encoder: usize, counts: i16) {
+        if let Some(slipped) = self.slipped.get_mut(encoder) {
+            *slipped += i64::from(counts);
+        }
     }
 
     pub(super) const fn lose(&mut self, encoder: usize) {

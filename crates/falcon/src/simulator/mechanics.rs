@@ -18,6 +18,8 @@ pub(super) struct Mechanics {
     velocity: Triple,
     /// The angles of the arms there.
     angles: Triple,
+    /// And how they change; nothing where an arm has no say.
+    jacobian: Option<Jacobian>,
 }
 
 impl Mechanics {
@@ -25,7 +27,7 @@ impl Mechanics {
     pub(super) fn new(config: MechanicsConfig, position: Triple) -> Self {
         let middle = [0.0, 0.0, 0.11];
         let (position, angles) = inverse(position).map_or_else(|| (middle, inverse(middle).unwrap_or_default()), |angles| (position, angles));
-        Self { config, at: Instant::ZERO, position, velocity: [0.0; 3], angles }
+        Self { config, at: Instant::ZERO, position, velocity: [0.0; 3], angles, jacobian: Jacobian::at(position) }
     }
 
     pub(super) const fn at(&self) -> Instant {
@@ -47,7 +49,7 @@ impl Mechanics {
 
     /// The force on the grip that torques make where it is.
     pub(super) fn force_of(&self, torques: Triple) -> Triple {
-        Jacobian::at(self.position).map_or([0.0; 3], |jacobian| jacobian.force(torques))
+        self.jacobian.map_or([0.0; 3], |jacobian| jacobian.force(torques))
     }
 
     /// The next step on the way to `to`; `None` when that is reached.
@@ -61,7 +63,7 @@ impl Mechanics {
         let seconds = span.as_secs_f64();
         let pull = hand.force(self.at, self.position, self.velocity);
         self.at += span;
-        let Some(jacobian) = Jacobian::at(self.position) else { return self.velocity = [0.0; 3] };
+        let Some(jacobian) = self.jacobian else { return self.velocity = [0.0; 3] };
         let turning = jacobian.turning(self.velocity);
         let torques = core::array::from_fn(|arm| motors[arm] + self.stop(arm, turning[arm]));
         let arms = jacobian.force(torques);
@@ -75,8 +77,8 @@ impl Mechanics {
         velocity = if speed > lost { velocity.map(|part| part * (1.0 - lost / speed)) } else { [0.0; 3] };
         let position = core::array::from_fn(|axis| self.position[axis] + velocity[axis] * seconds);
         // A hand that pulls with a force no device was built for ends at a wall.
-        match inverse(position).filter(|_| Jacobian::at(position).is_some() && velocity.iter().all(|part| part.is_finite())) {
-            Some(angles) => (self.position, self.velocity, self.angles) = (position, velocity, angles),
+        match inverse(position).zip(Jacobian::at(position)).filter(|_| velocity.iter().all(|part| part.is_finite())) {
+            Some((angles, jacobian)) => (self.position, self.velocity, self.angles, self.jacobian) = (position, velocity, angles, Some(jacobian)),
             None => self.velocity = [0.0; 3],
         }
     }

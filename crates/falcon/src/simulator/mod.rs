@@ -78,7 +78,10 @@ impl Simulator {
     /// Lets time pass until `to`; nothing happens if that has passed.
     pub fn advance(&mut self, to: Instant) {
         while let Some((at, byte)) = self.chip.next_for_device(to) {
-            self.move_until(at);
+            // The grip need not be moved to where it is at a byte that nothing follows from.
+            if self.program.may_answer(byte) {
+                self.move_until(at);
+            }
             if self.plugged {
                 self.hear(at, byte);
             }
@@ -206,7 +209,12 @@ impl Simulator {
         self.hand = Box::new(hand);
     }
 
-    /// Loses the homing of one encoder, top, right or left, as if it had slipped.
+    /// Shifts the counts of one encoder, top, right or left, of which the device notices nothing.
+    pub fn slip(&mut self, encoder: usize, counts: i16) {
+        self.encoders.slip(encoder, counts);
+    }
+
+    /// Loses the homing of one encoder, top, right or left, and says so.
     pub const fn lose_homing(&mut self, encoder: usize) {
         self.encoders.lose(encoder);
     }

@@ -8,7 +8,7 @@ use crate::boot::Firmware;
 use crate::calibration::MOTOR_LIMIT;
 use crate::ftdi::{BAUD_HANDSHAKE, BAUD_LOADING, BAUD_RUNNING};
 use crate::kinematics::Triple;
-use crate::protocol::{Buttons, CommandParts, Framer, Leds, PACKET, Report};
+use crate::protocol::{Buttons, CommandParts, END, Framer, Leds, PACKET, Report};
 
 /// What the processor is at.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -96,6 +96,11 @@ impl Program {
             buttons: Buttons::NONE,
             observed: Observed::default(),
         }
+    }
+
+    /// Whether something may follow from that byte: the firmware answers the last byte of a packet alone.
+    pub(super) fn may_answer(&self, byte: u8) -> bool {
+        self.activity != Activity::Running || byte == END
     }
 
     /// A pulse of DTR at 9600 baud: the boot loader begins anew, whatever ran.

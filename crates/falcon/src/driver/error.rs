@@ -1,0 +1,26 @@
+//! Why a driver gives up.
+
+use core::time::Duration;
+
+use thiserror::Error;
+
+use super::DriverConfigError;
+use crate::transport::TransportError;
+
+/// The driver cannot go on.
+#[derive(Clone, Copy, PartialEq, Debug, Error)]
+#[non_exhaustive]
+pub enum DriverError {
+    /// A number of the configuration makes no sense.
+    #[error(transparent)]
+    Config(#[from] DriverConfigError),
+    /// The transport failed.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// The device does not answer.
+    #[error("the device has not answered for {silence:?}: is its firmware loaded, and its power supply plugged in?")]
+    Silent {
+        /// For how long.
+        silence: Duration,
+    },
+}
