@@ -158,7 +158,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
     }
 
     /// Everything that happens at an instant at which a peer ticks.
-    #[inline]
+    #[inline(always)]
     fn tick<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
         self.now = now;
         if !self.changes.is_empty() {

@@ -324,7 +324,9 @@ mod tests {
                     assert_eq!(links.len(), 1);
                     assert_eq!(links[&(link.from, link.to)].model(Path::new("")).unwrap(), *link.config);
                 }
-                other => panic!("{other:?}"),
+                other @ (crate::ChangeKind::Contact { .. } | crate::ChangeKind::Hand { .. } | crate::ChangeKind::Coordination(_)) => {
+                    panic!("{other:?}")
+                }
             }
         }
     }
