@@ -66,28 +66,27 @@ struct Member<const A: usize, S> {
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "most peers of most scenes are the large variant, and a box would cost a cache miss a tick")]
 enum DeviceModel<const A: usize> {
-    Resting(RestingDevice<A>),
+    /// Nobody simulates it: it stays where it is or, in a live session, is in somebody's hand. One variant, so that the others' ticks decide between two.
+    Resting(RestingDevice<A>, Option<Box<HandDevice<A>>>),
     Simulated(SimulatedDevice<A>),
-    /// In somebody's hand.
-    Hand(HandDevice<A>),
 }
 
 impl<const A: usize> Device<A> for DeviceModel<A> {
     #[inline]
     fn state(&self) -> State<A> {
         match self {
-            Self::Resting(device) => device.state(),
+            Self::Resting(device, None) => device.state(),
+            Self::Resting(_, Some(hand)) => hand.state(),
             Self::Simulated(device) => device.state(),
-            Self::Hand(device) => device.state(),
         }
     }
 
     #[inline]
     fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
         match self {
-            Self::Resting(device) => device.advance(now, span, coupling_force),
+            Self::Resting(device, None) => device.advance(now, span, coupling_force),
+            Self::Resting(_, Some(hand)) => hand.advance(now, span, coupling_force),
             Self::Simulated(device) => device.advance(now, span, coupling_force),
-            Self::Hand(device) => device.advance(now, span, coupling_force),
         }
     }
 }
@@ -158,7 +157,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
     }
 
     /// Everything that happens at an instant at which a peer ticks.
-    #[inline]
+    #[inline(always)]
     fn tick<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
         self.now = now;
         if !self.changes.is_empty() {
@@ -223,7 +222,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
                 ChangeKind::Contact { peer, contact } => self.members[peer].peer.set_contact(contact),
                 ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
                     DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
-                    DeviceModel::Resting(_) | DeviceModel::Hand(_) => {}
+                    DeviceModel::Resting(..) => {}
                 },
                 ChangeKind::Coordination(gains) => {
                     for member in &mut self.members {
@@ -429,7 +428,7 @@ impl<const A: usize, S: Strategy<A>> Member<A, S> {
         let displaced =
             |body| disturbance.map_or(initial[place], |disturbance| disturbance.displace(initial[place], scene.axes.count(), place, body));
         let device = match plan.devices[place] {
-            DeviceChoice::Resting | DeviceChoice::Unobserved => DeviceModel::Resting(RestingDevice { position: displaced(0).position }),
+            DeviceChoice::Resting | DeviceChoice::Unobserved => DeviceModel::Resting(RestingDevice { position: displaced(0).position }, None),
             DeviceChoice::Simulated => {
                 DeviceModel::Simulated(SimulatedDevice::new(spec.device, spec.hand.as_ref(), displaced(0), integrator, &clock))
             }

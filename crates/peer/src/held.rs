@@ -119,6 +119,7 @@ impl<const A: usize> Held<A> {
     /// The mean is taken of the differences from the own state, so that senders with no weight at all leave exactly the own state. Where nobody fades
     /// it is the mean of [`Held::refresh`], to the bit.
     #[cold]
+    #[inline(never)]
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub(crate) fn refresh_around(&mut self, own: &State<A>) -> bool {
         for (place, held) in self.ages.held(own) {

@@ -154,15 +154,10 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// Step 3: computes the forces of this tick.
     #[inline(always)]
     pub fn compute(&mut self, now: Instant) -> Forces<A> {
-        let own = self.object.state();
         if self.stale_mean {
-            if self.held.has_ages() {
-                self.stale_mean = self.held.refresh_around(own);
-            } else {
-                self.held.refresh();
-                self.stale_mean = false;
-            }
+            self.refresh();
         }
+        let own = self.object.state();
         let coupling = self.coupling_force(own);
         let command = self.strategy.command(&Context { now, own, held: &self.held });
         //= Rakhsha & Constantinescu 2015, eq. (8): mO·aO = FC − FT − bO·vO
@@ -288,6 +283,15 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// Changes how the device touches the copy, from the next tick on.
     pub const fn set_contact(&mut self, contact: Contact) {
         self.config.contact = contact;
+    }
+
+    fn refresh(&mut self) {
+        if self.held.has_ages() {
+            self.stale_mean = self.held.refresh_around(self.object.state());
+        } else {
+            self.held.refresh();
+            self.stale_mean = false;
+        }
     }
 
     #[inline]

@@ -60,6 +60,8 @@ impl<const A: usize> HandDevice<A> {
 }
 
 impl<const A: usize> Device<A> for HandDevice<A> {
+    #[cold]
+    #[inline(never)]
     fn state(&self) -> State<A> {
         if self.share < 1.0 {
             let mix = |from: [f64; A], to: [f64; A]| core::array::from_fn(|axis| from[axis] + self.share * (to[axis] - from[axis]));
@@ -69,6 +71,8 @@ impl<const A: usize> Device<A> for HandDevice<A> {
         }
     }
 
+    #[cold]
+    #[inline(never)]
     fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
         if let Some(device) = &mut self.device {
             device.hold(now, span, core::array::from_fn(|axis| coupling_force.get(axis).copied().unwrap_or(0.0)));

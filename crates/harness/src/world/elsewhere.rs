@@ -1,7 +1,7 @@
 //! What a running scene does with peers that live elsewhere.
 
 use cohaptic_peer::wire::Sample;
-use cohaptic_peer::{Clock, Device, ReceiveError, State, Strategy};
+use cohaptic_peer::{Clock, Device, ReceiveError, RestingDevice, State, Strategy};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, LinkStats, PacketInfo};
@@ -29,7 +29,8 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
                 }
                 PeerKind::Falcon(..) => {
                     let state = member.peer.device().state();
-                    *member.peer.device_mut() = DeviceModel::Hand(HandDevice::new(devices(place), state));
+                    let hand = HandDevice::new(devices(place), state);
+                    *member.peer.device_mut() = DeviceModel::Resting(RestingDevice { position: state.position }, Some(Box::new(hand)));
                 }
                 PeerKind::Simulated => {}
                 _ => unreachable!("every kind of peer of this workspace is listed"),
@@ -107,7 +108,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
     /// Nobody feels a force of the session any more.
     pub(crate) fn let_go(&mut self, now: Instant) {
         for member in &mut self.members {
-            if let DeviceModel::Hand(device) = member.peer.device_mut() {
+            if let DeviceModel::Resting(_, Some(device)) = member.peer.device_mut() {
                 device.let_go(now);
             }
         }
@@ -150,7 +151,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
         if let Some(attendance) = &mut self.attendance {
             // A copy that nobody hears of is no measure of how far copies are apart.
             attendance.notice_silence(now, |place| {
-                if !matches!(members[place].peer.device(), DeviceModel::Hand(_)) {
+                if !matches!(members[place].peer.device(), DeviceModel::Resting(_, Some(_))) {
                     latest[place] = [f64::NAN; A];
                 }
             });
@@ -167,7 +168,7 @@ pub(super) fn attend<const A: usize, S: Strategy<A>, O: Observer>(
     axes: usize,
     observer: &mut O,
 ) -> Result<(), O::Error> {
-    if let (DeviceModel::Hand(device), Some(seat)) = (member.peer.device_mut(), attendance.seat_mut(place)) {
+    if let (DeviceModel::Resting(_, Some(device)), Some(seat)) = (member.peer.device_mut(), attendance.seat_mut(place)) {
         let read = device.read(now);
         observer.on_input(&InputRow { at: now, what: Input::Device { peer: place, state: read.as_ref().map(|state| row(state, axes)) } })?;
         if let Some(state) = read {
