@@ -204,3 +204,14 @@ proptest! {
         }
     }
 }
+
+/// What the page shows can be read.
+#[test]
+fn the_files_of_the_manual_are_routers() {
+    let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/router.md")).unwrap();
+    let files: Vec<&str> = page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    assert!(files.len() >= 2);
+    for text in files {
+        parse(text).unwrap_or_else(|error| panic!("{error}"));
+    }
+}
