@@ -45,6 +45,7 @@ mod strategies;
 mod table_reader;
 #[cfg(test)]
 mod tests;
+mod toml_text;
 mod tree;
 mod values;
 
