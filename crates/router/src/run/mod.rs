@@ -50,8 +50,9 @@ pub enum RunError {
 /// No packet of IP is longer; and a frame around it.
 const LONGEST: usize = (1 << 16) + 64;
 
-/// This close to a departure nothing is read any more, while spinning: reading and dealing with a packet takes about as long.
-const TOO_CLOSE: Duration = Duration::from_micros(5);
+/// This close to a departure nothing is read any more, while spinning: reading and dealing with a packet takes about as long. A packet that comes then is
+/// read that much late.
+const TOO_CLOSE: Duration = Duration::from_micros(10);
 
 /// So many packets are read from one device before the other one has its turn.
 const IN_TURN: usize = 16;

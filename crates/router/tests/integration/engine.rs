@@ -204,10 +204,12 @@ fn what_a_link_does_to_one_copy_it_does_not_do_to_the_other() {
 proptest! {
     /// Whatever comes, nothing is lost without a name, and departures are in order and never before the packet.
     #[test]
-    fn everything_is_counted(packets in prop::collection::vec((0_u64..3_000, any::<bool>(), 0_u16..5, 0_usize..600), 1..120), late in 0_u64..20_000) {
+    fn everything_is_counted(packets in prop::collection::vec((0_u64..3_000, any::<bool>(), 0_u16..7, 0_usize..600), 1..120), late in 0_u64..20_000) {
         let text = "router = { seed = 5, default = { left-to-right = \"a\", right-to-left = \"b\" }, memory = { packets = 40 } }\n\
-            links = { a = { delay = \"4ms\", jitter = \"3ms\", loss = \"20%\", duplicate = \"20%\" }, b = { rate = \"1Mbit\", queue = { limit = \"5 packets\" } } }\n\
-            rules = [{ source-port = 1, link = \"b\" }, { source-port = 2, link = \"pass\" }, { source-port = 3, link = \"drop\" }]";
+            links = { a = { delay = \"4ms\", jitter = \"3ms\", loss = \"20%\", duplicate = \"20%\" }, b = { rate = \"1Mbit\", queue = { limit = \"5 packets\" } },\n\
+            c = { netem = \"delay 3ms 1ms loss 20% duplicate 40% corrupt 20% rate 2mbit limit 4\", netem-profile = \"kernel-6.6\" },\n\
+            d = { netem = \"delay 3ms 1ms loss 20% duplicate 40% corrupt 20% rate 2mbit limit 4\" } }\n\
+            rules = [{ source-port = 4, link = \"c\" }, { source-port = 5, link = \"d\" }, { source-port = 1, link = \"b\" }, { source-port = 2, link = \"pass\" }, { source-port = 3, link = \"drop\" }]";
         let mut engine = Engine::new(&file(text));
         let mut now = 0;
         let mut all = Vec::new();

@@ -13,6 +13,7 @@ use crate::read::{parse_document, with_text};
 use crate::sections::{read_link, read_modulators};
 use crate::source::Sources;
 use crate::table_reader::TableReader;
+use crate::toml_text::value_text;
 use crate::tree::{Node, Value, quote};
 use crate::values;
 
@@ -46,6 +47,7 @@ impl RouterFile {
 pub(crate) fn read_document(document: &Node, context: Context<'_>) -> Option<RouterFile> {
     let mut root = TableReader::new(document, context, "a table")?;
     root.know(&["router", "left", "right", "links", "rules", "modulators"]);
+    let modulators_text = root.get("modulators").map_or_else(String::new, value_text);
     let modulators = read_modulators(root.get("modulators"), context);
     let context = Context { modulators: modulators.as_ref(), ..context };
     let links = root.optional("links", Some(Vec::new()), |node, _| Some(read_links(node, context))).flatten();
@@ -58,7 +60,17 @@ pub(crate) fn read_document(document: &Node, context: Context<'_>) -> Option<Rou
     let (left, (right, right_node)) = (left?, right?);
     check_sides(&left, &right, right_node, context)?;
     let (seed, memory, default) = router?;
-    Some(RouterFile { file: context.sources.file.to_path_buf(), seed, memory, left, right, links: links?, rules: rules?, default })
+    Some(RouterFile {
+        file: context.sources.file.to_path_buf(),
+        seed,
+        memory,
+        left,
+        right,
+        links: links?,
+        modulators: modulators_text,
+        rules: rules?,
+        default,
+    })
 }
 
 /// `[links]`: a table for each link. `None` where something was refused.
@@ -75,7 +87,8 @@ fn read_links(node: &Node, context: Context<'_>) -> Option<Vec<NamedLink>> {
             context.fault(entry.key, &entry.node.path, message);
         }
         let model = read_link(&entry.node, context, &[]);
-        Some(NamedLink { name: is_name.then(|| entry.name.clone())?, model: model? })
+        let keys = entry.node.as_table()?.0.iter().map(|key| (key.name.clone(), value_text(&key.node))).collect();
+        Some(NamedLink { name: is_name.then(|| entry.name.clone())?, keys, model: model? })
     });
     // Each is read, also after one that was refused.
     read.collect::<Vec<_>>().into_iter().collect()

@@ -74,6 +74,11 @@ fn every_key_is_read() {
     let up = LinkConfig { delay: Delay::constant(Duration::from_millis(24)), ..LinkConfig::default() };
     assert_eq!((file.links[0].name.as_str(), &file.links[0].model), ("up", &up.into()));
     assert_eq!(file.link_index("slow-one"), Some(1));
+    assert_eq!(file.links[0].keys, [("delay".to_owned(), "\"24ms\"".to_owned())]);
+    // The keys and the modulators as texts make the same file again.
+    let [(key, value)] = file.links[1].keys.as_slice() else { panic!("one key") };
+    let overrides = [format!("modulators={}", file.modulators), format!("links.slow-one.{key}={value}")];
+    assert_eq!(RouterFile::parse(EVERY_KEY, Path::new("router.toml"), &overrides).unwrap(), file);
     let any = RuleSpec {
         from: None,
         source: None,
@@ -202,5 +207,16 @@ proptest! {
         if let Err(error) = parse(&text) {
             prop_assert!(!error.to_string().is_empty());
         }
+    }
+}
+
+/// What the page shows can be read.
+#[test]
+fn the_files_of_the_manual_are_routers() {
+    let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/router.md")).unwrap();
+    let files: Vec<&str> = page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    assert!(files.len() >= 2);
+    for text in files {
+        parse(text).unwrap_or_else(|error| panic!("{error}"));
     }
 }

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use cohaptic_realtime::Pacing;
+use cohaptic_realtime::{Pacing, Wishes, prepare_thread};
 use cohaptic_router::{Report, Router};
 use cohaptic_scene::router_file::{RouterFile, Side};
 use nix::sched::{CloneFlags, unshare};
@@ -58,12 +58,19 @@ pub(super) struct Running {
 
 impl Running {
     pub(super) fn begin(text: &str) -> Self {
+        Self::begin_with(text, Pacing::Sleep, &Wishes::NONE)
+    }
+
+    /// With that pacing, in a thread that asks the system for these things.
+    pub(super) fn begin_with(text: &str, pacing: Pacing, wishes: &Wishes) -> Self {
+        let wishes = *wishes;
         let file = RouterFile::parse(text, Path::new("router.toml"), &[]).unwrap_or_else(|error| panic!("{error}"));
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let (ready, is_ready) = channel();
         let thread = thread::spawn(move || {
-            let mut router = Router::open(&file, Pacing::Sleep).unwrap_or_else(|error| panic!("{error}"));
+            let mut router = Router::open(&file, pacing).unwrap_or_else(|error| panic!("{error}"));
+            prepare_thread(&wishes).refused.iter().for_each(|refused| println!("{refused}"));
             ready.send(()).unwrap();
             router.run(&stopped, None, Duration::from_millis(100), |_| ()).unwrap();
             router.report()

@@ -6,5 +6,6 @@
 
 mod ethernet;
 mod hosts;
+mod measure;
 mod sandbox;
 mod tun;

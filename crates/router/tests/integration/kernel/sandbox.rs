@@ -23,6 +23,15 @@ impl Drop for Killed {
 
 /// Runs the test of that name again in a process with a network and a user of its own, where `body` is done.
 pub(super) fn inside(name: &str, body: impl FnOnce()) {
+    inside_one_of(["-Urn", "-n"], name, body);
+}
+
+/// The same, but with the user that there is, if that is root: the root of a user namespace gets no `SCHED_FIFO`.
+pub(super) fn inside_as_root(name: &str, body: impl FnOnce()) {
+    inside_one_of(["-n", "-Urn"], name, body);
+}
+
+fn inside_one_of(namespaces: [&str; 2], name: &str, body: impl FnOnce()) {
     if env::var_os(INSIDE).is_some() {
         if let Err(error) = std::fs::OpenOptions::new().read(true).write(true).open("/dev/net/tun") {
             println!("skipped: /dev/net/tun cannot be opened: {error}");
@@ -31,12 +40,12 @@ pub(super) fn inside(name: &str, body: impl FnOnce()) {
         body();
         return;
     }
-    let Some(namespaces) = ["-Urn", "-n"].into_iter().find(|namespaces| allows(namespaces)) else {
+    let Some(namespaces) = namespaces.into_iter().find(|namespaces| allows(namespaces)) else {
         println!("skipped: this system allows no network namespaces (`unshare -Urn true` fails)");
         return;
     };
     let mut command = Command::new("unshare");
-    command.args([namespaces, "--"]).arg(env::current_exe().unwrap()).args([name, "--exact", "--nocapture"]).env(INSIDE, "1");
+    command.args([namespaces, "--"]).arg(env::current_exe().unwrap()).args([name, "--exact", "--nocapture", "--include-ignored"]).env(INSIDE, "1");
     let mut child = Killed(command.spawn().unwrap());
     let begin = Instant::now();
     loop {

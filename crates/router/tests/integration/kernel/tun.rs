@@ -26,6 +26,12 @@ fn v6(host: u16) -> IpAddr {
 /// Two hosts, 1 on the left and 2 on the right, and the router between them.
 fn hosts(text: &str) -> (Host, Host, Running) {
     let (left, right) = (Host::new(), Host::new());
+    let running = Running::begin(&format!("{}{text}", sides(&left, &right)));
+    (left, right, running)
+}
+
+/// A TUN device in the namespace of each host, with an address of either family.
+pub(super) fn sides(left: &Host, right: &Host) -> String {
     let tun = |name: &str, host: u8, namespace: &str| {
         format!(
             "{name} = {{ tun = \"{name}0\", addresses = [\"{}/24\", \"{}/64\"], mtu = 1400, namespace = \"{namespace}\" }}\n",
@@ -33,8 +39,7 @@ fn hosts(text: &str) -> (Host, Host, Running) {
             v6(host.into())
         )
     };
-    let running = Running::begin(&format!("{}{}{text}", tun("left", 1, &left.namespace), tun("right", 2, &right.namespace)));
-    (left, right, running)
+    tun("left", 1, &left.namespace) + &tun("right", 2, &right.namespace)
 }
 
 /// Sends echo requests and gives the times until they were answered.
