@@ -56,9 +56,6 @@ struct Tally {
     kernel_drops: u64,
 }
 
-/// So many sockets are asked one by one whether something has come; of more, the kernel is asked which.
-const ASKED_ONE_BY_ONE: usize = 2;
-
 /// So many batches are read from one socket before the others, and what is due, have their turn.
 const BATCHES: usize = 8;
 
@@ -103,11 +100,10 @@ impl Doors {
     /// Hands what has come in to the engine. Says up to when all has been: time must not be let pass beyond, or what came earlier would be late.
     pub(super) fn receive(&mut self, engine: &mut Engine, clock: &MonotonicClock) -> io::Result<Heard> {
         let mut heard = Heard { count: 0, until: clock.now() };
-        if self.doors.len() <= ASKED_ONE_BY_ONE {
-            for place in 0..self.doors.len() {
-                self.receive_at(place, engine, clock, &mut heard)?;
-            }
+        if self.doors.len() == 1 {
+            self.receive_at(0, engine, clock, &mut heard)?;
         } else {
+            // Asking the kernel which of them have something costs less than asking two of them.
             let mut events = [MaybeUninit::uninit(); 64];
             let ready = match epoll::wait(&self.epoll, &mut events, Some(&Timespec::default())) {
                 Ok((ready, _)) => &*ready,
