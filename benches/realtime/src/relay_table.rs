@@ -40,7 +40,10 @@ fn release_error(span: Duration) -> Result<(), Box<dyn Error>> {
         "{RATE} packets a second through a link of {} ms. The *release error* is the time just before a datagram is handed to",
         subjects::DELAY.as_millis()
     );
-    println!("the kernel, less the instant at which it should leave.\n");
+    println!(
+        "the kernel, less the instant at which it should leave: for the relay {} ms after the kernel's time stamp, for the others after they read it.\n",
+        subjects::DELAY.as_millis()
+    );
     println!("| what | p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] | reordered | asked for: p50, p99 |");
     println!("| --- | ---: | ---: | ---: | ---: | ---: | --- |");
     let row = |name: &str, error: LatenessSummary, reordered: Option<f64>, asked: &str| {
@@ -64,7 +67,11 @@ fn release_error(span: Duration) -> Result<(), Box<dyn Error>> {
         of(&tokio)
     );
     for (name, Outcome { clamped: (count, longest), sent, .. }) in [("sleeping", &sleeping), ("spinning", &spinning)] {
-        println!("Offered to the link later than they came, {name}: {count} of {}, by at most {} µs.", sent.count, micros(*longest));
+        println!(
+            "Offered to the link later than they came, which the release error includes, {name}: {count} of {}, by at most {} µs.",
+            sent.count,
+            micros(*longest)
+        );
     }
     println!("The bare threads receive nothing: they wait for an instant every {} µs, and send.", 1_000_000 / RATE);
     match sleeping.refused.as_slice() {

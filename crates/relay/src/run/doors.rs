@@ -195,7 +195,9 @@ impl Doors {
             // Always there: clients without a socket have been sent away.
             let Some(Some(door)) = self.doors.get_mut(place) else { continue };
             if door.socket.queue(release.to, release.bytes, release.ecn) {
-                door.departures.push_back(release.at);
+                // When it should have left had it been offered when it came.
+                let late = u64::try_from(release.late.as_nanos()).unwrap_or(u64::MAX);
+                door.departures.push_back(Instant::from_nanos(release.at.as_nanos().saturating_sub(late)));
                 if !core::mem::replace(&mut door.is_dirty, true) {
                     self.dirty.push(place);
                 }
@@ -204,7 +206,8 @@ impl Doors {
         true
     }
 
-    /// Sends what was taken, and records how late each is: the time before the call of the kernel, less when it should leave.
+    /// Sends what was taken, and records how late each is: the time before the call of the kernel, less when it should leave. A datagram that was offered
+    /// to its link later than it came is that much later, too.
     #[inline]
     pub(super) fn send(&mut self, clock: &MonotonicClock, lateness: &mut Lateness) {
         let doors = &mut self.doors;
