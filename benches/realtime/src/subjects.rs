@@ -28,6 +28,10 @@ pub(crate) struct Outcome {
     /// Dropped by the kernel at the forwarder's socket.
     pub(crate) at_socket: u64,
     pub(crate) overload: u64,
+    /// Sent, and dropped by the kernel at the sink: no fault of the forwarder's.
+    pub(crate) at_sink: u64,
+    /// Offered to the link later than they came: how many, and the longest.
+    pub(crate) clamped: (u64, Duration),
     /// Of all but generator and sink, a packet.
     pub(crate) processor: Duration,
     /// Before and after \[kB\].
@@ -38,6 +42,17 @@ pub(crate) struct Outcome {
 
 type Done = Result<Outcome, Box<dyn Error>>;
 
+/// What a forwarder says of itself at its end.
+#[derive(Debug, Default)]
+struct Said {
+    error: LatenessSummary,
+    sent: u64,
+    at_socket: u64,
+    overload: u64,
+    clamped: (u64, Duration),
+    refused: Vec<String>,
+}
+
 /// Sends through something, and gathers what came of it.
 fn measure(
     source: &UdpSocket,
@@ -45,18 +60,19 @@ fn measure(
     rate: u64,
     span: Duration,
     sink: Sink,
-    end: impl FnOnce() -> Result<(LatenessSummary, u64, u64, Vec<String>), Box<dyn Error>>,
+    end: impl FnOnce(&Sent) -> Result<Said, Box<dyn Error>>,
 ) -> Done {
     let (memory, start) = (machine::memory(), machine::process_time());
     let sent = generate(source, to, rate, span);
     // What is on its way arrives.
     std::thread::sleep(DELAY + Duration::from_millis(200));
     let after = machine::memory();
-    let (error, at_socket, overload, refused) = end()?;
+    let Said { error, sent: forwarded, at_socket, overload, clamped, refused } = end(&sent)?;
     let received = sink.end();
+    let at_sink = forwarded.saturating_sub(received.count);
     let used = (machine::process_time() - start).saturating_sub(sent.processor + received.processor);
     let processor = used / u32::try_from(sent.count.max(1)).unwrap_or(u32::MAX);
-    Ok(Outcome { sent, received, error, at_socket, overload, processor, memory: (memory, after), refused })
+    Ok(Outcome { sent, received, error, at_socket, overload, at_sink, clamped, processor, memory: (memory, after), refused })
 }
 
 /// The relay.
@@ -78,12 +94,18 @@ pub(crate) fn relay(pacing: Pacing, rate: u64, span: Duration) -> Done {
         let options = RunOptions { pacing, wishes: Wishes { lock_memory: false, ..Wishes::default() }, ..RunOptions::default() };
         relay.run(&options, &changes, &is_over, |_| ())
     });
-    measure(&source, to, rate, span, sink, || {
+    measure(&source, to, rate, span, sink, |_| {
         stop.store(true, Ordering::Relaxed);
         let report = thread.join().map_err(|_| "the relay panicked")??;
         let refused = report.prepared.refused.iter().map(ToString::to_string).collect();
-        let dropped = report.ports.iter().filter_map(|port| port.kernel_drops).sum();
-        Ok((report.release.summary(), dropped, report.intake.overload, refused))
+        Ok(Said {
+            error: report.release.summary(),
+            sent: report.ports.iter().map(|port| port.counts.sent).sum(),
+            at_socket: report.ports.iter().filter_map(|port| port.kernel_drops).sum(),
+            overload: report.intake.overload,
+            clamped: (report.intake.clamped, report.clamped.summary().max),
+            refused,
+        })
     })
 }
 
@@ -94,8 +116,8 @@ pub(crate) fn tokio_forwarder(rate: u64, span: Duration) -> Done {
     inside.set_nonblocking(true)?;
     let (to, target) = (inside.local_addr()?, sink.address);
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
-    let (errors, taken) = (Arc::new(Mutex::new(Lateness::new())), Arc::new(AtomicU64::new(0)));
-    let (recorded, counted) = (Arc::clone(&errors), Arc::clone(&taken));
+    let (errors, taken, forwarded) = (Arc::new(Mutex::new(Lateness::new())), Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
+    let (recorded, counted, passed) = (Arc::clone(&errors), Arc::clone(&taken), Arc::clone(&forwarded));
     runtime.spawn(async move {
         let Ok(socket) = tokio::net::UdpSocket::from_std(inside) else { return };
         let socket = Arc::new(socket);
@@ -103,26 +125,27 @@ pub(crate) fn tokio_forwarder(rate: u64, span: Duration) -> Done {
         while let Ok((length, _)) = socket.recv_from(&mut bytes).await {
             let due = tokio::time::Instant::now() + DELAY;
             counted.fetch_add(1, Ordering::Relaxed);
-            let (socket, packet, recorded) = (Arc::clone(&socket), bytes[..length].to_vec(), Arc::clone(&recorded));
+            let (socket, packet) = (Arc::clone(&socket), bytes[..length].to_vec());
+            let (recorded, passed) = (Arc::clone(&recorded), Arc::clone(&passed));
             tokio::spawn(async move {
                 tokio::time::sleep_until(due).await;
                 let late = due.elapsed();
-                // A packet that cannot be sent shows as one that was not received.
-                let _ = socket.send_to(&packet, target).await;
+                if socket.send_to(&packet, target).await.is_ok() {
+                    passed.fetch_add(1, Ordering::Relaxed);
+                }
                 if let Ok(mut recorded) = recorded.lock() {
                     recorded.record(late);
                 }
             });
         }
     });
-    let mut outcome = measure(&source, to, rate, span, sink, || {
+    measure(&source, to, rate, span, sink, |sent| {
         runtime.shutdown_timeout(Duration::from_secs(1));
-        let summary = errors.lock().map_err(|_| "a task panicked")?.summary();
-        Ok((summary, 0, 0, Vec::new()))
-    })?;
-    // What the generator sent and no task ever saw.
-    outcome.at_socket = outcome.sent.count.saturating_sub(taken.load(Ordering::Relaxed));
-    Ok(outcome)
+        let error = errors.lock().map_err(|_| "a task panicked")?.summary();
+        // What the generator sent and no task ever saw.
+        let at_socket = sent.count.saturating_sub(taken.load(Ordering::Relaxed));
+        Ok(Said { error, sent: forwarded.load(Ordering::Relaxed), at_socket, ..Said::default() })
+    })
 }
 
 /// A thread that does nothing but wait for each packet's time and send it: what the system gives at best.

@@ -13,7 +13,7 @@
 //!
 //! [`Engine`] is the relay without sockets and without a clock: datagrams in at instants, datagrams out at instants, so that its fates are those of virtual
 //! time. [`Relay`] gives it both. Time is *logical*: a datagram came in when the kernel saw it, and leaves when the link says; how much later than that the
-//! program got round to sending it is the *release error*, which is recorded and adds up to nothing.
+//! program got round to sending it is the *release error*, which is recorded and does not add up.
 //!
 //! Memory is bounded: beyond so many datagrams or bytes on their way, what comes in is dropped and counted as overload; strangers are dropped and counted.
 //!

@@ -11,7 +11,7 @@ pub struct DoorCounts {
     pub received: u64,
     /// Datagrams that came in and were dropped, because they were longer than this socket takes.
     pub oversized: u64,
-    /// Errors on receiving: somebody said that an earlier datagram had not arrived. They do no harm.
+    /// Errors on receiving that pass: somebody said that an earlier datagram had not arrived, the network was down for a while, memory was short.
     pub receive_errors: u64,
     /// Datagrams that the kernel took.
     pub sent: u64,

@@ -137,7 +137,7 @@ impl UdpDoor {
     ///
     /// # Errors
     ///
-    /// What the system says, but for what is no fault of this socket: that there is nothing to read, or that an earlier datagram did not arrive.
+    /// What the system says, but for what passes: that there is nothing to read, that an earlier datagram did not arrive, or that memory is short.
     pub fn receive(&mut self, buffers: &mut ReceiveBuffers, clock: &MonotonicClock, mut take: impl FnMut(Datagram<'_>)) -> io::Result<usize> {
         let (mut rooms, told) = buffers.rooms();
         let count = match self.state.recv(UdpSockRef::from(&self.socket), &mut rooms, told) {
@@ -177,6 +177,11 @@ impl UdpDoor {
                 self.counts.receive_errors += 1;
                 // There may be more behind it.
                 Ok(Self::BATCH)
+            }
+            // They pass.
+            Errno::NETDOWN | Errno::NOBUFS | Errno::NOMEM => {
+                self.counts.receive_errors += 1;
+                Ok(0)
             }
             _ => Err(error),
         }

@@ -1,5 +1,6 @@
 //! What comes in, what leaves, and what is counted of both.
 
+use core::time::Duration;
 use std::net::SocketAddr;
 
 use cohaptic_realtime::udp::Ecn;
@@ -53,6 +54,8 @@ pub enum Intake {
 pub struct Release<'a> {
     /// When, by the link.
     pub at: Instant,
+    /// By how much it was offered to the link later than it came: see [`IntakeCounts::clamped`].
+    pub late: Duration,
     /// From where.
     pub port: Port,
     /// To whom.

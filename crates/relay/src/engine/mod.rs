@@ -154,10 +154,14 @@ impl Engine {
             self.staged.sort_by_key(|staged| staged.at);
         }
         let mut staged = core::mem::take(&mut self.staged);
-        for Staged { at, from, to, packet } in staged.drain(..) {
+        for Staged { at, from, to, mut packet } in staged.drain(..) {
             if let Some(late) = self.now.checked_duration_since(at).filter(|late| !late.is_zero()) {
                 self.counts.clamped += 1;
                 self.clamped.record(late);
+                // Nobody else holds it yet.
+                if let Some(packet) = Arc::get_mut(&mut packet) {
+                    packet.late = late;
+                }
             }
             self.pass(at);
             let info = PacketInfo { size: Bytes::new(packet.bytes.len() as u64), ecn_capable: packet.ecn.is_some() };
@@ -215,7 +219,7 @@ impl Engine {
                     }
                     let packet = self.released.insert(payload);
                     let ecn = if marked { Some(Ecn::Ce) } else { packet.ecn };
-                    return Some(Release { at, port, to, bytes: &packet.bytes, ecn });
+                    return Some(Release { at, late: packet.late, port, to, bytes: &packet.bytes, ecn });
                 }
                 Fate::Dropped(_) => {
                     self.packets -= 1;

@@ -1,5 +1,6 @@
 //! Datagrams in memory that is used again.
 
+use core::time::Duration;
 use std::sync::Arc;
 
 use cohaptic_realtime::udp::Ecn;
@@ -13,6 +14,8 @@ pub(super) struct Packet {
     pub(super) ecn: Option<Ecn>,
     /// Whose it is, where clients share a link.
     pub(super) client: Option<ClientId>,
+    /// By how much it was offered later than it came.
+    pub(super) late: Duration,
 }
 
 /// Memory for datagrams: what one has left, another takes. Once as many have been on their way as ever are, nothing is allocated any more.
@@ -36,7 +39,7 @@ impl Pool {
         if let Some(packet) = Arc::get_mut(&mut packet) {
             packet.bytes.clear();
             packet.bytes.extend_from_slice(bytes);
-            (packet.ecn, packet.client) = (ecn, client);
+            (packet.ecn, packet.client, packet.late) = (ecn, client, Duration::ZERO);
             // Only what nobody else holds is idle.
             debug_assert_eq!(packet.bytes, bytes);
         }

@@ -56,9 +56,6 @@ struct Tally {
     kernel_drops: u64,
 }
 
-/// So many sockets are asked one by one whether something has come; of more, the kernel is asked which.
-const ASKED_ONE_BY_ONE: usize = 2;
-
 /// So many batches are read from one socket before the others, and what is due, have their turn.
 const BATCHES: usize = 8;
 
@@ -103,11 +100,10 @@ impl Doors {
     /// Hands what has come in to the engine. Says up to when all has been: time must not be let pass beyond, or what came earlier would be late.
     pub(super) fn receive(&mut self, engine: &mut Engine, clock: &MonotonicClock) -> io::Result<Heard> {
         let mut heard = Heard { count: 0, until: clock.now() };
-        if self.doors.len() <= ASKED_ONE_BY_ONE {
-            for place in 0..self.doors.len() {
-                self.receive_at(place, engine, clock, &mut heard)?;
-            }
+        if self.doors.len() == 1 {
+            self.receive_at(0, engine, clock, &mut heard)?;
         } else {
+            // Asking the kernel which of them have something costs less than asking two of them.
             let mut events = [MaybeUninit::uninit(); 64];
             let ready = match epoll::wait(&self.epoll, &mut events, Some(&Timespec::default())) {
                 Ok((ready, _)) => &*ready,
@@ -199,7 +195,9 @@ impl Doors {
             // Always there: clients without a socket have been sent away.
             let Some(Some(door)) = self.doors.get_mut(place) else { continue };
             if door.socket.queue(release.to, release.bytes, release.ecn) {
-                door.departures.push_back(release.at);
+                // When it should have left had it been offered when it came.
+                let late = u64::try_from(release.late.as_nanos()).unwrap_or(u64::MAX);
+                door.departures.push_back(Instant::from_nanos(release.at.as_nanos().saturating_sub(late)));
                 if !core::mem::replace(&mut door.is_dirty, true) {
                     self.dirty.push(place);
                 }
@@ -208,7 +206,8 @@ impl Doors {
         true
     }
 
-    /// Sends what was taken, and records how late each is: the time before the call of the kernel, less when it should leave.
+    /// Sends what was taken, and records how late each is: the time before the call of the kernel, less when it should leave. A datagram that was offered
+    /// to its link later than it came is that much later, too.
     #[inline]
     pub(super) fn send(&mut self, clock: &MonotonicClock, lateness: &mut Lateness) {
         let doors = &mut self.doors;

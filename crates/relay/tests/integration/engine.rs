@@ -202,6 +202,14 @@ fn what_came_before_time_was_let_pass_is_late_and_says_by_how_much() {
     // Time never goes back.
     engine.handle_timeout(at(100));
     assert_eq!(engine.poll_timeout(), Some(at(1500)));
+    // The next one, in the memory of the first, is on time.
+    for (due, late) in [(1500, 300), (2600, 0)] {
+        engine.handle_timeout(at(due));
+        let release = engine.poll_release().unwrap();
+        assert_eq!((release.at, release.late), (at(due), Duration::from_micros(late)));
+        assert_eq!(engine.poll_release(), None);
+        engine.handle_datagram(arrival(at(1600), 0, 1, b"y", None));
+    }
 }
 
 #[test]

@@ -116,6 +116,17 @@ fn a_fault_names_line_key_and_what_was_expected() {
 }
 
 #[test]
+fn the_file_of_the_manual_says_what_it_says_it_does() {
+    let page = include_str!("../../../../docs/relay.md");
+    let text = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let file = parse(text).unwrap();
+    assert_eq!((file.title.as_str(), file.programs.len(), file.timeline.len()), ("three programs", 3, 1));
+    // What the page calls defaults are defaults.
+    assert_eq!(file.limits, RelayLimits::default());
+    assert_eq!(file.links.between(0, 2).mean_delay(), Duration::from_millis(40));
+}
+
+#[test]
 fn remote_addresses_are_taken_where_they_are_allowed() {
     let text = WHOLE.replace("seed = 7", "allow-remote = true").replace("127.0.0.1:7", "192.0.2.1:7");
     assert_eq!(parse(&text).unwrap().programs[0].port, "192.0.2.1:7001".parse().unwrap());
