@@ -13,10 +13,10 @@ use crate::SceneError;
 use crate::link_table::pairs;
 use crate::model::Scene;
 use crate::read::{parse_document, parse_scene, with_text};
+use crate::relay_file;
 use crate::source::{BEGINNING, Sources};
 use crate::toml_text::{key_text, value_text};
 use crate::tree::{Node, Table, Value};
-use crate::{relay_file, router_file};
 
 /// The least scene that has a link.
 const AROUND: &str = "scene = { duration = \"1s\", count = 2 }\nobject = { mass = 1.0 }\n\
@@ -47,6 +47,10 @@ pub struct LinkKeys {
 }
 
 impl LinkKeys {
+    pub(crate) fn of_table(table: &Table, modulators: &Arc<str>) -> Self {
+        Self { keys: keys_of(table), modulators: Arc::clone(modulators) }
+    }
+
     /// Each key with its value as TOML.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &str)> {
         self.keys.iter().map(|(key, value)| (key.as_str(), value.as_str()))
@@ -179,25 +183,13 @@ pub fn relay_link_keys(path: &Path, overrides: &[String]) -> Result<KeysOfLinks,
     Ok(keys_of_mesh(&document, relay.programs.len(), place))
 }
 
-/// The keys of every link of a router file, in the order of [`RouterFile::links`](crate::router_file::RouterFile::links).
-///
-/// # Errors
-///
-/// As [`RouterFile::read`](crate::router_file::RouterFile::read).
-pub fn router_link_keys(path: &Path, overrides: &[String]) -> Result<Vec<LinkKeys>, SceneError> {
-    let (router, document) = with_text(path, |text| parse_document(Sources { file: path, text, overrides }, false, router_file::read_document))?;
-    let (modulators, links) = (modulators_of(&document), part(&document, "links").and_then(Node::as_table));
-    let node = |name: &str| links.and_then(|links| links.get(name)).and_then(|entry| entry.node.as_table());
-    let keys = |name: &str| LinkKeys { keys: node(name).map_or_else(Vec::new, keys_of), modulators: Arc::clone(&modulators) };
-    Ok(router.links.iter().map(|link| keys(&link.name)).collect())
-}
-
 /// The keys of all links between so many ends, of a document with `[link]` and `[[links]]`.
 fn keys_of_mesh(document: &Node, ends: usize, place: impl Fn(&str) -> Option<usize>) -> KeysOfLinks {
     let modulators = modulators_of(document);
     let nothing = Node::empty_table(BEGINNING, "link".to_owned());
     let usual = part(document, "link").unwrap_or(&nothing);
-    let keys = |node: &Node| LinkKeys { keys: node.as_table().map_or_else(Vec::new, keys_of), modulators: Arc::clone(&modulators) };
+    let nothing_said = Table::default();
+    let keys = |node: &Node| LinkKeys::of_table(node.as_table().unwrap_or(&nothing_said), &modulators);
     let shared = keys(usual);
     let mut links: KeysOfLinks = pairs(ends).map(|pair| (pair, shared.clone())).collect();
     let Some(Value::List(entries)) = part(document, "links").map(|node| &node.value) else { return links };
@@ -213,7 +205,8 @@ fn part<'a>(document: &'a Node, name: &str) -> Option<&'a Node> {
     document.as_table().and_then(|table| table.get(name)).map(|entry| &*entry.node)
 }
 
-fn modulators_of(document: &Node) -> Arc<str> {
+/// The modulators of a document as TOML; empty if it has none.
+pub(crate) fn modulators_of(document: &Node) -> Arc<str> {
     part(document, "modulators").map_or_else(String::new, value_text).into()
 }
 

@@ -26,7 +26,6 @@
 mod address;
 mod model;
 mod read;
-pub(crate) use read::read_document;
 mod rules;
 mod sides;
 

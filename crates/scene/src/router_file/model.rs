@@ -6,6 +6,7 @@ use cohaptic_units::Bytes;
 use cohaptic_wan::LinkModel;
 
 use super::Network;
+use crate::LinkKeys;
 
 /// A router, ready to be run: every link that a rule names is there.
 #[derive(Clone, PartialEq, Debug)]
@@ -22,8 +23,6 @@ pub struct RouterFile {
     pub right: Attachment,
     /// The links, by the places that targets have. Their names differ.
     pub links: Vec<NamedLink>,
-    /// The list of modulators as TOML, for links that are to be read again from changed keys; empty if there is none.
-    pub modulators: String,
     /// The rules, in the order in which they are asked.
     pub rules: Vec<RuleSpec>,
     /// Where packets go to which no rule applies, by the side they come from: left, right.
@@ -51,8 +50,8 @@ impl Default for Memory {
 pub struct NamedLink {
     /// Its name.
     pub name: String,
-    /// Its keys and their values as TOML on one line, in the order of the file, to be shown and changed: `("delay", "\"24ms\"")`.
-    pub keys: Vec<(String, String)>,
+    /// Its keys, to be shown and changed.
+    pub keys: LinkKeys,
     /// What it does, in either direction. Each direction has a queue, a state and random numbers of its own.
     pub model: LinkModel,
 }

@@ -1,21 +1,21 @@
 //! From texts to router files.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use cohaptic_units::Bytes;
 
 use super::rules::{TARGET, read_rules, read_target};
 use super::sides::{check_sides, read_side};
 use super::{Memory, NamedLink, RouterFile, Target};
-use crate::SceneError;
 use crate::context::Context;
+use crate::link_keys::modulators_of;
 use crate::read::{parse_document, with_text};
 use crate::sections::{read_link, read_modulators};
 use crate::source::Sources;
 use crate::table_reader::TableReader;
-use crate::toml_text::value_text;
 use crate::tree::{Node, Value, quote};
-use crate::values;
+use crate::{LinkKeys, SceneError, values};
 
 impl RouterFile {
     /// Reads the file of a router. `overrides` are texts `KEY=VALUE` that replace values of the file, such as `links.wan.delay=8ms`.
@@ -44,13 +44,12 @@ impl RouterFile {
 }
 
 /// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
-pub(crate) fn read_document(document: &Node, context: Context<'_>) -> Option<RouterFile> {
+fn read_document(document: &Node, context: Context<'_>) -> Option<RouterFile> {
     let mut root = TableReader::new(document, context, "a table")?;
     root.know(&["router", "left", "right", "links", "rules", "modulators"]);
-    let modulators_text = root.get("modulators").map_or_else(String::new, value_text);
     let modulators = read_modulators(root.get("modulators"), context);
     let context = Context { modulators: modulators.as_ref(), ..context };
-    let links = root.optional("links", Some(Vec::new()), |node, _| Some(read_links(node, context))).flatten();
+    let links = root.optional("links", Some(Vec::new()), |node, _| Some(read_links(node, &modulators_of(document), context))).flatten();
     let router = root.required("router", "a table such as [router] with a default", |node, _| read_router(node, links.as_deref(), context));
     let side = "a table such as { tun = \"wan0\", addresses = [\"10.1.0.1/24\"] } or { interface = \"eth1\" }";
     let left = root.required("left", side, read_side);
@@ -60,21 +59,11 @@ pub(crate) fn read_document(document: &Node, context: Context<'_>) -> Option<Rou
     let (left, (right, right_node)) = (left?, right?);
     check_sides(&left, &right, right_node, context)?;
     let (seed, memory, default) = router?;
-    Some(RouterFile {
-        file: context.sources.file.to_path_buf(),
-        seed,
-        memory,
-        left,
-        right,
-        links: links?,
-        modulators: modulators_text,
-        rules: rules?,
-        default,
-    })
+    Some(RouterFile { file: context.sources.file.to_path_buf(), seed, memory, left, right, links: links?, rules: rules?, default })
 }
 
 /// `[links]`: a table for each link. `None` where something was refused.
-fn read_links(node: &Node, context: Context<'_>) -> Option<Vec<NamedLink>> {
+fn read_links(node: &Node, modulators: &Arc<str>, context: Context<'_>) -> Option<Vec<NamedLink>> {
     let Some(table) = node.as_table() else {
         context.fault_at(node, format!("found {}: expected a table for each link, such as [links.wan]", node.describe()));
         return None;
@@ -87,7 +76,7 @@ fn read_links(node: &Node, context: Context<'_>) -> Option<Vec<NamedLink>> {
             context.fault(entry.key, &entry.node.path, message);
         }
         let model = read_link(&entry.node, context, &[]);
-        let keys = entry.node.as_table()?.0.iter().map(|key| (key.name.clone(), value_text(&key.node))).collect();
+        let keys = LinkKeys::of_table(entry.node.as_table()?, modulators);
         Some(NamedLink { name: is_name.then(|| entry.name.clone())?, keys, model: model? })
     });
     // Each is read, also after one that was refused.
