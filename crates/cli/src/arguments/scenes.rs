@@ -18,6 +18,9 @@ pub(crate) struct RunArguments {
     /// Write trajectory.csv, packets.csv, links.csv and plots (SVG) into this folder; the second run goes into its folder `against`
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// Replay a live session: its inputs.csv, with the scene and the --set of that session. Fates and motion are the same to the last bit
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["against", "general"])]
+    pub(crate) inputs: Option<PathBuf>,
     /// Do not draw positions in the terminal. Nothing is looked at then but counters, which is fastest
     #[arg(long)]
     pub(crate) no_plot: bool,

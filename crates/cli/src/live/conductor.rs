@@ -3,8 +3,10 @@
 use std::sync::mpsc::Receiver;
 
 use cohaptic_live::{Conductor, LinkChange, Status};
+use cohaptic_units::Instant;
 
 use super::status::snapshot;
+use super::timeline::Elapsed;
 use crate::interrupt;
 use crate::realtime::{Edit, Look};
 
@@ -14,11 +16,12 @@ pub(super) struct Host {
     wanted: Receiver<Edit>,
     /// The links in the order of the description.
     pairs: Vec<(usize, usize)>,
+    elapsed: Elapsed,
 }
 
 impl Host {
-    pub(super) const fn new(look: Option<Look>, wanted: Receiver<Edit>, pairs: Vec<(usize, usize)>) -> Self {
-        Self { look, wanted, pairs }
+    pub(super) const fn new(look: Option<Look>, wanted: Receiver<Edit>, pairs: Vec<(usize, usize)>, elapsed: Elapsed) -> Self {
+        Self { look, wanted, pairs, elapsed }
     }
 }
 
@@ -34,6 +37,7 @@ impl Conductor for Host {
     }
 
     fn show(&mut self, status: Status) {
+        self.elapsed.set(Instant::ZERO.saturating_add(status.elapsed));
         if let Some(look) = &self.look {
             look.publish(snapshot(&status));
         }

@@ -4,18 +4,20 @@ mod conductor;
 mod document;
 mod prepare;
 mod status;
+mod timeline;
 mod words;
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::mpsc::channel;
 use std::thread;
 use std::time::Duration;
 
-use cohaptic_control::Description;
 use cohaptic_live::{Report, Session, SessionConfig, SessionError, SessionKey, SystemEntropy};
-use cohaptic_scene::{LinkKeys, Scene, link_keys};
+use cohaptic_scene::{KeysOfLinks, Scene, link_key_changes, link_keys};
 use cohaptic_units::Instant;
+use cohaptic_units::print::Span;
 
 use crate::arguments::LiveArguments;
 use crate::failure::{Failure, INTERRUPTED};
@@ -25,6 +27,7 @@ use crate::{interrupt, output};
 use conductor::Host;
 use document::Document;
 use prepare::ready_falcons;
+use timeline::{Elapsed, Planned, TimedLinks};
 
 /// Runs a scene by the wall clock with whoever is attached, and says how it went.
 pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {
@@ -43,26 +46,37 @@ fn make_key(file: &Path) -> Result<ExitCode, Failure> {
 }
 
 fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
-    let overrides = &arguments.overrides.set;
-    let mut scene = Scene::read_live(path, overrides)?;
-    if let Some(length) = arguments.length {
-        scene.duration = length;
-    }
-    if scene.duration.is_zero() {
-        return Err(Failure::Input("--for 0s: expected more than nothing".to_owned()));
-    }
+    let mut overrides = arguments.overrides.set.clone();
+    overrides.extend(arguments.length.map(|length| format!("scene.duration={}", Span(length))));
+    let overrides = overrides.as_slice();
+    let scene = Scene::read_live(path, overrides)?;
     if let Some(reason) = cohaptic_harness::too_large(&scene) {
         return Err(Failure::Input(format!("{}: {reason}", path.display())));
     }
+    let pairs = status::pairs(&scene);
+    let number = |pair| pairs.iter().position(|known| *known == pair).expect("a pair of peers is a link");
+    let numbered = |links: KeysOfLinks| links.into_iter().map(|(pair, keys)| (number(pair), keys)).collect();
+    let planned: Planned = link_key_changes(path, overrides)?.into_iter().map(|(at, links)| (at, numbered(links))).collect();
     let keys = link_keys(path, overrides)?.into_values().collect();
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let (changes, wanted) = channel();
+    let elapsed = Elapsed::default();
+    let editor = TimedLinks { links: KeyedLinks { keys, folder, changes }, planned, elapsed: elapsed.clone() };
     let session = open(arguments, &scene)?;
     let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
     prepare::announce(&scene, session.address(), arguments.key_file.is_some());
-    let report = conduct(arguments, &scene, session, keys, path)?;
+    let control = LiveControl::open(&arguments.real_time, status::description(&scene, &pairs), Box::new(editor))?;
+    let host = Host::new(control.look(), wanted, pairs, elapsed);
+    let report = conduct(&scene, session, host, &control)?;
     if arguments.json {
         output::json(&Document::new(&scene, &report))?;
     } else {
-        output::text(&words::describe(&scene, &report))?;
+        let mut text = words::describe(&scene, &report);
+        if let Some(folder) = &arguments.out {
+            let set: String = overrides.iter().map(|key| format!(" --set '{key}'")).collect();
+            let _ = writeln!(text, "  replay: cohaptic run {}{set} --inputs {}", path.display(), folder.join("inputs.csv").display());
+        }
+        output::text(&text)?;
     }
     Ok(if interrupt::asked() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
@@ -87,13 +101,7 @@ fn open(arguments: &LiveArguments, scene: &Scene) -> Result<Option<Session>, Fai
     Session::open(scene, config, |peer| falcons.take(peer)).map(Some).map_err(failure)
 }
 
-fn conduct(arguments: &LiveArguments, scene: &Scene, session: Session, keys: Vec<LinkKeys>, path: &Path) -> Result<Report, Failure> {
-    let pairs = status::pairs(scene);
-    let description: Description = status::description(scene, &pairs);
-    let (changes, wanted) = channel();
-    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let control = LiveControl::open(&arguments.real_time, description, Box::new(KeyedLinks { keys, folder, changes }))?;
-    let mut host = Host::new(control.look(), wanted, pairs);
+fn conduct(scene: &Scene, session: Session, mut host: Host, control: &LiveControl) -> Result<Report, Failure> {
     let progress = Progress::through_scene(&scene.title, scene.duration);
     let report = thread::scope(|scope| {
         let running = thread::Builder::new().name("live".to_owned()).spawn_scoped(scope, move || session.run(&mut host));

@@ -1,13 +1,15 @@
 //! `cohaptic run`.
 
 mod document;
+mod replayed;
 pub(crate) mod words;
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
+use cohaptic_harness::live::{Inputs, replay};
 use cohaptic_harness::record::{Bands, RecordError, Recorder};
 use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow, too_large};
 use cohaptic_scene::Scene;
@@ -23,7 +25,11 @@ use words::describe;
 /// Runs a scene, or a scene and a variant of it, and says what happened.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let overrides = &arguments.scene.overrides.set;
-    let scene = Scene::read(&arguments.scene.scene, overrides)?;
+    let scene = match &arguments.inputs {
+        None => Scene::read(&arguments.scene.scene, overrides)?,
+        // As the session read it.
+        Some(_) => Scene::read_live(&arguments.scene.scene, overrides)?,
+    };
     // Both scenes are read before either runs: a mistake in the second is not found after a long first run.
     let variant = if arguments.against.is_empty() {
         None
@@ -36,9 +42,13 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     if let Some(reason) = [Some(&scene), variant.as_ref()].into_iter().flatten().find_map(too_large) {
         return Err(Failure::Input(format!("{}: {reason}", arguments.scene.scene.display())));
     }
-    let first = run_one(arguments, &scene, arguments.out.clone())?;
+    let inputs = arguments.inputs.as_deref().map(|file| replayed::read(file, &scene, overrides)).transpose()?;
+    let what = inputs.as_ref().map_or(What::Simulated, What::Replayed);
+    let first = run_one(arguments, &scene, what, arguments.out.clone())?;
     let second = match &variant {
-        Some(variant) if !interrupt::asked() => Some(run_one(arguments, variant, arguments.out.as_ref().map(|out| out.join("against")))?),
+        Some(variant) if !interrupt::asked() => {
+            Some(run_one(arguments, variant, What::Simulated, arguments.out.as_ref().map(|out| out.join("against")))?)
+        }
         _ => None,
     };
     if arguments.scene.json {
@@ -63,9 +73,15 @@ struct Run {
     files: Vec<PathBuf>,
 }
 
-fn run_one(arguments: &RunArguments, scene: &Scene, out: Option<PathBuf>) -> Result<Run, Failure> {
-    let model = if arguments.general { Model::General } else { Model::Least };
-    let simulation = Simulation::new(scene, model);
+/// Where the motion comes from.
+#[derive(Clone, Copy)]
+enum What<'a> {
+    Simulated,
+    /// The scene with what came from outside in a live session.
+    Replayed(&'a Inputs),
+}
+
+fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<PathBuf>) -> Result<Run, Failure> {
     let shown = !arguments.scene.json && !arguments.no_plot;
     let mut watch = Watch {
         progress: Progress::through_scene(&scene.title, scene.duration),
@@ -73,19 +89,24 @@ fn run_one(arguments: &RunArguments, scene: &Scene, out: Option<PathBuf>) -> Res
     };
     let start = Clock::now();
     let (summary, files) = match out.as_deref() {
-        None => (simulation.run(&mut &mut watch)?, Vec::new()),
-        Some(folder) => record(&simulation, scene, folder, &mut watch)?,
+        None => (execute(arguments, scene, what, &mut &mut watch)?, Vec::new()),
+        Some(folder) => {
+            let mut observer = (Recorder::create(folder, scene)?, &mut watch);
+            let summary = execute(arguments, scene, what, &mut observer)?;
+            let files = observer.0.finish(&summary)?;
+            (summary, files)
+        }
     };
     let wall_s = start.elapsed().as_secs_f64();
     watch.progress.clear();
     Ok(Run { summary, wall_s, positions: watch.positions, files })
 }
 
-fn record(simulation: &Simulation<'_>, scene: &Scene, folder: &Path, watch: &mut Watch) -> Result<(Summary, Vec<PathBuf>), Failure> {
-    let mut observer = (Recorder::create(folder, scene)?, watch);
-    let summary = simulation.run(&mut observer)?;
-    let files = observer.0.finish(&summary)?;
-    Ok((summary, files))
+fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>, observer: &mut O) -> Result<Summary, O::Error> {
+    match what {
+        What::Simulated => Simulation::new(scene, if arguments.general { Model::General } else { Model::Least }).run(observer),
+        What::Replayed(inputs) => replay(scene, inputs, observer),
+    }
 }
 
 /// Twice the columns of the plot in the terminal: two dots a column.
