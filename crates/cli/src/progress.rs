@@ -12,7 +12,7 @@ impl Progress {
     /// Progress through a scene, in simulated time.
     pub(crate) fn through_scene(title: &str, duration: Duration) -> Self {
         let bar = bar(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX));
-        bar.set_style(style("{prefix} {bar:30} {percent:>3} %  {elapsed} passed, {eta} left"));
+        bar.set_style(style("{prefix} {bar:30} {percent:>3} %  {elapsed} passed, {eta} left{msg}"));
         bar.set_prefix(title.to_owned());
         Self(bar)
     }
@@ -58,6 +58,11 @@ impl Progress {
 
     pub(crate) fn reach(&self, now: Instant) {
         self.0.set_position(now.as_nanos() / 1_000_000);
+    }
+
+    /// What stands behind the bar.
+    pub(crate) fn note(&self, text: String) {
+        self.0.set_message(text);
     }
 
     pub(crate) fn one_more(&self) {

@@ -109,7 +109,9 @@ fn conduct(scene: &Scene, session: Session, mut host: Host, control: &LiveContro
         while !running.is_finished() {
             // Not the thread that has to be on time.
             thread::sleep(Duration::from_millis(50));
-            progress.reach(Instant::ZERO.saturating_add(control.latest().elapsed));
+            let latest = control.latest();
+            progress.reach(Instant::ZERO.saturating_add(latest.elapsed));
+            progress.note(status::note(scene, &latest));
         }
         running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(failure)
     });

@@ -7,6 +7,7 @@ use cohaptic_live::{Refusal, Status};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
+use crate::documents::micros;
 use crate::realtime::{counters, quantiles, quantiles_of};
 
 /// Every directed link, by sender, then receiver.
@@ -41,6 +42,13 @@ pub(super) fn snapshot(status: &Status) -> Snapshot {
             refused.map(|(cause, count): (Refusal, u64)| (cause.name(), count)).collect()
         }),
     }
+}
+
+/// What a terminal shows behind the progress: how late ticks are, and who is not there.
+pub(super) fn note(scene: &Scene, snapshot: &Snapshot) -> String {
+    let late = snapshot.lateness.first().map_or_else(String::new, |ticks| format!("  ticks p99 {:.0} µs late", micros(ticks.p99)));
+    let missing = snapshot.peers.iter().zip(&scene.peers).filter(|(peer, _)| matches!(peer.status, Shown::Absent | Shown::Stale));
+    missing.fold(late, |text, (peer, spec)| format!("{text}  {} {}", spec.name, peer.status.name()))
 }
 
 fn link(link: &LinkStatus) -> LinkCounters {

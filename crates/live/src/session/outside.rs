@@ -30,8 +30,6 @@ const LIMITS: Limits = Limits { position: 10.0, velocity: 100.0 };
 const LARGEST: usize = 2048;
 /// Datagrams of a few peers at 125 Hz: a second of a thousand of them.
 const RECEIVE_BUFFER: usize = 1 << 20;
-/// More than come in between two ticks of a session in order: what is beyond waits for the next, so that a flood cannot keep the loop from its ticks.
-const BATCHES: usize = 4;
 
 impl Outside {
     /// `None` in a scene without peers in other programs.
@@ -75,16 +73,13 @@ impl Outside {
     pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<()> {
         let Self { socket, buffers, door, .. } = self;
         let mut replies = Vec::new();
-        for _ in 0..BATCHES {
-            let count = socket.receive(buffers, clock, |datagram| match door.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
-                Admission::Sample { place, sample, .. } => take(datagram.at, place.0 as usize, sample.bytes()),
-                Admission::Reply { to, bytes } => replies.push((to, bytes)),
-                Admission::Refused(_) => {}
-            })?;
-            if count < UdpDoor::BATCH {
-                break;
-            }
-        }
+        // One batch: more than come in between two ticks of a session in order. What is beyond waits in the kernel until the next look, which is after the next
+        // tick if that is due, so that a flood cannot keep the loop from its ticks.
+        socket.receive(buffers, clock, |datagram| match door.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
+            Admission::Sample { place, sample, .. } => take(datagram.at, place.0 as usize, sample.bytes()),
+            Admission::Reply { to, bytes } => replies.push((to, bytes)),
+            Admission::Refused(_) => {}
+        })?;
         for (to, bytes) in replies {
             socket.queue(to, &bytes, None);
         }
