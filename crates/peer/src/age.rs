@@ -31,9 +31,9 @@ impl Age {
 
 /// The ages of those senders that have one, as one receiver sees them.
 ///
-/// They are kept beside the [`Peer`], not in it: most peers never have any, and the fields and questions would cost each of them a tenth of a tick. Who
-/// drives a peer with ages calls [`Ages::handle_sample`] in place of [`Peer::handle_sample`], and [`Ages::apply`] before every [`Peer::compute`]. A state
-/// that [`Peer::hold`] puts in the place of a sender with an age is not kept.
+/// They are kept beside the [`Peer`], not in it: most peers never have any, and are not to be larger for them nor to ask for them at every tick. Who drives
+/// a peer with ages calls [`Ages::handle_sample`] in place of [`Peer::handle_sample`], and [`Ages::apply`] before every [`Peer::compute`]. A state that
+/// [`Peer::hold`] puts in the place of a sender with an age is not kept.
 ///
 /// The others count in order, with the receiver left out. Every method takes the same peer.
 #[derive(Clone, Debug, Default)]

@@ -11,8 +11,8 @@ use crate::observer::Observer;
 
 /// The peers of a running scene that live elsewhere: in other processes, or with their device in somebody's hand.
 ///
-/// A type parameter of the world and not a field that may be empty: virtual time, where everybody lives here, is not to carry what live scenes need. The
-/// field cost two peers a seventh of a tick and ten of them a tenth, though nothing ever came of its questions.
+/// A type parameter of the world and not a field that may be empty: virtual time, where everybody lives here, is not to carry what live scenes need. As a
+/// field, with ages in every peer, it cost two peers a seventh of a tick and ten of them a tenth, though nothing ever came of its questions.
 pub(crate) trait Elsewhere<const A: usize> {
     /// What stands for a device that nobody simulates.
     type Device: Device<A> + From<RestingDevice<A>>;
