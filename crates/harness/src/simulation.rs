@@ -7,7 +7,7 @@ use crate::disturbance::Disturbance;
 use crate::observer::Observer;
 use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
-use crate::world::{Step, Watch, World};
+use crate::world::{Elsewhere, Nobody, Step, Watch, World};
 
 /// The most peers that a simulation takes: it makes every one of their N·(N−1) links. A scene may have more, for what does not simulate.
 pub const MOST_PEERS: usize = 4096;
@@ -69,14 +69,14 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         assert!(too_large(self.scene).is_none(), "a scene with more peers than a simulation takes is not run");
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         match plan.axes {
-            Axes::One => run_to_end(self.world::<1>(&plan), observer),
-            Axes::Two => run_to_end(self.world::<2>(&plan), observer),
-            Axes::Three => run_to_end(self.world::<3>(&plan), observer),
+            Axes::One => run_to_end(self.world::<1, _>(&plan, Nobody), observer),
+            Axes::Two => run_to_end(self.world::<2, _>(&plan, Nobody), observer),
+            Axes::Three => run_to_end(self.world::<3, _>(&plan, Nobody), observer),
         }
     }
 
-    pub(crate) fn world<const A: usize>(&self, plan: &Plan) -> World<A, S::Strategy<A>> {
-        World::new(self.scene, plan, self.disturbance, |peer| self.strategies.strategy(self.scene, peer))
+    pub(crate) fn world<const A: usize, E: Elsewhere<A>>(&self, plan: &Plan, elsewhere: E) -> World<A, S::Strategy<A>, E> {
+        World::new(self.scene, plan, self.disturbance, elsewhere, |peer| self.strategies.strategy(self.scene, peer))
     }
 }
 

@@ -1,31 +1,30 @@
 //! The running scene: its peers, its network, its clock, with A simulated axes.
 
 mod elsewhere;
+mod live;
 
 use std::time::Duration;
 
-use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_peer::{Clock, Contact, Device, Held, ObjectCopy, Peer, Reception, RestingDevice, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Change, ChangeKind, Scene};
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{AccessLine, Damage, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
+use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
-use crate::live::{Attendance, Datagram, HandDevice};
 use crate::observer::{Observer, PacketRow, StateRow, TickRow};
 use crate::plan::{DeviceChoice, Plan};
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
 
-use elsewhere::attend;
+pub(crate) use elsewhere::{Elsewhere, Nobody};
 
-/// A scene in the middle of a run.
-pub(crate) struct World<const A: usize, S> {
+/// A scene in the middle of a run; E is who of its peers lives elsewhere.
+pub(crate) struct World<const A: usize, S, E: Elsewhere<A> = Nobody> {
     /// The axes that the scene has, of the A that are simulated.
     axes: usize,
     names: Vec<String>,
-    members: Vec<Member<A, S>>,
+    members: Vec<Member<A, S, E::Device>>,
     network: Network<Handle>,
     datagrams: Datagrams<A>,
     schedule: Schedule,
@@ -40,19 +39,14 @@ pub(crate) struct World<const A: usize, S> {
     finite: bool,
     /// Who ticks at the present instant, if not all who live here.
     ticking: Vec<usize>,
-    /// The first of those who live here, by whose ticks all of them tick in lockstep.
-    lead: usize,
     /// In lockstep, the next tick at which anybody sends.
     earliest_send: u64,
-    /// Those who live elsewhere; `None` in virtual time.
-    attendance: Option<Box<Attendance>>,
-    /// When something came in from outside whose consequences have not been looked at.
-    undrained: Option<Instant>,
+    elsewhere: E,
 }
 
 /// A peer with its clock.
-struct Member<const A: usize, S> {
-    peer: Peer<A, DeviceModel<A>, S>,
+struct Member<const A: usize, S, D> {
+    peer: Peer<A, DeviceModel<A, D>, S>,
     clock: Clock,
     tick: u64,
     /// The tick at which it sends next, and how many ticks later again.
@@ -62,21 +56,19 @@ struct Member<const A: usize, S> {
     refused_samples: u64,
 }
 
-/// What stands for a peer's device.
+/// What stands for a peer's device; D is the type of those that nobody simulates.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "most peers of most scenes are the large variant, and a box would cost a cache miss a tick")]
-enum DeviceModel<const A: usize> {
-    /// Nobody simulates it: it stays where it is or, in a live session, is in somebody's hand. One variant, so that the others' ticks decide between two.
-    Resting(RestingDevice<A>, Option<Box<HandDevice<A>>>),
+pub(crate) enum DeviceModel<const A: usize, D> {
+    Unsimulated(D),
     Simulated(SimulatedDevice<A>),
 }
 
-impl<const A: usize> Device<A> for DeviceModel<A> {
+impl<const A: usize, D: Device<A>> Device<A> for DeviceModel<A, D> {
     #[inline]
     fn state(&self) -> State<A> {
         match self {
-            Self::Resting(device, None) => device.state(),
-            Self::Resting(_, Some(hand)) => hand.state(),
+            Self::Unsimulated(device) => device.state(),
             Self::Simulated(device) => device.state(),
         }
     }
@@ -84,8 +76,7 @@ impl<const A: usize> Device<A> for DeviceModel<A> {
     #[inline]
     fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
         match self {
-            Self::Resting(device, None) => device.advance(now, span, coupling_force),
-            Self::Resting(_, Some(hand)) => hand.advance(now, span, coupling_force),
+            Self::Unsimulated(device) => device.advance(now, span, coupling_force),
             Self::Simulated(device) => device.advance(now, span, coupling_force),
         }
     }
@@ -106,12 +97,12 @@ pub(crate) enum Step {
     Ended(Ending),
 }
 
-impl<const A: usize, S: Strategy<A>> World<A, S> {
+impl<const A: usize, S: Strategy<A>, E: Elsewhere<A>> World<A, S, E> {
     /// The scene at its beginning, with the strategies that `strategy` makes for the places of the peers.
-    pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>, strategy: impl Fn(usize) -> S) -> Self {
+    pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>, elsewhere: E, strategy: impl Fn(usize) -> S) -> Self {
         let initial: Vec<State<A>> = (0..scene.peers.len()).map(|place| scene.initial_state(place)).collect();
         let member = |place| Member::new(scene, plan, &initial, disturbance, place, strategy(place));
-        let members: Vec<Member<A, S>> = (0..scene.peers.len()).map(member).collect();
+        let members: Vec<Member<A, S, E::Device>> = (0..scene.peers.len()).map(member).collect();
         Self {
             axes: scene.axes.count(),
             names: scene.peers.iter().map(|peer| peer.name.clone()).collect(),
@@ -127,10 +118,8 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
             max_discrepancy: 0.0,
             finite: true,
             ticking: (0..scene.peers.len()).collect(),
-            lead: 0,
             earliest_send: 0,
-            attendance: None,
-            undrained: None,
+            elsewhere,
         }
     }
 
@@ -152,13 +141,6 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
         if !self.finite {
             return Ok(Step::Ended(Ending::Diverged(now)));
         }
-        self.tick(now, observer, watch)?;
-        Ok(Step::Ticked)
-    }
-
-    /// Everything that happens at an instant at which a peer ticks.
-    #[inline(always)]
-    fn tick<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
         self.now = now;
         if !self.changes.is_empty() {
             self.change(now);
@@ -168,7 +150,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
         self.deliver(now, observer, watch)?;
         self.compute_and_move(now, observer, watch)?;
         self.measure_discrepancy();
-        Ok(())
+        Ok(Step::Ticked)
     }
 
     /// What came out, up to `ending`.
@@ -222,7 +204,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
                 ChangeKind::Contact { peer, contact } => self.members[peer].peer.set_contact(contact),
                 ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
                     DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
-                    DeviceModel::Resting(..) => {}
+                    DeviceModel::Unsimulated(_) => {}
                 },
                 ChangeKind::Coordination(gains) => {
                     for member in &mut self.members {
@@ -240,7 +222,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
 
     /// Step 1: those whose time it is send their sample to everybody else.
     fn send(&mut self, now: Instant) {
-        if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.lead].tick < self.earliest_send {
+        if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.elsewhere.lead()].tick < self.earliest_send {
             return;
         }
         let others = self.members.len() - 1;
@@ -265,31 +247,13 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
         self.network.handle_timeout(now).expect("instants come in order");
         while let Some(event) = self.network.poll_event() {
             if let Fate::Delivered(_) = event.fate {
-                let (from, to) = (event.from.0 as usize, event.to.0 as usize);
+                let receiver = &mut self.members[event.to.0 as usize];
                 let sample = self.datagrams.sample(event.payload);
-                if let Some(attendance) = self.attendance.as_mut().filter(|attendance| attendance.is_process(to)) {
-                    let mut bytes = [0; MAX_LEN];
-                    let len = sample.encode(self.axes, &mut bytes);
-                    if let Some(damage) = &event.damage {
-                        damage.apply(&mut bytes[..len]);
-                    }
-                    attendance.send_out(to, event.at, Datagram::new(bytes, len));
-                } else {
-                    let receiver = &mut self.members[to];
-                    let received = match &event.damage {
-                        None => receiver.peer.handle_sample(sample),
-                        Some(damage) => receiver.peer.handle_datagram(damaged(sample, self.axes, damage, &mut [0; MAX_LEN])),
-                    };
-                    match received {
-                        Ok(Reception::Newest) => {
-                            if let Some(attendance) = &mut self.attendance {
-                                attendance.arrived(from, to, now, &mut receiver.peer);
-                            }
-                        }
-                        Ok(Reception::Stale) => receiver.stale_samples += 1,
-                        Err(_) if event.damage.is_some() => receiver.refused_samples += 1,
-                        Err(error) => unreachable!("peers of one scene understand each other: {error}"),
-                    }
+                match self.elsewhere.receive(now, &event, sample, self.axes, &mut receiver.peer) {
+                    None | Some(Ok(Reception::Newest)) => {}
+                    Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
+                    Some(Err(_)) if event.damage.is_some() => receiver.refused_samples += 1,
+                    Some(Err(error)) => unreachable!("peers of one scene understand each other: {error}"),
                 }
             }
             if event.fate == Fate::Duplicated {
@@ -316,15 +280,13 @@ impl<const A: usize, S: Strategy<A>> World<A, S> {
             }
             Schedule::EventDriven(_) => None,
         };
-        if let (Some(span), false, None) = (lockstep, watch.ticks, &self.attendance) {
+        if let (Some(span), false, true) = (lockstep, watch.ticks, E::IS_NOBODY) {
             self.move_together(now, span);
             return Ok(());
         }
         for &place in &self.ticking {
             let member = &mut self.members[place];
-            if let Some(attendance) = &mut self.attendance {
-                attend(attendance, now, place, member, self.axes, observer)?;
-            }
+            self.elsewhere.attend(now, place, &mut member.peer, self.axes, observer)?;
             let forces = member.peer.compute(now);
             let object = member.peer.object().state();
             self.latest[place] = object.position;
@@ -421,14 +383,14 @@ impl Watch {
     }
 }
 
-impl<const A: usize, S: Strategy<A>> Member<A, S> {
+impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Member<A, S, D> {
     fn new(scene: &Scene, plan: &Plan, initial: &[State<A>], disturbance: Option<Disturbance>, place: usize, strategy: S) -> Self {
         let spec = &scene.peers[place];
         let (clock, integrator) = (spec.clock, scene.integrator);
         let displaced =
             |body| disturbance.map_or(initial[place], |disturbance| disturbance.displace(initial[place], scene.axes.count(), place, body));
         let device = match plan.devices[place] {
-            DeviceChoice::Resting | DeviceChoice::Unobserved => DeviceModel::Resting(RestingDevice { position: displaced(0).position }, None),
+            DeviceChoice::Resting | DeviceChoice::Unobserved => DeviceModel::Unsimulated(RestingDevice { position: displaced(0).position }.into()),
             DeviceChoice::Simulated => {
                 DeviceModel::Simulated(SimulatedDevice::new(spec.device, spec.hand.as_ref(), displaced(0), integrator, &clock))
             }
@@ -449,15 +411,13 @@ impl<const A: usize, S: Strategy<A>> Member<A, S> {
 
     #[inline]
     fn is_finite(&self) -> bool {
-        self.peer.object().state().is_finite() & self.peer.device().state().is_finite()
+        // Each kind by itself: asked as one, both become a selection of addresses, which costs two peers a fiftieth of a tick.
+        let device = match self.peer.device() {
+            DeviceModel::Unsimulated(device) => device.state().is_finite(),
+            DeviceModel::Simulated(device) => device.state().is_finite(),
+        };
+        self.peer.object().state().is_finite() & device
     }
-}
-
-/// The bytes of a sample as they arrive.
-fn damaged<'a, const A: usize>(sample: &Sample<A>, axes: usize, damage: &Damage, buffer: &'a mut [u8; MAX_LEN]) -> &'a [u8] {
-    let len = sample.encode(axes, buffer);
-    damage.apply(&mut buffer[..len]);
-    &buffer[..len]
 }
 
 fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {

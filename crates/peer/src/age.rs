@@ -2,7 +2,8 @@
 
 use alloc::vec::Vec;
 
-use crate::State;
+use crate::wire::Sample;
+use crate::{Device, Peer, ReceiveError, Reception, State, Strategy};
 
 /// What is held in place of a sender: weight·\[(1 − share)·before + share·newest\] + (1 − weight)·own, with its newest sample, what was held before it came
 /// back, and the receiver's own copy. Both numbers lie from 0 to 1.
@@ -28,9 +29,19 @@ impl Age {
     }
 }
 
-/// The ages of those senders that have one.
+/// The ages of those senders that have one, as one receiver sees them.
+///
+/// They are kept beside the [`Peer`], not in it: most peers never have any, and are not to be larger for them nor to ask for them at every tick. Who drives
+/// a peer with ages calls [`Ages::handle_sample`] in place of [`Peer::handle_sample`], and [`Ages::apply`] before every [`Peer::compute`]. A state that
+/// [`Peer::hold`] puts in the place of a sender with an age is not kept.
+///
+/// The others count in order, with the receiver left out. Every method takes the same peer.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Ages<const A: usize>(Vec<Aged<A>>);
+pub struct Ages<const A: usize> {
+    aged: Vec<Aged<A>>,
+    /// Whether the own state was part of what is held after the latest [`Ages::apply`]: it moves, so the mean does.
+    fading: bool,
+}
 
 #[derive(Clone, Debug)]
 struct Aged<const A: usize> {
@@ -45,60 +56,95 @@ struct Aged<const A: usize> {
 }
 
 impl<const A: usize> Ages<A> {
-    #[inline]
-    pub(crate) const fn is_empty(&self) -> bool {
-        self.0.is_empty()
+    /// Sets how much of another peer's newest sample counts from the next tick on. Until it is first set it is [`Age::WHOLE`], and then forces are what they
+    /// would be without ages, to the bit.
+    ///
+    /// Weight and share should change in small steps: a step of either is a step of the force.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    pub fn set<D: Device<A>, S: Strategy<A>>(&mut self, peer: &mut Peer<A, D, S>, other: usize, age: Age) {
+        self.of(peer, other).age = age;
+        *peer.aged_parts().2 = true;
     }
 
-    pub(crate) fn set(&mut self, place: usize, age: Age, held: State<A>) {
-        self.of(place, held).age = age;
-    }
-
-    pub(crate) fn await_return(&mut self, place: usize, sequence: u64, held: State<A>) {
-        let aged = self.of(place, held);
+    /// From now on the first sample from another peer with that sequence number or a later one is its *return*: it is taken in as always, and what was held
+    /// before it, [`Age::share`] included, is kept as that from which the share counts. See [`Ages::take_return`].
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    pub fn await_return<D: Device<A>, S: Strategy<A>>(&mut self, peer: &mut Peer<A, D, S>, other: usize, sequence: u64) {
+        let aged = self.of(peer, other);
         (aged.awaited, aged.returned) = (Some(sequence), false);
     }
 
-    pub(crate) fn take_return(&mut self, place: usize) -> bool {
-        self.0.iter_mut().find(|aged| aged.place == place).is_some_and(|aged| core::mem::take(&mut aged.returned))
+    /// Whether another peer has returned since this was last asked.
+    ///
+    /// Whoever is told so sets the age anew before the next tick: with a weight above zero, to a share of zero that rises from there.
+    pub fn take_return(&mut self, other: usize) -> bool {
+        self.aged.iter_mut().find(|aged| aged.place == other).is_some_and(|aged| core::mem::take(&mut aged.returned))
     }
 
-    /// A sample that is newer than all before it.
-    #[cold]
-    pub(crate) fn arrived(&mut self, place: usize, sequence: u64, state: State<A>) {
-        let Some(aged) = self.0.iter_mut().find(|aged| aged.place == place) else { return };
-        if aged.awaited.is_some_and(|first| sequence >= first) {
-            aged.before = aged.base();
-            (aged.awaited, aged.returned) = (None, true);
+    /// Hands a sample to the peer.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Peer::handle_sample`]; nothing changed.
+    pub fn handle_sample<D: Device<A>, S: Strategy<A>>(&mut self, peer: &mut Peer<A, D, S>, sample: &Sample<A>) -> Result<Reception, ReceiveError> {
+        let received = peer.handle_sample(sample)?;
+        let place = peer.place_of(sample.sender).filter(|_| received == Reception::Newest);
+        if let Some(aged) = self.aged.iter_mut().find(|aged| Some(aged.place) == place) {
+            aged.arrived(sample.sequence, sample.state);
         }
-        aged.newest = state;
+        Ok(received)
     }
 
-    pub(crate) fn replace(&mut self, place: usize, state: State<A>) {
-        if let Some(aged) = self.0.iter_mut().find(|aged| aged.place == place) {
-            (aged.newest, aged.before) = (state, state);
+    /// Lets the ages count at the tick whose forces are computed next.
+    ///
+    /// Where nobody fades the mean is that of [`crate::Held::refresh`], to the bit.
+    pub fn apply<D: Device<A>, S: Strategy<A>>(&mut self, peer: &mut Peer<A, D, S>) {
+        let (own, held, stale_mean) = peer.aged_parts();
+        if self.aged.is_empty() || !(*stale_mean || self.fading) {
+            return;
         }
+        for aged in &self.aged {
+            held.replace_state(aged.place, aged.held(own));
+        }
+        self.fading = self.aged.iter().any(|aged| !aged.age.is_whole());
+        if self.fading {
+            held.refresh_around(own);
+        } else {
+            held.refresh();
+        }
+        *stale_mean = false;
     }
 
-    /// What is held of each of them.
-    pub(crate) fn held(&self, own: &State<A>) -> impl Iterator<Item = (usize, State<A>)> {
-        self.0.iter().map(move |aged| (aged.place, if aged.age.is_whole() { aged.newest } else { mix(own, &aged.base(), aged.age.weight) }))
-    }
-
-    pub(crate) fn all_whole(&self) -> bool {
-        self.0.iter().all(|aged| aged.age.is_whole())
-    }
-
-    fn of(&mut self, place: usize, held: State<A>) -> &mut Aged<A> {
-        let index = self.0.iter().position(|aged| aged.place == place).unwrap_or_else(|| {
-            self.0.push(Aged { place, age: Age::WHOLE, newest: held, before: held, awaited: None, returned: false });
-            self.0.len() - 1
+    fn of<D: Device<A>, S: Strategy<A>>(&mut self, peer: &mut Peer<A, D, S>, place: usize) -> &mut Aged<A> {
+        let index = self.aged.iter().position(|aged| aged.place == place).unwrap_or_else(|| {
+            let newest = *peer.aged_parts().1.state(place).expect("there is another peer in that place");
+            self.aged.push(Aged { place, age: Age::WHOLE, newest, before: newest, awaited: None, returned: false });
+            self.aged.len() - 1
         });
-        &mut self.0[index]
+        &mut self.aged[index]
     }
 }
 
 impl<const A: usize> Aged<A> {
+    /// A sample that is newer than all before it.
+    fn arrived(&mut self, sequence: u64, state: State<A>) {
+        if self.awaited.is_some_and(|first| sequence >= first) {
+            self.before = self.base();
+            (self.awaited, self.returned) = (None, true);
+        }
+        self.newest = state;
+    }
+
+    fn held(&self, own: &State<A>) -> State<A> {
+        if self.age.is_whole() { self.newest } else { mix(own, &self.base(), self.age.weight) }
+    }
+
     fn base(&self) -> State<A> {
         if self.age.share < 1.0 { mix(&self.before, &self.newest, self.age.share) } else { self.newest }
     }

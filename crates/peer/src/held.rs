@@ -3,17 +3,14 @@
 use alloc::vec::Vec;
 
 use crate::State;
-use crate::age::{Age, Ages};
 
 /// What a peer knows of the others: per sender, the sample with the highest sequence number that has arrived.
 ///
-/// Before anything has arrived from a sender it holds the sender's initial state. The mean is kept until a sample changes it. What is held of a sender
-/// with an [`Age`] is as that says.
+/// Before anything has arrived from a sender it holds the sender's initial state. The mean is kept until a sample changes it.
 #[derive(Clone, Debug)]
 pub struct Held<const A: usize> {
     samples: Vec<HeldSample<A>>,
     mean: State<A>,
-    ages: Ages<A>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +25,7 @@ impl<const A: usize> Held<A> {
     #[must_use]
     pub fn new(initial: impl IntoIterator<Item = State<A>>) -> Self {
         let samples = initial.into_iter().map(|state| HeldSample { state, next: 0 }).collect();
-        let mut held = Self { samples, mean: State::REST, ages: Ages::default() };
+        let mut held = Self { samples, mean: State::REST };
         held.refresh();
         held
     }
@@ -71,9 +68,6 @@ impl<const A: usize> Held<A> {
         if newer {
             // A sequence number of 2^64 − 1 is the last there can be: nothing is newer.
             *held = HeldSample { state, next: sequence.saturating_add(1) };
-            if !self.ages.is_empty() {
-                self.ages.arrived(place, sequence, state);
-            }
         }
         newer
     }
@@ -85,50 +79,16 @@ impl<const A: usize> Held<A> {
     /// If there is no sender in that place.
     pub fn hold(&mut self, place: usize, state: State<A>) {
         self.samples[place] = HeldSample { state, next: 0 };
-        self.ages.replace(place, state);
     }
 
-    /// Sets how much of a sender's newest sample counts. Call [`Held::refresh_around`] before states or mean are used again.
-    ///
-    /// # Panics
-    ///
-    /// If there is no sender in that place.
-    pub(crate) fn set_age(&mut self, place: usize, age: Age) {
-        let HeldSample { state, .. } = self.samples[place];
-        self.ages.set(place, age, state);
+    /// Replaces the state held from a sender, whose newest sample stays as new as it was.
+    pub(crate) fn replace_state(&mut self, place: usize, state: State<A>) {
+        self.samples[place].state = state;
     }
 
-    /// From now on the first sample of that number or a later one is a return: see [`crate::Peer::await_return`].
-    pub(crate) fn await_return(&mut self, place: usize, sequence: u64) {
-        let HeldSample { state, .. } = self.samples[place];
-        self.ages.await_return(place, sequence, state);
-    }
-
-    pub(crate) fn take_return(&mut self, place: usize) -> bool {
-        self.ages.take_return(place)
-    }
-
-    /// Whether any sender has, or has had, an age.
-    #[inline]
-    pub(crate) const fn has_ages(&self) -> bool {
-        !self.ages.is_empty()
-    }
-
-    /// [`Held::refresh`] around the holder's own state, into which a sender fades. Answers whether it must be called at the next tick too.
-    ///
-    /// The mean is taken of the differences from the own state, so that senders with no weight at all leave exactly the own state. Where nobody fades
-    /// it is the mean of [`Held::refresh`], to the bit.
-    #[cold]
-    #[inline(never)]
+    /// [`Held::refresh`] for a mean of the differences from the holder's own state, so that senders that are held exactly there leave exactly that.
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-    pub(crate) fn refresh_around(&mut self, own: &State<A>) -> bool {
-        for (place, held) in self.ages.held(own) {
-            self.samples[place].state = held;
-        }
-        if self.ages.all_whole() {
-            self.refresh();
-            return false;
-        }
+    pub(crate) fn refresh_around(&mut self, own: &State<A>) {
         let count = self.samples.len() as f64;
         for axis in 0..A {
             let (mut position, mut velocity) = (0.0, 0.0);
@@ -139,7 +99,6 @@ impl<const A: usize> Held<A> {
             self.mean.position[axis] = own.position[axis] + position / count;
             self.mean.velocity[axis] = own.velocity[axis] + velocity / count;
         }
-        true
     }
 
     /// Computes the mean anew.

@@ -39,7 +39,7 @@ mod state;
 mod stepper;
 pub mod wire;
 
-pub use age::Age;
+pub use age::{Age, Ages};
 pub use clock::{Clock, Drift, DriftError};
 pub use config::{ArmConfig, Contact, CopyConfig, DeviceConfig, Direction, Gains, Hand};
 pub use coordination::{Command, Context, Coordination, Strategy};

@@ -5,7 +5,7 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 
 use crate::wire::{DecodeError, MAX_LEN, Sample};
-use crate::{Age, Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
+use crate::{Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
 
 /// What a peer is, apart from its device, its copy of the object and its strategy.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -137,12 +137,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         if sample.session != self.config.session {
             return Err(ReceiveError::Session { found: sample.session });
         }
-        // The others are held in order with this peer left out.
-        let (sender, own) = (sample.sender as usize, self.config.place as usize);
-        let place = if sender < own { sender } else { sender.wrapping_sub(1) };
-        if sender == own || place >= self.held.len() {
-            return Err(ReceiveError::Sender { sender: sample.sender });
-        }
+        let Some(place) = self.place_of(sample.sender) else { return Err(ReceiveError::Sender { sender: sample.sender }) };
         if self.held.accept(place, sample.sequence, sample.state) {
             self.stale_mean = true;
             Ok(Reception::Newest)
@@ -155,7 +150,8 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     #[inline(always)]
     pub fn compute(&mut self, now: Instant) -> Forces<A> {
         if self.stale_mean {
-            self.refresh();
+            self.held.refresh();
+            self.stale_mean = false;
         }
         let own = self.object.state();
         let coupling = self.coupling_force(own);
@@ -217,36 +213,6 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.stale_mean = true;
     }
 
-    /// Sets how much of another peer's newest sample counts from the next tick on; the others count in order, with this peer left out. Until it is first
-    /// set it is [`Age::WHOLE`], and then forces are what they would be without ages, to the bit.
-    ///
-    /// Weight and share should change in small steps: a step of either is a step of the force.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such peer.
-    pub fn set_age(&mut self, other: usize, age: Age) {
-        self.held.set_age(other, age);
-        self.stale_mean = true;
-    }
-
-    /// From now on the first sample from another peer with that sequence number or a later one is its *return*: it is taken in as always, and what was held
-    /// before it, [`Age::share`] included, is kept as that from which the share counts. See [`Peer::take_return`].
-    ///
-    /// # Panics
-    ///
-    /// If there is no such peer.
-    pub fn await_return(&mut self, other: usize, sequence: u64) {
-        self.held.await_return(other, sequence);
-    }
-
-    /// Whether another peer has returned since this was last asked.
-    ///
-    /// Whoever is told so sets the age anew before the next tick: with a weight above zero, to a share of zero that rises from there.
-    pub fn take_return(&mut self, other: usize) -> bool {
-        self.held.take_return(other)
-    }
-
     /// Changes KC and BC, from the next tick on.
     pub const fn set_coupling(&mut self, coupling: Gains) {
         self.config.coupling = coupling;
@@ -285,13 +251,17 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.config.contact = contact;
     }
 
-    fn refresh(&mut self) {
-        if self.held.has_ages() {
-            self.stale_mean = self.held.refresh_around(self.object.state());
-        } else {
-            self.held.refresh();
-            self.stale_mean = false;
-        }
+    /// The place of another peer among those that are held, in order with this peer left out; `None` if there is no such peer.
+    #[inline(always)]
+    pub(crate) fn place_of(&self, sender: u32) -> Option<usize> {
+        let (sender, own) = (sender as usize, self.config.place as usize);
+        let place = if sender < own { sender } else { sender.wrapping_sub(1) };
+        (sender != own && place < self.held.len()).then_some(place)
+    }
+
+    /// What [`crate::Ages`] change: the peer's own state, what it holds, and whether a sample has changed since the mean was computed.
+    pub(crate) const fn aged_parts(&mut self) -> (&State<A>, &mut Held<A>, &mut bool) {
+        (self.object.state(), &mut self.held, &mut self.stale_mean)
     }
 
     #[inline]

@@ -17,7 +17,7 @@ use crate::disturbance::Disturbance;
 use crate::observer::NoObserver;
 use crate::plan::{Model, Plan};
 use crate::simulation::Simulation;
-use crate::world::{Step, Watch, World};
+use crate::world::{Nobody, Step, Watch, World};
 
 /// What a disturbance did.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -77,7 +77,7 @@ pub fn stability(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) 
 
 fn pair<const A: usize>(scene: &Scene, model: Model, plan: &Plan) -> (World<A, BuiltIn>, World<A, BuiltIn>) {
     let disturbed = Simulation::disturbed(scene, model, Disturbance { size: SIZE });
-    (Simulation::new(scene, model).world(plan), disturbed.world(plan))
+    (Simulation::new(scene, model).world(plan, Nobody), disturbed.world(plan, Nobody))
 }
 
 /// Runs the two side by side.

@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use cohaptic_peer::wire::MAX_LEN;
-use cohaptic_peer::{Age, Device, Peer, Strategy};
+use cohaptic_peer::wire::{MAX_LEN, Sample};
+use cohaptic_peer::{Age, Ages, Device, Peer, ReceiveError, Reception, Strategy};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::Instant;
 
@@ -49,16 +49,22 @@ pub struct Transmit {
 
 /// Everybody who lives elsewhere.
 #[derive(Debug)]
-pub(crate) struct Attendance {
+pub(crate) struct Attendance<const A: usize> {
     seats: Vec<Option<Seat>>,
+    /// What the others are to each who lives here.
+    ages: Vec<Ages<A>>,
     /// What each (sender, receiver) was last told.
     told: Vec<Option<Age>>,
     outbox: VecDeque<Transmit>,
     /// Whether any peer lives in another process.
     pub(crate) has_processes: bool,
+    /// The first of those who live here.
+    pub(crate) lead: usize,
+    /// When something came in from outside whose consequences have not been looked at.
+    pub(crate) undrained: Option<Instant>,
 }
 
-impl Attendance {
+impl<const A: usize> Attendance<A> {
     pub(crate) fn new(scene: &Scene) -> Self {
         let peers = scene.peers.len();
         let seat = |(place, peer): (usize, &cohaptic_scene::PeerSpec)| {
@@ -67,7 +73,9 @@ impl Attendance {
         };
         let seats: Vec<Option<Seat>> = scene.peers.iter().enumerate().map(seat).collect();
         let has_processes = seats.iter().flatten().any(|seat| seat.is_process);
-        Self { seats, told: vec![None; peers * peers], outbox: VecDeque::new(), has_processes }
+        let lead = seats.iter().position(|seat| seat.as_ref().is_none_or(|seat| !seat.is_process)).unwrap_or(0);
+        let (ages, told) = (vec![Ages::default(); peers], vec![None; peers * peers]);
+        Self { seats, ages, told, outbox: VecDeque::new(), has_processes, lead, undrained: None }
     }
 
     pub(crate) fn seat(&self, place: usize) -> Option<&Seat> {
@@ -92,10 +100,31 @@ impl Attendance {
         }
     }
 
+    /// From now on the first sample of that number or a later one is a return of that peer to the other.
+    pub(crate) fn await_return<D: Device<A>, S: Strategy<A>>(&mut self, from: usize, to: usize, sequence: u64, peer: &mut Peer<A, D, S>) {
+        self.ages[to].await_return(peer, other(from, to), sequence);
+    }
+
+    /// A sample has arrived.
+    pub(crate) fn take_in<D: Device<A>, S: Strategy<A>>(
+        &mut self,
+        now: Instant,
+        ends: (usize, usize),
+        sample: &Sample<A>,
+        peer: &mut Peer<A, D, S>,
+    ) -> Result<Reception, ReceiveError> {
+        let (from, to) = ends;
+        let received = self.ages[to].handle_sample(peer, sample)?;
+        if received == Reception::Newest {
+            self.arrived(now, from, to);
+        }
+        Ok(received)
+    }
+
     /// A sample has arrived that is newer than all before it.
-    pub(crate) fn arrived<const A: usize, D: Device<A>, S: Strategy<A>>(&mut self, from: usize, to: usize, now: Instant, peer: &mut Peer<A, D, S>) {
-        let Some(seat) = self.seat_mut(from).filter(|seat| seat.is_process) else { return };
-        if !peer.take_return(other(from, to)) {
+    fn arrived(&mut self, now: Instant, from: usize, to: usize) {
+        let Some(seat) = self.seats.get_mut(from).and_then(Option::as_mut).filter(|seat| seat.is_process) else { return };
+        if !self.ages[to].take_return(other(from, to)) {
             return;
         }
         seat.fades[to].moved(now);
@@ -105,16 +134,17 @@ impl Attendance {
     }
 
     /// Tells a peer that is about to tick what it feels of those who live elsewhere.
-    pub(crate) fn tell<const A: usize, D: Device<A>, S: Strategy<A>>(&mut self, to: usize, now: Instant, peer: &mut Peer<A, D, S>) {
+    pub(crate) fn tell<D: Device<A>, S: Strategy<A>>(&mut self, to: usize, now: Instant, peer: &mut Peer<A, D, S>) {
         let peers = self.seats.len();
         for (from, seat) in self.seats.iter().enumerate().filter(|(from, _)| *from != to) {
             let Some(seat) = seat else { continue };
             let (age, told) = (seat.fades[to].age(now), &mut self.told[from * peers + to]);
             if *told != Some(age) {
                 *told = Some(age);
-                peer.set_age(other(from, to), age);
+                self.ages[to].set(peer, other(from, to), age);
             }
         }
+        self.ages[to].apply(peer);
     }
 
     pub(crate) fn send_out(&mut self, to: usize, at: Instant, datagram: Datagram) {
@@ -127,6 +157,6 @@ impl Attendance {
 }
 
 /// The place of a sender among the others of a receiver.
-pub(crate) const fn other(from: usize, to: usize) -> usize {
+const fn other(from: usize, to: usize) -> usize {
     if from < to { from } else { from - 1 }
 }

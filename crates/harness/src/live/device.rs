@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::{Device, State};
+use cohaptic_peer::{Device, RestingDevice, State};
 use cohaptic_units::Instant;
 
 /// What a live session needs of a device. Components beyond the axes of the scene are zero, and are not looked at.
@@ -14,6 +14,36 @@ pub trait LiveDevice: Send {
     /// Holds a force until the next tick, `span` after `now`: FC \[N\], which the hand feels with the opposite sign. Called once a tick, after
     /// [`LiveDevice::read`], and with zero forces when the session ends.
     fn hold(&mut self, now: Instant, span: Duration, coupling_force: [f64; 3]);
+}
+
+/// A device that nobody simulates.
+#[derive(Debug)]
+pub(crate) enum UnsimulatedDevice<const A: usize> {
+    /// It stays where it is.
+    Resting(RestingDevice<A>),
+    InHand(Box<HandDevice<A>>),
+}
+
+impl<const A: usize> From<RestingDevice<A>> for UnsimulatedDevice<A> {
+    fn from(device: RestingDevice<A>) -> Self {
+        Self::Resting(device)
+    }
+}
+
+impl<const A: usize> Device<A> for UnsimulatedDevice<A> {
+    fn state(&self) -> State<A> {
+        match self {
+            Self::Resting(device) => device.state(),
+            Self::InHand(device) => device.state(),
+        }
+    }
+
+    fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
+        match self {
+            Self::Resting(device) => device.advance(now, span, coupling_force),
+            Self::InHand(device) => device.advance(now, span, coupling_force),
+        }
+    }
 }
 
 /// The device of a peer, where it was when it was last read.
@@ -60,8 +90,6 @@ impl<const A: usize> HandDevice<A> {
 }
 
 impl<const A: usize> Device<A> for HandDevice<A> {
-    #[cold]
-    #[inline(never)]
     fn state(&self) -> State<A> {
         if self.share < 1.0 {
             let mix = |from: [f64; A], to: [f64; A]| core::array::from_fn(|axis| from[axis] + self.share * (to[axis] - from[axis]));
@@ -71,8 +99,6 @@ impl<const A: usize> Device<A> for HandDevice<A> {
         }
     }
 
-    #[cold]
-    #[inline(never)]
     fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
         if let Some(device) = &mut self.device {
             device.hold(now, span, core::array::from_fn(|axis| coupling_force.get(axis).copied().unwrap_or(0.0)));

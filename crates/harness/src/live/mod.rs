@@ -15,8 +15,8 @@ mod rows;
 mod scene;
 mod seat;
 
-pub(crate) use attendance::{Attendance, other};
-pub(crate) use device::HandDevice;
+pub(crate) use attendance::Attendance;
+pub(crate) use device::{HandDevice, UnsimulatedDevice};
 
 pub use attendance::{Datagram, Transmit};
 pub use device::LiveDevice;

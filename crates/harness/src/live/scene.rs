@@ -9,7 +9,7 @@ use cohaptic_scene::{Axes, LinkKeys, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, LinkStats};
 
-use super::attendance::Transmit;
+use super::attendance::{Attendance, Transmit};
 use super::device::LiveDevice;
 use super::inputs::{Input, InputRow};
 use super::seat::{Presence, SampleError, SeatStats};
@@ -40,9 +40,9 @@ pub struct LiveScene {
 
 /// A world with as many axes as the scene has.
 enum AnyWorld {
-    One(Box<World<1, BuiltIn>>),
-    Two(Box<World<2, BuiltIn>>),
-    Three(Box<World<3, BuiltIn>>),
+    One(Box<World<1, BuiltIn, Attendance<1>>>),
+    Two(Box<World<2, BuiltIn, Attendance<2>>>),
+    Three(Box<World<3, BuiltIn, Attendance<3>>>),
 }
 
 macro_rules! each {
@@ -79,9 +79,9 @@ impl LiveScene {
         let plan = Plan::new(scene, Model::Least, true);
         let simulation = Simulation::new(scene, Model::Least);
         let world = match plan.axes {
-            Axes::One => AnyWorld::One(Box::new(simulation.world(&plan).with_attendance(scene, devices))),
-            Axes::Two => AnyWorld::Two(Box::new(simulation.world(&plan).with_attendance(scene, devices))),
-            Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan).with_attendance(scene, devices))),
+            Axes::One => AnyWorld::One(Box::new(simulation.world(&plan, Attendance::new(scene)).seated(scene, devices))),
+            Axes::Two => AnyWorld::Two(Box::new(simulation.world(&plan, Attendance::new(scene)).seated(scene, devices))),
+            Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan, Attendance::new(scene)).seated(scene, devices))),
         };
         // The session that peers of the scene have: see `Scene::peer_config`.
         Self { world, session: scene.seed, open: Instant::ZERO, ended: None }

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use cohaptic_peer::wire::Sample;
 use cohaptic_peer::{
-    Age, Clock, Contact, Coordination, CopyConfig, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, RestingDevice, State, coordination::BuiltIn,
+    Age, Ages, Clock, Contact, Coordination, CopyConfig, Forces, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, RestingDevice, State,
+    coordination::BuiltIn,
 };
 use cohaptic_units::Instant;
 use proptest::collection::vec;
@@ -12,13 +13,43 @@ use proptest::prelude::*;
 
 const GAINS: Gains = Gains { stiffness: 2000.0, damping: 7.0 };
 
+/// A peer and the ages that it gives to others.
+struct Receiver {
+    peer: Peer<1, RestingDevice<1>, BuiltIn>,
+    ages: Ages<1>,
+}
+
+impl Receiver {
+    fn set_age(&mut self, other: usize, age: Age) {
+        self.ages.set(&mut self.peer, other, age);
+    }
+
+    fn await_return(&mut self, other: usize, sequence: u64) {
+        self.ages.await_return(&mut self.peer, other, sequence);
+    }
+
+    fn take_in(&mut self, sample: &Sample<1>) {
+        self.ages.handle_sample(&mut self.peer, sample).unwrap();
+    }
+
+    fn compute(&mut self) -> Forces<1> {
+        self.ages.apply(&mut self.peer);
+        self.peer.compute(Instant::ZERO)
+    }
+
+    fn force(&mut self) -> f64 {
+        self.compute().coordination[0]
+    }
+}
+
 /// Peer 0 of so many, at rest at `own`; the others begin at the origin.
-fn receiver(peers: usize, own: f64) -> Peer<1, RestingDevice<1>, BuiltIn> {
+fn receiver(peers: usize, own: f64) -> Receiver {
     let config = PeerConfig { session: 1, place: 0, axes: 1, contact: Contact::None, coupling: GAINS, compute_delay: false, enclosure: None };
     let clock = Clock::regular(Duration::from_millis(1));
     let object = ObjectCopy::new(CopyConfig { mass: 0.2, damping: 0.0 }, at(own, 0.0), Integrator::Exact, &clock);
     let held = Held::new(vec![State::REST; peers - 1]);
-    Peer::new(config, RestingDevice { position: [0.0] }, object, Coordination::AveragePosition.strategy(GAINS, peers), held)
+    let peer = Peer::new(config, RestingDevice { position: [0.0] }, object, Coordination::AveragePosition.strategy(GAINS, peers), held);
+    Receiver { peer, ages: Ages::default() }
 }
 
 fn at(position: f64, velocity: f64) -> State<1> {
@@ -27,10 +58,6 @@ fn at(position: f64, velocity: f64) -> State<1> {
 
 fn sample(sender: u32, sequence: u64, state: State<1>) -> Sample<1> {
     Sample { session: 1, sender, sequence, sent: Instant::ZERO, state }
-}
-
-fn force(peer: &mut Peer<1, RestingDevice<1>, BuiltIn>) -> f64 {
-    peer.compute(Instant::ZERO).coordination[0]
 }
 
 /// With any number of peers: the mean of nothing but the own state is the own state, exactly.
@@ -43,8 +70,8 @@ fn senders_without_weight_exert_no_force_at_all() {
                 peer.set_age(other, Age::GONE);
             }
             for tick in 0..3 {
-                assert_eq!(force(&mut peer), 0.0, "{peers} peers, tick {tick}");
-                peer.handle_sample(&sample(1, tick, at(99.0, -3.0))).unwrap();
+                assert_eq!(peer.force(), 0.0, "{peers} peers, tick {tick}");
+                peer.take_in(&sample(1, tick, at(99.0, -3.0)));
             }
         }
     }
@@ -54,20 +81,20 @@ fn senders_without_weight_exert_no_force_at_all() {
 #[test]
 fn what_is_held_is_the_mixture_of_three_states() {
     let mut peer = receiver(3, 1.0);
-    peer.handle_sample(&sample(1, 0, at(4.0, 2.0))).unwrap();
-    peer.handle_sample(&sample(2, 0, at(-3.0, 0.0))).unwrap();
+    peer.take_in(&sample(1, 0, at(4.0, 2.0)));
+    peer.take_in(&sample(2, 0, at(-3.0, 0.0)));
     peer.set_age(0, Age { weight: 0.25, share: 1.0 });
     // (1 + (4 − 1)/4, 2/4) and (−3, 0).
-    let target = peer.compute(Instant::ZERO).target;
+    let target = peer.compute().target;
     assert_eq!((target.position, target.velocity), ([(1.75 - 3.0) / 2.0], [0.25]));
     peer.await_return(0, 5);
-    peer.handle_sample(&sample(1, 4, at(8.0, 2.0))).unwrap();
-    assert!(!peer.take_return(0), "sent before the silence");
-    peer.handle_sample(&sample(1, 5, at(16.0, 4.0))).unwrap();
-    assert!(peer.take_return(0) && !peer.take_return(0));
+    peer.take_in(&sample(1, 4, at(8.0, 2.0)));
+    assert!(!peer.ages.take_return(0), "sent before the silence");
+    peer.take_in(&sample(1, 5, at(16.0, 4.0)));
+    assert!(peer.ages.take_return(0) && !peer.ages.take_return(0));
     peer.set_age(0, Age { weight: 0.25, share: 0.5 });
     // Half way from (8, 2) to (16, 4) is (12, 3); a quarter of the way there from (1, 0) is (3.75, 0.75).
-    let target = peer.compute(Instant::ZERO).target;
+    let target = peer.compute().target;
     assert_eq!((target.position, target.velocity), ([(3.75 - 3.0) / 2.0], [0.375]));
 }
 
@@ -104,7 +131,7 @@ proptest! {
         let (mut age, mut falls, mut sequence) = (Age::GONE, true, 0);
         let (mut newest, mut before) = (State::REST, State::REST);
         peer.set_age(0, age);
-        let mut last = force(&mut peer);
+        let mut last = peer.force();
         for event in events {
             let mut moved = State::<1>::REST;
             match event {
@@ -112,15 +139,15 @@ proptest! {
                 Event::Falls(down) => falls = down,
                 Event::Sends(position) => {
                     let state = at(position, -position);
-                    peer.handle_sample(&sample(1, sequence, state)).unwrap();
+                    peer.take_in(&sample(1, sequence, state));
                     moved = at(state.position[0] - newest.position[0], state.velocity[0] - newest.velocity[0]);
                     newest = state;
                 }
                 Event::Returns(position) => {
                     let state = at(position, -position);
                     peer.await_return(0, sequence);
-                    peer.handle_sample(&sample(1, sequence, state)).unwrap();
-                    prop_assert!(peer.take_return(0));
+                    peer.take_in(&sample(1, sequence, state));
+                    prop_assert!(peer.ages.take_return(0));
                     before = at(
                         before.position[0] + age.share * (newest.position[0] - before.position[0]),
                         before.velocity[0] + age.share * (newest.velocity[0] - before.velocity[0]),
@@ -134,7 +161,7 @@ proptest! {
             age.weight = if falls { (age.weight - step).max(0.0) } else { (age.weight + step).min(1.0) };
             age.share = (age.share + step).min(1.0);
             peer.set_age(0, age);
-            let now = force(&mut peer);
+            let now = peer.force();
             // Every distance is at most what it is to the farther of the two states.
             let bound = |newest: f64, before: f64, own: f64, moved: f64| {
                 step * ((newest - own).abs().max((before - own).abs()) + (newest - before).abs()) + moved.abs()
@@ -150,20 +177,20 @@ proptest! {
     /// A sender that was gone and is back whole is as if it had never had an age: to the bit.
     #[test]
     fn whole_ages_change_no_bit(own in -1.0..1.0, states in vec((1..4_u32, -1.0..1.0), 1..30), aged in vec(0..3_usize, 1..4)) {
-        let (mut plain, mut with_ages) = (receiver(4, own), receiver(4, own));
+        let (Receiver { peer: mut plain, .. }, mut with_ages) = (receiver(4, own), receiver(4, own));
         for other in &aged {
             with_ages.set_age(*other, Age { weight: 0.3, share: 0.1 });
         }
-        force(&mut with_ages);
+        with_ages.force();
         for other in &aged {
             with_ages.set_age(*other, Age::WHOLE);
         }
-        prop_assert_eq!(plain.compute(Instant::ZERO), with_ages.compute(Instant::ZERO));
+        prop_assert_eq!(plain.compute(Instant::ZERO), with_ages.compute());
         for (sequence, (sender, position)) in states.into_iter().enumerate() {
-            for peer in [&mut plain, &mut with_ages] {
-                peer.handle_sample(&sample(sender, sequence as u64, at(position, position / 3.0))).unwrap();
-            }
-            prop_assert_eq!(plain.compute(Instant::ZERO), with_ages.compute(Instant::ZERO));
+            let sample = sample(sender, sequence as u64, at(position, position / 3.0));
+            plain.handle_sample(&sample).unwrap();
+            with_ages.take_in(&sample);
+            prop_assert_eq!(plain.compute(Instant::ZERO), with_ages.compute());
         }
     }
 }

@@ -1,0 +1,237 @@
+//! A running scene some of whose peers live elsewhere.
+
+use cohaptic_peer::wire::{MAX_LEN, Sample};
+use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, State, Strategy};
+use cohaptic_scene::{PeerKind, Scene};
+use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::{LinkModel, LinkStats, NetworkEvent, PacketInfo};
+
+use super::elsewhere::{Elsewhere, datagram};
+use super::{DeviceModel, Step, Watch, World, node, row};
+use crate::datagrams::Handle;
+use crate::live::{Attendance, Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, SampleError, SeatStats, Transmit, UnsimulatedDevice};
+use crate::observer::Observer;
+use crate::plan::ticking;
+use crate::schedule::Schedule;
+
+impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
+    /// The scene at its beginning, with nobody there yet of those who live elsewhere.
+    pub(crate) fn seated(mut self, scene: &Scene, mut devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
+        self.ticking.retain(|place| !self.elsewhere.is_process(*place));
+        let here = |place: &usize| &scene.peers[*place];
+        let clocks: Vec<(usize, &Clock)> = self.ticking.iter().map(|place| (*place, &here(place).clock)).collect();
+        self.schedule = Schedule::new(ticking(self.ticking.iter().map(here)), clocks);
+        for (place, (peer, member)) in scene.peers.iter().zip(&mut self.members).enumerate() {
+            match peer.kind {
+                PeerKind::Udp(_) => {
+                    member.next_send = u64::MAX;
+                    self.latest[place] = [f64::NAN; A];
+                }
+                PeerKind::Falcon(..) => {
+                    let state = member.peer.device().state();
+                    let hand = Box::new(HandDevice::new(devices(place), state));
+                    *member.peer.device_mut() = DeviceModel::Unsimulated(UnsimulatedDevice::InHand(hand));
+                }
+                PeerKind::Simulated => {}
+                _ => unreachable!("every kind of peer of this workspace is listed"),
+            }
+        }
+        self
+    }
+
+    /// The next instant at which anything happens; the end of the scene is the last.
+    ///
+    /// Where all live here it is a tick, as in virtual time: what arrives in between waits for it anyway. A process is to have its packets when they arrive.
+    pub(crate) fn next_instant(&self) -> Instant {
+        let tick = self.schedule.next_instant().unwrap_or(self.end);
+        if !self.elsewhere.has_processes {
+            return tick.min(self.end);
+        }
+        let change = self.changes.last().map(|change| change.at);
+        [self.network.poll_timeout(), change, self.elsewhere.undrained].into_iter().flatten().fold(tick, Instant::min).min(self.end)
+    }
+
+    /// Everything that happens at [`World::next_instant`], which is `at`.
+    pub(crate) fn happen<O: Observer>(&mut self, at: Instant, observer: &mut O, watch: Watch) -> Result<Step, O::Error> {
+        self.elsewhere.undrained = None;
+        self.notice_silence(at);
+        if at >= self.end {
+            return self.finish(observer, watch).map(Step::Ended);
+        }
+        if self.schedule.next_instant() == Some(at) {
+            return self.step(observer, watch);
+        }
+        self.now = at;
+        self.change(at);
+        self.deliver(at, observer, watch)?;
+        Ok(Step::Ticked)
+    }
+
+    /// A sample has come from the process of a peer. Everything before `at` has happened, nothing at it.
+    pub(crate) fn take_sample(&mut self, at: Instant, place: usize, datagram: &[u8], session: u64) -> Result<(), SampleError> {
+        self.notice_silence(at);
+        let Some(seat) = self.elsewhere.seat_mut(place).filter(|seat| seat.is_process) else {
+            return Err(SampleError::NoSeat { peer: place });
+        };
+        let read = read_sample::<A>(datagram, self.axes, session, place).inspect_err(|_| seat.stats.refused += 1);
+        let mut sample = read?;
+        seat.admit(sample.sequence)?;
+        let joins = seat.hear(at);
+        // A peer that comes back counts from 0 again; for the others its numbers go on.
+        sample.sequence = seat.next_sequence;
+        seat.next_sequence += 1;
+        if joins {
+            for (to, member) in self.members.iter_mut().enumerate() {
+                if to != place && !self.elsewhere.is_process(to) {
+                    self.elsewhere.await_return(place, to, sample.sequence, &mut member.peer);
+                }
+            }
+        }
+        self.latest[place] = sample.state.position;
+        self.members[place].peer.object_mut().set_state(sample.state);
+        self.change(at);
+        let copies = self.members.len() - 1;
+        let stored = self.datagrams.store(copies, self.axes, |bytes| sample.encode(self.axes, bytes));
+        let (handle, len) = stored.expect("what was decoded can be decoded again");
+        let info = PacketInfo { size: Bytes::new(len as u64), ecn_capable: true };
+        self.network.handle_broadcast(at, node(place), info, handle).expect("instants come in order");
+        self.elsewhere.undrained = Some(at);
+        Ok(())
+    }
+
+    /// A link changes from outside. Everything before `at` has happened, nothing at it.
+    pub(crate) fn take_link(&mut self, at: Instant, from: usize, to: usize, link: &LinkModel) {
+        self.change(at);
+        self.set_link(at, from, to, link);
+        self.elsewhere.undrained = Some(at);
+    }
+
+    /// Nobody feels a force of the session any more.
+    pub(crate) fn let_go(&mut self, now: Instant) {
+        for member in &mut self.members {
+            if let Some(device) = member.peer.device_mut().hand_mut() {
+                device.let_go(now);
+            }
+        }
+    }
+
+    pub(crate) fn next_transmit(&mut self) -> Option<Transmit> {
+        self.elsewhere.next_transmit()
+    }
+
+    pub(crate) fn presence(&self, place: usize, now: Instant) -> Option<Presence> {
+        (place < self.members.len()).then(|| self.elsewhere.seat(place).map_or(Presence::Here, |seat| seat.presence(now)))
+    }
+
+    pub(crate) fn seat_stats(&self, place: usize) -> Option<SeatStats> {
+        self.elsewhere.seat(place).map(|seat| seat.stats)
+    }
+
+    pub(crate) fn note_late(&mut self, place: usize, by: std::time::Duration) {
+        if let Some(seat) = self.elsewhere.seat_mut(place) {
+            seat.stats.late += 1;
+            seat.stats.most_late = seat.stats.most_late.max(by);
+        }
+    }
+
+    pub(crate) fn link_stats(&self, from: usize, to: usize) -> Option<LinkStats> {
+        let is_there = |place: usize| place < self.members.len();
+        (is_there(from) && is_there(to)).then(|| self.network.link_stats(node(from), node(to))).flatten()
+    }
+
+    /// The device, if it is here, and the copy of a peer.
+    pub(crate) fn states(&self, place: usize) -> Option<(Option<State<A>>, State<A>)> {
+        let member = self.members.get(place)?;
+        let is_process = self.elsewhere.is_process(place);
+        Some(((!is_process).then(|| member.peer.device().state()), *member.peer.object().state()))
+    }
+
+    fn notice_silence(&mut self, now: Instant) {
+        let (latest, members) = (&mut self.latest, &self.members);
+        // A copy that nobody hears of is no measure of how far copies are apart.
+        self.elsewhere.notice_silence(now, |place| {
+            if !matches!(members[place].peer.device(), DeviceModel::Unsimulated(UnsimulatedDevice::InHand(_))) {
+                latest[place] = [f64::NAN; A];
+            }
+        });
+    }
+}
+
+impl<const A: usize> DeviceModel<A, UnsimulatedDevice<A>> {
+    fn hand_mut(&mut self) -> Option<&mut HandDevice<A>> {
+        if let Self::Unsimulated(UnsimulatedDevice::InHand(device)) = self { Some(device) } else { None }
+    }
+}
+
+impl<const A: usize> Elsewhere<A> for Attendance<A> {
+    type Device = UnsimulatedDevice<A>;
+
+    const IS_NOBODY: bool = false;
+
+    fn lead(&self) -> usize {
+        self.lead
+    }
+
+    fn receive<S: Strategy<A>>(
+        &mut self,
+        now: Instant,
+        event: &NetworkEvent<Handle>,
+        sample: &Sample<A>,
+        axes: usize,
+        receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
+    ) -> Option<Result<Reception, ReceiveError>> {
+        let ends = (event.from.0 as usize, event.to.0 as usize);
+        let mut buffer = [0; MAX_LEN];
+        if self.is_process(ends.1) {
+            let len = datagram(sample, axes, event.damage.as_ref(), &mut buffer).len();
+            self.send_out(ends.1, event.at, Datagram::new(buffer, len));
+            return None;
+        }
+        Some(match &event.damage {
+            None => self.take_in(now, ends, sample, receiver),
+            Some(damage) => match Sample::decode(datagram(sample, axes, Some(damage), &mut buffer), axes) {
+                Ok(damaged) => self.take_in(now, ends, &damaged, receiver),
+                Err(error) => Err(error.into()),
+            },
+        })
+    }
+
+    fn attend<S: Strategy<A>, O: Observer>(
+        &mut self,
+        now: Instant,
+        place: usize,
+        peer: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
+        axes: usize,
+        observer: &mut O,
+    ) -> Result<(), O::Error> {
+        if let (Some(device), Some(seat)) = (peer.device_mut().hand_mut(), self.seat_mut(place)) {
+            let read = device.read(now);
+            observer.on_input(&InputRow { at: now, what: Input::Device { peer: place, state: read.as_ref().map(|state| row(state, axes)) } })?;
+            if let Some(state) = read {
+                let joins = seat.hear(now);
+                if joins {
+                    device.keep();
+                    seat.fades[place].moved(now);
+                    seat.fades.iter_mut().for_each(|fade| fade.rise(now));
+                }
+                device.set(state);
+            }
+            let age = seat.fades[place].age(now);
+            device.set_share(age.share);
+            peer.set_coupling(seat.coupling.scaled(age.weight));
+        }
+        self.tell(place, now, peer);
+        Ok(())
+    }
+}
+
+fn read_sample<const A: usize>(datagram: &[u8], axes: usize, session: u64, place: usize) -> Result<Sample<A>, SampleError> {
+    let sample = Sample::decode(datagram, axes)?;
+    if sample.session != session {
+        return Err(ReceiveError::Session { found: sample.session }.into());
+    }
+    if sample.sender as usize != place {
+        return Err(ReceiveError::Sender { sender: sample.sender }.into());
+    }
+    Ok(sample)
+}
