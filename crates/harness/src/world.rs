@@ -332,7 +332,10 @@ impl<const A: usize, S: Strategy<A>, E: Elsewhere<A>> World<A, S, E> {
     #[inline]
     fn measure_discrepancy(&mut self) {
         let (mut low, mut high) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A]);
-        for position in &self.latest {
+        for (place, position) in self.latest.iter().enumerate() {
+            if !self.elsewhere.is_there(place) {
+                continue;
+            }
             for axis in 0..A {
                 low[axis] = if position[axis] < low[axis] { position[axis] } else { low[axis] };
                 high[axis] = if position[axis] > high[axis] { position[axis] } else { high[axis] };

@@ -23,6 +23,9 @@ pub(crate) trait Elsewhere<const A: usize> {
     /// The first of those who live here, by whose ticks all of them tick in lockstep.
     fn lead(&self) -> usize;
 
+    /// Whether a peer is there, so that it is of interest how far its copy is from the others.
+    fn is_there(&self, place: usize) -> bool;
+
     /// Hands a packet that the network has delivered to its receiver, and says what became of it; `None` if that lives in another process.
     fn receive<S: Strategy<A>>(
         &mut self,
@@ -56,6 +59,11 @@ impl<const A: usize> Elsewhere<A> for Nobody {
     #[inline(always)]
     fn lead(&self) -> usize {
         0
+    }
+
+    #[inline(always)]
+    fn is_there(&self, _place: usize) -> bool {
+        true
     }
 
     #[inline(always)]

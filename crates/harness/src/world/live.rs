@@ -172,6 +172,10 @@ impl<const A: usize> Elsewhere<A> for Attendance<A> {
         self.lead
     }
 
+    fn is_there(&self, place: usize) -> bool {
+        self.seat(place).is_none_or(|seat| !seat.is_silent())
+    }
+
     fn receive<S: Strategy<A>>(
         &mut self,
         now: Instant,
