@@ -129,9 +129,12 @@ fn page(plan: &Plan, outcome: &Outcome, judgements: &[Judgement], command: &str)
     Ok(page)
 }
 
-/// The date, as in 2025-03-01: from days since 1970 by the rule of the calendar, a leap year every four years but for three of four centuries.
 fn today() -> String {
-    let days = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs() / 86_400;
+    date(SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs() / 86_400)
+}
+
+/// The date so many days after the beginning of 1970, as in 2025-03-01: by the rule of the calendar, a leap year every four years but for three of four centuries.
+fn date(days: u64) -> String {
     // Counted from the first of March of year 0, so that the leap day is the last of its year.
     let days = days + 719_468;
     let (era, day) = (days / 146_097, days % 146_097);
@@ -141,4 +144,30 @@ fn today() -> String {
     let day_of_month = day - (153 * month + 2) / 5 + 1;
     let (month, next) = if month < 10 { (month + 3, 0) } else { (month - 9, 1) };
     format!("{}-{month:02}-{day_of_month:02}", era * 400 + year + next)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::date;
+
+    #[test]
+    fn days_are_dates() {
+        // 30 years have 7 leap days from 1972 to 1996; 54 years have 13.
+        let known = [
+            (0, "1970-01-01"),
+            (30 * 365 + 7 + 59, "2000-02-29"),
+            (30 * 365 + 7 + 60, "2000-03-01"),
+            (54 * 365 + 13 + 59, "2024-02-29"),
+            (55 * 365 + 14 + 364, "2025-12-31"),
+        ];
+        for (days, expected) in known {
+            assert_eq!(date(days), expected);
+        }
+    }
+
+    #[test]
+    fn no_day_is_left_out_and_none_comes_twice() {
+        let days: Vec<String> = (0..200_000).map(date).collect();
+        assert!(days.is_sorted_by(|before, after| before < after));
+    }
 }

@@ -16,7 +16,7 @@ use cohaptic_units::Instant;
 use super::account::Account;
 use super::probe::{Asked, Probe, probe};
 use super::scene::{PEERS, TICK, VISITOR};
-use super::visitor::Visits;
+use crate::visitor::Visits;
 
 /// How far logical time was from the clock on the wall, over the looks since the sample before. `CLOCK_MONOTONIC`, read by whoever looks on.
 ///

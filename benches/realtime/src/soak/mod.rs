@@ -9,7 +9,6 @@ mod row;
 mod scene;
 mod stream;
 mod verdict;
-mod visitor;
 
 use std::error::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -23,11 +22,10 @@ pub use account::Account;
 pub use live::Lag;
 pub use row::{HEADER, Row};
 pub use verdict::{Judgement, MEMORY_BOUND, Verdict, judge};
-pub use visitor::Visits;
 
+use crate::visitor::{Invitation, Visitor, Visits};
 use live::{Live, LiveLook};
 use stream::{Stream, StreamLook};
-use visitor::{Invitation, Visitor};
 
 /// What to do.
 #[derive(Clone, Copy, Debug)]
@@ -94,7 +92,8 @@ pub fn run(plan: &Plan, interrupted: &AtomicBool, mut show: impl FnMut(&Row)) ->
     let scene = scene::scene(plan.duration * 2 + Duration::from_secs(3600))?;
     let key = SessionKey::generate(&mut SystemEntropy)?;
     let (live, stream) = (Live::start(&scene, key.clone(), plan.wishes)?, Stream::start(scene.links.between(0, 1), plan.wishes)?);
-    let visitor = Visitor::start(Invitation { door: live.address, session: scene.seed, key, stay: plan.stay, away: plan.away });
+    let visitor =
+        Visitor::start(Invitation { door: live.address, session: scene.seed, place: scene::VISITOR, key, stay: plan.stay, away: plan.away });
     let clock = MonotonicClock::start();
     let mut looks = Looks { live: &live, stream: &stream, clock, rows: Vec::new(), unbalanced: Vec::new() };
     let (end, mut next) = (Instant::ZERO + plan.duration, Instant::ZERO + plan.every);

@@ -11,9 +11,6 @@ pub(super) const VISITOR: u32 = 3;
 /// How many peers there are.
 pub(super) const PEERS: usize = 4;
 
-/// How often a peer sends \[ns\].
-pub(super) const UPDATE: Duration = Duration::from_millis(8);
-
 /// Of the control loop.
 pub(super) const TICK: Duration = Duration::from_millis(1);
 

@@ -17,16 +17,24 @@ use cohaptic_realtime::udp::{BindError, DoorConfig, ReceiveBuffers, UdpDoor};
 use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Pacing, Wishes, prepare_thread};
 use cohaptic_units::Instant;
 
-use super::scene::{UPDATE, VISITOR};
+/// How often it sends.
+pub const UPDATE: Duration = Duration::from_millis(8);
 
 /// Whom to visit, and for how long.
 #[derive(Clone, Debug)]
-pub(super) struct Invitation {
-    pub(super) door: SocketAddr,
-    pub(super) session: u64,
-    pub(super) key: SessionKey,
-    pub(super) stay: Duration,
-    pub(super) away: Duration,
+pub struct Invitation {
+    /// Where the session listens.
+    pub door: SocketAddr,
+    /// Its number.
+    pub session: u64,
+    /// The place to take.
+    pub place: u32,
+    /// The key of the session.
+    pub key: SessionKey,
+    /// For how long to stay.
+    pub stay: Duration,
+    /// And for how long to be away after that.
+    pub away: Duration,
 }
 
 /// What came of all visits.
@@ -54,7 +62,7 @@ pub struct Visits {
 
 /// The thread.
 #[derive(Debug)]
-pub(super) struct Visitor {
+pub struct Visitor {
     quiet: Arc<AtomicBool>,
     end: Arc<AtomicBool>,
     /// Datagrams that were sent.
@@ -64,11 +72,15 @@ pub(super) struct Visitor {
 
 /// Why there are no more visits.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum Failure {
+#[non_exhaustive]
+pub enum Failure {
+    /// A socket.
     #[error(transparent)]
     Bind(#[from] BindError),
+    /// Random bytes.
     #[error(transparent)]
     Entropy(#[from] EntropyError),
+    /// The system does not let it wait or receive.
     #[error("the visitor cannot go on: {0}")]
     System(#[from] io::Error),
 }
@@ -78,7 +90,9 @@ const REACH: f64 = 0.01;
 const TURNS_PER_SECOND: f64 = 0.5;
 
 impl Visitor {
-    pub(super) fn start(invitation: Invitation) -> Self {
+    /// Begins to visit.
+    #[must_use]
+    pub fn start(invitation: Invitation) -> Self {
         let [quiet, end] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let sent = Arc::new(AtomicU64::new(0));
         let thread = {
@@ -89,17 +103,22 @@ impl Visitor {
     }
 
     /// Datagrams that it sent so far.
-    pub(super) fn sent(&self) -> u64 {
+    #[must_use]
+    pub fn sent(&self) -> u64 {
         self.sent.load(Ordering::Acquire)
     }
 
     /// It says nothing any more, but goes on listening.
-    pub(super) fn hush(&self) {
+    pub fn hush(&self) {
         self.quiet.store(true, Ordering::Release);
     }
 
     /// What came of it. The session should have ended before.
-    pub(super) fn end(self) -> Result<Visits, Box<dyn Error>> {
+    ///
+    /// # Errors
+    ///
+    /// If the thread had to give up.
+    pub fn end(self) -> Result<Visits, Box<dyn Error>> {
         self.end.store(true, Ordering::Release);
         Ok(self.thread.join().map_err(|_| "the visitor panicked")??)
     }
@@ -168,7 +187,7 @@ impl Visiting {
         let turn = core::f64::consts::TAU * TURNS_PER_SECOND;
         let (sine, cosine) = (turn * now.saturating_duration_since(Instant::ZERO).as_secs_f64()).sin_cos();
         let state = State { position: [REACH * sine], velocity: [REACH * turn * cosine] };
-        let sample = Sample { session: self.invitation.session, sender: VISITOR, sequence: self.sequence, sent: now, state };
+        let sample = Sample { session: self.invitation.session, sender: self.invitation.place, sequence: self.sequence, sent: now, state };
         let (mut plain, mut sealed) = ([0; MAX_LEN], [0; MAX_DATAGRAM]);
         let len = sample.encode(1, &mut plain);
         // Before the first welcome there is nothing to seal it with.
@@ -213,7 +232,7 @@ impl Visiting {
 }
 
 fn client(invitation: &Invitation, now: Instant) -> Client {
-    Client::new(ClientConfig::Keyed { session: invitation.session, place: Place(VISITOR), key: invitation.key.clone() }, now)
+    Client::new(ClientConfig::Keyed { session: invitation.session, place: Place(invitation.place), key: invitation.key.clone() }, now)
 }
 
 fn socket() -> Result<UdpDoor, BindError> {
