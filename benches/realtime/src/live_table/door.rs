@@ -176,3 +176,12 @@ fn median(mut rounds: Vec<Duration>) -> Duration {
 const fn address(port: u16) -> SocketAddr {
     SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), port)
 }
+
+#[cfg(test)]
+mod tests {
+    /// Of every row it is counted whether all its datagrams met the fate that the row names.
+    #[test]
+    fn every_row_measures_what_it_says() {
+        assert_eq!(super::costs().unwrap().len(), 8);
+    }
+}

@@ -70,7 +70,7 @@ fn scene(peers: usize, span: Duration) -> Result<Scene, SceneError> {
     let mut text = COMMON.to_owned();
     for place in 1..peers {
         // Writing to a text does not fail.
-        let _ = write!(text, "\n[[peers]]\nname = \"peer {place}\"\n");
+        let _ = write!(text, "\n[[peers]]\nname = \"peer-{place}\"\n");
     }
     text.push_str("\n[[peers]]\nname = \"program\"\nkind = \"udp\"\n");
     let mut scene = Scene::parse_live(&text, Path::new("live-table.toml"), &[])?;
