@@ -26,11 +26,11 @@ use crate::visitor::Visits;
 pub struct Lag {
     /// How many looks there were.
     pub looks: u64,
-    /// The wall less logical time at the look where that was least, at most [ns]: below zero, logical time was ahead for certain.
+    /// The wall less logical time at the look where that was least, at most \[ns\]: below zero, logical time was ahead for certain.
     pub least_at_most: i128,
-    /// The same, at least [ns]: a tick or more, and logical time was behind all the time.
+    /// The same, at least \[ns\]: a tick or more, and logical time was behind all the time.
     pub least_at_least: i128,
-    /// At the look where it was most, at most [ns]: a pause of the machine shows here.
+    /// At the look where it was most, at most \[ns\]: a pause of the machine shows here.
     pub most: i128,
     /// How many looks found it a tick or more behind.
     pub behind: u64,
