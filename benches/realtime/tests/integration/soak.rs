@@ -1,6 +1,7 @@
 //! A short soak. What a loaded machine can break is not asserted: how late anything was, and whether logical time was up to date at any look.
 
 use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use cohaptic_benches_realtime::soak::{Judgement, Outcome, Plan, Verdict, judge, run};
@@ -9,12 +10,16 @@ use cohaptic_realtime::Wishes;
 /// For a few seconds, in which buffers are touched for the first time \[kB\].
 const MEMORY: u64 = 32_768;
 
+/// Open files and memory are those of the process: one soak at a time.
+static ALONE: Mutex<()> = Mutex::new(());
+
 fn find<'a>(judgements: &'a [Judgement], rule: &str) -> &'a Judgement {
     judgements.iter().find(|judgement| judgement.rule.starts_with(rule)).unwrap()
 }
 
 #[test]
 fn eight_seconds_lose_nothing_and_keep_nothing() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     // Without priority: a test does not push others aside.
     let plan = Plan { wishes: Wishes::NONE, ..Plan::new(Duration::from_secs(8), Duration::from_millis(500)) };
     let mut shown = 0;
@@ -49,6 +54,7 @@ fn eight_seconds_lose_nothing_and_keep_nothing() {
 
 #[test]
 fn it_ends_when_it_is_asked_to() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let plan = Plan { wishes: Wishes::NONE, ..Plan::new(Duration::from_secs(3600), Duration::from_secs(60)) };
     let outcome = run(&plan, &AtomicBool::new(true), |_| ()).unwrap();
     assert!(outcome.interrupted);
