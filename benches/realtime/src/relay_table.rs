@@ -3,13 +3,13 @@
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of packets")]
 
-mod machine;
 mod subjects;
 mod traffic;
 
 use std::error::Error;
 use std::time::Duration;
 
+use cohaptic_benches_realtime::machine;
 use cohaptic_realtime::{LatenessSummary, Pacing};
 use subjects::{Outcome, bare_thread, relay, tokio_forwarder};
 

@@ -13,8 +13,8 @@ use cohaptic_relay::{Form, Limits, Mesh, Program, Relay, RelayConfig, RunOptions
 use cohaptic_scene::LinkTable;
 use cohaptic_wan::{Delay, LinkConfig};
 
-use crate::machine;
 use crate::traffic::{Received, SIZE, Sent, Sink, generate, wide};
+use cohaptic_benches_realtime::machine;
 
 /// The delay of the link.
 pub(crate) const DELAY: Duration = Duration::from_millis(24);

@@ -10,7 +10,7 @@ use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Pacing, Wishes, prepa
 use cohaptic_units::Instant;
 use rustix::net::sockopt;
 
-use crate::machine;
+use cohaptic_benches_realtime::machine;
 
 /// The size of a datagram.
 pub(crate) const SIZE: usize = 64;
