@@ -53,6 +53,7 @@ mod values;
 pub use error::{Diagnostic, SceneError};
 pub use link_keys::{
     KeysOfLinks, LinkKeys, link_from_keys, link_key_changes, link_key_changes_of_text, link_keys, link_keys_of_text, relay_link_keys,
+    relay_link_keys_of_text,
 };
 pub use link_table::LinkTable;
 pub use model::*;

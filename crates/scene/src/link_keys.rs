@@ -176,9 +176,18 @@ pub fn link_key_changes_of_text(text: &str, file: &Path, overrides: &[String]) -
 ///
 /// # Errors
 ///
-/// As [`RelayFile::read`].
+/// As [`RelayFile::read`](crate::RelayFile::read).
 pub fn relay_link_keys(path: &Path, overrides: &[String]) -> Result<KeysOfLinks, SceneError> {
-    let (relay, document) = with_text(path, |text| parse_document(Sources { file: path, text, overrides }, false, relay_file::read_document))?;
+    with_text(path, |text| relay_link_keys_of_text(text, path, overrides))
+}
+
+/// [`relay_link_keys`] of a relay file that is a text.
+///
+/// # Errors
+///
+/// As [`RelayFile::parse`](crate::RelayFile::parse).
+pub fn relay_link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<KeysOfLinks, SceneError> {
+    let (relay, document) = parse_document(Sources { file, text, overrides }, false, relay_file::read_document)?;
     let place = |name: &str| relay.programs.iter().position(|program| program.name == name);
     Ok(keys_of_mesh(&document, relay.programs.len(), place))
 }

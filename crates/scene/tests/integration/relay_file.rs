@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use cohaptic_scene::{RelayFile, RelayLimits, SceneError};
+use cohaptic_scene::{RelayFile, RelayLimits, SceneError, relay_link_keys_of_text};
 use cohaptic_units::{Bytes, Instant};
 use proptest::prelude::*;
 
@@ -140,4 +140,16 @@ proptest! {
         let end = (at + cut).min(WHOLE.len());
         let _ = parse(&format!("{}{noise}{}", &WHOLE[..at], &WHOLE[end..]));
     }
+}
+
+#[test]
+fn the_keys_of_its_links_make_its_links() {
+    let (file, overrides) = (Path::new("x.toml"), ["link.loss=1%".to_owned()]);
+    let relay = RelayFile::parse(WHOLE, file, &overrides).unwrap();
+    let keys = relay_link_keys_of_text(WHOLE, file, &overrides).unwrap();
+    assert_eq!(keys.len(), 6);
+    for ((from, to), keys) in &keys {
+        assert_eq!(&keys.model(Path::new("")).unwrap(), relay.links.between(*from, *to), "{from} {to}: {keys}");
+    }
+    assert_eq!(keys[&(0, 1)].to_string(), "{ delay = \"24ms\", loss = \"1%\" }");
 }
