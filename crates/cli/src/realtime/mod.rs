@@ -17,7 +17,7 @@ pub(crate) use asked::AskedDelay;
 pub(crate) use control::{LiveControl, Look};
 pub(crate) use editor::{Edit, KeyedLinks};
 pub(crate) use snapshot::{counters, quantiles, quantiles_of};
-pub(crate) use traffic::{Publisher, carried, counts, say, some_length, status};
+pub(crate) use traffic::{Publisher, carried, counts, lasted, say, some_length, status};
 pub(crate) use words::{late, loading, notes};
 
 impl RealTimeArguments {

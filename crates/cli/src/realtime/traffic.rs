@@ -5,6 +5,7 @@ use std::io::{self, Write as _};
 use std::time::{Duration, Instant as Clock};
 
 use cohaptic_control::Snapshot;
+use cohaptic_units::print::Span;
 use cohaptic_wan::{DropCause, LinkStats};
 
 use super::{AskedDelay, Look};
@@ -74,6 +75,11 @@ pub(crate) fn carried(stats: &LinkStats, asked: &AskedDelay, beside: &[(&str, u6
         let _ = write!(text, "; {delays}");
     }
     text
+}
+
+/// How long a run lasted, to the millisecond.
+pub(crate) fn lasted(span: Duration) -> Span {
+    Span(Duration::from_millis(u64::try_from(span.as_millis()).unwrap_or(u64::MAX)))
 }
 
 /// Those that are not zero: `3 strangers, 1 to itself`. `None` if all are.

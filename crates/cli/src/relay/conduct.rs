@@ -32,7 +32,7 @@ pub(super) fn conduct(
         let running = thread::Builder::new().name("relay".to_owned()).spawn_scoped(scope, || {
             // Moved, so that it is this thread's alone.
             let heard = heard;
-            relay.run(options, &heard, &stop, |view| publisher.offer(|| status::snapshot(view, options.tolerance)))
+            relay.run(options, &heard, &stop, |view| publisher.offer(|| status::snapshot(view, &setup.pairs, options.tolerance)))
         });
         let running = running.map_err(|error| Failure::System(format!("the relay gets no thread: {error}")))?;
         while !running.is_finished() {

@@ -38,6 +38,7 @@ struct RelayLink {
     link: LinkDocument,
     asked_mean_delay_s: Option<f64>,
     changes: u64,
+    delivered_bytes: u64,
     overload: u64,
     undeliverable: u64,
 }
@@ -95,6 +96,7 @@ impl RelayLink {
             link: LinkDocument { from: link.from.clone(), to: link.to.clone(), counters: Counters::new(&link.stats) },
             asked_mean_delay_s: asked.first.map(|delay| delay.as_secs_f64()),
             changes: asked.changes,
+            delivered_bytes: link.counts.delivered_bytes,
             overload: link.counts.overload,
             undeliverable: link.counts.undeliverable,
         }

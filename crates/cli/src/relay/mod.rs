@@ -24,7 +24,7 @@ pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     let length = some_length(arguments.length)?;
     let mut setup = Setup::new(arguments)?;
     let relay = Relay::bind(setup.config.clone(), DoorConfig::default()).map_err(failure)?;
-    setup.listening(relay.ports()).iter().for_each(|line| say(line));
+    setup.opened(relay.ports()).iter().for_each(|line| say(line));
     let (changes, wanted) = channel();
     let editor = KeyedLinks { keys: std::mem::take(&mut setup.keys), folder: setup.folder.clone(), changes };
     let control = LiveControl::open(&arguments.real_time, status::description(&setup), Box::new(editor))?;

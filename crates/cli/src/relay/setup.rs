@@ -91,10 +91,14 @@ impl Setup {
         })
     }
 
-    /// Where programs are to send, in words.
-    pub(super) fn listening<'a>(&self, ports: impl Iterator<Item = (&'a str, SocketAddr)>) -> Vec<String> {
-        let line = |(place, (_, port)): (usize, (&str, SocketAddr))| match &self.config.form {
-            Form::Proxy(proxy) => format!("listening on {port} for what is meant for {}", proxy.to),
+    /// Where programs are to send, in words. A free port is known now.
+    pub(super) fn opened<'a>(&mut self, ports: impl Iterator<Item = (&'a str, SocketAddr)>) -> Vec<String> {
+        let (title, form) = (&mut self.title, &self.config.form);
+        let line = |(place, (_, port)): (usize, (&str, SocketAddr))| match form {
+            Form::Proxy(proxy) => {
+                *title = format!("{port} -> {}", proxy.to);
+                format!("listening on {port} for what is meant for {}", proxy.to)
+            }
             Form::Mesh(mesh) => {
                 let Some(program) = mesh.programs.get(place) else { return String::new() };
                 let address = program.address.map_or_else(|| "wherever it first sends from".to_owned(), |address| address.to_string());

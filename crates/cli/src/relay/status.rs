@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
-use cohaptic_control::{Description, Kind, LinkName, Snapshot};
+use cohaptic_control::{Description, Kind, LinkCounters, LinkName, Snapshot};
 use cohaptic_realtime::Tolerance;
 use cohaptic_relay::{LinkReport, View};
 use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
 
 use super::setup::Setup;
-use crate::realtime::{counters, quantiles};
+use crate::realtime::{counters, quantiles, quantiles_of};
 
 pub(super) fn description(setup: &Setup) -> Description {
     let link = |(from, to)| {
@@ -31,17 +32,22 @@ pub(super) fn publish_every(links: usize) -> Duration {
     Duration::from_millis(100) * moments
 }
 
-pub(super) fn snapshot(view: &View<'_>, tolerance: Tolerance) -> Snapshot {
+/// `pairs` are the links in the order of the description.
+pub(super) fn snapshot(view: &View<'_>, pairs: &[(NodeId, NodeId)], tolerance: Tolerance) -> Snapshot {
     let links = view.links();
     let validity = tolerance.judge(view.release());
     Snapshot {
         elapsed: view.now().saturating_duration_since(Instant::ZERO),
         invalid: (!validity.is_valid()).then(|| validity.to_string()),
         lateness: vec![quantiles(&view.release().summary())],
-        links: links.iter().map(|link| counters(&link.stats)).collect(),
+        links: links.iter().zip(pairs).map(|(report, (from, to))| link(report, view.recent_delays(*from, *to))).collect(),
         peers: Vec::new(),
         refused: refused(view, &links),
     }
+}
+
+fn link(report: &LinkReport, recent: &[Duration]) -> LinkCounters {
+    LinkCounters { delivered_bytes: report.counts.delivered_bytes, recent_delay: quantiles_of(recent), ..counters(&report.stats) }
 }
 
 fn refused(view: &View<'_>, links: &[LinkReport]) -> Vec<(&'static str, u64)> {

@@ -3,14 +3,16 @@
 use std::fmt::Write as _;
 
 use cohaptic_relay::{LinkReport, PortReport, Report};
-use cohaptic_units::print::Span;
 
 use super::document::{Totals, refused};
 use super::setup::Setup;
-use crate::realtime::{AskedDelay, carried, counts, late, notes};
+use crate::realtime::{AskedDelay, carried, counts, lasted, late, notes};
 
 /// So many links are named.
 const MOST_LINKS: usize = 64;
+
+/// So many of those over which nothing went.
+const MOST_IDLE: usize = 8;
 
 pub(super) fn describe(setup: &Setup, report: &Report, asked: &[AskedDelay]) -> String {
     let mut text = format!("{}\n", setup.title);
@@ -20,10 +22,7 @@ pub(super) fn describe(setup: &Setup, report: &Report, asked: &[AskedDelay]) -> 
     };
     let Totals { packets, dropped, sent, unsent } = Totals::of(report);
     let held = report.held.0;
-    line(format!(
-        "{packets} datagrams came in within {}, {sent} were sent on, {dropped} dropped, {held} on the way at the end",
-        Span(report.elapsed)
-    ));
+    line(format!("{packets} datagrams came in within {}, {sent} sent on, {dropped} dropped, {held} on the way at the end", lasted(report.elapsed)));
     line(format!("the run is {}", report.validity));
     if report.release.count() > 0 {
         line(format!("release error: {}", late(&report.release.summary())));
@@ -59,8 +58,12 @@ fn links(links: &[LinkReport], asked: &[AskedDelay], line: &mut impl FnMut(Strin
     if used.len() > MOST_LINKS {
         line(format!("... and {} more links: --json has them", used.len() - MOST_LINKS));
     }
-    if !idle.is_empty() {
-        line(format!("nothing went over {}", if used.is_empty() { "any link".to_owned() } else { format!("{} other links", idle.len()) }));
+    if used.is_empty() {
+        line("nothing went over any link".to_owned());
+    } else if idle.len() <= MOST_IDLE {
+        idle.iter().for_each(|(LinkReport { from, to, .. }, _)| line(format!("{from} -> {to}: nothing offered")));
+    } else {
+        line(format!("nothing went over {} other links", idle.len()));
     }
 }
 

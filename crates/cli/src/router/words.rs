@@ -4,13 +4,12 @@ use std::fmt::Write as _;
 
 use cohaptic_router::{LaneSnapshot, Received, Written};
 use cohaptic_scene::router_file::{RouterFile, Side};
-use cohaptic_units::print::Span;
 
 use super::attached;
 use super::conduct::{Ending, Ran};
 use super::status::elapsed;
 use crate::output;
-use crate::realtime::{AskedDelay, carried, counts, late, notes};
+use crate::realtime::{AskedDelay, carried, counts, lasted, late, notes};
 
 pub(super) fn describe(file: &RouterFile, ran: &Ran) -> String {
     let Ran { report, prepared, validity, asked, ending } = ran;
@@ -19,11 +18,11 @@ pub(super) fn describe(file: &RouterFile, ran: &Ran) -> String {
     let mut line = |line: String| {
         let _ = writeln!(text, "  {line}");
     };
-    let (lasted, held) = (Span(elapsed(report)), report.counters.held.packets);
+    let (span, held) = (lasted(elapsed(report)), report.counters.held.packets);
     if let Ending::Failed(error) = ending {
-        line(format!("FAILED after {lasted}: {error}"));
+        line(format!("FAILED after {span}: {error}"));
     }
-    line(format!("{} packets came in within {lasted}, {} dropped, {held} on the way at the end", report.packets(), report.dropped()));
+    line(format!("{} packets came in within {span}, {} dropped, {held} on the way at the end", report.packets(), report.dropped()));
     line(format!("the run is {validity}"));
     if report.release.count > 0 {
         line(format!("release error: {}", late(&report.release)));

@@ -108,9 +108,9 @@ fn a_signal_gives_the_report_in_words() {
     let outcome = running.end_by("-TERM");
     assert_eq!(outcome.status, Some(130), "{}", outcome.stderr);
     for part in [
-        format!("127.0.0.1:0 -> {server}\n").as_str(),
+        format!("{port} -> {server}\n").as_str(),
         "2 datagrams came in within ",
-        ", 2 were sent on, 0 dropped, 0 on the way at the end\n",
+        ", 2 sent on, 0 dropped, 0 on the way at the end\n",
         "the run is ",
         "release error: p50 ",
         "client -> server: 1 offered, 1 delivered; mean delay 1.000 ms, asked 1.000 ms\n",
@@ -194,12 +194,19 @@ fn a_link_is_changed_while_it_runs_and_what_makes_no_sense_changes_nothing() {
     until(|| {
         round_trip(&client, port, b"meanwhile");
         sent += 1;
-        control.json("GET", "/api/links/0", "")["mean_delay_s"].as_f64().unwrap() > 0.001_001
+        control.json("GET", "/api/links/0", "")["mean_delay_s"].as_f64().is_some_and(|mean| mean > 0.001_001)
     });
     for _ in 0..5 {
         assert!(round_trip(&client, port, b"after") >= millis(41));
         sent += 1;
     }
+    // Once a snapshot has all: the latest delays and the bytes are those of the link, too.
+    until(|| control.json("GET", "/api/links/0", "")["delivered"] == sent);
+    let link = control.json("GET", "/api/links/0", "");
+    let recent = &link["recent_delay"];
+    assert_eq!((&recent["count"], &recent["max_s"]), (&sent.min(128).into(), &0.04.into()), "{link:#}");
+    // The lengths of "before", "meanwhile" and "after".
+    assert_eq!(link["delivered_bytes"], 6 + 9 * (sent - 6) + 5 * 5);
     let (status, metrics) = control.ask("GET", "/metrics", "");
     assert_eq!(status, 200);
     assert!(metrics.contains("cohaptic_run_info{kind=\"relay\"") && metrics.contains("cohaptic_link_offered_packets_total{"), "{metrics}");
