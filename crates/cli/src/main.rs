@@ -20,6 +20,8 @@ mod output_file;
 mod paper;
 mod progress;
 mod realtime;
+mod relay;
+mod router;
 mod run;
 mod stability;
 mod terminal_plot;
@@ -41,6 +43,8 @@ fn main() -> ExitCode {
         Command::Stability(arguments) => stability::stability(&arguments),
         Command::Admittance(arguments) => admittance::admittance(&arguments),
         Command::Live(arguments) => live::live(&arguments),
+        Command::Relay(arguments) => relay::relay(&arguments),
+        Command::Router(arguments) => router::router(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),
         Command::Paper(arguments) => paper::paper(&arguments),

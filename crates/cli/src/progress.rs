@@ -52,6 +52,18 @@ impl Progress {
         Self(bar)
     }
 
+    /// One line about a run that goes on until it is stopped.
+    pub(crate) fn of_traffic(title: &str) -> Self {
+        let bar = bar(0);
+        bar.set_style(style("{prefix}: {msg}, {elapsed} passed"));
+        bar.set_prefix(title.to_owned());
+        Self(bar)
+    }
+
+    pub(crate) fn say(&self, line: String) {
+        self.0.set_message(line);
+    }
+
     pub(crate) fn reach_number(&self, number: u64) {
         self.0.set_position(number);
     }

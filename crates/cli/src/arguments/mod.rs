@@ -4,6 +4,8 @@ mod admittance;
 mod links;
 mod paper;
 mod realtime;
+mod relay;
+mod router;
 mod scenes;
 mod stability;
 
@@ -15,6 +17,8 @@ pub(crate) use admittance::AdmittanceArguments;
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use paper::PaperArguments;
 pub(crate) use realtime::{LiveArguments, RealTimeArguments};
+pub(crate) use relay::RelayArguments;
+pub(crate) use router::RouterArguments;
 pub(crate) use scenes::{CheckArguments, ExplainArguments, RunArguments};
 pub(crate) use stability::{BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, StabilityArguments, StabilityCommand};
 
@@ -44,6 +48,10 @@ pub(crate) enum Command {
     Admittance(AdmittanceArguments),
     /// Runs a scene by the wall clock, with other programs and Falcons attached, all through the emulated links
     Live(LiveArguments),
+    /// Puts the emulator between programs that speak UDP to each other
+    Relay(RelayArguments),
+    /// Puts the emulator between two network devices: any IP traffic
+    Router(RouterArguments),
     /// Sends a steady stream over one link and sets what it achieved beside what it was asked for
     Link(LinkArguments),
     /// Estimates the link that made a file of measurements, captures or fates

@@ -23,6 +23,7 @@ use crate::output_file::OutputFile;
 use crate::progress::Progress;
 use crate::{interrupt, output};
 use spec::Spec;
+pub(crate) use spec::link_and_keys;
 
 /// Without `--packets`.
 const PACKETS: u64 = 100_000;

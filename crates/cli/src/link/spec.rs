@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use cohaptic_measure::asked::Asked;
 use cohaptic_measure::fates::{self, ReadError};
-use cohaptic_scene::link_from_keys;
+use cohaptic_scene::{LinkKeys, link_from_keys};
 use cohaptic_wan::law::DistTable;
 use cohaptic_wan::netem::kernel::Table;
-use cohaptic_wan::netem::{Netem, TableName};
-use cohaptic_wan::{KernelNetem, LinkModel};
+use cohaptic_wan::netem::{ExactError, Netem, TableName};
+use cohaptic_wan::{KernelNetem, LinkConfig, LinkModel};
 
 use crate::arguments::{LinkArguments, Profile};
 use crate::failure::Failure;
@@ -47,21 +47,48 @@ fn of_keys(arguments: &LinkArguments) -> Result<(LinkModel, Asked), Failure> {
     Ok((model, asked))
 }
 
-fn of_words(arguments: &LinkArguments, said: &str) -> Result<(LinkModel, Asked), Failure> {
-    let netem = Netem::parse(said).map_err(|error| Failure::Input(format!("these words are no link:\n{}", error.excerpt(said))))?;
+/// The link that words of tc-netem or keys make, and its keys: words are one key, `netem`. Nothing said makes an ideal link.
+pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Failure> {
+    let nothing = LinkKeys::default();
+    if spec.is_empty() {
+        return Ok((LinkModel::default(), nothing));
+    }
+    if spec.iter().any(|word| word.contains('=')) {
+        let model = link_from_keys(spec).map_err(Failure::LinkKeys)?;
+        let keys = spec.iter().filter_map(|text| text.split_once('='));
+        return Ok((model, keys.fold(nothing, |keys, (key, value)| keys.with(key.trim(), value))));
+    }
+    let said = spec.join(" ");
+    let exact = exact(&parsed(&said)?)?.map_err(|error| not_exact(&said, &error))?;
+    Ok((exact.into(), nothing.with("netem", &said)))
+}
+
+fn parsed(said: &str) -> Result<Netem, Failure> {
+    Netem::parse(said).map_err(|error| Failure::Input(format!("these words are no link:\n{}", error.excerpt(said))))
+}
+
+fn not_exact(said: &str, error: &ExactError) -> Failure {
+    Failure::Input(format!("{error}\n{}", below(said, error.option())))
+}
+
+/// The link that does what the words say, if one can; a failure if a table that they name cannot be read.
+fn exact(netem: &Netem) -> Result<Result<LinkConfig, ExactError>, Failure> {
     let mut fault = None;
     let exact = netem.to_link_config(&mut |name| {
         let text = table(name, &mut fault)?;
         DistTable::parse(&text).map_err(|error| fault = Some(in_table(name, &error))).ok().map(Arc::new)
     });
-    if let Some(fault) = fault {
-        return Err(fault);
-    }
+    fault.map_or(Ok(exact), Err)
+}
+
+fn of_words(arguments: &LinkArguments, said: &str) -> Result<(LinkModel, Asked), Failure> {
+    let netem = parsed(said)?;
+    let exact = exact(&netem)?;
     let asked = exact.as_ref().map_or_else(|_| Asked::default(), |config| Asked::of_config(config, arguments.every, arguments.size));
     match arguments.profile {
         Profile::Exact => match exact {
             Ok(config) => Ok((config.into(), asked)),
-            Err(error) => Err(Failure::Input(format!("{error}\n{}", below(said, error.option())))),
+            Err(error) => Err(not_exact(said, &error)),
         },
         Profile::Kernel66 => {
             let mut fault = None;

@@ -7,7 +7,7 @@ use crate::scenes::TWO;
 fn help_names_the_commands() {
     let text = Desk::new().text("--help");
     assert!(
-        ["run", "check", "explain", "stability", "admittance", "link", "fit", "paper", "Exit status: 0 done", "130 interrupted"]
+        ["run", "check", "explain", "stability", "admittance", "relay", "router", "link", "fit", "paper", "Exit status: 0 done", "130 interrupted"]
             .iter()
             .all(|word| text.contains(word)),
         "{text}"

@@ -18,7 +18,13 @@ mod output;
 mod overrides;
 mod paper;
 mod records;
+#[cfg(target_os = "linux")]
+mod relay;
+#[cfg(target_os = "linux")]
+mod router;
 mod run;
+#[cfg(target_os = "linux")]
+mod running;
 mod scenes;
 mod stability_boundary;
 mod stability_map;

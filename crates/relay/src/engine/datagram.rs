@@ -73,6 +73,8 @@ pub struct LinkCounts {
     pub overload: u64,
     /// Came out of the link and were dropped: where their receiver is is not known yet, or it has left.
     pub undeliverable: u64,
+    /// The bytes of all that came out of the link.
+    pub delivered_bytes: u64,
 }
 
 /// What came in.

@@ -4,7 +4,9 @@ mod clients;
 mod datagram;
 mod pool;
 mod programs;
+mod recent;
 
+use core::time::Duration;
 use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -19,6 +21,7 @@ use clients::Clients;
 pub use datagram::{Arrival, Intake, IntakeCounts, LinkCounts, Port, Release};
 use pool::{Packet, Pool};
 use programs::Programs;
+use recent::Recent;
 
 /// A relay as a state machine: datagrams in with [`Engine::handle_datagram`], datagrams out with [`Engine::poll_release`].
 ///
@@ -41,6 +44,8 @@ pub struct Engine {
     changes: VecDeque<Change>,
     /// By sender, then receiver.
     links: Vec<LinkCounts>,
+    /// By sender, then receiver.
+    recent: Vec<Recent>,
     counts: IntakeCounts,
     clamped: Lateness,
     /// What the last release carries.
@@ -92,6 +97,7 @@ impl Engine {
             bytes: 0,
             changes: changes.into(),
             links: vec![LinkCounts::default(); nodes * nodes],
+            recent: vec![Recent::default(); nodes * nodes],
             counts: IntakeCounts::default(),
             clamped: Lateness::new(),
             released: None,
@@ -206,8 +212,10 @@ impl Engine {
                 Fate::Delivered(at) => {
                     self.packets -= 1;
                     self.bytes -= length;
+                    let link = self.link(event.from.0, event.to.0);
+                    self.links[link].delivered_bytes += event.payload.bytes.len() as u64;
+                    self.recent[link].record(at.saturating_duration_since(event.sent));
                     let Some((port, to)) = self.way_out(&event) else {
-                        let link = self.link(event.from.0, event.to.0);
                         self.links[link].undeliverable += 1;
                         self.pool.put(event.payload);
                         continue;
@@ -270,6 +278,12 @@ impl Engine {
     #[must_use]
     pub fn link_stats(&self, from: NodeId, to: NodeId) -> Option<(LinkStats, LinkCounts)> {
         Some((self.network.link_stats(from, to)?, self.links[self.link(from.0, to.0)]))
+    }
+
+    /// The delays of the latest datagrams that came out of a link, in no order: of 128 at most.
+    #[must_use]
+    pub fn recent_delays(&self, from: NodeId, to: NodeId) -> &[Duration] {
+        self.recent.get(self.link(from.0, to.0)).map_or(&[], Recent::delays)
     }
 
     /// What came in.

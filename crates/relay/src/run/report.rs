@@ -86,6 +86,12 @@ impl View<'_> {
         links(self.engine)
     }
 
+    /// The delays of the latest datagrams that came out of a link, in no order: of 128 at most.
+    #[must_use]
+    pub fn recent_delays(&self, from: NodeId, to: NodeId) -> &[Duration] {
+        self.engine.recent_delays(from, to)
+    }
+
     /// What came in.
     #[must_use]
     pub const fn intake(&self) -> &IntakeCounts {

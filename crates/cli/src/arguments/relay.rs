@@ -1,0 +1,56 @@
+//! `relay`.
+
+use std::ffi::OsString;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
+use cohaptic_units::{Bytes, parse};
+
+use super::{EXIT_STATUS, Overrides, RealTimeArguments};
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_STATUS, override_usage = USAGE)]
+pub(crate) struct RelayArguments {
+    /// A relay file: who speaks to whom over which links. With --listen in its place what the link does, as for `cohaptic link`: words of tc-netem
+    /// (delay 20ms 5ms 25% loss 1%), or keys of the link table of a scene (delay=24ms loss=1%)
+    #[arg(required_unless_present = "listen", value_name = "FILE | SPEC", allow_negative_numbers = true)]
+    pub(crate) words: Vec<OsString>,
+    #[command(flatten)]
+    pub(crate) overrides: Overrides,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Where clients send to, what is meant for --to; port 0 is a free one
+    #[arg(long, value_name = "ADDRESS", requires = "to", conflicts_with = "set")]
+    pub(crate) listen: Option<SocketAddr>,
+    /// Whom clients speak to
+    #[arg(long, value_name = "ADDRESS", requires = "listen")]
+    pub(crate) to: Option<SocketAddr>,
+    /// The link from there to the clients, up to the next option [default: the same in both directions]
+    #[arg(long, value_name = "SPEC", num_args = 1.., requires = "listen", allow_negative_numbers = true)]
+    pub(crate) back: Option<Vec<OsString>>,
+    #[command(flatten)]
+    pub(crate) real_time: RealTimeArguments,
+    /// End by itself after this time [default: on Ctrl-C]
+    #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
+    pub(crate) length: Option<Duration>,
+    /// The seed of all random numbers [default: that of the file, or 0]
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u64>::new().range(0..=i64::MAX.unsigned_abs()))]
+    pub(crate) seed: Option<u64>,
+    /// So many datagrams may be on their way at once; what comes beyond is dropped [default: that of the file, or 262144]
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u64>::new().range(1..=1 << 24))]
+    pub(crate) packets: Option<u64>,
+    /// So many bytes of them [default: that of the file, or 64MB]
+    #[arg(long, value_name = "SIZE", value_parser = room)]
+    pub(crate) bytes: Option<Bytes>,
+}
+
+const USAGE: &str = "cohaptic relay [OPTIONS] <FILE>\n       cohaptic relay [OPTIONS] --listen <ADDRESS> --to <ADDRESS> [SPEC]... [--back <SPEC>...]";
+
+/// One datagram at least.
+fn room(text: &str) -> Result<Bytes, String> {
+    let size = parse::size(text).map_err(|error| error.to_string())?;
+    if size.get() < 65_535 { Err("expected at least 65535B, one datagram".to_owned()) } else { Ok(size) }
+}

@@ -1,0 +1,152 @@
+//! What was said on the command line, as a relay.
+
+use std::ffi::OsString;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use cohaptic_realtime::Tolerance;
+use cohaptic_relay::{Form, Limits, Proxy, RelayConfig};
+use cohaptic_scene::{LinkKeys, RelayFile, relay_link_keys};
+use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
+
+use crate::arguments::RelayArguments;
+use crate::failure::Failure;
+use crate::link::link_and_keys;
+use crate::realtime::AskedDelay;
+
+/// A relay, and what it is called.
+pub(super) struct Setup {
+    pub(super) title: String,
+    pub(super) config: RelayConfig,
+    pub(super) tolerance: Tolerance,
+    /// Those at whom links begin and end.
+    pub(super) nodes: Vec<String>,
+    /// The links by sender and receiver, as reports have them.
+    pub(super) pairs: Vec<(NodeId, NodeId)>,
+    /// The keys of each.
+    pub(super) keys: Vec<LinkKeys>,
+    /// Where files that keys name are looked for.
+    pub(super) folder: PathBuf,
+}
+
+impl Setup {
+    pub(super) fn new(arguments: &RelayArguments) -> Result<Self, Failure> {
+        match (arguments.listen, arguments.to, arguments.words.as_slice()) {
+            (Some(listen), Some(to), _) => Self::of_proxy(arguments, listen, to),
+            (_, _, [file]) => Self::of_file(arguments, Path::new(file)),
+            (_, _, more) => {
+                let more: Vec<_> = more.iter().map(|word| word.to_string_lossy()).collect();
+                Err(Failure::Input(format!("{:?} is no file: expected one relay file; a link in words goes with --listen and --to", more.join(" "))))
+            }
+        }
+    }
+
+    fn of_file(arguments: &RelayArguments, path: &Path) -> Result<Self, Failure> {
+        let mut overrides = arguments.overrides.set.clone();
+        let mut lay = |key: &str, value: Option<String>| overrides.extend(value.map(|value| format!("relay.{key}={value}")));
+        lay("seed", arguments.seed.map(|seed| seed.to_string()));
+        lay("most-packets", arguments.packets.map(|packets| packets.to_string()));
+        lay("most-bytes", arguments.bytes.map(|bytes| format!("\"{}B\"", bytes.get())));
+        lay("allow-remote", arguments.real_time.allow_remote.then(|| "true".to_owned()));
+        let file = RelayFile::read(path, &overrides)?;
+        let keys = relay_link_keys(path, &overrides)?;
+        let tolerance = arguments.real_time.tolerance.unwrap_or(file.limits.tolerance);
+        Ok(Self {
+            title: file.title.clone(),
+            tolerance: Tolerance { limit: tolerance },
+            nodes: file.programs.iter().map(|program| program.name.clone()).collect(),
+            pairs: keys.keys().map(|(from, to)| (node(*from), node(*to))).collect(),
+            keys: keys.into_values().collect(),
+            folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
+            config: file.into(),
+        })
+    }
+
+    fn of_proxy(arguments: &RelayArguments, listen: SocketAddr, to: SocketAddr) -> Result<Self, Failure> {
+        if !arguments.real_time.allow_remote {
+            local("--listen", listen)?;
+            local("--to", to)?;
+        }
+        if to.port() == 0 {
+            return Err(Failure::Input(format!("--to {to}: expected the port of a program, which is not 0")));
+        }
+        let (forth, forth_keys) = link_and_keys(&words(&arguments.words)?)?;
+        let (back, back_keys) = match &arguments.back {
+            None => (forth.clone(), forth_keys.clone()),
+            Some(spec) => link_and_keys(&words(spec)?)?,
+        };
+        let usual = Limits::default();
+        let limits = Limits { packets: arguments.packets.unwrap_or(usual.packets), bytes: arguments.bytes.unwrap_or(usual.bytes), ..usual };
+        let proxy = Proxy { listen, to, forth, back, most_clients: Proxy::MOST_CLIENTS };
+        Ok(Self {
+            title: format!("{listen} -> {to}"),
+            config: RelayConfig { seed: arguments.seed.unwrap_or(0), form: Form::Proxy(proxy), limits, changes: Vec::new() },
+            tolerance: arguments.real_time.tolerance(),
+            nodes: vec!["client".to_owned(), "server".to_owned()],
+            pairs: vec![(NodeId(0), NodeId(1)), (NodeId(1), NodeId(0))],
+            keys: vec![forth_keys, back_keys],
+            folder: PathBuf::new(),
+        })
+    }
+
+    /// Where programs are to send, in words. A free port is known now.
+    pub(super) fn opened<'a>(&mut self, ports: impl Iterator<Item = (&'a str, SocketAddr)>) -> Vec<String> {
+        let (title, form) = (&mut self.title, &self.config.form);
+        let line = |(place, (_, port)): (usize, (&str, SocketAddr))| match form {
+            Form::Proxy(proxy) => {
+                *title = format!("{port} -> {}", proxy.to);
+                format!("listening on {port} for what is meant for {}", proxy.to)
+            }
+            Form::Mesh(mesh) => {
+                let Some(program) = mesh.programs.get(place) else { return String::new() };
+                let address = program.address.map_or_else(|| "wherever it first sends from".to_owned(), |address| address.to_string());
+                format!("listening on {port} for what is meant for {}, which is at {address}", program.name)
+            }
+        };
+        ports.enumerate().map(line).collect()
+    }
+
+    /// The name of a node.
+    pub(super) fn name(&self, node: NodeId) -> &str {
+        self.nodes.get(node.0 as usize).map_or("", String::as_str)
+    }
+
+    /// What each link was asked for, when a run is over in which each was changed so often from outside.
+    pub(super) fn asked(&self, edits: &[u64], lasted: Duration) -> Vec<AskedDelay> {
+        let end = Instant::ZERO.saturating_add(lasted);
+        let asked = |((from, to), edits): (&(NodeId, NodeId), &u64)| {
+            let begun = match &self.config.form {
+                Form::Mesh(mesh) => AskedDelay::of(mesh.links.between(from.0 as usize, to.0 as usize)),
+                Form::Proxy(proxy) => AskedDelay::of(if from.0 == 0 { &proxy.forth } else { &proxy.back }),
+            };
+            let planned = self.config.changes.iter().filter(|change| change.at <= end && (change.from, change.to) == (*from, *to)).count();
+            AskedDelay { changes: edits + planned as u64, ..begun }
+        };
+        self.pairs.iter().zip(edits).map(asked).collect()
+    }
+}
+
+fn node(place: usize) -> NodeId {
+    NodeId(u32::try_from(place).unwrap_or(u32::MAX))
+}
+
+fn words(spec: &[OsString]) -> Result<Vec<String>, Failure> {
+    let word = |word: &OsString| {
+        let text = word.to_str().ok_or_else(|| Failure::Input(format!("{}: expected words in Unicode", word.to_string_lossy())))?;
+        Ok(text.to_owned())
+    };
+    spec.iter().map(word).collect()
+}
+
+/// Refuses an address that other machines reach, or that is on one.
+fn local(option: &str, address: SocketAddr) -> Result<(), Failure> {
+    if address.ip().is_loopback() {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{option} {address} is not on loopback: expected an address such as 127.0.0.1 or ::1, or --allow-remote as well. The relay authenticates nobody: \
+         who reaches its ports can speak through it"
+    )))
+}

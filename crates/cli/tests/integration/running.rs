@@ -1,0 +1,129 @@
+//! A command that runs until it is stopped, what it says meanwhile, and its live control.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
+use std::process::{Child, ChildStderr, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::desk::Outcome;
+
+/// What is waited for takes milliseconds; this is how long a machine may be busy with something else.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A command in the background. It is ended when the test is over, whatever comes of it.
+pub(crate) struct Running {
+    child: Option<Child>,
+    lines: Receiver<String>,
+    reading: Option<JoinHandle<String>>,
+}
+
+impl Running {
+    pub(crate) fn begin(mut command: Command) -> Self {
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let (line, lines) = channel();
+        let stderr: ChildStderr = child.stderr.take().unwrap();
+        let reading = thread::spawn(move || {
+            let mut all = String::new();
+            for said in BufReader::new(stderr).lines().map_while(Result::ok) {
+                all.push_str(&said);
+                all.push('\n');
+                // When nobody waits for it any more.
+                let _ = line.send(said);
+            }
+            all
+        });
+        Self { child: Some(child), lines, reading: Some(reading) }
+    }
+
+    /// The rest of the next line on standard error that begins like that.
+    pub(crate) fn said(&self, beginning: &str) -> String {
+        let begin = Instant::now();
+        loop {
+            let left = PATIENCE.saturating_sub(begin.elapsed());
+            let line = self.lines.recv_timeout(left).unwrap_or_else(|error| panic!("nothing that begins with {beginning:?} was said: {error}"));
+            if let Some(rest) = line.strip_prefix(beginning) {
+                return rest.to_owned();
+            }
+        }
+    }
+
+    /// The address of the port that was said next, and what it is for.
+    pub(crate) fn port(&self) -> (SocketAddr, String) {
+        let said = self.said("listening on ");
+        let (address, purpose) = said.split_once(" for what is meant for ").unwrap();
+        (address.parse().unwrap(), purpose.to_owned())
+    }
+
+    /// Sends a signal, waits until it ends, and says what came of it.
+    pub(crate) fn end_by(self, signal: &str) -> Outcome {
+        let id = self.child.as_ref().unwrap().id().to_string();
+        assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
+        self.end()
+    }
+
+    /// Waits until it ends by itself.
+    pub(crate) fn end(mut self) -> Outcome {
+        let begin = Instant::now();
+        // A report is longer than a pipe holds only for thousands of links.
+        while self.child.as_mut().unwrap().try_wait().unwrap().is_none() {
+            assert!(begin.elapsed() < PATIENCE, "it does not end");
+            thread::sleep(Duration::from_millis(5));
+        }
+        let mut output = self.child.take().unwrap().wait_with_output().unwrap();
+        output.stderr = self.reading.take().unwrap().join().unwrap().into_bytes();
+        Outcome::of(output)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            drop(child.kill());
+            drop(child.wait());
+        }
+    }
+}
+
+/// Live control of a command that was started with `--control --token-file token`.
+pub(crate) struct Client {
+    address: SocketAddr,
+}
+
+/// What is in the file `token`.
+pub(crate) const TOKEN: &str = "0123456789-abcdefghijklm";
+
+impl Client {
+    pub(crate) fn of(running: &Running) -> Self {
+        let url = running.said("live control: http://");
+        let (address, rest) = url.split_once('/').unwrap();
+        assert!(rest.contains(TOKEN), "{url}");
+        Self { address: address.parse().unwrap() }
+    }
+
+    /// Asks over a connection of its own: the status and the body.
+    pub(crate) fn ask(&self, method: &str, path: &str, body: &str) -> (u16, String) {
+        self.ask_as(&format!("Authorization: Bearer {TOKEN}\r\n"), method, path, body)
+    }
+
+    pub(crate) fn ask_as(&self, who: &str, method: &str, path: &str, body: &str) -> (u16, String) {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let (address, length) = (self.address, body.len());
+        let head = format!("{method} {path} HTTP/1.1\r\nHost: {address}\r\n{who}Connection: close\r\nContent-Length: {length}\r\n\r\n");
+        stream.write_all((head + body).as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+        (head.split(' ').nth(1).unwrap().parse().unwrap(), body.to_owned())
+    }
+
+    pub(crate) fn json(&self, method: &str, path: &str, body: &str) -> Value {
+        let (status, body) = self.ask(method, path, body);
+        assert_eq!(status, 200, "{method} {path}: {body}");
+        serde_json::from_str(&body).unwrap_or_else(|error| panic!("{error} in {body}"))
+    }
+}
