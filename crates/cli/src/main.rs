@@ -10,6 +10,7 @@ mod check;
 mod documents;
 mod explain;
 mod failure;
+mod falcon;
 mod fit;
 mod interrupt;
 mod lines;
@@ -41,6 +42,7 @@ fn main() -> ExitCode {
         Command::Stability(arguments) => stability::stability(&arguments),
         Command::Admittance(arguments) => admittance::admittance(&arguments),
         Command::Live(arguments) => live::live(&arguments),
+        Command::Falcon(arguments) => falcon::falcon(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),
         Command::Paper(arguments) => paper::paper(&arguments),

@@ -1,6 +1,7 @@
 //! What can be said on the command line.
 
 mod admittance;
+mod falcon;
 mod links;
 mod paper;
 mod realtime;
@@ -12,6 +13,9 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use admittance::AdmittanceArguments;
+pub(crate) use falcon::{
+    FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
+};
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use paper::PaperArguments;
 pub(crate) use realtime::{LiveArguments, RealTimeArguments};
@@ -44,6 +48,8 @@ pub(crate) enum Command {
     Admittance(AdmittanceArguments),
     /// Runs a scene by the wall clock, with other programs and Falcons attached, all through the emulated links
     Live(LiveArguments),
+    /// Looks at a Novint Falcon, homes it, watches and pushes it, or simulates one
+    Falcon(FalconArguments),
     /// Sends a steady stream over one link and sets what it achieved beside what it was asked for
     Link(LinkArguments),
     /// Estimates the link that made a file of measurements, captures or fates

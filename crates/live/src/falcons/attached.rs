@@ -16,7 +16,7 @@ const OLD: Duration = Duration::from_millis(20);
 /// How far a Falcon is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Readiness {
-    /// Whether it takes part: homed, and its forces on.
+    /// Whether it takes part: homed, and its user has switched forces on.
     pub is_ready: bool,
     /// Whether it is simulated.
     pub is_simulated: bool,
@@ -39,8 +39,9 @@ impl<const A: usize> Attached<A> {
     }
 
     pub(super) fn readiness(&self) -> Readiness {
-        let phase = self.device.snapshot().map_or(Phase::Silent, |snapshot| snapshot.phase);
-        Readiness { is_ready: phase == Phase::Active, is_simulated: self.beginning.is_some(), phase }
+        // Its light is green only when somebody asks for force, which nobody does before the session begins.
+        let (phase, is_ready) = self.device.snapshot().map_or((Phase::Silent, false), |snapshot| (snapshot.phase, snapshot.is_ready()));
+        Readiness { is_ready, is_simulated: self.beginning.is_some(), phase }
     }
 
     pub(super) fn stopper(&self) -> Stopper {
@@ -55,7 +56,7 @@ impl<const A: usize> Attached<A> {
             _ => now,
         };
         self.newest = Some((snapshot.at, came));
-        let takes_part = snapshot.phase == Phase::Active && snapshot.reading.is_some() && self.device.ended().is_none();
+        let takes_part = snapshot.is_ready() && self.device.ended().is_none();
         (takes_part && now.saturating_duration_since(came) <= OLD).then_some(snapshot)
     }
 }
