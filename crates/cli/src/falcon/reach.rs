@@ -156,10 +156,10 @@ mod tests {
 
     #[test]
     fn none_is_said_with_what_to_look_at() {
-        let said = said(&meant(Vec::new(), None).unwrap_err());
-        assert!(["no Novint Falcon", "0403:cb48", "power supply", "lsusb", "docs/falcon.md"].iter().all(|part| said.contains(part)), "{said}");
-        let said = super::tests::said(&meant(Vec::new(), Some("A1")).unwrap_err());
-        assert!(said.contains("\"A1\"") && said.ends_with("there are: none"), "{said}");
+        let none = said(&meant(Vec::new(), None).unwrap_err());
+        assert!(["no Novint Falcon", "0403:cb48", "power supply", "lsusb", "docs/falcon.md"].iter().all(|part| none.contains(part)), "{none}");
+        let other = said(&meant(Vec::new(), Some("A1")).unwrap_err());
+        assert!(other.contains("\"A1\"") && other.ends_with("there are: none"), "{other}");
     }
 
     #[test]

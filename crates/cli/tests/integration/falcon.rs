@@ -222,16 +222,19 @@ fn a_spring_pulls_to_the_origin_within_its_limit() {
         if table["phase"][row] != "active" {
             assert_eq!(force, [0.0; 3], "row {row}");
         }
-        // From 5 s on the grip sways in the middle, where nothing is limited: what goes out is of what was read in the exchange before.
+        // From 5 s on the grip sways around the middle: what goes out is of what was read in the exchange before, shortened to 1 N.
         if value("t", row).unwrap() > 5.0 {
-            for (axis, force) in ["x", "y", "z"].iter().zip(force) {
-                let spring = -60.0 * value(axis, row - 1).unwrap() - 0.5 * value(&format!("v{axis}"), row - 1).unwrap();
-                assert!((force - spring).abs() < 1e-9, "row {row}: {force} N, a spring {spring} N");
-                compared += 1;
-            }
+            let spring = ["x", "y", "z"].map(|axis| {
+                let [place, speed] = [axis.to_owned(), format!("v{axis}")].map(|name| value(&name, row - 1).unwrap());
+                -60.0 * place - 0.5 * speed
+            });
+            let length = spring.iter().map(|part| part * part).sum::<f64>().sqrt();
+            let off = spring.iter().zip(force).map(|(spring, force)| (spring / length.max(1.0) - force).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-9, "row {row}: {force:?} N, a spring {spring:?} N");
+            compared += 1;
         }
     }
-    assert!(compared > 2900);
+    assert!(compared > 900);
 }
 
 #[test]
