@@ -14,12 +14,12 @@ impl LoadingBar {
         Self(bar)
     }
 
-    pub(super) fn reach(&mut self, bytes: usize) {
+    pub(super) fn reach(&self, bytes: usize) {
         self.0.set_position(bytes as u64);
     }
 
     /// Does something else to the terminal.
-    pub(super) fn aside(&mut self, work: impl FnOnce()) {
+    pub(super) fn aside(&self, work: impl FnOnce()) {
         self.0.suspend(work);
     }
 

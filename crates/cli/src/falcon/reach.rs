@@ -65,7 +65,7 @@ fn of_usb(error: &UsbError) -> Failure {
     let where_to_look = match error {
         UsbError::NoDevice => ". `lsusb -d 0403:cb48` shows whether the system sees it; docs/falcon.md says what else to look at",
         UsbError::System { .. } => ". `lsusb` shows whether this machine has USB at all",
-        _ => "",
+        UsbError::NoSuchSerial { .. } | UsbError::Several(_) | _ => "",
     };
     Failure::System(format!("{error}{where_to_look}"))
 }
@@ -108,7 +108,7 @@ pub(super) fn read_firmware(path: Option<&Path>) -> Result<Option<Firmware>, Fai
     let Some(path) = path else { return Ok(None) };
     Firmware::read(path).map(Some).map_err(|error| match error {
         FirmwareError::Read { path, error } => Failure::File { verb: "read", path, error },
-        error => Failure::Input(format!("{}: {error}", path.display())),
+        error @ (FirmwareError::Length { .. } | _) => Failure::Input(format!("{}: {error}", path.display())),
     })
 }
 
@@ -120,7 +120,7 @@ pub(super) fn make_ready(way: &mut Way, firmware: Option<&Firmware>) -> Result<F
         let missing = "it does not answer: it has no firmware yet, or no power. Give the path of the firmware that came with it with --firmware FILE";
         return if runs { Ok(FirmwareState::Running) } else { Err(format!("{missing} (docs/falcon.md)")) };
     };
-    let mut bar = LoadingBar::new(firmware.bytes().len());
+    let bar = LoadingBar::new(firmware.bytes().len());
     let outcome = boot::ensure_loaded(way, firmware, &options, &mut |progress| {
         if let Progress::Loaded { done, .. } = progress {
             bar.reach(done);
@@ -148,10 +148,9 @@ mod tests {
     }
 
     fn said(error: &UsbError) -> String {
-        match of_usb(error) {
-            Failure::System(said) => said,
-            other => panic!("{other:?}"),
-        }
+        let failure = of_usb(error);
+        let Failure::System(said) = failure else { panic!("{failure:?}") };
+        said
     }
 
     #[test]

@@ -217,8 +217,8 @@ fn the_same_session_is_the_same_to_the_last_byte() {
     assert!(one.trace.bits == two.trace.bits, "motion");
     for (one, two) in one.desks.iter().zip(&two.desks) {
         let (one, two) = (one.bytes.lock().unwrap(), two.bytes.lock().unwrap());
-        // Homing and session, a packet out and a report in each millisecond, but for the one after which the other is on its way.
-        assert!(one.len() >= 32 * 5990, "{}", one.len());
+        // Homing and session, 6 s: a packet out and a report in each millisecond. An exchange takes 1.02 ms here, with 0.02 ms for the call that ends it.
+        assert!(one.len() >= 32 * 5850, "{}", one.len());
         assert!(*one == *two, "bytes");
     }
 }
