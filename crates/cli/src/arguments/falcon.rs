@@ -75,16 +75,16 @@ pub(crate) struct WatchArguments {
     /// How long [default: until Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = some_time)]
     pub(crate) length: Option<Duration>,
-    /// Push with this force [N], once the device is homed and its grip was pulled out
+    /// Push with this force \[N\], once the device is homed and its grip was pulled out
     #[arg(long, value_name = "X,Y,Z", value_parser = force, allow_hyphen_values = true, conflicts_with = "spring")]
     pub(crate) force: Option<Force>,
-    /// Pull to the origin as a spring of this stiffness [N/m], up to 3000, likewise
+    /// Pull to the origin as a spring of this stiffness \[N/m\], up to 3000, likewise
     #[arg(long, value_name = "STIFFNESS", value_parser = stiffness)]
     pub(crate) spring: Option<f64>,
-    /// What the spring damps [N·s/m], up to 20
+    /// What the spring damps \[N·s/m\], up to 20
     #[arg(long, value_name = "DAMPING", value_parser = damping, requires = "spring", default_value_t = 0.0)]
     pub(crate) damping: f64,
-    /// No greater force [N], above 0 and up to 4. A device may push several times as hard as it is asked to (docs/falcon.md)
+    /// No greater force \[N\], above 0 and up to 4. A device may push several times as hard as it is asked to (docs/falcon.md)
     #[arg(long, value_name = "NEWTONS", value_parser = gentle, default_value_t = 0.5)]
     pub(crate) limit: f64,
     /// Write every exchange into this file
@@ -98,10 +98,10 @@ pub(crate) struct SimulateArguments {
     /// Who holds the grip
     #[arg(long, value_enum, default_value_t = HandName::Swaying)]
     pub(crate) hand: HandName,
-    /// Ask the driver for this force [N] all the time
+    /// Ask the driver for this force \[N\] all the time
     #[arg(long, value_name = "X,Y,Z", value_parser = force, allow_hyphen_values = true)]
     pub(crate) force: Option<Force>,
-    /// No greater force [N], above 0 and up to 20
+    /// No greater force \[N\], above 0 and up to 20
     #[arg(long, value_name = "NEWTONS", value_parser = strong, default_value_t = 4.0)]
     pub(crate) limit: f64,
     /// A byte to the host is changed, and one that nobody sent comes before it, each with this probability
