@@ -10,6 +10,7 @@ mod check;
 mod documents;
 mod explain;
 mod failure;
+mod falcon;
 mod fit;
 mod interrupt;
 mod lines;
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
         Command::Live(arguments) => live::live(&arguments),
         Command::Relay(arguments) => relay::relay(&arguments),
         Command::Router(arguments) => router::router(&arguments),
+        Command::Falcon(arguments) => falcon::falcon(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),
         Command::Paper(arguments) => paper::paper(&arguments),

@@ -1,6 +1,7 @@
 //! What can be said on the command line.
 
 mod admittance;
+mod falcon;
 mod links;
 mod paper;
 mod realtime;
@@ -14,6 +15,9 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use admittance::AdmittanceArguments;
+pub(crate) use falcon::{
+    FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
+};
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use paper::PaperArguments;
 pub(crate) use realtime::{LiveArguments, RealTimeArguments};
@@ -52,6 +56,8 @@ pub(crate) enum Command {
     Relay(RelayArguments),
     /// Puts the emulator between two network devices: any IP traffic
     Router(RouterArguments),
+    /// Looks at a Novint Falcon, homes it, watches and pushes it, or simulates one
+    Falcon(FalconArguments),
     /// Sends a steady stream over one link and sets what it achieved beside what it was asked for
     Link(LinkArguments),
     /// Estimates the link that made a file of measurements, captures or fates

@@ -9,11 +9,14 @@ mod check;
 mod desk;
 mod errors;
 mod explain;
+mod falcon;
 mod fit;
 mod help;
 #[cfg(unix)]
 mod interrupt;
 mod link;
+#[cfg(unix)]
+mod live_falcons;
 mod output;
 mod overrides;
 mod paper;

@@ -16,7 +16,7 @@ const OLD: Duration = Duration::from_millis(20);
 /// How far a Falcon is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Readiness {
-    /// Whether it takes part: homed, and pulled out to switch its forces on.
+    /// Whether it takes part: homed, and its user has switched forces on.
     pub is_ready: bool,
     /// Whether it is simulated.
     pub is_simulated: bool,
@@ -39,12 +39,9 @@ impl<const A: usize> Attached<A> {
     }
 
     pub(super) fn readiness(&self) -> Readiness {
-        let snapshot = self.device.snapshot();
-        Readiness {
-            is_ready: snapshot.is_some_and(|snapshot| snapshot.is_ready()),
-            is_simulated: self.beginning.is_some(),
-            phase: snapshot.map_or(Phase::Silent, |snapshot| snapshot.phase),
-        }
+        // Its light is green only when somebody asks for force, which nobody does before the session begins.
+        let (phase, is_ready) = self.device.snapshot().map_or((Phase::Silent, false), |snapshot| (snapshot.phase, snapshot.is_ready()));
+        Readiness { is_ready, is_simulated: self.beginning.is_some(), phase }
     }
 
     pub(super) fn stopper(&self) -> Stopper {

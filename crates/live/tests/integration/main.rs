@@ -5,6 +5,7 @@
 mod client;
 mod conversation;
 mod examples;
+mod falcons;
 mod hostile;
 mod key_files;
 mod keyed;

@@ -1,0 +1,116 @@
+//! `cohaptic falcon home`.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use cohaptic_falcon::driver::{Phase, Status};
+use cohaptic_falcon::kinematics::Triple;
+use cohaptic_units::print::Span;
+use serde::Serialize;
+
+use super::bench::{Bench, End, Go, Task};
+use super::document::{Identity, Seen, Traffic};
+use super::homing_guide::Guide;
+use super::line::StatusLine;
+use super::probe::WITHOUT_FORCE;
+use super::reach::{self, FirmwareState};
+use super::words;
+use crate::arguments::HomeArguments;
+use crate::failure::{Failure, INTERRUPTED};
+use crate::output;
+
+#[derive(Serialize)]
+struct Document {
+    #[serde(flatten)]
+    identity: Identity,
+    firmware: &'static str,
+    /// Whether it was homed at the end, beyond doubt.
+    is_homed: bool,
+    is_active: bool,
+    ending: &'static str,
+    #[serde(flatten)]
+    traffic: Traffic,
+    #[serde(flatten)]
+    seen: Seen,
+}
+
+/// Waits until a user has homed a device and pulled its grip out.
+pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
+    let which = &arguments.which;
+    let firmware = reach::read_firmware(which.firmware.as_deref())?;
+    let target = reach::target(which)?;
+    let mut way = target.open().map_err(|error| Failure::System(error.to_string()))?;
+    let state = reach::make_ready(&mut way, firmware.as_ref()).map_err(Failure::System)?;
+    let mut bench = Bench::open(way, WITHOUT_FORCE).map_err(|error| Failure::System(error.to_string()))?;
+    let mut homing = Homing { guide: Guide::new(true), line: StatusLine::new(), last: *bench.status(), until: Duration::ZERO };
+    let end = bench.run(Some(arguments.length), &mut homing);
+    homing.line.clear();
+    let (end, traffic) = (end?, Traffic::of(&bench, homing.until));
+    let document = Document {
+        identity: Identity::of(&target),
+        firmware: state.name(),
+        is_homed: homing.last.reading.is_some(),
+        is_active: homing.last.phase == Phase::Active,
+        ending: end.name(),
+        traffic,
+        seen: Seen::of(&homing.last),
+    };
+    if which.json {
+        output::json(&document)?;
+    } else {
+        output::text(&document.describe(&target.name(), state))?;
+    }
+    match end {
+        End::Enough => Ok(ExitCode::SUCCESS),
+        End::Interrupted => Ok(ExitCode::from(INTERRUPTED)),
+        End::Failed(error) => Err(Failure::System(error.to_string())),
+        End::Over => Err(Failure::System(format!(
+            "after {} the device is {}: pull the grip fully out, push it fully in, and pull it out again; --for gives more time",
+            Span(arguments.length),
+            if document.is_homed { "homed, but its grip was not pulled out beyond 170 mm" } else { "not homed" }
+        ))),
+    }
+}
+
+impl Document {
+    fn describe(&self, name: &str, firmware: FirmwareState) -> String {
+        let mut lines = Vec::new();
+        if firmware == FirmwareState::Loaded {
+            lines.push("its firmware was loaded just now".to_owned());
+        }
+        let seconds = self.traffic.seconds;
+        lines.push(match (self.is_homed, self.is_active) {
+            (_, true) => format!("homed and active after {seconds:.1} s"),
+            (true, false) => format!("homed, and not active after {seconds:.1} s"),
+            (false, false) => format!("not homed after {seconds:.1} s"),
+        });
+        lines.extend(self.seen.position_m.map(|position| format!("the grip is at {} from the origin", words::place(position))));
+        lines.extend(words::seen(&self.seen));
+        lines.extend(words::traffic(&self.traffic));
+        words::block(name, &lines)
+    }
+}
+
+struct Homing {
+    guide: Guide,
+    line: StatusLine,
+    last: Status,
+    until: Duration,
+}
+
+impl Task for Homing {
+    /// No force, but one that is asked for: so the light turns green when forces would go out.
+    fn wants(&mut self, _at: Duration, _status: &Status) -> Option<Triple> {
+        Some([0.0; 3])
+    }
+
+    fn look(&mut self, at: Duration, status: &Status) -> Result<Go, Failure> {
+        (self.last, self.until) = (*status, at);
+        self.guide.look(status, &self.line);
+        if self.line.is_seen() {
+            let homed = status.homed.map(|homed| if homed { "homed" } else { "-" });
+            self.line.show(format!("{:.1} s: top {}, right {}, left {}", at.as_secs_f64(), homed[0], homed[1], homed[2]));
+        }
+        Ok(if status.phase == Phase::Active { Go::Enough } else { Go::On })
+    }
+}

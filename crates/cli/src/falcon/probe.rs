@@ -1,0 +1,132 @@
+//! `cohaptic falcon probe`.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use cohaptic_falcon::boot::Firmware;
+use cohaptic_falcon::driver::{DriverConfig, Status};
+use cohaptic_falcon::kinematics::Triple;
+use cohaptic_falcon::safety::Limits;
+use serde::Serialize;
+
+use super::bench::{Bench, End, Go, Task};
+use super::document::{Identity, Seen, Traffic};
+use super::reach::{self, FirmwareState, Target};
+use super::words;
+use crate::arguments::ProbeArguments;
+use crate::failure::{Failure, INPUT_OUTPUT, INTERRUPTED};
+use crate::{interrupt, output};
+
+/// A device that nobody gets a force from.
+pub(super) const WITHOUT_FORCE: DriverConfig = DriverConfig { limits: Limits { force: 0.0, ..Limits::DEFAULT }, ..DriverConfig::DEFAULT };
+
+#[derive(Serialize)]
+struct Document {
+    falcons: Vec<Entry>,
+}
+
+/// What was found out about one Falcon, as far as it went.
+#[derive(Serialize)]
+struct Entry {
+    #[serde(flatten)]
+    identity: Identity,
+    opened: bool,
+    firmware: Option<&'static str>,
+    #[serde(flatten)]
+    answered: Option<Answered>,
+    /// What was in the way.
+    error: Option<String>,
+    #[serde(skip)]
+    name: String,
+}
+
+#[derive(Serialize)]
+struct Answered {
+    #[serde(flatten)]
+    traffic: Traffic,
+    #[serde(flatten)]
+    seen: Seen,
+}
+
+/// Looks at every Falcon that is meant.
+pub(super) fn probe(arguments: &ProbeArguments) -> Result<ExitCode, Failure> {
+    let firmware = reach::read_firmware(arguments.which.firmware.as_deref())?;
+    let targets = reach::targets(&arguments.which)?;
+    let mut falcons = Vec::new();
+    for target in &targets {
+        if !interrupt::asked() {
+            falcons.push(Entry::of(target, firmware.as_ref(), arguments.length)?);
+        }
+    }
+    let document = Document { falcons };
+    if arguments.which.json {
+        output::json(&document)?;
+    } else {
+        output::text(&document.falcons.iter().map(Entry::describe).collect::<String>())?;
+    }
+    let is_whole = document.falcons.iter().all(|entry| entry.error.is_none());
+    Ok(ExitCode::from(if interrupt::asked() {
+        INTERRUPTED
+    } else if is_whole {
+        0
+    } else {
+        INPUT_OUTPUT
+    }))
+}
+
+impl Entry {
+    fn of(target: &Target, firmware: Option<&Firmware>, length: Duration) -> Result<Self, Failure> {
+        let mut entry = Self { identity: Identity::of(target), opened: false, firmware: None, answered: None, error: None, name: target.name() };
+        let mut way = match target.open() {
+            Ok(way) => way,
+            Err(error) => return Ok(Self { error: Some(error.to_string()), ..entry }),
+        };
+        entry.opened = true;
+        match reach::make_ready(&mut way, firmware) {
+            Ok(state) => entry.firmware = Some(state.name()),
+            Err(error) => return Ok(Self { error: Some(error), ..entry }),
+        }
+        let mut bench = match Bench::open(way, WITHOUT_FORCE) {
+            Ok(bench) => bench,
+            Err(error) => return Ok(Self { error: Some(error.to_string()), ..entry }),
+        };
+        let mut looking = Looking { seen: None, until: Duration::ZERO };
+        let end = bench.run(Some(length), &mut looking)?;
+        if let End::Failed(error) = end {
+            entry.error = Some(error.to_string());
+        }
+        entry.answered = looking.seen.map(|seen| Answered { traffic: Traffic::of(&bench, looking.until), seen });
+        Ok(entry)
+    }
+
+    fn describe(&self) -> String {
+        let mut lines = Vec::new();
+        lines.push(if self.opened { "it may be opened" } else { "it cannot be opened" }.to_owned());
+        lines.extend(self.firmware.map(|firmware| {
+            if firmware == FirmwareState::Loaded.name() { "its firmware was loaded just now" } else { "its firmware runs" }.to_owned()
+        }));
+        if let Some(Answered { traffic, seen }) = &self.answered {
+            lines.extend(words::traffic(traffic));
+            lines.extend(words::seen(seen));
+        }
+        lines.extend(self.error.as_ref().map(|error| format!("ERROR: {error}")));
+        words::block(&self.name, &lines)
+    }
+}
+
+/// Keeps what was seen last.
+struct Looking {
+    seen: Option<Seen>,
+    until: Duration,
+}
+
+impl Task for Looking {
+    fn wants(&mut self, _at: Duration, _status: &Status) -> Option<Triple> {
+        None
+    }
+
+    fn look(&mut self, at: Duration, status: &Status) -> Result<Go, Failure> {
+        (self.seen, self.until) = (Some(Seen::of(status)), at);
+        Ok(Go::On)
+    }
+}

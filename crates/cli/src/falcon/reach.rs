@@ -1,0 +1,171 @@
+//! From a name on the command line to a device whose firmware runs.
+
+use std::io::{self, Write as _};
+use std::path::Path;
+use std::time::Duration;
+
+use cohaptic_falcon::boot::{self, BootOptions, Firmware, FirmwareError, Progress};
+use cohaptic_falcon::simulator::{SimulatedTransport, Simulator, SimulatorConfig, Waypoints};
+use cohaptic_falcon::usb::{self, Listed, UsbError, UsbTransport};
+
+use super::line::LoadingBar;
+use super::way::Way;
+use crate::arguments::WhichFalcon;
+use crate::failure::Failure;
+use crate::realtime::loading;
+
+/// How far the simulated hand sways \[m\], and how fast \[Hz\].
+pub(super) const SWAY: ([f64; 3], f64) = ([0.020, 0.015, 0.010], 0.5);
+
+/// A device that is there.
+#[derive(Clone, Debug)]
+pub(super) enum Target {
+    Usb(Listed),
+    Simulated {
+        in_virtual_time: bool,
+        /// Whether its firmware is to be loaded: a real one is switched on without, too.
+        switched_on: bool,
+    },
+}
+
+/// How a device came by its firmware.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum FirmwareState {
+    Running,
+    Loaded,
+}
+
+/// Every device that is meant; at least one.
+pub(super) fn targets(which: &WhichFalcon) -> Result<Vec<Target>, Failure> {
+    if which.simulated {
+        return Ok(vec![Target::Simulated { in_virtual_time: which.virtual_time, switched_on: which.firmware.is_some() }]);
+    }
+    let all = usb::list().map_err(|error| of_usb(&error))?;
+    Ok(meant(all, which.serial.as_deref()).map_err(|error| of_usb(&error))?.into_iter().map(Target::Usb).collect())
+}
+
+/// Those with that serial number, or all; at least one.
+fn meant(all: Vec<Listed>, serial: Option<&str>) -> Result<Vec<Listed>, UsbError> {
+    let Some(serial) = serial else { return if all.is_empty() { Err(UsbError::NoDevice) } else { Ok(all) } };
+    let meant: Vec<Listed> = all.iter().filter(|listed| listed.serial.as_deref() == Some(serial)).cloned().collect();
+    if meant.is_empty() { Err(UsbError::NoSuchSerial { serial: serial.to_owned(), others: all }) } else { Ok(meant) }
+}
+
+/// The one device that is meant.
+pub(super) fn target(which: &WhichFalcon) -> Result<Target, Failure> {
+    let mut all = targets(which)?;
+    if all.len() > 1 {
+        let listed = all.into_iter().filter_map(|target| if let Target::Usb(listed) = target { Some(listed) } else { None }).collect();
+        return Err(of_usb(&UsbError::Several(listed)));
+    }
+    all.pop().ok_or_else(|| of_usb(&UsbError::NoDevice))
+}
+
+fn of_usb(error: &UsbError) -> Failure {
+    let where_to_look = match error {
+        UsbError::NoDevice => ". `lsusb -d 0403:cb48` shows whether the system sees it; docs/falcon.md says what else to look at",
+        UsbError::System { .. } => ". `lsusb` shows whether this machine has USB at all",
+        UsbError::NoSuchSerial { .. } | UsbError::Several(_) | _ => "",
+    };
+    Failure::System(format!("{error}{where_to_look}"))
+}
+
+impl Target {
+    pub(super) const fn is_simulated(&self) -> bool {
+        matches!(self, Self::Simulated { .. })
+    }
+
+    pub(super) const fn listed(&self) -> Option<&Listed> {
+        match self {
+            Self::Usb(listed) => Some(listed),
+            Self::Simulated { .. } => None,
+        }
+    }
+
+    /// In words, for people.
+    pub(super) fn name(&self) -> String {
+        self.listed().map_or_else(|| "simulated Falcon".to_owned(), Listed::to_string)
+    }
+
+    /// Opens the way there.
+    pub(super) fn open(&self) -> Result<Way, UsbError> {
+        match self {
+            Self::Usb(listed) => UsbTransport::open(listed.serial.as_deref()).map(Way::new),
+            Self::Simulated { in_virtual_time, switched_on } => {
+                let config = SimulatorConfig { running: !switched_on, seed: 1, ..SimulatorConfig::default() };
+                let hand = Waypoints::homing(Duration::ZERO).swaying(SWAY.0, SWAY.1);
+                let simulator = Simulator::new(config, hand);
+                let transport =
+                    if *in_virtual_time { SimulatedTransport::in_virtual_time(simulator) } else { SimulatedTransport::in_real_time(simulator) };
+                Ok(Way::new(transport))
+            }
+        }
+    }
+}
+
+/// Reads the firmware of `--firmware`, before any device is touched.
+pub(super) fn read_firmware(path: Option<&Path>) -> Result<Option<Firmware>, Failure> {
+    let Some(path) = path else { return Ok(None) };
+    Firmware::read(path).map(Some).map_err(|error| match error {
+        FirmwareError::Read { path, error } => Failure::File { verb: "read", path, error },
+        error @ (FirmwareError::Length { .. } | _) => Failure::Input(format!("{}: {error}", path.display())),
+    })
+}
+
+/// Sees to it that firmware runs; what is in the way, in words.
+pub(super) fn make_ready(way: &mut Way, firmware: Option<&Firmware>) -> Result<FirmwareState, String> {
+    let options = BootOptions::DEFAULT;
+    let Some(firmware) = firmware else {
+        let runs = boot::is_loaded(way, &options).map_err(|error| error.to_string())?;
+        let missing = "it does not answer: it has no firmware yet, or no power. Give the path of the firmware that came with it with --firmware FILE";
+        return if runs { Ok(FirmwareState::Running) } else { Err(format!("{missing} (docs/falcon.md)")) };
+    };
+    let bar = LoadingBar::new(firmware.bytes().len());
+    let outcome = boot::ensure_loaded(way, firmware, &options, &mut |progress| {
+        if let Progress::Loaded { done, .. } = progress {
+            bar.reach(done);
+        }
+        if let Some(said) = loading(progress) {
+            bar.aside(|| say(&said));
+        }
+    });
+    bar.clear();
+    outcome.map(|loaded| if loaded { FirmwareState::Loaded } else { FirmwareState::Running }).map_err(|error| error.to_string())
+}
+
+/// A line for people, beside the results.
+pub(super) fn say(line: &str) {
+    // What cannot be said does not keep anything from being done.
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn listed(serial: Option<&str>) -> Listed {
+        Listed { serial: serial.map(str::to_owned), product: Some("FALCON HAPTIC".to_owned()), bus: "003".to_owned(), address: 4 }
+    }
+
+    fn said(error: &UsbError) -> String {
+        let failure = of_usb(error);
+        let Failure::System(said) = failure else { panic!("{failure:?}") };
+        said
+    }
+
+    #[test]
+    fn none_is_said_with_what_to_look_at() {
+        let none = said(&meant(Vec::new(), None).unwrap_err());
+        assert!(["no Novint Falcon", "0403:cb48", "power supply", "lsusb", "docs/falcon.md"].iter().all(|part| none.contains(part)), "{none}");
+        let other = said(&meant(Vec::new(), Some("A1")).unwrap_err());
+        assert!(other.contains("\"A1\"") && other.ends_with("there are: none"), "{other}");
+    }
+
+    #[test]
+    fn all_are_meant_unless_one_is_named() {
+        let all = vec![listed(Some("A1")), listed(None), listed(Some("B2"))];
+        assert_eq!(meant(all.clone(), None).unwrap(), all);
+        assert_eq!(meant(all.clone(), Some("B2")).unwrap(), [listed(Some("B2"))]);
+        assert!(said(&meant(all, Some("C3")).unwrap_err()).contains("bus 003 address 4: FALCON HAPTIC, serial A1"));
+    }
+}

@@ -1,0 +1,260 @@
+//! Three simulated Falcons hold one object over 24 ms, bytes and all, in virtual time: the scene `scenarios/live/three-falcons.toml`.
+//!
+//! Expected is the scene's equilibrium: arm ka and coupling KC in series are k = ka·KC/(ka + KC), W is the sum of the wanted places w, and a copy rests at
+//! x = (k·w + KT·W/2)/(k + 3/2·KT). All parts are positive and those of one copy add up to 1, so what shifts the w by at most Δ shifts no copy by more.
+
+use std::convert::Infallible;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use cohaptic_falcon::calibration::Calibration;
+use cohaptic_falcon::device::{Axes, Axis, DeviceConfig, SteppedFalcon};
+use cohaptic_falcon::driver::DriverConfig;
+use cohaptic_falcon::ftdi::Request;
+use cohaptic_falcon::safety::Limits;
+use cohaptic_falcon::simulator::{MechanicsConfig, SharedSimulator, SimulatedTransport, Simulator, SimulatorConfig, Waypoints};
+use cohaptic_falcon::transport::{Transport, TransportError};
+use cohaptic_harness::live::{LiveDevice, LiveScene};
+use cohaptic_harness::{Model, Observer, Simulation, TickRow};
+use cohaptic_peer::{Device as _, State};
+use cohaptic_scene::{PeerKind, Scene};
+use cohaptic_units::Instant;
+
+const PEERS: usize = 3;
+/// Of an arm and of the coupling in the scene \[N/m\].
+const ARM: f64 = 100.0;
+/// The hand on each grip wants to be there \[m\].
+const WANTED: [[f64; 3]; PEERS] = [[0.03, 0.0, -0.015], [0.0; 3], [0.0; 3]];
+/// The dry friction of a simulated grip \[N\].
+const COULOMB: f64 = MechanicsConfig::DEFAULT.coulomb;
+
+/// How far whole counts shift the place that a hand seems to want \[m\]. An encoder is at most one count off, 0.06 mm each (docs/falcon.md): √3·0.06 mm. A motor is at
+/// most half a count off, 5e-5 N·m at 10,000 counts per N·m, and three of them √3 times that; the force on the grip is at most 29 rad/m times the torques (a count
+/// of 6.36e-4 rad is at least 0.022 mm), so 2.5 mN, which ka holds on 0.025 mm.
+const COUNTS: f64 = 1.732 * 0.06e-3 + 1.732 * 5e-5 * 29.0 / ARM;
+
+fn scene() -> Scene {
+    Scene::read_live(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/live/three-falcons.toml"), &[]).unwrap()
+}
+
+/// A transport that keeps every byte that passes.
+struct Tapped {
+    inner: SimulatedTransport,
+    bytes: Arc<Mutex<Vec<u8>>>,
+}
+
+impl Transport for Tapped {
+    fn now(&self) -> Instant {
+        self.inner.now()
+    }
+
+    fn sleep_until(&mut self, until: Instant) {
+        self.inner.sleep_until(until);
+    }
+
+    fn control(&mut self, request: Request, value: u16) -> Result<(), TransportError> {
+        self.inner.control(request, value)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        self.bytes.lock().unwrap().extend(bytes);
+        self.inner.write(bytes)
+    }
+
+    fn read(&mut self, into: &mut [u8], patience: Duration) -> Result<usize, TransportError> {
+        let count = self.inner.read(into, patience)?;
+        self.bytes.lock().unwrap().extend(&into[..count]);
+        Ok(count)
+    }
+}
+
+/// A Falcon that the ticks of its peer drive.
+struct Stepped {
+    falcon: SteppedFalcon<Tapped, 3>,
+    largest: Arc<Mutex<f64>>,
+}
+
+impl LiveDevice for Stepped {
+    fn read(&mut self, _now: Instant) -> Option<State<3>> {
+        self.falcon.snapshot().is_ready().then(|| self.falcon.state())
+    }
+
+    fn hold(&mut self, now: Instant, span: Duration, coupling_force: [f64; 3]) {
+        self.falcon.advance(now, span, coupling_force);
+        let mut largest = self.largest.lock().unwrap();
+        *largest = largest.max(length(self.falcon.snapshot().force));
+    }
+}
+
+/// What is kept of a device while the scene has it.
+struct Desk {
+    simulator: SharedSimulator,
+    bytes: Arc<Mutex<Vec<u8>>>,
+    largest: Arc<Mutex<f64>>,
+}
+
+/// A homed Falcon in a hand that wants to be at `wanted`.
+fn falcon(scene: &Scene, place: usize, coulomb: f64, limit: f64) -> (Stepped, Desk) {
+    let peer = &scene.peers[place];
+    let (PeerKind::Falcon(_, spec), Some(cohaptic_peer::Hand::Arm { arm, follows })) = (&peer.kind, peer.hand.clone()) else {
+        panic!("a Falcon in a hand")
+    };
+    assert_eq!((arm.stiffness, follows.value::<3>(Instant::ZERO), spec.force_limit), (ARM, WANTED[place], Limits::DEFAULT.force));
+    let mechanics = MechanicsConfig { mass: peer.device.mass + arm.mass, damping: peer.device.damping, coulomb, ..MechanicsConfig::DEFAULT };
+    let config = SimulatorConfig { seed: place as u64, running: true, mechanics, ..SimulatorConfig::default() };
+    let transport = SimulatedTransport::in_virtual_time(Simulator::new(config, Waypoints::homing(Duration::ZERO)));
+    let (simulator, bytes, largest) = (transport.simulator(), Arc::default(), Arc::default());
+    let transport = Tapped { inner: transport, bytes: Arc::clone(&bytes) };
+    let calibration = Calibration::new(spec.counts_per_newton_metre, spec.origin).unwrap();
+    let driver = DriverConfig { calibration, limits: Limits { force: limit, ..Limits::DEFAULT }, ..DriverConfig::DEFAULT };
+    let axes = Axes::new([Axis::X, Axis::Y, Axis::Z]).unwrap();
+    let mut falcon = SteppedFalcon::start(transport, DeviceConfig { driver, ..DeviceConfig::new(axes) }).unwrap();
+    assert!(falcon.wait(Duration::from_millis(4500)).unwrap().is_ready());
+    let (origin, wanted) = (spec.origin, WANTED[place]);
+    simulator.with(|device| {
+        device.set_hand(move |_: Instant, position: [f64; 3], velocity: [f64; 3]| {
+            [0, 1, 2].map(|axis| arm.stiffness * (origin[axis] + wanted[axis] - position[axis]) - arm.damping * velocity[axis])
+        });
+    });
+    (Stepped { falcon, largest: Arc::clone(&largest) }, Desk { simulator, bytes, largest })
+}
+
+/// Every number of every tick, and the mean place of each copy and device over the last half second.
+#[derive(Default)]
+struct Trace {
+    bits: Vec<u64>,
+    from: Instant,
+    sums: [[[f64; 3]; 2]; PEERS],
+    count: u32,
+}
+
+impl Trace {
+    fn of(scene: &Scene) -> Self {
+        Self { from: Instant::ZERO + (scene.duration - Duration::from_millis(500)), ..Self::default() }
+    }
+
+    fn mean(&self, peer: usize, which: usize) -> [f64; 3] {
+        self.sums[peer][which].map(|sum| sum / f64::from(self.count / 3))
+    }
+
+    fn copy(&self, peer: usize) -> [f64; 3] {
+        self.mean(peer, 0)
+    }
+
+    fn device(&self, peer: usize) -> [f64; 3] {
+        self.mean(peer, 1)
+    }
+}
+
+impl Observer for Trace {
+    type Error = Infallible;
+
+    fn wants_ticks(&self) -> bool {
+        true
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
+        let numbers =
+            [row.device.position, row.device.velocity, row.object.position, row.object.velocity, row.coupling_force, row.coordination_force];
+        self.bits.extend(numbers.into_iter().flatten().map(|number| number.to_bits()));
+        if row.at >= self.from {
+            self.count += 1;
+            for (sums, position) in self.sums[row.peer].iter_mut().zip([row.object.position, row.device.position]) {
+                for (sum, part) in sums.iter_mut().zip(position) {
+                    *sum += part;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What came of a session.
+struct Session {
+    trace: Trace,
+    desks: Vec<Desk>,
+}
+
+fn session(scene: &Scene, coulomb: f64, limit: f64) -> Session {
+    let mut desks = Vec::new();
+    let mut live = LiveScene::new(scene, |place| {
+        let (device, desk) = falcon(scene, place, coulomb, limit);
+        desks.push(desk);
+        Some(Box::new(device))
+    });
+    let mut trace = Trace::of(scene);
+    while let Some(at) = live.poll_timeout() {
+        let Ok(()) = live.handle_timeout(at, &mut trace);
+    }
+    for place in 0..PEERS {
+        let stats = live.seat_stats(place).unwrap();
+        assert_eq!((stats.joined, stats.refused), (1, 0), "it joins once and stays");
+    }
+    drop(live);
+    for desk in &desks {
+        let observed = desk.simulator.with(|device| *device.observed());
+        assert_eq!((observed.largest_count_unhomed, observed.garbage, observed.misheard, observed.torque_timeouts), (0, 0, 0, 0));
+        assert_eq!(desk.simulator.with(|device| device.motor_force()), [0.0; 3], "force ends with the session");
+        assert!(*desk.largest.lock().unwrap() <= limit * (1.0 + 1e-12), "no force above the limit goes out");
+    }
+    Session { trace, desks }
+}
+
+fn length([x, y, z]: [f64; 3]) -> f64 {
+    x.hypot(y).hypot(z)
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    length([0, 1, 2].map(|axis| a[axis] - b[axis]))
+}
+
+#[test]
+fn the_same_session_is_the_same_to_the_last_byte() {
+    let scene = Scene { duration: Duration::from_millis(1500), ..scene() };
+    let [one, two] = [(); 2].map(|()| session(&scene, COULOMB, 4.0));
+    assert_eq!(one.trace.bits.len(), 1500 * PEERS * 18);
+    assert!(one.trace.bits == two.trace.bits, "motion");
+    for (one, two) in one.desks.iter().zip(&two.desks) {
+        let (one, two) = (one.bytes.lock().unwrap(), two.bytes.lock().unwrap());
+        // Homing and session, 6 s: a packet out and a report in each millisecond. An exchange takes 1.02 ms here, with 0.02 ms for the call that ends it.
+        assert!(one.len() >= 32 * 5850, "{}", one.len());
+        assert!(*one == *two, "bytes");
+    }
+}
+
+/// The copies rest where those of plain masses do, but for what whole counts and dry friction leave open.
+#[test]
+fn the_copies_rest_where_plain_masses_do() {
+    let scene = scene();
+    let mut plain = Trace::of(&scene);
+    let Ok(_) = Simulation::new(&scene, Model::Least).run(&mut plain);
+    for coulomb in [0.0, COULOMB] {
+        let Session { trace, desks } = session(&scene, coulomb, 4.0);
+        // Friction of a grip at rest is as good as a hand that wants to be elsewhere.
+        let shift = coulomb / ARM + COUNTS;
+        for (peer, desk) in desks.iter().enumerate() {
+            let off = distance(trace.copy(peer), plain.copy(peer));
+            assert!(off <= shift, "{peer}, friction {coulomb} N: {off} m off, at most {shift} m expected");
+            // The driver knows where the grip truly is, but for its counts: KC·(grip − copy) is what the hand holds.
+            let grip = desk.simulator.with(|device| device.position());
+            let seen = trace.device(peer);
+            let off = distance(seen, [grip[0], grip[1], grip[2] - 0.125]);
+            assert!(off <= COUNTS + 2e-5, "{peer}: the device is {off} m from where it is seen");
+        }
+        // As far apart as the formula says: k·w/(k + 3/2·KT), with w = 33.5 mm.
+        let apart = distance(trace.copy(0), trace.copy(1));
+        let k = ARM * 1000.0 / (ARM + 1000.0);
+        let expected = k / (k + 450.0);
+        assert!((apart - expected * length(WANTED[0])).abs() <= expected * 2.0 * shift, "{apart}");
+    }
+}
+
+/// Left pulls with 1.69 N where nothing limits it. With 1 N its hand gets 6.9 mm nearer to where it wants to be.
+#[test]
+fn a_limit_of_force_gives_way_to_the_hand() {
+    let Session { trace, desks } = session(&scene(), COULOMB, 1.0);
+    assert!((*desks[0].largest.lock().unwrap() - 1.0).abs() < 1e-9, "it is reached");
+    let lags = distance(trace.device(0), WANTED[0]);
+    assert!((lags - 1.0 / ARM).abs() <= COULOMB / ARM + COUNTS, "{lags} m: 10 mm, and what 0.2 N of friction hold");
+}
