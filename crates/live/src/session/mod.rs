@@ -1,4 +1,4 @@
-//! The session itself: a [`LiveScene`] driven by the wall clock, with a socket behind its [`Door`].
+//! The session itself: a [`LiveScene`] driven by the wall clock, with a socket behind its [`Door`](crate::Door).
 //!
 //! One thread does everything that has to be on time. It sleeps until something is due or a datagram comes in, and tells the scene the logical instant of
 //! either: that at which it was due, or that at which the kernel saw it. Files, live control and the terminal have threads of their own.
