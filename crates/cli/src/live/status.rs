@@ -1,5 +1,7 @@
 //! A session as live control shows it.
 
+use std::time::Duration;
+
 use cohaptic_control::{Description, Kind, LinkCounters, LinkName, PeerName, PeerView, Presence as Shown, Snapshot};
 use cohaptic_harness::live::Presence;
 use cohaptic_live::session::{LinkStatus, PeerStatus};
@@ -29,13 +31,23 @@ pub(super) fn description(scene: &Scene, pairs: &[(usize, usize)]) -> Descriptio
     }
 }
 
-pub(super) fn snapshot(status: &Status) -> Snapshot {
+/// For each peer that lives elsewhere, how long it may be silent before it counts as silent.
+pub(super) type Silences = Vec<Option<Duration>>;
+
+pub(super) fn silences(scene: &Scene) -> Silences {
+    scene.peers.iter().map(|peer| peer.kind.silence().map(|silence| silence.after)).collect()
+}
+
+pub(super) fn snapshot(status: &Status, silences: &[Option<Duration>]) -> Snapshot {
     Snapshot {
         elapsed: status.elapsed,
         invalid: (!status.validity.is_valid()).then(|| status.validity.to_string()),
         lateness: vec![quantiles(&status.ticks), quantiles(&status.releases)],
         links: status.links.iter().map(link).collect(),
-        peers: status.peers.iter().map(|peer| view(peer, Instant::ZERO.saturating_add(status.elapsed))).collect(),
+        peers: {
+            let now = Instant::ZERO.saturating_add(status.elapsed);
+            status.peers.iter().zip(silences).map(|(peer, silence)| view(peer, silence.unwrap_or_default(), now)).collect()
+        },
         refused: status.door.map_or_else(Vec::new, |door| {
             let refused = door.refusals().filter(|(_, count)| *count > 0);
             refused.map(|(cause, count): (Refusal, u64)| (cause.name(), count)).collect()
@@ -47,12 +59,13 @@ fn link(link: &LinkStatus) -> LinkCounters {
     LinkCounters { delivered_bytes: link.delivered_bytes, recent_delay: quantiles_of(&link.recent), ..counters(&link.stats) }
 }
 
-fn view(peer: &PeerStatus, now: Instant) -> PeerView {
+fn view(peer: &PeerStatus, silence: Duration, now: Instant) -> PeerView {
     let (status, age) = match peer.state.presence {
         Presence::Here => (Shown::Here, None),
         Presence::Absent => (Shown::Absent, None),
         Presence::Present => (Shown::Present, None),
-        Presence::Stale(since) => (Shown::Stale, Some(now.saturating_duration_since(since))),
+        // It was heard for the last time so long before it counted as silent.
+        Presence::Stale(since) => (Shown::Stale, Some(now.saturating_duration_since(since).saturating_add(silence))),
     };
     PeerView { status, age, position: peer.state.object.position.to_vec(), force: peer.force.to_vec() }
 }
