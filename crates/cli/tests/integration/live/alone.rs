@@ -114,8 +114,8 @@ fn ctrl_c_ends_it_with_whole_files_that_replay() {
 #[test]
 fn a_record_is_replayed_as_the_run_that_it_was() {
     let desk = Desk::with("scene.toml", &eventful());
-    desk.json("live scene.toml --json --out out --for 300ms");
-    assert_replays(&desk, "scene.toml", "--set scene.duration=300ms");
+    desk.json("live scene.toml --json --out out --for 500ms");
+    assert_replays(&desk, "scene.toml", "--set scene.duration=500ms");
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn what_cannot_be_is_refused_with_a_status() {
         (2, "live two.toml --for soon", &["soon"]),
         (2, "live two.toml --listen here", &["here"]),
         (2, "live two.toml --token-file token", &["--control"]),
-        (2, "live two.toml --control 0.0.0.0:0", &["0.0.0.0", "--allow-remote"]),
+        (2, "live two.toml --control 0.0.0.0:0", &["0.0.0.0", "allow remote access"]),
         (3, "live missing.toml", &["missing.toml"]),
         (2, "live udp.toml --key-file short.key", &["short.key"]),
         (2, "live udp.toml --listen 0.0.0.0:0", &["0.0.0.0:0", "--key-file", "--allow-remote", "127.0.0.1"]),

@@ -45,8 +45,9 @@ fn at_rest() -> [f64; 3] {
 }
 
 fn is_settled(state: &Value) -> bool {
-    let position = |peer: usize| state["peers"][peer]["position"][0].as_f64().unwrap();
-    at_rest().iter().enumerate().all(|(peer, rest)| (position(peer) - rest).abs() < SETTLED)
+    // Before the session has published anything there are no positions.
+    let position = |peer: usize| state["peers"][peer]["position"][0].as_f64();
+    at_rest().iter().enumerate().all(|(peer, rest)| position(peer).is_some_and(|x| (x - rest).abs() < SETTLED))
 }
 
 /// The programs in one session for so many seconds; whether they came to rest where they must, all of them and those here, and what they said at the end.

@@ -42,7 +42,7 @@ hand = { arm = { mass = 0.4, damping = 5.0, stiffness = 300.0 } }
 [[links]]
 from = "right"
 to   = "left"
-jitter = { std-dev = "9ms", law = "uniform" }
+jitter = { sd = "6.5ms", distribution = "uniform" }
 loss = { gilbert-elliott = { p = 0.05, r = 0.3 } }
 "#;
 
