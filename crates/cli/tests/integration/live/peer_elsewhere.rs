@@ -103,7 +103,7 @@ fn in_virtual_time(desk: &Desk, offers: &BTreeMap<usize, Vec<u64>>, end: u64) ->
             let link = format!("{}->{}", names[event.from.0 as usize], names[event.to.0 as usize]);
             let arrived = match event.fate {
                 Fate::Delivered(at) => Some(at.as_nanos()),
-                _ => None,
+                Fate::Dropped(_) | Fate::Duplicated => None,
             };
             seen.insert((link, event.sequence, event.sent.as_nanos(), arrived, event.fate.name().to_owned()));
         }
