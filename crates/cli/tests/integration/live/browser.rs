@@ -35,6 +35,9 @@ fn a_person_moves_the_slider_of_a_session_and_sees_the_delay_change() {
     browser.wait("document.querySelector('#links tr .asked').textContent.includes('delay 12ms')");
     assert_eq!(browser.value("document.querySelector('h1').innerText"), json!("cohaptic live Lifting a box together"));
     wait_moving(&mut browser);
+    // A scene of one axis is shown along one.
+    assert_eq!(control.state()["peers"][0]["position"].as_array().map(Vec::len), Some(1));
+    assert_eq!(control.state()["peers"][0]["force"].as_array().map(Vec::len), Some(1));
     let mean = |control: &super::http::Control| control.state()["links"][0]["mean_delay_s"].as_f64().unwrap();
     let median = |control: &super::http::Control| control.state()["links"][0]["recent_delay"]["p50_s"].as_f64().unwrap();
     control.wait("packets", |state| state["links"][0]["delivered"].as_u64() > Some(60));

@@ -101,10 +101,7 @@ fn in_virtual_time(desk: &Desk, offers: &BTreeMap<usize, Vec<u64>>, end: u64) ->
     let mut drain = |network: &mut Network<()>| {
         while let Some(event) = network.poll_event() {
             let link = format!("{}->{}", names[event.from.0 as usize], names[event.to.0 as usize]);
-            let arrived = match event.fate {
-                Fate::Delivered(at) => Some(at.as_nanos()),
-                Fate::Dropped(_) | Fate::Duplicated => None,
-            };
+            let arrived = if let Fate::Delivered(at) = event.fate { Some(at.as_nanos()) } else { None };
             seen.insert((link, event.sequence, event.sent.as_nanos(), arrived, event.fate.name().to_owned()));
         }
     };
