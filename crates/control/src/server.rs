@@ -41,7 +41,7 @@ pub enum ServeError {
     /// Other machines would reach it.
     #[error(
         "live control would be open to other machines at {address}: listen on 127.0.0.1 or [::1] and reach it from elsewhere through `ssh -L`, or allow \
-         remote access; it is not encrypted"
+         remote access (--allow-remote); it is not encrypted"
     )]
     NotLoopback {
         /// The address.

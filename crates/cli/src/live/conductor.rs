@@ -5,7 +5,7 @@ use std::sync::mpsc::Receiver;
 use cohaptic_live::{Conductor, LinkChange, Status};
 use cohaptic_units::Instant;
 
-use super::status::snapshot;
+use super::status::{Shape, snapshot};
 use super::timeline::Elapsed;
 use crate::interrupt;
 use crate::realtime::{Edit, Look};
@@ -17,11 +17,12 @@ pub(super) struct Host {
     /// The links in the order of the description.
     pairs: Vec<(usize, usize)>,
     elapsed: Elapsed,
+    shape: Shape,
 }
 
 impl Host {
-    pub(super) const fn new(look: Option<Look>, wanted: Receiver<Edit>, pairs: Vec<(usize, usize)>, elapsed: Elapsed) -> Self {
-        Self { look, wanted, pairs, elapsed }
+    pub(super) const fn new(look: Option<Look>, wanted: Receiver<Edit>, pairs: Vec<(usize, usize)>, elapsed: Elapsed, shape: Shape) -> Self {
+        Self { look, wanted, pairs, elapsed, shape }
     }
 }
 
@@ -39,7 +40,7 @@ impl Conductor for Host {
     fn show(&mut self, status: Status) {
         self.elapsed.set(Instant::ZERO.saturating_add(status.elapsed));
         if let Some(look) = &self.look {
-            look.publish(snapshot(&status));
+            look.publish(snapshot(&status, &self.shape));
         }
     }
 

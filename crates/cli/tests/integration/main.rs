@@ -1,6 +1,7 @@
 //! The command line as its users meet it. Every test types a command in a folder of its own and looks at what comes back: the exit status, standard
 //! output, standard error and files. Expected numbers come from counting, from a closed form or from another record of the same run.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
+#![allow(clippy::print_stderr, reason = "a test that cannot run here says so")]
 #![expect(clippy::float_cmp, reason = "what is printed is what was computed, to the bit")]
 
 mod admittance;
@@ -15,6 +16,8 @@ mod help;
 #[cfg(unix)]
 mod interrupt;
 mod link;
+#[cfg(unix)]
+mod live;
 #[cfg(unix)]
 mod live_falcons;
 mod output;

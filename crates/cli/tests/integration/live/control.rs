@@ -1,0 +1,117 @@
+//! Live control of a real session: what it shows is so, and what it changes is changed, in the record and its replay.
+
+use std::collections::BTreeMap;
+
+use serde_json::json;
+
+use super::http::Control;
+use super::records::{assert_replays, inputs, packets};
+use super::session::Session;
+use super::wait_for;
+use crate::desk::Desk;
+use crate::scenes::TWO;
+
+fn milliseconds(count: u64) -> u64 {
+    count * 1_000_000
+}
+
+fn refuses(control: &Control, body: &str, part: &str) {
+    let (status, answer) = control.ask("PATCH", "/api/links/0", body);
+    assert_eq!(status, 422, "{answer}");
+    assert!(answer.contains(part), "{answer}");
+}
+
+#[test]
+fn a_link_that_is_changed_is_another_link_from_then_on() {
+    let desk = Desk::with("two.toml", TWO);
+    let mut session = Session::begin(&desk, "two.toml --json --out out --for 1h --control");
+    let control = session.control();
+    control.wait("packets", |state| state["links"][0]["delivered"].as_u64() > Some(10));
+    let before = control.get("/api/links/0");
+    assert_eq!(before["keys"]["delay"], "24ms");
+    refuses(&control, r#"{"dlay": "50ms"}"#, "delay");
+    refuses(&control, r#"{"delay": "-1ms"}"#, "delay");
+    refuses(&control, "{}", "");
+    assert_eq!(control.get("/api/links/0")["keys"], before["keys"], "what is refused changes nothing");
+    let stranger = Control { token: "0".repeat(40), ..control.clone() };
+    for (method, path, body) in
+        [("GET", "/api/state", ""), ("GET", "/metrics", ""), ("GET", "/", ""), ("PATCH", "/api/links/0", r#"{"delay":"1ms"}"#)]
+    {
+        assert_eq!(stranger.ask(method, path, body).0, 401, "{method} {path}");
+    }
+    let (status, answer) = control.ask("PATCH", "/api/links/0", r#"{"delay": "60ms"}"#);
+    assert_eq!(status, 200, "{answer}");
+    assert!(answer.contains("60ms"), "{answer}");
+    wait_for("packets of the changed link", || {
+        // Of the link's latest packets, none is from before.
+        (control.get("/api/histograms").to_string().len() > 2 && control.state()["links"][0]["recent_delay"]["p50_s"] == json!(0.06)).then_some(())
+    });
+    assert_metrics(&control);
+    let document = session.end();
+    assert_eq!(document["ending"], "interrupted");
+    has_changed_once(&desk);
+    assert_replays(&desk, "two.toml", "--set scene.duration=1h");
+}
+
+/// One row in `inputs.csv`, and each packet that was sent from then on has the new delay, each before the old one, to the nanosecond.
+fn has_changed_once(desk: &Desk) {
+    let inputs = inputs(desk, "out");
+    assert_eq!(inputs.iter().map(|row| row.kind.as_str()).collect::<Vec<_>>(), ["link", "end"]);
+    let change = &inputs[0];
+    assert!(change.peer == "left" && change.value.contains("60ms"), "{change:?}");
+    let mut delays: BTreeMap<(String, bool), Vec<u64>> = BTreeMap::new();
+    for packet in packets(desk, "out") {
+        // What comes from outside at an instant counts before all else at it.
+        delays.entry((packet.link, packet.sent >= change.at)).or_default().push(packet.arrived.unwrap() - packet.sent);
+    }
+    for ((link, later), delays) in delays {
+        let expected = if link == "left->right" && later { 60 } else { 24 };
+        assert!(delays.iter().all(|delay| *delay == milliseconds(expected)), "{link}, {}", if later { "later" } else { "before" });
+        assert!(delays.len() > 5, "{link} had packets");
+    }
+}
+
+/// Prometheus text: every line is a comment or a name, labels and a number, and says what the state says.
+fn assert_metrics(control: &Control) {
+    let before = control.delivered(0);
+    let (status, text) = control.ask("GET", "/metrics", "");
+    let after = control.delivered(0);
+    assert_eq!(status, 200);
+    let mut values = BTreeMap::new();
+    for line in text.lines().filter(|line| !line.starts_with('#')) {
+        let (series, value) = line.rsplit_once(' ').unwrap_or_else(|| panic!("{line}"));
+        let name = series.split('{').next().unwrap();
+        assert!(
+            name.starts_with("cohaptic_") && name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_'),
+            "{line}"
+        );
+        assert!(series.len() == name.len() || series.ends_with('}'), "{line}");
+        assert!(values.insert(series.to_owned(), value.parse::<f64>().unwrap()).is_none(), "{line} is there twice");
+    }
+    let delivered = values[r#"cohaptic_link_delivered_packets_total{link="left->right",from="left",to="right"}"#];
+    #[expect(clippy::cast_precision_loss, reason = "some hundred packets")]
+    let (before, after) = (before as f64, after as f64);
+    assert!(before <= delivered && delivered <= after, "{before} {delivered} {after}");
+    assert_eq!(values[r#"cohaptic_run_info{kind="live",title="Two users"}"#], 1.0);
+    assert_eq!(values[r#"cohaptic_peer_status{peer="left",status="here"}"#], 1.0);
+}
+
+#[test]
+fn the_token_may_be_ones_own() {
+    let desk = Desk::with("two.toml", TWO);
+    desk.write("token", "a-token-of-our-own-0123456789\n");
+    let mut session = Session::begin(&desk, "two.toml --json --for 1h --control 127.0.0.1:0 --token-file token");
+    let control = session.control();
+    assert_eq!(control.token, "a-token-of-our-own-0123456789");
+    assert_eq!(control.state()["kind"], "live");
+    session.end();
+    desk.write("short", "abc");
+    desk.cohaptic("live two.toml --control --token-file short").assert_refused(2, &["short"]);
+}
+
+/// Without a word about control nothing listens.
+#[test]
+fn nothing_is_served_unless_asked_for() {
+    let desk = Desk::with("two.toml", TWO);
+    assert!(desk.cohaptic("live two.toml --for 50ms").stderr.is_empty());
+}
