@@ -47,7 +47,10 @@ fn make_key(file: &Path) -> Result<ExitCode, Failure> {
 
 fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let mut overrides = arguments.overrides.set.clone();
-    overrides.extend(arguments.length.map(|length| format!("scene.duration={}", Span(length))));
+    if let Some(length) = arguments.length {
+        // What is expected of the whole scene, which may be longer, is not looked at in a session anyway.
+        overrides.extend([format!("scene.duration={}", Span(length)), "expect={}".to_owned()]);
+    }
     let overrides = overrides.as_slice();
     let scene = Scene::read_live(path, overrides)?;
     if let Some(reason) = cohaptic_harness::too_large(&scene) {

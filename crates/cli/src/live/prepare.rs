@@ -23,6 +23,9 @@ pub(super) fn ready_falcons(scene: &Scene, firmware: Option<&Path>, wishes: Wish
         }
     };
     let falcons = Falcons::open(scene, firmware, wishes, told).map_err(|fault| Failure::System(fault.to_string()))?;
+    for stopper in falcons.stoppers() {
+        interrupt::before_exit(move || stopper.stop());
+    }
     let names = |simulated: bool| -> Vec<&str> {
         falcons.readiness().filter(|(_, at)| at.is_simulated == simulated).map(|(peer, _)| scene.peers[peer].name.as_str()).collect()
     };
