@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let seconds = std::env::args().nth(1).map_or(Ok(10), |text| text.parse())?;
     let span = Duration::from_secs(seconds);
     println!("# Live sessions: how late\n");
-    println!("What the 1 kHz loop of [`cohaptic live`](live-protocol.md) does. This page is written by\n");
+    println!("What the 1 kHz loop of [`cohaptic live`](live.md) does. This page is written by\n");
     println!("    cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/live-speed.md\n");
     println!("and measured on: {}. Each row is a run of {seconds} s, all of them one after the other in one process.\n", machine::name());
     loops(span)?;
