@@ -37,7 +37,7 @@ pub(crate) fn generate(socket: &UdpSocket, to: SocketAddr, rate: u64, span: Dura
     let _ = prepare_thread(&Wishes::NONE);
     let start = machine::thread_time();
     let clock = MonotonicClock::start();
-    let (pacer, end) = (Pacer::new(Pacing::Sleep), Instant::ZERO + span);
+    let (mut pacer, end) = (Pacer::new(Pacing::Sleep), Instant::ZERO + span);
     let due = |number: u64| Instant::from_nanos(number * 1_000_000_000 / rate);
     let mut bytes = [0; SIZE];
     let (mut number, mut sent) = (0_u64, 0);

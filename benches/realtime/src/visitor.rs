@@ -149,7 +149,7 @@ impl Visiting {
 
     fn run(mut self, quiet: &AtomicBool, end: &AtomicBool, sent: &AtomicU64) -> Result<Visits, Failure> {
         let _ = prepare_thread(&Wishes::NONE);
-        let pacer = Pacer::new(Pacing::Sleep);
+        let mut pacer = Pacer::new(Pacing::Sleep);
         let (mut is_here, mut turn) = (true, self.clock.now() + self.invitation.stay);
         let mut next = self.clock.now();
         while !end.load(Ordering::Acquire) {

@@ -20,7 +20,7 @@
 //! use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock, Pacer, Pacing};
 //!
 //! let clock = MonotonicClock::start();
-//! let pacer = Pacer::new(Pacing::Sleep);
+//! let mut pacer = Pacer::new(Pacing::Sleep);
 //! let mut lateness = Lateness::new();
 //! let mut due = clock.now();
 //! for _ in 0..10 {

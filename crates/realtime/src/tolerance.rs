@@ -7,7 +7,7 @@ use cohaptic_units::print::Span;
 
 use crate::Lateness;
 
-/// How late things may be for a run to be valid: no more than one in a thousand later than `limit`.
+/// How late things may be for a run to be valid: no more than one in a thousand later than `limit`, or a single one.
 ///
 /// One in a thousand and not none, because on a system that does other things too the worst of a million wake-ups says more about that system than
 /// about the run; the worst is reported all the same.

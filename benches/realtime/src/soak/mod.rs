@@ -135,7 +135,7 @@ pub fn run(plan: &Plan, interrupted: &AtomicBool, mut show: impl FnMut(&Row)) ->
 
 /// Waits, and looks every tenth of a second whether somebody wants the end; whether nobody does.
 fn wait(clock: &MonotonicClock, until: Instant, interrupted: &AtomicBool) -> std::io::Result<bool> {
-    let pacer = Pacer::new(Pacing::Sleep);
+    let mut pacer = Pacer::new(Pacing::Sleep);
     while clock.now() < until && !interrupted.load(Ordering::Relaxed) {
         pacer.wait(clock, Some(until.min(clock.now() + Duration::from_millis(100))), &[])?;
     }
@@ -144,7 +144,7 @@ fn wait(clock: &MonotonicClock, until: Instant, interrupted: &AtomicBool) -> std
 
 /// Nobody sends any more: waits until everything that was sent has been read and has left.
 fn settle(clock: &MonotonicClock, live: &Live, stream: &Stream, visitor: &Visitor) -> std::io::Result<()> {
-    let (pacer, until) = (Pacer::new(Pacing::Sleep), clock.now() + SETTLING);
+    let (mut pacer, until) = (Pacer::new(Pacing::Sleep), clock.now() + SETTLING);
     stream.hush();
     loop {
         // Long enough for a thread that was just told, on a machine with nothing else to do; on another one more is waited for below.

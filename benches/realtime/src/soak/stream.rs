@@ -138,7 +138,7 @@ fn look(view: &View<'_>) -> StreamLook {
 /// Sends numbered datagrams, each at its time; those that are late are sent at once.
 fn generate(socket: &UdpSocket, to: SocketAddr, count: &AtomicU64, end: &AtomicBool) -> io::Result<()> {
     let _ = prepare_thread(&Wishes::NONE);
-    let (clock, pacer) = (MonotonicClock::start(), Pacer::new(Pacing::Sleep));
+    let (clock, mut pacer) = (MonotonicClock::start(), Pacer::new(Pacing::Sleep));
     let (mut due, period, mut bytes, mut number) = (clock.now(), Duration::from_nanos(1_000_000_000 / RATE), [0; SIZE], 0_u64);
     while !end.load(Ordering::Acquire) {
         pacer.wait(&clock, Some(due), &[])?;
@@ -154,7 +154,7 @@ fn generate(socket: &UdpSocket, to: SocketAddr, count: &AtomicU64, end: &AtomicB
 
 /// Receives until it is told to end, and then what has come until then; counts it and what the kernel dropped.
 fn drain(mut socket: UdpDoor, end: &AtomicBool) -> io::Result<(u64, Option<u64>)> {
-    let (clock, pacer, mut buffers) = (MonotonicClock::start(), Pacer::new(Pacing::Sleep), ReceiveBuffers::new());
+    let (clock, mut pacer, mut buffers) = (MonotonicClock::start(), Pacer::new(Pacing::Sleep), ReceiveBuffers::new());
     loop {
         let is_over = end.load(Ordering::Acquire);
         while socket.receive(&mut buffers, &clock, |_| ())? > 0 {}

@@ -127,7 +127,7 @@ impl Session {
     }
 
     fn drive(&mut self, clock: &MonotonicClock, conductor: &mut impl Conductor) -> Result<(), SessionError> {
-        let pacer = Pacer::new(self.config.pacing);
+        let mut pacer = Pacer::new(self.config.pacing);
         let (mut next_look, mut looks) = (Instant::ZERO, 0_u32);
         while let Some(due) = self.live.poll_timeout() {
             let woken = {

@@ -12,7 +12,7 @@ use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Pacing, Woken};
 fn no_wait_ends_before_its_deadline() {
     let clock = MonotonicClock::start();
     for pacing in [Pacing::Sleep, Pacing::SPIN] {
-        let pacer = Pacer::new(pacing);
+        let mut pacer = Pacer::new(pacing);
         let mut due = clock.now();
         for _ in 0..20 {
             due += Duration::from_micros(700);
@@ -26,7 +26,7 @@ fn no_wait_ends_before_its_deadline() {
 fn a_wait_with_sockets_ends_at_its_deadline_or_when_one_can_be_read() {
     let (mut sender, receiver) = UnixStream::pair().unwrap();
     let clock = MonotonicClock::start();
-    let pacer = Pacer::new(Pacing::Sleep);
+    let mut pacer = Pacer::new(Pacing::Sleep);
     let due = clock.now() + Duration::from_millis(5);
     assert_eq!(pacer.wait(&clock, Some(due), &[receiver.as_fd()]).unwrap(), Woken::Deadline);
     assert!(clock.now() >= due);

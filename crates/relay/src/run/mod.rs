@@ -89,7 +89,7 @@ pub struct Relay {
     refused_changes: u64,
 }
 
-/// So long before a release, spinning, what leaves then is made ready, and sockets are not looked at any more. To make it ready takes less than a microsecond
+/// So long before a release, if it is awake by then, what leaves then is made ready, and sockets are not looked at any more. To make it ready takes less than a microsecond
 /// once the processor has it at hand, and what comes in meanwhile is offered late.
 const MADE_READY: Duration = Duration::from_micros(3);
 
@@ -129,6 +129,7 @@ impl Relay {
         let clock = MonotonicClock::start();
         let end = options.duration.map(|duration| Instant::ZERO.saturating_add(duration));
         let (mut look_at, mut heard) = (Instant::ZERO, None);
+        let mut pacer = Pacer::new(options.pacing);
         loop {
             // What came in first: then nothing that has not been read came before what is let pass.
             let Heard { until, count } = match heard.take() {
@@ -152,7 +153,7 @@ impl Relay {
                 }
             }
             if !is_more {
-                heard = self.wait(&clock, options.pacing, end.map_or(look_at, |end| end.min(look_at)))?;
+                heard = self.wait(&clock, &mut pacer, end.map_or(look_at, |end| end.min(look_at)))?;
             }
         }
         let elapsed = clock.now().saturating_duration_since(Instant::ZERO);
@@ -179,38 +180,32 @@ impl Relay {
     }
 
     /// Waits until something is due or can be read; tells what was heard if it has listened meanwhile.
-    fn wait(&mut self, clock: &MonotonicClock, pacing: Pacing, look_at: Instant) -> io::Result<Option<Heard>> {
+    fn wait(&mut self, clock: &MonotonicClock, pacer: &mut Pacer, look_at: Instant) -> io::Result<Option<Heard>> {
+        if pacer.pacing() == Pacing::Sleep && self.density.is_dense() {
+            // More comes and more is due than is worth a look each.
+            clock.block(Some(clock.now() + Density::REST), &[])?;
+            return Ok(None);
+        }
         let due = self.engine.poll_timeout();
         let mut until = due.map_or(look_at, |due| due.min(look_at));
         if self.doors.has_waiting() {
             until = until.min(clock.now() + AGAIN);
         }
-        match pacing {
-            Pacing::Spin { margin } if due == Some(until) => self.spin(clock, until, margin),
-            Pacing::Sleep if self.density.is_dense() => {
-                // More comes and more is due than is worth a look each.
-                Pacer::new(Pacing::Sleep).wait(clock, Some(clock.now() + Density::REST), &[])?;
-                Ok(None)
-            }
-            Pacing::Sleep | Pacing::Spin { .. } => {
-                Pacer::new(Pacing::Sleep).wait(clock, Some(until), &[self.doors.readable()])?;
-                Ok(None)
-            }
+        if due != Some(until) {
+            pacer.wait(clock, Some(until), &[self.doors.readable()])?;
+            return Ok(None);
+        }
+        match pacer.approach(clock, due, &[self.doors.readable()])? {
+            Woken::Deadline => self.meet(clock, until),
+            Woken::Readable | Woken::Early => Ok(None),
         }
     }
 
-    /// Waits until `due`, when something leaves: sleeps, then looks at the sockets again and again, then makes ready what leaves, looks at nothing but the
-    /// clock, and sends it.
-    fn spin(&mut self, clock: &MonotonicClock, due: Instant, margin: Duration) -> io::Result<Option<Heard>> {
-        let before = |span: Duration| Instant::from_nanos(due.as_nanos().saturating_sub(u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)));
-        let (asleep_until, ready_at) = (before(margin), before(MADE_READY));
+    /// Something leaves at `due`, in a moment: looks at the sockets again and again, then makes ready what leaves, looks at nothing but the clock, and
+    /// sends it.
+    fn meet(&mut self, clock: &MonotonicClock, due: Instant) -> io::Result<Option<Heard>> {
+        let ready_at = Instant::ZERO + due.saturating_duration_since(Instant::ZERO).saturating_sub(MADE_READY);
         let mut now = clock.now();
-        if now < asleep_until {
-            if Pacer::new(Pacing::Sleep).wait(clock, Some(asleep_until), &[self.doors.readable()])? != Woken::Deadline {
-                return Ok(None);
-            }
-            now = clock.now();
-        }
         while now < ready_at {
             let heard = self.doors.receive(&mut self.engine, clock)?;
             if heard.count > 0 {

@@ -23,8 +23,7 @@ pub struct Router<D = AnyDevice, C = MonotonicClock> {
     /// Left, right.
     devices: [D; 2],
     clock: C,
-    /// How long before a departure the thread stays awake; zero: not at all.
-    awake: Duration,
+    pacer: Pacer,
     release: Lateness,
     written: [Written; 2],
     buffer: Vec<u8>,
@@ -73,12 +72,8 @@ impl<D: Device, C: Clock> Router<D, C> {
     /// A router between these devices, left and right, by this clock. The devices that the file names are not looked at.
     #[must_use]
     pub fn with(file: &RouterFile, devices: [D; 2], clock: C, pacing: Pacing) -> Self {
-        let awake = match pacing {
-            Pacing::Sleep => Duration::ZERO,
-            Pacing::Spin { margin } => margin,
-        };
         let written = [Written::default(); 2];
-        Self { engine: Engine::new(file), devices, clock, awake, release: Lateness::new(), written, buffer: vec![0; LONGEST] }
+        Self { engine: Engine::new(file), devices, clock, pacer: Pacer::new(pacing), release: Lateness::new(), written, buffer: vec![0; LONGEST] }
     }
 
     /// Routes packets until `stop` is set, or until the run is `until` old. Every now and then, `every` so often and once at the end, `look` is called on
@@ -92,8 +87,6 @@ impl<D: Device, C: Clock> Router<D, C> {
     pub fn run(&mut self, stop: &AtomicBool, until: Option<Instant>, every: Duration, mut look: impl FnMut(&mut Self)) -> Result<(), RunError> {
         // A stop is noticed as often.
         const NEVER_LONGER: Duration = Duration::from_millis(50);
-        // Reading is what a packet waits for: its instant is that at which it was read.
-        let sleeper = Pacer::new(Pacing::Sleep);
         let mut next_look = self.clock.now().saturating_add(every);
         loop {
             let now = self.clock.now();
@@ -112,14 +105,14 @@ impl<D: Device, C: Clock> Router<D, C> {
                 continue;
             }
             let left = due.map(|due| due.saturating_duration_since(now));
-            match left.filter(|left| *left <= self.awake) {
+            match left.filter(|left| *left <= self.pacer.margin()) {
+                // Reading is what a packet waits for: its instant is that at which it was read.
                 Some(left) if left > TOO_CLOSE => self.receive()?,
                 Some(_) => std::hint::spin_loop(),
                 None => {
-                    let asleep = left.map(|left| now.saturating_add(left - self.awake));
-                    let wake = [asleep, Some(next_look), until, Some(now.saturating_add(NEVER_LONGER))].into_iter().flatten().min();
+                    let wake = [due, Some(next_look), until, Some(now.saturating_add(NEVER_LONGER))].into_iter().flatten().min();
                     let readable = [self.devices[0].readable(), self.devices[1].readable()];
-                    sleeper.wait(&self.clock, wake, &readable).map_err(RunError::Wait)?;
+                    self.pacer.approach(&self.clock, wake, &readable).map_err(RunError::Wait)?;
                     self.receive()?;
                 }
             }

@@ -48,8 +48,8 @@ fn its_records_are_those_of_the_run_and_its_document_says_how_late_it_was() {
     let ticks = document["ticks"].as_u64().unwrap();
     assert_eq!(ticks, 600);
     let late = document["late_ticks"].as_u64().unwrap();
-    // Not more than one in a thousand; no datagram was sent, so nothing but ticks was late.
-    assert_eq!(document["valid"], json!(late * 1000 <= ticks), "{late} of {ticks} were late");
+    // Not more than one, which is no fault of so short a run; no datagram was sent, so nothing but ticks was late.
+    assert_eq!(document["valid"], json!(late <= 1), "{late} of {ticks} were late");
     let lateness = numbers(&document, "lateness_us");
     assert!(0.0 <= lateness("p50") && lateness("p50") <= lateness("p99") && lateness("p99") <= lateness("p999"));
     assert!(lateness("p999") <= lateness("max") && lateness("count") == 600.0);
