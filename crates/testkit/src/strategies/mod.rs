@@ -1,0 +1,1 @@
+//! Strategies of proptest: links and networks that shrink to the least impaired one.
