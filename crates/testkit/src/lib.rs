@@ -1,4 +1,32 @@
 //! Tests of networked programs over emulated bad links, in virtual time, the same way every time.
+//!
+//! A [`Testbed`] is hosts and the [links](cohaptic_wan) between them. A program that is run on it has [UDP sockets](UdpSocket) with the methods of tokio's,
+//! [timers](time), and hosts that crash, come back, and lose sight of each other. Nothing waits in real time: the clock jumps to the next event.
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 
+mod address;
+mod artefacts;
+mod bed;
+mod context;
+mod core;
+mod host;
+mod link;
+mod runtime;
+mod seed;
+mod socket;
 #[cfg(feature = "strategies")]
 pub mod strategies;
+mod task;
+pub mod time;
+mod trace;
+
+pub use address::{AddressPlan, Addresses, ToSocketAddrs};
+pub use bed::{Bed, Testbed};
+pub use cohaptic_units::Instant;
+pub use cohaptic_wan as wan;
+pub use host::Host;
+pub use link::ToLink;
+pub use seed::SEED_VARIABLE;
+pub use socket::UdpSocket;
+pub use task::{JoinHandle, TaskStopped};
+pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};

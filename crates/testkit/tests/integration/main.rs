@@ -1,1 +1,4 @@
 //! Tests of the test kit.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, reason = "tests")]
+
+mod sockets;

@@ -1,0 +1,224 @@
+//! Names and addresses: which host has which.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+
+use crate::context;
+
+/// Which host has which name and which addresses.
+///
+/// The n-th host, counted from 1, has 10.0.0.n (beyond 255 it goes on with 10.0.1.0, like any number in four bytes) and `fd00::n`. Addresses that are given out later,
+/// by [`Host::change_addresses`](crate::Host::change_addresses), come after those of all hosts.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct AddressPlan {
+    names: Vec<String>,
+    current: Vec<Addresses>,
+    owners: BTreeMap<IpAddr, usize>,
+    /// The number of the next addresses that nobody has had.
+    next: u32,
+}
+
+/// The addresses of one host.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Addresses {
+    /// Version 4.
+    pub v4: Ipv4Addr,
+    /// Version 6.
+    pub v6: Ipv6Addr,
+}
+
+impl Addresses {
+    fn numbered(number: u32) -> Self {
+        Self {
+            v4: Ipv4Addr::from_bits(u32::from(Ipv4Addr::new(10, 0, 0, 0)) + number),
+            v6: Ipv6Addr::from_bits((0xfd00 << 112) + u128::from(number)),
+        }
+    }
+
+    /// The one of the same version as `other`.
+    #[must_use]
+    pub const fn like(&self, other: IpAddr) -> IpAddr {
+        match other {
+            IpAddr::V4(_) => IpAddr::V4(self.v4),
+            IpAddr::V6(_) => IpAddr::V6(self.v6),
+        }
+    }
+
+    /// Whether it is one of the two.
+    #[must_use]
+    pub fn has(&self, address: IpAddr) -> bool {
+        self.like(address) == address
+    }
+}
+
+impl AddressPlan {
+    pub(crate) fn new(names: Vec<String>) -> Self {
+        let count = u32::try_from(names.len()).unwrap_or(u32::MAX);
+        let mut plan = Self { names, current: Vec::new(), owners: BTreeMap::new(), next: 1 };
+        (0..count).for_each(|_| {
+            let host = plan.current.len();
+            let addresses = plan.fresh(host);
+            plan.current.push(addresses);
+        });
+        plan
+    }
+
+    fn fresh(&mut self, host: usize) -> Addresses {
+        let addresses = Addresses::numbered(self.next);
+        self.next += 1;
+        self.owners.insert(addresses.v4.into(), host);
+        self.owners.insert(addresses.v6.into(), host);
+        addresses
+    }
+
+    /// Gives a host addresses that nobody has had. Those that it had belong to nobody from now on.
+    pub(crate) fn change(&mut self, host: usize) -> Addresses {
+        let before = self.current[host];
+        self.owners.remove(&before.v4.into());
+        self.owners.remove(&before.v6.into());
+        let addresses = self.fresh(host);
+        self.current[host] = addresses;
+        addresses
+    }
+
+    /// The names of the hosts, in the order in which they were given.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The addresses of a host; `None` if there is none of that name.
+    #[must_use]
+    pub fn addresses(&self, name: &str) -> Option<Addresses> {
+        self.place(name).map(|place| self.current[place])
+    }
+
+    /// The name of the host that has this address now.
+    #[must_use]
+    pub fn owner(&self, address: IpAddr) -> Option<&str> {
+        self.owner_place(address).map(|place| &*self.names[place])
+    }
+
+    /// Whether any host has or had that address.
+    pub(crate) fn was_given(&self, address: IpAddr) -> bool {
+        (1..self.next).any(|number| Addresses::numbered(number).has(address))
+    }
+
+    pub(crate) fn place(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|known| known == name)
+    }
+
+    pub(crate) fn owner_place(&self, address: IpAddr) -> Option<usize> {
+        self.owners.get(&address).copied()
+    }
+
+    pub(crate) fn of(&self, place: usize) -> Addresses {
+        self.current[place]
+    }
+}
+
+impl fmt::Display for AddressPlan {
+    /// A line a host: `server 10.0.0.2 fd00::2`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (name, addresses) in self.names.iter().zip(&self.current) {
+            writeln!(f, "{name} {} {}", addresses.v4, addresses.v6)?;
+        }
+        Ok(())
+    }
+}
+
+/// What can be said in place of a socket address: the address itself, or the name of a host of the running test bed, or a literal address, with a port.
+///
+/// A name gives the address of version 4; `"[server]:80"` that of version 6.
+pub trait ToSocketAddrs {
+    /// The address.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::InvalidInput`] if it is none, [`io::ErrorKind::NotFound`] if there is no host of that name, or no test bed is running.
+    fn to_socket_addr(&self) -> io::Result<SocketAddr>;
+}
+
+impl ToSocketAddrs for SocketAddr {
+    fn to_socket_addr(&self) -> io::Result<SocketAddr> {
+        Ok(*self)
+    }
+}
+
+impl ToSocketAddrs for (IpAddr, u16) {
+    fn to_socket_addr(&self) -> io::Result<SocketAddr> {
+        Ok((*self).into())
+    }
+}
+
+impl ToSocketAddrs for (Ipv4Addr, u16) {
+    fn to_socket_addr(&self) -> io::Result<SocketAddr> {
+        Ok((*self).into())
+    }
+}
+
+impl ToSocketAddrs for (Ipv6Addr, u16) {
+    fn to_socket_addr(&self) -> io::Result<SocketAddr> {
+        Ok((*self).into())
+    }
+}
+
+impl ToSocketAddrs for (&str, u16) {
+    fn to_socket_addr(&self) -> io::Result<SocketAddr> {
+        let (name, port) = *self;
+        let address = match name.parse::<IpAddr>() {
+            Ok(address) => address,
+            Err(_) => look_up(name)?.v4.into(),
+        };
+        Ok((address, port).into())
+    }
+}
+
+impl ToSocketAddrs for (String, u16) {
+    fn to_socket_addr(&self) -> io::Result<SocketAddr> {
+        (&*self.0, self.1).to_socket_addr()
+    }
+}
+
+impl ToSocketAddrs for str {
+    fn to_socket_addr(&self) -> io::Result<SocketAddr> {
+        if let Ok(address) = self.parse() {
+            return Ok(address);
+        }
+        let wrong = || {
+            io::Error::new(
+                io::ErrorKind::InvalidInput,
+                format!("`{self}` is no address; expected one like `10.0.0.1:80`, `[fd00::1]:80` or `server:80`"),
+            )
+        };
+        let (name, port) = self.rsplit_once(':').ok_or_else(wrong)?;
+        let port = port.parse().map_err(|_| wrong())?;
+        match name.strip_prefix('[').and_then(|name| name.strip_suffix(']')) {
+            Some(name) => Ok((look_up(name)?.v6, port).into()),
+            None => (name, port).to_socket_addr(),
+        }
+    }
+}
+
+impl ToSocketAddrs for String {
+    fn to_socket_addr(&self) -> io::Result<SocketAddr> {
+        (**self).to_socket_addr()
+    }
+}
+
+impl<T: ToSocketAddrs + ?Sized> ToSocketAddrs for &T {
+    fn to_socket_addr(&self) -> io::Result<SocketAddr> {
+        (**self).to_socket_addr()
+    }
+}
+
+fn look_up(name: &str) -> io::Result<Addresses> {
+    let shared = context::shared().ok_or_else(|| context::outside("a host's name means something"))?;
+    let core = shared.lock();
+    core.plan.addresses(name).ok_or_else(|| {
+        let text = format!("there is no host `{name}`; the hosts are {}", core.plan.names().join(", "));
+        io::Error::new(io::ErrorKind::NotFound, text)
+    })
+}

@@ -1,0 +1,287 @@
+//! The test bed: what it is made of, and its run.
+
+mod running;
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::future::Future;
+use std::panic::{AssertUnwindSafe, Location, catch_unwind, resume_unwind};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use cohaptic_wan::LinkModel;
+
+pub use running::Bed;
+
+use crate::context::Running;
+use crate::core::{Clock, Core, Seen, Settings, Shared};
+use crate::link::ToLink;
+use crate::runtime::own::Executor;
+use crate::seed::Seed;
+use crate::task::Tasks;
+use crate::trace::Trace;
+
+/// Hosts, the links between them, and a program that is run on them in virtual time.
+///
+/// ```
+/// use std::time::Duration;
+/// use cohaptic_testkit::{Testbed, UdpSocket, time};
+///
+/// let delay = Testbed::new(["client", "server"]).links("delay 24ms").run(|bed| async move {
+///     bed.host("server").spawn(async {
+///         let socket = UdpSocket::bind("0.0.0.0:7").await?;
+///         let mut buffer = [0; 1500];
+///         let (len, from) = socket.recv_from(&mut buffer).await?;
+///         socket.send_to(&buffer[..len], from).await
+///     });
+///     let socket = bed.host("client").bind("0.0.0.0:0").unwrap();
+///     socket.send_to(b"echo", "server:7").await.unwrap();
+///     socket.recv(&mut [0; 1500]).await.unwrap();
+///     time::now()
+/// });
+/// assert_eq!(delay.as_nanos(), 48_000_000);
+/// ```
+#[derive(Clone, Debug)]
+#[must_use = "a test bed does nothing until it is run"]
+pub struct Testbed {
+    names: Vec<String>,
+    every: LinkModel,
+    links: BTreeMap<(usize, usize), LinkModel>,
+    seed: Option<u64>,
+    settings: Settings,
+    #[cfg(feature = "tokio")]
+    is_tokio: bool,
+    pub(crate) artefacts: Option<crate::artefacts::Artefacts>,
+}
+
+/// As Linux gives a socket (`net.core.rmem_default`) \[bytes\].
+const RECEIVE_BUFFER: usize = 212_992;
+
+/// A million polls at one instant take a tenth of a second.
+const PATIENCE: u64 = 1_000_000;
+
+impl Testbed {
+    /// Hosts of these names, with ideal links between them.
+    ///
+    /// # Panics
+    ///
+    /// If there is no host, a name is empty or there twice, or has one of the characters that an address is written with (`:`, `[`, `]`, white space).
+    pub fn new<N: Into<String>>(hosts: impl IntoIterator<Item = N>) -> Self {
+        let names: Vec<String> = hosts.into_iter().map(Into::into).collect();
+        assert!(!names.is_empty(), "a test bed without hosts; expected one name at least");
+        for (place, name) in names.iter().enumerate() {
+            let is_word = !name.is_empty()
+                && !name.contains([':', '[', ']'])
+                && !name.contains(char::is_whitespace)
+                && name.parse::<std::net::IpAddr>().is_err();
+            assert!(is_word, "`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address");
+            assert!(!names[..place].contains(name), "two hosts are called `{name}`");
+        }
+        Self {
+            names,
+            every: LinkModel::default(),
+            links: BTreeMap::new(),
+            seed: None,
+            settings: Settings { receive_buffer: RECEIVE_BUFFER, traces: false, keeps_packets: false, patience: PATIENCE },
+            #[cfg(feature = "tokio")]
+            is_tokio: false,
+            artefacts: None,
+        }
+    }
+
+    /// The names of the hosts.
+    #[must_use]
+    pub fn hosts(&self) -> &[String] {
+        &self.names
+    }
+
+    /// What every link is that is not named by [`Testbed::link`], before or after: a model, or words of `tc-netem`.
+    ///
+    /// # Panics
+    ///
+    /// If the words are none.
+    pub fn links(mut self, link: impl ToLink) -> Self {
+        self.every = link.to_link();
+        self
+    }
+
+    /// What the link from one host to another is; the way back is a link of its own.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host, both are the same, or the words are none.
+    pub fn link(mut self, from: &str, to: &str, link: impl ToLink) -> Self {
+        let pair = (self.place(from), self.place(to));
+        assert!(pair.0 != pair.1, "host `{from}` has no link to itself");
+        self.links.insert(pair, link.to_link());
+        self
+    }
+
+    /// What the links in both directions between two hosts are. Each has random numbers of its own.
+    ///
+    /// # Panics
+    ///
+    /// As [`Testbed::link`].
+    pub fn link_both(self, one: &str, other: &str, link: impl ToLink) -> Self {
+        let model = link.to_link();
+        self.link(one, other, &model).link(other, one, &model)
+    }
+
+    /// The seed of all chance in the links, unless the environment says another one ([`SEED_VARIABLE`](crate::SEED_VARIABLE)). Without it, the seed is made of
+    /// the name of the test.
+    pub const fn seed(mut self, seed: u64) -> Self {
+        self.seed = Some(seed);
+        self
+    }
+
+    /// How many bytes of datagrams a socket holds that nobody has read; what comes beyond is lost. 212,992 if it is not said, as with Linux.
+    pub const fn receive_buffer(mut self, bytes: usize) -> Self {
+        self.settings.receive_buffer = bytes;
+        self
+    }
+
+    /// How often tasks may be polled at one instant before the run is given up, because time does not pass; a million if it is not said.
+    pub const fn patience(mut self, polls: u64) -> Self {
+        self.settings.patience = polls;
+        self
+    }
+
+    /// Runs the program on tokio, whose clock is paused: for programs that use tokio's timers and tasks. Otherwise an executor of this crate runs it.
+    ///
+    /// Packets arrive, and [`time`](crate::time) goes off, to the nanosecond all the same. Tokio's own timers are rounded up to the next millisecond since the run
+    /// began, as they are with tokio's paused clock elsewhere: a `tokio::time::sleep` of 2.5 ms is over after 3 ms. `tokio::select!` without `biased` chooses
+    /// at random, and so two runs differ.
+    #[cfg(feature = "tokio")]
+    pub const fn on_tokio(mut self) -> Self {
+        self.is_tokio = true;
+        self
+    }
+
+    /// Runs a program until it is over, and gives what came out. Tasks that run on then are dropped.
+    ///
+    /// # Panics
+    ///
+    /// If the program or one of its tasks does, with the seed on standard error; if nothing will ever happen any more, or time does not pass; inside another
+    /// test bed or runtime.
+    #[track_caller]
+    pub fn run<T, F>(self, program: impl FnOnce(Bed) -> F) -> T
+    where
+        F: Future<Output = T> + 'static,
+        T: 'static,
+    {
+        let seed = Seed::choose(self.seed);
+        self.run_once(&seed, program, Location::caller()).0
+    }
+
+    /// Runs a program twice, and gives what came out first, if all that happened was the same to the nanosecond: every packet, with what it carried.
+    ///
+    /// # Panics
+    ///
+    /// As [`Testbed::run`]; and if the two runs are not the same, with the first difference and its time.
+    #[track_caller]
+    #[expect(clippy::panic, reason = "what it was asked to find out")]
+    pub fn run_twice<T, F>(mut self, program: impl Fn(Bed) -> F) -> T
+    where
+        F: Future<Output = T> + 'static,
+        T: 'static,
+    {
+        self.settings.traces = true;
+        let seed = Seed::choose(self.seed);
+        let (outcome, first) = self.clone().run_once(&seed, &program, Location::caller());
+        let (_, second) = self.run_once(&seed, &program, Location::caller());
+        if let Some(difference) = first.first_difference(&second) {
+            panic!(
+                "the program does not do the same twice: {difference}Look for hash maps, threads, the time of day, random numbers without a seed, and \
+                 `tokio::select!` without `biased`.\n{}",
+                seed.advice()
+            );
+        }
+        outcome
+    }
+
+    fn place(&self, name: &str) -> usize {
+        place(&self.names, name)
+    }
+
+    #[expect(clippy::print_stderr, reason = "a test that fails says how to see it again")]
+    fn run_once<T, F>(self, seed: &Seed, program: impl FnOnce(Bed) -> F, origin: &'static Location<'static>) -> (T, Trace)
+    where
+        F: Future<Output = T> + 'static,
+        T: 'static,
+    {
+        let artefacts = self.artefacts.clone();
+        let mut settings = self.settings.clone();
+        settings.keeps_packets |= artefacts.is_some();
+        settings.traces |= artefacts.is_some();
+        let (every, links) = (&self.every, &self.links);
+        let core = Core::new(&self.names, seed.value, settings, |from, to| links.get(&(from, to)).unwrap_or(every).clone());
+        let mut recorded = None;
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            #[cfg(feature = "tokio")]
+            if self.is_tokio {
+                return crate::runtime::on_tokio::run(core, self.names.len(), program, origin, &mut recorded);
+            }
+            on_own(core, self.names.len(), program, origin, &mut recorded)
+        }));
+        let (trace, packets) = recorded.unwrap_or_else(|| (Trace::new(self.names.clone()), Vec::new()));
+        match outcome {
+            Ok(outcome) => (outcome, trace),
+            Err(panic) => {
+                if let Some(artefacts) = artefacts {
+                    eprintln!("{}", artefacts.write(&trace, &packets));
+                }
+                eprintln!("{}", seed.advice());
+                resume_unwind(panic)
+            }
+        }
+    }
+}
+
+/// Which of the hosts is called so.
+///
+/// # Panics
+///
+/// If there is none.
+#[expect(clippy::panic, reason = "a misuse, and the way out")]
+pub(crate) fn place(names: &[String], name: &str) -> usize {
+    names.iter().position(|known| known == name).unwrap_or_else(|| panic!("there is no host `{name}`; the hosts are {}", names.join(", ")))
+}
+
+/// What was recorded of a run.
+pub(crate) type Recorded = Option<(Trace, Vec<Seen>)>;
+
+/// Takes what was recorded out of a run that ends, however it ends.
+pub(crate) struct Recorder<'a> {
+    pub(crate) shared: Arc<Shared>,
+    pub(crate) tasks: Rc<Tasks>,
+    pub(crate) recorded: &'a mut Recorded,
+}
+
+impl Drop for Recorder<'_> {
+    fn drop(&mut self) {
+        *self.recorded = Some(self.shared.lock().recording.take());
+        // Tasks hold the state, and the state their wakers.
+        self.tasks.stop_all();
+    }
+}
+
+/// Runs a program on the executor of this crate.
+fn on_own<T, F>(core: Core, hosts: usize, program: impl FnOnce(Bed) -> F, origin: &'static Location<'static>, recorded: &mut Recorded) -> T
+where
+    F: Future<Output = T> + 'static,
+    T: 'static,
+{
+    let shared = Arc::new(Shared::new(core, Clock::Own));
+    let executor = Executor::default();
+    let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts));
+    let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
+    let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
+    let outcome = Rc::new(RefCell::new(None));
+    let (future, slot) = (program(Bed::new(Arc::clone(&shared))), Rc::clone(&outcome));
+    let _main = tasks.spawn(None, origin, async move {
+        let came_out = future.await;
+        *slot.borrow_mut() = Some(came_out);
+    });
+    executor.run(&shared, &tasks, || outcome.borrow().is_some());
+    outcome.take().expect("the executor runs until the program is over")
+}

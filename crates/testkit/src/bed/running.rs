@@ -1,0 +1,168 @@
+//! The test bed as a running program sees it.
+
+use std::fmt;
+use std::future::Future;
+use std::net::IpAddr;
+use std::panic::Location;
+use std::sync::Arc;
+
+use cohaptic_units::Instant;
+use cohaptic_wan::LinkStats;
+
+use super::place;
+use crate::address::AddressPlan;
+use crate::context;
+use crate::core::Shared;
+use crate::host::Host;
+use crate::link::ToLink;
+use crate::task::JoinHandle;
+use crate::trace::Happening;
+
+/// The test bed as a running program sees it.
+#[derive(Clone)]
+pub struct Bed {
+    shared: Arc<Shared>,
+}
+
+impl Bed {
+    pub(crate) const fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+
+    /// A host, by its name.
+    ///
+    /// # Panics
+    ///
+    /// If there is none of that name.
+    #[must_use]
+    pub fn host(&self, name: &str) -> Host {
+        Host::new(Arc::clone(&self.shared), self.place(name))
+    }
+
+    /// All hosts, in the order in which they were named.
+    #[must_use]
+    pub fn hosts(&self) -> Vec<Host> {
+        let count = self.shared.lock().plan.names().len();
+        (0..count).map(|place| Host::new(Arc::clone(&self.shared), place)).collect()
+    }
+
+    /// Which host has which addresses now.
+    #[must_use]
+    pub fn addresses(&self) -> AddressPlan {
+        self.shared.lock().plan.clone()
+    }
+
+    /// The name of the host that has this address now.
+    #[must_use]
+    pub fn owner(&self, address: IpAddr) -> Option<String> {
+        self.shared.lock().plan.owner(address).map(str::to_owned)
+    }
+
+    /// The time since the run began.
+    #[must_use]
+    pub fn now(&self) -> Instant {
+        self.shared.lock().now
+    }
+
+    /// Starts a task that lives on no host: it survives all crashes, and binds sockets by [`Host::bind`].
+    ///
+    /// # Panics
+    ///
+    /// Outside the run.
+    #[track_caller]
+    pub fn spawn<F>(&self, future: F) -> JoinHandle<F::Output>
+    where
+        F: Future + 'static,
+        F::Output: 'static,
+    {
+        context::expect_running("tasks can be spawned").tasks.spawn(None, Location::caller(), future)
+    }
+
+    /// Cuts the way from one host to another: what is sent from now on is lost, and what would arrive. The way back is as before.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host.
+    pub fn cut(&self, from: &str, to: &str) {
+        self.set_cut(from, to, true);
+    }
+
+    /// Mends the way from one host to another.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host.
+    pub fn mend(&self, from: &str, to: &str) {
+        self.set_cut(from, to, false);
+    }
+
+    /// Cuts all ways, in both directions, between the hosts of one group and those of another.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host.
+    pub fn partition(&self, one: &[&str], other: &[&str]) {
+        for (from, to) in one.iter().flat_map(|from| other.iter().map(move |to| (from, to))) {
+            self.cut(from, to);
+            self.cut(to, from);
+        }
+    }
+
+    /// Mends all ways.
+    pub fn mend_all(&self) {
+        let mut core = self.shared.lock();
+        let count = core.plan.names().len();
+        (0..count).flat_map(|from| (0..count).map(move |to| (from, to))).for_each(|(from, to)| core.set_cut(from, to, false));
+    }
+
+    /// The link from one host to another is another one from now on. What is in it follows the rules of [`cohaptic_wan::Link::set_model`].
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host, both are the same, or the words are none.
+    pub fn set_link(&self, from: &str, to: &str, link: impl ToLink) {
+        let (from_place, to_place) = (self.place(from), self.place(to));
+        assert!(from_place != to_place, "host `{from}` has no link to itself");
+        self.shared.lock().set_link(from_place, to_place, link.to_link());
+    }
+
+    /// What the link from one host to another has done so far.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    #[must_use]
+    pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
+        let (from_place, to_place) = (self.place(from), self.place(to));
+        self.shared.lock().link_stats(from_place, to_place).unwrap_or_else(|| unreachable_link(from))
+    }
+
+    /// Notes something in the trace: what a program computes, say, so that two runs are compared by it too.
+    pub fn note(&self, text: impl fmt::Display) {
+        let mut core = self.shared.lock();
+        let now = core.now;
+        core.recording.note(now, Happening::Note(text.to_string()));
+    }
+
+    fn set_cut(&self, from: &str, to: &str, cut: bool) {
+        let (from, to) = (self.place(from), self.place(to));
+        self.shared.lock().set_cut(from, to, cut);
+    }
+
+    fn place(&self, name: &str) -> usize {
+        // Not while the state is held: what panics says the names.
+        let names = self.shared.lock().plan.names().to_vec();
+        place(&names, name)
+    }
+}
+
+#[expect(clippy::panic, reason = "a misuse, and the way out")]
+fn unreachable_link(host: &str) -> LinkStats {
+    panic!("host `{host}` has no link to itself")
+}
+
+impl fmt::Debug for Bed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Bed").field("now", &self.now()).finish_non_exhaustive()
+    }
+}

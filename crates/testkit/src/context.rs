@@ -1,0 +1,93 @@
+//! What a program finds around it: the test bed that runs on this thread, and the host on which the task that is being polled lives.
+
+use std::cell::{Cell, RefCell};
+use std::io;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use crate::core::Shared;
+use crate::task::Tasks;
+
+thread_local! {
+    static RUNNING: RefCell<Option<Running>> = const { RefCell::new(None) };
+    static HOST: Cell<Option<usize>> = const { Cell::new(None) };
+}
+
+/// A test bed that runs.
+#[derive(Clone)]
+pub(crate) struct Running {
+    pub(crate) shared: Arc<Shared>,
+    pub(crate) tasks: Rc<Tasks>,
+}
+
+/// Makes a test bed the one that runs on this thread, until it is dropped.
+pub(crate) struct Entered(());
+
+impl Running {
+    /// # Panics
+    ///
+    /// If another one runs on this thread.
+    #[expect(clippy::panic, reason = "a misuse, and the way out")]
+    pub(crate) fn enter(self) -> Entered {
+        RUNNING.with_borrow_mut(|running| {
+            if running.is_some() {
+                panic!("a test bed runs inside another one: the time of both cannot pass. Give both programs hosts of one test bed, or run one after the other");
+            }
+            *running = Some(self);
+        });
+        Entered(())
+    }
+}
+
+impl Drop for Entered {
+    fn drop(&mut self) {
+        let left = RUNNING.with_borrow_mut(Option::take);
+        drop(left);
+    }
+}
+
+/// The test bed that runs on this thread.
+pub(crate) fn running() -> Option<Running> {
+    RUNNING.with_borrow(Clone::clone)
+}
+
+/// Its state.
+pub(crate) fn shared() -> Option<Arc<Shared>> {
+    RUNNING.with_borrow(|running| running.as_ref().map(|running| Arc::clone(&running.shared)))
+}
+
+/// The test bed that runs on this thread.
+///
+/// # Panics
+///
+/// If there is none.
+#[expect(clippy::panic, reason = "a misuse, and the way out")]
+pub(crate) fn expect_running(what: &str) -> Running {
+    running().unwrap_or_else(|| panic!("{}", outside_text(what)))
+}
+
+/// The host on which the task that is being polled lives.
+pub(crate) fn host() -> Option<usize> {
+    HOST.get()
+}
+
+/// Does something as a task of that host.
+pub(crate) fn on_host<T>(host: Option<usize>, act: impl FnOnce() -> T) -> T {
+    struct Back(Option<usize>);
+    impl Drop for Back {
+        fn drop(&mut self) {
+            HOST.set(self.0);
+        }
+    }
+    let _back = Back(HOST.replace(host));
+    act()
+}
+
+/// The error of what works only inside a test bed.
+pub(crate) fn outside(what: &str) -> io::Error {
+    io::Error::new(io::ErrorKind::NotFound, outside_text(what))
+}
+
+fn outside_text(what: &str) -> String {
+    format!("only inside a running test bed {what}: call it within `Testbed::run`, on its thread")
+}

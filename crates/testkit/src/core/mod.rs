@@ -1,0 +1,224 @@
+//! The hosts, their sockets and the network between them, as one state machine: it is told the time.
+
+mod arrival;
+mod hosts;
+mod recording;
+mod sending;
+mod sockets;
+mod timers;
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::task::Waker;
+
+use bytes::Bytes;
+use cohaptic_units::Instant;
+use cohaptic_wan::{LinkModel, Network, NetworkConfig, NodeId};
+
+pub(crate) use recording::{Recording, Seen};
+pub(crate) use sending::Outgoing;
+pub(crate) use sockets::{Datagram, SocketId};
+pub(crate) use timers::TimerId;
+
+use crate::address::AddressPlan;
+use crate::trace::Happening;
+use hosts::HostState;
+use sockets::Sockets;
+use timers::Timers;
+
+/// What can be said of a test bed before it runs.
+#[derive(Clone, Debug)]
+pub(crate) struct Settings {
+    /// How many bytes of datagrams a socket holds that have not been read.
+    pub(crate) receive_buffer: usize,
+    /// Whether what happens is recorded.
+    pub(crate) traces: bool,
+    /// Whether packets are recorded, with what they carry.
+    pub(crate) keeps_packets: bool,
+    /// How often tasks may be polled, or the time asked, at one instant.
+    pub(crate) patience: u64,
+}
+
+pub(crate) struct Core {
+    pub(crate) now: Instant,
+    pub(crate) plan: AddressPlan,
+    pub(crate) settings: Settings,
+    pub(crate) recording: Recording,
+    pub(crate) timers: Timers,
+    network: Network<Parcel>,
+    hosts: Vec<HostState>,
+    sockets: Sockets,
+    /// By sender, then receiver: whether the way is cut.
+    cut: Vec<bool>,
+    /// By sender, then receiver: how many packets were offered.
+    offered: Vec<u64>,
+    /// Who is to be woken when nobody holds this any more.
+    woken: Vec<Waker>,
+    /// How often the time was asked since it last passed.
+    asked: u64,
+}
+
+/// What travels.
+#[derive(Clone, Debug)]
+pub(crate) struct Parcel {
+    from: std::net::SocketAddr,
+    to: std::net::SocketAddr,
+    bytes: Bytes,
+    kind: Kind,
+}
+
+/// What a packet is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Kind {
+    Datagram,
+    /// "There is no socket at that port", which IP tells a sender.
+    Unreachable,
+}
+
+impl Core {
+    pub(crate) fn new(names: &[String], seed: u64, settings: Settings, link: impl Fn(usize, usize) -> LinkModel) -> Self {
+        let config = NetworkConfig { seed, nodes: names.to_vec(), general: false };
+        Self {
+            now: Instant::ZERO,
+            plan: AddressPlan::new(names.to_vec()),
+            recording: Recording::new(names.to_vec(), &settings),
+            settings,
+            timers: Timers::default(),
+            network: Network::new(config, |from, to| link(from.0 as usize, to.0 as usize)),
+            hosts: names.iter().map(|_| HostState::default()).collect(),
+            sockets: Sockets::default(),
+            cut: vec![false; names.len() * names.len()],
+            offered: vec![0; names.len() * names.len()],
+            woken: Vec::new(),
+            asked: 0,
+        }
+    }
+
+    /// When the network or a timer wants to be woken.
+    pub(crate) fn next_event(&self) -> Option<Instant> {
+        [self.network.poll_timeout(), self.timers.next()].into_iter().flatten().min()
+    }
+
+    /// Lets time pass: what arrives until then arrives, and then timers go off.
+    pub(crate) fn pass(&mut self, now: Instant) {
+        if now > self.now {
+            self.now = now;
+            self.asked = 0;
+        }
+        if self.network.poll_timeout().is_some_and(|at| at <= self.now) {
+            let passed = self.network.handle_timeout(self.now);
+            debug_assert_eq!(passed, Ok(()), "time does not go back");
+            self.take_arrivals();
+        }
+        self.timers.fire(self.now, &mut self.woken);
+    }
+
+    /// The time, for the program; `None` if it has been asked so often that it seems to be waited for without letting it pass.
+    pub(crate) fn ask_time(&mut self) -> Option<Instant> {
+        self.asked += 1;
+        (self.asked <= self.settings.patience.saturating_mul(10)).then_some(self.now)
+    }
+
+    pub(crate) fn set_link(&mut self, from: usize, to: usize, link: LinkModel) {
+        let changed = self.network.set_link(self.now, node(from), node(to), link);
+        debug_assert_eq!(changed, Ok(()), "hosts are checked, and time does not go back");
+        self.recording.note(self.now, Happening::Relinked(from, to));
+        self.take_arrivals();
+    }
+
+    pub(crate) fn link_stats(&self, from: usize, to: usize) -> Option<cohaptic_wan::LinkStats> {
+        self.network.link_stats(node(from), node(to))
+    }
+
+    pub(crate) fn set_cut(&mut self, from: usize, to: usize, cut: bool) {
+        let place = self.pair(from, to);
+        if from != to && std::mem::replace(&mut self.cut[place], cut) != cut {
+            self.recording.note(self.now, if cut { Happening::Cut(from, to) } else { Happening::Mended(from, to) });
+        }
+    }
+
+    fn is_cut(&self, from: usize, to: usize) -> bool {
+        self.cut[self.pair(from, to)]
+    }
+
+    const fn pair(&self, from: usize, to: usize) -> usize {
+        from * self.hosts.len() + to
+    }
+}
+
+fn node(place: usize) -> NodeId {
+    // A network has at most 23,170 nodes.
+    NodeId(u32::try_from(place).unwrap_or(u32::MAX))
+}
+
+/// The state machine, and how what belongs to tasks gets at it.
+pub(crate) struct Shared {
+    core: Mutex<Core>,
+    clock: Clock,
+}
+
+/// Who tells the time.
+pub(crate) enum Clock {
+    /// The executor of this crate, by [`Core::pass`].
+    Own,
+    /// Tokio's paused clock.
+    #[cfg(feature = "tokio")]
+    Tokio {
+        /// Its time at [`Instant::ZERO`].
+        origin: tokio::time::Instant,
+    },
+}
+
+impl Shared {
+    pub(crate) const fn new(core: Core, clock: Clock) -> Self {
+        Self { core: Mutex::new(core), clock }
+    }
+
+    /// The state at this instant. Whoever is to be woken is woken when the guard is gone.
+    pub(crate) fn lock(&self) -> Guard<'_> {
+        #[cfg_attr(not(feature = "tokio"), expect(unused_mut, reason = "only tokio's clock moves by itself"))]
+        let mut core = self.core.lock().unwrap_or_else(PoisonError::into_inner);
+        match self.clock {
+            Clock::Own => {}
+            #[cfg(feature = "tokio")]
+            Clock::Tokio { origin } => {
+                let now = Instant::ZERO + origin.elapsed();
+                if now > core.now {
+                    core.pass(now);
+                }
+            }
+        }
+        Guard { core: Some(core) }
+    }
+}
+
+/// The state, as long as it is held.
+pub(crate) struct Guard<'a> {
+    core: Option<MutexGuard<'a, Core>>,
+}
+
+impl std::ops::Deref for Guard<'_> {
+    type Target = Core;
+
+    fn deref(&self) -> &Core {
+        self.core.as_ref().expect("it is there until the guard is dropped")
+    }
+}
+
+impl std::ops::DerefMut for Guard<'_> {
+    fn deref_mut(&mut self) -> &mut Core {
+        self.core.as_mut().expect("it is there until the guard is dropped")
+    }
+}
+
+impl Drop for Guard<'_> {
+    fn drop(&mut self) {
+        let Some(mut core) = self.core.take() else { return };
+        if core.woken.is_empty() {
+            return;
+        }
+        // A waker may run anything, what asks for this state included: nobody may hold it then.
+        let woken = std::mem::take(&mut core.woken);
+        drop(core);
+        woken.into_iter().for_each(Waker::wake);
+    }
+}

@@ -1,0 +1,114 @@
+//! The way of a datagram from a socket into its link.
+
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+
+use bytes::Bytes;
+use cohaptic_wan::PacketInfo;
+
+use super::{Core, Kind, Parcel, SocketId, node};
+use crate::seed::hash;
+use crate::trace::{Happening, Lost, PacketName};
+
+/// The longest datagram over IPv4 and over IPv6 \[bytes\].
+const LONGEST: [usize; 2] = [65_507, 65_527];
+
+/// What a socket sends.
+#[derive(Clone, Debug)]
+pub(crate) struct Outgoing {
+    /// To whom; `None`: to the peer to which the socket is connected.
+    pub(crate) to: Option<SocketAddr>,
+    pub(crate) bytes: Bytes,
+    pub(crate) ecn_capable: bool,
+}
+
+fn refuse<T>(kind: io::ErrorKind, text: String) -> io::Result<T> {
+    Err(io::Error::new(kind, text))
+}
+
+impl Core {
+    /// Sends a datagram, now.
+    pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing) -> io::Result<()> {
+        self.check_alive(id)?;
+        let socket = self.sockets.get_mut(id);
+        if std::mem::take(&mut socket.refused) {
+            return refuse(io::ErrorKind::ConnectionRefused, "connection refused: no socket at the port of the peer".into());
+        }
+        let (host, local, may_broadcast) = (socket.host, socket.local, socket.may_broadcast);
+        let Some(mut to) = outgoing.to.or(socket.peer) else {
+            return refuse(io::ErrorKind::NotConnected, "the socket is not connected; use `send_to`, or `connect` before".into());
+        };
+        let len = outgoing.bytes.len();
+        if to.is_ipv6() != local.is_ipv6() {
+            return refuse(io::ErrorKind::InvalidInput, format!("a socket at {local} cannot reach {to}, which is of the other version of IP"));
+        }
+        if to.port() == 0 {
+            return refuse(io::ErrorKind::InvalidInput, format!("nothing can be sent to port 0 ({to})"));
+        }
+        if len > LONGEST[usize::from(to.is_ipv6())] {
+            let text = format!("message too long: {len} bytes, where a datagram has {} at most", LONGEST[usize::from(to.is_ipv6())]);
+            return refuse(io::ErrorKind::InvalidInput, text);
+        }
+        if to.ip().is_multicast() {
+            return refuse(io::ErrorKind::Unsupported, format!("{to} is a multicast address, and a test bed has no groups"));
+        }
+        if to.ip().is_unspecified() {
+            let loopback = if to.is_ipv6() { Ipv6Addr::LOCALHOST.into() } else { IpAddr::V4(Ipv4Addr::LOCALHOST) };
+            to.set_ip(loopback);
+        }
+        let from = SocketAddr::new(self.source(host, local.ip(), to.ip())?, local.port());
+        let parcel = Parcel { from, to, bytes: outgoing.bytes, kind: Kind::Datagram };
+        if to.ip() == IpAddr::V4(Ipv4Addr::BROADCAST) {
+            if !may_broadcast {
+                return refuse(io::ErrorKind::PermissionDenied, "this socket may not broadcast; `set_broadcast(true)` allows it".into());
+            }
+            for other in (0..self.hosts.len()).filter(|other| *other != host) {
+                self.offer(host, other, outgoing.ecn_capable, parcel.clone());
+            }
+        } else if to.ip().is_loopback() || self.plan.owner_place(to.ip()) == Some(host) {
+            self.hand_over(host, host, parcel, false);
+        } else if let Some(receiver) = self.plan.owner_place(to.ip()) {
+            self.offer(host, receiver, outgoing.ecn_capable, parcel);
+        } else if !self.plan.was_given(to.ip()) {
+            let text = format!("no host has the address {}; the hosts are\n{}", to.ip(), self.plan);
+            return refuse(io::ErrorKind::HostUnreachable, text);
+        }
+        Ok(())
+    }
+
+    /// The address from which a socket that is bound to `bound` reaches `to`.
+    fn source(&self, host: usize, bound: IpAddr, to: IpAddr) -> io::Result<IpAddr> {
+        let addresses = self.plan.of(host);
+        if bound.is_unspecified() {
+            return Ok(if to.is_loopback() { to } else { addresses.like(to) });
+        }
+        if bound.is_loopback() && !to.is_loopback() {
+            return refuse(io::ErrorKind::InvalidInput, format!("a socket at {bound} reaches no other host, and so not {to}"));
+        }
+        if !bound.is_loopback() && !addresses.has(bound) {
+            let text = format!("host `{}` does not have the address {bound} any more; it has {}", self.plan.names()[host], addresses.like(bound));
+            return refuse(io::ErrorKind::AddrNotAvailable, text);
+        }
+        Ok(bound)
+    }
+
+    /// Hands a packet to its link.
+    pub(super) fn offer(&mut self, from: usize, to: usize, ecn_capable: bool, parcel: Parcel) {
+        let pair = self.pair(from, to);
+        if self.cut[pair] {
+            // It does not reach the link, so that it uses up none of the link's numbers.
+            let packet = PacketName { from, to, sequence: self.offered[pair], copy: 0 };
+            return self.recording.note(self.now, Happening::Lost { packet, why: Lost::Cut });
+        }
+        if self.recording.traces {
+            let packet = PacketName { from, to, sequence: self.offered[pair], copy: 0 };
+            let digest = hash(&parcel.bytes);
+            self.recording.note(self.now, Happening::Sent { packet, len: parcel.bytes.len(), digest });
+        }
+        self.offered[pair] += 1;
+        let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn_capable };
+        let offered = self.network.handle_packet(self.now, node(from), node(to), info, parcel);
+        debug_assert_eq!(offered, Ok(()), "hosts are checked, and time does not go back");
+        self.take_arrivals();
+    }
+}

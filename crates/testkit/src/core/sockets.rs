@@ -1,0 +1,224 @@
+//! Sockets: where they are bound, what lies in their buffers, and who waits.
+
+use std::collections::VecDeque;
+use std::io;
+use std::net::{IpAddr, SocketAddr};
+use std::task::Waker;
+
+use bytes::Bytes;
+use cohaptic_units::Instant;
+
+use super::Core;
+
+/// A socket, until it is closed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct SocketId(usize);
+
+/// A datagram in the buffer of a socket.
+#[derive(Clone, Debug)]
+pub(crate) struct Datagram {
+    pub(crate) from: SocketAddr,
+    pub(crate) bytes: Bytes,
+    /// When it arrived.
+    pub(crate) at: Instant,
+    /// Whether an active queue marked it.
+    pub(crate) marked: bool,
+    /// The address to which it was sent.
+    pub(crate) to: IpAddr,
+}
+
+#[derive(Debug)]
+pub(crate) struct SocketState {
+    pub(super) host: usize,
+    pub(super) local: SocketAddr,
+    pub(super) peer: Option<SocketAddr>,
+    pub(super) inbox: VecDeque<Datagram>,
+    /// The bytes of the datagrams in `inbox`.
+    pub(super) held: usize,
+    readers: Vec<Waker>,
+    /// What IP told about something that was sent, until the program is told.
+    pub(super) refused: bool,
+    pub(super) may_broadcast: bool,
+    pub(super) died: Option<Instant>,
+}
+
+impl SocketState {
+    pub(super) fn wake_readers(&mut self, woken: &mut Vec<Waker>) {
+        woken.append(&mut self.readers);
+    }
+
+    pub(super) fn die(&mut self, at: Instant, woken: &mut Vec<Waker>) {
+        self.died = Some(at);
+        self.inbox.clear();
+        self.held = 0;
+        self.wake_readers(woken);
+    }
+}
+
+/// All sockets that have not been closed.
+#[derive(Debug, Default)]
+pub(super) struct Sockets {
+    places: Vec<Option<SocketState>>,
+    free: Vec<usize>,
+}
+
+impl Sockets {
+    fn insert(&mut self, state: SocketState) -> SocketId {
+        if let Some(place) = self.free.pop() {
+            self.places[place] = Some(state);
+            return SocketId(place);
+        }
+        self.places.push(Some(state));
+        SocketId(self.places.len() - 1)
+    }
+
+    pub(super) fn get(&self, id: SocketId) -> &SocketState {
+        self.places[id.0].as_ref().expect("whoever has its number keeps it open")
+    }
+
+    pub(super) fn get_mut(&mut self, id: SocketId) -> &mut SocketState {
+        self.places[id.0].as_mut().expect("whoever has its number keeps it open")
+    }
+
+    pub(super) fn all_of(&mut self, host: usize) -> impl Iterator<Item = &mut SocketState> {
+        self.places.iter_mut().flatten().filter(move |socket| socket.host == host)
+    }
+}
+
+/// The first of the ports that are given to sockets that ask for none (RFC 6335).
+const FIRST_DYNAMIC: u16 = 49_152;
+
+impl Core {
+    /// Binds a socket of a host that is up.
+    pub(crate) fn bind(&mut self, host: usize, asked: SocketAddr) -> io::Result<SocketId> {
+        let (ip, six) = (asked.ip(), asked.is_ipv6());
+        if !ip.is_unspecified() && !ip.is_loopback() && !self.plan.of(host).has(ip) {
+            let text = format!("{ip} is no address of host `{}`, which has {}", self.plan.names()[host], self.plan.of(host).like(ip));
+            return Err(io::Error::new(io::ErrorKind::AddrNotAvailable, text));
+        }
+        let port = match asked.port() {
+            0 => self.free_port(host, ip)?,
+            port if self.is_taken(host, ip, port) => {
+                let text = format!("{asked} is taken on host `{}`", self.plan.names()[host]);
+                return Err(io::Error::new(io::ErrorKind::AddrInUse, text));
+            }
+            port => port,
+        };
+        let local = SocketAddr::new(ip, port);
+        let (readers, inbox) = (Vec::new(), VecDeque::new());
+        let state = SocketState { host, local, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
+        let id = self.sockets.insert(state);
+        self.hosts[host].ports.entry((six, port)).or_default().push(id);
+        Ok(id)
+    }
+
+    fn is_taken(&self, host: usize, ip: IpAddr, port: u16) -> bool {
+        self.hosts[host].ports.get(&(ip.is_ipv6(), port)).is_some_and(|bound| {
+            bound.iter().any(|id| {
+                let other = self.sockets.get(*id).local.ip();
+                other == ip || other.is_unspecified() || ip.is_unspecified()
+            })
+        })
+    }
+
+    fn free_port(&mut self, host: usize, ip: IpAddr) -> io::Result<u16> {
+        let count = u16::MAX - FIRST_DYNAMIC + 1;
+        for _ in 0..count {
+            let port = FIRST_DYNAMIC + self.hosts[host].next_port;
+            self.hosts[host].next_port = (self.hosts[host].next_port + 1) % count;
+            if !self.is_taken(host, ip, port) {
+                return Ok(port);
+            }
+        }
+        let text = format!("all {count} dynamic ports of host `{}` are taken", self.plan.names()[host]);
+        Err(io::Error::new(io::ErrorKind::AddrInUse, text))
+    }
+
+    /// The socket is closed: its port is free.
+    pub(crate) fn close(&mut self, id: SocketId) {
+        let Some(state) = self.sockets.places[id.0].take() else { return };
+        self.sockets.free.push(id.0);
+        let key = (state.local.is_ipv6(), state.local.port());
+        if let Some(bound) = self.hosts[state.host].ports.get_mut(&key) {
+            bound.retain(|other| *other != id);
+            if bound.is_empty() {
+                self.hosts[state.host].ports.remove(&key);
+            }
+        }
+    }
+
+    /// Fails if the socket died with its host.
+    pub(crate) fn check_alive(&self, id: SocketId) -> io::Result<()> {
+        let socket = self.sockets.get(id);
+        let Some(at) = socket.died else { return Ok(()) };
+        let name = &self.plan.names()[socket.host];
+        let text = format!(
+            "host `{name}` crashed at {} s, and this socket ({}) with it; after `Host::restart`, bind a new one",
+            cohaptic_units::print::Seconds(at),
+            socket.local
+        );
+        Err(io::Error::new(io::ErrorKind::ConnectionAborted, text))
+    }
+
+    pub(crate) fn local_of(&self, id: SocketId) -> SocketAddr {
+        self.sockets.get(id).local
+    }
+
+    pub(crate) fn peer_of(&self, id: SocketId) -> Option<SocketAddr> {
+        self.sockets.get(id).peer
+    }
+
+    /// From now on the socket hears that peer only. What lies in its buffer already stays, as it does with Linux.
+    pub(crate) fn connect(&mut self, id: SocketId, peer: SocketAddr) -> io::Result<()> {
+        self.check_alive(id)?;
+        let local = self.sockets.get(id).local;
+        if local.is_ipv6() != peer.is_ipv6() {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                format!("a socket at {local} cannot reach {peer}, which is of the other version of IP"),
+            ));
+        }
+        self.sockets.get_mut(id).peer = Some(peer);
+        Ok(())
+    }
+
+    pub(crate) fn may_broadcast(&mut self, id: SocketId) -> &mut bool {
+        &mut self.sockets.get_mut(id).may_broadcast
+    }
+
+    /// The next datagram, which is taken out unless it is only peeked at; `None` if there is none.
+    pub(crate) fn receive(&mut self, id: SocketId, peek: bool) -> io::Result<Option<Datagram>> {
+        self.check_alive(id)?;
+        let socket = self.sockets.get_mut(id);
+        if std::mem::take(&mut socket.refused) {
+            return Err(io::Error::new(io::ErrorKind::ConnectionRefused, "connection refused: no socket at the port of the peer"));
+        }
+        if peek {
+            return Ok(socket.inbox.front().cloned());
+        }
+        let datagram = socket.inbox.pop_front();
+        if let Some(datagram) = &datagram {
+            socket.held -= datagram.bytes.len();
+        }
+        Ok(datagram)
+    }
+
+    /// Whether [`Core::receive`] has something to say.
+    pub(crate) fn is_readable(&self, id: SocketId) -> bool {
+        let socket = self.sockets.get(id);
+        socket.died.is_some() || socket.refused || !socket.inbox.is_empty()
+    }
+
+    /// Takes an error out.
+    pub(crate) fn take_error(&mut self, id: SocketId) -> Option<io::Error> {
+        std::mem::take(&mut self.sockets.get_mut(id).refused).then(|| io::ErrorKind::ConnectionRefused.into())
+    }
+
+    /// Somebody wants to be woken when the socket becomes readable.
+    pub(crate) fn wait_to_read(&mut self, id: SocketId, waker: &Waker) {
+        let readers = &mut self.sockets.get_mut(id).readers;
+        if !readers.iter().any(|known| known.will_wake(waker)) {
+            readers.push(waker.clone());
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! A host of a running test bed.
+
+use std::fmt;
+use std::future::Future;
+use std::io;
+use std::net::IpAddr;
+use std::panic::Location;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use crate::address::{Addresses, ToSocketAddrs};
+use crate::context;
+use crate::core::Shared;
+use crate::socket::UdpSocket;
+use crate::task::JoinHandle;
+
+/// A host of a running test bed: its tasks and sockets live and die with it.
+#[derive(Clone)]
+pub struct Host {
+    shared: Arc<Shared>,
+    place: usize,
+}
+
+impl Host {
+    pub(crate) const fn new(shared: Arc<Shared>, place: usize) -> Self {
+        Self { shared, place }
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.shared.lock().plan.names()[self.place].clone()
+    }
+
+    /// The addresses that it has now.
+    #[must_use]
+    pub fn addresses(&self) -> Addresses {
+        self.shared.lock().plan.of(self.place)
+    }
+
+    /// Its address of version 4.
+    #[must_use]
+    pub fn ip(&self) -> IpAddr {
+        IpAddr::from(self.addresses().v4)
+    }
+
+    pub(crate) const fn place(&self) -> usize {
+        self.place
+    }
+
+    pub(crate) const fn shared(&self) -> &Arc<Shared> {
+        &self.shared
+    }
+
+    /// Starts a task that lives on this host: what it binds is bound here, and when the host crashes it is dropped where it waits.
+    ///
+    /// # Panics
+    ///
+    /// Outside the run, or if the host is down.
+    #[track_caller]
+    pub fn spawn<F>(&self, future: F) -> JoinHandle<F::Output>
+    where
+        F: Future + 'static,
+        F::Output: 'static,
+    {
+        let running = context::expect_running("tasks can be spawned");
+        self.expect_up("spawn a task");
+        running.tasks.spawn(Some(self.place), Location::caller(), future)
+    }
+
+    /// Starts a program on this host, and keeps it: [`Host::restart`] starts it anew.
+    ///
+    /// # Panics
+    ///
+    /// Outside the run, or if the host is down.
+    #[track_caller]
+    pub fn start<F>(&self, program: impl Fn() -> F + 'static)
+    where
+        F: Future<Output = ()> + 'static,
+    {
+        let running = context::expect_running("programs can be started");
+        self.expect_up("start a program");
+        running.tasks.set_program(self.place, Location::caller(), Rc::new(move || Box::pin(program())));
+    }
+
+    /// Binds a socket on this host.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::bind`]; [`io::ErrorKind::NetworkDown`] if the host is down.
+    pub fn bind(&self, address: impl ToSocketAddrs) -> io::Result<UdpSocket> {
+        UdpSocket::bind_on(Arc::clone(&self.shared), self.place, address)
+    }
+
+    /// The host is gone, at once: its tasks are dropped where they wait, its sockets closed. What it has sent is on its way still, and what is sent to it is
+    /// lost. Tasks that were not spawned by [`Host::spawn`] or [`Host::start`] (by `tokio::spawn`, say) go on, and their sockets give errors.
+    ///
+    /// # Panics
+    ///
+    /// Outside the run.
+    pub fn crash(&self) {
+        let running = context::expect_running("hosts crash");
+        // First the sockets: what the tasks do while they are dropped does not reach anybody.
+        self.shared.lock().crash(self.place);
+        running.tasks.stop_all_of(self.place);
+    }
+
+    /// The host is back, with the program of [`Host::start`] begun anew if it has one. Nothing happens to a host that is up.
+    ///
+    /// # Panics
+    ///
+    /// Outside the run.
+    pub fn restart(&self) {
+        let running = context::expect_running("hosts restart");
+        let was_down = {
+            let mut core = self.shared.lock();
+            let was_down = !core.is_up(self.place);
+            core.restart(self.place);
+            was_down
+        };
+        if was_down {
+            running.tasks.restart(self.place);
+        }
+    }
+
+    /// Whether it is up.
+    #[must_use]
+    pub fn is_up(&self) -> bool {
+        self.shared.lock().is_up(self.place)
+    }
+
+    /// Gives the host addresses that nobody has had, as a phone gets that leaves the house. Those before belong to nobody: what is sent to them, or is on its way, is
+    /// lost. Sockets bound to `0.0.0.0` or `[::]` go on with the new ones, others cannot send any more.
+    pub fn change_addresses(&self) -> Addresses {
+        self.shared.lock().change_addresses(self.place)
+    }
+
+    #[expect(clippy::panic, reason = "a misuse, and the way out")]
+    #[track_caller]
+    fn expect_up(&self, what: &str) {
+        if !self.is_up() {
+            panic!("host `{}` is down and cannot {what}; `Host::restart` brings it back", self.name());
+        }
+    }
+}
+
+impl fmt::Debug for Host {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Host").field("name", &self.name()).field("addresses", &self.addresses()).finish_non_exhaustive()
+    }
+}
+
+impl From<&Host> for IpAddr {
+    fn from(host: &Host) -> Self {
+        host.ip()
+    }
+}
+
+impl ToSocketAddrs for (&Host, u16) {
+    fn to_socket_addr(&self) -> io::Result<std::net::SocketAddr> {
+        Ok((self.0.addresses().v4, self.1).into())
+    }
+}

@@ -1,0 +1,62 @@
+//! What can be said in place of a link.
+
+use cohaptic_wan::netem::Netem;
+use cohaptic_wan::{KernelNetem, LinkConfig, LinkModel, Modulated};
+
+/// What can be said in place of a link: a model, a configuration, or the words of `tc-netem`.
+pub trait ToLink {
+    /// The link.
+    ///
+    /// # Panics
+    ///
+    /// If words say nothing that a link can do, with the place of the error.
+    fn to_link(&self) -> LinkModel;
+}
+
+impl ToLink for LinkModel {
+    fn to_link(&self) -> LinkModel {
+        self.clone()
+    }
+}
+
+impl ToLink for LinkConfig {
+    fn to_link(&self) -> LinkModel {
+        self.clone().into()
+    }
+}
+
+impl ToLink for Modulated {
+    fn to_link(&self) -> LinkModel {
+        self.clone().into()
+    }
+}
+
+impl ToLink for KernelNetem {
+    fn to_link(&self) -> LinkModel {
+        self.clone().into()
+    }
+}
+
+impl ToLink for str {
+    /// The words of `tc-netem`, done exactly: see [`Netem::to_link_config`]. No words are the ideal link.
+    #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
+    fn to_link(&self) -> LinkModel {
+        if self.trim().is_empty() {
+            return LinkModel::default();
+        }
+        let netem = Netem::parse(self).unwrap_or_else(|error| panic!("this is no link: {error}\n{}", error.excerpt(self)));
+        netem.to_link_config(&mut |_| None).unwrap_or_else(|error| panic!("`{self}` is no link: {error}")).into()
+    }
+}
+
+impl ToLink for String {
+    fn to_link(&self) -> LinkModel {
+        (**self).to_link()
+    }
+}
+
+impl<T: ToLink + ?Sized> ToLink for &T {
+    fn to_link(&self) -> LinkModel {
+        (**self).to_link()
+    }
+}

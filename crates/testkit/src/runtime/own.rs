@@ -1,0 +1,156 @@
+//! The executor of this crate: one thread, and a clock that jumps to the next event, to the nanosecond.
+//!
+//! All tasks that can go on are polled, in the order in which they were woken, until none can. Then time jumps to the next arrival or timer. At one instant
+//! packets arrive first, then timers go off, in the order in which they were set.
+
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::fmt::Write as _;
+use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Wake, Waker};
+
+use cohaptic_units::print::Seconds;
+
+use crate::core::Shared;
+use crate::task::{Named, Spawner, Task, Tasks};
+
+/// The tasks that can go on.
+#[derive(Default)]
+struct Ready(Mutex<VecDeque<Arc<Place>>>);
+
+/// Where a task is.
+struct Place {
+    number: usize,
+    is_queued: AtomicBool,
+    ready: Arc<Ready>,
+}
+
+impl Wake for Place {
+    fn wake(self: Arc<Self>) {
+        if !self.is_queued.swap(true, Ordering::Relaxed) {
+            let ready = Arc::clone(&self.ready);
+            ready.0.lock().unwrap_or_else(PoisonError::into_inner).push_back(self);
+        }
+    }
+}
+
+/// The executor.
+#[derive(Clone, Default)]
+pub(crate) struct Executor {
+    ready: Arc<Ready>,
+    slots: Rc<RefCell<Vec<Option<Slot>>>>,
+    free: Rc<RefCell<Vec<usize>>>,
+    last: Rc<Cell<usize>>,
+}
+
+#[derive(Clone)]
+struct Slot {
+    task: Rc<Task>,
+    waker: Waker,
+}
+
+impl Spawner for Executor {
+    fn start(&self, task: Rc<Task>) {
+        let mut slots = self.slots.borrow_mut();
+        let number = self.free.borrow_mut().pop().unwrap_or_else(|| {
+            slots.push(None);
+            slots.len() - 1
+        });
+        let place = Arc::new(Place { number, is_queued: AtomicBool::new(false), ready: Arc::clone(&self.ready) });
+        let waker = Waker::from(Arc::clone(&place));
+        slots[number] = Some(Slot { task, waker });
+        drop(slots);
+        place.wake();
+    }
+}
+
+impl Executor {
+    /// Polls tasks and lets time pass until `is_over`.
+    ///
+    /// # Panics
+    ///
+    /// If nothing will ever happen any more, or if time cannot pass because tasks are polled again and again.
+    pub(crate) fn run(&self, shared: &Shared, tasks: &Tasks, is_over: impl Fn() -> bool) {
+        let patience = shared.lock().settings.patience;
+        let mut polls = 0;
+        while !is_over() {
+            if self.poll_one() {
+                polls += 1;
+                if polls > patience {
+                    self.give_up(shared, polls);
+                }
+                continue;
+            }
+            let mut core = shared.lock();
+            let Some(next) = core.next_event() else {
+                drop(core);
+                nothing_will_happen(shared, tasks);
+            };
+            if next > core.now {
+                polls = 0;
+            }
+            core.pass(next);
+        }
+    }
+
+    /// Polls the task that has waited longest; says whether there was one.
+    fn poll_one(&self) -> bool {
+        let Some(place) = self.ready.0.lock().unwrap_or_else(PoisonError::into_inner).pop_front() else { return false };
+        place.is_queued.store(false, Ordering::Relaxed);
+        let number = place.number;
+        self.last.set(number);
+        // The task may start others while it is polled.
+        let slot = self.slots.borrow()[number].clone();
+        let Some(Slot { task, waker }) = slot else { return true };
+        // A place that was given to another task wakes that one in vain, once.
+        if task.poll(&mut Context::from_waker(&waker)).is_ready() {
+            let over = self.slots.borrow_mut()[number].take();
+            self.free.borrow_mut().push(number);
+            drop(over);
+        }
+        true
+    }
+
+    #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
+    fn give_up(&self, shared: &Shared, polls: u64) -> ! {
+        let (now, hosts) = {
+            let core = shared.lock();
+            (core.now, core.plan.names().to_vec())
+        };
+        let slot = self.slots.borrow()[self.last.get()].clone();
+        let who = slot.map_or_else(|| "a task that is over now".to_owned(), |slot| Named { task: &slot.task, hosts: &hosts }.to_string());
+        panic!(
+            "time stands still at {} s: tasks were polled {polls} times without waiting for it to pass, {who} the last. It wakes itself, or others, again and \
+             again: let it wait for a socket or a `sleep`",
+            Seconds(now)
+        );
+    }
+}
+
+/// Tells that nothing will ever happen any more.
+///
+/// # Panics
+///
+/// Always.
+#[expect(clippy::panic, reason = "the program waits for ever; says who does, and the way out")]
+pub(crate) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
+    const SHOWN: usize = 8;
+    let (now, hosts) = {
+        let core = shared.lock();
+        (core.now, core.plan.names().to_vec())
+    };
+    let waiting = tasks.waiting();
+    let mut text = String::new();
+    for task in waiting.iter().take(SHOWN) {
+        let _ = write!(text, "\n  {}", Named { task, hosts: &hosts });
+    }
+    if waiting.len() > SHOWN {
+        let _ = write!(text, "\n  and {} more", waiting.len() - SHOWN);
+    }
+    panic!(
+        "nothing will ever happen after {} s: no packet is on its way, no timer is set, and these wait for what never comes. A lost packet needs a `timeout`:{text}",
+        Seconds(now)
+    );
+}

@@ -1,0 +1,97 @@
+//! The outcome of a task.
+
+use std::cell::RefCell;
+use std::fmt;
+use std::future::Future;
+use std::pin::Pin;
+use std::rc::{Rc, Weak};
+use std::task::{Context, Poll, Waker};
+
+use super::Task;
+
+/// Waits for the outcome of a task. A task goes on when its handle is dropped.
+pub struct JoinHandle<T> {
+    state: Rc<RefCell<State<T>>>,
+    task: Weak<Task>,
+}
+
+/// The task was stopped before it was over: by [`JoinHandle::abort`], or because its host crashed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("the task was stopped before it was over: it was aborted, or its host crashed")]
+pub struct TaskStopped;
+
+#[derive(Debug)]
+pub(crate) struct State<T> {
+    outcome: Option<Result<T, TaskStopped>>,
+    waker: Option<Waker>,
+}
+
+impl<T> JoinHandle<T> {
+    pub(super) const fn new(state: Rc<RefCell<State<T>>>, task: Weak<Task>) -> Self {
+        Self { state, task }
+    }
+
+    /// Stops the task: it is dropped where it waits.
+    pub fn abort(&self) {
+        if let Some(task) = self.task.upgrade() {
+            task.stop();
+        }
+    }
+
+    /// Whether the task is over or was stopped.
+    #[must_use]
+    pub fn is_finished(&self) -> bool {
+        self.task.upgrade().is_none_or(|task| task.is_over())
+    }
+}
+
+impl<T> fmt::Debug for JoinHandle<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("JoinHandle").field("is_finished", &self.is_finished()).finish_non_exhaustive()
+    }
+}
+
+impl<T> Future for JoinHandle<T> {
+    type Output = Result<T, TaskStopped>;
+
+    /// # Panics
+    ///
+    /// If it is polled again after it gave the outcome.
+    fn poll(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Self::Output> {
+        let mut state = self.state.borrow_mut();
+        if let Some(outcome) = state.outcome.take() {
+            return Poll::Ready(outcome);
+        }
+        state.waker = Some(cx.waker().clone());
+        Poll::Pending
+    }
+}
+
+/// A program that leaves what comes out of a future in a state.
+pub(crate) fn joined<F: Future>(future: F) -> (impl Future<Output = ()>, Rc<RefCell<State<F::Output>>>) {
+    let state = Rc::new(RefCell::new(State { outcome: None, waker: None }));
+    // Whatever becomes of the program, who waits for it is told.
+    let told = Told(Rc::clone(&state));
+    let program = async move {
+        let outcome = future.await;
+        told.0.borrow_mut().outcome = Some(Ok(outcome));
+        drop(told);
+    };
+    (program, state)
+}
+
+struct Told<T>(Rc<RefCell<State<T>>>);
+
+impl<T> Drop for Told<T> {
+    fn drop(&mut self) {
+        let mut state = self.0.borrow_mut();
+        if state.outcome.is_none() {
+            state.outcome = Some(Err(TaskStopped));
+        }
+        let waker = state.waker.take();
+        drop(state);
+        if let Some(waker) = waker {
+            waker.wake();
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Tasks: futures that live on hosts, whoever polls them.
+
+mod join;
+
+use std::cell::{Cell, RefCell};
+use std::fmt;
+use std::future::Future;
+use std::panic::Location;
+use std::pin::Pin;
+use std::rc::{Rc, Weak};
+use std::task::{Context, Poll, Waker};
+
+pub(crate) use join::joined;
+pub use join::{JoinHandle, TaskStopped};
+
+use crate::context;
+
+/// What a task runs.
+pub(crate) type Program = Pin<Box<dyn Future<Output = ()>>>;
+
+/// A task.
+pub(crate) struct Task {
+    host: Option<usize>,
+    origin: &'static Location<'static>,
+    program: RefCell<Option<Program>>,
+    /// It was stopped while it was polled.
+    is_doomed: Cell<bool>,
+    /// Whoever polls it last.
+    waker: RefCell<Option<Waker>>,
+}
+
+impl Task {
+    fn new(host: Option<usize>, origin: &'static Location<'static>, program: Program) -> Rc<Self> {
+        Rc::new(Self { host, origin, program: RefCell::new(Some(program)), is_doomed: Cell::new(false), waker: RefCell::new(None) })
+    }
+
+    /// Polls the program; ready when it is over, or was stopped.
+    pub(crate) fn poll(&self, cx: &mut Context<'_>) -> Poll<()> {
+        {
+            let mut waker = self.waker.borrow_mut();
+            if !waker.as_ref().is_some_and(|known| known.will_wake(cx.waker())) {
+                *waker = Some(cx.waker().clone());
+            }
+        }
+        let mut program = self.program.borrow_mut();
+        let Some(future) = program.as_mut() else { return Poll::Ready(()) };
+        let polled = context::on_host(self.host, || future.as_mut().poll(cx));
+        if polled.is_ready() || self.is_doomed.get() {
+            let over = program.take();
+            drop(program);
+            context::on_host(self.host, || drop(over));
+            return Poll::Ready(());
+        }
+        Poll::Pending
+    }
+
+    /// Drops the program; a task that stops itself is dropped when it next waits.
+    pub(crate) fn stop(&self) {
+        self.is_doomed.set(true);
+        // A program that is being polled is in use.
+        let Ok(mut program) = self.program.try_borrow_mut() else { return };
+        let over = program.take();
+        drop(program);
+        context::on_host(self.host, || drop(over));
+        let waker = self.waker.borrow_mut().take();
+        if let Some(waker) = waker {
+            waker.wake();
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.program.try_borrow().is_ok_and(|program| program.is_none())
+    }
+}
+
+/// A task in words: where it was spawned, and on which host it lives.
+pub(crate) struct Named<'a> {
+    pub(crate) task: &'a Task,
+    pub(crate) hosts: &'a [String],
+}
+
+impl fmt::Display for Named<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.task.host.and_then(|host| self.hosts.get(host)) {
+            Some(host) => write!(f, "the task of host `{host}` that was spawned at {}", self.task.origin),
+            None => write!(f, "the task that was spawned at {}", self.task.origin),
+        }
+    }
+}
+
+/// Who polls tasks.
+pub(crate) trait Spawner {
+    /// Polls a task from now on, until it is over.
+    fn start(&self, task: Rc<Task>);
+}
+
+/// What starts a host's program anew.
+type Factory = Rc<dyn Fn() -> Program>;
+
+/// All tasks of a test bed.
+pub(crate) struct Tasks {
+    spawner: Box<dyn Spawner>,
+    known: RefCell<Vec<Weak<Task>>>,
+    /// By host: its program, and where it was given.
+    factories: RefCell<Vec<Option<(Factory, &'static Location<'static>)>>>,
+}
+
+impl Tasks {
+    pub(crate) fn new(spawner: Box<dyn Spawner>, hosts: usize) -> Self {
+        Self { spawner, known: RefCell::new(Vec::new()), factories: RefCell::new(vec![None; hosts]) }
+    }
+
+    /// Starts a task on a host.
+    pub(crate) fn spawn<F>(&self, host: Option<usize>, origin: &'static Location<'static>, future: F) -> JoinHandle<F::Output>
+    where
+        F: Future + 'static,
+        F::Output: 'static,
+    {
+        let (program, state) = joined(future);
+        let task = self.start(host, origin, Box::pin(program));
+        JoinHandle::new(state, Rc::downgrade(&task))
+    }
+
+    fn start(&self, host: Option<usize>, origin: &'static Location<'static>, program: Program) -> Rc<Task> {
+        let task = Task::new(host, origin, program);
+        let mut known = self.known.borrow_mut();
+        // Now and then those that are over are forgotten: so that they are never more than twice those that run.
+        if known.len() == known.capacity() {
+            known.retain(|task| task.upgrade().is_some_and(|task| !task.is_over()));
+        }
+        known.push(Rc::downgrade(&task));
+        drop(known);
+        self.spawner.start(Rc::clone(&task));
+        task
+    }
+
+    /// Starts the program of a host, and keeps it for [`Tasks::restart`].
+    pub(crate) fn set_program(&self, host: usize, origin: &'static Location<'static>, factory: Factory) {
+        self.factories.borrow_mut()[host] = Some((factory, origin));
+        self.restart(host);
+    }
+
+    /// Starts the program of a host again, if it has one.
+    pub(crate) fn restart(&self, host: usize) {
+        let factory = self.factories.borrow()[host].clone();
+        if let Some((factory, origin)) = factory {
+            let program = context::on_host(Some(host), || factory());
+            self.start(Some(host), origin, program);
+        }
+    }
+
+    /// Stops all tasks of a host.
+    pub(crate) fn stop_all_of(&self, host: usize) {
+        // Dropping a program may spawn and stop others.
+        let of_host: Vec<Rc<Task>> = self.known.borrow().iter().filter_map(Weak::upgrade).filter(|task| task.host == Some(host)).collect();
+        of_host.iter().for_each(|task| task.stop());
+    }
+
+    /// Stops all tasks.
+    pub(crate) fn stop_all(&self) {
+        loop {
+            let all: Vec<Rc<Task>> = self.known.borrow_mut().drain(..).filter_map(|task| task.upgrade()).collect();
+            if all.is_empty() {
+                return;
+            }
+            all.iter().for_each(|task| task.stop());
+        }
+    }
+
+    /// The tasks that are not over.
+    pub(crate) fn waiting(&self) -> Vec<Rc<Task>> {
+        self.known.borrow().iter().filter_map(Weak::upgrade).filter(|task| !task.is_over()).collect()
+    }
+}

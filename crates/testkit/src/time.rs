@@ -1,0 +1,197 @@
+//! Virtual time to the nanosecond, for programs that do not use tokio's: what they would take from a runtime otherwise.
+//!
+//! On [tokio's clock](crate::Testbed::on_tokio) these work too: they go off to the nanosecond where tokio's own timers are rounded up to milliseconds.
+
+use std::future::{Future, poll_fn};
+use std::pin::{Pin, pin};
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use cohaptic_units::Instant;
+use cohaptic_units::print::Seconds;
+
+use crate::context;
+use crate::core::{Shared, TimerId};
+
+/// The time since the run began.
+///
+/// # Panics
+///
+/// Outside a running test bed; and if it is asked millions of times without letting time pass, as a loop does that waits for it: `sleep` instead.
+#[must_use]
+#[expect(clippy::panic, reason = "time cannot pass while it is asked for; says why, and the way out")]
+pub fn now() -> Instant {
+    let running = context::expect_running("time is known");
+    let mut core = running.shared.lock();
+    core.ask_time().unwrap_or_else(|| {
+        panic!(
+            "time stands still at {} s: it was asked for again and again by a task that never waits; `sleep(..).await` lets it pass",
+            Seconds(core.now)
+        )
+    })
+}
+
+/// Waits for a span. One of zero is over at once.
+///
+/// # Panics
+///
+/// Outside a running test bed.
+#[must_use = "futures do nothing unless they are awaited"]
+pub fn sleep(span: Duration) -> Sleep {
+    let shared = context::expect_running("time passes").shared;
+    let deadline = shared.lock().now.saturating_add(span);
+    Sleep { shared, deadline, timer: None }
+}
+
+/// Waits until an instant; one that has passed is over at once.
+///
+/// # Panics
+///
+/// Outside a running test bed.
+#[must_use = "futures do nothing unless they are awaited"]
+pub fn sleep_until(deadline: Instant) -> Sleep {
+    Sleep { shared: context::expect_running("time passes").shared, deadline, timer: None }
+}
+
+/// A wait: see [`sleep`].
+pub struct Sleep {
+    shared: Arc<Shared>,
+    deadline: Instant,
+    timer: Option<TimerId>,
+}
+
+impl Sleep {
+    #[cfg_attr(not(feature = "quinn"), expect(dead_code, reason = "for runtimes that make timers out of their own context"))]
+    pub(crate) const fn of(shared: Arc<Shared>, deadline: Instant) -> Self {
+        Self { shared, deadline, timer: None }
+    }
+
+    /// When it is over.
+    #[must_use]
+    pub const fn deadline(&self) -> Instant {
+        self.deadline
+    }
+
+    /// Waits until another instant from now on.
+    pub fn reset(&mut self, deadline: Instant) {
+        if let Some(timer) = self.timer.take() {
+            self.shared.lock().timers.cancel(timer);
+        }
+        self.deadline = deadline;
+    }
+}
+
+impl std::fmt::Debug for Sleep {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Sleep").field("deadline", &self.deadline).finish_non_exhaustive()
+    }
+}
+
+impl Future for Sleep {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<()> {
+        let this = &mut *self;
+        let mut core = this.shared.lock();
+        if core.now >= this.deadline {
+            if let Some(timer) = this.timer.take() {
+                core.timers.cancel(timer);
+            }
+            return Poll::Ready(());
+        }
+        match this.timer {
+            Some(timer) => core.timers.renew(timer, cx.waker()),
+            None => this.timer = Some(core.timers.set(this.deadline, cx.waker().clone())),
+        }
+        Poll::Pending
+    }
+}
+
+impl Drop for Sleep {
+    fn drop(&mut self) {
+        if let Some(timer) = self.timer.take() {
+            self.shared.lock().timers.cancel(timer);
+        }
+    }
+}
+
+/// The time was up.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("the time was up")]
+pub struct Elapsed;
+
+impl From<Elapsed> for std::io::Error {
+    fn from(elapsed: Elapsed) -> Self {
+        Self::new(std::io::ErrorKind::TimedOut, elapsed)
+    }
+}
+
+/// Waits for a future, but no longer than a span. If both are over at the same instant, the future wins.
+///
+/// # Errors
+///
+/// [`Elapsed`] if the time was up first. The future is dropped.
+///
+/// # Panics
+///
+/// Outside a running test bed.
+pub async fn timeout<F: Future>(span: Duration, future: F) -> Result<F::Output, Elapsed> {
+    let (mut future, mut time) = (pin!(future), pin!(sleep(span)));
+    poll_fn(move |cx| {
+        if let Poll::Ready(outcome) = future.as_mut().poll(cx) {
+            return Poll::Ready(Ok(outcome));
+        }
+        time.as_mut().poll(cx).map(|()| Err(Elapsed))
+    })
+    .await
+}
+
+/// Ticks at even distances: the first at once.
+///
+/// # Panics
+///
+/// Outside a running test bed, and with a period of zero.
+#[must_use]
+pub fn interval(period: Duration) -> Interval {
+    assert!(!period.is_zero(), "an interval of no time would never let time pass; expected one longer than zero");
+    let shared = context::expect_running("time passes").shared;
+    let next = shared.lock().now;
+    Interval { shared, next, period }
+}
+
+/// Ticks at even distances. Ticks that were missed come at once, one after the other.
+pub struct Interval {
+    shared: Arc<Shared>,
+    next: Instant,
+    period: Duration,
+}
+
+impl Interval {
+    /// Waits for the next tick, and gives its instant.
+    pub async fn tick(&mut self) -> Instant {
+        let at = self.next;
+        Sleep { shared: Arc::clone(&self.shared), deadline: at, timer: None }.await;
+        self.next = at + self.period;
+        at
+    }
+}
+
+impl std::fmt::Debug for Interval {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Interval").field("next", &self.next).field("period", &self.period).finish_non_exhaustive()
+    }
+}
+
+/// Lets other tasks go first that can go on now; time does not pass.
+pub async fn yield_now() {
+    let mut has_yielded = false;
+    poll_fn(|cx| {
+        if std::mem::replace(&mut has_yielded, true) {
+            return Poll::Ready(());
+        }
+        cx.waker().wake_by_ref();
+        Poll::Pending
+    })
+    .await;
+}

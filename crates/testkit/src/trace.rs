@@ -1,0 +1,257 @@
+//! What happened in a run, event by event, and where two runs part.
+
+use std::fmt;
+
+use cohaptic_units::Instant;
+use cohaptic_units::print::Seconds;
+use cohaptic_wan::DropCause;
+
+/// What happened, and when.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct TraceEvent {
+    /// When.
+    pub at: Instant,
+    /// What.
+    pub what: Happening,
+}
+
+/// What can happen in a test bed. Hosts are counted from 0.
+#[derive(Clone, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum Happening {
+    /// A host has sent a packet.
+    Sent {
+        /// Which one.
+        packet: PacketName,
+        /// How many bytes it carries.
+        len: usize,
+        /// FNV-1a of them, 64 bits; 0 if nothing is recorded.
+        digest: u64,
+    },
+    /// A packet lies in the buffer of a socket.
+    Arrived {
+        /// Which one.
+        packet: PacketName,
+    },
+    /// A packet has come to its end elsewhere.
+    Lost {
+        /// Which one.
+        packet: PacketName,
+        /// Why.
+        why: Lost,
+    },
+    /// A link has made a copy of a packet.
+    Copied {
+        /// The copy.
+        packet: PacketName,
+    },
+    /// A host crashed.
+    Crashed(usize),
+    /// A host was restarted.
+    Restarted(usize),
+    /// A host has new addresses.
+    Readdressed(usize),
+    /// The way from one host to another was cut.
+    Cut(usize, usize),
+    /// It was mended.
+    Mended(usize, usize),
+    /// The link from one host to another became another one.
+    Relinked(usize, usize),
+    /// What the program noted: see [`Bed::note`](crate::Bed::note).
+    Note(String),
+}
+
+/// The name of a packet.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct PacketName {
+    /// The host that sent it.
+    pub from: usize,
+    /// The host to which it was sent.
+    pub to: usize,
+    /// The how many-th of those between the two, from 0.
+    pub sequence: u64,
+    /// Which copy of it; 0 is the packet itself.
+    pub copy: u8,
+}
+
+/// Why a packet did not come into the buffer of a socket.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[non_exhaustive]
+pub enum Lost {
+    /// Its link took it.
+    Link(DropCause),
+    /// The way was cut when it was sent, or when it would have arrived.
+    Cut,
+    /// The host was down when it arrived.
+    HostDown,
+    /// The host had another address when it arrived.
+    NoSuchAddress,
+    /// No socket was bound to its port. The sender is told so.
+    NoSocket,
+    /// The buffer of the socket was full.
+    BufferFull,
+}
+
+impl fmt::Display for Lost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Link(cause) => cause.name(),
+            Self::Cut => "the way is cut",
+            Self::HostDown => "the host is down",
+            Self::NoSuchAddress => "the host has another address",
+            Self::NoSocket => "no socket at that port",
+            Self::BufferFull => "the socket's buffer is full",
+        })
+    }
+}
+
+/// All that happened in a run, in order.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Trace {
+    hosts: Vec<String>,
+    events: Vec<TraceEvent>,
+}
+
+impl Trace {
+    pub(crate) const fn new(hosts: Vec<String>) -> Self {
+        Self { hosts, events: Vec::new() }
+    }
+
+    pub(crate) fn push(&mut self, at: Instant, what: Happening) {
+        self.events.push(TraceEvent { at, what });
+    }
+
+    /// The names of the hosts.
+    #[must_use]
+    pub fn hosts(&self) -> &[String] {
+        &self.hosts
+    }
+
+    /// The events.
+    #[must_use]
+    pub fn events(&self) -> &[TraceEvent] {
+        &self.events
+    }
+
+    /// Where two runs part; `None` if they are the same.
+    #[must_use]
+    pub fn first_difference<'a>(&'a self, other: &'a Self) -> Option<Difference<'a>> {
+        let place = (0..).find(|place| {
+            let (one, other) = (self.events.get(*place), other.events.get(*place));
+            one != other || one.is_none()
+        })?;
+        let events = (self.events.get(place), other.events.get(place));
+        (events != (None, None)).then_some(Difference { hosts: &self.hosts, place, events })
+    }
+
+    /// An event in words: `1.024 s  client -> server  packet 17 lost: queue-full`.
+    pub fn words<'a>(&'a self, event: &'a TraceEvent) -> impl fmt::Display + 'a {
+        Words { hosts: &self.hosts, event }
+    }
+}
+
+/// Where two runs part.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Difference<'a> {
+    hosts: &'a [String],
+    /// The number of the first event that differs, from 0.
+    pub place: usize,
+    /// That event in the one run and in the other; `None` if the run has ended before.
+    pub events: (Option<&'a TraceEvent>, Option<&'a TraceEvent>),
+}
+
+impl Difference<'_> {
+    /// When the two runs part.
+    #[must_use]
+    pub fn at(&self) -> Instant {
+        let (one, other) = self.events;
+        one.into_iter().chain(other).map(|event| event.at).min().unwrap_or(Instant::ZERO)
+    }
+}
+
+impl fmt::Display for Difference<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "the runs part at {} s, with event {}:", Seconds(self.at()), self.place)?;
+        for (name, event) in [("first ", self.events.0), ("second", self.events.1)] {
+            match event {
+                Some(event) => writeln!(f, "  {name}: {}", Words { hosts: self.hosts, event })?,
+                None => writeln!(f, "  {name}: nothing more")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// An event in words.
+struct Words<'a> {
+    hosts: &'a [String],
+    event: &'a TraceEvent,
+}
+
+impl Words<'_> {
+    fn name(&self, host: usize) -> &str {
+        self.hosts.get(host).map_or("?", |name| name)
+    }
+
+    fn packet(&self, f: &mut fmt::Formatter<'_>, packet: PacketName) -> fmt::Result {
+        write!(f, "{} -> {}  packet {}", self.name(packet.from), self.name(packet.to), packet.sequence)?;
+        if packet.copy == 0 { Ok(()) } else { write!(f, " (copy {})", packet.copy) }
+    }
+}
+
+impl fmt::Display for Words<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} s  ", Seconds(self.event.at))?;
+        match &self.event.what {
+            Happening::Sent { packet, len, digest } => {
+                self.packet(f, *packet)?;
+                write!(f, " sent, {len} bytes, digest {digest:016x}")
+            }
+            Happening::Arrived { packet } => {
+                self.packet(f, *packet)?;
+                f.write_str(" arrived")
+            }
+            Happening::Lost { packet, why } => {
+                self.packet(f, *packet)?;
+                write!(f, " lost: {why}")
+            }
+            Happening::Copied { packet } => {
+                self.packet(f, *packet)?;
+                f.write_str(" copied")
+            }
+            Happening::Crashed(host) => write!(f, "{} crashed", self.name(*host)),
+            Happening::Restarted(host) => write!(f, "{} restarted", self.name(*host)),
+            Happening::Readdressed(host) => write!(f, "{} has new addresses", self.name(*host)),
+            Happening::Cut(from, to) => write!(f, "{} -> {} cut", self.name(*from), self.name(*to)),
+            Happening::Mended(from, to) => write!(f, "{} -> {} mended", self.name(*from), self.name(*to)),
+            Happening::Relinked(from, to) => write!(f, "{} -> {} is another link", self.name(*from), self.name(*to)),
+            Happening::Note(note) => write!(f, "note: {note}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sent(at: u64, sequence: u64) -> TraceEvent {
+        let packet = PacketName { from: 0, to: 1, sequence, copy: 0 };
+        TraceEvent { at: Instant::from_nanos(at), what: Happening::Sent { packet, len: 3, digest: 7 } }
+    }
+
+    #[test]
+    fn the_first_difference_is_told_with_its_time() {
+        let trace = |events: Vec<TraceEvent>| Trace { hosts: vec!["a".into(), "b".into()], events };
+        let one = trace(vec![sent(0, 0), sent(5_000, 1), sent(9_000, 2)]);
+        assert_eq!(one.first_difference(&one.clone()), None);
+        let other = trace(vec![sent(0, 0), sent(5_001, 1), sent(9_000, 2)]);
+        let difference = one.first_difference(&other).unwrap();
+        assert_eq!((difference.at(), difference.place), (Instant::from_nanos(5_000), 1));
+        let shorter = trace(vec![sent(0, 0)]);
+        assert_eq!(shorter.first_difference(&one).unwrap().at(), Instant::from_nanos(5_000));
+        assert_eq!(
+            shorter.first_difference(&one).unwrap().to_string(),
+            "the runs part at 0.000005 s, with event 1:\n  first : nothing more\n  second: 0.000005 s  a -> b  packet 1 sent, 3 bytes, digest 0000000000000007\n"
+        );
+    }
+}
