@@ -1,4 +1,7 @@
 //! Tests of the test kit.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, reason = "tests")]
 
+mod faults;
+mod like_tokio;
+mod misuse;
 mod sockets;
