@@ -22,6 +22,7 @@ mod trace;
 
 pub use address::{AddressPlan, Addresses, ToSocketAddrs};
 pub use bed::{Bed, Testbed};
+pub use cohaptic_units as units;
 pub use cohaptic_units::Instant;
 pub use cohaptic_wan as wan;
 pub use host::Host;

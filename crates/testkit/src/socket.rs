@@ -1,5 +1,7 @@
 //! The virtual UDP socket.
 
+mod options;
+
 use std::fmt;
 use std::future::poll_fn;
 use std::io;
@@ -30,6 +32,7 @@ use crate::core::{Datagram, Outgoing, Shared, SocketId};
 pub struct UdpSocket {
     shared: Arc<Shared>,
     id: SocketId,
+    options: options::Options,
 }
 
 impl UdpSocket {
@@ -58,7 +61,7 @@ impl UdpSocket {
         }
         let id = core.bind(host, address)?;
         drop(core);
-        Ok(Self { shared, id })
+        Ok(Self { shared, id, options: options::Options::default() })
     }
 
     /// The address at which it is bound.
@@ -151,6 +154,7 @@ impl UdpSocket {
     }
 
     pub(crate) fn send_now(&self, to: Option<SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<usize> {
+        let ecn_capable = ecn_capable || self.options.is_ecn_capable();
         let outgoing = Outgoing { to, bytes: Bytes::copy_from_slice(bytes), ecn_capable };
         self.shared.lock().send(self.id, outgoing)?;
         Ok(bytes.len())

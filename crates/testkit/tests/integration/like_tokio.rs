@@ -4,6 +4,7 @@ use std::fmt::Debug;
 use std::io;
 
 use cohaptic_testkit::Testbed;
+use tokio::io::Interest;
 
 /// What a program saw, in words. Ports are free ones, so they are left out.
 #[derive(Default)]
@@ -102,6 +103,22 @@ macro_rules! program {
             let nowhere = (std::net::Ipv4Addr::UNSPECIFIED, any.local_addr().unwrap().port());
             log.see("to no address is to oneself", unconnected.send_to(b"self", std::net::SocketAddr::from(nowhere)).await);
             log.see("as it is heard", any.recv_from(&mut short).await.map(|(len, from)| (len, from == to(&unconnected))));
+            log.see("time to live", any.ttl());
+            log.see("none", any.set_ttl(0));
+            log.see("too much", any.set_ttl(256));
+            log.see("another", any.set_ttl(9));
+            log.see("as said", any.ttl());
+            log.see("type of service", any.tos_v4());
+            log.see("capable of marks", any.set_tos_v4(0b10));
+            log.see("as said", any.tos_v4());
+            log.see("multicast", any.multicast_ttl_v4().and_then(|ttl| Ok((ttl, any.multicast_loop_v4()?))));
+            log.see("nothing to read", any.try_io(Interest::READABLE, || any.try_recv(&mut [0; 1])));
+            log.see(
+                "ready to send",
+                any.ready(Interest::READABLE | Interest::WRITABLE).await.map(|ready| (ready.is_readable(), ready.is_writable())),
+            );
+            any.send_to(b"own", to(&any)).await.unwrap();
+            log.see("by hand", any.async_io(Interest::READABLE, || any.try_recv(&mut [0; 8])).await);
             let six = Socket::bind("[::1]:0").await.unwrap();
             log.see("over the other version", six.send_to(b"six", to(&six)).await);
             log.see("heard", six.recv_from(&mut short).await.map(|(len, from)| (len, from == to(&six))));
