@@ -2,3 +2,6 @@
 
 #[cfg(feature = "strategies")]
 pub mod strategies;
+
+#[cfg(feature = "strategies")]
+pub use proptest;
