@@ -239,7 +239,7 @@ impl LinkBounds {
         self
     }
 
-    /// Whether neighbouring packets may be alike: the correlation of jitter and of whatever happens with a probability.
+    /// Whether neighbouring packets may be alike: the correlation of uniform and normal jitter, and of whatever happens with a probability.
     #[must_use]
     pub const fn correlation(mut self, may: bool) -> Self {
         self.correlation = may;
