@@ -64,6 +64,8 @@ mod grid;
 mod link;
 mod network;
 mod numbers;
+#[cfg(feature = "scenes")]
+pub mod scene;
 mod shrink;
 mod space;
 mod stage;

@@ -172,6 +172,19 @@ impl ImpairedNetwork {
         self.links.values().map(|link| link.stages().len()).sum()
     }
 
+    /// The network without a host: those after it move up. None is left out of one host.
+    #[cfg(feature = "scenes")]
+    pub(super) fn without_host(&self, gone: usize) -> Self {
+        let moved = |node: NodeId| {
+            let place = usize::try_from(node.0).unwrap_or(usize::MAX);
+            (place != gone).then_some(NodeId(node.0 - u32::from(place > gone)))
+        };
+        let mut less = Self::ideal((self.hosts - 1).max(1));
+        let links = self.links.iter().filter_map(|((from, to), link)| Some((moved(*from)?, moved(*to)?, link.clone())));
+        links.for_each(|(from, to, link)| less.put(from, to, link));
+        less
+    }
+
     fn nodes(&self) -> impl Iterator<Item = NodeId> + use<> {
         (0..u32::try_from(self.hosts).unwrap_or(u32::MAX)).map(NodeId)
     }
