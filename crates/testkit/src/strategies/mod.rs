@@ -57,6 +57,7 @@
 mod admits;
 mod any;
 mod bounds;
+mod bounds_error;
 mod chain;
 mod draw;
 mod forms;
@@ -71,7 +72,8 @@ mod space;
 mod stage;
 
 pub use any::{LinkTree, Links, NetworkTree, Networks, any_link, any_network, links_like, networks_like};
-pub use bounds::{BoundsError, LinkBounds, LossModel};
+pub use bounds::{LinkBounds, LossModel};
+pub use bounds_error::BoundsError;
 pub use link::{ImpairedLink, LinkError};
 pub use network::{ImpairedNetwork, NetworkTextError};
 pub use stage::Stage;

@@ -67,7 +67,7 @@ impl Knob {
     }
 }
 
-/// A correlation is least at nothing, a gap where seldom one is reordered.
+/// All of them, in the order in which they shrink. A correlation that stays goes to one percent, a gap to two packets.
 pub(super) const KNOBS: [Knob; 27] = [
     // Jitter goes first, since no delay may be below it.
     Knob { goal: Goal::Low(Stage::Jitter), read: |n| Some(nanos(jitter(n)?.time)), write: |n, v| put(jitter_mut(n).map(|j| &mut j.time), time(v)) },

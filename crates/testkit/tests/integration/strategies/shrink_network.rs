@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use cohaptic_testkit::proptest::prelude::*;
+use cohaptic_testkit::proptest::sample::{select, subsequence};
 use cohaptic_testkit::strategies::{ImpairedLink, ImpairedNetwork, LinkBounds, Stage, any_network, networks_like};
 use cohaptic_wan::NodeId;
 
@@ -76,5 +78,76 @@ fn required_stages_stay_in_every_link() {
     for seed in 0..10 {
         let least = shrink(&networks_like(3, bounds.clone()), seed, |_| true).unwrap().least;
         assert!(least.links().all(|(_, _, link)| link.to_string() == "delay 1ms"), "{least}");
+    }
+}
+
+/// What a program cannot stand on a link, and the least link that has it.
+#[derive(Clone, Copy, Debug)]
+enum Weakness {
+    Delay(u64),
+    Jitter(u64),
+    Loss(u32),
+    Duplicate(u32),
+    Reorder(u32),
+    Rate(u64),
+}
+
+impl Weakness {
+    fn shows(self, link: &ImpairedLink) -> bool {
+        let netem = link.netem();
+        let share = |chance: Option<cohaptic_wan::netem::ChanceSpec>, percent: u32| chance.is_some_and(|c| c.percent.get() >= f64::from(percent));
+        match self {
+            Self::Delay(ms) => delay(link) >= Duration::from_millis(ms),
+            Self::Jitter(ms) => {
+                netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()).is_some_and(|jitter| jitter.time >= Duration::from_millis(ms))
+            }
+            Self::Loss(percent) => link.config().loss.mean().unwrap() >= f64::from(percent) / 100.0,
+            Self::Duplicate(percent) => share(netem.duplicate, percent),
+            Self::Reorder(percent) => share(netem.reorder.map(|reorder| reorder.chance), percent),
+            Self::Rate(kbit) => netem.rate.is_some_and(|rate| rate.bytes_per_sec.get() <= 125 * kbit),
+        }
+    }
+
+    fn least(self) -> String {
+        match self {
+            Self::Delay(ms) => format!("delay {ms}ms"),
+            Self::Jitter(ms) => format!("delay {ms}ms {ms}ms"),
+            Self::Loss(percent) => format!("loss {percent}%"),
+            Self::Duplicate(percent) => format!("duplicate {percent}%"),
+            Self::Reorder(percent) => format!("delay 1ms reorder {percent}%"),
+            Self::Rate(kbit) => ImpairedLink::words(&format!("rate {kbit}kbit")).to_string(),
+        }
+    }
+}
+
+fn weakness() -> impl Strategy<Value = Weakness> {
+    let round = select(vec![1_u64, 2, 7, 10, 11, 24, 60]);
+    prop_oneof![
+        round.clone().prop_map(Weakness::Delay),
+        round.prop_map(Weakness::Jitter),
+        (1..15_u32).prop_map(Weakness::Loss),
+        (1..10_u32).prop_map(Weakness::Duplicate),
+        (1..25_u32).prop_map(Weakness::Reorder),
+        select(vec![1_000_u64, 1_500, 20_000]).prop_map(Weakness::Rate),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_a_program_cannot_stand_is_all_that_is_left(
+        pairs in subsequence((0..20_u32).collect::<Vec<_>>(), 1..=2), weaknesses in (weakness(), weakness()), seed in any::<u64>()
+    ) {
+        // The n-th ordered pair of five hosts.
+        let pairs = pairs.into_iter().map(|n| (n / 4, (n / 4 + 1 + n % 4) % 5));
+        let planted: Vec<_> = pairs.zip([weaknesses.0, weaknesses.1]).collect();
+        let fails = |network: &ImpairedNetwork| planted.iter().all(|((from, to), weakness)| weakness.shows(link(network, *from, *to)));
+        let Some(shrunk) = shrink(&any_network(5), seed, fails) else { return Ok(()) };
+        let least = planted.iter().fold(ImpairedNetwork::ideal(5), |network, ((from, to), weakness)| {
+            network.with_link(NodeId(*from), NodeId(*to), ImpairedLink::words(&weakness.least()))
+        });
+        prop_assert_eq!(&shrunk.least, &least, "from {:?}", shrunk.first);
+        prop_assert!(shrunk.asked < 100, "{} steps", shrunk.asked);
     }
 }
