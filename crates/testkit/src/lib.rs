@@ -31,3 +31,6 @@ pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
+
+#[cfg(feature = "strategies")]
+pub use proptest;
