@@ -93,3 +93,15 @@ fn a_broadcast_reaches_all_others_and_only_with_leave() {
         assert!(sockets[0].try_recv(&mut [0; 3]).is_err());
     });
 }
+
+#[test]
+fn what_is_on_its_way_at_the_end_stays_there() {
+    for bed in [pair().links("delay 1us"), pair().links("delay 1us").on_tokio()] {
+        bed.run_twice(|bed| async move {
+            let a = bed.host("a").bind("0.0.0.0:0").unwrap();
+            // The machine takes longer than a microsecond to end the run; that time does not count.
+            a.send_to(b"never arrives", "b:5").await.unwrap();
+            drop(bed.spawn(async move { a.recv(&mut [0; 1]).await }));
+        });
+    }
+}
