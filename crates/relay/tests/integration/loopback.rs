@@ -3,24 +3,28 @@
 use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::AsFd as _;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use cohaptic_realtime::udp::{DoorConfig, Ecn, ReceiveBuffers, UdpDoor};
-use cohaptic_realtime::{MonotonicClock, Pacer, Pacing, Tolerance, Wishes};
-use cohaptic_relay::{Control, Form, Limits, Proxy, Relay, RelayConfig, Report, RunOptions};
+use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Pacing, Tolerance, Wishes};
+use cohaptic_relay::{Control, Form, Limits, Proxy, Relay, RelayConfig, Report, RunOptions, View};
 use cohaptic_units::Bytes;
 use cohaptic_wan::{Fate, Network, NetworkConfig, NodeId};
 
 use super::{link, mesh};
+
+/// Long enough for any machine; it is the end of a test that fails.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A relay in a thread of its own.
 struct Running {
     ports: Vec<SocketAddr>,
     control: Sender<Control>,
     stop: Arc<AtomicBool>,
+    offered: Arc<AtomicU64>,
     thread: JoinHandle<Report>,
 }
 
@@ -29,7 +33,8 @@ fn start(config: RelayConfig, pacing: Pacing) -> Running {
     let ports = relay.ports().map(|(_, address)| address).collect();
     let (control, changes) = channel();
     let stop = Arc::new(AtomicBool::new(false));
-    let is_over = Arc::clone(&stop);
+    let (is_over, offered) = (Arc::clone(&stop), Arc::new(AtomicU64::new(0)));
+    let shown = Arc::clone(&offered);
     let options = RunOptions {
         pacing,
         wishes: Wishes::NONE,
@@ -37,11 +42,23 @@ fn start(config: RelayConfig, pacing: Pacing) -> Running {
         look_every: Duration::from_millis(2),
         ..RunOptions::default()
     };
-    let thread = std::thread::spawn(move || relay.run(&options, &changes, &is_over, |_| ()).unwrap());
-    Running { ports, control, stop, thread }
+    let thread = std::thread::spawn(move || {
+        let look = |view: &View<'_>| shown.store(view.intake().offered, Ordering::Relaxed);
+        relay.run(&options, &changes, &is_over, look).unwrap()
+    });
+    Running { ports, control, stop, offered, thread }
 }
 
 impl Running {
+    /// Waits until it has read so many.
+    fn has_offered(&self, count: u64) {
+        let end = Instant::now() + PATIENCE;
+        while self.offered.load(Ordering::Relaxed) < count {
+            assert!(Instant::now() < end, "{} were offered", self.offered.load(Ordering::Relaxed));
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
     fn end(self) -> Report {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.join().unwrap()
@@ -50,8 +67,7 @@ impl Running {
 
 fn program(family: &str) -> UdpSocket {
     let socket = UdpSocket::bind(family).unwrap();
-    // Long enough for any machine; it is the end of a test that fails.
-    socket.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    socket.set_read_timeout(Some(PATIENCE)).unwrap();
     socket
 }
 
@@ -119,6 +135,8 @@ fn nothing_is_early_or_out_of_order_and_a_seeded_link_loses_what_it_loses_in_vir
             let delay = when - sent[usize::try_from(sequence).unwrap()];
             assert!(delay >= Duration::from_millis(8), "number {sequence} after {delay:?}");
         }
+        // The last ones may be among those that are lost.
+        relay.has_offered(COUNT);
         let report = relay.end();
         assert_eq!((report.intake.offered, report.release.count(), report.held.0), (COUNT, delivered.len() as u64, 0));
         assert_eq!((report.ports[0].counts.sent, report.ports[1].counts.received), (delivered.len() as u64, COUNT));
@@ -138,12 +156,15 @@ fn three_programs_speak_to_each_other_through_their_own_links() {
     let config =
         mesh(&[("a", port, place(0)), ("b", port, place(1)), ("c", port, place(2))], link(&["delay=1ms"]), &[((1, 0), link(&["loss=100%"]))]);
     let relay = start(config, Pacing::Sleep);
-    // The last one first, so that it is known.
+    let mut offered = 0;
     for from in [2, 1, 0] {
         for to in (0..3).filter(|to| *to != from) {
             let name = u64::try_from(10 * from + to).unwrap();
             programs[from].send_to(&name.to_le_bytes(), relay.ports[to]).unwrap();
+            offered += 1;
         }
+        // The last one first, so that it is known before anybody speaks to it.
+        relay.has_offered(offered);
     }
     for (to, expected) in [(0, vec![20]), (1, vec![1, 21]), (2, vec![2, 12])] {
         let mut found: Vec<u64> = Vec::new();
@@ -181,9 +202,9 @@ fn congestion_bits_pass_and_a_link_that_marks_marks() {
         from.queue(port, b"marked?", ecn);
         from.flush();
         let (mut buffers, mut found) = (ReceiveBuffers::new(), None);
-        let end = Instant::now() + Duration::from_secs(20);
-        while found.is_none() && Instant::now() < end {
-            Pacer::new(Pacing::Sleep).wait(&clock, None, &[to.as_fd()]).unwrap();
+        let end = clock.now() + PATIENCE;
+        while found.is_none() && clock.now() < end {
+            Pacer::new(Pacing::Sleep).wait(&clock, Some(end), &[to.as_fd()]).unwrap();
             to.receive(&mut buffers, &clock, |datagram| found = Some(datagram.ecn)).unwrap();
         }
         found.unwrap()
@@ -211,7 +232,7 @@ fn a_link_changes_when_it_is_told_and_one_that_is_not_there_is_counted() {
     right.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
     let mut bytes = [0; 8];
     let mut tries = 0;
-    while tries < 1000 && right.recv(&mut bytes).is_err() {
+    while tries < 3000 && right.recv(&mut bytes).is_err() {
         left.send_to(&1_u64.to_le_bytes(), relay.ports[1]).unwrap();
         tries += 1;
     }

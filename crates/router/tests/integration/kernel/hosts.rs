@@ -15,7 +15,7 @@ use nix::sched::{CloneFlags, unshare};
 use nix::unistd::gettid;
 
 /// What is waited for takes milliseconds; this is how long a machine may be busy with something else.
-pub(super) const PATIENCE: Duration = Duration::from_secs(20);
+pub(super) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A thread in a network namespace of its own. Sockets that it opens belong there, whoever uses them.
 pub(super) struct Host {
