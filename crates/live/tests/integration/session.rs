@@ -4,8 +4,8 @@ use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant as Wall};
 
 use cohaptic_live::session::{Conductor, LinkChange, Session, SessionConfig, Status};
-use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_peer::State;
+use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_realtime::Wishes;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
