@@ -3,7 +3,7 @@
 use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::AsFd as _;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -25,16 +25,21 @@ struct Running {
     control: Sender<Control>,
     stop: Arc<AtomicBool>,
     offered: Arc<AtomicU64>,
+    clients: Arc<AtomicUsize>,
     thread: JoinHandle<Report>,
 }
 
 fn start(config: RelayConfig, pacing: Pacing) -> Running {
-    let relay = Relay::bind(config, DoorConfig::default()).unwrap();
+    run(Relay::bind(config, DoorConfig::default()).unwrap(), pacing)
+}
+
+fn run(relay: Relay, pacing: Pacing) -> Running {
     let ports = relay.ports().map(|(_, address)| address).collect();
     let (control, changes) = channel();
     let stop = Arc::new(AtomicBool::new(false));
     let (is_over, offered) = (Arc::clone(&stop), Arc::new(AtomicU64::new(0)));
-    let shown = Arc::clone(&offered);
+    let clients = Arc::new(AtomicUsize::new(0));
+    let shown = (Arc::clone(&offered), Arc::clone(&clients));
     let options = RunOptions {
         pacing,
         wishes: Wishes::NONE,
@@ -43,10 +48,13 @@ fn start(config: RelayConfig, pacing: Pacing) -> Running {
         ..RunOptions::default()
     };
     let thread = std::thread::spawn(move || {
-        let look = |view: &View<'_>| shown.store(view.intake().offered, Ordering::Relaxed);
+        let look = |view: &View<'_>| {
+            shown.0.store(view.intake().offered, Ordering::Relaxed);
+            shown.1.store(view.clients(), Ordering::Relaxed);
+        };
         relay.run(&options, &changes, &is_over, look).unwrap()
     });
-    Running { ports, control, stop, offered, thread }
+    Running { ports, control, stop, offered, clients, thread }
 }
 
 impl Running {
@@ -227,6 +235,7 @@ fn a_link_changes_when_it_is_told_and_one_that_is_not_there_is_counted() {
     let relay = start(config, Pacing::Sleep);
     let set = |from, to| Control::SetLink { from: NodeId(from), to: NodeId(to), model: Box::new(link(&[])) };
     relay.control.send(set(0, 0)).unwrap();
+    relay.control.send(set(1, 1)).unwrap();
     relay.control.send(set(0, 1)).unwrap();
     // It is heard within 2 ms or as late as the machine likes: ask until it is.
     right.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
@@ -238,7 +247,31 @@ fn a_link_changes_when_it_is_told_and_one_that_is_not_there_is_counted() {
     }
     let report = relay.end();
     assert!(number(&bytes) == 1 && report.links[0].stats.delivered() > 0);
-    assert_eq!(report.refused_changes, 1);
+    assert_eq!(report.refused_changes, 2);
+}
+
+/// More wait at a port than are read at once. No time is let pass before all of them have been read, so that none is offered later than it came.
+#[test]
+fn what_waits_at_a_port_is_read_before_time_passes() {
+    const COUNT: u64 = 1000;
+    let (left, right) = (program("127.0.0.1:0"), program("127.0.0.1:0"));
+    let port = "127.0.0.1:0".parse().unwrap();
+    let place = |socket: &UdpSocket| Some(socket.local_addr().unwrap());
+    let config = mesh(&[("left", port, place(&left)), ("right", port, place(&right))], link(&["delay=1h"]), &[]);
+    let relay = Relay::bind(config, DoorConfig::default()).unwrap();
+    let (_, there) = relay.ports().nth(1).unwrap();
+    for sequence in 0..COUNT {
+        left.send_to(&sequence.to_le_bytes(), there).unwrap();
+    }
+    let relay = run(relay, Pacing::Sleep);
+    // The kernel may have had no room for some.
+    let end = Instant::now() + Duration::from_millis(300);
+    while Instant::now() < end && relay.offered.load(Ordering::Relaxed) < COUNT {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    relay.has_offered(1);
+    let report = relay.end();
+    assert_eq!((report.intake.clamped, report.clamped.count()), (0, 0), "{:?}", report.clamped.summary());
 }
 
 #[test]
@@ -280,4 +313,31 @@ fn clients_of_a_proxy_reach_the_server_and_get_their_answers() {
         assert_eq!(report.ports.iter().map(|port| port.name.as_str()).collect::<Vec<_>>(), ["listen", "clients"]);
         assert_eq!(report.ports[1].counts.received, 6);
     }
+}
+
+/// What the port of a client did is not forgotten with the client.
+#[test]
+fn a_client_that_has_left_is_still_in_the_report() {
+    let (server, client) = (program("127.0.0.1:0"), program("127.0.0.1:0"));
+    let to = server.local_addr().unwrap();
+    let proxy = Proxy { listen: "127.0.0.1:0".parse().unwrap(), to, forth: link(&[]), back: link(&[]), most_clients: 2 };
+    let limits = Limits { forget_after: Duration::from_millis(200), ..Limits::default() };
+    let relay = start(RelayConfig { seed: 1, form: Form::Proxy(proxy), limits, changes: Vec::new() }, Pacing::Sleep);
+    server.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
+    // One that is read so late that its sender is forgotten by then goes nowhere: ask until one arrives.
+    let mut bytes = [0; 8];
+    let arrived = (0..3000).any(|_| {
+        client.send_to(&[1; 8], relay.ports[0]).unwrap();
+        server.recv(&mut bytes).is_ok()
+    });
+    assert!(arrived);
+    // The first look after its datagram was read shows it, unless it has left by then.
+    relay.has_offered(1);
+    let end = Instant::now() + PATIENCE;
+    while relay.clients.load(Ordering::Relaxed) > 0 {
+        assert!(Instant::now() < end, "the client is not forgotten");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let report = relay.end();
+    assert!(report.ports[1].counts.sent >= 1, "{:?}", report.ports);
 }

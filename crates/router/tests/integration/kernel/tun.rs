@@ -27,6 +27,8 @@ fn v6(host: u16) -> IpAddr {
 fn hosts(text: &str) -> (Host, Host, Running) {
     let (left, right) = (Host::new(), Host::new());
     let running = Running::begin(&format!("{}{text}", sides(&left, &right)));
+    left.has(v6(1));
+    right.has(v6(2));
     (left, right, running)
 }
 
