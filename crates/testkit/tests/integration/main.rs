@@ -1,4 +1,6 @@
 //! Tests of the test kit.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, clippy::cast_possible_truncation, reason = "tests")]
 
+mod equivalence;
+mod nodes;
 mod sockets;
