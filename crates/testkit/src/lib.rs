@@ -9,6 +9,7 @@ mod artefacts;
 mod bed;
 mod context;
 mod core;
+mod file;
 mod host;
 mod link;
 pub mod node;
@@ -16,21 +17,28 @@ mod record;
 mod runtime;
 mod seed;
 mod socket;
+#[cfg(feature = "scenes")]
+mod scenes;
 #[cfg(feature = "strategies")]
 pub mod strategies;
 mod task;
 pub mod time;
 mod trace;
+mod words;
 
 pub use address::{AddressPlan, Addresses, ToSocketAddrs};
 pub use artefacts::{ARTEFACTS_VARIABLE, WriteError};
 pub use bed::{Bed, Testbed};
 pub use cohaptic_units::Instant;
 pub use cohaptic_wan as wan;
+pub use file::{LinkFile, LinkFileError};
 pub use host::Host;
 pub use link::ToLink;
 pub use record::Record;
+#[cfg(feature = "scenes")]
+pub use scenes::{check_scene, check_scenes};
 pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};
+pub use words::WordsError;
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};

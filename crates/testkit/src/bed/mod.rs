@@ -18,6 +18,7 @@ pub use running::Bed;
 use crate::artefacts::Artefacts;
 use crate::context::Running;
 use crate::core::{Clock, Core, Seen, Settings, Shared};
+use crate::file::{LinkChange, LinkFile};
 use crate::link::ToLink;
 use crate::record::Record;
 use crate::runtime::own::Executor;
@@ -51,6 +52,7 @@ pub struct Testbed {
     names: Vec<String>,
     every: LinkModel,
     links: BTreeMap<(usize, usize), LinkModel>,
+    changes: Vec<LinkChange>,
     seed: Option<u64>,
     settings: Settings,
     #[cfg(feature = "tokio")]
@@ -81,12 +83,23 @@ impl Testbed {
             names,
             every: LinkModel::default(),
             links: BTreeMap::new(),
+            changes: Vec::new(),
             seed: None,
             settings: Settings { receive_buffer: RECEIVE_BUFFER, traces: false, keeps_packets: false, patience: PATIENCE },
             #[cfg(feature = "tokio")]
             is_tokio: false,
             artefacts: None,
         }
+    }
+
+    /// The hosts and the links between them that a file says: see [`LinkFile`].
+    ///
+    /// # Panics
+    ///
+    /// If the file cannot be read or makes no sense, with the path, the place and the line.
+    #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
+    pub fn from_file(path: impl AsRef<std::path::Path>) -> Self {
+        LinkFile::read(path).unwrap_or_else(|error| panic!("{error}")).into()
     }
 
     /// The names of the hosts.
@@ -237,7 +250,8 @@ impl Testbed {
         settings.keeps_packets |= artefacts.is_wanted();
         settings.traces |= artefacts.is_wanted();
         let (every, links) = (&self.every, &self.links);
-        let core = Core::new(&self.names, seed.value, settings, |from, to| links.get(&(from, to)).unwrap_or(every).clone());
+        let mut core = Core::new(&self.names, seed.value, settings, |from, to| links.get(&(from, to)).unwrap_or(every).clone());
+        core.changes = self.changes.iter().cloned().collect();
         let mut recorded = None;
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             #[cfg(feature = "tokio")]
@@ -258,16 +272,30 @@ impl Testbed {
     }
 }
 
+impl From<LinkFile> for Testbed {
+    fn from(file: LinkFile) -> Self {
+        let LinkFile { hosts, every, links, changes, seed } = file;
+        let bed = Self::new(hosts);
+        Self { every, links, changes, seed, ..bed }
+    }
+}
+
 /// Checks the name of one more host.
 ///
 /// # Panics
 ///
 /// If it is none, or one of the others has it.
 pub(crate) fn check_name(others: &[String], name: &str) {
+    let fault = name_fault(name);
+    assert!(fault.is_none(), "{}", fault.unwrap_or_default());
+    assert!(!others.iter().any(|other| other == name), "two hosts are called `{name}`");
+}
+
+/// Why a text is no name of a host; `None` if it is one.
+pub(crate) fn name_fault(name: &str) -> Option<String> {
     let is_word =
         !name.is_empty() && !name.contains([':', '[', ']']) && !name.contains(char::is_whitespace) && name.parse::<std::net::IpAddr>().is_err();
-    assert!(is_word, "`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address");
-    assert!(!others.iter().any(|other| other == name), "two hosts are called `{name}`");
+    (!is_word).then(|| format!("`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address"))
 }
 
 /// Which of the hosts is called so.

@@ -7,6 +7,7 @@ mod sending;
 mod sockets;
 mod timers;
 
+use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 
@@ -20,6 +21,7 @@ pub(crate) use sockets::{Datagram, SocketId};
 pub(crate) use timers::TimerId;
 
 use crate::address::AddressPlan;
+use crate::file::LinkChange;
 use crate::trace::{Happening, Trace};
 use hosts::HostState;
 use sockets::Sockets;
@@ -44,6 +46,8 @@ pub(crate) struct Core {
     pub(crate) settings: Settings,
     pub(crate) recording: Recording,
     pub(crate) timers: Timers,
+    /// Links that become other ones, in order of time.
+    pub(crate) changes: VecDeque<LinkChange>,
     network: Network<Parcel>,
     hosts: Vec<HostState>,
     sockets: Sockets,
@@ -83,6 +87,7 @@ impl Core {
             recording: Recording::new(names.to_vec(), &settings),
             settings,
             timers: Timers::default(),
+            changes: VecDeque::new(),
             network: Network::new(config, |from, to| link(from.0 as usize, to.0 as usize)),
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),
@@ -95,7 +100,8 @@ impl Core {
 
     /// When the network or a timer wants to be woken.
     pub(crate) fn next_event(&self) -> Option<Instant> {
-        [self.network.poll_timeout(), self.timers.next()].into_iter().flatten().min()
+        let change = self.changes.front().map(|change| change.at);
+        [self.network.poll_timeout(), self.timers.next(), change].into_iter().flatten().min()
     }
 
     /// Lets time pass: what arrives until then arrives, and then timers go off.
@@ -103,6 +109,11 @@ impl Core {
         if now > self.now {
             self.now = now;
             self.asked = 0;
+        }
+        while self.changes.front().is_some_and(|change| change.at <= now) {
+            if let Some(change) = self.changes.pop_front() {
+                self.change_link(change);
+            }
         }
         if self.network.poll_timeout().is_some_and(|at| at <= self.now) {
             let passed = self.network.handle_timeout(self.now);
@@ -119,9 +130,14 @@ impl Core {
     }
 
     pub(crate) fn set_link(&mut self, from: usize, to: usize, link: LinkModel) {
-        let changed = self.network.set_link(self.now, node(from), node(to), link);
+        self.change_link(LinkChange { at: self.now, from, to, link });
+    }
+
+    fn change_link(&mut self, change: LinkChange) {
+        let LinkChange { at, from, to, link } = change;
+        let changed = self.network.set_link(at, node(from), node(to), link);
         debug_assert_eq!(changed, Ok(()), "hosts are checked, and time does not go back");
-        self.recording.note(self.now, Happening::Relinked(from, to));
+        self.recording.note(at, Happening::Relinked(from, to));
         self.take_arrivals();
     }
 

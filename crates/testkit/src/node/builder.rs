@@ -10,6 +10,7 @@ use cohaptic_wan::LinkModel;
 use super::{Node, NodeRun};
 use crate::bed::{check_name, place};
 use crate::core::Settings;
+use crate::file::{LinkChange, LinkFile};
 use crate::link::ToLink;
 use crate::record::Record;
 use crate::seed::Seed;
@@ -21,6 +22,8 @@ pub struct Nodes {
     pub(super) nodes: Vec<Box<dyn Node>>,
     every: LinkModel,
     links: BTreeMap<(usize, usize), LinkModel>,
+    /// In order of time.
+    pub(super) changes: Vec<LinkChange>,
     seed: Option<u64>,
     pub(super) settings: Settings,
     pub(super) time_limit: Duration,
@@ -47,6 +50,7 @@ impl Nodes {
             nodes: Vec::new(),
             every: LinkModel::default(),
             links: BTreeMap::new(),
+            changes: Vec::new(),
             seed: None,
             settings: Settings { receive_buffer: 0, traces: false, keeps_packets: false, patience: PATIENCE },
             time_limit: TIME_LIMIT,
@@ -96,6 +100,21 @@ impl Nodes {
     pub fn link_both(self, one: &str, other: &str, link: impl ToLink) -> Self {
         let model = link.to_link();
         self.link(one, other, &model).link(other, one, &model)
+    }
+
+    /// All links, what becomes of them, and the seed, as a file says: see [`LinkFile`]. Its hosts are nodes that have been added.
+    ///
+    /// # Panics
+    ///
+    /// If the file cannot be read or makes no sense, with the path, the place and the line; if one of its hosts is no node.
+    #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
+    pub fn links_from_file(self, path: impl AsRef<std::path::Path>) -> Self {
+        let file = LinkFile::read(path).unwrap_or_else(|error| panic!("{error}"));
+        let LinkFile { hosts, every, links, changes, seed } = file;
+        let places: Vec<usize> = hosts.iter().map(|host| place(&self.names, host)).collect();
+        let links = links.into_iter().map(|((from, to), link)| ((places[from], places[to]), link)).collect();
+        let changes = changes.into_iter().map(|change| LinkChange { from: places[change.from], to: places[change.to], ..change }).collect();
+        Self { every, links, changes, seed: seed.or(self.seed), ..self }
     }
 
     /// The seed of all chance in the links, unless the environment says another one ([`SEED_VARIABLE`](crate::SEED_VARIABLE)). Without it, the seed is made of

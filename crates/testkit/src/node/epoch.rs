@@ -30,7 +30,6 @@ impl Epoch {
 
     /// The instant in the time of the run; its beginning if it was before.
     #[must_use]
-    #[expect(clippy::wrong_self_convention, reason = "the other direction of `to_std`")]
     pub fn from_std(self, at: StdInstant) -> Instant {
         Instant::ZERO.saturating_add(at.saturating_duration_since(self.0))
     }

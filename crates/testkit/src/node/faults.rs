@@ -3,6 +3,8 @@
 use std::any::Any;
 use std::fmt;
 
+use cohaptic_wan::LinkModel;
+
 use super::run::is_another;
 use super::{Node, NodeRun};
 use crate::bed::place;
@@ -58,11 +60,15 @@ impl NodeRun {
         let (from_place, to_place) = (place(&self.names, from), place(&self.names, to));
         assert!(from_place != to_place, "node `{from}` has no link to itself");
         self.ask_touched();
-        let changed = self.network.set_link(self.now, network_node(from_place), network_node(to_place), link.to_link());
-        debug_assert_eq!(changed, Ok(()), "nodes are checked, and time does not go back");
-        self.recording.note(self.now, Happening::Relinked(from_place, to_place));
-        self.take_events();
+        self.change_link(from_place, to_place, link.to_link());
         self.hand_over();
+    }
+
+    pub(super) fn change_link(&mut self, from: usize, to: usize, link: LinkModel) {
+        let changed = self.network.set_link(self.now, network_node(from), network_node(to), link);
+        debug_assert_eq!(changed, Ok(()), "nodes are checked, and time does not go back");
+        self.recording.note(self.now, Happening::Relinked(from, to));
+        self.take_events();
     }
 
     /// The node is gone, at once, and given back. What it has sent is on its way still; what arrives for it is lost.

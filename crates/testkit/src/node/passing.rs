@@ -26,6 +26,11 @@ impl NodeRun {
             self.now = at;
             self.done = 0;
         }
+        while self.changes.front().is_some_and(|change| change.at <= at) {
+            if let Some(change) = self.changes.pop_front() {
+                self.change_link(change.from, change.to, change.link);
+            }
+        }
         if self.network.poll_timeout().is_some_and(|at| at <= self.now) {
             let passed = self.network.handle_timeout(self.now);
             debug_assert_eq!(passed, Ok(()), "time does not go back");

@@ -14,6 +14,7 @@ use super::deadlines::Deadlines;
 use super::{Node, Nodes, Packet};
 use crate::artefacts::Artefacts;
 use crate::bed::place;
+use crate::file::LinkChange;
 use crate::core::{Recording, follow_to_the_end, network_node, seen};
 use crate::record::Record;
 use crate::seed::Seed;
@@ -29,6 +30,8 @@ pub struct NodeRun {
     pub(super) nodes: Vec<Option<Box<dyn Node>>>,
     pub(super) up: Vec<bool>,
     pub(super) network: Network<Parcel>,
+    /// Links that become other ones, in order of time.
+    pub(super) changes: VecDeque<LinkChange>,
     pub(super) now: Instant,
     pub(super) deadlines: Deadlines,
     /// By sender, then receiver: whether the way is cut.
@@ -80,7 +83,7 @@ pub struct NodeCounts {
 
 impl NodeRun {
     pub(super) fn new(nodes: Nodes, seed: Seed, link: impl Fn(usize, usize) -> LinkModel) -> Self {
-        let Nodes { names, nodes, mut settings, time_limit, artefacts, .. } = nodes;
+        let Nodes { names, nodes, changes, mut settings, time_limit, artefacts, .. } = nodes;
         let artefacts = Artefacts::new(artefacts, &seed);
         settings.traces |= artefacts.is_wanted();
         settings.keeps_packets |= artefacts.is_wanted();
@@ -89,6 +92,7 @@ impl NodeRun {
         let mut run = Self {
             nodes: nodes.into_iter().map(Some).collect(),
             network: Network::new(config, |from, to| link(from.0 as usize, to.0 as usize)),
+            changes: changes.into(),
             now: Instant::ZERO,
             up: vec![true; count],
             deadlines: Deadlines::new(count),
@@ -279,7 +283,8 @@ impl NodeRun {
     }
 
     fn next(&self) -> Option<Instant> {
-        [self.network.poll_timeout(), self.deadlines.next()].into_iter().flatten().min()
+        let change = self.changes.front().map(|change| change.at);
+        [self.network.poll_timeout(), self.deadlines.next(), change].into_iter().flatten().min()
     }
 }
 
