@@ -15,10 +15,10 @@ mod link;
 pub mod node;
 mod record;
 mod runtime;
-mod seed;
-mod socket;
 #[cfg(feature = "scenes")]
 mod scenes;
+mod seed;
+mod socket;
 #[cfg(feature = "strategies")]
 pub mod strategies;
 mod task;
@@ -40,5 +40,5 @@ pub use scenes::{check_scene, check_scenes};
 pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};
-pub use words::WordsError;
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
+pub use words::WordsError;

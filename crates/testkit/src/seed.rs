@@ -25,9 +25,8 @@ impl Seed {
 
     #[expect(clippy::panic, reason = "a test that is not run with the seed that was asked for is worse than none")]
     fn of(environment: Option<&str>, said: Option<u64>, test: &str) -> Self {
-        let asked = environment.map(|text| {
-            number(text).unwrap_or_else(|| panic!("{SEED_VARIABLE} is `{text}`; expected a number from 0 to {}", u64::MAX))
-        });
+        let asked =
+            environment.map(|text| number(text).unwrap_or_else(|| panic!("{SEED_VARIABLE} is `{text}`; expected a number from 0 to {}", u64::MAX)));
         Self { value: asked.or(said).unwrap_or_else(|| hash(test.as_bytes())), test: test.to_owned() }
     }
 

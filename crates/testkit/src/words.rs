@@ -138,8 +138,8 @@ impl Reader {
                     return Err((whole, "a host has no link to itself: expected two hosts".to_owned()));
                 }
                 let link = link(line, &rest, file)?;
-                let is_known = self.links.insert(pair, link.clone()).is_some()
-                    || arrow == "<->" && self.links.insert((pair.1, pair.0), link).is_some();
+                let is_known =
+                    self.links.insert(pair, link.clone()).is_some() || arrow == "<->" && self.links.insert((pair.1, pair.0), link).is_some();
                 if is_known { Err(twice(&whole, "this link")) } else { Ok(()) }
             }
             _ => Err((begin..colon.max(begin + 1), "expected `a -> b`, `a <-> b`, `all`, `hosts` or `seed` before the colon".to_owned())),

@@ -56,7 +56,10 @@ fn all_scenes_of_a_folder_are_checked_whatever_came_before() {
     write("b.toml", &format!("{SCENE}\nexpect = {{ stable = true }}\n"));
     write("c.toml", SCENE);
     let text = message(|| check_scenes(base.path()));
-    assert!(text.starts_with("of 3 scenes 2 failed:\n") && text.contains("a.toml:1:9: scene: ") && text.contains("c.toml: nothing was compared"), "{text}");
+    assert!(
+        text.starts_with("of 3 scenes 2 failed:\n") && text.contains("a.toml:1:9: scene: ") && text.contains("c.toml: nothing was compared"),
+        "{text}"
+    );
     fs::remove_file(base.path().join("a.toml")).unwrap();
     fs::remove_file(base.path().join("c.toml")).unwrap();
     check_scenes(base.path());

@@ -14,8 +14,8 @@ use super::deadlines::Deadlines;
 use super::{Node, Nodes, Packet};
 use crate::artefacts::Artefacts;
 use crate::bed::place;
-use crate::file::LinkChange;
 use crate::core::{Recording, follow_to_the_end, network_node, seen};
+use crate::file::LinkChange;
 use crate::record::Record;
 use crate::seed::Seed;
 
@@ -170,9 +170,7 @@ impl NodeRun {
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
         let (from_place, to_place) = (place(&self.names, from), place(&self.names, to));
-        self.network
-            .link_stats(network_node(from_place), network_node(to_place))
-            .unwrap_or_else(|| panic!("node `{from}` has no link to itself"))
+        self.network.link_stats(network_node(from_place), network_node(to_place)).unwrap_or_else(|| panic!("node `{from}` has no link to itself"))
     }
 
     /// When something happens next; `None` if nothing will.

@@ -41,15 +41,8 @@ fn log(folder: &Path, name: &str) -> FateLog {
     FateLog::parse(&fs::read_to_string(folder.join(name)).unwrap()).unwrap()
 }
 
-const FILES: [&str; 7] = [
-    "fates-a-to-b.csv",
-    "fates-b-to-a.csv",
-    "links.txt",
-    "packets-a-to-b.pcapng",
-    "packets-b-to-a.pcapng",
-    "summary.txt",
-    "trace.txt",
-];
+const FILES: [&str; 7] =
+    ["fates-a-to-b.csv", "fates-b-to-a.csv", "links.txt", "packets-a-to-b.pcapng", "packets-b-to-a.pcapng", "summary.txt", "trace.txt"];
 
 #[test]
 fn a_run_that_fails_leaves_all_that_happened() {
@@ -74,7 +67,10 @@ fn a_run_that_fails_leaves_all_that_happened() {
     let lost = logs[0].records().iter().filter(|record| record.fate == Fate::Dropped(DropCause::Loss)).count();
     let copied = logs[0].records().iter().filter(|record| record.fate == Fate::Duplicated).count();
     let line = format!("  a -> b: 50 packets, {} arrived, {copied} copied, {lost} lost (loss)\n", 50 + copied - lost);
-    assert!(summary.contains(&line) && summary.contains("which ended at 0.05 s") && summary.contains("COHAPTIC_TEST_SEED=5 runs it again"), "{summary}");
+    assert!(
+        summary.contains(&line) && summary.contains("which ended at 0.05 s") && summary.contains("COHAPTIC_TEST_SEED=5 runs it again"),
+        "{summary}"
+    );
     // As long as a capture has frames: one for each record.
     let capture = fs::read(folder.join("packets-a-to-b.pcapng")).unwrap();
     assert_eq!(frames(&capture), logs[0].records().len());
@@ -175,7 +171,9 @@ fn nodes_leave_the_same_when_the_test_fails_while_they_run() {
     // At 0, 1, ... 30 ms.
     let log = log(&folder, "fates-a-to-b.csv");
     assert_eq!(log.packets(), 31);
-    assert!(log.records().iter().all(|record| record.fate == Fate::Dropped(DropCause::Loss) || record.at == record.offered + Duration::from_millis(24)));
+    assert!(
+        log.records().iter().all(|record| record.fate == Fate::Dropped(DropCause::Loss) || record.at == record.offered + Duration::from_millis(24))
+    );
 }
 
 #[test]
@@ -189,7 +187,10 @@ fn a_host_that_did_not_hear_a_packet_is_in_the_trace_and_not_in_the_fates() {
         socket.send_to(b"two", "b:7").await.unwrap();
         time::sleep(Duration::from_millis(20)).await;
     });
-    assert_eq!(record.fates("a", "b").records().iter().map(|record| record.fate).collect::<Vec<_>>(), [Fate::Delivered(Instant::from_nanos(5_000_000))]);
+    assert_eq!(
+        record.fates("a", "b").records().iter().map(|record| record.fate).collect::<Vec<_>>(),
+        [Fate::Delivered(Instant::from_nanos(5_000_000))]
+    );
     let lost = record.trace().events().iter().filter(|event| matches!(event.what, Happening::Lost { .. })).count();
     assert_eq!(lost, 2);
     let replayed = LinkModel::Replay(std::sync::Arc::new(record.fates("a", "b")));
@@ -223,7 +224,10 @@ fn the_environment_asks_for_the_artefacts_of_every_test_that_fails_and_sets_its_
     let [name] = &names(&base.path().join("all"))[..] else { panic!("one folder is expected") };
     assert!(name == "artefacts__fails_in_a_child_of_this_process_only" || name == "main", "{name}");
     let folder = base.path().join("all").join(name);
-    assert!(said.contains(&format!("what happened is in {}\n", folder.display())) && said.contains("seed 77; COHAPTIC_TEST_SEED=77 runs it again"), "{said}");
+    assert!(
+        said.contains(&format!("what happened is in {}\n", folder.display())) && said.contains("seed 77; COHAPTIC_TEST_SEED=77 runs it again"),
+        "{said}"
+    );
     assert_eq!(names(&folder), FILES);
     assert!(fs::read_to_string(folder.join("summary.txt")).unwrap().contains("Its seed was 77:"));
 }

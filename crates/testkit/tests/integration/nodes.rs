@@ -203,7 +203,8 @@ fn at_one_instant_packets_come_before_timers_and_late_timers_go_off_now() {
     let b = Watch { wakes: [ms(5), ms(5), ms(2)].into(), ..Watch::default() };
     let mut run = Nodes::new().add("a", a).add("b", b).links("delay 5ms").start();
     run.run_until_idle();
-    let packet = Packet { from: "[fd00::1]:7".parse().unwrap(), to: "[fd00::2]:9".parse().unwrap(), bytes: Bytes::from_static(b"six"), marked: false };
+    let packet =
+        Packet { from: "[fd00::1]:7".parse().unwrap(), to: "[fd00::2]:9".parse().unwrap(), bytes: Bytes::from_static(b"six"), marked: false };
     assert_eq!(packet.from_place(), 0);
     assert_eq!(run.node::<Watch>("b").seen, [(ms(5), Some(packet)), (ms(5), None), (ms(5), None), (ms(5), None)]);
 }
@@ -226,7 +227,8 @@ fn a_link_that_damages_packets_does_so() {
     let mut run = Nodes::new().add("a", Watch { sends, ..Watch::default() }).add("b", Watch::default()).links(link).seed(3).start();
     run.run_until_idle();
     let flipped = |packet: &Packet| packet.bytes.iter().map(|byte| byte.count_ones()).sum::<u32>();
-    let damaged: Vec<u32> = run.node::<Watch>("b").seen.iter().filter_map(|(_, packet)| Some(flipped(packet.as_ref()?)).filter(|bits| *bits > 0)).collect();
+    let damaged: Vec<u32> =
+        run.node::<Watch>("b").seen.iter().filter_map(|(_, packet)| Some(flipped(packet.as_ref()?)).filter(|bits| *bits > 0)).collect();
     assert_eq!(damaged.len() as u64, run.link_stats("a", "b").damaged());
     assert!(!damaged.is_empty() && damaged.len() < 50 && damaged.iter().all(|bits| *bits == 3));
 }
