@@ -11,6 +11,8 @@ mod context;
 mod core;
 mod host;
 mod link;
+#[cfg(feature = "quinn")]
+pub mod quinn;
 mod runtime;
 mod seed;
 mod socket;

@@ -1,6 +1,8 @@
 //! The hosts, their sockets and the network between them, as one state machine: it is told the time.
 
 mod arrival;
+#[cfg(feature = "quinn")]
+mod entropy;
 mod hosts;
 mod recording;
 mod sending;
@@ -32,6 +34,8 @@ pub(crate) struct Settings {
     pub(crate) receive_buffer: usize,
     /// Whether what happens is recorded.
     pub(crate) traces: bool,
+    /// Whether what packets carry is part of that.
+    pub(crate) digests: bool,
     /// Whether packets are recorded, with what they carry.
     pub(crate) keeps_packets: bool,
     /// How often tasks may be polled, or the time asked, at one instant.
@@ -44,6 +48,8 @@ pub(crate) struct Core {
     pub(crate) settings: Settings,
     pub(crate) recording: Recording,
     pub(crate) timers: Timers,
+    #[cfg(feature = "quinn")]
+    pub(crate) entropy: entropy::Entropy,
     network: Network<Parcel>,
     hosts: Vec<HostState>,
     sockets: Sockets,
@@ -63,6 +69,8 @@ pub(crate) struct Parcel {
     from: std::net::SocketAddr,
     to: std::net::SocketAddr,
     bytes: Bytes,
+    /// Whether its sender understands marks.
+    ecn_capable: bool,
     kind: Kind,
 }
 
@@ -83,6 +91,8 @@ impl Core {
             recording: Recording::new(names.to_vec(), &settings),
             settings,
             timers: Timers::default(),
+            #[cfg(feature = "quinn")]
+            entropy: entropy::Entropy::new(seed),
             network: Network::new(config, |from, to| link(from.0 as usize, to.0 as usize)),
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),
