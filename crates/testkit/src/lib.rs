@@ -24,6 +24,7 @@ mod trace;
 
 pub use address::{AddressPlan, Addresses, ToSocketAddrs};
 pub use bed::{Bed, Testbed};
+pub use cohaptic_units as units;
 pub use cohaptic_units::Instant;
 pub use cohaptic_wan as wan;
 pub use host::Host;
@@ -32,3 +33,6 @@ pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
+
+#[cfg(feature = "strategies")]
+pub use proptest;

@@ -1,5 +1,7 @@
 //! The virtual UDP socket.
 
+mod options;
+
 use std::fmt;
 use std::future::poll_fn;
 use std::io;
@@ -23,12 +25,14 @@ use crate::core::{Datagram, Outgoing, Shared, SocketId};
 /// - A datagram counts in its link with the bytes that it carries. Headers are counted where the link's `overhead` (the second word of `rate`) says so.
 /// - A datagram that finds the buffer of the socket full is lost: see [`Testbed::receive_buffer`](crate::Testbed::receive_buffer). One that is longer than the
 ///   buffer given to receive it is cut off, as with Linux.
-/// - If no socket is at the port of the peer, a connected socket gets [`io::ErrorKind::ConnectionRefused`], once the answer has come back over the link.
+/// - If no socket is at the port of the peer, a connected socket gets [`io::ErrorKind::ConnectionRefused`], once the answer has come back over the
+///   link: by what is called next, or by what waits to receive.
 /// - A socket at `[::]` hears IPv6 only.
 /// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out.
 pub struct UdpSocket {
     shared: Arc<Shared>,
     id: SocketId,
+    options: options::Options,
 }
 
 impl UdpSocket {
@@ -57,7 +61,7 @@ impl UdpSocket {
         }
         let id = core.bind(host, address)?;
         drop(core);
-        Ok(Self { shared, id })
+        Ok(Self { shared, id, options: options::Options::default() })
     }
 
     /// The address at which it is bound.
@@ -150,6 +154,7 @@ impl UdpSocket {
     }
 
     pub(crate) fn send_now(&self, to: Option<SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<usize> {
+        let ecn_capable = ecn_capable || self.options.is_ecn_capable();
         let outgoing = Outgoing { to, bytes: Bytes::copy_from_slice(bytes), ecn_capable };
         self.shared.lock().send(self.id, outgoing)?;
         Ok(bytes.len())

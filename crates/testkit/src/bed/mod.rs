@@ -153,6 +153,12 @@ impl Testbed {
         self
     }
 
+    /// Records what happens, for [`Bed::trace`].
+    pub const fn traced(mut self) -> Self {
+        self.settings.traces = true;
+        self
+    }
+
     /// Runs the program on tokio, whose clock is paused: for programs that use tokio's timers and tasks. Otherwise an executor of this crate runs it.
     ///
     /// Packets arrive, and [`time`](crate::time) goes off, to the nanosecond all the same. Tokio's own timers are rounded up to the next millisecond since the run

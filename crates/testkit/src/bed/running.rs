@@ -16,7 +16,7 @@ use crate::core::Shared;
 use crate::host::Host;
 use crate::link::ToLink;
 use crate::task::JoinHandle;
-use crate::trace::Happening;
+use crate::trace::{Happening, Trace};
 
 /// The test bed as a running program sees it.
 #[derive(Clone)]
@@ -142,6 +142,12 @@ impl Bed {
         let mut core = self.shared.lock();
         let now = core.now;
         core.recording.note(now, Happening::Note(text.to_string()));
+    }
+
+    /// What has happened so far, if it is recorded: in [`Testbed::run_twice`](crate::Testbed::run_twice) and with [`Testbed::traced`](crate::Testbed::traced).
+    #[must_use]
+    pub fn trace(&self) -> Trace {
+        self.shared.lock().recording.trace().clone()
     }
 
     fn set_cut(&self, from: &str, to: &str, cut: bool) {

@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use cohaptic_units::Instant;
-
 use super::{Core, SocketId};
 use crate::address::Addresses;
 use crate::trace::Happening;

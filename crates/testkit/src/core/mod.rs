@@ -61,6 +61,9 @@ pub(crate) struct Core {
     woken: Vec<Waker>,
     /// How often the time was asked since it last passed.
     asked: u64,
+    /// How often tasks were polled since it last passed, as far as they are counted here.
+    #[cfg(feature = "tokio")]
+    polled: u64,
 }
 
 /// What travels.
@@ -100,6 +103,8 @@ impl Core {
             offered: vec![0; names.len() * names.len()],
             woken: Vec::new(),
             asked: 0,
+            #[cfg(feature = "tokio")]
+            polled: 0,
         }
     }
 
@@ -113,6 +118,10 @@ impl Core {
         if now > self.now {
             self.now = now;
             self.asked = 0;
+            #[cfg(feature = "tokio")]
+            {
+                self.polled = 0;
+            }
         }
         if self.network.poll_timeout().is_some_and(|at| at <= self.now) {
             let passed = self.network.handle_timeout(self.now);
@@ -126,6 +135,13 @@ impl Core {
     pub(crate) fn ask_time(&mut self) -> Option<Instant> {
         self.asked += 1;
         (self.asked <= self.settings.patience.saturating_mul(10)).then_some(self.now)
+    }
+
+    /// A task is polled; says whether time has stood still for too long.
+    #[cfg(feature = "tokio")]
+    pub(crate) const fn count_poll(&mut self) -> bool {
+        self.polled += 1;
+        self.polled > self.settings.patience
     }
 
     pub(crate) fn set_link(&mut self, from: usize, to: usize, link: LinkModel) {
@@ -191,9 +207,12 @@ impl Shared {
             Clock::Own => {}
             #[cfg(feature = "tokio")]
             Clock::Tokio { origin } => {
-                let now = Instant::ZERO + origin.elapsed();
-                if now > core.now {
-                    core.pass(now);
+                // Once the run is over, tokio's clock is that of the machine.
+                if tokio::runtime::Handle::try_current().is_ok() {
+                    let now = Instant::ZERO + origin.elapsed();
+                    if now > core.now {
+                        core.pass(now);
+                    }
                 }
             }
         }

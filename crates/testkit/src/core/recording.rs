@@ -44,6 +44,11 @@ impl Recording {
         }
     }
 
+    /// What happened so far.
+    pub(crate) const fn trace(&self) -> &Trace {
+        &self.trace
+    }
+
     /// What was recorded.
     pub(crate) fn take(&mut self) -> (Trace, Vec<Seen>) {
         let hosts = self.trace.hosts().to_vec();

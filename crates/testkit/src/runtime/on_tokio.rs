@@ -26,7 +26,7 @@ use std::time::Duration;
 use cohaptic_units::Instant;
 use tokio::task::LocalSet;
 
-use super::own::nothing_will_happen;
+use super::own::{nothing_will_happen, time_stands_still};
 use crate::bed::{Bed, Recorded, Recorder};
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
@@ -96,6 +96,7 @@ fn step(now: Instant, next: Option<Instant>) -> Option<Instant> {
 
 /// Starts tasks in a set of tokio's that stays on this thread.
 struct Local {
+    shared: Arc<Shared>,
     set: Rc<LocalSet>,
     panic: Rc<RefCell<Panic>>,
 }
@@ -109,10 +110,18 @@ struct Panic {
 
 impl Spawner for Local {
     fn start(&self, task: Rc<Task>) {
-        let panic = Rc::clone(&self.panic);
+        let (panic, shared) = (Rc::clone(&self.panic), Arc::clone(&self.shared));
         self.set.spawn_local(poll_fn(move |cx| {
             // Tokio would keep a panic for whoever joins the task; a test is to fail.
-            catch_unwind(AssertUnwindSafe(|| task.poll(cx))).unwrap_or_else(|payload| {
+            let poll = || {
+                let is_too_often = shared.lock().count_poll();
+                if is_too_often {
+                    let patience = shared.lock().settings.patience;
+                    time_stands_still(&shared, patience, Some(&task));
+                }
+                task.poll(cx)
+            };
+            catch_unwind(AssertUnwindSafe(poll)).unwrap_or_else(|payload| {
                 let mut panic = panic.borrow_mut();
                 panic.payload.get_or_insert(payload);
                 panic.main.take().into_iter().for_each(Waker::wake);
@@ -159,7 +168,7 @@ where
     drop(guard);
     let panic = Rc::new(RefCell::new(Panic::default()));
     let set = Rc::new(LocalSet::new());
-    let tasks = Rc::new(Tasks::new(Box::new(Local { set: Rc::clone(&set), panic: Rc::clone(&panic) }), hosts));
+    let tasks = Rc::new(Tasks::new(Box::new(Local { shared: Arc::clone(&shared), set: Rc::clone(&set), panic: Rc::clone(&panic) }), hosts));
     let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     let _ = known.set(Arc::clone(&shared));

@@ -113,20 +113,30 @@ impl Executor {
         true
     }
 
-    #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
+    /// Gives up, because time does not pass.
     fn give_up(&self, shared: &Shared, polls: u64) -> ! {
-        let (now, hosts) = {
-            let core = shared.lock();
-            (core.now, core.plan.names().to_vec())
-        };
         let slot = self.slots.borrow()[self.last.get()].clone();
-        let who = slot.map_or_else(|| "a task that is over now".to_owned(), |slot| Named { task: &slot.task, hosts: &hosts }.to_string());
-        panic!(
-            "time stands still at {} s: tasks were polled {polls} times without waiting for it to pass, {who} the last. It wakes itself, or others, again and \
-             again: let it wait for a socket or a `sleep`",
-            Seconds(now)
-        );
+        time_stands_still(shared, polls, slot.as_ref().map(|slot| &*slot.task))
     }
+}
+
+/// Tells that time does not pass, because tasks are polled again and again.
+///
+/// # Panics
+///
+/// Always.
+#[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
+pub(crate) fn time_stands_still(shared: &Shared, polls: u64, last: Option<&Task>) -> ! {
+    let (now, hosts) = {
+        let core = shared.lock();
+        (core.now, core.plan.names().to_vec())
+    };
+    let who = last.map_or_else(|| "a task that is over now".to_owned(), |task| Named { task, hosts: &hosts }.to_string());
+    panic!(
+        "time stands still at {} s: tasks were polled {polls} times without waiting for it to pass, {who} the last. It wakes itself, or others, again and again: let \
+         it wait for a socket or a `sleep`",
+        Seconds(now)
+    );
 }
 
 /// Tells that nothing will ever happen any more.

@@ -1,6 +1,11 @@
 //! Tests of the test kit.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, clippy::missing_panics_doc, reason = "tests")]
 
+mod faults;
+mod like_tokio;
+mod misuse;
 #[cfg(feature = "quinn")]
 mod quic;
 mod sockets;
+#[cfg(feature = "strategies")]
+mod strategies;

@@ -47,3 +47,61 @@ fn tokios_own_timers_are_rounded_up_and_packets_are_not() {
     });
     assert_eq!((slept, arrived), (Duration::from_millis(2), Duration::from_micros(1300)));
 }
+
+#[test]
+fn what_may_be_marked_is_not_dropped() {
+    let heard = pair().links("delay 1ms loss 100% ecn").run_twice(|bed| async move {
+        let (a, b) = (bed.host("a").bind("0.0.0.0:0").unwrap(), bed.host("b").bind("0.0.0.0:5").unwrap());
+        a.send_to(b"dropped", "b:5").await.unwrap();
+        a.set_tos_v4(0b10).unwrap();
+        a.send_to(b"marked", "b:5").await.unwrap();
+        let mut buffer = [0; 10];
+        let len = b.recv(&mut buffer).await.unwrap();
+        assert_eq!(bed.link_stats("a", "b").marked(), 1);
+        buffer[..len].to_vec()
+    });
+    assert_eq!(heard, b"marked");
+}
+
+#[test]
+fn bits_that_the_link_flips_are_flipped_in_what_arrives() {
+    use cohaptic_testkit::wan::{Chance, Checksum, Corruption, Flips, LinkConfig};
+    let bits = Flips::Bits { packets: Chance::independent(cohaptic_testkit::units::Probability::ONE), count: 3 };
+    let corruption = |checksum| LinkConfig { corruption: Some(Corruption { bits, within: None, checksum }), ..LinkConfig::default() };
+    let flipped = pair().link("a", "b", corruption(Checksum::Passes)).run_twice(|bed| async move {
+        let (a, b) = (bed.host("a").bind("0.0.0.0:0").unwrap(), bed.host("b").bind("0.0.0.0:5").unwrap());
+        a.send_to(&[0; 100], "b:5").await.unwrap();
+        let mut buffer = [0; 100];
+        assert_eq!(b.recv(&mut buffer).await.unwrap(), 100);
+        buffer.iter().map(|byte| byte.count_ones()).sum::<u32>()
+    });
+    assert_eq!(flipped, 3);
+}
+
+#[test]
+fn a_broadcast_reaches_all_others_and_only_with_leave() {
+    let bed = Testbed::new(["a", "b", "c"]).link("a", "c", "delay 5ms");
+    bed.run_twice(|bed| async move {
+        let sockets: Vec<_> = bed.hosts().iter().map(|host| host.bind("0.0.0.0:5").unwrap()).collect();
+        let refused = sockets[0].send_to(b"all", "255.255.255.255:5").await.unwrap_err();
+        assert_eq!(refused.kind(), std::io::ErrorKind::PermissionDenied);
+        sockets[0].set_broadcast(true).unwrap();
+        sockets[0].send_to(b"all", "255.255.255.255:5").await.unwrap();
+        assert_eq!(sockets[1].recv_from_at(&mut [0; 3]).await.unwrap(), (3, "10.0.0.1:5".parse().unwrap(), bed.now()));
+        sockets[2].recv(&mut [0; 3]).await.unwrap();
+        assert_eq!(bed.now().as_nanos(), 5_000_000);
+        assert!(sockets[0].try_recv(&mut [0; 3]).is_err());
+    });
+}
+
+#[test]
+fn what_is_on_its_way_at_the_end_stays_there() {
+    for bed in [pair().links("delay 1us"), pair().links("delay 1us").on_tokio()] {
+        bed.run_twice(|bed| async move {
+            let a = bed.host("a").bind("0.0.0.0:0").unwrap();
+            // The machine takes longer than a microsecond to end the run; that time does not count.
+            a.send_to(b"never arrives", "b:5").await.unwrap();
+            drop(bed.spawn(async move { a.recv(&mut [0; 1]).await }));
+        });
+    }
+}

@@ -1,0 +1,142 @@
+//! Misuse is told, with the way out.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+use cohaptic_testkit::{Bed, Testbed, UdpSocket, time};
+
+fn bed() -> Testbed {
+    Testbed::new(["a", "b"]).links("delay 1ms").seed(1)
+}
+
+/// What it says when it gives up.
+fn complaint(act: impl FnOnce()) -> String {
+    let payload = catch_unwind(AssertUnwindSafe(act)).expect_err("it gives up");
+    payload.downcast_ref::<String>().cloned().or_else(|| payload.downcast_ref::<&str>().map(|text| (*text).to_owned())).unwrap()
+}
+
+fn says(act: impl FnOnce(), parts: &[&str]) {
+    let text = complaint(act);
+    for part in parts {
+        assert!(text.contains(part), "no {part:?} in {text:?}");
+    }
+}
+
+#[test]
+fn a_task_that_spins_is_named() {
+    for bed in [bed().patience(1000), bed().patience(1000).on_tokio()] {
+        let spin = |bed: Bed| async move {
+            time::sleep(Duration::from_millis(7)).await;
+            drop(bed.host("b").spawn(async {
+                loop {
+                    time::yield_now().await;
+                }
+            }));
+            time::sleep(Duration::from_secs(1)).await;
+        };
+        says(|| bed.run(spin), &["time stands still at 0.007 s", "host `b`", "misuse.rs:", "let it wait for a socket or a `sleep`"]);
+    }
+}
+
+#[test]
+fn asking_for_the_time_does_not_let_it_pass() {
+    for bed in [bed().patience(1000), bed().patience(1000).on_tokio()] {
+        let wait = |_| async {
+            let begin = time::now();
+            while time::now() < begin + Duration::from_millis(1) {}
+        };
+        says(|| bed.run(wait), &["time stands still at 0 s", "asked for again and again", "`sleep(..).await` lets it pass"]);
+    }
+}
+
+#[test]
+fn who_waits_for_what_never_comes_is_named() {
+    for bed in [bed(), bed().on_tokio()] {
+        let wait = |bed: Bed| async move {
+            time::sleep(Duration::from_micros(1500)).await;
+            let socket = bed.host("a").bind("0.0.0.0:1").unwrap();
+            let task = bed.host("a").spawn(async move { socket.recv(&mut [0; 1]).await });
+            task.await.unwrap().unwrap();
+        };
+        says(|| bed.run(wait), &["nothing will ever happen after ", "host `a`", "misuse.rs:", "A lost packet needs a `timeout`"]);
+    }
+}
+
+#[test]
+fn test_beds_and_runtimes_are_not_nested() {
+    says(|| bed().run(|_| async { bed().run(|_| async {}) }), &["a test bed runs inside another one", "Give both programs hosts of one test bed"]);
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    says(|| runtime.block_on(async { bed().on_tokio().run(|_| async {}) }), &["brings its own runtime", "`#[test]` in place of `#[tokio::test]`"]);
+    // After a failure the next one runs.
+    bed().run(|_| async { time::sleep(Duration::from_secs(1)).await });
+}
+
+#[test]
+fn outside_of_a_test_bed_nothing_can_be_bound_and_no_time_passes() {
+    says(|| drop(time::sleep(Duration::ZERO)), &["only inside a running test bed time passes: call it within `Testbed::run`, on its thread"]);
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    let error = runtime.block_on(UdpSocket::bind("0.0.0.0:0")).unwrap_err().to_string();
+    assert_eq!(error, "only inside a running test bed a socket can be bound: call it within `Testbed::run`, on its thread");
+    let error = bed().run(|_| async { UdpSocket::bind("0.0.0.0:0").await.unwrap_err().to_string() });
+    assert!(error.contains("this task lives on no host") && error.contains("`Host::spawn`"), "{error}");
+    let error = bed().run(|bed| async move { bed.host("a").bind("c:0").unwrap_err().to_string() });
+    assert_eq!(error, "there is no host `c`; the hosts are a, b");
+}
+
+#[test]
+fn a_test_bed_that_is_none_is_refused_where_it_is_said() {
+    says(|| drop(Testbed::new(Vec::<String>::new())), &["without hosts"]);
+    says(|| drop(Testbed::new(["a", "a"])), &["two hosts are called `a`"]);
+    says(|| drop(Testbed::new(["a:b"])), &["`a:b` is no name of a host"]);
+    says(|| drop(Testbed::new(["10.0.0.1"])), &["`10.0.0.1` is no name of a host"]);
+    says(|| drop(bed().link("a", "c", "delay 1ms")), &["there is no host `c`; the hosts are a, b"]);
+    says(|| drop(bed().link("a", "a", "delay 1ms")), &["host `a` has no link to itself"]);
+    says(|| drop(bed().links("delay 24ms loss 250%")), &["this is no link", "^^^^ expected a percentage from 0 to 100"]);
+    says(|| bed().run(|bed| async move { drop(bed.host("c")) }), &["there is no host `c`"]);
+    says(|| bed().run(|bed| async move { assert_eq!(bed.link_stats("a", "a").offered(), 0) }), &["no link to itself"]);
+    let spawned_on_the_dead = |bed: Bed| async move {
+        bed.host("a").crash();
+        drop(bed.host("a").spawn(async {}));
+    };
+    says(|| bed().run(spawned_on_the_dead), &["host `a` is down and cannot spawn a task; `Host::restart` brings it back"]);
+}
+
+#[test]
+fn a_program_that_differs_is_shown_where() {
+    use std::cell::Cell;
+    for bed in [bed(), bed().on_tokio()] {
+        let run = Cell::new(0);
+        let program = |bed: Bed| {
+            run.set(run.get() + 1);
+            let extra = run.get();
+            async move {
+                let socket = bed.host("a").bind("0.0.0.0:0").unwrap();
+                socket.send_to(b"same", "b:1").await.unwrap();
+                time::sleep(Duration::from_micros(500 + extra)).await;
+                socket.send_to(b"later", "b:1").await.unwrap();
+                time::sleep(Duration::from_millis(5)).await;
+            }
+        };
+        let parts = [
+            "does not do the same twice",
+            "the runs part at 0.000501 s, with event 1:",
+            "first : 0.000501 s  a -> b  packet 1 sent, 5 bytes",
+            "COHAPTIC_TEST_SEED=1",
+        ];
+        says(|| bed.run_twice(program), &parts);
+    }
+}
+
+#[test]
+fn a_panic_of_any_task_is_the_tests() {
+    for bed in [bed(), bed().on_tokio()] {
+        let program = |bed: Bed| async move {
+            drop(bed.host("b").spawn(async {
+                time::sleep(Duration::from_millis(1)).await;
+                panic!("from a task");
+            }));
+            time::sleep(Duration::from_secs(1)).await;
+        };
+        says(|| bed.run(program), &["from a task"]);
+    }
+}
