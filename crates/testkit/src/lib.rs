@@ -13,6 +13,8 @@ mod file;
 mod host;
 mod link;
 pub mod node;
+#[cfg(feature = "quinn")]
+pub mod quinn;
 mod record;
 mod runtime;
 #[cfg(feature = "scenes")]

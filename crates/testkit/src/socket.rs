@@ -412,7 +412,7 @@ impl UdpSocket {
         Ok(core.take_error(self.id))
     }
 
-    fn try_take(&self, peek: bool) -> io::Result<Datagram> {
+    pub(crate) fn try_take(&self, peek: bool) -> io::Result<Datagram> {
         self.shared.lock().receive(self.id, peek)?.ok_or_else(|| io::ErrorKind::WouldBlock.into())
     }
 

@@ -62,7 +62,7 @@ pub struct Sleep {
 }
 
 impl Sleep {
-    #[cfg_attr(not(feature = "quinn"), expect(dead_code, reason = "for runtimes that make timers out of their own context"))]
+    #[cfg(feature = "quinn")]
     pub(crate) const fn of(shared: Arc<Shared>, deadline: Instant) -> Self {
         Self { shared, deadline, timer: None }
     }

@@ -25,7 +25,7 @@ pub enum Happening {
         packet: PacketName,
         /// How many bytes it carries.
         len: usize,
-        /// FNV-1a of them, 64 bits; 0 if nothing is recorded.
+        /// FNV-1a of them, 64 bits; 0 with [`Testbed::without_digests`](crate::Testbed::without_digests).
         digest: u64,
     },
     /// A packet lies in the buffer of a socket.
@@ -205,7 +205,8 @@ impl fmt::Display for Words<'_> {
         match &self.event.what {
             Happening::Sent { packet, len, digest } => {
                 self.packet(f, *packet)?;
-                write!(f, " sent, {len} bytes, digest {digest:016x}")
+                write!(f, " sent, {len} bytes")?;
+                if *digest == 0 { Ok(()) } else { write!(f, ", digest {digest:016x}") }
             }
             Happening::Arrived { packet } => {
                 self.packet(f, *packet)?;

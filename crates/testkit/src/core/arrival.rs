@@ -71,7 +71,7 @@ impl Core {
                     return Err(Lost::BufferFull);
                 }
                 socket.held += parcel.bytes.len();
-                socket.inbox.push_back(Datagram { from: parcel.from, bytes: parcel.bytes, at, marked, to: ip });
+                socket.inbox.push_back(Datagram { from: parcel.from, bytes: parcel.bytes, at, ecn_capable: parcel.ecn_capable, marked, to: ip });
                 socket.wake_readers(&mut self.woken);
             }
         }
@@ -96,7 +96,7 @@ impl Core {
     fn tell_unreachable(&mut self, host: usize, sender: usize, parcel: &Parcel) {
         // As long as that of ICMP (RFC 792): its header, and the header and the first eight bytes of what could not be delivered. The addresses say all that is
         // needed here.
-        let answer = Parcel { from: parcel.to, to: parcel.from, bytes: Bytes::from_static(&[0; 36]), kind: Kind::Unreachable };
-        if host == sender { self.hand_over(host, host, answer, false) } else { self.offer(host, sender, false, answer) }
+        let answer = Parcel { from: parcel.to, to: parcel.from, bytes: Bytes::from_static(&[0; 36]), ecn_capable: false, kind: Kind::Unreachable };
+        if host == sender { self.hand_over(host, host, answer, false) } else { self.offer(host, sender, answer) }
     }
 }

@@ -1,6 +1,8 @@
 //! The hosts, their sockets and the network between them, as one state machine: it is told the time.
 
 mod arrival;
+#[cfg(feature = "quinn")]
+mod entropy;
 mod hosts;
 mod recording;
 mod sending;
@@ -34,6 +36,8 @@ pub(crate) struct Settings {
     pub(crate) receive_buffer: usize,
     /// Whether what happens is recorded.
     pub(crate) traces: bool,
+    /// Whether what packets carry is part of that.
+    pub(crate) digests: bool,
     /// Whether packets are recorded, with what they carry.
     pub(crate) keeps_packets: bool,
     /// How often tasks may be polled, or the time asked, at one instant.
@@ -48,6 +52,8 @@ pub(crate) struct Core {
     pub(crate) timers: Timers,
     /// Links that become other ones, in order of time.
     pub(crate) changes: VecDeque<LinkChange>,
+    #[cfg(feature = "quinn")]
+    pub(crate) entropy: entropy::Entropy,
     network: Network<Parcel>,
     hosts: Vec<HostState>,
     sockets: Sockets,
@@ -70,6 +76,8 @@ pub(crate) struct Parcel {
     from: std::net::SocketAddr,
     to: std::net::SocketAddr,
     bytes: Bytes,
+    /// Whether its sender understands marks.
+    ecn_capable: bool,
     kind: Kind,
 }
 
@@ -91,6 +99,8 @@ impl Core {
             settings,
             timers: Timers::default(),
             changes: VecDeque::new(),
+            #[cfg(feature = "quinn")]
+            entropy: entropy::Entropy::new(seed),
             network: Network::new(config, |from, to| link(from.0 as usize, to.0 as usize)),
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),

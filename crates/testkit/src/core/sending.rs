@@ -57,18 +57,18 @@ impl Core {
             to.set_ip(loopback);
         }
         let from = SocketAddr::new(self.source(host, local.ip(), to.ip())?, local.port());
-        let parcel = Parcel { from, to, bytes: outgoing.bytes, kind: Kind::Datagram };
+        let parcel = Parcel { from, to, bytes: outgoing.bytes, ecn_capable: outgoing.ecn_capable, kind: Kind::Datagram };
         if to.ip() == IpAddr::V4(Ipv4Addr::BROADCAST) {
             if !may_broadcast {
                 return refuse(io::ErrorKind::PermissionDenied, "this socket may not broadcast; `set_broadcast(true)` allows it".into());
             }
             for other in (0..self.hosts.len()).filter(|other| *other != host) {
-                self.offer(host, other, outgoing.ecn_capable, parcel.clone());
+                self.offer(host, other, parcel.clone());
             }
         } else if to.ip().is_loopback() || self.plan.owner_place(to.ip()) == Some(host) {
             self.hand_over(host, host, parcel, false);
         } else if let Some(receiver) = self.plan.owner_place(to.ip()) {
-            self.offer(host, receiver, outgoing.ecn_capable, parcel);
+            self.offer(host, receiver, parcel);
         } else if !self.plan.was_given(to.ip()) {
             let text = format!("no host has the address {}; the hosts are\n{}", to.ip(), self.plan);
             return refuse(io::ErrorKind::HostUnreachable, text);
@@ -93,7 +93,7 @@ impl Core {
     }
 
     /// Hands a packet to its link.
-    pub(super) fn offer(&mut self, from: usize, to: usize, ecn_capable: bool, parcel: Parcel) {
+    pub(super) fn offer(&mut self, from: usize, to: usize, parcel: Parcel) {
         let pair = self.pair(from, to);
         if self.cut[pair] {
             // It does not reach the link, so that it uses up none of the link's numbers.
@@ -102,11 +102,11 @@ impl Core {
         }
         if self.recording.traces {
             let packet = PacketName { from, to, sequence: self.offered[pair], copy: 0 };
-            let digest = hash(&parcel.bytes);
+            let digest = if self.settings.digests { hash(&parcel.bytes) } else { 0 };
             self.recording.note(self.now, Happening::Sent { packet, len: parcel.bytes.len(), digest });
         }
         self.offered[pair] += 1;
-        let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn_capable };
+        let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn_capable: parcel.ecn_capable };
         let offered = self.network.handle_packet(self.now, node(from), node(to), info, parcel);
         debug_assert_eq!(offered, Ok(()), "hosts are checked, and time does not go back");
         self.take_arrivals();

@@ -16,11 +16,14 @@ pub(crate) struct SocketId(usize);
 
 /// A datagram in the buffer of a socket.
 #[derive(Clone, Debug)]
+#[cfg_attr(not(feature = "quinn"), allow(dead_code, reason = "congestion and the own address are asked for by the adapters of protocols"))]
 pub(crate) struct Datagram {
     pub(crate) from: SocketAddr,
     pub(crate) bytes: Bytes,
     /// When it arrived.
     pub(crate) at: Instant,
+    /// Whether its sender understands marks.
+    pub(crate) ecn_capable: bool,
     /// Whether an active queue marked it.
     pub(crate) marked: bool,
     /// The address to which it was sent.

@@ -52,7 +52,7 @@ impl Nodes {
             links: BTreeMap::new(),
             changes: Vec::new(),
             seed: None,
-            settings: Settings { receive_buffer: 0, traces: false, keeps_packets: false, patience: PATIENCE },
+            settings: Settings { receive_buffer: 0, traces: false, keeps_packets: false, patience: PATIENCE, digests: true },
             time_limit: TIME_LIMIT,
             artefacts: None,
         }

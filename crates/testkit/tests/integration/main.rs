@@ -8,6 +8,8 @@ mod like_tokio;
 mod link_files;
 mod misuse;
 mod nodes;
+#[cfg(feature = "quinn")]
+mod quic;
 mod sockets;
 #[cfg(feature = "strategies")]
 mod strategies;

@@ -1,0 +1,76 @@
+//! Quinn's runtime: tasks of a host, and timers in virtual time.
+
+use std::fmt;
+use std::future::Future;
+use std::io;
+use std::panic::Location;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Instant as StdInstant;
+
+use ::quinn::{AsyncTimer, AsyncUdpSocket, Runtime};
+
+use super::time::{from_std, to_std};
+use crate::context;
+use crate::core::Shared;
+use crate::host::Host;
+use crate::time::Sleep;
+
+/// The runtime of an endpoint that lives on a host.
+pub(super) struct OnHost {
+    shared: Arc<Shared>,
+    place: usize,
+    /// Where the endpoint was made: what its tasks are called after.
+    origin: &'static Location<'static>,
+}
+
+impl OnHost {
+    pub(super) fn new(host: &Host, origin: &'static Location<'static>) -> Self {
+        Self { shared: Arc::clone(host.shared()), place: host.place(), origin }
+    }
+}
+
+impl Runtime for OnHost {
+    fn new_timer(&self, at: StdInstant) -> Pin<Box<dyn AsyncTimer>> {
+        Box::pin(Timer(Sleep::of(Arc::clone(&self.shared), from_std(at))))
+    }
+
+    /// An endpoint whose driver is gone, as it is when its test bed or its host is, starts nothing; so this is called while the test bed runs.
+    fn spawn(&self, future: Pin<Box<dyn Future<Output = ()> + Send>>) {
+        let running = context::expect_running("an endpoint works");
+        // What a host starts while it goes down is gone with it.
+        if self.shared.lock().is_up(self.place) {
+            drop(running.tasks.spawn(Some(self.place), self.origin, future));
+        }
+    }
+
+    fn wrap_udp_socket(&self, _socket: std::net::UdpSocket) -> io::Result<Arc<dyn AsyncUdpSocket>> {
+        let text = "a socket of the system has no place in a test bed; `cohaptic_testkit::quinn::endpoint` makes endpoints on hosts";
+        Err(io::Error::new(io::ErrorKind::Unsupported, text))
+    }
+
+    fn now(&self) -> StdInstant {
+        to_std(self.shared.lock().now)
+    }
+}
+
+impl fmt::Debug for OnHost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("OnHost").field("place", &self.place).finish_non_exhaustive()
+    }
+}
+
+/// A timer of quinn's.
+#[derive(Debug)]
+struct Timer(Sleep);
+
+impl AsyncTimer for Timer {
+    fn reset(mut self: Pin<&mut Self>, at: StdInstant) {
+        self.0.reset(from_std(at));
+    }
+
+    fn poll(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<()> {
+        Pin::new(&mut self.0).poll(cx)
+    }
+}

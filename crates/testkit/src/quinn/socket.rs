@@ -1,0 +1,100 @@
+//! Quinn's socket: a virtual one, with marks of congestion both ways.
+
+use std::io::{self, IoSliceMut};
+use std::net::{IpAddr, SocketAddr};
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use ::quinn::udp::{EcnCodepoint, RecvMeta, Transmit};
+use ::quinn::{AsyncUdpSocket, UdpPoller};
+
+use crate::address::ToSocketAddrs;
+use crate::core::Datagram;
+use crate::host::Host;
+use crate::socket::UdpSocket;
+
+/// The socket of an endpoint.
+#[derive(Debug)]
+pub(super) struct VirtualSocket {
+    socket: UdpSocket,
+    host: Host,
+}
+
+impl VirtualSocket {
+    pub(super) fn new(host: &Host, address: impl ToSocketAddrs) -> io::Result<Self> {
+        Ok(Self { socket: host.bind(address)?, host: host.clone() })
+    }
+
+    /// Whether the host may send from that address: an old one is not its own any more.
+    fn may_send_from(&self, source: Option<IpAddr>) -> bool {
+        source.is_none_or(|source| source.is_loopback() || self.host.addresses().has(source))
+    }
+}
+
+impl AsyncUdpSocket for VirtualSocket {
+    fn create_io_poller(self: Arc<Self>) -> Pin<Box<dyn UdpPoller>> {
+        Box::pin(AlwaysWritable)
+    }
+
+    fn try_send(&self, transmit: &Transmit<'_>) -> io::Result<()> {
+        if !self.may_send_from(transmit.src_ip) {
+            return Ok(());
+        }
+        match self.socket.send_now(Some(transmit.destination), transmit.contents, transmit.ecn.is_some()) {
+            // The host has crashed.
+            Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => Err(error),
+            // As quinn's own sockets do: what cannot be sent is lost, and the protocol finds out by itself.
+            Ok(_) | Err(_) => Ok(()),
+        }
+    }
+
+    fn poll_recv(&self, cx: &mut Context<'_>, buffers: &mut [IoSliceMut<'_>], metas: &mut [RecvMeta]) -> Poll<io::Result<usize>> {
+        let mut count = 0;
+        for (buffer, meta) in buffers.iter_mut().zip(metas) {
+            let taken = if count == 0 {
+                match self.socket.poll_take(cx, false) {
+                    Poll::Ready(taken) => taken?,
+                    Poll::Pending => return Poll::Pending,
+                }
+            } else {
+                // An error comes again with the next call.
+                let Ok(taken) = self.socket.try_take(false) else { break };
+                taken
+            };
+            *meta = fill(buffer, &taken);
+            count += 1;
+        }
+        Poll::Ready(Ok(count))
+    }
+
+    fn local_addr(&self) -> io::Result<SocketAddr> {
+        self.socket.local_addr()
+    }
+
+    fn may_fragment(&self) -> bool {
+        false
+    }
+}
+
+/// Copies a datagram, cut off where the buffer ends, and says what is known of it.
+fn fill(buffer: &mut [u8], datagram: &Datagram) -> RecvMeta {
+    let len = datagram.bytes.len().min(buffer.len());
+    buffer[..len].copy_from_slice(&datagram.bytes[..len]);
+    let ecn = match (datagram.marked, datagram.ecn_capable) {
+        (true, _) => Some(EcnCodepoint::Ce),
+        (false, true) => Some(EcnCodepoint::Ect0),
+        (false, false) => None,
+    };
+    RecvMeta { addr: datagram.from, len, stride: len, ecn, dst_ip: Some(datagram.to) }
+}
+
+/// Sending never waits.
+#[derive(Debug)]
+struct AlwaysWritable;
+
+impl UdpPoller for AlwaysWritable {
+    fn poll_writable(self: Pin<&mut Self>, _cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Poll::Ready(Ok(()))
+    }
+}
