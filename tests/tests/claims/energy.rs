@@ -12,9 +12,11 @@
 //! with E the kinetic energy, and ½·Kᵢⱼ and ½·KC times the squared distances; d and dH are what a copy and a device move in a tick.
 
 use cohaptic_harness::Model;
-use cohaptic_peer::{Contact, Coordination, Direction, Gains};
+use cohaptic_peer::{Contact, Coordination, Direction, Gains, Hand};
+use cohaptic_scene::Scene;
 use cohaptic_stability::{Effort, Links, Method, Patterns, Verdict, WorstVerdict, analyse, worst_case};
 use cohaptic_tests::{Draft, DraftHand, Log, Tick, links, run};
+use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -25,18 +27,18 @@ use crate::{TICK, ages, cases};
 const SHARE: f64 = 0.75;
 
 /// Kᵢ: what holds one copy to all others together [N/m].
-pub(crate) fn stiffness(draft: &Draft) -> f64 {
-    let gains = draft.strategy.as_average_position(draft.gains, draft.peers.len());
+pub(crate) fn stiffness(scene: &Scene) -> f64 {
+    let gains = scene.coordination.strategy.as_average_position(scene.coordination.gains, scene.peers.len());
     gains.map_or(f64::NAN, |gains| gains.stiffness)
 }
 
 /// The bound on the damping of every copy, with `age` the largest at a tick \[s\].
-pub(crate) fn least_damping(draft: &Draft, age: f64) -> f64 {
-    let coupling = draft.peers.iter().filter(|peer| peer.contact != Contact::None).map(|peer| {
+pub(crate) fn least_damping(scene: &Scene, age: f64) -> f64 {
+    let coupling = scene.peers.iter().filter(|peer| peer.contact != Contact::None).map(|peer| {
         let (pull, damping) = (peer.coupling.stiffness * TICK, SHARE * peer.device.damping);
         pull * damping / (2.0 * damping - pull)
     });
-    stiffness(draft) * (age + TICK) + coupling.fold(0.0, f64::max)
+    stiffness(scene) * (age + TICK) + coupling.fold(0.0, f64::max)
 }
 
 /// What is stored, and what must not exceed it.
@@ -53,17 +55,17 @@ pub(crate) struct Ledger {
 
 impl Ledger {
     /// Of a run with the bound for ages up to `age`.
-    pub(crate) fn of(draft: &Draft, log: &Log, age: f64) -> Self {
-        let peers = draft.peers.len();
+    pub(crate) fn of(scene: &Scene, log: &Log, age: f64) -> Self {
+        let peers = scene.peers.len();
         let ticks: Vec<&[Tick]> = log.ticks.chunks_exact(peers).collect();
-        let mass = if draft.split_mass { draft.mass / peers as f64 } else { draft.mass };
-        let pair = stiffness(draft) / (peers - 1) as f64;
-        let excess = draft.damping - least_damping(draft, age);
+        let mass = scene.copy_mass();
+        let pair = stiffness(scene) / (peers - 1) as f64;
+        let excess = scene.object.damping - least_damping(scene, age);
         let (mut supplied, mut taken, mut exchanged) = (0.0, 0.0, 0.0);
         let mut ledger = Self { stored: Vec::new(), supplied: Vec::new(), taken: Vec::new(), rounding: 0.0 };
         for (k, now) in ticks.iter().enumerate() {
             let mut stored = 0.0;
-            for (peer, tick) in draft.peers.iter().zip(*now) {
+            for (peer, tick) in scene.peers.iter().zip(*now) {
                 let (device, object) = (tick.device, tick.object);
                 stored += 0.5 * (mass * object.velocity[0].powi(2) + peer.device.mass * device.velocity[0].powi(2));
                 let stretch = device.position[0] - object.position[0];
@@ -87,9 +89,9 @@ impl Ledger {
             ledger.taken.push(taken);
             exchanged += stored;
             let Some(next) = ticks.get(k + 1) else { break };
-            for (peer, (tick, next)) in draft.peers.iter().zip(now.iter().zip(*next)) {
+            for (peer, (tick, next)) in scene.peers.iter().zip(now.iter().zip(*next)) {
                 let (moved, object) = (next.device.position[0] - tick.device.position[0], next.object.position[0] - tick.object.position[0]);
-                let work = force(peer.hand, tick.at.as_secs_f64()) * moved;
+                let work = force(peer.hand.as_ref(), tick.at) * moved;
                 supplied += work;
                 let used = if peer.contact == Contact::None { 0.0 } else { SHARE };
                 taken += (excess * object * object + (1.0 - used) * peer.device.damping * moved * moved) / TICK;
@@ -111,11 +113,10 @@ impl Ledger {
 }
 
 /// The force of a hand \[N\].
-fn force(hand: DraftHand, t: f64) -> f64 {
+fn force(hand: Option<&Hand>, at: Instant) -> f64 {
     match hand {
-        DraftHand::Force(force) => force[0],
-        DraftHand::Sine { amplitude, frequency, phase } => amplitude[0] * libm::sin(core::f64::consts::TAU * frequency * t + phase),
-        DraftHand::None | DraftHand::Arm { .. } => 0.0,
+        Some(Hand::Force(signal)) => signal.value::<1>(at)[0],
+        Some(Hand::Arm { .. }) | None => 0.0,
     }
 }
 
@@ -155,7 +156,7 @@ pub(crate) fn springs() -> impl Strategy<Value = Draft> {
 /// Gives the copies the damping of the bound for what the links do, and `more` of it; answers with the largest age. What becomes of a packet does not depend on where the copies are.
 pub(crate) fn damped(draft: &mut Draft, more: f64) -> f64 {
     let age = ages::oldest(&run(&draft.scene(), Model::Least), draft.peers.len());
-    draft.damping = (1.0 + more) * least_damping(draft, age);
+    draft.damping = (1.0 + more) * least_damping(&draft.scene(), age);
     age
 }
 
@@ -168,7 +169,7 @@ proptest! {
         let age = damped(&mut draft, more);
         let log = run(&draft.scene(), Model::Least);
         prop_assert_eq!(ages::oldest(&log, draft.peers.len()), age);
-        let ledger = Ledger::of(&draft, &log, age);
+        let ledger = Ledger::of(&draft.scene(), &log, age);
         prop_assert!(ledger.from_nowhere() <= 0.0, "{:e} J from nowhere, of {:e} J", ledger.from_nowhere(), ledger.stored[0]);
         // The tolerance decides nothing: it is far below what moves.
         prop_assert!(ledger.rounding < 1e-6 * ledger.stored.iter().copied().fold(0.0, f64::max));
@@ -194,7 +195,7 @@ fn one_percent_below_the_bound_energy_comes_from_nowhere() {
     assert_eq!(verdict(&draft), Verdict::Stable);
     draft.damping *= 0.99;
     assert_eq!(verdict(&draft), Verdict::Unstable);
-    let ledger = Ledger::of(&draft, &run(&draft.scene(), Model::Least), age);
+    let ledger = Ledger::of(&draft.scene(), &run(&draft.scene(), Model::Least), age);
     // `taken` is negative here: what would be missing. The swing itself must have grown.
     let last_second = ledger.stored[19_000..].iter().copied().fold(0.0, f64::max);
     assert!(last_second > ledger.stored[0] * 1.001 + ledger.rounding, "{last_second} J of {} J", ledger.stored[0]);
@@ -209,12 +210,12 @@ fn the_tick_itself_is_part_of_the_age() {
     let log = run(&draft.scene(), Model::Least);
     assert_eq!(ages::oldest(&log, 2), 0.0);
     assert!(log.ticks.len() == 4000);
-    let ledger = Ledger::of(&draft, &log, -TICK);
+    let ledger = Ledger::of(&draft.scene(), &log, -TICK);
     // Squared distances grow by ω²h²/2·… a tick: q/2 = ω²h²/2 = 2e-4 each, of 2000.
     let growth = ledger.stored.last().unwrap() / ledger.stored[0];
     assert!(growth > 1.3, "{growth}");
     assert_eq!(analyse(&draft.scene(), Method::Reduced).unwrap().verdict(), Verdict::Unstable);
-    draft.damping = 1.001 * least_damping(&draft, 0.0);
+    draft.damping = 1.001 * least_damping(&draft.scene(), 0.0);
     assert_eq!(analyse(&draft.scene(), Method::Reduced).unwrap().verdict(), Verdict::Stable);
 }
 
@@ -235,7 +236,7 @@ proptest! {
         draft.link = format!("delay = \"{}ms\"", frames * every);
         // The oldest is used last a tick before the next one comes.
         let age = (frames + u64::from(losses) + 1) * every - 1;
-        draft.damping = least_damping(&draft, age as f64 * TICK);
+        draft.damping = least_damping(&draft.scene(), age as f64 * TICK);
         let patterns = Patterns { losses_in_a_row: losses, delay: None, links: Links::Together };
         let found = worst_case(&draft.scene(), &patterns, &Effort { products: 2000, ..Effort::default() }).unwrap();
         prop_assert!(found.verdict() != WorstVerdict::Unstable, "{found:?}");

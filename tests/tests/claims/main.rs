@@ -12,7 +12,17 @@
 )]
 
 mod ages;
+mod counterexamples;
 mod energy;
+mod experiments;
+mod felt;
+mod healing;
+mod joining;
+mod jumps;
+mod paper;
+mod regions;
+mod settling;
+mod stiffness;
 
 use cohaptic_tests::same_cases;
 use proptest::prelude::ProptestConfig;
