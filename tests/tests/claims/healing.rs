@@ -7,9 +7,12 @@
 //! *Outside*: `heals-and-diverges.toml`: three copies that moved as one come apart for ever after a short outage of one link, since the scene on whole links is unstable, in a mode that
 //! nothing excites as long as the links are alike.
 
+use std::time::Duration;
+
 use cohaptic_harness::Model;
 use cohaptic_peer::{Contact, Coordination, Gains};
 use cohaptic_tests::{Draft, DraftHand, links, run};
+use cohaptic_wan::Fate;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -67,7 +70,12 @@ proptest! {
         let frames = settling.frames(0.01);
         prop_assume!(frames * ticks < 30_000);
         draft.duration = ((first + frames) * ticks + 1) as u64;
-        let motions = motions(&run(&draft.scene(), Model::Least), draft.peers.len());
+        let log = run(&draft.scene(), Model::Least);
+        // Healed is healed: whatever is sent from then on takes the delay, and nothing else happens to it.
+        for packet in log.packets.iter().filter(|packet| packet.sent.as_nanos() >= HEALED * 1_000_000) {
+            prop_assert_eq!(packet.fate, Fate::Delivered(packet.sent.saturating_add(Duration::from_micros(delay))));
+        }
+        let motions = motions(&log, draft.peers.len());
         let size = settling.size(&draft, &motions, first);
         let place = motions.iter().flatten().map(|motion| motion.object.0.abs().max(motion.device.0.abs())).fold(0.0, f64::max);
         for frame in first..=first + frames {
