@@ -133,7 +133,7 @@ fn from_nowhere(scene: &Scene) -> (f64, Log) {
     let log = run(scene, Model::Least);
     let age = ages::oldest(&log, scene.peers.len());
     assert!(scene.object.damping >= least_damping(scene, age), "not below the bound");
-    (Ledger::of(scene, &log, age).from_nowhere(), log)
+    (Ledger::of(scene, &log, age).excess(), log)
 }
 
 #[test]

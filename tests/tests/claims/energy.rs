@@ -106,7 +106,7 @@ impl Ledger {
     }
 
     /// The largest energy from nowhere \[J\]: above zero, by more than rounding, where the claim fails.
-    pub(crate) fn from_nowhere(&self) -> f64 {
+    pub(crate) fn excess(&self) -> f64 {
         let all = self.stored.iter().zip(&self.supplied).zip(&self.taken);
         all.map(|((stored, supplied), taken)| stored + taken - supplied).fold(f64::MIN, f64::max) - self.rounding
     }
@@ -170,7 +170,7 @@ proptest! {
         let log = run(&draft.scene(), Model::Least);
         prop_assert_eq!(ages::oldest(&log, draft.peers.len()), age);
         let ledger = Ledger::of(&draft.scene(), &log, age);
-        prop_assert!(ledger.from_nowhere() <= 0.0, "{:e} J from nowhere, of {:e} J", ledger.from_nowhere(), ledger.stored[0]);
+        prop_assert!(ledger.excess() <= 0.0, "{:e} J from nowhere, of {:e} J", ledger.excess(), ledger.stored[0]);
         // The tolerance decides nothing: it is far below what moves.
         prop_assert!(ledger.rounding < 1e-6 * ledger.stored.iter().copied().fold(0.0, f64::max));
     }

@@ -39,9 +39,8 @@ proptest! {
             viscosity(&draft)
         };
         let [ap, pd] = BOTH.map(|strategy| scene(strategy, peers));
-        if let (Some(ap), Some(pd)) = (ap, pd) {
-            prop_assert!(ap < pd, "AP {ap}, PD {pd} N·s/m");
-        }
+        prop_assume!(ap.is_some() && pd.is_some());
+        prop_assert!(ap < pd, "AP {ap:?}, PD {pd:?} N·s/m");
         for (strategy, more) in BOTH.into_iter().zip([ap, pd]) {
             if let (Some(fewer), Some(more)) = (scene(strategy, peers - 1), more) {
                 prop_assert!(fewer < more, "{strategy:?}: {fewer} and {more} N·s/m");
