@@ -143,7 +143,7 @@ fn a_held_velocity_makes_energy_above_the_bound() {
     let (none, log) = from_nowhere(&scene("held-velocity.toml", &["coordination.damping=0"]));
     assert!(none <= 0.0);
     assert_eq!(log.of(1)[1000].object.position[0], 0.0, "what it holds is where it is");
-    // An outage of half the time makes no energy.
+    // Nor is there any without the outage.
     assert!(from_nowhere(&scene("held-velocity.toml", &["links.thrown.second.outage=[]"])).0 <= 0.0);
 }
 

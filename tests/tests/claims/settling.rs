@@ -95,8 +95,8 @@ impl Settling {
         let sample = |peer: usize, age: usize| {
             let every = (draft.update / 1000) as usize;
             let phase = draft.peers[peer].phase as usize;
-            let sent = (0..start).rev().filter(|tick| tick % every == phase);
-            motions[peer][sent.skip(age - 1).step_by(1).next().unwrap()].object
+            let mut sent = (0..start).rev().filter(|tick| tick % every == phase);
+            motions[peer][sent.nth(age - 1).unwrap()].object
         };
         let value = |peer: usize, kind: StateKind| match kind {
             // A device that touches nothing is relative to nothing.
