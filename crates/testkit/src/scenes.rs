@@ -37,7 +37,10 @@ pub fn check_scene(path: impl AsRef<Path>) {
 #[track_caller]
 #[expect(clippy::panic, reason = "a test that fails")]
 pub fn check_scenes(folder: impl AsRef<Path>) {
-    let files = scene_files(folder.as_ref()).unwrap_or_else(|error| panic!("{error}"));
+    let files = match scene_files(folder.as_ref()) {
+        Ok(files) => files,
+        Err(error) => panic!("{error}"),
+    };
     let failures: Vec<String> = files.iter().filter_map(|file| failure(file)).collect();
     if !failures.is_empty() {
         panic!("of {} scenes {} failed:\n{}", files.len(), failures.len(), failures.join("\n"));

@@ -33,7 +33,7 @@ pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
     }
     let seed = record.seed();
     let summary = format!(
-        "{MARK}: `{}`, which ended at {} s.\n\nIts seed was {}: {}={} runs it again.\n\nWhat the links did, of what they took:\n\n{table}\n\
+        "{MARK}: that of `{}`, which ended at {} s.\n\nIts seed was {}: {}={} runs it again.\n\nWhat the links did, of what they took:\n\n{table}\n\
          trace.txt has all that happened, in order. links.txt replays what the links did:\nTestbed::from_file(\"links.txt\") has these hosts and links.\n",
         seed.test,
         Seconds(record.ended()),

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::WriteError;
 
 /// The first words of the file by which a folder is known again.
-pub(super) const MARK: &str = "What happened in a test that failed";
+pub(super) const MARK: &str = "What happened in a test bed";
 
 /// The file.
 pub(super) const MARKED: &str = "summary.txt";

@@ -18,7 +18,7 @@ pub const ARTEFACTS_VARIABLE: &str = "COHAPTIC_TEST_ARTEFACTS";
 #[non_exhaustive]
 pub enum WriteError {
     /// The folder holds something else.
-    #[error("{} is there already and was not written by a test that failed; expected a folder of its own", folder.display())]
+    #[error("{} is there already and was not written by a test bed; expected a folder of its own", folder.display())]
     NotOurs {
         /// The folder.
         folder: PathBuf,

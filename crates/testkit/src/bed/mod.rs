@@ -98,8 +98,12 @@ impl Testbed {
     ///
     /// If the file cannot be read or makes no sense, with the path, the place and the line.
     #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
+    #[track_caller]
     pub fn from_file(path: impl AsRef<std::path::Path>) -> Self {
-        LinkFile::read(path).unwrap_or_else(|error| panic!("{error}")).into()
+        match LinkFile::read(path) {
+            Ok(file) => file.into(),
+            Err(error) => panic!("{error}"),
+        }
     }
 
     /// The names of the hosts.

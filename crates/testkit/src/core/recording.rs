@@ -22,6 +22,7 @@ pub(crate) struct Seen {
     pub(crate) from: usize,
     pub(crate) to: usize,
     pub(crate) record: PacketRecord,
+    #[cfg_attr(not(feature = "pcapng"), expect(dead_code, reason = "only captures hold what packets carry"))]
     pub(crate) payload: Bytes,
 }
 

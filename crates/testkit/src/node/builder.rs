@@ -108,9 +108,12 @@ impl Nodes {
     ///
     /// If the file cannot be read or makes no sense, with the path, the place and the line; if one of its hosts is no node.
     #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
+    #[track_caller]
     pub fn links_from_file(self, path: impl AsRef<std::path::Path>) -> Self {
-        let file = LinkFile::read(path).unwrap_or_else(|error| panic!("{error}"));
-        let LinkFile { hosts, every, links, changes, seed } = file;
+        let LinkFile { hosts, every, links, changes, seed } = match LinkFile::read(path) {
+            Ok(file) => file,
+            Err(error) => panic!("{error}"),
+        };
         let places: Vec<usize> = hosts.iter().map(|host| place(&self.names, host)).collect();
         let links = links.into_iter().map(|((from, to), link)| ((places[from], places[to]), link)).collect();
         let changes = changes.into_iter().map(|change| LinkChange { from: places[change.from], to: places[change.to], ..change }).collect();

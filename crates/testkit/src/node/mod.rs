@@ -1,7 +1,7 @@
 //! Programs without input and output of their own: state machines that are told the time, on emulated links.
 //!
 //! Many protocols are written so that they read no clock and open no socket: they are handed packets and instants, and asked what they want to send and when to be
-//! woken (`quinn-proto`, `str0m`, `smoltcp`, `rustls`-like libraries, most consensus algorithms). [`Nodes`] wires such state machines through a
+//! woken (`quinn-proto`, `str0m`, `smoltcp`, many implementations of consensus). [`Nodes`] wires such state machines through a
 //! [`cohaptic_wan::Network`], in virtual time, without tasks and without sockets. A packet costs some tens of nanoseconds more than its link.
 //!
 //! ```
