@@ -1,7 +1,7 @@
 //! What the tests of whole scenes share: scenes to order, a log of all that happened, and where two runs first differ.
 //!
 //! A [`Draft`] is a scene as a test thinks of it; it becomes TOML text and is read like any scene file, so the reader is tested too. [`drafts`] draws
-//! them at random. [`Log`] holds every row of a run, [`Records`] every byte that a recorder writes.
+//! them at random, [`links`] the links alone. [`Log`] holds every row of a run, [`Records`] every byte that a recorder writes.
 //!
 //! Nothing here knows what the right answer is: the oracles stand in the tests.
 #![allow(clippy::panic, clippy::unwrap_used, clippy::missing_panics_doc, reason = "this crate is nothing but test support")]
@@ -18,6 +18,7 @@ mod book {
 }
 
 pub mod drafts;
+pub mod links;
 mod log;
 mod records;
 
@@ -28,11 +29,18 @@ pub use records::{Records, record};
 use std::path::{Path, PathBuf};
 
 use proptest::prelude::ProptestConfig;
+use proptest::test_runner::RngSeed;
 
 /// A property test of that many cases that leaves no files behind.
 #[must_use]
 pub fn cases(count: u32) -> ProptestConfig {
     ProptestConfig { cases: count, failure_persistence: None, max_shrink_iters: 400, ..ProptestConfig::default() }
+}
+
+/// [`cases`] that are the same at every run.
+#[must_use]
+pub fn same_cases(count: u32, seed: u64) -> ProptestConfig {
+    ProptestConfig { rng_seed: RngSeed::Fixed(seed), ..cases(count) }
 }
 
 /// The shipped scenes, in order of their paths.

@@ -9,7 +9,7 @@ use core::time::Duration;
 pub struct Snapshot {
     /// Since the run began.
     pub elapsed: Duration,
-    /// Why the run does not say what it claims to say, such as a tick that came too late; `None` while it does.
+    /// Why the run is not valid so far, such as too many late ticks; `None` while it is.
     pub invalid: Option<String>,
     /// How late each clock of the description was, since the run began.
     pub lateness: Vec<Quantiles>,

@@ -9,11 +9,16 @@ mod artefacts;
 mod bed;
 mod context;
 mod core;
+mod file;
 mod host;
 mod link;
+pub mod node;
 #[cfg(feature = "quinn")]
 pub mod quinn;
+mod record;
 mod runtime;
+#[cfg(feature = "scenes")]
+mod scenes;
 mod seed;
 mod socket;
 #[cfg(feature = "strategies")]
@@ -21,18 +26,25 @@ pub mod strategies;
 mod task;
 pub mod time;
 mod trace;
+mod words;
 
 pub use address::{AddressPlan, Addresses, ToSocketAddrs};
+pub use artefacts::{ARTEFACTS_VARIABLE, WriteError};
 pub use bed::{Bed, Testbed};
 pub use cohaptic_units as units;
 pub use cohaptic_units::Instant;
 pub use cohaptic_wan as wan;
+pub use file::{LinkFile, LinkFileError};
 pub use host::Host;
 pub use link::ToLink;
+pub use record::Record;
+#[cfg(feature = "scenes")]
+pub use scenes::{check_scene, check_scenes};
 pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
+pub use words::WordsError;
 
 #[cfg(feature = "strategies")]
 pub use proptest;

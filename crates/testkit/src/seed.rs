@@ -25,10 +25,8 @@ impl Seed {
 
     #[expect(clippy::panic, reason = "a test that is not run with the seed that was asked for is worse than none")]
     fn of(environment: Option<&str>, said: Option<u64>, test: &str) -> Self {
-        let asked = environment.map(|text| {
-            let number = text.strip_prefix("0x").map_or_else(|| text.parse().ok(), |digits| u64::from_str_radix(digits, 16).ok());
-            number.unwrap_or_else(|| panic!("{SEED_VARIABLE} is `{text}`; expected a number from 0 to {}", u64::MAX))
-        });
+        let asked =
+            environment.map(|text| number(text).unwrap_or_else(|| panic!("{SEED_VARIABLE} is `{text}`; expected a number from 0 to {}", u64::MAX)));
         Self { value: asked.or(said).unwrap_or_else(|| hash(test.as_bytes())), test: test.to_owned() }
     }
 
@@ -36,6 +34,11 @@ impl Seed {
     pub(crate) fn advice(&self) -> String {
         format!("test bed of `{}`: seed {}; {SEED_VARIABLE}={} runs it again", self.test, self.value, self.value)
     }
+}
+
+/// A seed as it is written: decimal, or hexadecimal after `0x`.
+pub(crate) fn number(text: &str) -> Option<u64> {
+    text.strip_prefix("0x").map_or_else(|| text.parse().ok(), |digits| u64::from_str_radix(digits, 16).ok())
 }
 
 /// FNV-1a: the same everywhere and for ever.

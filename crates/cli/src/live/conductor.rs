@@ -5,7 +5,7 @@ use std::sync::mpsc::Receiver;
 use cohaptic_live::{Conductor, LinkChange, Status};
 use cohaptic_units::Instant;
 
-use super::status::{Shape, snapshot};
+use super::status::snapshot;
 use super::timeline::Elapsed;
 use crate::interrupt;
 use crate::realtime::{Edit, Look};
@@ -17,12 +17,13 @@ pub(super) struct Host {
     /// The links in the order of the description.
     pairs: Vec<(usize, usize)>,
     elapsed: Elapsed,
-    shape: Shape,
+    /// Of the scene.
+    axes: usize,
 }
 
 impl Host {
-    pub(super) const fn new(look: Option<Look>, wanted: Receiver<Edit>, pairs: Vec<(usize, usize)>, elapsed: Elapsed, shape: Shape) -> Self {
-        Self { look, wanted, pairs, elapsed, shape }
+    pub(super) const fn new(look: Option<Look>, wanted: Receiver<Edit>, pairs: Vec<(usize, usize)>, elapsed: Elapsed, axes: usize) -> Self {
+        Self { look, wanted, pairs, elapsed, axes }
     }
 }
 
@@ -40,7 +41,7 @@ impl Conductor for Host {
     fn show(&mut self, status: Status) {
         self.elapsed.set(Instant::ZERO.saturating_add(status.elapsed));
         if let Some(look) = &self.look {
-            look.publish(snapshot(&status, &self.shape));
+            look.publish(snapshot(&status, self.axes));
         }
     }
 

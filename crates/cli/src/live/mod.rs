@@ -69,7 +69,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
     prepare::announce(&scene, session.address(), arguments.key_file.is_some());
     let control = LiveControl::open(&arguments.real_time, status::description(&scene, &pairs), Box::new(editor))?;
-    let host = Host::new(control.look(), wanted, pairs, elapsed, status::Shape::of(&scene));
+    let host = Host::new(control.look(), wanted, pairs, elapsed, scene.axes.count());
     let report = conduct(&scene, session, host, &control)?;
     if arguments.json {
         output::json(&Document::new(&scene, &report))?;

@@ -1,12 +1,10 @@
 //! A session as live control shows it.
 
-use std::time::Duration;
-
 use cohaptic_control::{Description, Kind, LinkCounters, LinkName, PeerName, PeerView, Presence as Shown, Snapshot};
 use cohaptic_harness::live::Presence;
 use cohaptic_live::session::{LinkStatus, PeerStatus};
 use cohaptic_live::{Refusal, Status};
-use cohaptic_scene::{PeerSpec, Scene};
+use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use crate::documents::micros;
@@ -32,21 +30,7 @@ pub(super) fn description(scene: &Scene, pairs: &[(usize, usize)]) -> Descriptio
     }
 }
 
-/// What must be known of a scene to show a session of it.
-pub(super) struct Shape {
-    axes: usize,
-    /// For each peer, how long it may be silent before it counts as silent; zero for one that lives here.
-    silences: Vec<Duration>,
-}
-
-impl Shape {
-    pub(super) fn of(scene: &Scene) -> Self {
-        let silence = |peer: &PeerSpec| peer.kind.silence().map_or(Duration::ZERO, |silence| silence.after);
-        Self { axes: scene.axes.count(), silences: scene.peers.iter().map(silence).collect() }
-    }
-}
-
-pub(super) fn snapshot(status: &Status, shape: &Shape) -> Snapshot {
+pub(super) fn snapshot(status: &Status, axes: usize) -> Snapshot {
     let now = Instant::ZERO.saturating_add(status.elapsed);
     let validity = status.validity.to_string();
     Snapshot {
@@ -55,7 +39,7 @@ pub(super) fn snapshot(status: &Status, shape: &Shape) -> Snapshot {
         invalid: (!status.validity.is_valid()).then(|| validity.trim_start_matches("not valid: ").to_owned()),
         lateness: vec![quantiles(&status.ticks), quantiles(&status.releases)],
         links: status.links.iter().map(link).collect(),
-        peers: status.peers.iter().zip(&shape.silences).map(|(peer, silence)| view(peer, *silence, shape.axes, now)).collect(),
+        peers: status.peers.iter().map(|peer| view(peer, axes, now)).collect(),
         refused: status.door.map_or_else(Vec::new, |door| {
             let refused = door.refusals().filter(|(_, count)| *count > 0);
             refused.map(|(cause, count): (Refusal, u64)| (cause.name(), count)).collect()
@@ -74,13 +58,14 @@ fn link(link: &LinkStatus) -> LinkCounters {
     LinkCounters { delivered_bytes: link.delivered_bytes, recent_delay: quantiles_of(&link.recent), ..counters(&link.stats) }
 }
 
-fn view(peer: &PeerStatus, silence: Duration, axes: usize, now: Instant) -> PeerView {
-    let (status, age) = match peer.state.presence {
-        Presence::Here => (Shown::Here, None),
-        Presence::Absent => (Shown::Absent, None),
-        Presence::Present => (Shown::Present, None),
-        // It was heard for the last time so long before it counted as silent.
-        Presence::Stale(since) => (Shown::Stale, Some(now.saturating_duration_since(since).saturating_add(silence))),
+fn view(peer: &PeerStatus, axes: usize, now: Instant) -> PeerView {
+    let state = &peer.state;
+    let status = match state.presence {
+        Presence::Here => Shown::Here,
+        Presence::Absent => Shown::Absent,
+        Presence::Present => Shown::Present,
+        Presence::Stale(_) => Shown::Stale,
     };
-    PeerView { status, age, position: peer.state.object.position[..axes].to_vec(), force: peer.force[..axes].to_vec() }
+    let age = state.heard.map(|heard| now.saturating_duration_since(heard));
+    PeerView { status, age, position: state.object.position[..axes].to_vec(), force: peer.force[..axes].to_vec() }
 }

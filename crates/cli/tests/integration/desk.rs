@@ -3,12 +3,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use serde_json::Value;
 use tempfile::TempDir;
 
 /// A folder of its own for one test, removed at the end.
 pub(crate) struct Desk(TempDir);
+
+/// No command of a test takes that long, however busy the machine is: one that does hangs.
+const AT_MOST: Duration = Duration::from_secs(900);
 
 /// What came of a command.
 #[derive(Debug)]
@@ -60,7 +64,12 @@ impl Desk {
     }
 
     pub(crate) fn cohaptic(&self, line: &str) -> Outcome {
-        Outcome::of(assert_cmd::Command::from_std(self.command(line)).output().unwrap())
+        self.cohaptic_within(AT_MOST, line)
+    }
+
+    /// The same, but it is ended and has no status if it takes longer: for what would go on for ever if it were not refused.
+    pub(crate) fn cohaptic_within(&self, patience: Duration, line: &str) -> Outcome {
+        Outcome::of(assert_cmd::Command::from_std(self.command(line)).timeout(patience).output().unwrap())
     }
 
     /// What a command prints that succeeds.

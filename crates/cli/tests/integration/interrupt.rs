@@ -20,7 +20,7 @@ pub(crate) fn interrupted(desk: &Desk, line: &str, begun: impl Fn(u32) -> bool) 
 }
 
 /// Far more than an interrupted run needs on a slow machine. One that does not stop must not go on filling the disk.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 fn end_within(child: &mut Child, patience: Duration) {
     let asked = Instant::now();

@@ -279,7 +279,7 @@ fn bad_arguments_are_refused() {
         ("relay --listen 127.0.0.1:0 --to 127.0.0.1:0", &["--to 127.0.0.1:0", "not 0"]),
         ("relay lab.toml --set link.delay=1ms --set programs.a.port=0.0.0.0:0", &["allow-remote"]),
     ] {
-        desk.cohaptic(line).assert_refused(2, parts);
+        desk.cohaptic_within(PATIENCE, line).assert_refused(2, parts);
     }
     desk.cohaptic("relay nothing.toml").assert_refused(3, &["nothing.toml"]);
 }

@@ -44,7 +44,8 @@ fn is_inside(name: &str) -> bool {
     }
     let mut command = Command::new("unshare");
     command.args(["-Urn", "--"]).arg(env::current_exe().unwrap()).args([name, "--exact", "--nocapture"]).env(INSIDE, "1");
-    let outcome = Running::begin(command).end();
+    // Each of its own waits ends after a minute.
+    let outcome = Running::begin(command).end_within(5 * PATIENCE);
     assert_eq!(outcome.status, Some(0), "{}\n{}", outcome.stdout, outcome.stderr);
     false
 }
@@ -242,7 +243,7 @@ fn bad_arguments_are_refused() {
         ("router lab.toml --set links.wan.delay=1ms --for 0s", &["--for 0s", "more than nothing"]),
         ("router lab.toml --token-file token", &["--control"]),
     ] {
-        desk.cohaptic(line).assert_refused(2, parts);
+        desk.cohaptic_within(PATIENCE, line).assert_refused(2, parts);
     }
     desk.cohaptic("router nothing.toml").assert_refused(3, &["nothing.toml"]);
 }

@@ -66,11 +66,15 @@ impl Running {
     }
 
     /// Waits until it ends by itself.
-    pub(crate) fn end(mut self) -> Outcome {
+    pub(crate) fn end(self) -> Outcome {
+        self.end_within(PATIENCE)
+    }
+
+    pub(crate) fn end_within(mut self, patience: Duration) -> Outcome {
         let begin = Instant::now();
         // A report is longer than a pipe holds only for thousands of links.
         while self.child.as_mut().unwrap().try_wait().unwrap().is_none() {
-            assert!(begin.elapsed() < PATIENCE, "it does not end");
+            assert!(begin.elapsed() < patience, "it does not end");
             thread::sleep(Duration::from_millis(5));
         }
         let mut output = self.child.take().unwrap().wait_with_output().unwrap();

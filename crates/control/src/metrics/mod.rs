@@ -41,7 +41,7 @@ fn run(out: &mut Exposition, description: &Description, latest: &Latest) {
     out.count(&[("kind", description.kind.name()), ("title", &description.title)], 1);
     out.family("cohaptic_run_elapsed_seconds", Gauge, "Time since the run began.");
     out.number(&[], latest.snapshot.elapsed.as_secs_f64());
-    out.family("cohaptic_run_valid", Gauge, "1 while the run says what it claims to say, 0 from then on.");
+    out.family("cohaptic_run_valid", Gauge, "1 while so far at most one in a thousand was too late, 0 while it was more.");
     out.count(&[], latest.snapshot.invalid.is_none().into());
     out.family("cohaptic_run_snapshots_total", Counter, "Snapshots published; one that stands still means that the run does.");
     out.count(&[], latest.number);

@@ -60,6 +60,8 @@ macro_rules! each {
 pub struct PeerState {
     /// Whether it is there.
     pub presence: Presence,
+    /// When it was last heard; `None` if it is simulated here, or never was.
+    pub heard: Option<Instant>,
     /// Its device at its latest tick; `None` for a peer in another process.
     pub device: Option<State<3>>,
     /// Its copy of the object; for a peer in another process, what its newest sample says of it (where it begins, before the first).
@@ -216,7 +218,7 @@ impl LiveScene {
         let presence = self.presence(peer)?;
         each!(&self.world, world => {
             let (device, object) = world.states(peer)?;
-            Some(PeerState { presence, device: device.map(|state| widen(&state)), object: widen(&object) })
+            Some(PeerState { presence, heard: world.heard(peer), device: device.map(|state| widen(&state)), object: widen(&object) })
         })
     }
 

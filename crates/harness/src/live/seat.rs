@@ -76,7 +76,7 @@ pub struct SeatStats {
 pub(crate) struct Seat {
     pub(crate) is_process: bool,
     silence: Silence,
-    heard: Option<Instant>,
+    pub(crate) heard: Option<Instant>,
     /// Whether the present silence has been noticed. So is one before anything was heard.
     is_silent: bool,
     /// The number that the peer gave its newest sample.

@@ -123,6 +123,10 @@ impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
         (place < self.members.len()).then(|| self.elsewhere.seat(place).map_or(Presence::Here, |seat| seat.presence(now)))
     }
 
+    pub(crate) fn heard(&self, place: usize) -> Option<Instant> {
+        self.elsewhere.seat(place)?.heard
+    }
+
     pub(crate) fn seat_stats(&self, place: usize) -> Option<SeatStats> {
         self.elsewhere.seat(place).map(|seat| seat.stats)
     }

@@ -48,6 +48,7 @@ fn a_peer_joins_falls_silent_and_comes_back_with_its_numbers_going_on() {
     // The last at 92 ms; stale 100 ms later.
     pass(&mut live, millis(191));
     assert_eq!(live.presence(1), Some(Presence::Present));
+    assert_eq!([0, 1, 2].map(|peer| live.peer(peer).unwrap().heard), [None, Some(millis(92)), None]);
     pass(&mut live, millis(192));
     assert_eq!(live.presence(1), Some(Presence::Stale(millis(192))));
     assert_eq!(live.peer(1).unwrap().object.position, [0.01, 0.0, 0.0]);
@@ -55,6 +56,7 @@ fn a_peer_joins_falls_silent_and_comes_back_with_its_numbers_going_on() {
     take(&mut live, millis(500), 1, &sample(&scene, 1, 0, 0.02, 0.0)).unwrap();
     assert_eq!(live.presence(1), Some(Presence::Present));
     assert_eq!(live.peer(1).unwrap().object.position[0], 0.02);
+    assert_eq!(live.peer(1).unwrap().heard, Some(millis(500)));
     let stats = live.seat_stats(1).unwrap();
     assert_eq!((stats.taken, stats.joined, stats.late), (6, 2, 0));
     assert_eq!(live.seat_stats(0), None);

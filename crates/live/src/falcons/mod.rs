@@ -225,5 +225,5 @@ impl AnyAttached {
     }
 }
 
-/// How long a simulated hand may take to home its device: it takes four seconds.
-pub const SIMULATED_HOMING: Duration = Duration::from_secs(20);
+/// How long a simulated hand may take to home its device. It takes a second; a busy machine takes its time.
+pub const SIMULATED_HOMING: Duration = Duration::from_secs(60);

@@ -10,5 +10,6 @@ mod hostile;
 mod key_files;
 mod keyed;
 mod keyless;
+mod session;
 mod support;
 mod vectors;

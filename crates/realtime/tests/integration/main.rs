@@ -40,13 +40,19 @@ fn a_wait_with_sockets_ends_at_its_deadline_or_when_one_can_be_read() {
 #[test]
 fn the_two_clocks_read_together_place_a_stamp_of_now_at_now() {
     let clock = MonotonicClock::start();
-    std::thread::sleep(Duration::from_millis(2));
-    let unix = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();
-    let before = clock.now();
-    let placed = clock.stamps().instant(Some(unix));
-    // The stamp was taken before `before` was read; the clocks are read a moment apart.
-    assert!(placed <= before + Duration::from_millis(1) || placed <= clock.now());
-    assert!(placed > cohaptic_units::Instant::ZERO);
+    // Whether it is placed between two readings around it, and not when it was read.
+    let is_placed = || {
+        let before = clock.now();
+        let unix = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();
+        let after = clock.now();
+        std::thread::sleep(Duration::from_millis(2));
+        let stamps = clock.stamps();
+        let placed = stamps.instant(Some(unix));
+        assert!(before <= placed && placed <= stamps.now(), "{before:?} {placed:?} {stamps:?}");
+        placed <= after
+    };
+    // The clocks are read a moment apart, and a busy machine may make that moment long: not each time.
+    assert!((0..1000).any(|_| is_placed()));
 }
 
 mod udp;

@@ -19,7 +19,7 @@ fn door(address: &str, config: DoorConfig) -> UdpDoor {
 /// Reads until there are so many; the wait is for a machine that is busy, and ends as soon as they are there.
 fn receive(door: &mut UdpDoor, clock: &MonotonicClock, count: usize) -> Vec<Received> {
     let (mut buffers, mut received) = (ReceiveBuffers::new(), Vec::new());
-    let end = clock.now() + Duration::from_secs(20);
+    let end = clock.now() + Duration::from_secs(60);
     while received.len() < count && clock.now() < end {
         Pacer::new(Pacing::Sleep).wait(clock, Some(end), &[door.as_fd()]).unwrap();
         door.receive(&mut buffers, clock, |datagram| received.push((datagram.from, datagram.bytes.to_vec(), datagram.ecn, datagram.at))).unwrap();

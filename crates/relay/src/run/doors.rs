@@ -319,3 +319,39 @@ fn beside(to: SocketAddr) -> SocketAddr {
         (false, false) => (Ipv4Addr::UNSPECIFIED, 0).into(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    use cohaptic_scene::{LinkTable, link_from_keys};
+
+    use super::*;
+    use crate::{Limits, Mesh, Program};
+
+    /// What is offered to its link later than it came leaves that much later than it should, however soon it is sent then.
+    #[test]
+    fn what_was_offered_late_is_released_late() {
+        let [left, right] = [SocketAddr::from((Ipv4Addr::LOCALHOST, 9)), SocketAddr::from((Ipv4Addr::LOCALHOST, 10))];
+        let port = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let program = |name: &str, address| Program { name: name.to_owned(), port, address: Some(address) };
+        let links = LinkTable::new(2, Arc::new(link_from_keys(&[]).unwrap()), []);
+        let form = Form::Mesh(Mesh { programs: vec![program("left", left), program("right", right)], links });
+        let config = RelayConfig { seed: 0, form, limits: Limits::default(), changes: Vec::new() };
+        let clock = MonotonicClock::start();
+        let (mut doors, mut engine) = (Doors::open(&config, DoorConfig::default()).unwrap(), Engine::new(config).unwrap());
+        let late = Duration::from_millis(5);
+        let passed = Instant::ZERO.saturating_add(late);
+        while clock.now() < passed {
+            std::hint::spin_loop();
+        }
+        engine.handle_timeout(passed);
+        engine.handle_datagram(Arrival { at: Instant::ZERO, port: Port::Program(1), from: left, bytes: b"late", ecn: None });
+        assert!(!doors.take_releases(&mut engine));
+        let mut lateness = Lateness::new();
+        doors.send(&clock, &mut lateness);
+        assert_eq!(lateness.count(), 1);
+        assert!(lateness.summary().max >= late, "{:?}", lateness.summary());
+    }
+}

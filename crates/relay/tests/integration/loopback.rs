@@ -3,33 +3,43 @@
 use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::AsFd as _;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use cohaptic_realtime::udp::{DoorConfig, Ecn, ReceiveBuffers, UdpDoor};
-use cohaptic_realtime::{MonotonicClock, Pacer, Pacing, Tolerance, Wishes};
-use cohaptic_relay::{Control, Form, Limits, Proxy, Relay, RelayConfig, Report, RunOptions};
+use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Pacing, Tolerance, Wishes};
+use cohaptic_relay::{Control, Form, Limits, Proxy, Relay, RelayConfig, Report, RunOptions, View};
 use cohaptic_units::Bytes;
 use cohaptic_wan::{Fate, Network, NetworkConfig, NodeId};
 
 use super::{link, mesh};
+
+/// Long enough for any machine; it is the end of a test that fails.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A relay in a thread of its own.
 struct Running {
     ports: Vec<SocketAddr>,
     control: Sender<Control>,
     stop: Arc<AtomicBool>,
+    offered: Arc<AtomicU64>,
+    clients: Arc<AtomicUsize>,
     thread: JoinHandle<Report>,
 }
 
 fn start(config: RelayConfig, pacing: Pacing) -> Running {
-    let relay = Relay::bind(config, DoorConfig::default()).unwrap();
+    run(Relay::bind(config, DoorConfig::default()).unwrap(), pacing)
+}
+
+fn run(relay: Relay, pacing: Pacing) -> Running {
     let ports = relay.ports().map(|(_, address)| address).collect();
     let (control, changes) = channel();
     let stop = Arc::new(AtomicBool::new(false));
-    let is_over = Arc::clone(&stop);
+    let (is_over, offered) = (Arc::clone(&stop), Arc::new(AtomicU64::new(0)));
+    let clients = Arc::new(AtomicUsize::new(0));
+    let shown = (Arc::clone(&offered), Arc::clone(&clients));
     let options = RunOptions {
         pacing,
         wishes: Wishes::NONE,
@@ -37,11 +47,26 @@ fn start(config: RelayConfig, pacing: Pacing) -> Running {
         look_every: Duration::from_millis(2),
         ..RunOptions::default()
     };
-    let thread = std::thread::spawn(move || relay.run(&options, &changes, &is_over, |_| ()).unwrap());
-    Running { ports, control, stop, thread }
+    let thread = std::thread::spawn(move || {
+        let look = |view: &View<'_>| {
+            shown.0.store(view.intake().offered, Ordering::Relaxed);
+            shown.1.store(view.clients(), Ordering::Relaxed);
+        };
+        relay.run(&options, &changes, &is_over, look).unwrap()
+    });
+    Running { ports, control, stop, offered, clients, thread }
 }
 
 impl Running {
+    /// Waits until it has read so many.
+    fn has_offered(&self, count: u64) {
+        let end = Instant::now() + PATIENCE;
+        while self.offered.load(Ordering::Relaxed) < count {
+            assert!(Instant::now() < end, "{} were offered", self.offered.load(Ordering::Relaxed));
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
     fn end(self) -> Report {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.join().unwrap()
@@ -50,8 +75,7 @@ impl Running {
 
 fn program(family: &str) -> UdpSocket {
     let socket = UdpSocket::bind(family).unwrap();
-    // Long enough for any machine; it is the end of a test that fails.
-    socket.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    socket.set_read_timeout(Some(PATIENCE)).unwrap();
     socket
 }
 
@@ -119,6 +143,8 @@ fn nothing_is_early_or_out_of_order_and_a_seeded_link_loses_what_it_loses_in_vir
             let delay = when - sent[usize::try_from(sequence).unwrap()];
             assert!(delay >= Duration::from_millis(8), "number {sequence} after {delay:?}");
         }
+        // The last ones may be among those that are lost.
+        relay.has_offered(COUNT);
         let report = relay.end();
         assert_eq!((report.intake.offered, report.release.count(), report.held.0), (COUNT, delivered.len() as u64, 0));
         assert_eq!((report.ports[0].counts.sent, report.ports[1].counts.received), (delivered.len() as u64, COUNT));
@@ -138,12 +164,15 @@ fn three_programs_speak_to_each_other_through_their_own_links() {
     let config =
         mesh(&[("a", port, place(0)), ("b", port, place(1)), ("c", port, place(2))], link(&["delay=1ms"]), &[((1, 0), link(&["loss=100%"]))]);
     let relay = start(config, Pacing::Sleep);
-    // The last one first, so that it is known.
+    let mut offered = 0;
     for from in [2, 1, 0] {
         for to in (0..3).filter(|to| *to != from) {
             let name = u64::try_from(10 * from + to).unwrap();
             programs[from].send_to(&name.to_le_bytes(), relay.ports[to]).unwrap();
+            offered += 1;
         }
+        // The last one first, so that it is known before anybody speaks to it.
+        relay.has_offered(offered);
     }
     for (to, expected) in [(0, vec![20]), (1, vec![1, 21]), (2, vec![2, 12])] {
         let mut found: Vec<u64> = Vec::new();
@@ -181,9 +210,9 @@ fn congestion_bits_pass_and_a_link_that_marks_marks() {
         from.queue(port, b"marked?", ecn);
         from.flush();
         let (mut buffers, mut found) = (ReceiveBuffers::new(), None);
-        let end = Instant::now() + Duration::from_secs(20);
-        while found.is_none() && Instant::now() < end {
-            Pacer::new(Pacing::Sleep).wait(&clock, None, &[to.as_fd()]).unwrap();
+        let end = clock.now() + PATIENCE;
+        while found.is_none() && clock.now() < end {
+            Pacer::new(Pacing::Sleep).wait(&clock, Some(end), &[to.as_fd()]).unwrap();
             to.receive(&mut buffers, &clock, |datagram| found = Some(datagram.ecn)).unwrap();
         }
         found.unwrap()
@@ -206,18 +235,43 @@ fn a_link_changes_when_it_is_told_and_one_that_is_not_there_is_counted() {
     let relay = start(config, Pacing::Sleep);
     let set = |from, to| Control::SetLink { from: NodeId(from), to: NodeId(to), model: Box::new(link(&[])) };
     relay.control.send(set(0, 0)).unwrap();
+    relay.control.send(set(1, 1)).unwrap();
     relay.control.send(set(0, 1)).unwrap();
     // It is heard within 2 ms or as late as the machine likes: ask until it is.
     right.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
     let mut bytes = [0; 8];
     let mut tries = 0;
-    while tries < 1000 && right.recv(&mut bytes).is_err() {
+    while tries < 3000 && right.recv(&mut bytes).is_err() {
         left.send_to(&1_u64.to_le_bytes(), relay.ports[1]).unwrap();
         tries += 1;
     }
     let report = relay.end();
     assert!(number(&bytes) == 1 && report.links[0].stats.delivered() > 0);
-    assert_eq!(report.refused_changes, 1);
+    assert_eq!(report.refused_changes, 2);
+}
+
+/// More wait at a port than are read at once. No time is let pass before all of them have been read, so that none is offered later than it came.
+#[test]
+fn what_waits_at_a_port_is_read_before_time_passes() {
+    const COUNT: u64 = 1000;
+    let (left, right) = (program("127.0.0.1:0"), program("127.0.0.1:0"));
+    let port = "127.0.0.1:0".parse().unwrap();
+    let place = |socket: &UdpSocket| Some(socket.local_addr().unwrap());
+    let config = mesh(&[("left", port, place(&left)), ("right", port, place(&right))], link(&["delay=1h"]), &[]);
+    let relay = Relay::bind(config, DoorConfig::default()).unwrap();
+    let (_, there) = relay.ports().nth(1).unwrap();
+    for sequence in 0..COUNT {
+        left.send_to(&sequence.to_le_bytes(), there).unwrap();
+    }
+    let relay = run(relay, Pacing::Sleep);
+    // The kernel may have had no room for some.
+    let end = Instant::now() + Duration::from_millis(300);
+    while Instant::now() < end && relay.offered.load(Ordering::Relaxed) < COUNT {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    relay.has_offered(1);
+    let report = relay.end();
+    assert_eq!((report.intake.clamped, report.clamped.count()), (0, 0), "{:?}", report.clamped.summary());
 }
 
 #[test]
@@ -259,4 +313,31 @@ fn clients_of_a_proxy_reach_the_server_and_get_their_answers() {
         assert_eq!(report.ports.iter().map(|port| port.name.as_str()).collect::<Vec<_>>(), ["listen", "clients"]);
         assert_eq!(report.ports[1].counts.received, 6);
     }
+}
+
+/// What the port of a client did is not forgotten with the client.
+#[test]
+fn a_client_that_has_left_is_still_in_the_report() {
+    let (server, client) = (program("127.0.0.1:0"), program("127.0.0.1:0"));
+    let to = server.local_addr().unwrap();
+    let proxy = Proxy { listen: "127.0.0.1:0".parse().unwrap(), to, forth: link(&[]), back: link(&[]), most_clients: 2 };
+    let limits = Limits { forget_after: Duration::from_millis(200), ..Limits::default() };
+    let relay = start(RelayConfig { seed: 1, form: Form::Proxy(proxy), limits, changes: Vec::new() }, Pacing::Sleep);
+    server.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
+    // One that is read so late that its sender is forgotten by then goes nowhere: ask until one arrives.
+    let mut bytes = [0; 8];
+    let arrived = (0..3000).any(|_| {
+        client.send_to(&[1; 8], relay.ports[0]).unwrap();
+        server.recv(&mut bytes).is_ok()
+    });
+    assert!(arrived);
+    // The first look after its datagram was read shows it, unless it has left by then.
+    relay.has_offered(1);
+    let end = Instant::now() + PATIENCE;
+    while relay.clients.load(Ordering::Relaxed) > 0 {
+        assert!(Instant::now() < end, "the client is not forgotten");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let report = relay.end();
+    assert!(report.ports[1].counts.sent >= 1, "{:?}", report.ports);
 }

@@ -9,6 +9,7 @@ mod sending;
 mod sockets;
 mod timers;
 
+use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 
@@ -16,13 +17,14 @@ use bytes::Bytes;
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, Network, NetworkConfig, NodeId};
 
-pub(crate) use recording::{Recording, Seen};
+pub(crate) use recording::{Recording, Seen, follow_to_the_end, seen};
 pub(crate) use sending::Outgoing;
 pub(crate) use sockets::{Datagram, SocketId};
 pub(crate) use timers::TimerId;
 
 use crate::address::AddressPlan;
-use crate::trace::Happening;
+use crate::file::LinkChange;
+use crate::trace::{Happening, Trace};
 use hosts::HostState;
 use sockets::Sockets;
 use timers::Timers;
@@ -48,6 +50,8 @@ pub(crate) struct Core {
     pub(crate) settings: Settings,
     pub(crate) recording: Recording,
     pub(crate) timers: Timers,
+    /// Links that become other ones, in order of time.
+    pub(crate) changes: VecDeque<LinkChange>,
     #[cfg(feature = "quinn")]
     pub(crate) entropy: entropy::Entropy,
     network: Network<Parcel>,
@@ -94,6 +98,7 @@ impl Core {
             recording: Recording::new(names.to_vec(), &settings),
             settings,
             timers: Timers::default(),
+            changes: VecDeque::new(),
             #[cfg(feature = "quinn")]
             entropy: entropy::Entropy::new(seed),
             network: Network::new(config, |from, to| link(from.0 as usize, to.0 as usize)),
@@ -110,7 +115,8 @@ impl Core {
 
     /// When the network or a timer wants to be woken.
     pub(crate) fn next_event(&self) -> Option<Instant> {
-        [self.network.poll_timeout(), self.timers.next()].into_iter().flatten().min()
+        let change = self.changes.front().map(|change| change.at);
+        [self.network.poll_timeout(), self.timers.next(), change].into_iter().flatten().min()
     }
 
     /// Lets time pass: what arrives until then arrives, and then timers go off.
@@ -121,6 +127,11 @@ impl Core {
             #[cfg(feature = "tokio")]
             {
                 self.polled = 0;
+            }
+        }
+        while self.changes.front().is_some_and(|change| change.at <= now) {
+            if let Some(change) = self.changes.pop_front() {
+                self.change_link(change);
             }
         }
         if self.network.poll_timeout().is_some_and(|at| at <= self.now) {
@@ -145,10 +156,24 @@ impl Core {
     }
 
     pub(crate) fn set_link(&mut self, from: usize, to: usize, link: LinkModel) {
-        let changed = self.network.set_link(self.now, node(from), node(to), link);
+        self.change_link(LinkChange { at: self.now, from, to, link });
+    }
+
+    fn change_link(&mut self, change: LinkChange) {
+        let LinkChange { at, from, to, link } = change;
+        let changed = self.network.set_link(at, node(from), node(to), link);
         debug_assert_eq!(changed, Ok(()), "hosts are checked, and time does not go back");
-        self.recording.note(self.now, Happening::Relinked(from, to));
+        self.recording.note(at, Happening::Relinked(from, to));
         self.take_arrivals();
+    }
+
+    /// What was recorded. Packets that are on their way are followed to their end, in the fates alone.
+    pub(crate) fn take_recording(&mut self) -> (Trace, Vec<Seen>, Instant) {
+        let (trace, mut packets) = self.recording.take();
+        if self.settings.keeps_packets {
+            follow_to_the_end(&mut self.network.clone(), |event| packets.push(seen(event, event.payload.bytes.clone())));
+        }
+        (trace, packets, self.now)
     }
 
     pub(crate) fn link_stats(&self, from: usize, to: usize) -> Option<cohaptic_wan::LinkStats> {
@@ -171,7 +196,9 @@ impl Core {
     }
 }
 
-fn node(place: usize) -> NodeId {
+pub(crate) use node as network_node;
+
+pub(crate) fn node(place: usize) -> NodeId {
     // A network has at most 23,170 nodes.
     NodeId(u32::try_from(place).unwrap_or(u32::MAX))
 }

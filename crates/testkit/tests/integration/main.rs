@@ -1,9 +1,13 @@
 //! Tests of the test kit.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, clippy::missing_panics_doc, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, clippy::missing_panics_doc, clippy::cast_possible_truncation, reason = "tests")]
 
+mod artefacts;
+mod equivalence;
 mod faults;
 mod like_tokio;
+mod link_files;
 mod misuse;
+mod nodes;
 #[cfg(feature = "quinn")]
 mod quic;
 mod sockets;

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::records::{assert_replays, assert_same, inputs, trajectory};
 use super::session::Session;
-use super::wait_for;
+use super::{PATIENCE, wait_for};
 use crate::desk::{Desk, parse};
 use crate::scenes::{RANDOM, TWO};
 
@@ -53,7 +53,9 @@ fn its_records_are_those_of_the_run_and_its_document_says_how_late_it_was() {
     let lateness = numbers(&document, "lateness_us");
     assert!(0.0 <= lateness("p50") && lateness("p50") <= lateness("p99") && lateness("p99") <= lateness("p999"));
     assert!(lateness("p999") <= lateness("max") && lateness("count") == 600.0);
-    assert_eq!(late > 0, lateness("max") > 1000.0 * (1.0 + 1e-3), "{late} late, at most {} µs", lateness("max"));
+    // The histogram has three digits: the latest may be late or not when it is that near to the limit.
+    let is_near = (lateness("max") - 1000.0).abs() <= 1000.0 * 2e-3;
+    assert!(is_near || (late > 0) == (lateness("max") > 1000.0), "{late} late, at most {} µs", lateness("max"));
     let histogram = desk.read("out/lateness.csv");
     let counted: u64 = histogram.lines().skip(1).map(|line| line.rsplit(',').next().unwrap().parse::<u64>().unwrap()).sum();
     assert_eq!(counted, ticks);
@@ -165,7 +167,8 @@ fn what_cannot_be_is_refused_with_a_status() {
         (3, "live two.toml --out two.toml/out", &["two.toml"]),
         (2, "live two.toml --new-key new.key", &["--new-key"]),
     ] {
-        let outcome = desk.cohaptic(line);
+        // What is not refused would run to the end of its scene, an hour.
+        let outcome = desk.cohaptic_within(PATIENCE, line);
         assert_eq!(outcome.status, Some(status), "{line}: {outcome:#?}");
         outcome.assert_refused(status, parts);
     }

@@ -13,14 +13,14 @@ use super::session::Session;
 use super::wait_for;
 use crate::desk::Desk;
 
-/// Somebody who holds on to 0, the programs, and perhaps a third user who lets the object go where it will. All else is what the programs take unless told.
+/// Somebody who holds on to 0, the programs, and perhaps a third user who lets the object go where it will. All but the damping is what the programs take unless told.
 fn scene(programs: usize) -> String {
     let kinds = ["", "kind = \"udp\"", if programs > 1 { "kind = \"udp\"" } else { "" }];
     let [_, right, third] = kinds;
     format!(
         "scene = {{ duration = \"1h\", seed = {SESSION} }}\nobject = {{ mass = 0.45 }}\n\
-         coordination = {{ strategy = \"average-position\", stiffness = {STIFFNESS}, damping = 5.0, update = \"8ms\" }}\n\
-         peer = {{ device = {{ mass = 0.1, damping = 5.0 }}, coupling = {{ stiffness = {COUPLING}, damping = 5.0 }} }}\n\
+         coordination = {{ strategy = \"average-position\", stiffness = {STIFFNESS}, damping = {DAMPING}, update = \"8ms\" }}\n\
+         peer = {{ device = {{ mass = 0.1, damping = 5.0 }}, coupling = {{ stiffness = {COUPLING}, damping = 5.0 }}, silence = {{ after = \"20s\" }} }}\n\
          link = {{ delay = \"4ms\", jitter = \"1ms\", loss = \"2%\" }}\n\
          [[peers]]\nname = \"left\"\nhand = {{ arm = {{ mass = 0.4, damping = 10.0, stiffness = {ARM} }} }}\n\
          [[peers]]\nname = \"right\"\n{right}\n[[peers]]\nname = \"third\"\n{third}\n"
@@ -28,6 +28,9 @@ fn scene(programs: usize) -> String {
 }
 
 const STIFFNESS: f64 = 300.0;
+/// So much that no copy swings over: then no peer passes on more than it is told, at any frequency, and they come to rest however long a busy machine lets one of
+/// them wait. None counts as silent meanwhile.
+const DAMPING: f64 = 20.0;
 const COUPLING: f64 = 3500.0;
 const ARM: f64 = 300.0;
 /// What the hand of the program at place 1 pushes with, all the time [N].
@@ -61,6 +64,7 @@ fn taken_part(desk: &Desk, languages: &[Language], with_key: bool, seconds: f64)
         let mut command = program.command();
         let force = if place == 1 { FORCE } else { 0.0 };
         command.arg(door.to_string()).args(["--session", &SESSION.to_string(), "--place", &place.to_string()]);
+        command.args(["--coordination", &format!("{STIFFNESS},{DAMPING}")]);
         command.args(["--duration", &seconds.to_string(), "--force", &force.to_string(), "--patience", "60"]);
         if with_key {
             // Axes, peers and periods are told by the door.
@@ -91,7 +95,7 @@ fn come_to_rest(languages: &[Language], with_key: bool) {
         let said = desk.text("live --new-key session.key");
         assert!(said.starts_with("session.key: a new session key"), "{said}");
     }
-    for seconds in [2.0, 8.0, 30.0] {
+    for seconds in [2.0, 8.0, 40.0] {
         let Some((settled, summaries, document)) = taken_part(&desk, languages, with_key, seconds) else { return };
         // What each program itself says of its copy at its end.
         let rest = &at_rest()[1..];

@@ -59,8 +59,12 @@ pub(super) fn keyless(peers: u32) -> ClientConfig {
 fn visited(desk: &Desk) -> (Value, [Account; 2]) {
     let mut session = Session::begin(desk, "scene.toml --json --out out --listen 127.0.0.1:0 --control");
     let (door, control) = (session.address(), session.control());
-    assert_eq!(control.state()["peers"][1]["status"], "absent");
+    let state = control.state();
+    assert_eq!((&state["peers"][1]["status"], &state["peers"][1]["age_s"]), (&json!("absent"), &json!(null)));
     let first = stays(&control, door, PLACES[0]);
+    // Who is present was heard within the 150 ms after which he counts as silent; who is simulated here is not heard.
+    let state = control.wait_status(1, "present");
+    assert!(state["peers"][1]["age_s"].as_f64().is_some_and(|age| (0.0..0.15).contains(&age)) && state["peers"][0]["age_s"].is_null(), "{state}");
     first.fall_silent();
     let state = control.wait_status(1, "stale");
     // It was heard, and not within the last 150 ms.

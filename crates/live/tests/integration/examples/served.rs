@@ -145,7 +145,8 @@ fn serve_until(
 }
 
 fn takes_part(language: Language, with_key: bool) {
-    let heard = |_: &Served, summary: &Summary| summary.others.iter().all(|other| other.received > 0);
+    // What it hears in its last tick does not move it any more.
+    let heard = |_: &Served, summary: &Summary| summary.others.iter().all(|other| other.received > 0) && summary.position[0] != 0.0;
     let Some((served, summary)) = serve_until(language, with_key, true, [0.3, 2.0, 10.0, 40.0], None, heard) else { return };
     let stats = served.door.stats();
     // Every sample that it sent was let in, in order: what is on loopback is not lost while the socket has room, which it has for 100 of them
@@ -178,7 +179,8 @@ fn takes_part(language: Language, with_key: bool) {
 fn comes_back(language: Language) {
     // Samples of the second session are answered from number 0, below what it has heard before.
     let back = |served: &Served, summary: &Summary| {
-        served.first_number == 0 && summary.joinings >= 2 && served.answers > 0 && served.door.stats().refused(Refusal::NotJoined) > 0
+        let is_back = served.first_number == 0 && summary.joinings >= 2 && served.answers > 0 && summary.position[0] != 0.0;
+        is_back && served.door.stats().refused(Refusal::NotJoined) > 0
     };
     let Some((served, summary)) = serve_until(language, true, false, [1.8, 6.0, 20.0, 60.0], Some(20), back) else { return };
     let stats = served.door.stats();

@@ -32,6 +32,7 @@ fn cable(device: &'static str, number: u8) -> Result<Host, String> {
         ip(&format!("link set {far} gso_max_segs 1"))?;
         ip(&format!("link set {far} up"))
     })?;
+    host.has(Ipv6Addr::new(0xfd00, 0, 0, 0, 0, 0, 0, number.into()).into());
     Ok(host)
 }
 

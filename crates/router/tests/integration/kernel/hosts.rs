@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use cohaptic_realtime::{Pacing, Wishes, prepare_thread};
 use cohaptic_router::{Report, Router};
@@ -15,7 +15,7 @@ use nix::sched::{CloneFlags, unshare};
 use nix::unistd::gettid;
 
 /// What is waited for takes milliseconds; this is how long a machine may be busy with something else.
-pub(super) const PATIENCE: Duration = Duration::from_secs(20);
+pub(super) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A thread in a network namespace of its own. Sockets that it opens belong there, whoever uses them.
 pub(super) struct Host {
@@ -41,6 +41,16 @@ impl Host {
         let (done, is_done) = channel();
         self.work.send(Box::new(move || drop(done.send(work())))).unwrap();
         is_done.recv_timeout(PATIENCE).unwrap()
+    }
+
+    /// Waits until it has an address: one of IPv6 is there only once the kernel has noticed, some time after, that its device is up.
+    pub(super) fn has(&self, address: IpAddr) {
+        self.does(move || {
+            let begin = Instant::now();
+            while UdpSocket::bind(SocketAddr::new(address, 0)).is_err() && begin.elapsed() < PATIENCE {
+                thread::sleep(Duration::from_millis(1));
+            }
+        });
     }
 
     pub(super) fn udp(&self, address: IpAddr, port: u16) -> UdpSocket {

@@ -27,6 +27,8 @@ fn v6(host: u16) -> IpAddr {
 fn hosts(text: &str) -> (Host, Host, Running) {
     let (left, right) = (Host::new(), Host::new());
     let running = Running::begin(&format!("{}{text}", sides(&left, &right)));
+    left.has(v6(1));
+    right.has(v6(2));
     (left, right, running)
 }
 
@@ -71,11 +73,9 @@ fn ping(host: &Host, to: IpAddr, count: u16) -> Vec<Duration> {
 
 const DELAY: Duration = Duration::from_millis(20);
 
-/// No packet is earlier than its link says, and they do arrive. The upper bound is for the median, and far beyond what a busy machine needs.
-fn check_round_trips(mut times: Vec<Duration>, least: Duration) {
-    times.sort_unstable();
-    assert!(times[0] >= least, "{times:?}");
-    assert!(times[times.len() / 2] < least + Duration::from_secs(1), "{times:?}");
+/// No packet is earlier than its link says, and all arrive. How late they are is the machine's doing; that the link itself adds nothing is seen in its counters.
+fn check_round_trips(times: &[Duration], least: Duration) {
+    assert!(times.iter().all(|time| *time >= least), "{times:?}");
 }
 
 #[test]
@@ -83,8 +83,8 @@ fn ping_udp_and_tcp_take_as_long_as_asked_with_ipv4_and_ipv6() {
     inside("kernel::tun::ping_udp_and_tcp_take_as_long_as_asked_with_ipv4_and_ipv6", || {
         let (left, right, running) = hosts("router = { default = \"x\" }\nlinks = { x = { delay = \"20ms\" } }");
         for [here, there] in [[v4(1), v4(2)], [v6(1), v6(2)]] {
-            check_round_trips(ping(&left, there, 5), 2 * DELAY);
-            check_round_trips(ping(&right, here, 5), 2 * DELAY);
+            check_round_trips(&ping(&left, there, 5), 2 * DELAY);
+            check_round_trips(&ping(&right, here, 5), 2 * DELAY);
             let (client, server) = (left.udp(here, 0), right.udp(there, 7));
             let echo = thread::spawn(move || {
                 let mut buffer = [0; 2000];
@@ -100,7 +100,7 @@ fn ping_udp_and_tcp_take_as_long_as_asked_with_ipv4_and_ipv6() {
                 assert_eq!((client.recv(&mut buffer).unwrap(), buffer[700]), (1300, number));
                 begin.elapsed()
             };
-            check_round_trips((0..5).map(round_trip).collect(), 2 * DELAY);
+            check_round_trips(&(0..5).map(round_trip).collect::<Vec<_>>(), 2 * DELAY);
             echo.join().unwrap();
             let listener = right.does(move || TcpListener::bind(SocketAddr::new(there, 80)).unwrap());
             let server = thread::spawn(move || {
@@ -162,6 +162,10 @@ fn exactly_those_packets_are_lost_that_the_seeded_link_loses_in_virtual_time() {
                 }
             }
             assert_eq!(found, survivors.into_iter().collect::<Vec<_>>());
+            // The last ones may be among the lost: what is sent after them and arrives says that they were read.
+            let behind = to_host.udp(there, 7001);
+            sender.send_to(b"!", SocketAddr::new(there, 7001)).unwrap();
+            assert_eq!(behind.recv(&mut [0; 2]).unwrap(), 1);
             expected_losses.push(link.stats().dropped(DropCause::Loss));
         }
         let report = running.end();
@@ -221,7 +225,7 @@ fn rules_choose_the_link_of_real_traffic() {
             socket.recv(&mut byte).unwrap();
         }
         assert!(begin.elapsed() >= Duration::from_millis(60));
-        check_round_trips(ping(&left, v4(2), 3), Duration::from_millis(1));
+        check_round_trips(&ping(&left, v4(2), 3), Duration::from_millis(1));
         let report = running.end();
         let offered = |link: &str, from: Side| report.counters.lane(link, from).unwrap().stats.offered();
         assert_eq!(report.counters.by_rule.iter().map(|count| count.packets).collect::<Vec<_>>(), [1, 2, 3, 1, 1]);

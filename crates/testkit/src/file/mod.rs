@@ -1,0 +1,145 @@
+//! Hosts and links from a file that a test can keep.
+
+#[cfg(feature = "files")]
+mod documents;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use cohaptic_units::Instant;
+use cohaptic_wan::LinkModel;
+
+use crate::words::{self, WordsError};
+
+/// Hosts and the links between them, read from a file.
+///
+/// A file that ends in `.toml` is a relay file, whose programs are the hosts, or a scene file, whose peers are (feature `files`): its links are as it says, also
+/// those that change while the run goes on, and its seed is that of the run. What is said of devices, objects and expectations means nothing here.
+///
+/// Any other file is of plain words, a line each:
+///
+/// ```text
+/// # Lines that begin with # say nothing.
+/// seed: 17
+/// hosts: client server other
+/// all: delay 10ms
+/// client -> server: delay 24ms loss 1%
+/// server -> client: replay fates-server-to-client.csv
+/// client <-> other:
+/// ```
+///
+/// After the colon stand words of `tc-netem`, done exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log, beside the file itself. `all`
+/// is every link that no other line names; without it they are ideal. Without `hosts` those take part whom lines name, in the order of the lines.
+///
+/// Relative paths begin in the folder in which the test runs, which `cargo test` makes that of the package.
+#[derive(Clone, PartialEq, Debug)]
+pub struct LinkFile {
+    pub(crate) hosts: Vec<String>,
+    /// What every link is that is not in `links`.
+    pub(crate) every: LinkModel,
+    /// By sender, then receiver.
+    pub(crate) links: BTreeMap<(usize, usize), LinkModel>,
+    /// In order of time.
+    pub(crate) changes: Vec<LinkChange>,
+    pub(crate) seed: Option<u64>,
+}
+
+/// A link that becomes another one.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct LinkChange {
+    pub(crate) at: Instant,
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+    pub(crate) link: LinkModel,
+}
+
+/// Why a file says no links.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinkFileError {
+    /// It cannot be read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Its words make no sense.
+    #[error("{}:{error}", path.display())]
+    Words {
+        /// The file.
+        path: PathBuf,
+        /// Where, and why.
+        error: WordsError,
+    },
+    /// It is a scene file or a relay file, and this crate was built without them.
+    #[error("{}: a scene file or a relay file is read with the feature `files` of cohaptic-testkit only; expected it, or a file of plain words", path.display())]
+    NoDocuments {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It makes no sense as a scene file or a relay file.
+    #[cfg(feature = "files")]
+    #[error(transparent)]
+    Document(#[from] cohaptic_scene::SceneError),
+    /// A scene has what links between hosts cannot stand for.
+    #[error("{}: {what}", path.display())]
+    NotLinks {
+        /// The file.
+        path: PathBuf,
+        /// What, and what was expected.
+        what: String,
+    },
+}
+
+impl LinkFile {
+    /// Reads a file.
+    ///
+    /// # Errors
+    ///
+    /// [`LinkFileError`] if it cannot be read or makes no sense, with the place.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, LinkFileError> {
+        let path = path.as_ref();
+        let text = fs::read_to_string(path).map_err(|source| LinkFileError::Io { path: path.to_path_buf(), source })?;
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            return Self::document(&text, path);
+        }
+        let folder = path.parent().unwrap_or_else(|| Path::new(""));
+        let file = |name: &str| fs::read_to_string(folder.join(name)).map_err(|error| format!("cannot be read: {error}"));
+        Self::parse_with(&text, file).map_err(|error| LinkFileError::Words { path: path.to_path_buf(), error })
+    }
+
+    /// Reads a text of plain words, which names no files.
+    ///
+    /// # Errors
+    ///
+    /// [`WordsError`] if it makes no sense, with the place.
+    pub fn parse(text: &str) -> Result<Self, WordsError> {
+        Self::parse_with(text, |_| Err("a text names no files: expected words of tc-netem".to_owned()))
+    }
+
+    /// The names of the hosts.
+    #[must_use]
+    pub fn hosts(&self) -> &[String] {
+        &self.hosts
+    }
+
+    /// The link from one host to another at the beginning, by their places in [`LinkFile::hosts`].
+    #[must_use]
+    pub fn between(&self, from: usize, to: usize) -> &LinkModel {
+        self.links.get(&(from, to)).unwrap_or(&self.every)
+    }
+
+    fn parse_with(text: &str, file: impl FnMut(&str) -> Result<String, String>) -> Result<Self, WordsError> {
+        let words::Words { hosts, every, links, seed } = words::parse(text, file)?;
+        Ok(Self { hosts, every, links, changes: Vec::new(), seed })
+    }
+
+    #[cfg(not(feature = "files"))]
+    fn document(_text: &str, path: &Path) -> Result<Self, LinkFileError> {
+        Err(LinkFileError::NoDocuments { path: path.to_path_buf() })
+    }
+}

@@ -1,0 +1,318 @@
+//! Links in plain words: hosts and what is between them, a line each.
+//!
+//! ```text
+//! # Lines that begin with # say nothing.
+//! seed: 17
+//! hosts: client server
+//! all: delay 10ms
+//! client -> server: delay 24ms loss 1%
+//! server -> client: replay fates.csv
+//! client <-> other:
+//! ```
+//!
+//! After the colon stand words of `tc-netem`, done exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log. `all` is every link that
+//! no other line names, wherever it stands; without it they are ideal. `hosts` says who takes part and in which order; without it those do whom lines name, in
+//! the order of the lines. Names are parted from the arrow by blanks.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+use cohaptic_wan::netem::Netem;
+use cohaptic_wan::{FateLog, LinkModel};
+
+use crate::bed::name_fault;
+
+/// What a text says.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct Words {
+    /// The hosts, at least one.
+    pub(crate) hosts: Vec<String>,
+    /// What every link is that is not in `links`.
+    pub(crate) every: LinkModel,
+    /// By sender, then receiver.
+    pub(crate) links: BTreeMap<(usize, usize), LinkModel>,
+    pub(crate) seed: Option<u64>,
+}
+
+/// Why a text says no links, and where.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct WordsError {
+    line: usize,
+    column: usize,
+    message: String,
+    shown: String,
+    width: usize,
+}
+
+impl WordsError {
+    /// The line, from 1.
+    #[must_use]
+    pub const fn line(&self) -> usize {
+        self.line
+    }
+
+    /// The column, from 1, in characters.
+    #[must_use]
+    pub const fn column(&self) -> usize {
+        self.column
+    }
+
+    /// What is wrong, and what was expected.
+    #[must_use]
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+}
+
+impl std::error::Error for WordsError {}
+
+impl fmt::Display for WordsError {
+    /// The place, the message, and the line with the place marked.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { line, column, message, shown, width } = self;
+        let margin = line.to_string().len();
+        let (before, width) = (column - 1, *width.max(&1));
+        write!(f, "{line}:{column}: {message}\n{:margin$} |\n{line} | {shown}\n{:margin$} | {:before$}{:^<width$}", "", "", "", "")
+    }
+}
+
+/// What is wrong with some bytes of a line.
+type Fault = (Range<usize>, String);
+
+/// Reads a text. `file` reads the file of a fate log, by the path in the text.
+pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, String>) -> Result<Words, WordsError> {
+    let mut reader = Reader::default();
+    let mut last = (1, "");
+    for (number, line) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
+        reader.line(line, &mut file).map_err(|fault| locate(number, line, fault))?;
+        last = (number, line);
+    }
+    let every = reader.every.unwrap_or_default();
+    if reader.hosts.is_empty() {
+        let end = last.1.len()..last.1.len();
+        return Err(locate(last.0, last.1, (end, "no line names a host: expected one such as `a -> b: delay 24ms` or `hosts: a b`".to_owned())));
+    }
+    Ok(Words { hosts: reader.hosts, every, links: reader.links, seed: reader.seed })
+}
+
+fn locate(number: usize, line: &str, (span, message): Fault) -> WordsError {
+    let shown: String = line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let characters = |range: Range<usize>| line.get(range).map_or(0, |part| part.chars().count());
+    WordsError { line: number, column: characters(0..span.start) + 1, message, shown, width: characters(span) }
+}
+
+#[derive(Debug, Default)]
+struct Reader {
+    hosts: Vec<String>,
+    /// Whether a line has said who takes part.
+    is_closed: bool,
+    every: Option<LinkModel>,
+    links: BTreeMap<(usize, usize), LinkModel>,
+    seed: Option<u64>,
+}
+
+impl Reader {
+    fn line(&mut self, line: &str, file: &mut impl FnMut(&str) -> Result<String, String>) -> Result<(), Fault> {
+        let said = line.trim();
+        if said.is_empty() || said.starts_with('#') {
+            return Ok(());
+        }
+        let begin = line.len() - line.trim_start().len();
+        let Some(colon) = line.find(':') else {
+            return Err((begin..begin + said.len(), "no colon: expected a line such as `a -> b: delay 24ms loss 1%`".to_owned()));
+        };
+        let (subject, rest) = (tokens(line, begin..colon), tokens(line, colon + 1..line.len()));
+        match subject.iter().map(|span| &line[span.clone()]).collect::<Vec<_>>()[..] {
+            ["seed"] => self.seed(line, &subject[0], &rest),
+            ["hosts"] => self.hosts(line, &subject[0], &rest),
+            ["all"] => {
+                let link = link(line, &rest, file)?;
+                if self.every.replace(link).is_some() { Err(twice(&subject[0], "all")) } else { Ok(()) }
+            }
+            [_, arrow @ ("->" | "<->"), _] => {
+                let pair = (self.host(line, &subject[0])?, self.host(line, &subject[2])?);
+                let whole = subject[0].start..subject[2].end;
+                if pair.0 == pair.1 {
+                    return Err((whole, "a host has no link to itself: expected two hosts".to_owned()));
+                }
+                let link = link(line, &rest, file)?;
+                let is_known =
+                    self.links.insert(pair, link.clone()).is_some() || arrow == "<->" && self.links.insert((pair.1, pair.0), link).is_some();
+                if is_known { Err(twice(&whole, "this link")) } else { Ok(()) }
+            }
+            _ => Err((begin..colon.max(begin + 1), "expected `a -> b`, `a <-> b`, `all`, `hosts` or `seed` before the colon".to_owned())),
+        }
+    }
+
+    fn seed(&mut self, line: &str, subject: &Range<usize>, rest: &[Range<usize>]) -> Result<(), Fault> {
+        let [span] = rest else { return Err((rest_of(line, subject, rest), "expected one number as the seed".to_owned())) };
+        let seed = crate::seed::number(&line[span.clone()]).ok_or_else(|| (span.clone(), format!("expected a number from 0 to {}", u64::MAX)))?;
+        if self.seed.replace(seed).is_some() { Err(twice(subject, "seed")) } else { Ok(()) }
+    }
+
+    fn hosts(&mut self, line: &str, subject: &Range<usize>, rest: &[Range<usize>]) -> Result<(), Fault> {
+        if self.is_closed {
+            return Err(twice(subject, "hosts"));
+        }
+        if !self.hosts.is_empty() {
+            return Err((subject.clone(), "hosts were named before: expected this line before those of links".to_owned()));
+        }
+        if rest.is_empty() {
+            return Err((rest_of(line, subject, rest), "expected the names of hosts, parted by blanks".to_owned()));
+        }
+        for span in rest {
+            let name = &line[span.clone()];
+            if self.hosts.iter().any(|known| known == name) {
+                return Err((span.clone(), format!("host `{name}` is named twice: expected it once")));
+            }
+            self.host(line, span)?;
+        }
+        self.is_closed = true;
+        Ok(())
+    }
+
+    /// The place of a host, which is a new one unless it is known.
+    fn host(&mut self, line: &str, span: &Range<usize>) -> Result<usize, Fault> {
+        let name = &line[span.clone()];
+        if let Some(place) = self.hosts.iter().position(|known| known == name) {
+            return Ok(place);
+        }
+        if self.is_closed {
+            return Err((span.clone(), format!("there is no host `{name}`: expected one of {}", self.hosts.join(", "))));
+        }
+        if let Some(fault) = name_fault(name) {
+            return Err((span.clone(), fault));
+        }
+        self.hosts.push(name.to_owned());
+        Ok(self.hosts.len() - 1)
+    }
+}
+
+fn twice(span: &Range<usize>, what: &str) -> Fault {
+    (span.clone(), format!("{what} is said twice: expected it once"))
+}
+
+/// What stands after the colon; the end of the line if that is nothing.
+fn rest_of(line: &str, subject: &Range<usize>, rest: &[Range<usize>]) -> Range<usize> {
+    match (rest.first(), rest.last()) {
+        (Some(first), Some(last)) => first.start..last.end,
+        _ => {
+            let end = line.trim_end().len().max(subject.end);
+            end..end
+        }
+    }
+}
+
+/// The words of a part of a line, by their places.
+fn tokens(line: &str, part: Range<usize>) -> Vec<Range<usize>> {
+    let mut tokens = Vec::new();
+    let mut begin = None;
+    for (place, c) in line[part.clone()].char_indices().map(|(place, c)| (part.start + place, c)) {
+        if c.is_whitespace() {
+            tokens.extend(begin.take().map(|begin| begin..place));
+        } else {
+            begin = begin.or(Some(place));
+        }
+    }
+    tokens.extend(begin.map(|begin| begin..part.end));
+    tokens
+}
+
+/// What stands after the colon, as a link.
+fn link(line: &str, words: &[Range<usize>], file: &mut impl FnMut(&str) -> Result<String, String>) -> Result<LinkModel, Fault> {
+    let (Some(first), Some(last)) = (words.first(), words.last()) else { return Ok(LinkModel::default()) };
+    let whole = first.start..last.end;
+    if &line[first.clone()] == "replay" {
+        let [_, _, ..] = words else { return Err((whole.end..whole.end, "expected the file of a fate log after `replay`".to_owned())) };
+        let path = words[1].start..last.end;
+        let log = file(&line[path.clone()]).and_then(|text| FateLog::parse(&text).map_err(|error| error.to_string()));
+        return log.map(|log| LinkModel::Replay(Arc::new(log))).map_err(|message| (path, message));
+    }
+    let netem = Netem::parse(&line[whole.clone()]).map_err(|error| {
+        let span = whole.start + error.span.start..whole.start + error.span.end;
+        (span, error.to_string())
+    })?;
+    netem.to_link_config(&mut |_| None).map(LinkModel::from).map_err(|error| (whole, error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::link::ToLink;
+
+    fn read(text: &str) -> Result<Words, String> {
+        parse(text, |path| if path == "a log.csv" { Ok(FateLog::default().to_text()) } else { Err(format!("{path}: not there")) })
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_text_of_the_module_page_is_read() {
+        let text = "# Lines that begin with # say nothing.\nseed: 0x11\n\nhosts: client server other\r\nall: delay 10ms\n  client -> server: delay 24ms loss 1%\n\
+                    server -> client: replay a log.csv\nclient <-> other:";
+        let words = read(text).unwrap();
+        assert_eq!((words.seed, &words.hosts[..]), (Some(17), &["client", "server", "other"].map(String::from)[..]));
+        assert_eq!(words.every, "delay 10ms".to_link());
+        let replay = LinkModel::Replay(Arc::new(FateLog::default()));
+        let links = [((0, 1), "delay 24ms loss 1%".to_link()), ((0, 2), "".to_link()), ((1, 0), replay), ((2, 0), "".to_link())];
+        assert_eq!(words.links, BTreeMap::from(links));
+    }
+
+    #[test]
+    fn hosts_are_those_that_lines_name() {
+        let words = read("b -> a: delay 1ms\na -> c: loss 1%").unwrap();
+        assert_eq!(words.hosts, ["b", "a", "c"]);
+        assert_eq!(words.links.keys().copied().collect::<Vec<_>>(), [(0, 1), (1, 2)]);
+        assert_eq!(words.every, LinkModel::default());
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_shown_with_its_place() {
+        assert_eq!(
+            read("a -> b: delay 24ms\nb -> a: delay 24 parsecs loss 1%").unwrap_err(),
+            "2:18: unknown word \"parsecs\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, slot, seed or the end\n\
+             \u{20} |\n2 | b -> a: delay 24 parsecs loss 1%\n  |                  ^^^^^^^"
+        );
+        for (text, expected) in [
+            ("", "1:1: no line names a host"),
+            ("all: delay 1ms", "1:15: no line names a host"),
+            ("a -> b delay 1ms", "1:1: no colon"),
+            ("a b: delay 1ms", "1:1: expected `a -> b`"),
+            (": delay 1ms", "1:1: expected `a -> b`"),
+            ("a->b: delay 1ms", "1:1: expected `a -> b`"),
+            ("é -> é: delay 1ms", "1:1: a host has no link to itself"),
+            ("é -> b: delai 1ms", "1:9: unknown word \"delai\""),
+            ("a -> b:\nb -> a:\n a -> b: loss 1%", "3:2: this link is said twice"),
+            ("a -> b:\nb <-> a:", "2:1: this link is said twice"),
+            ("all:\nall:", "2:1: all is said twice"),
+            ("hosts: a b\na -> c:", "2:6: there is no host `c`: expected one of a, b"),
+            ("hosts: a a", "1:10: host `a` is named twice"),
+            ("hosts:  ", "1:7: expected the names of hosts"),
+            ("a -> b:\nhosts: a", "2:1: hosts were named before"),
+            ("hosts: a\nhosts: b", "2:1: hosts is said twice"),
+            ("a -> [b]:", "1:6: `[b]` is no name of a host"),
+            ("10.0.0.1 -> b:", "1:1: `10.0.0.1` is no name of a host"),
+            ("seed: x", "1:7: expected a number"),
+            ("seed: 1 2", "1:7: expected one number"),
+            ("seed: 1\nseed: 1", "2:1: seed is said twice"),
+            ("a -> b: replay", "1:15: expected the file of a fate log"),
+            ("a -> b: replay x.csv", "1:16: x.csv: not there"),
+            ("a -> b: delay 5ms 9ms distribution uniform", "1:9: delay: uniform jitter of 9ms around 5ms begins below zero"),
+        ] {
+            let error = read(text).expect_err(text);
+            assert!(error.starts_with(expected), "{text}: {error}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_or_refused(text in "([a-c:>#<\t é-]|delay|loss|seed|hosts|all|replay|->|<->|1ms|5%|\r|\n){0,40}") {
+            if let Err(error) = read(&text) {
+                prop_assert!(!error.is_empty());
+            }
+        }
+    }
+}

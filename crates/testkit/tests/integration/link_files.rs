@@ -1,0 +1,95 @@
+//! Tests against files of links in plain words.
+
+use std::fs;
+use std::panic::catch_unwind;
+use std::path::Path;
+use std::time::Duration;
+
+use cohaptic_testkit::node::{Node, Nodes, Packet, Transmit};
+use cohaptic_testkit::{Instant, LinkFile, LinkFileError, Testbed, ToLink, time};
+
+fn file(folder: &Path, name: &str, text: &str) -> std::path::PathBuf {
+    let path = folder.join(name);
+    fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn hosts_links_and_seed_are_those_of_the_file() {
+    let base = tempfile::tempdir().unwrap();
+    let text = "seed: 3\nhosts: x y z\nall: delay 5ms\nx -> y: delay 3ms 1ms loss 30%\n";
+    let path = file(base.path(), "bad.links", text);
+    let trace = |bed: Testbed| {
+        let ((), record) = bed.run_recorded(|bed| async move {
+            let socket = bed.host("x").bind("0.0.0.0:1").unwrap();
+            for _ in 0..100 {
+                socket.send_to(b"hello", "y:1").await.unwrap();
+                socket.send_to(b"hello", "z:1").await.unwrap();
+                time::sleep(Duration::from_millis(1)).await;
+            }
+        });
+        record.trace().clone()
+    };
+    let said = Testbed::new(["x", "y", "z"]).links("delay 5ms").link("x", "y", "delay 3ms 1ms loss 30%").seed(3);
+    let (said, read) = (trace(said), trace(Testbed::from_file(&path)));
+    assert_eq!(said, read);
+    assert_ne!(said, trace(Testbed::from_file(&path).seed(4)));
+    let links = LinkFile::parse(text).unwrap();
+    assert_eq!(links.hosts(), ["x", "y", "z"]);
+    assert_eq!((links.between(0, 1), links.between(1, 0)), (&"delay 3ms 1ms loss 30%".to_link(), &"delay 5ms".to_link()));
+}
+
+fn message(act: impl FnOnce() + std::panic::UnwindSafe) -> String {
+    catch_unwind(act).unwrap_err().downcast_ref::<String>().unwrap().clone()
+}
+
+#[test]
+fn a_file_that_makes_no_sense_fails_the_test_with_its_place() {
+    let base = tempfile::tempdir().unwrap();
+    let path = file(base.path(), "bad.links", "a -> b: delay 24ms\n\nb -> a: loss 250%\n");
+    let expected = format!(
+        "{}:3:14: \"250%\" is not what loss takes here: expected a percentage from 0 to 100\n  |\n3 | b -> a: loss 250%\n  |              ^^^^",
+        path.display()
+    );
+    assert_eq!(message(|| drop(Testbed::from_file(&path))), expected);
+    let path = file(base.path(), "log.links", "a -> b: replay fates.csv\n");
+    assert!(message(|| drop(Testbed::from_file(&path))).contains("log.links:1:16: cannot be read: "));
+    file(base.path(), "fates.csv", "sequence\n");
+    assert!(message(|| drop(Testbed::from_file(&path))).contains("log.links:1:16: line 1: found \"sequence\", expected the header"));
+    let path = base.path().join("none.links");
+    assert!(message(|| drop(Testbed::from_file(&path))).starts_with(&format!("{}: cannot be read: ", path.display())));
+    assert!(matches!(LinkFile::read(&path), Err(LinkFileError::Io { .. })));
+    let path = file(base.path(), "bytes.links", "");
+    fs::write(&path, [0xff, 0xfe]).unwrap();
+    assert!(message(|| drop(Testbed::from_file(&path))).contains("cannot be read: stream did not contain valid UTF-8"));
+    assert!(LinkFile::parse("a -> b: replay x.csv").unwrap_err().to_string().starts_with("1:16: a text names no files"));
+}
+
+/// Sends once, at the beginning, to the one that was added after it; keeps when something came.
+#[derive(Default)]
+struct Once {
+    sends: Option<Transmit>,
+    came: Option<Instant>,
+}
+
+impl Node for Once {
+    fn handle_packet(&mut self, now: Instant, _packet: Packet) {
+        self.came = Some(now);
+    }
+
+    fn poll_transmit(&mut self, _now: Instant) -> Option<Transmit> {
+        self.sends.take()
+    }
+}
+
+#[test]
+fn nodes_take_the_links_of_a_file_by_name() {
+    let base = tempfile::tempdir().unwrap();
+    let path = file(base.path(), "two.links", "b -> a: delay 7ms\na -> b: delay 3ms\n");
+    let sender = || Once { sends: Some(Transmit::to(1, "x")), came: None };
+    let mut run = Nodes::new().add("a", sender()).add("b", Once::default()).links_from_file(&path).start();
+    run.run_until_idle();
+    assert_eq!(run.node::<Once>("b").came, Some(Instant::from_nanos(3_000_000)));
+    let nodes = || drop(Nodes::new().add("a", sender()).links_from_file(&path));
+    assert_eq!(message(std::panic::AssertUnwindSafe(nodes)), "there is no host `b`; the hosts are a");
+}
