@@ -41,8 +41,14 @@
 //! With the configurations of this module nothing is left to the system, and [`Testbed::run_twice`](crate::Testbed::run_twice) compares every byte. With
 //! configurations of your own, lengths and times are the same twice still, provided that the certificate's key gives signatures of fixed length (Ed25519 or RSA; those of
 //! ECDSA vary by some bytes), but not the bytes: say [`Testbed::without_digests`](crate::Testbed::without_digests). Or take the pieces:
-//! [`crypto_provider`] and [`TestTime`] go into any configuration of rustls. Make configurations inside the program: a client's remembers the servers that it has
-//! met.
+//! [`crypto_provider`] and [`TestTime`] go into any configuration of rustls. On links that damage packets, times depend on the bytes too: what a damaged header
+//! says is up to them. Make configurations inside the program: a client's remembers the servers that it has met.
+//!
+//! # Which clocks are read
+//!
+//! Quinn asks its runtime for the time, and its server's time source for that of tokens; both are virtual, as is the time provider of the TLS configurations of
+//! this module. What is left are features that are not built here (`qlog`, `lock_tracking`), and rustls outside of those configurations: the validity of certificates is
+//! checked against the day's date then, and `Ticketer`s change their keys by it. None of this has a part in when a packet is sent.
 //!
 //! # What differs from a real socket
 //!

@@ -88,6 +88,34 @@ fn the_day_passes_in_virtual_time() {
     assert_eq!(quinn::TestTime.current_time(), None);
 }
 
+/// A token of a retry is good for 15 s as quinn has it, and it travels there and back: over 7 s each way it comes in time, over 8 s it does not.
+#[test]
+fn tokens_grow_old_in_virtual_time() {
+    let connected = |delay: &str| {
+        Testbed::new(["client", "server"]).links(delay).run_twice(|bed| async move {
+            let server = quinn::server(&bed.host("server"), "0.0.0.0:443").unwrap();
+            let other = bed.host("server");
+            other.clone().spawn(async move {
+                while let Some(incoming) = server.accept().await {
+                    if incoming.remote_address_validated() {
+                        other.spawn(incoming.into_future());
+                    } else {
+                        incoming.retry().unwrap();
+                    }
+                }
+            });
+            let client = quinn::client(&bed.host("client")).unwrap();
+            client.connect((bed.host("server").ip(), 443).into(), quinn::SERVER_NAME).unwrap().await.map(drop)
+        })
+    };
+    assert_eq!(connected("delay 7s"), Ok(()));
+    let refused = connected("delay 8s").unwrap_err();
+    assert!(
+        matches!(&refused, quinn::ConnectionError::ConnectionClosed(close) if close.error_code == quinn::TransportErrorCode::INVALID_TOKEN),
+        "{refused:?}"
+    );
+}
+
 #[test]
 fn an_endpoint_is_over_with_its_test_bed() {
     let client = Testbed::new(["a"]).run(|bed| async move { quinn::client(&bed.host("a")).unwrap() });
