@@ -145,7 +145,7 @@ impl Testbed {
     }
 
     /// The seed of all chance in the links, unless the environment says another one ([`SEED_VARIABLE`](crate::SEED_VARIABLE)). Without it, the seed is made of
-    /// the name of the test.
+    /// the name of the test, which is that of its thread: with `--test-threads=1` all tests run on the thread `main`, and so have its seed.
     pub const fn seed(mut self, seed: u64) -> Self {
         self.seed = Some(seed);
         self
