@@ -26,6 +26,8 @@ pub use cohaptic_units::Instant;
 pub use cohaptic_wan as wan;
 pub use host::Host;
 pub use link::ToLink;
+#[cfg(feature = "strategies")]
+pub use proptest;
 pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};

@@ -1,0 +1,82 @@
+//! Whether a link is within bounds.
+
+use cohaptic_wan::netem::{ChanceSpec, LossSpec, Netem, SlotGap};
+
+use super::bounds::{LinkBounds, LossModel, Presence};
+use super::link::ImpairedLink;
+use super::numbers::{ALL, nanos, units, whole};
+use super::stage::{self, Stage};
+
+/// By how much the long-run loss of a model with bursts may miss its range: a hundredth of a percent.
+pub(super) const SLACK: u64 = 100;
+
+pub(super) fn admits(bounds: &LinkBounds, link: &ImpairedLink) -> bool {
+    let netem = link.netem();
+    let present = |stage: Stage| stage::has(netem, stage);
+    let right = |stage: Stage| match bounds.presence(stage) {
+        Presence::Never => !present(stage),
+        Presence::Maybe => true,
+        // Whatever varies or is overtaken is delayed.
+        Presence::Always => present(stage) || (stage == Stage::Delay && netem.delay.is_some()),
+    };
+    Stage::ALL.into_iter().all(|stage| right(stage) && (number(netem, stage).is_none_or(|number| bounds.span(stage).contains(number))))
+        && netem.delay.as_ref().is_none_or(|delay| bounds.span(Stage::Delay).contains(nanos(delay.time)))
+        && loss(bounds, link)
+        && shapes(bounds, netem)
+}
+
+/// The number of a stage that is there.
+fn number(netem: &Netem, stage: Stage) -> Option<u64> {
+    if !stage::has(netem, stage) {
+        return None;
+    }
+    let share = |chance: &ChanceSpec| whole(chance.percent);
+    match stage {
+        Stage::Limit => netem.limit.map(Into::into),
+        Stage::Delay => None,
+        Stage::Jitter => netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()).map(|jitter| nanos(jitter.time)),
+        Stage::Loss => match &netem.loss {
+            Some(LossSpec::Random(chance)) => Some(share(chance)),
+            Some(LossSpec::Gemodel(_) | LossSpec::State(_)) | None => None,
+        },
+        Stage::Corrupt => netem.corrupt.as_ref().map(share),
+        Stage::Duplicate => netem.duplicate.as_ref().map(share),
+        Stage::Reorder => netem.reorder.as_ref().map(|reorder| share(&reorder.chance)),
+        Stage::Rate => netem.rate.map(|rate| rate.bytes_per_sec.get().saturating_mul(8)),
+        Stage::Slot => netem.slot.as_ref().map(|slot| match &slot.gap {
+            SlotGap::Range { min, .. } => nanos(*min),
+            SlotGap::Drawn { delay, .. } => nanos(*delay),
+        }),
+    }
+}
+
+/// How much a link loses in the long run, in ten-thousandths of a percent.
+pub(super) fn long_run(link: &ImpairedLink) -> Option<u64> {
+    link.config().loss.mean().map(|mean| units(mean * 100.0).min(ALL))
+}
+
+fn loss(bounds: &LinkBounds, link: &ImpairedLink) -> bool {
+    let model = match link.netem().loss {
+        None => return true,
+        Some(LossSpec::Random(_)) => LossModel::Random,
+        Some(LossSpec::Gemodel(_)) => LossModel::Gemodel,
+        Some(LossSpec::State(_)) => LossModel::State,
+    };
+    let span = bounds.span(Stage::Loss);
+    let within = |loss: u64| span.low <= loss + SLACK && loss <= span.high + SLACK;
+    bounds.models.contains(&model) && (model == LossModel::Random || long_run(link).is_some_and(within))
+}
+
+/// Whether the forms are those that may be drawn.
+fn shapes(bounds: &LinkBounds, netem: &Netem) -> bool {
+    let jitter = netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref());
+    let random = if let Some(LossSpec::Random(chance)) = &netem.loss { Some(chance) } else { None };
+    let reorder = netem.reorder.as_ref().map(|reorder| &reorder.chance);
+    let chances = [random, netem.corrupt.as_ref(), netem.duplicate.as_ref(), reorder];
+    let correlated = chances.into_iter().flatten().any(|chance| chance.correlation.is_some()) || jitter.is_some_and(|jitter| jitter.correlation.is_some());
+    let drawn = netem.slot.as_ref().is_some_and(|slot| matches!(slot.gap, SlotGap::Drawn { .. }));
+    let distributed = drawn || jitter.is_some_and(|jitter| jitter.distribution.is_some());
+    (bounds.correlation || !correlated)
+        && (bounds.distributions || !distributed)
+        && jitter.zip(netem.delay.as_ref()).is_none_or(|(jitter, delay)| jitter.time <= delay.time)
+}

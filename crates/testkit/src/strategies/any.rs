@@ -1,0 +1,163 @@
+//! The strategies.
+
+use core::fmt;
+use std::sync::Arc;
+
+use cohaptic_wan::NodeId;
+use proptest::strategy::{NewTree, Strategy, ValueTree};
+use proptest::test_runner::TestRunner;
+
+use super::bounds::LinkBounds;
+use super::draw;
+use super::grid::Dice;
+use super::link::ImpairedLink;
+use super::network::ImpairedNetwork;
+use super::shrink::Search;
+use super::space::{LinkSpace, NetworkSpace};
+
+/// Any link: [`links_like`] with [`LinkBounds::any`].
+pub fn any_link() -> Links {
+    links_like(LinkBounds::any())
+}
+
+/// Links within bounds, shrinking to the least impaired one that still fails.
+///
+/// # Panics
+///
+/// If the bounds make no sense; [`LinkBounds::check`] gives an error instead.
+#[track_caller]
+pub fn links_like(bounds: LinkBounds) -> Links {
+    Links { bounds: checked(bounds) }
+}
+
+/// Any network of so many hosts: [`networks_like`] with [`LinkBounds::any`].
+///
+/// # Panics
+///
+/// With no hosts, or more than 1000.
+#[track_caller]
+pub fn any_network(hosts: usize) -> Networks {
+    networks_like(hosts, LinkBounds::any())
+}
+
+/// Networks of so many hosts whose links are within bounds, shrinking to the least impaired one that still fails. In a third each of all networks
+/// about a quarter, half and all of the links are impaired.
+///
+/// # Panics
+///
+/// With no hosts, or more than 1000, or if the bounds make no sense; [`LinkBounds::check`] gives an error instead.
+#[track_caller]
+pub fn networks_like(hosts: usize, bounds: LinkBounds) -> Networks {
+    Networks { ideal: ImpairedNetwork::ideal(hosts), bounds: checked(bounds) }
+}
+
+#[track_caller]
+#[expect(clippy::panic, reason = "documented: bounds stand in a test")]
+fn checked(bounds: LinkBounds) -> Arc<LinkBounds> {
+    if let Err(error) = bounds.check() {
+        panic!("bounds of links that make no sense: {error}");
+    }
+    Arc::new(bounds)
+}
+
+/// Links at random: see [`links_like`].
+#[derive(Clone, Debug)]
+#[must_use = "strategies do nothing unless used"]
+pub struct Links {
+    bounds: Arc<LinkBounds>,
+}
+
+/// Networks at random: see [`networks_like`].
+#[derive(Clone, Debug)]
+#[must_use = "strategies do nothing unless used"]
+pub struct Networks {
+    ideal: ImpairedNetwork,
+    bounds: Arc<LinkBounds>,
+}
+
+/// A link and the way to less impaired ones.
+#[derive(Clone)]
+pub struct LinkTree(Search<LinkSpace>);
+
+/// A network and the way to less impaired ones.
+#[derive(Clone)]
+pub struct NetworkTree(Search<NetworkSpace>);
+
+/// How often a link is drawn anew where models with bursts cannot lose as little or as much as the bounds say.
+const ATTEMPTS: u32 = 100;
+
+fn link(bounds: &LinkBounds, is_ideal: bool, runner: &mut TestRunner) -> Result<ImpairedLink, proptest::test_runner::Reason> {
+    let mut dice = Dice(runner.rng());
+    (0..ATTEMPTS).find_map(|_| draw::link(bounds, is_ideal, &mut dice)).ok_or_else(|| format!("found no link within {bounds:?}").into())
+}
+
+impl Strategy for Links {
+    type Tree = LinkTree;
+    type Value = ImpairedLink;
+
+    fn new_tree(&self, runner: &mut TestRunner) -> NewTree<Self> {
+        let link = link(&self.bounds, false, runner)?;
+        Ok(LinkTree(Search::new(LinkSpace(Arc::clone(&self.bounds)), link)))
+    }
+}
+
+impl Strategy for Networks {
+    type Tree = NetworkTree;
+    type Value = ImpairedNetwork;
+
+    fn new_tree(&self, runner: &mut TestRunner) -> NewTree<Self> {
+        let mut network = self.ideal.clone();
+        let impaired = Dice(runner.rng()).pick(1, &[2, 4]);
+        let hosts = u32::try_from(network.hosts()).unwrap_or(u32::MAX);
+        let pairs = (0..hosts).flat_map(|from| (0..hosts).map(move |to| (NodeId(from), NodeId(to)))).filter(|(from, to)| from != to);
+        for (from, to) in pairs {
+            let is_ideal = Dice(runner.rng()).below(4) >= impaired;
+            network = network.with_link(from, to, link(&self.bounds, is_ideal, runner)?);
+        }
+        Ok(NetworkTree(Search::new(NetworkSpace(LinkSpace(Arc::clone(&self.bounds))), network)))
+    }
+}
+
+impl ValueTree for LinkTree {
+    type Value = ImpairedLink;
+
+    fn current(&self) -> ImpairedLink {
+        self.0.current()
+    }
+
+    fn simplify(&mut self) -> bool {
+        self.0.simplify()
+    }
+
+    fn complicate(&mut self) -> bool {
+        self.0.complicate()
+    }
+}
+
+impl ValueTree for NetworkTree {
+    type Value = ImpairedNetwork;
+
+    fn current(&self) -> ImpairedNetwork {
+        self.0.current()
+    }
+
+    fn simplify(&mut self) -> bool {
+        self.0.simplify()
+    }
+
+    fn complicate(&mut self) -> bool {
+        self.0.complicate()
+    }
+}
+
+impl fmt::Debug for LinkTree {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("LinkTree").field(&self.current()).finish()
+    }
+}
+
+impl fmt::Debug for NetworkTree {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("NetworkTree").field(&self.current()).finish()
+    }
+}

@@ -1,0 +1,355 @@
+//! How bad links may be.
+
+use core::ops::RangeInclusive;
+use core::time::Duration;
+
+use super::grid::Span;
+use super::link::ImpairedLink;
+use super::stage::Stage;
+use super::{admits, numbers};
+
+/// Bounds of links, stage by stage: whether it may be there, and its numbers.
+///
+/// [`LinkBounds::any`] lets every stage be there, [`LinkBounds::ideal`] none. Giving a stage a range lets it be there; [`LinkBounds::always`] and
+/// [`LinkBounds::never`] say more. A range that begins at zero begins at the least that is something: 1 µs, 0.01 %, one packet; without the stage it is
+/// zero. Percentages are counted in ten-thousandths, rates in whole bytes per second.
+///
+/// | stage | its number | where [`LinkBounds::any`] has it |
+/// |---|---|---|
+/// | delay | mean delay, that of jitter and reordering too | 1 ms to 500 ms |
+/// | jitter | half the width if uniform, else the standard deviation; never above the mean | 1 ms to 100 ms |
+/// | loss | packets lost in the long run, whatever the model | 0.1 % to 30 % |
+/// | corrupt | packets with a flipped bit, which the receiver's checksum discards | 0.1 % to 10 % |
+/// | duplicate | packets that come twice | 0.1 % to 20 % |
+/// | reorder | packets that go at once | 1 % to 50 % |
+/// | rate | \[bit/s\] | 64 kbit/s to 100 Mbit/s |
+/// | limit | packets held at most | 2 to 1000 |
+/// | slot | least time from one slot to the next | 1 ms to 50 ms |
+///
+/// ```
+/// use std::time::Duration;
+/// use cohaptic_testkit::strategies::{LinkBounds, Stage, links_like};
+///
+/// let late_and_lossy = LinkBounds::ideal().delay(Duration::ZERO..=Duration::from_millis(100)).loss(1.0..=5.0).always(Stage::Loss);
+/// let links = links_like(late_and_lossy);
+/// # let _ = links;
+/// ```
+#[derive(Clone, PartialEq, Debug)]
+pub struct LinkBounds {
+    presence: [Presence; Stage::ALL.len()],
+    spans: [Span; Stage::ALL.len()],
+    pub(super) distributions: bool,
+    pub(super) correlation: bool,
+    pub(super) models: Vec<LossModel>,
+    fault: Option<BoundsError>,
+}
+
+/// Whether a stage is there.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Presence {
+    Never,
+    Maybe,
+    Always,
+}
+
+/// A model of loss.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+#[non_exhaustive]
+pub enum LossModel {
+    /// `loss PERCENT`.
+    Random,
+    /// `loss gemodel`.
+    Gemodel,
+    /// `loss state`.
+    State,
+}
+
+/// Why bounds make no sense.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BoundsError {
+    /// The range has nothing in it.
+    #[error("{stage}: the range from {low} to {high} is empty: expected its end at or above its beginning")]
+    Empty {
+        /// The stage.
+        stage: Stage,
+        /// Where it begins.
+        low: String,
+        /// Where it ends.
+        high: String,
+    },
+    /// The range has only zero in it.
+    #[error("{stage}: a range with nothing but zero: expected LinkBounds::never(Stage::{stage:?}), or an end above zero")]
+    OnlyZero {
+        /// The stage.
+        stage: Stage,
+    },
+    /// No percentage.
+    #[error("{stage}: {found} is no percentage: expected 0 to 100")]
+    Percentage {
+        /// The stage.
+        stage: Stage,
+        /// What was found.
+        found: f64,
+    },
+    /// A time that netem cannot count.
+    #[error("{stage}: {found:?} is too long: expected at most 1 hour")]
+    TooLong {
+        /// The stage.
+        stage: Stage,
+        /// What was found.
+        found: Duration,
+    },
+    /// A rate that netem cannot count.
+    #[error("rate: {found} bit/s: expected 8 bit/s to 1 Tbit/s")]
+    Rate {
+        /// What was found.
+        found: u64,
+    },
+    /// Jitter above any delay.
+    #[error("jitter of at least {jitter:?} around delays of at most {delay:?}: expected a delay that may be as long as the least jitter")]
+    JitterAboveDelay {
+        /// The least jitter.
+        jitter: Duration,
+        /// The longest delay.
+        delay: Duration,
+    },
+    /// Loss without a model.
+    #[error("loss without a model: expected one of random, gemodel and state, or LinkBounds::never(Stage::Loss)")]
+    NoModel,
+}
+
+/// Ten-thousandths of a percent.
+const PERCENT: u64 = 10_000;
+const MS: u64 = 1_000_000;
+
+const fn span(low: u64, high: u64, step: u64) -> Span {
+    Span { low, high, step }
+}
+
+/// In the order of [`Stage::ALL`].
+const DEFAULTS: [Span; Stage::ALL.len()] = [
+    span(2, 1000, 1),
+    span(MS, 500 * MS, 1),
+    span(MS, 100 * MS, 1),
+    span(PERCENT / 10, 30 * PERCENT, 1),
+    span(PERCENT / 10, 10 * PERCENT, 1),
+    span(PERCENT / 10, 20 * PERCENT, 1),
+    span(PERCENT, 50 * PERCENT, 1),
+    span(64_000, 100_000_000, 1_000),
+    span(MS, 50 * MS, 1),
+];
+
+impl LinkBounds {
+    /// Any stage may be there, with the ranges above, every distribution, correlation and model of loss.
+    #[must_use]
+    pub fn any() -> Self {
+        Self { presence: [Presence::Maybe; Stage::ALL.len()], ..Self::ideal() }
+    }
+
+    /// No stage is there.
+    #[must_use]
+    pub fn ideal() -> Self {
+        Self {
+            presence: [Presence::Never; Stage::ALL.len()],
+            spans: DEFAULTS,
+            distributions: true,
+            correlation: true,
+            models: vec![LossModel::Random, LossModel::Gemodel, LossModel::State],
+            fault: None,
+        }
+    }
+
+    /// The mean delay, that of jitter and reordering too.
+    #[must_use]
+    pub fn delay(self, range: RangeInclusive<Duration>) -> Self {
+        self.time(Stage::Delay, &range)
+    }
+
+    /// The jitter: half the width if the law is uniform, else the standard deviation.
+    #[must_use]
+    pub fn jitter(self, range: RangeInclusive<Duration>) -> Self {
+        self.time(Stage::Jitter, &range)
+    }
+
+    /// How much is lost in the long run \[%\], to a hundredth of a percent for models with bursts.
+    #[must_use]
+    pub fn loss(self, range: RangeInclusive<f64>) -> Self {
+        self.percent(Stage::Loss, &range)
+    }
+
+    /// How much is corrupted \[%\].
+    #[must_use]
+    pub fn corrupt(self, range: RangeInclusive<f64>) -> Self {
+        self.percent(Stage::Corrupt, &range)
+    }
+
+    /// How much comes twice \[%\].
+    #[must_use]
+    pub fn duplicate(self, range: RangeInclusive<f64>) -> Self {
+        self.percent(Stage::Duplicate, &range)
+    }
+
+    /// How much goes at once, before what waits \[%\].
+    #[must_use]
+    pub fn reorder(self, range: RangeInclusive<f64>) -> Self {
+        self.percent(Stage::Reorder, &range)
+    }
+
+    /// The rate \[bit/s\].
+    #[must_use]
+    pub fn rate(mut self, range: RangeInclusive<u64>) -> Self {
+        const MOST: u64 = 1_000_000_000_000;
+        for found in [*range.start(), *range.end()] {
+            if !(8..=MOST).contains(&found) {
+                return self.refuse(BoundsError::Rate { found });
+            }
+        }
+        // What is rounded to whole bytes must stay inside.
+        let (low, high) = (range.start().next_multiple_of(8), range.end() - range.end() % 8);
+        if low > high {
+            let (low, high) = (format!("{}bit", range.start()), format!("{}bit", range.end()));
+            return self.refuse(BoundsError::Empty { stage: Stage::Rate, low, high });
+        }
+        self.set(Stage::Rate, low, high);
+        self
+    }
+
+    /// How many packets are held at most, those under way included.
+    #[must_use]
+    pub fn limit(mut self, range: RangeInclusive<u32>) -> Self {
+        let (low, high) = (*range.start(), *range.end());
+        if let Err(error) = check(Stage::Limit, low, high, |packets| packets.to_string()) {
+            return self.refuse(error);
+        }
+        self.set(Stage::Limit, low.max(1).into(), high.into());
+        self
+    }
+
+    /// The least time from one slot to the next; the longest is at most twice that.
+    #[must_use]
+    pub fn slot(self, range: RangeInclusive<Duration>) -> Self {
+        self.time(Stage::Slot, &range)
+    }
+
+    /// Whether jitter may have laws other than the uniform one.
+    #[must_use]
+    pub const fn distributions(mut self, may: bool) -> Self {
+        self.distributions = may;
+        self
+    }
+
+    /// Whether neighbouring packets may be alike: the correlation of jitter and of whatever happens with a probability.
+    #[must_use]
+    pub const fn correlation(mut self, may: bool) -> Self {
+        self.correlation = may;
+        self
+    }
+
+    /// Which models of loss there may be.
+    #[must_use]
+    pub fn loss_models(mut self, models: &[LossModel]) -> Self {
+        self.models = models.to_vec();
+        self
+    }
+
+    /// Lets the stage be there in every link; shrinking leaves it there.
+    #[must_use]
+    pub const fn always(mut self, stage: Stage) -> Self {
+        self.presence[stage.place()] = Presence::Always;
+        self
+    }
+
+    /// Lets the stage be there or not, with the range that it has.
+    #[must_use]
+    pub const fn maybe(mut self, stage: Stage) -> Self {
+        self.presence[stage.place()] = Presence::Maybe;
+        self
+    }
+
+    /// Keeps the stage out. Jitter and reordering bring a delay with them even where there is none otherwise.
+    #[must_use]
+    pub const fn never(mut self, stage: Stage) -> Self {
+        self.presence[stage.place()] = Presence::Never;
+        self
+    }
+
+    /// Whether the bounds make sense. The strategies made from them ask it too.
+    ///
+    /// # Errors
+    ///
+    /// The first thing that makes none.
+    pub fn check(&self) -> Result<(), BoundsError> {
+        if let Some(fault) = &self.fault {
+            return Err(fault.clone());
+        }
+        let (jitter, delay) = (self.span(Stage::Jitter).low, self.span(Stage::Delay).high);
+        if self.presence(Stage::Jitter) != Presence::Never && jitter > delay {
+            return Err(BoundsError::JitterAboveDelay { jitter: Duration::from_nanos(jitter), delay: Duration::from_nanos(delay) });
+        }
+        let no_model = self.models.is_empty() && self.presence(Stage::Loss) != Presence::Never;
+        if no_model { Err(BoundsError::NoModel) } else { Ok(()) }
+    }
+
+    /// Whether such a link may be drawn, or be shrunk to.
+    #[must_use]
+    pub fn admits(&self, link: &ImpairedLink) -> bool {
+        admits::admits(self, link)
+    }
+
+    pub(super) const fn presence(&self, stage: Stage) -> Presence {
+        self.presence[stage.place()]
+    }
+
+    pub(super) const fn span(&self, stage: Stage) -> Span {
+        self.spans[stage.place()]
+    }
+
+    fn refuse(mut self, error: BoundsError) -> Self {
+        self.fault = self.fault.or(Some(error));
+        self
+    }
+
+    fn set(&mut self, stage: Stage, low: u64, high: u64) {
+        let place = stage.place();
+        (self.spans[place].low, self.spans[place].high) = (low, high);
+        if self.presence[place] == Presence::Never {
+            self.presence[place] = Presence::Maybe;
+        }
+    }
+
+    fn time(mut self, stage: Stage, range: &RangeInclusive<Duration>) -> Self {
+        const LONGEST: Duration = Duration::from_secs(3600);
+        let (low, high) = (*range.start(), *range.end());
+        if let Some(found) = [low, high].into_iter().find(|time| *time > LONGEST) {
+            return self.refuse(BoundsError::TooLong { stage, found });
+        }
+        if let Err(error) = check(stage, low, high, |time| format!("{time:?}")) {
+            return self.refuse(error);
+        }
+        let low = if low.is_zero() { high.min(Duration::from_micros(1)) } else { low };
+        self.set(stage, numbers::nanos(low), numbers::nanos(high));
+        self
+    }
+
+    fn percent(mut self, stage: Stage, range: &RangeInclusive<f64>) -> Self {
+        let (low, high) = (*range.start(), *range.end());
+        if let Some(found) = [low, high].into_iter().find(|percent| !(0.0..=100.0).contains(percent)) {
+            return self.refuse(BoundsError::Percentage { stage, found });
+        }
+        let units = |percent: f64| numbers::units(percent);
+        if let Err(error) = check(stage, units(low), units(high), |units| numbers::percent(units).to_string()) {
+            return self.refuse(error);
+        }
+        let least = if units(low) == 0 { units(high).min(PERCENT / 100) } else { units(low) };
+        self.set(stage, least, units(high));
+        self
+    }
+}
+
+fn check<N: PartialOrd + Default + Copy>(stage: Stage, low: N, high: N, print: impl Fn(N) -> String) -> Result<(), BoundsError> {
+    if low > high {
+        return Err(BoundsError::Empty { stage, low: print(low), high: print(high) });
+    }
+    if high == N::default() { Err(BoundsError::OnlyZero { stage }) } else { Ok(()) }
+}

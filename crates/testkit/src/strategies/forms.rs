@@ -1,0 +1,141 @@
+//! Stages in plainer forms.
+
+use cohaptic_wan::netem::{ChanceSpec, GemodelSpec, JitterSpec, LossSpec, Netem, SlotGap};
+
+use super::admits::long_run;
+use super::bounds::LinkBounds;
+use super::link::ImpairedLink;
+use super::numbers::{jitter_mut, percent, random_mut, reorder_mut};
+use super::stage::{self, Stage};
+
+/// A form that can be made plainer, in the order in which they are.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Form {
+    /// Reordering to the delay that it brought.
+    Reordering,
+    /// Jitter to the delay around which it is.
+    Jitter,
+    JitterCorrelation,
+    /// Any law to the uniform one.
+    JitterDistribution,
+    /// Bursts to random loss that loses as much.
+    LossInBursts,
+    LossCorrelation,
+    /// The last probability of a chain that was said, if what is left means something.
+    LastProbability,
+    /// Four states to two.
+    FourStates,
+    CorruptCorrelation,
+    DuplicateCorrelation,
+    ReorderCorrelation,
+    ReorderGap,
+    SlotDistribution,
+    SlotRange,
+    SlotPackets,
+    SlotBytes,
+}
+
+impl Form {
+    /// A chain has up to four probabilities that can go, so that is tried as often.
+    pub(super) const ALL: [Self; 19] = [
+        Self::Reordering,
+        Self::Jitter,
+        Self::JitterCorrelation,
+        Self::JitterDistribution,
+        Self::LossInBursts,
+        Self::LossCorrelation,
+        Self::LastProbability,
+        Self::LastProbability,
+        Self::LastProbability,
+        Self::LastProbability,
+        Self::FourStates,
+        Self::CorruptCorrelation,
+        Self::DuplicateCorrelation,
+        Self::ReorderCorrelation,
+        Self::ReorderGap,
+        Self::SlotDistribution,
+        Self::SlotRange,
+        Self::SlotPackets,
+        Self::SlotBytes,
+    ];
+
+    /// The words with that made plainer; unchanged if it is plain.
+    pub(super) fn plainer(self, link: &ImpairedLink, bounds: &LinkBounds) -> Netem {
+        let old = link.netem();
+        let mut netem = old.clone();
+        match self {
+            Self::Reordering => return stage::without(old, &[Stage::Reorder], true),
+            Self::Jitter => return stage::without(old, &[Stage::Jitter], true),
+            Self::JitterCorrelation => change(jitter_mut(&mut netem), |jitter: &mut JitterSpec| jitter.correlation = None),
+            Self::JitterDistribution => change(jitter_mut(&mut netem), |jitter| jitter.distribution = None),
+            Self::LossInBursts => {
+                if let Some(LossSpec::Gemodel(_) | LossSpec::State(_)) = old.loss {
+                    let span = bounds.span(Stage::Loss);
+                    let loss = long_run(link).unwrap_or(span.low).clamp(span.low, span.high);
+                    netem.loss = Some(LossSpec::Random(ChanceSpec { percent: percent(loss), correlation: None }));
+                }
+            }
+            Self::LossCorrelation => uncorrelate(random_mut(&mut netem)),
+            Self::LastProbability => netem.loss = netem.loss.map(without_last_probability),
+            Self::FourStates => {
+                if let Some(LossSpec::State(state)) = old.loss
+                    && state.p32.is_none()
+                {
+                    netem.loss = Some(LossSpec::Gemodel(GemodelSpec { p: state.p13, r: state.p31, loss_in_bad: None, loss_in_good: None }));
+                }
+            }
+            Self::CorruptCorrelation => uncorrelate(netem.corrupt.as_mut()),
+            Self::DuplicateCorrelation => uncorrelate(netem.duplicate.as_mut()),
+            Self::ReorderCorrelation => uncorrelate(reorder_mut(&mut netem)),
+            Self::ReorderGap => change(netem.reorder.as_mut(), |reorder| reorder.gap = None),
+            Self::SlotDistribution => change(netem.slot.as_mut(), |slot| {
+                if let SlotGap::Drawn { delay, .. } = slot.gap {
+                    slot.gap = SlotGap::Range { min: delay, max: None };
+                }
+            }),
+            Self::SlotRange => change(netem.slot.as_mut(), |slot| {
+                if let SlotGap::Range { max, .. } = &mut slot.gap {
+                    *max = None;
+                }
+            }),
+            Self::SlotPackets => change(netem.slot.as_mut(), |slot| slot.packets = None),
+            Self::SlotBytes => change(netem.slot.as_mut(), |slot| slot.bytes = None),
+        }
+        netem
+    }
+}
+
+fn change<T>(place: Option<&mut T>, change: impl FnOnce(&mut T)) {
+    if let Some(place) = place {
+        change(place);
+    }
+}
+
+fn uncorrelate(chance: Option<&mut ChanceSpec>) {
+    change(chance, |chance| chance.correlation = None);
+}
+
+/// p and r stay: without r a chain has bursts of another length.
+fn without_last_probability(loss: LossSpec) -> LossSpec {
+    match loss {
+        LossSpec::Random(chance) => LossSpec::Random(chance),
+        LossSpec::Gemodel(mut model) => {
+            if model.loss_in_good.is_some() {
+                model.loss_in_good = None;
+            } else {
+                model.loss_in_bad = None;
+            }
+            LossSpec::Gemodel(model)
+        }
+        LossSpec::State(mut state) => {
+            if state.p14.is_some() {
+                state.p14 = None;
+            } else if state.p23.is_some() {
+                state.p23 = None;
+            } else {
+                state.p32 = None;
+            }
+            LossSpec::State(state)
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Numbers as people write them, and searches among them.
+
+use proptest::prelude::Rng;
+use proptest::test_runner::TestRng;
+
+/// Whole numbers from `low` to `high`, those between them multiples of `step` where they are round.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Span {
+    pub(super) low: u64,
+    pub(super) high: u64,
+    pub(super) step: u64,
+}
+
+impl Span {
+    pub(super) const fn contains(&self, value: u64) -> bool {
+        self.low <= value && value <= self.high
+    }
+}
+
+/// The least number of at most `digits` significant digits, counted in steps, that is above `value`; `None` if it cannot be counted.
+fn next_above(value: u64, digits: u32, step: u64) -> Option<u64> {
+    let count = value / step;
+    let places = count.checked_ilog10().map_or(1, |log| log + 1);
+    let unit = 10_u64.pow(places.saturating_sub(digits));
+    (count / unit).checked_add(1)?.checked_mul(unit)?.checked_mul(step)
+}
+
+/// All numbers of at most `digits` significant digits strictly between the two, ascending: at most nine tenths of 10^`digits` a decade.
+pub(super) fn round_between(low: u64, high: u64, digits: u32, step: u64) -> Vec<u64> {
+    std::iter::successors(next_above(low, digits, step), |value| next_above(*value, digits, step)).take_while(|value| *value < high).collect()
+}
+
+/// Whether the number has at most that many significant digits, counted in steps.
+pub(super) fn is_round(value: u64, digits: u32, step: u64) -> bool {
+    let count = value / step;
+    let places = count.checked_ilog10().map_or(1, |log| log + 1);
+    value.is_multiple_of(step) && count.is_multiple_of(10_u64.pow(places.saturating_sub(digits)))
+}
+
+/// Random choices.
+pub(super) struct Dice<'a>(pub(super) &'a mut TestRng);
+
+impl Dice<'_> {
+    /// 0 to `count` − 1; 0 if the count is 0. The bias is below 2⁻³² for any count that is used here.
+    pub(super) fn below(&mut self, count: u64) -> u64 {
+        let wide = u128::from(self.0.next_u64()) * u128::from(count);
+        u64::try_from(wide >> 64).unwrap_or(0)
+    }
+
+    pub(super) fn one_in(&mut self, count: u64) -> bool {
+        self.below(count) == 0
+    }
+
+    /// One of several.
+    pub(super) fn pick<T: Copy>(&mut self, first: T, others: &[T]) -> T {
+        let place = usize::try_from(self.below(others.len() as u64 + 1)).unwrap_or(0);
+        place.checked_sub(1).and_then(|place| others.get(place)).copied().unwrap_or(first)
+    }
+
+    /// A number of the span: either end in a tenth of all cases each, else mostly of two digits (every decade as likely as the next in half of the
+    /// cases), and in a tenth of all cases any at all.
+    pub(super) fn number(&mut self, span: Span) -> u64 {
+        let Span { low, high, step } = span;
+        let anywhere = |dice: &mut Self| low + dice.below((high - low).saturating_add(1));
+        match self.below(10) {
+            0 => low,
+            1 => high,
+            2..=6 => self.pick(low, &round_between(low, high, 2, step)),
+            7 | 8 => {
+                let value = anywhere(self);
+                next_above(value, 2, step).map_or(high, |round| round.min(high))
+            }
+            _ => {
+                let value = anywhere(self);
+                (value - value % step).max(low)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn round_numbers_have_few_digits() {
+        assert_eq!(round_between(0, 30, 1, 1), [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 20]);
+        assert_eq!(round_between(95, 121, 2, 1), [96, 97, 98, 99, 100, 110, 120]);
+        assert_eq!(round_between(8_500, 21_000, 1, 1_000), [9_000, 10_000, 20_000]);
+        assert_eq!(round_between(5, 5, 1, 1), []);
+        assert_eq!(round_between(u64::MAX - 1, u64::MAX, 2, 1), []);
+    }
+
+    #[test]
+    fn what_lies_between_round_numbers_is_not_round() {
+        for digits in 1..4 {
+            let round = round_between(0, 100_000, digits, 10);
+            assert!(round.iter().all(|value| is_round(*value, digits, 10)));
+            assert_eq!((1..100_000).filter(|value| is_round(*value, digits, 10)).count(), round.len());
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! A link in the words of `tc-netem`.
+
+use core::fmt;
+use core::str::FromStr;
+use std::sync::Arc;
+
+use cohaptic_wan::netem::{ExactError, Netem, NetemError};
+use cohaptic_wan::{LinkConfig, LinkModel};
+
+use super::stage::{self, Stage};
+
+/// A link that does what words of `tc-netem` say, exactly ([`Netem::to_link_config`]).
+///
+/// It is shown as its words: `Display` as they are, `Debug` as Rust that makes the same value, so that what a failing test prints can be pasted into a test. The ideal
+/// link is shown as `delay 0s`, which netem and scenes read as an ideal link too; all that says nothing reads as the ideal link: `""`, `delay 0s`.
+///
+/// ```
+/// use cohaptic_testkit::strategies::{ImpairedLink, Stage};
+///
+/// let link = ImpairedLink::words("delay 24ms 2ms loss 1%");
+/// assert_eq!(link.to_string(), "delay 24ms 2ms loss 1%");
+/// assert_eq!(format!("{link:?}"), r#"ImpairedLink::words("delay 24ms 2ms loss 1%")"#);
+/// assert_eq!(link.stages(), [Stage::Jitter, Stage::Loss]);
+/// assert_eq!(ImpairedLink::ideal().to_string(), "delay 0s");
+///
+/// let error = "delay 24ms loss 250%".parse::<ImpairedLink>().unwrap_err();
+/// assert_eq!(error.to_string(), "delay 24ms loss 250%\n                ^^^^ expected a percentage from 0 to 100");
+/// ```
+#[derive(Clone, Default)]
+pub struct ImpairedLink {
+    netem: Netem,
+    config: Arc<LinkConfig>,
+}
+
+/// Why words are no link.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// They are no words of netem. The message has the line, and a mark under the word to blame.
+    #[error("{excerpt}")]
+    Words {
+        /// The words and the mark.
+        excerpt: String,
+        /// What is wrong.
+        reason: NetemError,
+    },
+    /// They ask for what cannot be. Tables of distributions are not read from files here.
+    #[error(transparent)]
+    Exact(#[from] ExactError),
+}
+
+impl ImpairedLink {
+    /// The link without any impairment.
+    #[must_use]
+    pub fn ideal() -> Self {
+        Self::default()
+    }
+
+    /// The link that the words say: what `Debug` prints.
+    ///
+    /// # Panics
+    ///
+    /// If they are refused; `words.parse::<ImpairedLink>()` gives an error instead.
+    #[must_use]
+    #[track_caller]
+    #[expect(clippy::panic, reason = "documented: for words that stand in a test")]
+    pub fn words(words: &str) -> Self {
+        words.parse().unwrap_or_else(|error| panic!("not the words of a link:\n{error}"))
+    }
+
+    /// Checks the words.
+    ///
+    /// # Errors
+    ///
+    /// [`ExactError`] if they ask for what cannot be, a table of a file among it.
+    pub fn new(mut netem: Netem) -> Result<Self, ExactError> {
+        if netem.delay.as_ref().is_some_and(|delay| delay.time.is_zero() && delay.jitter.is_none()) {
+            netem.check()?;
+            netem.delay = None;
+        }
+        let config = Arc::new(netem.to_link_config(&mut |_| None)?);
+        Ok(Self { netem, config })
+    }
+
+    /// What the words say.
+    #[must_use]
+    pub const fn netem(&self) -> &Netem {
+        &self.netem
+    }
+
+    /// The configuration that does it.
+    #[must_use]
+    pub fn config(&self) -> LinkConfig {
+        LinkConfig::clone(&self.config)
+    }
+
+    /// The model of it, for [`cohaptic_wan::Link`] and [`cohaptic_wan::Network`].
+    #[must_use]
+    pub fn model(&self) -> LinkModel {
+        LinkModel::from(self.config())
+    }
+
+    /// Its impairments, in the order of the words. A delay counts as one only without jitter and reordering, which it serves; what is zero, and `seed`, are none.
+    #[must_use]
+    pub fn stages(&self) -> Vec<Stage> {
+        Stage::ALL.into_iter().filter(|stage| stage::has(&self.netem, *stage)).collect()
+    }
+
+    /// Whether that is one of its impairments.
+    #[must_use]
+    pub fn has(&self, stage: Stage) -> bool {
+        stage::has(&self.netem, stage)
+    }
+
+    /// Whether it has no impairments.
+    #[must_use]
+    pub fn is_ideal(&self) -> bool {
+        !Stage::ALL.into_iter().any(|stage| self.has(stage))
+    }
+}
+
+impl PartialEq for ImpairedLink {
+    fn eq(&self, other: &Self) -> bool {
+        // The configuration follows from the words.
+        self.netem == other.netem
+    }
+}
+
+impl FromStr for ImpairedLink {
+    type Err = LinkError;
+
+    fn from_str(words: &str) -> Result<Self, LinkError> {
+        let netem = Netem::parse(words).map_err(|reason| LinkError::Words { excerpt: reason.excerpt(words), reason })?;
+        Ok(Self::new(netem)?)
+    }
+}
+
+impl fmt::Display for ImpairedLink {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.netem == Netem::default() { f.pad("delay 0s") } else { f.pad(&self.netem.to_string()) }
+    }
+}
+
+impl fmt::Debug for ImpairedLink {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ImpairedLink::words(\"{self}\")")
+    }
+}
+
+impl From<&ImpairedLink> for LinkModel {
+    fn from(link: &ImpairedLink) -> Self {
+        link.model()
+    }
+}
+
+impl From<ImpairedLink> for LinkModel {
+    fn from(link: ImpairedLink) -> Self {
+        link.model()
+    }
+}

@@ -1,0 +1,235 @@
+//! A network of such links.
+
+use core::fmt;
+use core::str::FromStr;
+
+use cohaptic_wan::{LinkModel, NetworkConfig, NodeId};
+
+use super::link::{ImpairedLink, LinkError};
+
+/// The most hosts that a network may have.
+const MOST: usize = 1_000;
+
+/// Hosts, and a link from each to each other, most of them perhaps ideal.
+///
+/// It is shown as one line for each impaired link, after one that counts the hosts, which are called `a` to `z`, then `aa`, `ab`, and so on, in the order of
+/// their [`NodeId`]. `Debug` is Rust that makes the same value. It reads back from the same lines; empty lines and the space around lines say nothing, and `;`
+/// ends a line too.
+///
+/// ```
+/// use cohaptic_testkit::strategies::{ImpairedLink, ImpairedNetwork};
+/// use cohaptic_wan::{Network, NodeId};
+///
+/// let network = ImpairedNetwork::ideal(3).with_link(NodeId(0), NodeId(2), ImpairedLink::words("delay 24ms"));
+/// assert_eq!(network.to_string(), "3 hosts\na -> c: delay 24ms");
+/// assert_eq!(ImpairedNetwork::words("3 hosts; a -> c: delay 24ms"), network);
+///
+/// let wan: Network<&str> = Network::new(network.config(7), |from, to| network.model(from, to));
+/// # let _ = wan;
+/// ```
+#[derive(Clone, PartialEq)]
+pub struct ImpairedNetwork {
+    hosts: usize,
+    /// By sender, then receiver; the diagonal is ideal and never used.
+    links: Vec<ImpairedLink>,
+}
+
+/// Why a text is no network.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NetworkTextError {
+    /// The first line does not count hosts.
+    #[error("\"{found}\" does not count hosts: expected a first line such as \"3 hosts\", with 1 to {MOST}")]
+    Hosts {
+        /// The line.
+        found: String,
+    },
+    /// A line is no link.
+    #[error("\"{found}\" is no link: expected a line such as \"a -> b: delay 24ms\"")]
+    Line {
+        /// The line.
+        found: String,
+    },
+    /// There is no such host, or it would send to itself.
+    #[error("\"{found}\" is no link between two of the hosts {first} to {last}")]
+    NoLink {
+        /// The line.
+        found: String,
+        /// The name of the first host.
+        first: String,
+        /// The name of the last one.
+        last: String,
+    },
+    /// A link is said twice.
+    #[error("the link {from} -> {to} is said twice: expected it once")]
+    Repeated {
+        /// The sender.
+        from: String,
+        /// The receiver.
+        to: String,
+    },
+    /// The words of a link are refused.
+    #[error("{from} -> {to}:\n{reason}")]
+    Link {
+        /// The sender.
+        from: String,
+        /// The receiver.
+        to: String,
+        /// Why.
+        reason: LinkError,
+    },
+}
+
+impl ImpairedNetwork {
+    /// Hosts whose links are all ideal.
+    ///
+    /// # Panics
+    ///
+    /// With no hosts, or more than 1000.
+    #[must_use]
+    #[track_caller]
+    pub fn ideal(hosts: usize) -> Self {
+        assert!((1..=MOST).contains(&hosts), "a network of {hosts} hosts: expected 1 to {MOST}");
+        Self { hosts, links: vec![ImpairedLink::ideal(); hosts * hosts] }
+    }
+
+    /// The network that the text says: what `Debug` prints.
+    ///
+    /// # Panics
+    ///
+    /// If it is refused; `text.parse::<ImpairedNetwork>()` gives an error instead.
+    #[must_use]
+    #[track_caller]
+    #[expect(clippy::panic, reason = "documented: for text that stands in a test")]
+    pub fn words(text: &str) -> Self {
+        text.parse().unwrap_or_else(|error| panic!("not the words of a network: {error}"))
+    }
+
+    /// The network with that link.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    #[must_use]
+    #[track_caller]
+    pub fn with_link(mut self, from: NodeId, to: NodeId, link: ImpairedLink) -> Self {
+        let place = self.place(from, to);
+        assert!(place.is_some(), "there is no link from node {} to node {} among {} hosts", from.0, to.0, self.hosts);
+        if let Some(place) = place {
+            self.links[place] = link;
+        }
+        self
+    }
+
+    /// How many hosts there are.
+    #[must_use]
+    pub const fn hosts(&self) -> usize {
+        self.hosts
+    }
+
+    /// The name of a host in the text.
+    #[must_use]
+    pub fn name(node: NodeId) -> String {
+        let mut rest = u64::from(node.0) + 1;
+        let mut letters = Vec::new();
+        while let Some(place) = rest.checked_sub(1) {
+            letters.push(u8::try_from(place % 26).map_or('?', |letter| char::from(b'a' + letter)));
+            rest = place / 26;
+        }
+        letters.into_iter().rev().collect()
+    }
+
+    /// What [`cohaptic_wan::Network::new`] needs beside the links: the names, and a seed.
+    #[must_use]
+    pub fn config(&self, seed: u64) -> NetworkConfig {
+        NetworkConfig { seed, nodes: self.nodes().map(Self::name).collect(), ..NetworkConfig::default() }
+    }
+
+    /// The link from one host to another; `None` if there is none.
+    #[must_use]
+    pub fn link(&self, from: NodeId, to: NodeId) -> Option<&ImpairedLink> {
+        self.links.get(self.place(from, to)?)
+    }
+
+    /// The model of that link; ideal where there is none.
+    #[must_use]
+    pub fn model(&self, from: NodeId, to: NodeId) -> LinkModel {
+        self.link(from, to).map(ImpairedLink::model).unwrap_or_default()
+    }
+
+    /// All links, by sender, then receiver.
+    pub fn links(&self) -> impl Iterator<Item = (NodeId, NodeId, &ImpairedLink)> {
+        self.nodes().flat_map(move |from| self.nodes().filter_map(move |to| Some((from, to, self.link(from, to)?))))
+    }
+
+    /// The links that are not ideal.
+    pub fn impaired(&self) -> impl Iterator<Item = (NodeId, NodeId, &ImpairedLink)> {
+        self.links().filter(|(_, _, link)| !link.is_ideal())
+    }
+
+    fn nodes(&self) -> impl Iterator<Item = NodeId> + use<> {
+        (0..u32::try_from(self.hosts).unwrap_or(u32::MAX)).map(NodeId)
+    }
+
+    fn place(&self, from: NodeId, to: NodeId) -> Option<usize> {
+        let [from, to] = [from, to].map(|node| usize::try_from(node.0).ok().filter(|node| *node < self.hosts));
+        let (from, to) = (from?, to?);
+        (from != to).then_some(from * self.hosts + to)
+    }
+
+    /// The host of that name.
+    fn named(&self, name: &str) -> Option<NodeId> {
+        self.nodes().find(|node| Self::name(*node) == name)
+    }
+}
+
+impl fmt::Display for ImpairedNetwork {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} hosts", self.hosts)?;
+        // A link may say what impairs nothing, such as a seed.
+        for (from, to, link) in self.links().filter(|(_, _, link)| **link != ImpairedLink::ideal()) {
+            write!(f, "\n{} -> {}: {link}", Self::name(from), Self::name(to))?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Debug for ImpairedNetwork {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ImpairedNetwork::words(\"")?;
+        for line in self.to_string().lines() {
+            write!(f, "\n    {line}")?;
+        }
+        write!(f, "\n\")")
+    }
+}
+
+impl FromStr for ImpairedNetwork {
+    type Err = NetworkTextError;
+
+    fn from_str(text: &str) -> Result<Self, NetworkTextError> {
+        let mut lines = text.split(['\n', ';']).map(str::trim).filter(|line| !line.is_empty());
+        let first = lines.next().unwrap_or_default();
+        let count = first.strip_suffix("hosts").or_else(|| first.strip_suffix("host")).and_then(|count| count.trim().parse().ok());
+        let hosts: usize =
+            count.filter(|count| (1..=MOST).contains(count)).ok_or_else(|| NetworkTextError::Hosts { found: first.to_owned() })?;
+        let mut network = Self::ideal(hosts);
+        let mut said = Vec::new();
+        for line in lines {
+            let halves = line.split_once("->").and_then(|(from, rest)| rest.split_once(':').map(|(to, words)| (from.trim(), to.trim(), words)));
+            let Some((from, to, words)) = halves else { return Err(NetworkTextError::Line { found: line.to_owned() }) };
+            let place = network.named(from).zip(network.named(to)).and_then(|(from, to)| network.place(from, to));
+            let Some(place) = place else {
+                let last = network.nodes().last().map(Self::name).unwrap_or_default();
+                return Err(NetworkTextError::NoLink { found: line.to_owned(), first: Self::name(NodeId(0)), last });
+            };
+            let (from, to) = (from.to_owned(), to.to_owned());
+            if said.contains(&place) {
+                return Err(NetworkTextError::Repeated { from, to });
+            }
+            said.push(place);
+            network.links[place] = words.trim().parse().map_err(|reason| NetworkTextError::Link { from, to, reason })?;
+        }
+        Ok(network)
+    }
+}

@@ -1,0 +1,147 @@
+//! Numbers towards the least impairing value, by bisection among round ones.
+
+use super::Space;
+use crate::strategies::grid::{is_round, round_between};
+
+/// A number that can be changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(in crate::strategies) struct Number {
+    pub(in crate::strategies) value: u64,
+    /// What would impair least.
+    pub(in crate::strategies) goal: u64,
+    /// What digits are counted in.
+    pub(in crate::strategies) step: u64,
+}
+
+/// The numbers of a value, one after the other.
+#[derive(Clone, Debug)]
+pub(super) struct Numbers<P> {
+    places: std::vec::IntoIter<P>,
+    /// Whether a number is given up if the next round one passes.
+    only_nearest: bool,
+    now: Option<(P, Bisection)>,
+}
+
+impl<P: Clone> Numbers<P> {
+    pub(super) fn new(places: Vec<P>, only_nearest: bool) -> Self {
+        Self { places: places.into_iter(), only_nearest, now: None }
+    }
+
+    pub(super) fn propose<S: Space<Place = P>>(&mut self, space: &S, best: &S::Value) -> Option<S::Value> {
+        loop {
+            while let Some((place, bisection)) = &mut self.now {
+                let Some(number) = bisection.propose() else { break };
+                let candidate = space.with_number(best, place, number);
+                if candidate.is_some() {
+                    return candidate;
+                }
+                bisection.answer(false);
+            }
+            let place = self.places.next()?;
+            self.now = space.number(best, &place).map(|number| (place, Bisection::new(number, self.only_nearest)));
+        }
+    }
+
+    pub(super) fn answer(&mut self, fails: bool) {
+        if let Some((_, bisection)) = &mut self.now {
+            bisection.answer(fails);
+        }
+    }
+}
+
+/// The search for one number.
+#[derive(Clone, Debug)]
+struct Bisection {
+    step: u64,
+    /// The number nearest to the goal that failed.
+    fails: u64,
+    /// The number nearest to it, on the side of the goal, that passed; the goal until then.
+    passes: u64,
+    digits: u32,
+    /// The round numbers between the two, from the goal's side on.
+    between: Vec<u64>,
+    next: Next,
+    asked: u64,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Next {
+    Goal,
+    Nearest,
+    Middle,
+    Nothing,
+}
+
+impl Bisection {
+    fn new(number: Number, only_nearest: bool) -> Self {
+        let Number { value, goal, step } = number;
+        let mut new = Self { step, fails: value, passes: goal, digits: 1, between: Vec::new(), next: Next::Goal, asked: goal };
+        if value == goal {
+            new.next = Next::Nothing;
+        } else if only_nearest {
+            new.next = Next::Nearest;
+        }
+        new
+    }
+
+    fn fill(&mut self) {
+        let (low, high) = (self.fails.min(self.passes), self.fails.max(self.passes));
+        self.between = round_between(low, high, self.digits, self.step);
+        if self.passes > self.fails {
+            self.between.reverse();
+        }
+    }
+
+    fn propose(&mut self) -> Option<u64> {
+        self.asked = match self.next {
+            Next::Nothing => return None,
+            Next::Goal => self.passes,
+            Next::Nearest => {
+                self.digits = 2;
+                while !is_round(self.fails, self.digits, self.step) && self.digits < 20 {
+                    self.digits += 1;
+                }
+                self.fill();
+                self.between.last().copied().unwrap_or(self.passes)
+            }
+            Next::Middle => loop {
+                if !self.between.is_empty() {
+                    break self.between[(self.between.len() - 1) / 2];
+                }
+                // Two digits are enough, unless the number drawn has more and stays.
+                if self.digits >= 20 || (self.digits >= 2 && is_round(self.fails, self.digits, self.step)) {
+                    self.next = Next::Nothing;
+                    return None;
+                }
+                self.digits += 1;
+                self.fill();
+            },
+        };
+        Some(self.asked)
+    }
+
+    fn answer(&mut self, fails: bool) {
+        match (self.next, fails) {
+            (Next::Goal, true) | (Next::Nearest, false) | (Next::Nothing, _) => self.next = Next::Nothing,
+            (Next::Goal, false) => {
+                self.next = Next::Middle;
+                self.fill();
+            }
+            (Next::Nearest, true) => {
+                self.fails = self.asked;
+                self.next = if self.asked == self.passes { Next::Nothing } else { Next::Goal };
+                self.digits = 1;
+            }
+            (Next::Middle, _) => {
+                let middle = (self.between.len() - 1) / 2;
+                if fails {
+                    self.fails = self.asked;
+                    self.between.truncate(middle);
+                } else {
+                    self.passes = self.asked;
+                    self.between.drain(..=middle);
+                }
+            }
+        }
+    }
+}

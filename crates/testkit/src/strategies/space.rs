@@ -1,0 +1,148 @@
+//! What can be made of links and networks when they shrink.
+
+use std::sync::Arc;
+
+use cohaptic_wan::NodeId;
+use cohaptic_wan::netem::Netem;
+
+use super::bounds::{LinkBounds, Presence};
+use super::forms::Form;
+use super::link::ImpairedLink;
+use super::network::ImpairedNetwork;
+use super::numbers::{KNOBS, Knob};
+use super::shrink::{Number, Space};
+use super::stage::{self, Stage};
+
+/// Links within bounds.
+#[derive(Clone, Debug)]
+pub(super) struct LinkSpace(pub(super) Arc<LinkBounds>);
+
+impl LinkSpace {
+    /// The link that the words say, if it is one within bounds and another than before.
+    fn changed(&self, link: &ImpairedLink, netem: Netem) -> Option<ImpairedLink> {
+        if netem == *link.netem() {
+            return None;
+        }
+        ImpairedLink::new(netem).ok().filter(|link| self.0.admits(link))
+    }
+}
+
+impl Space for LinkSpace {
+    type Value = ImpairedLink;
+    type Part = Stage;
+    type Form = Form;
+    type Place = &'static Knob;
+
+    const LEVELS: usize = 1;
+
+    fn parts(&self, link: &ImpairedLink, _level: usize) -> Vec<Stage> {
+        link.stages().into_iter().filter(|stage| self.0.presence(*stage) != Presence::Always).collect()
+    }
+
+    fn without(&self, link: &ImpairedLink, parts: &[Stage]) -> Option<ImpairedLink> {
+        let keeps_delay = self.0.presence(Stage::Delay) == Presence::Always;
+        self.changed(link, stage::without(link.netem(), parts, keeps_delay))
+    }
+
+    fn forms(&self, _link: &ImpairedLink) -> Vec<Form> {
+        Form::ALL.to_vec()
+    }
+
+    fn plainer(&self, link: &ImpairedLink, form: &Form) -> Option<ImpairedLink> {
+        self.changed(link, form.plainer(link, &self.0))
+    }
+
+    fn places(&self, _link: &ImpairedLink) -> Vec<&'static Knob> {
+        static ALL: [Knob; KNOBS.len()] = KNOBS;
+        ALL.iter().collect()
+    }
+
+    fn number(&self, link: &ImpairedLink, knob: &&'static Knob) -> Option<Number> {
+        knob.number(link.netem(), &self.0)
+    }
+
+    fn with_number(&self, link: &ImpairedLink, knob: &&'static Knob, number: u64) -> Option<ImpairedLink> {
+        self.changed(link, knob.set(link.netem(), number))
+    }
+}
+
+/// Networks whose links are within bounds.
+#[derive(Clone, Debug)]
+pub(super) struct NetworkSpace(pub(super) LinkSpace);
+
+/// From whom to whom.
+pub(super) type Pair = (NodeId, NodeId);
+
+/// A part of a network.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum NetworkPart {
+    /// All stages of a link that can go.
+    Link(Pair),
+    /// One of them.
+    Stage(Pair, Stage),
+}
+
+impl NetworkSpace {
+    fn changed(network: &ImpairedNetwork, pair: Pair, change: impl FnOnce(&ImpairedLink) -> Option<ImpairedLink>) -> Option<ImpairedNetwork> {
+        let link = change(network.link(pair.0, pair.1)?)?;
+        Some(network.clone().with_link(pair.0, pair.1, link))
+    }
+
+    /// Everything that `of` gives for each link that is not ideal.
+    fn each<T>(network: &ImpairedNetwork, of: impl Fn(&ImpairedLink) -> Vec<T>) -> Vec<(Pair, T)> {
+        network.impaired().flat_map(|(from, to, link)| of(link).into_iter().map(move |thing| ((from, to), thing))).collect()
+    }
+}
+
+impl Space for NetworkSpace {
+    type Value = ImpairedNetwork;
+    type Part = NetworkPart;
+    type Form = (Pair, Form);
+    type Place = (Pair, &'static Knob);
+
+    const LEVELS: usize = 2;
+
+    fn parts(&self, network: &ImpairedNetwork, level: usize) -> Vec<NetworkPart> {
+        let stages = Self::each(network, |link| self.0.parts(link, 0));
+        if level > 0 {
+            return stages.into_iter().map(|(pair, stage)| NetworkPart::Stage(pair, stage)).collect();
+        }
+        let mut pairs: Vec<Pair> = stages.into_iter().map(|(pair, _)| pair).collect();
+        pairs.dedup();
+        pairs.into_iter().map(NetworkPart::Link).collect()
+    }
+
+    fn without(&self, network: &ImpairedNetwork, parts: &[NetworkPart]) -> Option<ImpairedNetwork> {
+        let mut gone: Vec<(Pair, Vec<Stage>)> = Vec::new();
+        for part in parts {
+            match *part {
+                NetworkPart::Link(pair) => gone.push((pair, self.0.parts(network.link(pair.0, pair.1)?, 0))),
+                NetworkPart::Stage(pair, stage) => match gone.last_mut() {
+                    Some((last, stages)) if *last == pair => stages.push(stage),
+                    Some(_) | None => gone.push((pair, vec![stage])),
+                },
+            }
+        }
+        gone.into_iter().try_fold(network.clone(), |network, (pair, stages)| Self::changed(&network, pair, |link| self.0.without(link, &stages)))
+    }
+
+    fn forms(&self, network: &ImpairedNetwork) -> Vec<(Pair, Form)> {
+        Self::each(network, |link| self.0.forms(link))
+    }
+
+    fn plainer(&self, network: &ImpairedNetwork, (pair, form): &(Pair, Form)) -> Option<ImpairedNetwork> {
+        Self::changed(network, *pair, |link| self.0.plainer(link, form))
+    }
+
+    fn places(&self, network: &ImpairedNetwork) -> Vec<(Pair, &'static Knob)> {
+        Self::each(network, |link| self.0.places(link))
+    }
+
+    fn number(&self, network: &ImpairedNetwork, (pair, knob): &(Pair, &'static Knob)) -> Option<Number> {
+        self.0.number(network.link(pair.0, pair.1)?, knob)
+    }
+
+    fn with_number(&self, network: &ImpairedNetwork, (pair, knob): &(Pair, &'static Knob), number: u64) -> Option<ImpairedNetwork> {
+        Self::changed(network, *pair, |link| self.0.with_number(link, knob, number))
+    }
+}
