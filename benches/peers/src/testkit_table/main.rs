@@ -12,6 +12,10 @@ use on_testkit::Kind;
 use program::{Errors, PERIOD};
 
 fn main() {
+    if let Some(what) = std::env::args().nth(1) {
+        for _ in 0..20 { match &*what { "own" => {on_testkit::run(Kind::Own, 10, 2_000);} "own2" => {on_testkit::run(Kind::Own, 2, 20_000);} "tokio" => {on_testkit::run(Kind::Tokio, 2, 20_000);} _ => {let _ = on_turmoil::run(Duration::from_millis(1), 10, 2_000);} } }
+        return;
+    }
     for (hosts, count) in [(2, 20_000), (10, 2_000)] {
         for kind in [Kind::Own, Kind::Tokio, Kind::TokioTimers] {
             let t = Instant::now();
