@@ -30,7 +30,7 @@ pub struct Addresses {
 }
 
 impl Addresses {
-    fn numbered(number: u32) -> Self {
+    pub(crate) fn numbered(number: u32) -> Self {
         Self {
             v4: Ipv4Addr::from_bits(u32::from(Ipv4Addr::new(10, 0, 0, 0)) + number),
             v6: Ipv6Addr::from_bits((0xfd00 << 112) + u128::from(number)),

@@ -11,6 +11,8 @@ mod context;
 mod core;
 mod host;
 mod link;
+pub mod node;
+mod record;
 mod runtime;
 mod seed;
 mod socket;
@@ -21,6 +23,7 @@ pub mod time;
 mod trace;
 
 pub use address::{AddressPlan, Addresses, ToSocketAddrs};
+pub use artefacts::{ARTEFACTS_VARIABLE, WriteError};
 pub use bed::{Bed, Testbed};
 pub use cohaptic_units::Instant;
 pub use cohaptic_wan as wan;
@@ -28,6 +31,7 @@ pub use host::Host;
 pub use link::ToLink;
 #[cfg(feature = "strategies")]
 pub use proptest;
+pub use record::Record;
 pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};

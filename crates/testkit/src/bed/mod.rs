@@ -8,16 +8,20 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::panic::{AssertUnwindSafe, Location, catch_unwind, resume_unwind};
+use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 
+use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
 pub use running::Bed;
 
+use crate::artefacts::Artefacts;
 use crate::context::Running;
 use crate::core::{Clock, Core, Seen, Settings, Shared};
 use crate::link::ToLink;
+use crate::record::Record;
 use crate::runtime::own::Executor;
 use crate::seed::Seed;
 use crate::task::Tasks;
@@ -53,7 +57,7 @@ pub struct Testbed {
     settings: Settings,
     #[cfg(feature = "tokio")]
     is_tokio: bool,
-    pub(crate) artefacts: Option<crate::artefacts::Artefacts>,
+    artefacts: Option<PathBuf>,
 }
 
 /// As Linux gives a socket (`net.core.rmem_default`) \[bytes\].
@@ -69,16 +73,12 @@ impl Testbed {
     ///
     /// If there is no host, a name is empty or there twice, or has one of the characters that an address is written with (`:`, `[`, `]`, white space).
     pub fn new<N: Into<String>>(hosts: impl IntoIterator<Item = N>) -> Self {
-        let names: Vec<String> = hosts.into_iter().map(Into::into).collect();
+        let names = hosts.into_iter().map(Into::into).fold(Vec::new(), |mut names: Vec<String>, name: String| {
+            check_name(&names, &name);
+            names.push(name);
+            names
+        });
         assert!(!names.is_empty(), "a test bed without hosts; expected one name at least");
-        for (place, name) in names.iter().enumerate() {
-            let is_word = !name.is_empty()
-                && !name.contains([':', '[', ']'])
-                && !name.contains(char::is_whitespace)
-                && name.parse::<std::net::IpAddr>().is_err();
-            assert!(is_word, "`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address");
-            assert!(!names[..place].contains(name), "two hosts are called `{name}`");
-        }
         Self {
             names,
             every: LinkModel::default(),
@@ -148,6 +148,13 @@ impl Testbed {
         self
     }
 
+    /// If the run fails, what happened is written into this folder: see [`Record::write`]. [`ARTEFACTS_VARIABLE`](crate::ARTEFACTS_VARIABLE) asks for it without
+    /// the test.
+    pub fn artefacts(mut self, folder: impl Into<PathBuf>) -> Self {
+        self.artefacts = Some(folder.into());
+        self
+    }
+
     /// Runs the program on tokio, whose clock is paused: for programs that use tokio's timers and tasks. Otherwise an executor of this crate runs it.
     ///
     /// Packets arrive, and [`time`](crate::time) goes off, to the nanosecond all the same. Tokio's own timers are rounded up to the next millisecond since the run
@@ -175,6 +182,23 @@ impl Testbed {
         self.run_once(&seed, program, Location::caller()).0
     }
 
+    /// Runs a program as [`Testbed::run`] does, and gives what happened too.
+    ///
+    /// # Panics
+    ///
+    /// As [`Testbed::run`].
+    #[track_caller]
+    pub fn run_recorded<T, F>(mut self, program: impl FnOnce(Bed) -> F) -> (T, Record)
+    where
+        F: Future<Output = T> + 'static,
+        T: 'static,
+    {
+        self.settings.traces = true;
+        self.settings.keeps_packets = true;
+        let seed = Seed::choose(self.seed);
+        self.run_once(&seed, program, Location::caller())
+    }
+
     /// Runs a program twice, and gives what came out first, if all that happened was the same to the nanosecond: every packet, with what it carried.
     ///
     /// # Panics
@@ -191,7 +215,7 @@ impl Testbed {
         let seed = Seed::choose(self.seed);
         let (outcome, first) = self.clone().run_once(&seed, &program, Location::caller());
         let (_, second) = self.run_once(&seed, &program, Location::caller());
-        if let Some(difference) = first.first_difference(&second) {
+        if let Some(difference) = first.trace().first_difference(second.trace()) {
             panic!(
                 "the program does not do the same twice: {difference}Look for hash maps, threads, the time of day, random numbers without a seed, and \
                  `tokio::select!` without `biased`.\n{}",
@@ -205,16 +229,15 @@ impl Testbed {
         place(&self.names, name)
     }
 
-    #[expect(clippy::print_stderr, reason = "a test that fails says how to see it again")]
-    fn run_once<T, F>(self, seed: &Seed, program: impl FnOnce(Bed) -> F, origin: &'static Location<'static>) -> (T, Trace)
+    fn run_once<T, F>(self, seed: &Seed, program: impl FnOnce(Bed) -> F, origin: &'static Location<'static>) -> (T, Record)
     where
         F: Future<Output = T> + 'static,
         T: 'static,
     {
-        let artefacts = self.artefacts.clone();
+        let artefacts = Artefacts::new(self.artefacts.clone(), seed);
         let mut settings = self.settings.clone();
-        settings.keeps_packets |= artefacts.is_some();
-        settings.traces |= artefacts.is_some();
+        settings.keeps_packets |= artefacts.is_wanted();
+        settings.traces |= artefacts.is_wanted();
         let (every, links) = (&self.every, &self.links);
         let core = Core::new(&self.names, seed.value, settings, |from, to| links.get(&(from, to)).unwrap_or(every).clone());
         let mut recorded = None;
@@ -225,18 +248,28 @@ impl Testbed {
             }
             on_own(core, self.names.len(), program, origin, &mut recorded)
         }));
-        let (trace, packets) = recorded.unwrap_or_else(|| (Trace::new(self.names.clone()), Vec::new()));
+        let (trace, packets, ended) = recorded.unwrap_or_else(|| (Trace::new(self.names.clone()), Vec::new(), Instant::ZERO));
+        let record = Record::new(seed.clone(), trace, packets, ended);
         match outcome {
-            Ok(outcome) => (outcome, trace),
+            Ok(outcome) => (outcome, record),
             Err(panic) => {
-                if let Some(artefacts) = artefacts {
-                    eprintln!("{}", artefacts.write(&trace, &packets));
-                }
-                eprintln!("{}", seed.advice());
+                artefacts.report(seed, || record);
                 resume_unwind(panic)
             }
         }
     }
+}
+
+/// Checks the name of one more host.
+///
+/// # Panics
+///
+/// If it is none, or one of the others has it.
+pub(crate) fn check_name(others: &[String], name: &str) {
+    let is_word =
+        !name.is_empty() && !name.contains([':', '[', ']']) && !name.contains(char::is_whitespace) && name.parse::<std::net::IpAddr>().is_err();
+    assert!(is_word, "`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address");
+    assert!(!others.iter().any(|other| other == name), "two hosts are called `{name}`");
 }
 
 /// Which of the hosts is called so.
@@ -250,7 +283,7 @@ pub(crate) fn place(names: &[String], name: &str) -> usize {
 }
 
 /// What was recorded of a run.
-pub(crate) type Recorded = Option<(Trace, Vec<Seen>)>;
+pub(crate) type Recorded = Option<(Trace, Vec<Seen>, Instant)>;
 
 /// Takes what was recorded out of a run that ends, however it ends.
 pub(crate) struct Recorder<'a> {
@@ -261,7 +294,7 @@ pub(crate) struct Recorder<'a> {
 
 impl Drop for Recorder<'_> {
     fn drop(&mut self) {
-        *self.recorded = Some(self.shared.lock().recording.take());
+        *self.recorded = Some(self.shared.lock().take_recording());
         // Tasks hold the state, and the state their wakers.
         self.tasks.stop_all();
     }

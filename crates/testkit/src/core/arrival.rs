@@ -1,9 +1,9 @@
 //! The way of a packet from its link into the buffer of a socket.
 
 use bytes::Bytes;
-use cohaptic_wan::{Fate, NetworkEvent, PacketRecord};
+use cohaptic_wan::Fate;
 
-use super::{Core, Datagram, Kind, Parcel, Seen, SocketId};
+use super::{Core, Datagram, Kind, Parcel, SocketId, seen};
 use crate::trace::{Happening, Lost, PacketName};
 
 impl Core {
@@ -11,8 +11,8 @@ impl Core {
     pub(super) fn take_arrivals(&mut self) {
         while let Some(event) = self.network.poll_event() {
             let (from, to) = (event.from.0 as usize, event.to.0 as usize);
-            let packet = PacketName { from, to, sequence: event.sequence, copy: event.copy };
-            self.recording.keep(|| seen(&event));
+            let packet = PacketName { from, to, sequence: event.sequence, copy: event.copy >> 1 };
+            self.recording.keep(|| seen(&event, event.payload.bytes.clone()));
             match event.fate {
                 Fate::Delivered(at) => {
                     // A copy of it may be on its way still, undamaged.
@@ -99,18 +99,4 @@ impl Core {
         let answer = Parcel { from: parcel.to, to: parcel.from, bytes: Bytes::from_static(&[0; 36]), kind: Kind::Unreachable };
         if host == sender { self.hand_over(host, host, answer, false) } else { self.offer(host, sender, false, answer) }
     }
-}
-
-fn seen(event: &NetworkEvent<Parcel>) -> Seen {
-    let record = PacketRecord {
-        sequence: event.sequence,
-        copy: event.copy,
-        offered: event.sent,
-        at: event.at,
-        size: event.size,
-        fate: event.fate,
-        marked: event.marked,
-        damaged: event.damage.is_some(),
-    };
-    Seen { from: event.from.0 as usize, to: event.to.0 as usize, record, payload: event.payload.bytes.clone() }
 }

@@ -14,13 +14,13 @@ use bytes::Bytes;
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, Network, NetworkConfig, NodeId};
 
-pub(crate) use recording::{Recording, Seen};
+pub(crate) use recording::{Recording, Seen, follow_to_the_end, seen};
 pub(crate) use sending::Outgoing;
 pub(crate) use sockets::{Datagram, SocketId};
 pub(crate) use timers::TimerId;
 
 use crate::address::AddressPlan;
-use crate::trace::Happening;
+use crate::trace::{Happening, Trace};
 use hosts::HostState;
 use sockets::Sockets;
 use timers::Timers;
@@ -125,6 +125,15 @@ impl Core {
         self.take_arrivals();
     }
 
+    /// What was recorded. Packets that are on their way are followed to their end, in the fates alone.
+    pub(crate) fn take_recording(&mut self) -> (Trace, Vec<Seen>, Instant) {
+        let (trace, mut packets) = self.recording.take();
+        if self.settings.keeps_packets {
+            follow_to_the_end(&mut self.network.clone(), |event| packets.push(seen(event, event.payload.bytes.clone())));
+        }
+        (trace, packets, self.now)
+    }
+
     pub(crate) fn link_stats(&self, from: usize, to: usize) -> Option<cohaptic_wan::LinkStats> {
         self.network.link_stats(node(from), node(to))
     }
@@ -145,7 +154,9 @@ impl Core {
     }
 }
 
-fn node(place: usize) -> NodeId {
+pub(crate) use node as network_node;
+
+pub(crate) fn node(place: usize) -> NodeId {
     // A network has at most 23,170 nodes.
     NodeId(u32::try_from(place).unwrap_or(u32::MAX))
 }

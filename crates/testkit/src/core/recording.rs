@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 use cohaptic_units::Instant;
-use cohaptic_wan::PacketRecord;
+use cohaptic_wan::{Network, NetworkEvent, PacketRecord};
 
 use super::Settings;
 use crate::trace::{Happening, Trace};
@@ -26,7 +26,7 @@ pub(crate) struct Seen {
 }
 
 impl Recording {
-    pub(super) const fn new(hosts: Vec<String>, settings: &Settings) -> Self {
+    pub(crate) const fn new(hosts: Vec<String>, settings: &Settings) -> Self {
         Self { trace: Trace::new(hosts), packets: Vec::new(), traces: settings.traces, keeps_packets: settings.keeps_packets }
     }
 
@@ -38,15 +38,51 @@ impl Recording {
     }
 
     #[inline]
-    pub(super) fn keep(&mut self, seen: impl FnOnce() -> Seen) {
+    pub(crate) fn keep(&mut self, seen: impl FnOnce() -> Seen) {
         if self.keeps_packets {
             self.packets.push(seen());
         }
+    }
+
+    /// What has been recorded so far.
+    pub(crate) fn so_far(&self) -> (Trace, Vec<Seen>) {
+        (self.trace.clone(), self.packets.clone())
     }
 
     /// What was recorded.
     pub(crate) fn take(&mut self) -> (Trace, Vec<Seen>) {
         let hosts = self.trace.hosts().to_vec();
         (std::mem::replace(&mut self.trace, Trace::new(hosts)), std::mem::take(&mut self.packets))
+    }
+}
+
+/// What a link says of a packet, as the row of its log. Without access lines the only copy is that of the link, whose number in a network is 2.
+pub(crate) fn seen<P>(event: &NetworkEvent<P>, payload: Bytes) -> Seen {
+    let record = PacketRecord {
+        sequence: event.sequence,
+        copy: event.copy >> 1,
+        offered: event.sent,
+        at: event.at,
+        size: event.size,
+        fate: event.fate,
+        marked: event.marked,
+        damaged: event.damage.is_some(),
+    };
+    Seen { from: event.from.0 as usize, to: event.to.0 as usize, record, payload }
+}
+
+/// No link holds a packet for longer than this many of its events.
+const MOST_EVENTS: u32 = 10_000_000;
+
+/// Follows the packets that are in a network until they have arrived or are lost, as long as nothing more is sent.
+pub(crate) fn follow_to_the_end<P: Clone>(network: &mut Network<P>, mut keep: impl FnMut(&NetworkEvent<P>)) {
+    for _ in 0..MOST_EVENTS {
+        while let Some(event) = network.poll_event() {
+            keep(&event);
+        }
+        let Some(next) = network.poll_timeout() else { return };
+        if network.handle_timeout(next).is_err() {
+            return;
+        }
     }
 }

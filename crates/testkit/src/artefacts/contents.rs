@@ -1,0 +1,111 @@
+//! What is in the files.
+
+use std::fmt::Write as _;
+
+use cohaptic_units::print::Seconds;
+use cohaptic_wan::{DropCause, Fate};
+
+use super::folder::{MARK, MARKED};
+use crate::record::Record;
+
+/// The files of a record: their names, and what is in them.
+pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
+    let mut files = Vec::new();
+    let mut links = String::new();
+    let mut table = String::new();
+    let hosts = record.trace().hosts();
+    let names = file_names(hosts);
+    for pair in record.pairs() {
+        let (from, to) = (&names[pair.0], &names[pair.1]);
+        let log = record.fates_of(pair);
+        let fates = format!("fates-{from}-to-{to}.csv");
+        let (one, other) = (&hosts[pair.0], &hosts[pair.1]);
+        // Writing to a `String` cannot fail.
+        let _ = writeln!(links, "{one} -> {other}: replay {fates}");
+        let _ = writeln!(table, "  {one} -> {other}: {}", counts(&log));
+        files.push((fates, log.to_text().into_bytes()));
+        #[cfg(feature = "pcapng")]
+        files.push((format!("packets-{from}-to-{to}.pcapng"), capture(record, pair, one, other)));
+    }
+    let mut trace = String::new();
+    for event in record.trace().events() {
+        let _ = writeln!(trace, "{}", record.trace().words(event));
+    }
+    let seed = record.seed();
+    let summary = format!(
+        "{MARK}: `{}`, which ended at {} s.\n\nIts seed was {}: {}={} runs it again.\n\nWhat the links did, of what they took:\n\n{table}\n\
+         trace.txt has all that happened, in order. links.txt replays what the links did:\nTestbed::from_file(\"links.txt\") has these hosts and links.\n",
+        seed.test,
+        Seconds(record.ended()),
+        seed.value,
+        crate::SEED_VARIABLE,
+        seed.value,
+    );
+    let links = format!("# What the links did, packet by packet.\nseed: {}\nhosts: {}\n{links}", seed.value, hosts.join(" "));
+    files.push((MARKED.to_owned(), summary.into_bytes()));
+    files.push(("trace.txt".to_owned(), trace.into_bytes()));
+    files.push(("links.txt".to_owned(), links.into_bytes()));
+    files
+}
+
+/// What a link did, in words: `12 packets, 10 arrived, 1 copied, 2 lost (loss), 1 lost (queue-full)`.
+fn counts(log: &cohaptic_wan::FateLog) -> String {
+    let count = |is: &dyn Fn(Fate) -> bool| log.records().iter().filter(|record| is(record.fate)).count();
+    let mut text = format!("{} packets, {} arrived", log.packets(), count(&|fate| matches!(fate, Fate::Delivered(_))));
+    let copied = count(&|fate| fate == Fate::Duplicated);
+    if copied > 0 {
+        let _ = write!(text, ", {copied} copied");
+    }
+    for cause in DropCause::ALL {
+        let lost = count(&|fate| fate == Fate::Dropped(cause));
+        if lost > 0 {
+            let _ = write!(text, ", {lost} lost ({})", cause.name());
+        }
+    }
+    text
+}
+
+#[cfg(feature = "pcapng")]
+fn capture(record: &Record, pair: (usize, usize), from: &str, to: &str) -> Vec<u8> {
+    let write = || -> std::io::Result<Vec<u8>> {
+        let mut capture = cohaptic_measure::pcapng::CaptureWriter::new(Vec::new(), &format!("{from} -> {to}"))?;
+        for seen in record.packets_of(pair) {
+            capture.write(&seen.record, &seen.payload)?;
+        }
+        capture.finish()
+    };
+    // Writing to memory cannot fail.
+    write().unwrap_or_default()
+}
+
+/// The longest name of a host within that of a file.
+const LONGEST: usize = 60;
+
+/// A name as part of the name of a file, on every system.
+pub(super) fn file_name(name: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '_' };
+    name.chars().map(plain).take(2 * LONGEST).collect()
+}
+
+/// The names of hosts as parts of names of files. No two are the same, also where a system does not tell large letters from small ones.
+fn file_names(hosts: &[String]) -> Vec<String> {
+    let mut taken = std::collections::BTreeSet::new();
+    let name = |(place, host): (usize, &String)| {
+        let plain: String = file_name(host).chars().take(LONGEST).collect();
+        let alone = if taken.contains(&plain.to_ascii_lowercase()) { format!("{plain}-{place}") } else { plain };
+        taken.insert(alone.to_ascii_lowercase());
+        alone
+    };
+    hosts.iter().enumerate().map(name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hosts_of_any_name_have_files_of_their_own() {
+        let hosts = ["a", "A", "a/b", "a.b", "ü", "a_b", &"x".repeat(200)].map(String::from);
+        assert_eq!(file_names(&hosts), ["a", "A-1", "a_b", "a_b-3", "_", "a_b-5", &"x".repeat(60)]);
+    }
+}

@@ -1,0 +1,133 @@
+//! A folder that is written as a whole.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::WriteError;
+
+/// The first words of the file by which a folder is known again.
+pub(super) const MARK: &str = "What happened in a test that failed";
+
+/// The file.
+pub(super) const MARKED: &str = "summary.txt";
+
+/// So that two tests of one process never write to the same name.
+static COUNT: AtomicU64 = AtomicU64::new(0);
+
+/// Puts files into a folder, in place of those that were written before. At every instant the folder is whole or not there.
+pub(super) fn replace(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), WriteError> {
+    let Some(name) = folder.file_name() else { return Err(WriteError::NoName { folder: folder.to_path_buf() }) };
+    if !is_ours(folder) {
+        return Err(WriteError::NotOurs { folder: folder.to_path_buf() });
+    }
+    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    fs::create_dir_all(parent).map_err(failed(parent))?;
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    let beside = |what: &str| parent.join(format!(".{}.{}-{count}.{what}", name.to_string_lossy(), std::process::id()));
+    let (new, old) = (beside("new"), beside("old"));
+    let written = write_all(&new, files).and_then(|()| put(&new, folder, &old));
+    if written.is_err() {
+        // What is left of it is of no use; that it cannot be removed is of no interest beside why it was not written.
+        let _ = fs::remove_dir_all(&new);
+    }
+    written
+}
+
+fn write_all(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), WriteError> {
+    fs::create_dir(folder).map_err(failed(folder))?;
+    for (name, bytes) in files {
+        let path = folder.join(name);
+        fs::write(&path, bytes).map_err(failed(&path))?;
+    }
+    Ok(())
+}
+
+/// Renames a folder into its place, and removes what was there.
+fn put(new: &Path, folder: &Path, old: &Path) -> Result<(), WriteError> {
+    match fs::rename(folder, old) {
+        Ok(()) => {
+            if let Err(error) = fs::rename(new, folder) {
+                // What was there is there again, if that is possible at all.
+                let _ = fs::rename(old, folder);
+                return Err(failed(folder)(error));
+            }
+            // It is in nobody's way.
+            let _ = fs::remove_dir_all(old);
+            Ok(())
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => fs::rename(new, folder).map_err(failed(folder)),
+        Err(error) => Err(failed(folder)(error)),
+    }
+}
+
+/// Whether a folder may be replaced: it is not there, empty, or one of those that are written here.
+fn is_ours(folder: &Path) -> bool {
+    if fs::symlink_metadata(folder).is_err() {
+        return true;
+    }
+    let is_empty = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
+    is_empty || fs::read(folder.join(MARKED)).is_ok_and(|text| text.starts_with(MARK.as_bytes()))
+}
+
+fn failed(path: &Path) -> impl FnOnce(io::Error) -> WriteError {
+    let path: PathBuf = path.to_path_buf();
+    move |source| WriteError::Io { path, source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn files(text: &str) -> Vec<(String, Vec<u8>)> {
+        vec![(MARKED.to_owned(), format!("{MARK}\n{text}").into_bytes()), (text.to_owned(), Vec::new())]
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn what_an_earlier_failure_left_is_replaced_as_a_whole_and_nothing_lies_beside_it() {
+        let base = tempfile::tempdir().unwrap();
+        let folder = base.path().join("deep/er");
+        replace(&folder, &files("one")).unwrap();
+        assert_eq!(names(&folder), ["one", MARKED]);
+        replace(&folder, &files("two")).unwrap();
+        assert_eq!(names(&folder), [MARKED, "two"]);
+        assert_eq!(names(&base.path().join("deep")), ["er"]);
+    }
+
+    #[test]
+    fn a_folder_of_somebody_else_is_left_alone() {
+        let base = tempfile::tempdir().unwrap();
+        fs::write(base.path().join("precious"), "x").unwrap();
+        assert!(matches!(replace(base.path(), &files("one")), Err(WriteError::NotOurs { .. })));
+        assert_eq!(names(base.path()), ["precious"]);
+        let file = base.path().join("precious");
+        assert!(matches!(replace(&file, &files("one")), Err(WriteError::NotOurs { .. })));
+        let error = replace(&file.join("below"), &files("one")).unwrap_err().to_string();
+        assert!(error.starts_with(&file.display().to_string()), "{error}");
+        assert!(matches!(replace(Path::new(".."), &files("one")), Err(WriteError::NoName { .. })));
+        // An empty one is as good as none.
+        let empty = base.path().join("empty");
+        fs::create_dir(&empty).unwrap();
+        replace(&empty, &files("one")).unwrap();
+        assert_eq!(names(base.path()), ["empty", "precious"]);
+    }
+
+    #[test]
+    fn what_cannot_be_written_leaves_what_was_there() {
+        let base = tempfile::tempdir().unwrap();
+        let folder = base.path().join("kept");
+        replace(&folder, &files("one")).unwrap();
+        // There is no such folder within the new one.
+        let error = replace(&folder, &[("no/such".to_owned(), Vec::new())]).unwrap_err();
+        assert!(matches!(error, WriteError::Io { .. }));
+        assert_eq!(names(base.path()), ["kept"]);
+        assert_eq!(names(&folder), ["one", MARKED]);
+    }
+}

@@ -1,0 +1,308 @@
+//! Nodes that run: their time, what is asked of them, and the way of a packet.
+
+use std::any::{Any, type_name};
+use std::collections::VecDeque;
+use std::fmt;
+use std::time::Duration;
+
+use bytes::Bytes;
+use cohaptic_units::Instant;
+use cohaptic_units::print::Seconds;
+use cohaptic_wan::{LinkModel, LinkStats, Network, NetworkConfig};
+
+use super::deadlines::Deadlines;
+use super::{Node, Nodes, Packet};
+use crate::artefacts::Artefacts;
+use crate::bed::place;
+use crate::core::{Recording, follow_to_the_end, network_node, seen};
+use crate::record::Record;
+use crate::seed::Seed;
+
+/// Nodes that run.
+///
+/// Between the steps the test looks at the nodes, changes them, and breaks what is between them. At one instant packets arrive first, in the order of the
+/// [network](cohaptic_wan::Network); then the timers go off that are due, in the order of the nodes; then what is sent at this instant over links without delay
+/// arrives. If the test fails while the run is there, the seed is told, and what [`Nodes::artefacts`] asked for is written.
+pub struct NodeRun {
+    pub(super) names: Vec<String>,
+    /// `None`: crashed, or being asked.
+    pub(super) nodes: Vec<Option<Box<dyn Node>>>,
+    pub(super) up: Vec<bool>,
+    pub(super) network: Network<Parcel>,
+    pub(super) now: Instant,
+    pub(super) deadlines: Deadlines,
+    /// By sender, then receiver: whether the way is cut.
+    pub(super) cut: Vec<bool>,
+    /// By sender, then receiver: how many packets the link has taken.
+    pub(super) offered: Vec<u64>,
+    pub(super) counts: Vec<NodeCounts>,
+    /// What has arrived and is not handed over yet.
+    pub(super) arrived: VecDeque<(usize, Packet)>,
+    /// Nodes that the test has touched.
+    touched: Vec<usize>,
+    pub(super) recording: Recording,
+    pub(super) traces: bool,
+    /// What was done since time last passed.
+    pub(super) done: u64,
+    pub(super) patience: u64,
+    time_limit: Duration,
+    seed: Seed,
+    artefacts: Artefacts,
+}
+
+/// What travels.
+#[derive(Clone, Debug)]
+pub(super) struct Parcel {
+    pub(super) from_port: u16,
+    pub(super) to_port: u16,
+    /// Whether it is of version 6.
+    pub(super) is_six: bool,
+    pub(super) bytes: Bytes,
+}
+
+/// What a node has sent and got.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[non_exhaustive]
+pub struct NodeCounts {
+    /// Packets that it sent, wherever they went.
+    pub sent: u64,
+    /// Packets that it was handed.
+    pub arrived: u64,
+    /// Timers that went off.
+    pub timeouts: u64,
+    /// Packets that it sent to an address that no node has.
+    pub unroutable: u64,
+    /// Packets that were lost because it was down when they arrived.
+    pub while_down: u64,
+    /// Packets of it that were lost because the way was cut when they were sent, or would have arrived.
+    pub cut: u64,
+}
+
+impl NodeRun {
+    pub(super) fn new(nodes: Nodes, seed: Seed, link: impl Fn(usize, usize) -> LinkModel) -> Self {
+        let Nodes { names, nodes, mut settings, time_limit, artefacts, .. } = nodes;
+        let artefacts = Artefacts::new(artefacts, &seed);
+        settings.traces |= artefacts.is_wanted();
+        settings.keeps_packets |= artefacts.is_wanted();
+        let config = NetworkConfig { seed: seed.value, nodes: names.clone(), general: false };
+        let count = names.len();
+        let mut run = Self {
+            nodes: nodes.into_iter().map(Some).collect(),
+            network: Network::new(config, |from, to| link(from.0 as usize, to.0 as usize)),
+            now: Instant::ZERO,
+            up: vec![true; count],
+            deadlines: Deadlines::new(count),
+            cut: vec![false; count * count],
+            offered: vec![0; count * count],
+            counts: vec![NodeCounts::default(); count],
+            arrived: VecDeque::new(),
+            touched: (0..count).collect(),
+            recording: Recording::new(names.clone(), &settings),
+            traces: settings.traces,
+            done: 0,
+            patience: settings.patience,
+            time_limit,
+            seed,
+            artefacts,
+            names,
+        };
+        run.ask_touched();
+        run
+    }
+
+    /// The time since the run began.
+    #[must_use]
+    pub const fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// The names of the nodes, in the order in which they were added.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// A node.
+    ///
+    /// # Panics
+    ///
+    /// If there is none of that name, it is down, or of another type.
+    #[must_use]
+    pub fn node<T: Node>(&self, name: &str) -> &T {
+        let place = place(&self.names, name);
+        let node: &dyn Any = self.nodes[place].as_deref().unwrap_or_else(|| is_down(name));
+        node.downcast_ref().unwrap_or_else(|| is_another::<T>(name))
+    }
+
+    /// A node, to be changed. What it wants to send then is sent now, and its timer is asked for anew.
+    ///
+    /// # Panics
+    ///
+    /// As [`NodeRun::node`].
+    #[must_use]
+    pub fn node_mut<T: Node>(&mut self, name: &str) -> &mut T {
+        let place = place(&self.names, name);
+        self.touched.push(place);
+        let node: &mut dyn Any = self.nodes[place].as_deref_mut().unwrap_or_else(|| is_down(name));
+        node.downcast_mut().unwrap_or_else(|| is_another::<T>(name))
+    }
+
+    /// What a node has sent and got.
+    ///
+    /// # Panics
+    ///
+    /// If there is none of that name.
+    #[must_use]
+    pub fn counts(&self, name: &str) -> NodeCounts {
+        self.counts[place(&self.names, name)]
+    }
+
+    /// What the link from one node to another has done so far.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    #[must_use]
+    #[expect(clippy::panic, reason = "a misuse, and the way out")]
+    pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
+        let (from_place, to_place) = (place(&self.names, from), place(&self.names, to));
+        self.network
+            .link_stats(network_node(from_place), network_node(to_place))
+            .unwrap_or_else(|| panic!("node `{from}` has no link to itself"))
+    }
+
+    /// When something happens next; `None` if nothing will.
+    ///
+    /// # Panics
+    ///
+    /// If a node that the test has touched never ends to send.
+    pub fn next_event(&mut self) -> Option<Instant> {
+        self.ask_touched();
+        self.next()
+    }
+
+    /// Lets happen what happens next, all that is due at that instant; says whether there was anything.
+    ///
+    /// # Panics
+    ///
+    /// If a node does, or time stands still: a node sends, or wants to be woken, again and again.
+    pub fn step(&mut self) -> bool {
+        self.ask_touched();
+        let next = self.next();
+        if let Some(next) = next {
+            self.pass(next);
+        }
+        next.is_some()
+    }
+
+    /// Lets time pass until then, with all that happens, that instant included.
+    ///
+    /// # Panics
+    ///
+    /// As [`NodeRun::step`]; if the instant has passed.
+    pub fn run_until(&mut self, until: Instant) {
+        assert!(until >= self.now, "{} s has passed: it is {} s", Seconds(until), Seconds(self.now));
+        self.ask_touched();
+        while let Some(next) = self.next().filter(|next| *next <= until) {
+            self.pass(next);
+        }
+        self.now = until;
+    }
+
+    /// Lets time pass until nothing will happen any more: no packet is on its way, and no node wants to be woken. Gives that instant.
+    ///
+    /// # Panics
+    ///
+    /// As [`NodeRun::step`]; if there is no end before the [time limit](Nodes::time_limit).
+    #[expect(clippy::panic, reason = "a test that waits for ever; says the way out")]
+    pub fn run_until_idle(&mut self) -> Instant {
+        while self.step() {
+            if self.is_late() {
+                panic!("at {} s something happens still; nodes that always wake again run with `run_until` or `run_while`", Seconds(self.now));
+            }
+        }
+        self.now
+    }
+
+    /// Lets time pass as long as that is so; it is asked after every instant at which something happened. Gives the instant at which it is so no more.
+    ///
+    /// # Panics
+    ///
+    /// As [`NodeRun::step`]; if it is so still when nothing will happen any more, or at the [time limit](Nodes::time_limit).
+    #[expect(clippy::panic, reason = "a test that waits for what never comes; says the way out")]
+    pub fn run_while(&mut self, mut is_so: impl FnMut(&Self) -> bool) -> Instant {
+        while is_so(self) {
+            if !self.step() {
+                panic!(
+                    "nothing will ever happen after {} s, and what was to end has not ended: no packet is on its way, and no node wants to be woken. A lost \
+                     packet needs a timer",
+                    Seconds(self.now)
+                );
+            }
+            if self.is_late() {
+                panic!("at {} s what was to end has not ended; `Nodes::time_limit` lets it go on for longer", Seconds(self.now));
+            }
+        }
+        self.now
+    }
+
+    /// What has happened so far. Packets that are on their way are followed to their end, in the fates alone.
+    ///
+    /// # Panics
+    ///
+    /// If it is not [recorded](Nodes::recorded).
+    #[must_use]
+    pub fn record(&self) -> Record {
+        assert!(self.traces, "nothing was recorded; `Nodes::recorded` asks for it");
+        let (trace, mut packets) = self.recording.so_far();
+        follow_to_the_end(&mut self.network.clone(), |event| packets.push(seen(event, event.payload.bytes.clone())));
+        Record::new(self.seed.clone(), trace, packets, self.now)
+    }
+
+    fn is_late(&self) -> bool {
+        self.now.saturating_duration_since(Instant::ZERO) > self.time_limit
+    }
+
+    /// Asks the nodes that the test has touched.
+    pub(super) fn ask_touched(&mut self) {
+        if self.touched.is_empty() {
+            return;
+        }
+        for place in std::mem::take(&mut self.touched) {
+            self.ask(place);
+        }
+        self.hand_over();
+    }
+
+    pub(super) fn touch(&mut self, place: usize) {
+        self.touched.push(place);
+    }
+
+    fn next(&self) -> Option<Instant> {
+        [self.network.poll_timeout(), self.deadlines.next()].into_iter().flatten().min()
+    }
+}
+
+#[expect(clippy::panic, reason = "a misuse, and the way out")]
+fn is_down<T>(name: &str) -> T {
+    panic!("node `{name}` is down; `NodeRun::restart` brings one back in its place")
+}
+
+#[expect(clippy::panic, reason = "a misuse, and the way out")]
+pub(super) fn is_another<T>(name: &str) -> ! {
+    panic!("node `{name}` is no `{}`", type_name::<T>())
+}
+
+impl Drop for NodeRun {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.artefacts.report(&self.seed, || self.record());
+        }
+    }
+}
+
+impl fmt::Debug for NodeRun {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("NodeRun").field("names", &self.names).field("now", &self.now).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,109 @@
+//! What was recorded of a run, as a test gets it.
+
+use std::collections::BTreeMap;
+
+use cohaptic_units::Instant;
+use cohaptic_wan::{FateLog, FateLogError, PacketRecord};
+
+use crate::bed::place;
+use crate::core::Seen;
+use crate::seed::Seed;
+use crate::trace::Trace;
+
+/// What was recorded of a run: all that happened, and what became of every packet on its link.
+///
+/// Packets that were on their way when the run ended are followed to their end, as if nothing more had been sent: the fates know it, the trace ends with the run.
+#[derive(Clone, Debug)]
+pub struct Record {
+    seed: Seed,
+    trace: Trace,
+    packets: Vec<Seen>,
+    ended: Instant,
+}
+
+impl Record {
+    pub(crate) const fn new(seed: Seed, trace: Trace, packets: Vec<Seen>, ended: Instant) -> Self {
+        Self { seed, trace, packets, ended }
+    }
+
+    /// All that happened, in order.
+    #[must_use]
+    pub const fn trace(&self) -> &Trace {
+        &self.trace
+    }
+
+    /// When the run ended.
+    #[must_use]
+    pub const fn ended(&self) -> Instant {
+        self.ended
+    }
+
+    pub(crate) const fn seed(&self) -> &Seed {
+        &self.seed
+    }
+
+    /// What became of the packets from one host to another on their link, as [`LinkModel::Replay`](cohaptic_wan::LinkModel::Replay) replays it. A packet that its
+    /// link delivered to a host that was down, or over a way that was cut, has arrived here: the trace says what became of it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host.
+    #[must_use]
+    pub fn fates(&self, from: &str, to: &str) -> FateLog {
+        let pair = (place(self.trace.hosts(), from), place(self.trace.hosts(), to));
+        complete(self.packets_of(pair).map(|seen| seen.record).collect())
+    }
+
+    /// Every pair (sender, receiver) with a packet on its link.
+    pub(crate) fn pairs(&self) -> Vec<(usize, usize)> {
+        let pairs: BTreeMap<(usize, usize), ()> = self.packets.iter().map(|seen| ((seen.from, seen.to), ())).collect();
+        pairs.into_keys().collect()
+    }
+
+    pub(crate) fn packets_of(&self, pair: (usize, usize)) -> impl Iterator<Item = &Seen> {
+        self.packets.iter().filter(move |seen| (seen.from, seen.to) == pair)
+    }
+
+    /// What became of the packets of a pair, by places.
+    pub(crate) fn fates_of(&self, pair: (usize, usize)) -> FateLog {
+        complete(self.packets_of(pair).map(|seen| seen.record).collect())
+    }
+}
+
+/// The log of all packets before the first whose end is not known. There is none of those, unless a link never lets go.
+fn complete(mut records: Vec<PacketRecord>) -> FateLog {
+    loop {
+        match FateLog::new(records.iter().copied()) {
+            Ok(log) => return log,
+            Err(FateLogError::Missing { sequence, .. } | FateLogError::NoEnd { sequence, .. }) => records.retain(|record| record.sequence < sequence),
+            // A link does none of the other things.
+            Err(_) => return FateLog::default(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_units::Bytes;
+    use cohaptic_wan::Fate;
+
+    use super::*;
+
+    #[test]
+    fn a_log_ends_before_the_first_packet_without_an_end() {
+        let record = |sequence, fate| PacketRecord {
+            sequence,
+            copy: 0,
+            offered: Instant::ZERO,
+            at: Instant::ZERO,
+            size: Bytes::new(1),
+            fate,
+            marked: false,
+            damaged: false,
+        };
+        let arrived = Fate::Delivered(Instant::ZERO);
+        assert_eq!(complete(vec![record(0, arrived), record(1, arrived), record(3, arrived)]).packets(), 2);
+        assert_eq!(complete(vec![record(0, arrived), record(1, Fate::Duplicated), record(1, arrived), record(2, arrived)]).packets(), 1);
+        assert_eq!(complete(Vec::new()).packets(), 0);
+    }
+}
