@@ -6,7 +6,7 @@ use proptest::option;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-use crate::{Draft, DraftHand, DraftLink, DraftPeer, Place};
+use crate::{Draft, DraftHand, DraftLink, DraftPeer, Place, contact_to_toml};
 
 /// Anything that a scene can hold: 2 to 5 peers, every kind of link, contact, hand and clock, up to three axes, changes on the way. It may be unstable.
 pub fn anything() -> impl Strategy<Value = Draft> {
@@ -241,13 +241,5 @@ impl Change {
             }
             Self::Gains(Gains { stiffness, damping }) => format!("coordination = {{ stiffness = {stiffness:?}, damping = {damping:?} }}"),
         }
-    }
-}
-
-pub(crate) fn contact_to_toml(contact: Contact) -> String {
-    match contact {
-        Contact::Grasp => "\"grasp\"".to_owned(),
-        Contact::None => "\"none\"".to_owned(),
-        Contact::Push(Direction { axis, positive }) => format!("{{ push = \"{}{}\" }}", if positive { '+' } else { '-' }, ["x", "y", "z"][axis]),
     }
 }

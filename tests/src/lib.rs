@@ -17,12 +17,11 @@ mod book {
     mod stability {}
 }
 
-mod draft;
 pub mod drafts;
 mod log;
 mod records;
 
-pub use draft::{Draft, DraftHand, DraftLink, DraftPeer, Place};
+pub use cohaptic_testkit::strategies::scene::{Draft, DraftHand, DraftLink, DraftPeer, Place, contact_to_toml};
 pub use log::{Body, Log, Tick, first_difference, keep, run};
 pub use records::{Records, record};
 

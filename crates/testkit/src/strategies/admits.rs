@@ -73,7 +73,8 @@ fn shapes(bounds: &LinkBounds, netem: &Netem) -> bool {
     let random = if let Some(LossSpec::Random(chance)) = &netem.loss { Some(chance) } else { None };
     let reorder = netem.reorder.as_ref().map(|reorder| &reorder.chance);
     let chances = [random, netem.corrupt.as_ref(), netem.duplicate.as_ref(), reorder];
-    let correlated = chances.into_iter().flatten().any(|chance| chance.correlation.is_some()) || jitter.is_some_and(|jitter| jitter.correlation.is_some());
+    let correlated =
+        chances.into_iter().flatten().any(|chance| chance.correlation.is_some()) || jitter.is_some_and(|jitter| jitter.correlation.is_some());
     let drawn = netem.slot.as_ref().is_some_and(|slot| matches!(slot.gap, SlotGap::Drawn { .. }));
     let distributed = drawn || jitter.is_some_and(|jitter| jitter.distribution.is_some());
     (bounds.correlation || !correlated)

@@ -53,7 +53,7 @@ pub fn networks_like(hosts: usize, bounds: LinkBounds) -> Networks {
 
 #[track_caller]
 #[expect(clippy::panic, reason = "documented: bounds stand in a test")]
-fn checked(bounds: LinkBounds) -> Arc<LinkBounds> {
+pub(super) fn checked(bounds: LinkBounds) -> Arc<LinkBounds> {
     if let Err(error) = bounds.check() {
         panic!("bounds of links that make no sense: {error}");
     }
@@ -73,6 +73,14 @@ pub struct Links {
 pub struct Networks {
     ideal: ImpairedNetwork,
     bounds: Arc<LinkBounds>,
+}
+
+#[cfg(feature = "scenes")]
+impl Networks {
+    /// Networks of so many hosts within bounds that were checked.
+    pub(super) fn within(hosts: usize, bounds: &Arc<LinkBounds>) -> Self {
+        Self { ideal: ImpairedNetwork::ideal(hosts), bounds: Arc::clone(bounds) }
+    }
 }
 
 /// A link and the way to less impaired ones.

@@ -3,6 +3,7 @@
 use core::ops::RangeInclusive;
 use core::time::Duration;
 
+use super::bounds_error::BoundsError;
 use super::grid::Span;
 use super::link::ImpairedLink;
 use super::stage::Stage;
@@ -25,6 +26,9 @@ use super::{admits, numbers};
 /// | rate | \[bit/s\] | 64 kbit/s to 100 Mbit/s |
 /// | limit | packets held at most | 2 to 1000 |
 /// | slot | least time from one slot to the next | 1 ms to 50 ms |
+///
+/// Not drawn, though words may have them: `ecn`, `seed`, the framing of a rate, bytes of a slot, tables from files, and correlated Pareto laws, which take
+/// long to compute.
 ///
 /// ```
 /// use std::time::Duration;
@@ -62,61 +66,6 @@ pub enum LossModel {
     Gemodel,
     /// `loss state`.
     State,
-}
-
-/// Why bounds make no sense.
-#[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum BoundsError {
-    /// The range has nothing in it.
-    #[error("{stage}: the range from {low} to {high} is empty: expected its end at or above its beginning")]
-    Empty {
-        /// The stage.
-        stage: Stage,
-        /// Where it begins.
-        low: String,
-        /// Where it ends.
-        high: String,
-    },
-    /// The range has only zero in it.
-    #[error("{stage}: a range with nothing but zero: expected LinkBounds::never(Stage::{stage:?}), or an end above zero")]
-    OnlyZero {
-        /// The stage.
-        stage: Stage,
-    },
-    /// No percentage.
-    #[error("{stage}: {found} is no percentage: expected 0 to 100")]
-    Percentage {
-        /// The stage.
-        stage: Stage,
-        /// What was found.
-        found: f64,
-    },
-    /// A time that netem cannot count.
-    #[error("{stage}: {found:?} is too long: expected at most 1 hour")]
-    TooLong {
-        /// The stage.
-        stage: Stage,
-        /// What was found.
-        found: Duration,
-    },
-    /// A rate that netem cannot count.
-    #[error("rate: {found} bit/s: expected 8 bit/s to 1 Tbit/s")]
-    Rate {
-        /// What was found.
-        found: u64,
-    },
-    /// Jitter above any delay.
-    #[error("jitter of at least {jitter:?} around delays of at most {delay:?}: expected a delay that may be as long as the least jitter")]
-    JitterAboveDelay {
-        /// The least jitter.
-        jitter: Duration,
-        /// The longest delay.
-        delay: Duration,
-    },
-    /// Loss without a model.
-    #[error("loss without a model: expected one of random, gemodel and state, or LinkBounds::never(Stage::Loss)")]
-    NoModel,
 }
 
 /// Ten-thousandths of a percent.
@@ -226,7 +175,7 @@ impl LinkBounds {
         self
     }
 
-    /// The least time from one slot to the next; the longest is at most twice that.
+    /// The least time from one slot to the next; the longest is drawn up to twice that.
     #[must_use]
     pub fn slot(self, range: RangeInclusive<Duration>) -> Self {
         self.time(Stage::Slot, &range)
@@ -239,7 +188,7 @@ impl LinkBounds {
         self
     }
 
-    /// Whether neighbouring packets may be alike: the correlation of jitter and of whatever happens with a probability.
+    /// Whether neighbouring packets may be alike: the correlation of uniform and normal jitter, and of whatever happens with a probability.
     #[must_use]
     pub const fn correlation(mut self, may: bool) -> Self {
         self.correlation = may;

@@ -7,8 +7,8 @@ use cohaptic_wan::netem::{
     ChanceSpec, DelaySpec, Distribution, GemodelSpec, JitterSpec, LossSpec, Netem, RateSpec, ReorderSpec, SlotGap, SlotSpec, StateSpec,
 };
 
-use super::admits::{SLACK, long_run};
 use super::bounds::{LinkBounds, LossModel, Presence};
+use super::chain::fitting;
 use super::grid::{Dice, Span};
 use super::link::ImpairedLink;
 use super::numbers::{ALL, percent};
@@ -89,7 +89,10 @@ fn delay(bounds: &LinkBounds, jitters: bool, dice: &mut Dice<'_>) -> DelaySpec {
     } else {
         None
     };
-    DelaySpec { time: nanos(mean), jitter: Some(JitterSpec { time: nanos(sd), correlation: correlation(bounds, dice), distribution: law }) }
+    // For the heavy-tailed laws it takes ten milliseconds to find the chain that has a correlation: a test would spend its time with that.
+    let is_quick = matches!(law, None | Some(Distribution::Normal));
+    let correlation = correlation(bounds, dice).filter(|_| is_quick);
+    DelaySpec { time: nanos(mean), jitter: Some(JitterSpec { time: nanos(sd), correlation, distribution: law }) }
 }
 
 fn slot(bounds: &LinkBounds, dice: &mut Dice<'_>) -> SlotSpec {
@@ -143,23 +146,4 @@ fn state(share: u64, dice: &mut Dice<'_>) -> Option<LossSpec> {
     let (p32, p23) = in_burst.unzip();
     let most = ALL - p14.unwrap_or(0);
     fitting(share, most, |p13| LossSpec::State(StateSpec { p13: percent(p13), p31, p32, p23, p14: p14.map(percent) }))
-}
-
-/// The chain whose way into bursts makes it lose that share in the long run, which grows with it; `None` if none does.
-fn fitting(share: u64, most: u64, chain: impl Fn(u64) -> LossSpec) -> Option<LossSpec> {
-    let lost = |p: u64| {
-        let netem = Netem { loss: Some(chain(p)), ..Netem::default() };
-        ImpairedLink::new(netem).ok().as_ref().and_then(long_run)
-    };
-    let (mut low, mut high) = (1, most);
-    while low < high {
-        let middle = low.midpoint(high);
-        if lost(middle)? < share {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    // The grid of p is finer than what it may miss by.
-    lost(low).filter(|lost| lost.abs_diff(share) <= SLACK / 2).map(|_| chain(low))
 }

@@ -1,11 +1,12 @@
 //! Stages in plainer forms.
 
-use cohaptic_wan::netem::{ChanceSpec, GemodelSpec, JitterSpec, LossSpec, Netem, SlotGap};
+use cohaptic_wan::netem::{ChanceSpec, GemodelSpec, JitterSpec, LossSpec, Netem, SlotGap, StateSpec};
 
 use super::admits::long_run;
 use super::bounds::LinkBounds;
+use super::chain::fitting;
 use super::link::ImpairedLink;
-use super::numbers::{jitter_mut, percent, random_mut, reorder_mut};
+use super::numbers::{ALL, jitter_mut, percent, random_mut, reorder_mut, whole};
 use super::stage::{self, Stage};
 
 /// A form that can be made plainer, in the order in which they are.
@@ -21,7 +22,7 @@ pub(super) enum Form {
     /// Bursts to random loss that loses as much.
     LossInBursts,
     LossCorrelation,
-    /// The last probability of a chain that was said, if what is left means something.
+    /// The last probability of a chain to its default; the way into bursts is made such that it loses as much as before.
     LastProbability,
     /// Four states to two.
     FourStates,
@@ -76,7 +77,7 @@ impl Form {
                 }
             }
             Self::LossCorrelation => uncorrelate(random_mut(&mut netem)),
-            Self::LastProbability => netem.loss = netem.loss.map(without_last_probability),
+            Self::LastProbability => netem.loss = old.loss.map(|loss| without_last_probability(loss, long_run(link).unwrap_or(0))),
             Self::FourStates => {
                 if let Some(LossSpec::State(state)) = old.loss
                     && state.p32.is_none()
@@ -116,16 +117,16 @@ fn uncorrelate(chance: Option<&mut ChanceSpec>) {
 }
 
 /// p and r stay: without r a chain has bursts of another length.
-fn without_last_probability(loss: LossSpec) -> LossSpec {
+fn without_last_probability(loss: LossSpec, share: u64) -> LossSpec {
     match loss {
-        LossSpec::Random(chance) => LossSpec::Random(chance),
+        LossSpec::Random(_) => None,
         LossSpec::Gemodel(mut model) => {
             if model.loss_in_good.is_some() {
                 model.loss_in_good = None;
             } else {
                 model.loss_in_bad = None;
             }
-            LossSpec::Gemodel(model)
+            fitting(share, ALL, |p| LossSpec::Gemodel(GemodelSpec { p: percent(p), ..model }))
         }
         LossSpec::State(mut state) => {
             if state.p14.is_some() {
@@ -135,7 +136,9 @@ fn without_last_probability(loss: LossSpec) -> LossSpec {
             } else {
                 state.p32 = None;
             }
-            LossSpec::State(state)
+            let most = ALL - state.p14.map_or(0, whole);
+            fitting(share, most, |p13| LossSpec::State(StateSpec { p13: percent(p13), ..state }))
         }
     }
+    .unwrap_or(loss)
 }

@@ -20,9 +20,29 @@ impl Span {
 /// The least number of at most `digits` significant digits, counted in steps, that is above `value`; `None` if it cannot be counted.
 fn next_above(value: u64, digits: u32, step: u64) -> Option<u64> {
     let count = value / step;
-    let places = count.checked_ilog10().map_or(1, |log| log + 1);
-    let unit = 10_u64.pow(places.saturating_sub(digits));
+    let unit = unit(count, digits);
     (count / unit).checked_add(1)?.checked_mul(unit)?.checked_mul(step)
+}
+
+/// What the last of so many digits of a count is worth.
+fn unit(count: u64, digits: u32) -> u64 {
+    let places = count.checked_ilog10().map_or(1, |log| log + 1);
+    10_u64.pow(places.saturating_sub(digits))
+}
+
+/// The greatest number of at most `digits` significant digits, counted in steps, that is below `value`; `None` below nothing.
+fn next_below(value: u64, digits: u32, step: u64) -> Option<u64> {
+    let count = value.checked_sub(1)? / step;
+    Some(count / unit(count, digits) * unit(count, digits) * step)
+}
+
+/// The round number next to `value` on the way to `goal`; that at the latest.
+pub(super) fn next_towards(goal: u64, value: u64, digits: u32, step: u64) -> u64 {
+    if goal < value {
+        next_below(value, digits, step).map_or(goal, |next| next.max(goal))
+    } else {
+        next_above(value, digits, step).map_or(goal, |next| next.min(goal))
+    }
 }
 
 /// All numbers of at most `digits` significant digits strictly between the two, ascending: at most nine tenths of 10^`digits` a decade.
@@ -33,8 +53,7 @@ pub(super) fn round_between(low: u64, high: u64, digits: u32, step: u64) -> Vec<
 /// Whether the number has at most that many significant digits, counted in steps.
 pub(super) fn is_round(value: u64, digits: u32, step: u64) -> bool {
     let count = value / step;
-    let places = count.checked_ilog10().map_or(1, |log| log + 1);
-    value.is_multiple_of(step) && count.is_multiple_of(10_u64.pow(places.saturating_sub(digits)))
+    value.is_multiple_of(step) && count.is_multiple_of(unit(count, digits))
 }
 
 /// Random choices.
@@ -89,6 +108,19 @@ mod tests {
         assert_eq!(round_between(8_500, 21_000, 1, 1_000), [9_000, 10_000, 20_000]);
         assert_eq!(round_between(5, 5, 1, 1), []);
         assert_eq!(round_between(u64::MAX - 1, u64::MAX, 2, 1), []);
+    }
+
+    #[test]
+    fn the_next_round_number_is_the_last_before_the_goal_or_the_goal() {
+        for (goal, value) in [(7, 100), (7, 101), (95, 123_456), (100, 7), (123_456, 95), (0, 1), (5, 5)] {
+            for digits in 1..6 {
+                let mut between = round_between(goal.min(value), goal.max(value), digits, 1);
+                if goal > value {
+                    between.reverse();
+                }
+                assert_eq!(next_towards(goal, value, digits, 1), between.last().copied().unwrap_or(goal), "{goal} {value} {digits}");
+            }
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use core::fmt;
 use core::str::FromStr;
+use std::collections::{BTreeMap, BTreeSet};
 
 use cohaptic_wan::{LinkModel, NetworkConfig, NodeId};
 
@@ -30,8 +31,9 @@ const MOST: usize = 1_000;
 #[derive(Clone, PartialEq)]
 pub struct ImpairedNetwork {
     hosts: usize,
-    /// By sender, then receiver; the diagonal is ideal and never used.
-    links: Vec<ImpairedLink>,
+    /// By sender, then receiver; what is not there is ideal.
+    links: BTreeMap<(NodeId, NodeId), ImpairedLink>,
+    ideal: ImpairedLink,
 }
 
 /// Why a text is no network.
@@ -90,7 +92,7 @@ impl ImpairedNetwork {
     #[track_caller]
     pub fn ideal(hosts: usize) -> Self {
         assert!((1..=MOST).contains(&hosts), "a network of {hosts} hosts: expected 1 to {MOST}");
-        Self { hosts, links: vec![ImpairedLink::ideal(); hosts * hosts] }
+        Self { hosts, links: BTreeMap::new(), ideal: ImpairedLink::ideal() }
     }
 
     /// The network that the text says: what `Debug` prints.
@@ -113,11 +115,8 @@ impl ImpairedNetwork {
     #[must_use]
     #[track_caller]
     pub fn with_link(mut self, from: NodeId, to: NodeId, link: ImpairedLink) -> Self {
-        let place = self.place(from, to);
-        assert!(place.is_some(), "there is no link from node {} to node {} among {} hosts", from.0, to.0, self.hosts);
-        if let Some(place) = place {
-            self.links[place] = link;
-        }
+        assert!(self.is_link(from, to), "there is no link from node {} to node {} among {} hosts", from.0, to.0, self.hosts);
+        self.put(from, to, link);
         self
     }
 
@@ -148,7 +147,7 @@ impl ImpairedNetwork {
     /// The link from one host to another; `None` if there is none.
     #[must_use]
     pub fn link(&self, from: NodeId, to: NodeId) -> Option<&ImpairedLink> {
-        self.links.get(self.place(from, to)?)
+        self.is_link(from, to).then(|| self.links.get(&(from, to)).unwrap_or(&self.ideal))
     }
 
     /// The model of that link; ideal where there is none.
@@ -164,17 +163,44 @@ impl ImpairedNetwork {
 
     /// The links that are not ideal.
     pub fn impaired(&self) -> impl Iterator<Item = (NodeId, NodeId, &ImpairedLink)> {
-        self.links().filter(|(_, _, link)| !link.is_ideal())
+        self.links.iter().filter(|(_, link)| !link.is_ideal()).map(|((from, to), link)| (*from, *to, link))
+    }
+
+    /// How many impairments all links have together.
+    #[must_use]
+    pub fn stages(&self) -> usize {
+        self.links.values().map(|link| link.stages().len()).sum()
+    }
+
+    /// The network without a host: those after it move up. None is left out of one host.
+    #[cfg(feature = "scenes")]
+    pub(super) fn without_host(&self, gone: usize) -> Self {
+        let moved = |node: NodeId| {
+            let place = usize::try_from(node.0).unwrap_or(usize::MAX);
+            (place != gone).then_some(NodeId(node.0 - u32::from(place > gone)))
+        };
+        let mut less = Self::ideal((self.hosts - 1).max(1));
+        let links = self.links.iter().filter_map(|((from, to), link)| Some((moved(*from)?, moved(*to)?, link.clone())));
+        links.for_each(|(from, to, link)| less.put(from, to, link));
+        less
     }
 
     fn nodes(&self) -> impl Iterator<Item = NodeId> + use<> {
         (0..u32::try_from(self.hosts).unwrap_or(u32::MAX)).map(NodeId)
     }
 
-    fn place(&self, from: NodeId, to: NodeId) -> Option<usize> {
-        let [from, to] = [from, to].map(|node| usize::try_from(node.0).ok().filter(|node| *node < self.hosts));
-        let (from, to) = (from?, to?);
-        (from != to).then_some(from * self.hosts + to)
+    fn is_link(&self, from: NodeId, to: NodeId) -> bool {
+        let is_host = |node: NodeId| usize::try_from(node.0).is_ok_and(|node| node < self.hosts);
+        is_host(from) && is_host(to) && from != to
+    }
+
+    /// Keeps a link that is there.
+    fn put(&mut self, from: NodeId, to: NodeId, link: ImpairedLink) {
+        if link == self.ideal {
+            self.links.remove(&(from, to));
+        } else {
+            self.links.insert((from, to), link);
+        }
     }
 
     /// The host of that name.
@@ -187,8 +213,8 @@ impl fmt::Display for ImpairedNetwork {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} hosts", self.hosts)?;
         // A link may say what impairs nothing, such as a seed.
-        for (from, to, link) in self.links().filter(|(_, _, link)| **link != ImpairedLink::ideal()) {
-            write!(f, "\n{} -> {}: {link}", Self::name(from), Self::name(to))?;
+        for ((from, to), link) in &self.links {
+            write!(f, "\n{} -> {}: {link}", Self::name(*from), Self::name(*to))?;
         }
         Ok(())
     }
@@ -211,24 +237,23 @@ impl FromStr for ImpairedNetwork {
         let mut lines = text.split(['\n', ';']).map(str::trim).filter(|line| !line.is_empty());
         let first = lines.next().unwrap_or_default();
         let count = first.strip_suffix("hosts").or_else(|| first.strip_suffix("host")).and_then(|count| count.trim().parse().ok());
-        let hosts: usize =
-            count.filter(|count| (1..=MOST).contains(count)).ok_or_else(|| NetworkTextError::Hosts { found: first.to_owned() })?;
+        let hosts: usize = count.filter(|count| (1..=MOST).contains(count)).ok_or_else(|| NetworkTextError::Hosts { found: first.to_owned() })?;
         let mut network = Self::ideal(hosts);
-        let mut said = Vec::new();
+        let mut said = BTreeSet::new();
         for line in lines {
             let halves = line.split_once("->").and_then(|(from, rest)| rest.split_once(':').map(|(to, words)| (from.trim(), to.trim(), words)));
             let Some((from, to, words)) = halves else { return Err(NetworkTextError::Line { found: line.to_owned() }) };
-            let place = network.named(from).zip(network.named(to)).and_then(|(from, to)| network.place(from, to));
-            let Some(place) = place else {
+            let pair = network.named(from).zip(network.named(to)).filter(|(from, to)| from != to);
+            let Some((sender, receiver)) = pair else {
                 let last = network.nodes().last().map(Self::name).unwrap_or_default();
                 return Err(NetworkTextError::NoLink { found: line.to_owned(), first: Self::name(NodeId(0)), last });
             };
             let (from, to) = (from.to_owned(), to.to_owned());
-            if said.contains(&place) {
+            if !said.insert((sender, receiver)) {
                 return Err(NetworkTextError::Repeated { from, to });
             }
-            said.push(place);
-            network.links[place] = words.trim().parse().map_err(|reason| NetworkTextError::Link { from, to, reason })?;
+            let link = words.trim().parse().map_err(|reason| NetworkTextError::Link { from, to, reason })?;
+            network.put(sender, receiver, link);
         }
         Ok(network)
     }

@@ -67,7 +67,7 @@ impl Knob {
     }
 }
 
-/// A correlation is least at nothing, a gap where seldom one is reordered.
+/// All of them, in the order in which they shrink. A correlation that stays goes to one percent, a gap to two packets.
 pub(super) const KNOBS: [Knob; 27] = [
     // Jitter goes first, since no delay may be below it.
     Knob { goal: Goal::Low(Stage::Jitter), read: |n| Some(nanos(jitter(n)?.time)), write: |n, v| put(jitter_mut(n).map(|j| &mut j.time), time(v)) },
@@ -101,11 +101,7 @@ pub(super) const KNOBS: [Knob; 27] = [
     Knob { goal: Goal::At(ONE), read: |n| likeness(n.duplicate), write: |n, v| put_likeness(n.duplicate.as_mut(), v) },
     Knob { goal: Goal::Low(Stage::Reorder), read: |n| share(reorder(n)), write: |n, v| put_share(reorder_mut(n), v) },
     Knob { goal: Goal::At(ONE), read: |n| likeness(reorder(n)), write: |n, v| put_likeness(reorder_mut(n), v) },
-    Knob {
-        goal: Goal::At(2),
-        read: |n| Some(n.reorder?.gap?.get().into()),
-        write: |n, v| put(n.reorder.as_mut().map(|r| &mut r.gap), count(v)),
-    },
+    Knob { goal: Goal::At(2), read: |n| Some(n.reorder?.gap?.get().into()), write: |n, v| put(n.reorder.as_mut().map(|r| &mut r.gap), count(v)) },
     Knob {
         goal: Goal::High(Stage::Rate),
         read: |n| Some(n.rate?.bytes_per_sec.get().saturating_mul(8)),

@@ -1,7 +1,7 @@
 //! Numbers towards the least impairing value, by bisection among round ones.
 
 use super::Space;
-use crate::strategies::grid::{is_round, round_between};
+use crate::strategies::grid::{is_round, next_towards, round_between};
 
 /// A number that can be changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -101,8 +101,7 @@ impl Bisection {
                 while !is_round(self.fails, self.digits, self.step) && self.digits < 20 {
                     self.digits += 1;
                 }
-                self.fill();
-                self.between.last().copied().unwrap_or(self.passes)
+                next_towards(self.passes, self.fails, self.digits, self.step)
             }
             Next::Middle => loop {
                 if !self.between.is_empty() {

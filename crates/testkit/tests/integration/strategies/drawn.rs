@@ -24,7 +24,16 @@ fn every_stage_is_drawn_in_every_form() {
     // The ideal link and a single impairment are drawn too: (2/3)⁹ = 2.6 %, of one stage 9 · (2/3)⁸ / 3 = 11.7 % at least.
     assert!((0.014..0.039).contains(&share(&links, ImpairedLink::is_ideal)));
     assert!(share(&links, |link| link.stages().len() == 1) > 0.09);
-    for words in ["distribution normal", "distribution pareto ", "distribution paretonormal", "loss gemodel", "loss state", "gap ", "slot distribution", "packets"] {
+    for words in [
+        "distribution normal",
+        "distribution pareto ",
+        "distribution paretonormal",
+        "loss gemodel",
+        "loss state",
+        "gap ",
+        "slot distribution",
+        "packets",
+    ] {
         assert!(share(&links, |link| format!("{link} ").contains(words)) > 0.005, "{words}");
     }
 }

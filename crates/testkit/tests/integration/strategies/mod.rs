@@ -2,6 +2,8 @@
 
 mod bounds;
 mod drawn;
+#[cfg(feature = "scenes")]
+mod scenes;
 mod shrink_link;
 mod shrink_network;
 mod text;

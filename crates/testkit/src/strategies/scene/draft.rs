@@ -1,9 +1,9 @@
 //! A scene as a test thinks of it, and the TOML text of it.
 
-use std::fmt::{self, Write};
+use core::fmt;
 
-use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Enclosure, Gains};
-use cohaptic_scene::Scene;
+use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
+use cohaptic_scene::{Scene, SceneError};
 
 /// A component for each of up to three axes; those beyond the scene's are not written.
 pub type Place = [f64; 3];
@@ -68,7 +68,7 @@ pub struct DraftPeer {
     pub hand: DraftHand,
     /// By how much its clock is late \[ns\].
     pub offset: u64,
-    /// How fast its clock runs [parts per billion].
+    /// How fast its clock runs \[parts per billion\].
     pub drift: i32,
     /// Where it begins, if not with the object \[m\].
     pub position: Option<Place>,
@@ -148,10 +148,24 @@ impl Draft {
     }
 
     /// Reads the draft as a scene file is read.
+    ///
+    /// # Panics
+    ///
+    /// If it is refused; [`Draft::read`] gives the error instead.
     #[must_use]
+    #[track_caller]
+    #[expect(clippy::panic, reason = "documented: a draft stands in a test")]
     pub fn scene(&self) -> Scene {
-        let text = self.to_toml();
-        Scene::parse(&text, "draft.toml".as_ref(), &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
+        self.read().unwrap_or_else(|error| panic!("{error}\n{}", self.to_toml()))
+    }
+
+    /// Reads the draft as a scene file is read.
+    ///
+    /// # Errors
+    ///
+    /// What the reader says of a scene that makes no sense.
+    pub fn read(&self) -> Result<Scene, SceneError> {
+        Scene::parse(&self.to_toml(), "draft.toml".as_ref(), &[])
     }
 
     /// The scene file.
@@ -159,7 +173,10 @@ impl Draft {
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
         let Self { duration, seed, axes, mass, damping, split_mass, gains, update, .. } = self;
-        let mut line = |content: String| writeln!(text, "{content}").unwrap();
+        let mut line = |content: String| {
+            text.push_str(&content);
+            text.push('\n');
+        };
         line(format!("scene = {{ duration = \"{duration}ms\", seed = {seed}, axes = {axes} }}"));
         let (position, velocity) = (self.vector(&self.position), self.vector(&self.velocity));
         let walls = self.enclosure.map_or_else(String::new, |walls| {
@@ -190,7 +207,7 @@ impl Draft {
 
     fn peer(&self, peer: &DraftPeer) -> String {
         let DraftPeer { name, tick, phase, device, coupling, offset, .. } = peer;
-        let contact = crate::drafts::contact_to_toml(peer.contact);
+        let contact = contact_to_toml(peer.contact);
         let hand = match peer.hand {
             DraftHand::None => "\"none\"".to_owned(),
             DraftHand::Force(force) => format!("{{ force = {} }}", self.vector(&force)),
@@ -215,12 +232,12 @@ impl Draft {
         );
         for (key, value) in [("position", &peer.position), ("velocity", &peer.velocity)] {
             if let Some(value) = value {
-                writeln!(text, "{key} = {}", self.vector(value)).unwrap();
+                text.push_str(&format!("{key} = {}\n", self.vector(value)));
             }
         }
         for (key, value) in [("uplink", &peer.uplink), ("downlink", &peer.downlink)] {
             if let Some(value) = value {
-                writeln!(text, "{key} = {{ {value} }}").unwrap();
+                text.push_str(&format!("{key} = {{ {value} }}\n"));
             }
         }
         text
@@ -265,5 +282,15 @@ impl DraftPeer {
             uplink: None,
             downlink: None,
         }
+    }
+}
+
+/// A contact as it stands in a scene file.
+#[must_use]
+pub fn contact_to_toml(contact: Contact) -> String {
+    match contact {
+        Contact::Grasp => "\"grasp\"".to_owned(),
+        Contact::None => "\"none\"".to_owned(),
+        Contact::Push(Direction { axis, positive }) => format!("{{ push = \"{}{}\" }}", if positive { '+' } else { '-' }, ["x", "y", "z"][axis]),
     }
 }
