@@ -7,6 +7,7 @@ use std::time::Duration;
 use cohaptic_testkit::{Instant, Testbed, UdpSocket, time};
 
 use super::program::{DELAY, Datagrams, Errors, PORT, Role, Runtime, host};
+use super::seldom as now_and_then;
 
 /// Which runtime, and whose timers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -97,6 +98,32 @@ pub fn run(kind: Kind, hosts: u32, count: u32) -> Errors {
         }
         errors
     })
+}
+
+/// Runs the program that waits.
+///
+/// # Panics
+///
+/// If a socket gives an error.
+pub fn seldom(kind: Kind, wait: Duration, count: u32) {
+    let bed = Testbed::new(["client", "server"]).links(format!("delay {}ns", DELAY.as_nanos()));
+    let bed = if kind == Kind::Own { bed } else { bed.on_tokio() };
+    bed.run(move |bed| async move {
+        let (client, server) = (bed.host("client"), bed.host("server"));
+        let addresses: [SocketAddr; 2] = [(client.ip(), PORT).into(), (server.ip(), PORT).into()];
+        let done = match kind {
+            Kind::Own | Kind::Tokio => {
+                server.spawn(now_and_then::server(Exact, addresses[0]));
+                client.spawn(now_and_then::client(Exact, addresses[1], wait, count))
+            }
+            Kind::TokioTimers => {
+                let clock = OfTokio(tokio::time::Instant::now());
+                server.spawn(now_and_then::server(clock, addresses[0]));
+                client.spawn(now_and_then::client(clock, addresses[1], wait, count))
+            }
+        };
+        done.await.expect("no host crashes").expect("sockets work");
+    });
 }
 
 /// Sends so many datagrams of 64 bytes from one socket to another, one every 10 µs, over a link of 24 ms; gives how many arrived.

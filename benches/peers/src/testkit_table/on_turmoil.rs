@@ -9,6 +9,7 @@ use std::time::Duration;
 use turmoil::net::UdpSocket;
 
 use super::program::{DELAY, Datagrams, Errors, PERIOD, PORT, Role, Runtime, host};
+use super::seldom as now_and_then;
 
 impl Datagrams for UdpSocket {
     async fn send_to(&self, bytes: &[u8], to: SocketAddr) -> io::Result<usize> {
@@ -47,15 +48,8 @@ impl Runtime for OfHost {
 /// If turmoil gives an error.
 #[must_use]
 pub fn run(tick: Duration, hosts: u32, count: u32) -> (Errors, Duration) {
-    let mut sim = turmoil::Builder::new()
-        .tick_duration(tick)
-        .min_message_latency(DELAY)
-        .max_message_latency(DELAY)
-        .udp_capacity(1024)
-        .rng_seed(1)
-        // More than it can take.
-        .simulation_duration(PERIOD * count * 2 + Duration::from_secs(1))
-        .build();
+    // Twice as long as it should take.
+    let mut sim = simulation(tick, PERIOD * count * 2 + Duration::from_secs(1));
     let addresses: Vec<SocketAddr> = (0..hosts).map(|host| (sim.lookup(format!("host-{host}")), PORT).into()).collect();
     let errors = Rc::new(Cell::new(Errors::default()));
     for (me, address) in (0..hosts).zip(&addresses) {
@@ -69,4 +63,29 @@ pub fn run(tick: Duration, hosts: u32, count: u32) -> (Errors, Duration) {
     }
     sim.run().expect("the program ends");
     (errors.get(), sim.elapsed())
+}
+
+/// Runs the program that waits.
+///
+/// # Panics
+///
+/// If turmoil gives an error.
+pub fn seldom(tick: Duration, wait: Duration, count: u32) {
+    let mut sim = simulation(tick, (DELAY * 2 + wait) * count * 2 + Duration::from_secs(1));
+    let [client, server]: [SocketAddr; 2] = ["client", "server"].map(|name| (sim.lookup(name), PORT).into());
+    sim.host("server", move || async move { Ok(now_and_then::server(OfHost(tokio::time::Instant::now()), client).await?) });
+    sim.client("client", async move { Ok(now_and_then::client(OfHost(tokio::time::Instant::now()), server, wait, count).await?) });
+    sim.run().expect("the program ends");
+}
+
+/// Links of the same delay always, and buffers that do not fill.
+fn simulation<'a>(tick: Duration, longest: Duration) -> turmoil::Sim<'a> {
+    turmoil::Builder::new()
+        .tick_duration(tick)
+        .min_message_latency(DELAY)
+        .max_message_latency(DELAY)
+        .udp_capacity(1024)
+        .rng_seed(1)
+        .simulation_duration(longest)
+        .build()
 }

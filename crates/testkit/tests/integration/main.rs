@@ -8,6 +8,8 @@
     reason = "tests"
 )]
 
+#[cfg(feature = "strategies")]
+mod chapter;
 mod equivalence;
 mod nodes;
 mod sockets;
