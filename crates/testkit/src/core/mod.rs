@@ -52,7 +52,7 @@ pub(crate) struct Core {
     /// By sender, then receiver: how many packets were offered.
     offered: Vec<u64>,
     /// Who is to be woken when nobody holds this any more.
-    woken: Vec<Waker>,
+    pub(crate) woken: Vec<Waker>,
     /// How often the time was asked since it last passed.
     asked: u64,
 }
