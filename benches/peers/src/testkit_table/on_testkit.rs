@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use cohaptic_testkit::{Instant, Testbed, UdpSocket, time};
 
-use super::program::{DELAY, Datagrams, Errors, PORT, Role, Runtime, host};
+use super::program::{DELAY, Datagrams, Errors, PORT, Role, Runtime, Stream, host};
 use super::seldom as now_and_then;
 
 /// Which runtime, and whose timers.
@@ -70,13 +70,13 @@ impl Runtime for OfTokio {
     }
 }
 
-/// Runs it on so many hosts, each sending so many datagrams to each other one.
+/// Runs it on so many hosts, each sending that to each other one.
 ///
 /// # Panics
 ///
 /// If a socket gives an error.
 #[must_use]
-pub fn run(kind: Kind, hosts: u32, count: u32) -> Errors {
+pub fn run(kind: Kind, hosts: u32, stream: Stream) -> Errors {
     let bed = Testbed::new((0..hosts).map(|host| format!("host-{host}"))).links(format!("delay {}ns", DELAY.as_nanos()));
     let bed = if kind == Kind::Own { bed } else { bed.on_tokio() };
     bed.run(move |bed| async move {
@@ -85,7 +85,7 @@ pub fn run(kind: Kind, hosts: u32, count: u32) -> Errors {
             .zip(&places)
             .map(|(me, place)| {
                 let others = places.iter().filter(|other| other.ip() != place.ip()).map(|other| (other.ip(), PORT).into()).collect();
-                let role = Role { me, others, count };
+                let role = Role { me, others, stream };
                 match kind {
                     Kind::Own | Kind::Tokio => place.spawn(host(Exact, role)),
                     Kind::TokioTimers => place.spawn(host(OfTokio(tokio::time::Instant::now()), role)),

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use turmoil::net::UdpSocket;
 
-use super::program::{DELAY, Datagrams, Errors, PERIOD, PORT, Role, Runtime, host};
+use super::program::{DELAY, Datagrams, Errors, PORT, Role, Runtime, Stream, host};
 use super::seldom as now_and_then;
 
 impl Datagrams for UdpSocket {
@@ -41,20 +41,20 @@ impl Runtime for OfHost {
     }
 }
 
-/// Runs it on so many hosts, each sending so many datagrams to each other one, stepped by such ticks. Gives the errors, and how long turmoil says it was.
+/// Runs it on so many hosts, each sending that to each other one, stepped by such ticks. Gives the errors, and how long turmoil says it was.
 ///
 /// # Panics
 ///
 /// If turmoil gives an error.
 #[must_use]
-pub fn run(tick: Duration, hosts: u32, count: u32) -> (Errors, Duration) {
+pub fn run(tick: Duration, hosts: u32, stream: Stream) -> (Errors, Duration) {
     // Twice as long as it should take.
-    let mut sim = simulation(tick, PERIOD * count * 2 + Duration::from_secs(1));
+    let mut sim = simulation(tick, stream.length() * 2 + Duration::from_secs(1));
     let addresses: Vec<SocketAddr> = (0..hosts).map(|host| (sim.lookup(format!("host-{host}")), PORT).into()).collect();
     let errors = Rc::new(Cell::new(Errors::default()));
     for (me, address) in (0..hosts).zip(&addresses) {
         let others = addresses.iter().filter(|other| *other != address).copied().collect();
-        let (role, errors) = (Role { me, others, count }, Rc::clone(&errors));
+        let (role, errors) = (Role { me, others, stream }, Rc::clone(&errors));
         sim.client(format!("host-{me}"), async move {
             let seen = host(OfHost(tokio::time::Instant::now()), role).await?;
             errors.set(errors.get().and(seen));

@@ -6,8 +6,6 @@ use std::time::Duration;
 
 use futures_util::future;
 
-/// How far apart the datagrams of a host are: 1 kHz.
-pub const PERIOD: Duration = Duration::from_millis(1);
 /// How long each is on its way.
 pub const DELAY: Duration = Duration::from_millis(24);
 /// So much later than the one before it does a host begin: the clocks of real ones are not aligned either.
@@ -38,6 +36,28 @@ pub trait Datagrams {
     fn receive(&self, buffer: &mut [u8]) -> impl Future<Output = io::Result<usize>>;
 }
 
+/// What a host sends to another one.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Stream {
+    /// How far apart its datagrams are.
+    pub period: Duration,
+    /// How many there are.
+    pub count: u32,
+}
+
+impl Stream {
+    /// How long it takes.
+    #[must_use]
+    pub fn length(self) -> Duration {
+        self.period * self.count
+    }
+
+    /// When a host sends its datagram of that number.
+    fn when(self, host: u32, number: u32) -> Duration {
+        OFFSET * host + self.period * number
+    }
+}
+
 /// One host among others.
 #[derive(Clone, Debug)]
 pub struct Role {
@@ -45,8 +65,8 @@ pub struct Role {
     pub me: u32,
     /// The others.
     pub others: Vec<SocketAddr>,
-    /// How many datagrams each sends to each other one.
-    pub count: u32,
+    /// What each sends to each other one.
+    pub stream: Stream,
 }
 
 /// How far the arrivals were from when they should have been.
@@ -68,12 +88,7 @@ impl Errors {
     }
 }
 
-/// When a host sends its datagram of that number.
-fn when(host: u32, number: u32) -> Duration {
-    OFFSET * host + PERIOD * number
-}
-
-/// Sends to all others at 1 kHz, and says how exact it was when their datagrams arrived.
+/// Sends to all others, and says how exact it was when their datagrams arrived.
 ///
 /// # Errors
 ///
@@ -83,8 +98,8 @@ pub async fn host<R: Runtime>(runtime: R, role: Role) -> io::Result<Errors> {
     let sends = async {
         let mut datagram = [0; SIZE];
         datagram[..4].copy_from_slice(&role.me.to_be_bytes());
-        for number in 0..role.count {
-            runtime.sleep_until(when(role.me, number)).await;
+        for number in 0..role.stream.count {
+            runtime.sleep_until(role.stream.when(role.me, number)).await;
             datagram[4..8].copy_from_slice(&number.to_be_bytes());
             for other in &role.others {
                 socket.send_to(&datagram, *other).await?;
@@ -95,9 +110,9 @@ pub async fn host<R: Runtime>(runtime: R, role: Role) -> io::Result<Errors> {
     let receives = async {
         let (mut buffer, mut errors) = ([0; SIZE], Errors::default());
         let word = |bytes: &[u8]| bytes.try_into().map(u32::from_be_bytes).map_err(|_| io::ErrorKind::InvalidData);
-        while errors.packets < role.others.len() as u64 * u64::from(role.count) {
+        while errors.packets < role.others.len() as u64 * u64::from(role.stream.count) {
             let len = socket.receive(&mut buffer).await?;
-            let error = runtime.now().abs_diff(when(word(&buffer[..4])?, word(&buffer[4..8])?) + DELAY);
+            let error = runtime.now().abs_diff(role.stream.when(word(&buffer[..4])?, word(&buffer[4..8])?) + DELAY);
             assert_eq!(len, SIZE);
             errors = errors.and(Errors { packets: 1, worst: error, sum: error });
         }
