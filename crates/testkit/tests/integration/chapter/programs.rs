@@ -168,8 +168,17 @@ fn what_happened_is_kept() {
     assert!(kept.join("packets-client-to-server.pcapng").exists());
 }
 
+/// What the program that differs panics with, in a test of that name.
+fn difference(test: &str) -> String {
+    std::thread::Builder::new().name(test.into()).spawn(|| message_of(differs)).unwrap().join().unwrap()
+}
+
 #[test]
 fn a_program_that_differs_is_told_so() {
-    let message = std::thread::spawn(|| message_of(differs)).join().unwrap();
-    super::assert_shown(&message.replace("<unnamed>", "main"));
+    super::assert_shown(&difference("main"));
+}
+
+#[test]
+fn the_seed_is_told_with_the_name_of_the_test() {
+    super::assert_shown(difference("lossy").lines().last().unwrap());
 }
