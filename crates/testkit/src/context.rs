@@ -66,6 +66,19 @@ pub(crate) fn expect_running(what: &str) -> Running {
     running().unwrap_or_else(|| panic!("{}", outside_text(what)))
 }
 
+/// Asks the state of the test bed that runs on this thread.
+///
+/// # Panics
+///
+/// If there is none.
+#[expect(clippy::panic, reason = "a misuse, and the way out")]
+pub(crate) fn ask<T>(what: &str, question: impl FnOnce(&Arc<Shared>) -> T) -> T {
+    RUNNING.with_borrow(|running| match running {
+        Some(running) => question(&running.shared),
+        None => panic!("{}", outside_text(what)),
+    })
+}
+
 /// The host on which the task that is being polled lives.
 pub(crate) fn host() -> Option<usize> {
     HOST.get()

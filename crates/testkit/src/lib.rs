@@ -37,6 +37,8 @@ pub use cohaptic_wan as wan;
 pub use file::{LinkFile, LinkFileError};
 pub use host::Host;
 pub use link::ToLink;
+#[cfg(feature = "strategies")]
+pub use proptest;
 pub use record::Record;
 #[cfg(feature = "scenes")]
 pub use scenes::{check_scene, check_scenes};
@@ -45,6 +47,3 @@ pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
 pub use words::WordsError;
-
-#[cfg(feature = "strategies")]
-pub use proptest;

@@ -22,13 +22,12 @@ use crate::core::{Shared, TimerId};
 #[must_use]
 #[expect(clippy::panic, reason = "time cannot pass while it is asked for; says why, and the way out")]
 pub fn now() -> Instant {
-    let running = context::expect_running("time is known");
-    let mut core = running.shared.lock();
-    core.ask_time().unwrap_or_else(|| {
-        panic!(
-            "time stands still at {} s: it was asked for again and again by a task that never waits; `sleep(..).await` lets it pass",
-            Seconds(core.now)
-        )
+    let (asked, now) = context::ask("time is known", |shared| {
+        let mut core = shared.lock();
+        (core.ask_time(), core.now)
+    });
+    asked.unwrap_or_else(|| {
+        panic!("time stands still at {} s: it was asked for again and again by a task that never waits; `sleep(..).await` lets it pass", Seconds(now))
     })
 }
 
@@ -39,7 +38,7 @@ pub fn now() -> Instant {
 /// Outside a running test bed.
 #[must_use = "futures do nothing unless they are awaited"]
 pub fn sleep(span: Duration) -> Sleep {
-    let shared = context::expect_running("time passes").shared;
+    let shared = context::ask("time passes", Arc::clone);
     let deadline = shared.lock().now.saturating_add(span);
     Sleep { shared, deadline, timer: None }
 }
@@ -51,7 +50,7 @@ pub fn sleep(span: Duration) -> Sleep {
 /// Outside a running test bed.
 #[must_use = "futures do nothing unless they are awaited"]
 pub fn sleep_until(deadline: Instant) -> Sleep {
-    Sleep { shared: context::expect_running("time passes").shared, deadline, timer: None }
+    Sleep { shared: context::ask("time passes", Arc::clone), deadline, timer: None }
 }
 
 /// A wait: see [`sleep`].
@@ -155,7 +154,7 @@ pub async fn timeout<F: Future>(span: Duration, future: F) -> Result<F::Output, 
 #[must_use]
 pub fn interval(period: Duration) -> Interval {
     assert!(!period.is_zero(), "an interval of no time would never let time pass; expected one longer than zero");
-    let shared = context::expect_running("time passes").shared;
+    let shared = context::ask("time passes", Arc::clone);
     let next = shared.lock().now;
     Interval { shared, next, period }
 }

@@ -1,5 +1,7 @@
 //! The test bed: what it is made of, and its run.
 
+#[cfg(feature = "strategies")]
+mod network;
 mod running;
 
 use std::cell::RefCell;

@@ -62,7 +62,7 @@ pub(crate) struct Core {
     /// By sender, then receiver: how many packets were offered.
     offered: Vec<u64>,
     /// Who is to be woken when nobody holds this any more.
-    woken: Vec<Waker>,
+    pub(crate) woken: Vec<Waker>,
     /// How often the time was asked since it last passed.
     asked: u64,
     /// How often tasks were polled since it last passed, as far as they are counted here.

@@ -65,9 +65,12 @@ impl Core {
             for other in (0..self.hosts.len()).filter(|other| *other != host) {
                 self.offer(host, other, parcel.clone());
             }
-        } else if to.ip().is_loopback() || self.plan.owner_place(to.ip()) == Some(host) {
+            return Ok(());
+        }
+        let receiver = if to.ip().is_loopback() { Some(host) } else { self.plan.owner_place(to.ip()) };
+        if receiver == Some(host) {
             self.hand_over(host, host, parcel, false);
-        } else if let Some(receiver) = self.plan.owner_place(to.ip()) {
+        } else if let Some(receiver) = receiver {
             self.offer(host, receiver, parcel);
         } else if !self.plan.was_given(to.ip()) {
             let text = format!("no host has the address {}; the hosts are\n{}", to.ip(), self.plan);

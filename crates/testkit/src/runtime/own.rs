@@ -29,9 +29,12 @@ struct Place {
 
 impl Wake for Place {
     fn wake(self: Arc<Self>) {
+        Self::wake_by_ref(&self);
+    }
+
+    fn wake_by_ref(self: &Arc<Self>) {
         if !self.is_queued.swap(true, Ordering::Relaxed) {
-            let ready = Arc::clone(&self.ready);
-            ready.0.lock().unwrap_or_else(PoisonError::into_inner).push_back(self);
+            self.ready.0.lock().unwrap_or_else(PoisonError::into_inner).push_back(Arc::clone(self));
         }
     }
 }
@@ -74,7 +77,7 @@ impl Executor {
     /// If nothing will ever happen any more, or if time cannot pass because tasks are polled again and again.
     pub(crate) fn run(&self, shared: &Shared, tasks: &Tasks, is_over: impl Fn() -> bool) {
         let patience = shared.lock().settings.patience;
-        let mut polls = 0;
+        let (mut polls, mut woken) = (0, Vec::new());
         while !is_over() {
             if self.poll_one() {
                 polls += 1;
@@ -92,6 +95,10 @@ impl Executor {
                 polls = 0;
             }
             core.pass(next);
+            // As the guard does it, without a new list each time.
+            std::mem::swap(&mut core.woken, &mut woken);
+            drop(core);
+            woken.drain(..).for_each(Waker::wake);
         }
     }
 
@@ -101,14 +108,13 @@ impl Executor {
         place.is_queued.store(false, Ordering::Relaxed);
         let number = place.number;
         self.last.set(number);
-        // The task may start others while it is polled.
-        let slot = self.slots.borrow()[number].clone();
-        let Some(Slot { task, waker }) = slot else { return true };
+        // The task may start others while it is polled, which get other places.
+        let Some(slot) = self.slots.borrow_mut()[number].take() else { return true };
         // A place that was given to another task wakes that one in vain, once.
-        if task.poll(&mut Context::from_waker(&waker)).is_ready() {
-            let over = self.slots.borrow_mut()[number].take();
+        if slot.task.poll(&mut Context::from_waker(&slot.waker)).is_ready() {
             self.free.borrow_mut().push(number);
-            drop(over);
+        } else {
+            self.slots.borrow_mut()[number] = Some(slot);
         }
         true
     }

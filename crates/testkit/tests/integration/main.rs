@@ -2,6 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, clippy::missing_panics_doc, clippy::cast_possible_truncation, reason = "tests")]
 
 mod artefacts;
+#[cfg(feature = "strategies")]
+mod chapter;
 mod equivalence;
 mod faults;
 mod like_tokio;

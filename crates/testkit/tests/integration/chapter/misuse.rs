@@ -1,0 +1,68 @@
+//! What docs/testing.md says of misuse is what comes.
+
+use std::time::Duration;
+
+use cohaptic_testkit::{Testbed, time};
+
+use super::{assert_shown, message_of};
+
+fn pair() -> Testbed {
+    Testbed::new(["client", "server"])
+}
+
+/// Fails unless the chapter shows how a message begins, up to where it names a place in a file.
+fn assert_begin_shown(message: &str, rest: &str) {
+    let (begin, _) = message.split_once(rest).unwrap_or_else(|| panic!("{message}"));
+    assert_shown(begin);
+}
+
+#[test]
+fn a_socket_after_the_crash_of_its_host() {
+    pair().run(|bed| async move {
+        let socket = bed.host("server").bind("0.0.0.0:7").unwrap();
+        time::sleep(Duration::from_secs(1)).await;
+        bed.host("server").crash();
+        assert_shown(&socket.recv(&mut [0]).await.unwrap_err().to_string());
+    });
+}
+
+#[test]
+fn test_beds_and_runtimes_inside_others() {
+    assert_shown(&message_of(|| pair().run(|_| async { pair().run(|_| async {}) })));
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    assert_shown(&message_of(|| runtime.block_on(async { pair().on_tokio().run(|_| async {}) })));
+}
+
+#[test]
+fn tasks_that_never_wait() {
+    let message = message_of(|| {
+        pair().run(|_| async {
+            loop {
+                time::yield_now().await;
+            }
+        })
+    });
+    assert_begin_shown(&message, ", the task");
+}
+
+#[test]
+fn waits_that_never_end() {
+    let message = message_of(|| {
+        pair().links("delay 24ms").run(|bed| async move {
+            let (client, server) = (bed.host("client").bind("0.0.0.0:0").unwrap(), bed.host("server").bind("0.0.0.0:7").unwrap());
+            client.send_to(b"hello", "server:7").await.unwrap();
+            server.recv(&mut [0; 10]).await.unwrap();
+            server.recv(&mut [0; 10]).await.unwrap();
+        })
+    });
+    assert_begin_shown(&message, ":\n");
+}
+
+#[test]
+fn names_that_nobody_has_and_what_works_inside_a_run_only() {
+    assert_shown(&message_of(|| pair().run(|bed| async move { drop(bed.host("sever")) })));
+    let outside = || {
+        let _ = time::now();
+    };
+    assert_shown(&message_of(outside));
+}

@@ -1,0 +1,184 @@
+//! The blocks of docs/testing.md that use sockets, as they stand there.
+
+use std::cell::Cell;
+use std::net::IpAddr;
+use std::rc::Rc;
+use std::time::Duration;
+
+use cohaptic_testkit::proptest::prelude::*;
+use cohaptic_testkit::strategies::{ImpairedNetwork, LinkBounds, Stage, links_like};
+use cohaptic_testkit::{Instant, Testbed, UdpSocket, time};
+
+use super::message_of;
+
+#[test]
+fn answers_that_are_late() {
+    let network = ImpairedNetwork::words(
+        "2 hosts
+         b -> a: delay 210ms",
+    );
+    let took = Testbed::new(["client", "server"]).network(&network).run(|bed| async move {
+        bed.host("server").spawn(echo());
+        // The server begins, and binds its socket.
+        time::yield_now().await;
+        let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+        client.send_to(b"hello", "server:7").await.unwrap();
+        client.recv(&mut [0; 100]).await.unwrap();
+        time::now()
+    });
+    assert_eq!(took, Instant::from_nanos(210_000_000));
+}
+
+async fn echo() {
+    let socket = UdpSocket::bind("0.0.0.0:7").await.unwrap();
+    let mut buffer = [0; 1500];
+    while let Ok((len, from)) = socket.recv_from(&mut buffer).await {
+        socket.send_to(&buffer[..len], from).await.unwrap();
+    }
+}
+
+#[test]
+fn each_way_has_a_link_of_its_own() {
+    let bed = Testbed::new(["phone", "server"]).links("delay 5ms").link("phone", "server", "delay 24ms 2ms loss 1% rate 5mbit");
+    bed.run(|bed| async move {
+        bed.host("server").spawn(echo());
+        let phone = bed.host("phone").bind("0.0.0.0:0").unwrap();
+        let mut answers = 0;
+        for _ in 0..1000 {
+            phone.send_to(&[0; 100], "server:7").await.unwrap();
+            answers += u64::from(time::timeout(Duration::from_millis(100), phone.recv(&mut [0; 100])).await.is_ok());
+        }
+        assert_eq!(answers, bed.link_stats("phone", "server").delivered());
+    });
+}
+
+#[test]
+fn time_is_exact_to_the_nanosecond() {
+    Testbed::new(["client", "server"]).links("delay 1234567ns").run(|bed| async move {
+        bed.host("server").spawn(echo());
+        let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+        time::sleep(Duration::from_nanos(1)).await;
+        client.send_to(b"now", "server:7").await.unwrap();
+        client.recv(&mut [0; 3]).await.unwrap();
+        assert_eq!(time::now().as_nanos(), 1 + 2 * 1_234_567);
+    });
+}
+
+#[test]
+fn tokio_rounds_its_own_timers_up() {
+    Testbed::new(["client", "server"]).links("delay 1300us").on_tokio().run(|bed| async move {
+        bed.host("server").spawn(echo());
+        let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+        let begin = tokio::time::Instant::now();
+        client.send_to(b"now", "server:7").await.unwrap();
+        client.recv(&mut [0; 3]).await.unwrap();
+        assert_eq!(begin.elapsed(), Duration::from_micros(2600));
+        tokio::time::sleep(Duration::from_micros(100)).await;
+        assert_eq!(begin.elapsed(), Duration::from_millis(3));
+    });
+}
+
+#[test]
+fn a_client_outlives_its_servers_troubles() {
+    Testbed::new(["client", "server"]).links("delay 10ms").run(|bed| async move {
+        let server = bed.host("server");
+        server.start(echo);
+        let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+        let answers = async || {
+            client.send_to(b"there?", "server:7").await.unwrap();
+            time::timeout(Duration::from_millis(50), client.recv(&mut [0; 10])).await.is_ok()
+        };
+        assert!(answers().await);
+
+        server.crash();
+        assert!(!answers().await);
+        server.restart();
+        assert!(answers().await);
+
+        // The question arrives, and the answer does not.
+        bed.cut("server", "client");
+        assert!(!answers().await);
+        bed.mend("server", "client");
+        assert!(answers().await);
+
+        bed.partition(&["client"], &["server"]);
+        assert!(!answers().await);
+        bed.mend_all();
+        assert!(answers().await);
+
+        // The name is looked up anew with each question, so that it is found again.
+        let before = server.ip();
+        assert_ne!(IpAddr::from(server.change_addresses().v4), before);
+        assert!(answers().await);
+
+        bed.set_link("client", "server", "loss 100%");
+        assert!(!answers().await);
+    });
+}
+
+fn differs() {
+    let run = Rc::new(Cell::new(0_u8));
+    Testbed::new(["client", "server"]).seed(7).run_twice(|bed| {
+        let run = Rc::clone(&run);
+        async move {
+            let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+            time::sleep(Duration::from_millis(3)).await;
+            run.set(run.get() + 1);
+            client.send_to(&[run.get()], "server:7").await.unwrap();
+        }
+    });
+}
+
+proptest! {
+    #[test]
+    fn a_question_that_is_asked_often_enough_is_answered(link in links_like(
+        LinkBounds::ideal().delay(Duration::ZERO..=Duration::from_millis(200)).loss(0.0..=20.0).always(Stage::Loss)
+    )) {
+        Testbed::new(["client", "server"]).links(link).run(|bed| async move {
+            bed.host("server").spawn(echo());
+            let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+            client.connect("server:7").await.unwrap();
+            for _ in 0..100 {
+                client.send(b"there?").await.unwrap();
+                if time::timeout(Duration::from_secs(1), client.recv(&mut [0; 10])).await.is_ok() {
+                    return;
+                }
+            }
+            panic!("a hundred questions without an answer");
+        });
+    }
+}
+
+#[test]
+fn what_happened_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let kept = folder.path().join("lossy");
+    let bed = Testbed::new(["client", "server"]).links("loss 100%").artefacts(&kept);
+    let failed = std::panic::catch_unwind(|| {
+        bed.run(|bed| async move {
+            let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+            client.send_to(b"hello", "server:7").await.unwrap();
+            time::timeout(Duration::from_secs(1), client.recv(&mut [0; 10])).await.expect("an answer").unwrap();
+        });
+    });
+    assert!(failed.is_err());
+    let trace = std::fs::read_to_string(kept.join("trace.txt")).unwrap();
+    assert!(trace.contains("client -> server  packet 0 lost: loss"), "{trace}");
+    assert!(kept.join("fates-client-to-server.csv").exists());
+    assert!(kept.join("packets-client-to-server.pcapng").exists());
+}
+
+/// What the program that differs panics with, in a test of that name.
+fn difference(test: &str) -> String {
+    std::thread::Builder::new().name(test.into()).spawn(|| message_of(differs)).unwrap().join().unwrap()
+}
+
+#[test]
+fn a_program_that_differs_is_told_so() {
+    super::assert_shown(&difference("main"));
+}
+
+#[test]
+fn the_seed_is_told_with_the_name_of_the_test() {
+    super::assert_shown(difference("lossy").lines().last().unwrap());
+}
