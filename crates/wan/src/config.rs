@@ -75,13 +75,14 @@ impl LinkConfig {
     /// Whether all that this link does is to delay every packet by the same span.
     #[must_use]
     pub fn is_constant_delay(&self) -> bool {
-        // The order policy counts: a live change to a shorter delay lets later packets overtake.
-        *self == Self { delay: Delay::constant(self.delay.mean()), ..Self::default() }
+        // The order policy counts: a live change to a shorter delay lets later packets overtake. The order of stages does not where there is one.
+        *self == Self { layout: self.layout, delay: Delay::constant(self.delay.mean()), ..Self::default() }
     }
 
     /// Whether a packet's fate is known as soon as it is offered, and there are no copies: nothing waits, nothing is counted.
     pub(crate) fn is_direct(&self) -> bool {
-        let Self { outages, loss, delay, order, .. } = self.clone();
-        *self == Self { outages, loss, delay, order, ..Self::default() }
+        // In both layouts these follow each other in the same order.
+        let Self { layout, outages, loss, delay, order, .. } = self.clone();
+        *self == Self { layout, outages, loss, delay, order, ..Self::default() }
     }
 }
