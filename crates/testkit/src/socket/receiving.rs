@@ -1,0 +1,254 @@
+//! What a socket receives.
+
+use std::future::poll_fn;
+use std::io;
+use std::net::SocketAddr;
+use std::task::{Context, Poll};
+
+use bytes::BufMut;
+use cohaptic_units::Instant;
+
+use super::UdpSocket;
+use crate::core::Datagram;
+
+impl UdpSocket {
+    /// Receives a datagram, whoever sent it; gives its length.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::ConnectionRefused`] if the peer has told that nobody is at its port.
+    pub async fn recv(&self, buffer: &mut [u8]) -> io::Result<usize> {
+        Ok(self.take(false).await?.copy_to(buffer).0)
+    }
+
+    /// Receives a datagram; gives its length and its sender.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    pub async fn recv_from(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
+        Ok(self.take(false).await?.copy_to(buffer))
+    }
+
+    /// Receives a datagram into the free room of a buffer; gives its length.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    pub async fn recv_buf(&self, buffer: &mut impl BufMut) -> io::Result<usize> {
+        Ok(self.take(false).await?.put_into(buffer).0)
+    }
+
+    /// Receives a datagram into the free room of a buffer; gives its length and its sender.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    pub async fn recv_buf_from(&self, buffer: &mut impl BufMut) -> io::Result<(usize, SocketAddr)> {
+        Ok(self.take(false).await?.put_into(buffer))
+    }
+
+    /// Receives a datagram; gives its length, its sender, and when it arrived, to the nanosecond.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    pub async fn recv_from_at(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr, Instant)> {
+        let datagram = self.take(false).await?;
+        let (len, from) = datagram.copy_to(buffer);
+        Ok((len, from, datagram.at))
+    }
+
+    /// Looks at the next datagram and leaves it; gives its length.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    pub async fn peek(&self, buffer: &mut [u8]) -> io::Result<usize> {
+        Ok(self.take(true).await?.copy_to(buffer).0)
+    }
+
+    /// Looks at the next datagram and leaves it; gives its length and its sender.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    pub async fn peek_from(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
+        Ok(self.take(true).await?.copy_to(buffer))
+    }
+
+    /// The sender of the next datagram, which is left.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    pub async fn peek_sender(&self) -> io::Result<SocketAddr> {
+        Ok(self.take(true).await?.from)
+    }
+
+    /// Receives a datagram if there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`]; [`io::ErrorKind::WouldBlock`] if there is none.
+    pub fn try_recv(&self, buffer: &mut [u8]) -> io::Result<usize> {
+        Ok(self.try_take(false)?.copy_to(buffer).0)
+    }
+
+    /// Receives a datagram if there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::try_recv`].
+    pub fn try_recv_from(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
+        Ok(self.try_take(false)?.copy_to(buffer))
+    }
+
+    /// Receives a datagram into the free room of a buffer if there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::try_recv`].
+    pub fn try_recv_buf(&self, buffer: &mut impl BufMut) -> io::Result<usize> {
+        Ok(self.try_take(false)?.put_into(buffer).0)
+    }
+
+    /// Receives a datagram into the free room of a buffer if there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::try_recv`].
+    pub fn try_recv_buf_from(&self, buffer: &mut impl BufMut) -> io::Result<(usize, SocketAddr)> {
+        Ok(self.try_take(false)?.put_into(buffer))
+    }
+
+    /// Looks at the next datagram if there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::try_recv`].
+    pub fn try_peek(&self, buffer: &mut [u8]) -> io::Result<usize> {
+        Ok(self.try_take(true)?.copy_to(buffer).0)
+    }
+
+    /// Looks at the next datagram if there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::try_recv`].
+    pub fn try_peek_from(&self, buffer: &mut [u8]) -> io::Result<(usize, SocketAddr)> {
+        Ok(self.try_take(true)?.copy_to(buffer))
+    }
+
+    /// The sender of the next datagram if there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::try_recv`].
+    pub fn try_peek_sender(&self) -> io::Result<SocketAddr> {
+        Ok(self.try_take(true)?.from)
+    }
+
+    /// Receives a datagram, or sees to it that the task is woken when there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    #[cfg(feature = "tokio")]
+    pub fn poll_recv(&self, cx: &mut Context<'_>, buffer: &mut tokio::io::ReadBuf<'_>) -> Poll<io::Result<()>> {
+        self.poll_recv_from(cx, buffer).map_ok(drop)
+    }
+
+    /// Receives a datagram, or sees to it that the task is woken when there is one; gives its sender.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    #[cfg(feature = "tokio")]
+    pub fn poll_recv_from(&self, cx: &mut Context<'_>, buffer: &mut tokio::io::ReadBuf<'_>) -> Poll<io::Result<SocketAddr>> {
+        self.poll_take(cx, false).map_ok(|datagram| datagram.fill(buffer))
+    }
+
+    /// Looks at the next datagram, or sees to it that the task is woken when there is one; gives its sender.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    #[cfg(feature = "tokio")]
+    pub fn poll_peek_from(&self, cx: &mut Context<'_>, buffer: &mut tokio::io::ReadBuf<'_>) -> Poll<io::Result<SocketAddr>> {
+        self.poll_take(cx, true).map_ok(|datagram| datagram.fill(buffer))
+    }
+
+    /// Looks at the sender of the next datagram, or sees to it that the task is woken when there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::recv`].
+    pub fn poll_peek_sender(&self, cx: &mut Context<'_>) -> Poll<io::Result<SocketAddr>> {
+        self.poll_take(cx, true).map_ok(|datagram| datagram.from)
+    }
+
+    /// Waits until something can be received.
+    ///
+    /// # Errors
+    ///
+    /// None: an error of the socket is given by what is called next.
+    pub async fn readable(&self) -> io::Result<()> {
+        poll_fn(|cx| self.poll_recv_ready(cx)).await
+    }
+
+    /// Ready when something can be received.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::readable`].
+    pub fn poll_recv_ready(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let mut core = self.shared.lock();
+        if core.is_readable(self.id) {
+            return Poll::Ready(Ok(()));
+        }
+        core.wait_to_read(self.id, cx.waker());
+        Poll::Pending
+    }
+
+    pub(crate) fn try_take(&self, peek: bool) -> io::Result<Datagram> {
+        self.shared.lock().receive(self.id, peek)?.ok_or_else(|| io::ErrorKind::WouldBlock.into())
+    }
+
+    async fn take(&self, peek: bool) -> io::Result<Datagram> {
+        poll_fn(|cx| self.poll_take(cx, peek)).await
+    }
+
+    pub(crate) fn poll_take(&self, cx: &Context<'_>, peek: bool) -> Poll<io::Result<Datagram>> {
+        let mut core = self.shared.lock();
+        match core.receive(self.id, peek) {
+            Ok(Some(datagram)) => Poll::Ready(Ok(datagram)),
+            Err(error) => Poll::Ready(Err(error)),
+            Ok(None) => {
+                core.wait_to_read(self.id, cx.waker());
+                Poll::Pending
+            }
+        }
+    }
+}
+
+impl Datagram {
+    fn copy_to(&self, buffer: &mut [u8]) -> (usize, SocketAddr) {
+        let len = self.bytes.len().min(buffer.len());
+        buffer[..len].copy_from_slice(&self.bytes[..len]);
+        (len, self.from)
+    }
+
+    fn put_into(&self, buffer: &mut impl BufMut) -> (usize, SocketAddr) {
+        let len = self.bytes.len().min(buffer.remaining_mut());
+        buffer.put_slice(&self.bytes[..len]);
+        (len, self.from)
+    }
+
+    #[cfg(feature = "tokio")]
+    fn fill(&self, buffer: &mut tokio::io::ReadBuf<'_>) -> SocketAddr {
+        let len = self.bytes.len().min(buffer.remaining());
+        buffer.put_slice(&self.bytes[..len]);
+        self.from
+    }
+}

@@ -1,0 +1,95 @@
+//! What a socket sends.
+
+use std::io;
+use std::net::SocketAddr;
+use std::task::{Context, Poll};
+
+use bytes::Bytes;
+
+use super::UdpSocket;
+use crate::address::ToSocketAddrs;
+use crate::core::Outgoing;
+
+impl UdpSocket {
+    /// Sends to the peer; gives the length.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::NotConnected`] without a peer, `ConnectionRefused` if the peer has told that nobody is at its port, `InvalidInput` if it is too long.
+    #[expect(clippy::unused_async, reason = "as tokio's")]
+    pub async fn send(&self, bytes: &[u8]) -> io::Result<usize> {
+        self.try_send(bytes)
+    }
+
+    /// Sends to the peer; gives the length.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::send`].
+    pub fn try_send(&self, bytes: &[u8]) -> io::Result<usize> {
+        self.send_now(None, bytes, false)
+    }
+
+    /// Sends to an address; gives the length.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::send`]; [`io::ErrorKind::HostUnreachable`] if no host ever had that address.
+    #[expect(clippy::unused_async, reason = "as tokio's")]
+    pub async fn send_to(&self, bytes: &[u8], to: impl ToSocketAddrs) -> io::Result<usize> {
+        self.send_now(Some(to.to_socket_addr()?), bytes, false)
+    }
+
+    /// Sends to an address; gives the length.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::send_to`].
+    pub fn try_send_to(&self, bytes: &[u8], to: SocketAddr) -> io::Result<usize> {
+        self.send_now(Some(to), bytes, false)
+    }
+
+    /// Sends to the peer; ready at once.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::send`].
+    pub fn poll_send(&self, _cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        Poll::Ready(self.try_send(bytes))
+    }
+
+    /// Sends to an address; ready at once.
+    ///
+    /// # Errors
+    ///
+    /// As [`UdpSocket::send_to`].
+    pub fn poll_send_to(&self, _cx: &mut Context<'_>, bytes: &[u8], to: SocketAddr) -> Poll<io::Result<usize>> {
+        Poll::Ready(self.try_send_to(bytes, to))
+    }
+
+    pub(crate) fn send_now(&self, to: Option<SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<usize> {
+        let ecn_capable = ecn_capable || self.options.is_ecn_capable();
+        let outgoing = Outgoing { to, bytes: Bytes::copy_from_slice(bytes), ecn_capable };
+        self.shared.lock().send(self.id, outgoing)?;
+        Ok(bytes.len())
+    }
+
+    /// Waits until something can be sent: not at all.
+    ///
+    /// # Errors
+    ///
+    /// None.
+    #[expect(clippy::unused_async, reason = "as tokio's")]
+    pub async fn writable(&self) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// Always ready: sending never waits.
+    ///
+    /// # Errors
+    ///
+    /// None.
+    pub fn poll_send_ready(&self, _cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Poll::Ready(Ok(()))
+    }
+}
