@@ -44,11 +44,7 @@ fn tasks_that_never_wait() {
         })
     });
     assert_begin_shown(&message, ", the task");
-    let message = message_of(|| {
-        pair().patience(1000).run(|_| async {
-            while time::now() < Instant::from_nanos(1) {}
-        })
-    });
+    let message = message_of(|| pair().patience(1000).run(|_| async { while time::now() < Instant::from_nanos(1) {} }));
     assert_shown(&message);
 }
 
