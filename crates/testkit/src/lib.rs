@@ -1,7 +1,60 @@
 //! Tests of networked programs over emulated bad links, in virtual time, the same way every time.
 //!
-//! A [`Testbed`] is hosts and the [links](cohaptic_wan) between them. A program that is run on it has [UDP sockets](UdpSocket) with the methods of tokio's,
+//! A [`Testbed`] is hosts and the [links](wan) between them. A program that is run on it has [UDP sockets](UdpSocket) with the methods of tokio's,
 //! [timers](time), and hosts that crash, come back, and lose sight of each other. Nothing waits in real time: the clock jumps to the next event.
+//!
+//! ```
+//! use cohaptic_testkit::{Instant, Testbed, time};
+//!
+//! let took = Testbed::new(["client", "server"]).links("delay 24ms").run(|bed| async move {
+//!     let server = bed.host("server").bind("0.0.0.0:7").unwrap();
+//!     let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+//!     client.send_to(b"hello", "server:7").await.unwrap();
+//!     server.recv(&mut [0; 5]).await.unwrap();
+//!     time::now()
+//! });
+//! assert_eq!(took, Instant::from_nanos(24_000_000));
+//! ```
+//!
+//! The chapter "Testing your own program over a bad network", `docs/testing.md` in the repository, begins with nothing and shows all of it by example.
+//!
+//! # Contents
+//!
+//! | what | where |
+//! | --- | --- |
+//! | hosts and links, and how a program is run: once, twice, recorded, on tokio | [`Testbed`] |
+//! | while it runs: hosts, links, cuts, notes | [`Bed`], [`Host`], [`JoinHandle`] |
+//! | sockets, and the addresses and names of hosts | [`UdpSocket`], [`Addresses`], [`AddressPlan`], [`ToSocketAddrs`] |
+//! | timers to the nanosecond | [`time`], [`Instant`] |
+//! | what a link is: words of `tc-netem`, or a model of the emulator | [`ToLink`], [`wan`] |
+//! | programs without sockets: state machines | [`node`] |
+#![cfg_attr(feature = "strategies", doc = "| links and networks at random, which shrink to the least impaired | [`strategies`] |")]
+#![cfg_attr(not(feature = "strategies"), doc = "| links and networks at random, which shrink to the least impaired | feature `strategies` |")]
+#![cfg_attr(feature = "quinn", doc = "| unmodified QUIC endpoints | [`quinn`](mod@quinn) |")]
+#![cfg_attr(not(feature = "quinn"), doc = "| unmodified QUIC endpoints | feature `quinn` |")]
+//! | hosts and links from a file | [`Testbed::from_file`], [`LinkFile`] |
+#![cfg_attr(feature = "scenes", doc = "| scene files as tests, and scenes at random | [`check_scene`], [`check_scenes`], [`strategies::scene`] |")]
+#![cfg_attr(not(feature = "scenes"), doc = "| scene files as tests, and scenes at random | feature `scenes` |")]
+//! | what happened: events, the fate of every packet, the first difference between two runs | [`Trace`], [`Record`], [`Difference`] |
+//! | what a failed test leaves behind, and its replay | [`Testbed::artefacts`], [`Record::write`] |
+//!
+//! # Features
+//!
+//! | feature | on by default | brings |
+//! | --- | --- | --- |
+//! | `strategies` | yes | strategies of proptest for links and networks, and `proptest` itself |
+//! | `tokio` | yes | `Testbed::on_tokio`, for programs that use tokio's timers and tasks, and the methods of sockets whose arguments are of tokio's types |
+//! | `pcapng` | yes | captures among what a failed test leaves behind |
+//! | `files` | | scene files and relay files (TOML) as hosts and links; files of plain words need no feature |
+//! | `scenes` | | scene files as tests, and strategies for scenes of coordination; brings `files` and `strategies` |
+//! | `quinn` | | QUIC by quinn, and `quinn` itself |
+//!
+//! # Variables of the environment
+//!
+//! | variable | says |
+//! | --- | --- |
+//! | [`COHAPTIC_TEST_SEED`](SEED_VARIABLE) | the seed of every test bed of the process |
+//! | [`COHAPTIC_TEST_ARTEFACTS`](ARTEFACTS_VARIABLE) | the folder below which every test that fails writes what happened |
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 
 mod address;

@@ -1,6 +1,6 @@
 //! Virtual time to the nanosecond, for programs that do not use tokio's: what they would take from a runtime otherwise.
 //!
-//! On [tokio's clock](crate::Testbed::on_tokio) these work too: they go off to the nanosecond where tokio's own timers are rounded up to milliseconds.
+//! On tokio's clock (`Testbed::on_tokio`) these work too: they go off to the nanosecond where tokio's own timers are rounded up to milliseconds.
 
 use std::future::{Future, poll_fn};
 use std::pin::{Pin, pin};

@@ -1,6 +1,7 @@
 //! The test kit with scene files and relay files.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
+mod chapter;
 mod files;
 mod scenes;
 

@@ -1,8 +1,9 @@
 //! What docs/testing.md says of misuse is what comes.
 
+use std::net::Ipv4Addr;
 use std::time::Duration;
 
-use cohaptic_testkit::{Testbed, time};
+use cohaptic_testkit::{Instant, Testbed, time};
 
 use super::{assert_shown, message_of};
 
@@ -43,6 +44,17 @@ fn tasks_that_never_wait() {
         })
     });
     assert_begin_shown(&message, ", the task");
+    let message = message_of(|| pair().patience(1000).run(|_| async { while time::now() < Instant::from_nanos(1) {} }));
+    assert_shown(&message);
+}
+
+#[test]
+fn multicast() {
+    pair().run(|bed| async move {
+        let socket = bed.host("client").bind("0.0.0.0:0").unwrap();
+        assert_shown(&socket.join_multicast_v4(Ipv4Addr::new(224, 0, 0, 251), Ipv4Addr::UNSPECIFIED).unwrap_err().to_string());
+        assert_shown(&socket.send_to(b"hello", "224.0.0.251:5353").await.unwrap_err().to_string());
+    });
 }
 
 #[test]

@@ -1,15 +1,27 @@
 //! docs/testing.md says what is true: its blocks are tests, and what it shows comes out.
 
+mod files;
 mod misuse;
 mod nodes;
 mod programs;
+#[cfg(feature = "quinn")]
+mod quic;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 const CHAPTER: &str = include_str!("../../../../../docs/testing.md");
 
-/// The code in which the blocks must stand as they are.
-const CODE: [&str; 3] = [include_str!("programs.rs"), include_str!("nodes.rs"), include_str!("../../../../../docs/examples/first-test/src/lib.rs")];
+/// The code in which the blocks must stand as they are. What needs the feature `scenes` is among the tests across crates, which always have it.
+const CODE: [&str; 6] = [
+    FIRST_TEST,
+    include_str!("programs.rs"),
+    include_str!("files.rs"),
+    include_str!("nodes.rs"),
+    include_str!("quic.rs"),
+    include_str!("../../../../../tests/tests/testkit/chapter.rs"),
+];
+
+const FIRST_TEST: &str = include_str!("../../../../../docs/examples/first-test/src/lib.rs");
 
 /// The blocks of a language.
 fn blocks(language: &str) -> Vec<&'static str> {
@@ -30,9 +42,16 @@ fn every_block_of_rust_is_compiled_and_run() {
 fn the_first_test_has_fewer_than_forty_lines() {
     let (manifest, code) = (blocks("toml")[0], blocks("rust")[0]);
     assert!(include_str!("../../../../../docs/examples/first-test/Cargo.toml").starts_with(manifest));
-    assert_eq!(CODE[2], code);
+    assert_eq!(FIRST_TEST, code);
     let count = manifest.lines().count() + code.lines().count();
     assert!(count < 40, "{count} lines");
+}
+
+/// Those that the blocks read.
+#[test]
+fn the_files_that_are_shown_are_there() {
+    assert!(blocks("text").contains(&include_str!("../../home.links")));
+    assert_eq!(blocks("toml")[1..], [include_str!("../../../../../tests/tests/testkit/room.toml")]);
 }
 
 /// What a program panics with.

@@ -29,7 +29,7 @@ fn answers_that_are_late() {
     assert_eq!(took, Instant::from_nanos(210_000_000));
 }
 
-async fn echo() {
+pub(super) async fn echo() {
     let socket = UdpSocket::bind("0.0.0.0:7").await.unwrap();
     let mut buffer = [0; 1500];
     while let Ok((len, from)) = socket.recv_from(&mut buffer).await {
