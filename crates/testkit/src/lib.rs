@@ -84,6 +84,8 @@ mod words;
 pub use address::{AddressPlan, Addresses, ToSocketAddrs};
 pub use artefacts::{ARTEFACTS_VARIABLE, WriteError};
 pub use bed::{Bed, Testbed};
+#[cfg(feature = "scenes")]
+pub use cohaptic_harness as harness;
 pub use cohaptic_units as units;
 pub use cohaptic_units::Instant;
 pub use cohaptic_wan as wan;

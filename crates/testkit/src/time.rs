@@ -9,7 +9,6 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use cohaptic_units::Instant;
-use cohaptic_units::print::Seconds;
 
 use crate::context;
 use crate::core::{Shared, TimerId};
@@ -20,14 +19,11 @@ use crate::core::{Shared, TimerId};
 ///
 /// Outside a running test bed; and if it is asked millions of times without letting time pass, as a loop does that waits for it: `sleep` instead.
 #[must_use]
-#[expect(clippy::panic, reason = "time cannot pass while it is asked for; says why, and the way out")]
 pub fn now() -> Instant {
-    let (asked, now) = context::ask("time is known", |shared| {
+    context::ask("time is known", |shared| {
         let mut core = shared.lock();
-        (core.ask_time(), core.now)
-    });
-    asked.unwrap_or_else(|| {
-        panic!("time stands still at {} s: it was asked for again and again by a task that never waits; `sleep(..).await` lets it pass", Seconds(now))
+        core.note_call();
+        core.now
     })
 }
 
@@ -94,8 +90,10 @@ impl Future for Sleep {
         let this = &mut *self;
         let mut core = this.shared.lock();
         if core.now >= this.deadline {
-            if let Some(timer) = this.timer.take() {
-                core.timers.cancel(timer);
+            match this.timer.take() {
+                Some(timer) => core.timers.cancel(timer),
+                // It has not waited.
+                None => core.note_call(),
             }
             return Poll::Ready(());
         }

@@ -1,6 +1,6 @@
 //! The blocks of docs/testing.md that need the feature `scenes`, as they stand there. The test kit's own tests see to it.
 
-use cohaptic_harness::{Model, NoObserver, Simulation};
+use cohaptic_testkit::harness::{Model, NoObserver, Simulation};
 use cohaptic_testkit::proptest::prelude::*;
 use cohaptic_testkit::strategies::scene::any_scene;
 use cohaptic_testkit::{Instant, Testbed, check_scene, time};

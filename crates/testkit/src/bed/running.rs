@@ -59,9 +59,15 @@ impl Bed {
     }
 
     /// The time since the run began.
+    ///
+    /// # Panics
+    ///
+    /// As [`time::now`](crate::time::now): if it is asked again and again without letting time pass.
     #[must_use]
     pub fn now(&self) -> Instant {
-        self.shared.lock().now
+        let mut core = self.shared.lock();
+        core.note_call();
+        core.now
     }
 
     /// Starts a task that lives on no host: it survives all crashes, and binds sockets by [`Host::bind`].

@@ -15,6 +15,7 @@ use std::task::Waker;
 
 use bytes::Bytes;
 use cohaptic_units::Instant;
+use cohaptic_units::print::Seconds;
 use cohaptic_wan::{LinkModel, Network, NetworkConfig, NodeId};
 
 pub(crate) use recording::{Recording, Seen, follow_to_the_end, seen};
@@ -63,7 +64,7 @@ pub(crate) struct Core {
     offered: Vec<u64>,
     /// Who is to be woken when nobody holds this any more.
     pub(crate) woken: Vec<Waker>,
-    /// How often the time was asked since it last passed.
+    /// How often the program asked for what takes no time since it last passed.
     asked: u64,
     /// How often tasks were polled since it last passed, as far as they are counted here.
     #[cfg(feature = "tokio")]
@@ -142,10 +143,28 @@ impl Core {
         self.timers.fire(self.now, &mut self.woken);
     }
 
-    /// The time, for the program; `None` if it has been asked so often that it seems to be waited for without letting it pass.
-    pub(crate) fn ask_time(&mut self) -> Option<Instant> {
+    /// The program asks for something that takes no time.
+    ///
+    /// # Panics
+    ///
+    /// If it has done so for so often since time last passed that it seems to wait for time without letting it pass.
+    #[inline]
+    pub(crate) fn note_call(&mut self) {
         self.asked += 1;
-        (self.asked <= self.settings.patience.saturating_mul(10)).then_some(self.now)
+        if self.asked > self.settings.patience.saturating_mul(10) {
+            self.lose_patience();
+        }
+    }
+
+    #[cold]
+    #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
+    fn lose_patience(&mut self) -> ! {
+        // What is dropped while it unwinds may ask again.
+        self.asked = 0;
+        panic!(
+            "time stands still at {} s: a task asks for the time, sends or tries to receive again and again and never waits; `sleep(..).await` lets it pass",
+            Seconds(self.now)
+        );
     }
 
     /// A task is polled; says whether time has stood still for too long.

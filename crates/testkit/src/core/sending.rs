@@ -29,6 +29,7 @@ fn refuse<T>(kind: io::ErrorKind, text: String) -> io::Result<T> {
 impl Core {
     /// Sends a datagram, now.
     pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing) -> io::Result<()> {
+        self.note_call();
         self.check_alive(id)?;
         let socket = self.sockets.get_mut(id);
         if std::mem::take(&mut socket.refused) {

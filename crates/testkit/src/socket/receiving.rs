@@ -212,7 +212,9 @@ impl UdpSocket {
     }
 
     pub(crate) fn try_take(&self, peek: bool) -> io::Result<Datagram> {
-        self.shared.lock().receive(self.id, peek)?.ok_or_else(|| io::ErrorKind::WouldBlock.into())
+        let mut core = self.shared.lock();
+        core.note_call();
+        core.receive(self.id, peek)?.ok_or_else(|| io::ErrorKind::WouldBlock.into())
     }
 
     async fn take(&self, peek: bool) -> io::Result<Datagram> {
