@@ -328,7 +328,28 @@ mod tests {
     use cohaptic_scene::{LinkTable, link_from_keys};
 
     use super::*;
-    use crate::{Limits, Mesh, Program};
+    use crate::{Limits, Mesh, Program, Proxy};
+
+    /// A client for which no port can be had is forgotten and counted; the next one is not harmed.
+    #[test]
+    fn a_client_without_a_port_is_sent_away_and_counted() {
+        let here = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let link = link_from_keys(&[]).unwrap();
+        let proxy = Proxy { listen: here, to: SocketAddr::from((Ipv4Addr::LOCALHOST, 9)), forth: link.clone(), back: link, most_clients: 2 };
+        let config = RelayConfig { seed: 0, form: Form::Proxy(proxy), limits: Limits::default(), changes: Vec::new() };
+        let (mut doors, mut engine) = (Doors::open(&config, DoorConfig::default()).unwrap(), Engine::new(config).unwrap());
+        // Somebody has it.
+        let taken = std::net::UdpSocket::bind(here).unwrap();
+        for (clients, expected) in [(taken.local_addr().unwrap(), (0, 1)), (here, (1, 1))] {
+            doors.layout = Layout::Proxy { clients };
+            let from = SocketAddr::from((Ipv4Addr::LOCALHOST, 10));
+            let intake = engine.handle_datagram(Arrival { at: Instant::ZERO, port: Port::Listen, from, bytes: b"ask", ecn: None });
+            let Intake::FromNewClient(slot) = intake else { panic!("{intake:?}") };
+            doors.opened.push(slot);
+            doors.follow_clients(&mut engine);
+            assert_eq!((engine.clients(), doors.without_socket()), expected);
+        }
+    }
 
     /// What is offered to its link later than it came leaves that much later than it should, however soon it is sent then.
     #[test]

@@ -113,8 +113,11 @@ proptest! {
         prop_assert_eq!(engine.held(), (0, Bytes::new(0)));
         let counts = *engine.counts();
         prop_assert_eq!((counts.offered, counts.overload, counts.clamped), (offers.len() as u64, 0, 0));
-        let delivered: u64 = pairs().map(|(from, to)| engine.link_stats(from, to).unwrap().0.delivered()).sum();
-        prop_assert_eq!(delivered, left.len() as u64);
+        for (from, to) in pairs() {
+            let lengths = left.iter().filter(|passing| (passing.1, passing.2) == (from.0, to.0)).map(|passing| passing.3.len() as u64);
+            let (stats, link) = engine.link_stats(from, to).unwrap();
+            prop_assert_eq!((stats.delivered(), link.delivered_bytes), (lengths.clone().count() as u64, lengths.sum()));
+        }
     }
 
     /// Datagrams that were read from several sockets in any order are offered in the order in which they came.
@@ -199,6 +202,7 @@ fn what_came_before_time_was_let_pass_is_late_and_says_by_how_much() {
     engine.handle_datagram(arrival(at(200), 0, 1, b"x", None));
     assert_eq!((engine.counts().clamped, engine.poll_timeout()), (1, Some(at(1500))));
     assert!(engine.clamped().summary().max.abs_diff(Duration::from_micros(300)) < Duration::from_micros(1));
+    assert_eq!(engine.recent_delays(NodeId(0), NodeId(1)), []);
     // Time never goes back.
     engine.handle_timeout(at(100));
     assert_eq!(engine.poll_timeout(), Some(at(1500)));
@@ -210,6 +214,9 @@ fn what_came_before_time_was_let_pass_is_late_and_says_by_how_much() {
         assert_eq!(engine.poll_release(), None);
         engine.handle_datagram(arrival(at(1600), 0, 1, b"y", None));
     }
+    // Being late is no delay of the link.
+    assert_eq!(engine.recent_delays(NodeId(0), NodeId(1)), [Duration::from_millis(1); 2]);
+    assert_eq!(engine.recent_delays(NodeId(1), NodeId(0)), []);
 }
 
 #[test]

@@ -89,6 +89,21 @@ proptest! {
         prop_assert!(is_right(packet.bytes()));
     }
 
+    /// The addresses are covered by the checksum of IPv4 and, but for ICMP, by that of what it carries: both are right for the addresses that it has now.
+    #[test]
+    fn the_bits_of_the_addresses_are_flipped_and_no_checksum_notices(kind in 0_u8..6, seed in any::<u64>(), count in 1_u32..20) {
+        let before = packet(kind, b"some data");
+        let addresses = if kind < 3 { 12..20 } else { 8..40 };
+        let damage = damage(seed, before.len() as u64, count, Some(addresses.start as u64..addresses.end as u64));
+        let mut packet = Packet::new(before.clone(), Framing::Ip);
+        packet.damage(&damage);
+        let mut expected = before.clone();
+        damage.apply(&mut expected);
+        prop_assert_ne!(&expected, &before);
+        prop_assert_eq!(&packet.bytes()[addresses.clone()], &expected[addresses]);
+        prop_assert!(is_right(packet.bytes()));
+    }
+
     /// Anywhere in the packet: nothing panics, bits outside of checksums are those of the link, and padding is not touched.
     #[test]
     fn any_bit_may_be_flipped(kind in 0_u8..6, data in prop::collection::vec(any::<u8>(), 0..40), seed in any::<u64>(), count in 1_u32..40, padding in 0_usize..9) {
@@ -122,4 +137,19 @@ fn a_wrong_checksum_stays_wrong_and_none_stays_none() {
     none.damage(&damage(5, bytes.len() as u64, 3, Some(28..37)));
     assert_eq!(none.bytes()[26..28], [0, 0]);
     assert!(matches!(none.content(), Content::Ip { .. }));
+}
+
+/// A checksum of UDP that comes out as zero is written as its other zero: zero would say that there is none (RFC 768).
+#[test]
+fn a_checksum_that_comes_out_as_zero_does_not_vanish() {
+    let damaged = |last: [u8; 2]| {
+        let bytes = packet(0, &[1, 2, last[0], last[1]]);
+        let mut packet = Packet::new(bytes.clone(), Framing::Ip);
+        packet.damage(&damage(5, bytes.len() as u64, 3, Some(28..30)));
+        packet.bytes().to_vec()
+    };
+    // What is missing to all ones is the checksum itself.
+    let checksum = <[u8; 2]>::try_from(&damaged([0; 2])[26..28]).unwrap();
+    let found = damaged(checksum);
+    assert_eq!((&found[26..28], is_right(&found)), (&[0xff; 2][..], true));
 }

@@ -221,3 +221,17 @@ proptest! {
         prop_assert_eq!(completed.bytes(), bytes.as_slice());
     }
 }
+
+/// One that is computed and comes out as zero is written as its other zero: zero would say that there is none (RFC 768).
+#[test]
+fn a_checksum_that_is_computed_and_comes_out_as_zero_does_not_vanish() {
+    let field = 26..28;
+    // What is missing to all ones is the checksum itself.
+    let missing = udp_bytes([1, 2], &[0; 2])[field.clone()].to_vec();
+    let whole = udp_bytes([1, 2], &missing);
+    assert_eq!(whole[field.clone()], [0xff; 2]);
+    let mut partial = whole.clone();
+    // From 10.1.0.1 to 10.2.0.1, UDP, 10 bytes: the sum of the pseudo-header.
+    partial[field].copy_from_slice(&(0x0a01_u16 + 0x0001 + 0x0a02 + 0x0001 + 17 + 10).to_be_bytes());
+    assert_eq!(Packet::new(partial, Framing::Ip).bytes(), whole);
+}

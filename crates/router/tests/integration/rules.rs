@@ -51,6 +51,7 @@ fn the_first_rule_that_applies_decides() {
     let cases = [
         (Side::Right, udp_bytes([6000, 9], &[]), rule(0), voice),
         (Side::Right, udp_bytes([6009, 9], &[]), rule(0), voice),
+        (Side::Right, udp_bytes([5999, 9], &[]), Decided::Default, down),
         (Side::Right, udp_bytes([6010, 9], &[]), Decided::Default, down),
         (Side::Left, udp_bytes([6000, 9], &[]), Decided::Default, up),
         (Side::Left, udp_bytes([9, 6000], &[]), Decided::Default, up),

@@ -30,6 +30,9 @@ struct World {
     /// How late the system wakes \[ns\].
     late: u64,
     coming: [RefCell<VecDeque<At>>; 2],
+    /// Somebody stops the run then \[ns\].
+    stop_at: Cell<u64>,
+    stop: AtomicBool,
 }
 
 impl World {
@@ -44,6 +47,7 @@ struct Watch(Rc<World>);
 impl Clock for Watch {
     fn now(&self) -> Instant {
         self.0.now.set(self.0.now.get() + self.0.step);
+        self.0.stop.fetch_or(self.0.now.get() >= self.0.stop_at.get(), Ordering::Relaxed);
         Instant::from_nanos(self.0.now.get())
     }
 
@@ -95,11 +99,23 @@ impl Device for Wire {
 }
 
 fn router(text: &str, step: u64, late: u64, coming: [Vec<At>; 2], takes: Sent, pacing: Pacing) -> (Router<Wire, Watch>, [Log; 2]) {
+    let (router, logs, _) = router_and_world(text, step, late, coming, takes, pacing);
+    (router, logs)
+}
+
+fn router_and_world(
+    text: &str,
+    step: u64,
+    late: u64,
+    coming: [Vec<At>; 2],
+    takes: Sent,
+    pacing: Pacing,
+) -> (Router<Wire, Watch>, [Log; 2], Rc<World>) {
     let coming = coming.map(|coming| RefCell::new(coming.into()));
-    let world = Rc::new(World { now: Cell::new(0), step, late, coming });
+    let world = Rc::new(World { now: Cell::new(0), step, late, coming, stop_at: Cell::new(u64::MAX), stop: AtomicBool::new(false) });
     let logs = [Log::default(), Log::default()];
     let wire = |side: usize| Wire { side, world: Rc::clone(&world), sent: Rc::clone(&logs[side]), takes, fd: File::open("/dev/null").unwrap() };
-    (Router::with(&file(text), [wire(0), wire(1)], Watch(Rc::clone(&world)), pacing), logs)
+    (Router::with(&file(text), [wire(0), wire(1)], Watch(Rc::clone(&world)), pacing), logs, world)
 }
 
 const DELAY: &str = "router = { default = \"x\" }\nlinks = { x = { delay = \"5ms\" } }";
@@ -129,7 +145,12 @@ fn a_late_system_makes_packets_late_but_lateness_does_not_add_up() {
     assert_eq!(error.count, 100);
     // To the three digits of the histogram.
     assert!(error.max <= Duration::from_nanos(80_100), "{error:?}");
-    assert_eq!(router.report().written[1].packets, 100);
+    // From the departure, 5 ms after it was read, until it was written.
+    let late: u64 = left.iter().zip(0_u64..).map(|((at, _), number)| at - (number * 1_000_000 + 500_000 + 80_000 + 5_000_000)).sum();
+    assert!(late > 0);
+    assert_eq!(error.sum, Duration::from_nanos(late));
+    // 20 bytes of IPv4 and 8 of UDP each.
+    assert_eq!(router.report().written.map(|written| (written.packets, written.bytes)), [(0, 0), (100, 2800)]);
     assert_eq!((router.report().packets(), router.report().dropped()), (100, 0));
 }
 
@@ -193,10 +214,20 @@ fn a_stop_is_noticed() {
     let stop = AtomicBool::new(false);
     let mut looks = 0;
     router
-        .run(&stop, None, Duration::from_millis(10), |_| {
+        .run(&stop, Some(Instant::from_nanos(SECOND)), Duration::from_millis(10), |_| {
             looks += 1;
             stop.store(looks == 3, Ordering::Relaxed);
         })
         .unwrap();
-    assert!(looks >= 4, "and a last look at the end");
+    assert_eq!(looks, 4, "and a last look at the end");
+}
+
+/// Nothing comes, nothing is due and nobody looks for an hour.
+#[test]
+fn a_stop_is_noticed_however_seldom_it_is_looked_at() {
+    let (mut router, _, world) = router_and_world(DELAY, 0, 0, [Vec::new(), Vec::new()], Sent::Sent, Pacing::Sleep);
+    world.stop_at.set(SECOND);
+    let mut looks = 0;
+    router.run(&world.stop, Some(Instant::from_nanos(3600 * SECOND)), Duration::from_secs(3600), |_| looks += 1).unwrap();
+    assert_eq!((router.report().elapsed, looks), (Instant::from_nanos(SECOND), 1), "it wakes every 50 ms, and so at that instant");
 }
