@@ -44,12 +44,12 @@ impl Host {
         IpAddr::from(self.addresses().v4)
     }
 
-    #[cfg_attr(not(feature = "quinn"), allow(dead_code, reason = "for the adapters of protocols"))]
+    #[cfg(feature = "quinn")]
     pub(crate) const fn place(&self) -> usize {
         self.place
     }
 
-    #[cfg_attr(not(feature = "quinn"), allow(dead_code, reason = "for the adapters of protocols"))]
+    #[cfg(feature = "quinn")]
     pub(crate) const fn shared(&self) -> &Arc<Shared> {
         &self.shared
     }
