@@ -219,3 +219,24 @@ fn kind<T: Clone>(now: Instant, seed: u64, name: &LinkName, model: LinkModel, pa
 fn constant_nanos(config: &LinkConfig) -> u64 {
     u64::try_from(config.delay.mean().as_nanos()).unwrap_or(u64::MAX)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::netem::Netem;
+
+    fn of_words(words: &str, general: bool) -> Pipeline<()> {
+        let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+        Pipeline::new(1, &LinkName::between("a", "b"), config.into(), general)
+    }
+
+    #[test]
+    fn a_link_of_words_is_compiled_to_the_least_that_it_needs() {
+        assert!(matches!(of_words("delay 24ms", false), Pipeline::Constant(24_000_000, _)));
+        assert!(matches!(of_words("delay 24ms 2ms loss 1%", false), Pipeline::Direct(_)));
+        for words in ["delay 24ms limit 10", "delay 24ms duplicate 1%", "delay 24ms rate 1mbit", "delay 24ms loss 1% ecn"] {
+            assert!(matches!(of_words(words, false), Pipeline::Engine(_)), "{words}");
+        }
+        assert!(matches!(of_words("delay 24ms", true), Pipeline::Engine(_)));
+    }
+}

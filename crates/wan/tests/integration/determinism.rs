@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{Distribution, DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName, Loss, Network, NetworkConfig, NetworkEvent, NodeId};
+use cohaptic_wan::{
+    Distribution, DropCause, Fate, Layout, Link, LinkConfig, LinkEvent, LinkName, Loss, Network, NetworkConfig, NetworkEvent, NodeId,
+};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -109,7 +111,17 @@ proptest! {
     }
 
     #[test]
-    fn the_general_path_gives_the_same_events(plan in prop_oneof![1 => plan(3, 0.5), 1 => plan(3, 0.01)], script in sendings(3), changed in vec(any_config(), 1..4)) {
+    fn the_general_path_gives_the_same_events(
+        plan in prop_oneof![1 => plan(3, 0.5), 1 => plan(3, 0.01)],
+        script in sendings(3),
+        changed in vec(any_config(), 1..4),
+        layouts in vec(any::<bool>(), 1..5),
+    ) {
+        // In either order of the stages, also where a link has but one.
+        let (mut plan, mut changed) = (plan, changed);
+        for (config, is_netem) in plan.links.iter_mut().chain(&mut changed).zip(layouts.iter().cycle()) {
+            config.layout = if *is_netem { Layout::Netem } else { Layout::Physical };
+        }
         prop_assert_eq!(run_network(&plan, false, &script), run_network(&plan, true, &script));
 
         // Also when links are changed while packets are inside.
