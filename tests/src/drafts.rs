@@ -64,6 +64,46 @@ pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Valu
     })
 }
 
+/// Scenes of one shape that need no events, if nobody watches: that many of them, with equal peers, ticks and durations. Everything else may differ, in half of
+/// the cases even the links.
+pub fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<Draft>> {
+    let counts = prop_oneof![3 => 2..=5_usize, 1 => 6..=11_usize];
+    (scenes, counts).prop_flat_map(|(scenes, count)| {
+        let drafts = vec((anything_among(Just(count)), direct_link(), vec((0..count, 1..count, direct_link()), 0..3)), scenes);
+        (drafts, any::<bool>(), 0.9..2.0).prop_map(|(mut drafts, same_links, stiffer)| {
+            for (draft, link, links) in &mut drafts {
+                draft.timeline.clear();
+                draft.link.clone_from(link);
+                let names: Vec<String> = draft.peers.iter().map(|peer| peer.name.clone()).collect();
+                draft.links.clear();
+                for (from, step, keys) in links {
+                    let (from, to) = (names[*from].clone(), names[(*from + *step) % names.len()].clone());
+                    if !draft.links.iter().any(|link| (&link.from, &link.to) == (&from, &to)) {
+                        draft.links.push(DraftLink { from, to, keys: keys.clone() });
+                    }
+                }
+                // Now and then one diverges before the others.
+                draft.gains.stiffness *= stiffer;
+            }
+            let first = drafts[0].0.clone();
+            for (draft, ..) in &mut drafts {
+                (draft.axes, draft.update, draft.duration) = (first.axes, first.update, first.duration);
+                if same_links {
+                    (draft.link, draft.links) = (first.link.clone(), first.links.clone());
+                }
+                for (peer, like) in draft.peers.iter_mut().zip(&first.peers) {
+                    (peer.tick, peer.offset, peer.drift, peer.phase) = (first.peers[0].tick, 0, 0, like.phase % (first.update / first.peers[0].tick));
+                    (peer.uplink, peer.downlink) = (None, None);
+                    if let Contact::Push(direction) = &mut peer.contact {
+                        direction.axis %= first.axes;
+                    }
+                }
+            }
+            drafts.into_iter().map(|(draft, ..)| draft).collect()
+        })
+    })
+}
+
 /// A scene whose motions stay bounded and depend continuously on where bodies begin: gains far from the edge of stability at the ages that `link` and
 /// update make, grasps but no pushes, no walls, constant forces, equal clocks, one axis. The gains of the proportional-derivative strategy are the
 /// smaller, the more peers there are.
@@ -97,6 +137,16 @@ pub fn fixed_link() -> impl Strategy<Value = String> + Clone {
 
 /// Keys of a link of any kind.
 pub fn link() -> impl Strategy<Value = String> + Clone {
+    link_with(true)
+}
+
+/// Keys of a link of a kind in which no packet waits for another: in half of the cases of nothing but a constant delay.
+pub fn direct_link() -> impl Strategy<Value = String> + Clone {
+    prop_oneof![link_with(false), (0..40_000_u32).prop_map(|us| format!("delay = \"{us}us\", jitter = \"0s\""))]
+}
+
+/// Keys of a link that may have a rate, or not.
+fn link_with(may_have_rate: bool) -> impl Strategy<Value = String> + Clone {
     let delay = prop_oneof![Just(None), (0..40_000_u32).prop_map(Some)];
     // In parts per thousand of the delay: a uniform law reaches √3 of it.
     let jitter = option::of((1..550_u32, any::<bool>(), any::<bool>()));
@@ -109,7 +159,7 @@ pub fn link() -> impl Strategy<Value = String> + Clone {
     ];
     let rate = option::of((30..1000_u32, 0..60_u32, option::of((1..6_u32, any::<bool>()))));
     let outage = option::weighted(0.3, (0..60_u32, 1..60_u32));
-    (delay, jitter, loss, rate, outage).prop_map(|(delay, jitter, loss, rate, outage)| {
+    (delay, jitter, loss, rate, outage).prop_map(move |(delay, jitter, loss, rate, outage)| {
         let mut keys = Vec::new();
         if let Some(us) = delay {
             keys.push(format!("delay = \"{us}us\""));
@@ -123,7 +173,7 @@ pub fn link() -> impl Strategy<Value = String> + Clone {
             }
         }
         keys.extend(loss);
-        if let Some((kbit, overhead, queue)) = rate {
+        if let Some((kbit, overhead, queue)) = rate.filter(|_| may_have_rate) {
             keys.push(format!("rate = \"{kbit}kbit\", overhead = \"{overhead}B\""));
             if let Some((limit, packets)) = queue {
                 let limit = if packets { format!("{limit} packets") } else { format!("{}B", 150 * limit) };

@@ -24,6 +24,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod arrays;
 pub mod check;
 mod datagrams;
 mod disturbance;
@@ -37,6 +38,7 @@ mod simulation;
 mod summary;
 mod world;
 
+pub use arrays::{run_side_by_side, same_shape};
 pub use cohaptic_scene::{FromScene, Strategies};
 pub use observer::{NoObserver, Observer, PacketRow, StateRow, TickRow};
 pub use plan::Model;

@@ -77,6 +77,29 @@ pub enum Contact {
     Push(Direction),
 }
 
+impl Contact {
+    /// FC along an axis \[N\], through a coupling KC and BC, of a device that is `gap` \[m\] from the copy and moves away from it with `speed` [m/s]: xH − xO
+    /// and vH − vO.
+    #[must_use]
+    #[inline(always)]
+    pub fn force_along(self, axis: usize, coupling: Gains, gap: f64, speed: f64) -> f64 {
+        let Gains { stiffness: k_c, damping: b_c } = coupling;
+        match self {
+            Self::None => 0.0,
+            //= Rakhsha & Constantinescu 2015, eq. (9): FC = KC·(xH − xO) + BC·(vH − vO)
+            Self::Grasp => k_c * gap + b_c * speed,
+            Self::Push(direction) => {
+                let sign = if direction.positive { 1.0 } else { -1.0 };
+                let depth = sign * gap;
+                if axis != direction.axis || depth <= 0.0 {
+                    return 0.0;
+                }
+                sign * (k_c * depth + b_c * (sign * speed)).max(0.0)
+            }
+        }
+    }
+}
+
 /// A direction along an axis: `+x`, `-z`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Direction {

@@ -54,25 +54,35 @@ pub struct SimulatedDevice<const A: usize> {
     hand: HandForce<A>,
 }
 
-/// The force of the hand that is held over a tick. The rest of an arm is part of the plant.
+/// The force of the hand that is held over a tick. The rest of an arm is part of the plant: see [`DeviceConfig::plant`].
 #[derive(Clone, Debug)]
-enum HandForce<const A: usize> {
+pub struct HandForce<const A: usize>(Kind<A>);
+
+#[derive(Clone, Debug)]
+enum Kind<const A: usize> {
     Constant([f64; A]),
     Force(Signal),
     Arm { arm: ArmConfig, follows: Signal },
+}
+
+impl DeviceConfig {
+    /// The device with the arm that holds it, if the hand is one: the arm's mass moves with the device; its spring and damper end at the wanted motion, which
+    /// enters as a held force.
+    #[must_use]
+    pub fn plant(self, hand: Option<&Hand>) -> Plant {
+        let arm = match hand {
+            Some(Hand::Arm { arm, .. }) => *arm,
+            Some(Hand::Force(_)) | None => ArmConfig { mass: 0.0, damping: 0.0, stiffness: 0.0 },
+        };
+        Plant { mass: self.mass + arm.mass, damping: self.damping + arm.damping, stiffness: arm.stiffness }
+    }
 }
 
 impl<const A: usize> SimulatedDevice<A> {
     /// A device in that state with that hand; `None` is no hand.
     #[must_use]
     pub fn new(device: DeviceConfig, hand: Option<&Hand>, state: State<A>, integrator: Integrator, clock: &Clock) -> Self {
-        let arm = match hand {
-            Some(Hand::Arm { arm, .. }) => *arm,
-            Some(Hand::Force(_)) | None => ArmConfig { mass: 0.0, damping: 0.0, stiffness: 0.0 },
-        };
-        // The arm's mass moves with the device; its spring and damper end at the wanted motion, which enters as a held force.
-        let plant = Plant { mass: device.mass + arm.mass, damping: device.damping + arm.damping, stiffness: arm.stiffness };
-        Self { state, stepper: Stepper::new(plant, integrator, clock), hand: HandForce::of(hand) }
+        Self { state, stepper: Stepper::new(device.plant(hand), integrator, clock), hand: HandForce::of(hand) }
     }
 
     /// Puts the device into that state.
@@ -87,26 +97,39 @@ impl<const A: usize> SimulatedDevice<A> {
 }
 
 impl<const A: usize> HandForce<A> {
-    fn of(hand: Option<&Hand>) -> Self {
-        match hand {
-            None => Self::Constant([0.0; A]),
-            Some(Hand::Force(signal)) if signal.is_constant() => Self::Constant(signal.value(Instant::ZERO)),
-            Some(Hand::Force(signal)) => Self::Force(signal.clone()),
-            Some(Hand::Arm { arm, follows }) => Self::Arm { arm: *arm, follows: follows.clone() },
+    /// The force of that hand; `None` is no hand.
+    #[must_use]
+    pub fn of(hand: Option<&Hand>) -> Self {
+        Self(match hand {
+            None => Kind::Constant([0.0; A]),
+            Some(Hand::Force(signal)) if signal.is_constant() => Kind::Constant(signal.value(Instant::ZERO)),
+            Some(Hand::Force(signal)) => Kind::Force(signal.clone()),
+            Some(Hand::Arm { arm, follows }) => Kind::Arm { arm: *arm, follows: follows.clone() },
+        })
+    }
+
+    /// The force, if it is the same at all times.
+    #[must_use]
+    pub const fn constant(&self) -> Option<[f64; A]> {
+        match &self.0 {
+            Kind::Constant(force) => Some(*force),
+            Kind::Force(_) | Kind::Arm { .. } => None,
         }
     }
 
+    /// The force that is held from that instant over a tick \[N\].
+    #[must_use]
     #[inline(always)]
-    fn at(&self, now: Instant) -> [f64; A] {
-        if let Self::Constant(force) = self { *force } else { self.varying(now) }
+    pub fn at(&self, now: Instant) -> [f64; A] {
+        if let Kind::Constant(force) = &self.0 { *force } else { self.varying(now) }
     }
 
     #[inline(never)]
     fn varying(&self, now: Instant) -> [f64; A] {
-        match self {
-            Self::Constant(force) => *force,
-            Self::Force(signal) => signal.value(now),
-            Self::Arm { arm, follows } => {
+        match &self.0 {
+            Kind::Constant(force) => *force,
+            Kind::Force(signal) => signal.value(now),
+            Kind::Arm { arm, follows } => {
                 let (wanted, speed) = (follows.value::<A>(now), follows.slope::<A>(now));
                 core::array::from_fn(|axis| arm.stiffness * wanted[axis] + arm.damping * speed[axis])
             }

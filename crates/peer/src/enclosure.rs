@@ -22,19 +22,23 @@ impl Enclosure {
     /// The force of the walls on an object in that state \[N\]; zero inside.
     #[must_use]
     pub fn force<const A: usize>(&self, object: &State<A>) -> [f64; A] {
-        core::array::from_fn(|axis| {
-            let (x, v) = (object.position[axis], object.velocity[axis]);
-            let push = |depth: f64| self.stiffness * depth + self.damping * v;
-            if x > self.max[axis] {
-                // Pushes down only.
-                -push(x - self.max[axis]).max(0.0)
-            } else if x < self.min[axis] {
-                // Pushes up only.
-                -push(x - self.min[axis]).min(0.0)
-            } else {
-                0.0
-            }
-        })
+        core::array::from_fn(|axis| self.force_along(axis, object.position[axis], object.velocity[axis]))
+    }
+
+    /// The force of the walls of one axis on an object there \[N\], at `x` \[m\] and with `v` [m/s].
+    #[must_use]
+    #[inline]
+    pub fn force_along(&self, axis: usize, x: f64, v: f64) -> f64 {
+        let push = |depth: f64| self.stiffness * depth + self.damping * v;
+        if x > self.max[axis] {
+            // Pushes down only.
+            -push(x - self.max[axis]).max(0.0)
+        } else if x < self.min[axis] {
+            // Pushes up only.
+            -push(x - self.min[axis]).min(0.0)
+        } else {
+            0.0
+        }
     }
 }
 

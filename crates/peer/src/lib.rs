@@ -43,7 +43,7 @@ pub use age::{Age, Ages};
 pub use clock::{Clock, Drift, DriftError};
 pub use config::{ArmConfig, Contact, CopyConfig, DeviceConfig, Direction, Gains, Hand};
 pub use coordination::{Command, Context, Coordination, Strategy};
-pub use device::{Device, RestingDevice, SimulatedDevice};
+pub use device::{Device, HandForce, RestingDevice, SimulatedDevice};
 pub use enclosure::Enclosure;
 pub use held::Held;
 pub use object::ObjectCopy;

@@ -12,12 +12,19 @@ pub struct ObjectCopy<const A: usize> {
     stepper: Stepper,
 }
 
+impl CopyConfig {
+    /// The copy on one axis: nothing ties it to ground.
+    #[must_use]
+    pub const fn plant(self) -> Plant {
+        Plant { mass: self.mass, damping: self.damping, stiffness: 0.0 }
+    }
+}
+
 impl<const A: usize> ObjectCopy<A> {
     /// A copy in that state.
     #[must_use]
     pub fn new(copy: CopyConfig, state: State<A>, integrator: Integrator, clock: &Clock) -> Self {
-        let plant = Plant { mass: copy.mass, damping: copy.damping, stiffness: 0.0 };
-        Self { state, stepper: Stepper::new(plant, integrator, clock) }
+        Self { state, stepper: Stepper::new(copy.plant(), integrator, clock) }
     }
 
     /// Where it is and how fast it moves.

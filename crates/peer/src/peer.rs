@@ -266,28 +266,13 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
 
     #[inline]
     fn coupling_force(&self, object: &State<A>) -> [f64; A] {
-        let Gains { stiffness: k_c, damping: b_c } = self.config.coupling;
-        match self.config.contact {
-            Contact::None => [0.0; A],
-            Contact::Grasp => {
-                let device = self.device.state();
-                //= Rakhsha & Constantinescu 2015, eq. (9): FC = KC·(xH − xO) + BC·(vH − vO)
-                core::array::from_fn(|axis| {
-                    k_c * (device.position[axis] - object.position[axis]) + b_c * (device.velocity[axis] - object.velocity[axis])
-                })
-            }
-            Contact::Push(direction) => {
-                let device = self.device.state();
-                let sign = if direction.positive { 1.0 } else { -1.0 };
-                core::array::from_fn(|axis| {
-                    let depth = sign * (device.position[axis] - object.position[axis]);
-                    if axis != direction.axis || depth <= 0.0 {
-                        return 0.0;
-                    }
-                    let closing = sign * (device.velocity[axis] - object.velocity[axis]);
-                    sign * (k_c * depth + b_c * closing).max(0.0)
-                })
-            }
+        let PeerConfig { contact, coupling, .. } = self.config;
+        if contact == Contact::None {
+            return [0.0; A];
         }
+        let device = self.device.state();
+        core::array::from_fn(|axis| {
+            contact.force_along(axis, coupling, device.position[axis] - object.position[axis], device.velocity[axis] - object.velocity[axis])
+        })
     }
 }

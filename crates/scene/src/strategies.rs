@@ -1,6 +1,6 @@
 //! Which strategy each peer runs: the scene's, or one of the caller's own.
 
-use cohaptic_peer::Strategy;
+use cohaptic_peer::{Gains, Strategy};
 use cohaptic_peer::coordination::BuiltIn;
 
 use crate::Scene;
@@ -14,6 +14,12 @@ pub trait Strategies {
 
     /// Makes the strategy of the peer in that place of [`Scene::peers`].
     fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> Self::Strategy<A>;
+
+    /// The gains KT and BT towards the mean of the samples held with which average-position coordination gives the same forces at every peer, to the bit;
+    /// `None` if these strategies are not known to be that. A run that knows can do without them.
+    fn towards_mean(&self, _scene: &Scene) -> Option<Gains> {
+        None
+    }
 }
 
 /// The strategy that the scene names, with its gains scaled by the number of peers.
@@ -27,5 +33,11 @@ impl Strategies for FromScene {
         let peers = scene.peers.len();
         let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(peers));
         scene.coordination.strategy.strategy(gains, peers)
+    }
+
+    fn towards_mean(&self, scene: &Scene) -> Option<Gains> {
+        let peers = scene.peers.len();
+        let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(peers));
+        scene.coordination.strategy.as_average_position(gains, peers)
     }
 }

@@ -141,8 +141,9 @@ impl LinkModel {
         }
     }
 
-    /// Whether fates are known as soon as packets are offered, and nothing is copied.
-    pub(crate) fn is_direct(&self) -> bool {
+    /// Whether what becomes of a packet is known as soon as it is offered, and nothing is copied: what a [`crate::DirectLink`] can be.
+    #[must_use]
+    pub fn is_direct(&self) -> bool {
         match self {
             Self::Fixed(config) => config.is_direct(),
             Self::Modulated(_) | Self::Replay(_) | Self::Kernel(_) => false,

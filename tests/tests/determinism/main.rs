@@ -1,6 +1,7 @@
 //! The same scene and seed give the same bytes, whatever the machinery, the number of threads, and who else takes part.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 
+mod arrays;
 mod bystander;
 mod models;
 mod threads;

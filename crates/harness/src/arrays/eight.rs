@@ -1,0 +1,102 @@
+//! Eight numbers at once.
+
+use std::ops::{Add, BitAnd, Div, Mul, Sub};
+
+/// How many numbers are computed at once: a cache line, and one register of the widest processors.
+pub(super) const WIDTH: usize = 8;
+
+/// Eight numbers that have the same done to them. Each is rounded as it would be alone, so what they are computed with changes no bit.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Eight(pub(super) [f64; WIDTH]);
+
+/// For each of eight numbers all bits or none.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Mask([u64; WIDTH]);
+
+impl Eight {
+    pub(super) const ZERO: Self = Self([0.0; WIDTH]);
+
+    #[inline(always)]
+    pub(super) fn splat(value: f64) -> Self {
+        Self([value; WIDTH])
+    }
+
+    #[inline(always)]
+    pub(super) fn abs(self) -> Self {
+        Self(self.0.map(f64::abs))
+    }
+
+    /// The smaller of each pair; of two equal ones, or where one is not a number, the second.
+    #[inline(always)]
+    pub(super) fn smaller(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
+    }
+
+    /// The larger of each pair; of two equal ones, or where one is not a number, the second.
+    #[inline(always)]
+    pub(super) fn larger(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
+    }
+}
+
+impl Mask {
+    pub(super) const NONE: Self = Self([0; WIDTH]);
+
+    pub(super) fn set(&mut self, place: usize, holds: bool) {
+        self.0[place] = if holds { u64::MAX } else { 0 };
+    }
+
+    pub(super) fn get(&self, place: usize) -> bool {
+        self.0[place] != 0
+    }
+
+    /// `yes` where it holds, `no` elsewhere.
+    #[inline(always)]
+    pub(super) fn choose(self, yes: Eight, no: Eight) -> Eight {
+        Eight(std::array::from_fn(|i| f64::from_bits(yes.0[i].to_bits() & self.0[i] | no.0[i].to_bits() & !self.0[i])))
+    }
+}
+
+/// The numbers where the mask holds, +0 elsewhere.
+impl BitAnd<Mask> for Eight {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitand(self, mask: Mask) -> Self {
+        Self(std::array::from_fn(|i| f64::from_bits(self.0[i].to_bits() & mask.0[i])))
+    }
+}
+
+macro_rules! each {
+    ($operation:ident, $name:ident, $sign:tt) => {
+        impl $operation for Eight {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                Self(std::array::from_fn(|i| self.0[i] $sign other.0[i]))
+            }
+        }
+    };
+}
+each!(Add, add, +);
+each!(Sub, sub, -);
+each!(Mul, mul, *);
+each!(Div, div, /);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mask_takes_away_even_the_sign_of_zero() {
+        let mut mask = Mask::NONE;
+        mask.set(1, true);
+        let masked = Eight::splat(-0.0) & mask;
+        assert_eq!((masked.0[0].to_bits(), masked.0[1].to_bits()), (0, (-0.0_f64).to_bits()));
+        let chosen = mask.choose(Eight::splat(1.0), Eight::splat(2.0));
+        assert_eq!((chosen.0[0], chosen.0[1], mask.get(0), mask.get(1)), (2.0, 1.0, false, true));
+    }
+}

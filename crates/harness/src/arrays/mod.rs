@@ -1,0 +1,212 @@
+//! Scenes that need no events: all numbers of all peers in arrays, one scene or several of one shape side by side.
+//!
+//! Where everybody ticks together, nothing changes on the way, no packet waits for another, and nobody watches, a run is a loop over ticks: who sends,
+//! what has arrived, forces, motion. Here that loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. It is what
+//! [`crate::world::World`] does, with the same operations in the same order on each number, the same random numbers at the same addresses and the same
+//! counters, and comes to the same [`Summary`] to the bit.
+
+mod blocks;
+mod eight;
+mod place;
+mod samples;
+mod shape;
+mod side_by_side;
+
+use cohaptic_peer::Gains;
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+use cohaptic_wan::LinkStats;
+
+use crate::simulation::BREATH;
+use crate::summary::{Ending, LinkSummary, PeerSummary, Summary};
+use blocks::{Blocks, Moved};
+use place::Places;
+use samples::{Broadcast, Single};
+pub(crate) use shape::Shape;
+pub use side_by_side::{run_side_by_side, same_shape};
+
+/// L runs of scenes of one shape with A axes.
+#[derive(Debug)]
+pub(crate) struct Arrays<'a, const A: usize, const L: usize> {
+    scenes: [&'a Scene; L],
+    shape: Shape,
+    blocks: Blocks<A>,
+    samples: Samples<A, L>,
+    /// The tick at which each peer sends next.
+    next_send: Vec<u64>,
+    earliest_send: u64,
+    max_discrepancy: [f64; L],
+    finite: [bool; L],
+    summaries: [Option<Summary>; L],
+}
+
+/// How samples travel.
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one for each run")]
+enum Samples<const A: usize, const L: usize> {
+    Broadcast(Broadcast<A, L>),
+    Single(Single<A, L>),
+}
+
+impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
+    /// The scenes at their beginning, all of that shape.
+    pub(crate) fn new(scenes: [&'a Scene; L], shape: Shape, gains: [Gains; L]) -> Self {
+        let places = Places { peers: shape.peers, runs: L };
+        let tick_nanos = nanos(shape.tick);
+        let samples = match shape.delay {
+            Some(delay) => Samples::Broadcast(Broadcast::new(&scenes, nanos(delay).div_ceil(tick_nanos))),
+            None => Samples::Single(Single::new(&scenes, shape.end, tick_nanos)),
+        };
+        Self {
+            blocks: Blocks::new(places, &scenes, &gains),
+            scenes,
+            samples,
+            earliest_send: shape.phases.iter().copied().min().unwrap_or(u64::MAX),
+            next_send: shape.phases.clone(),
+            shape,
+            max_discrepancy: [0.0; L],
+            finite: [true; L],
+            summaries: [const { None }; L],
+        }
+    }
+
+    /// Runs all of them to their end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
+    pub(crate) fn run(mut self, mut keep_going: impl FnMut(Instant) -> bool) -> [Summary; L] {
+        let tick_nanos = nanos(self.shape.tick);
+        let mut tick = 0;
+        loop {
+            let now = Instant::from_nanos(tick * tick_nanos);
+            if tick > 0 && tick % u64::from(BREATH) == 0 {
+                let before = Instant::from_nanos((tick - 1) * tick_nanos);
+                if !keep_going(before) {
+                    self.end_all(tick, |_| Ending::Interrupted(before));
+                    break;
+                }
+            }
+            if now >= self.shape.end {
+                if let Samples::Single(samples) = &mut self.samples {
+                    samples.finish(tick);
+                }
+                let end = self.shape.end;
+                self.end_all(tick, |finite| if finite { Ending::Complete } else { Ending::Diverged(end) });
+                break;
+            }
+            if self.finite.contains(&false) && self.end_diverged(tick, now) {
+                break;
+            }
+            self.step(tick, now);
+            tick += 1;
+        }
+        self.summaries.map(|summary| summary.expect("every run has ended"))
+    }
+
+    /// Everything that happens at a tick.
+    #[inline(always)]
+    fn step(&mut self, tick: u64, now: Instant) {
+        if tick == self.earliest_send {
+            self.send(tick, now);
+        }
+        match &mut self.samples {
+            Samples::Broadcast(samples) => samples.deliver(tick, &mut self.blocks),
+            Samples::Single(samples) => samples.deliver(tick, &mut self.blocks),
+        }
+        self.blocks.move_hands(now);
+        let Moved { discrepancy, finite } = self.blocks.advance::<L>();
+        for run in 0..L {
+            self.max_discrepancy[run] = self.max_discrepancy[run].max(discrepancy[run]);
+        }
+        self.finite = finite;
+    }
+
+    fn send(&mut self, tick: u64, now: Instant) {
+        let goes_on: [bool; L] = std::array::from_fn(|run| self.summaries[run].is_none());
+        for (peer, next) in self.next_send.iter_mut().enumerate() {
+            if *next != tick {
+                continue;
+            }
+            *next += self.shape.send_every;
+            match &mut self.samples {
+                Samples::Broadcast(samples) => samples.send(tick, peer, &self.blocks),
+                Samples::Single(samples) => samples.send(tick, now, peer, &self.blocks, &goes_on),
+            }
+        }
+        self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
+    }
+
+    /// Ends the runs that have diverged before that tick, and says whether none is left.
+    #[cold]
+    fn end_diverged(&mut self, tick: u64, now: Instant) -> bool {
+        for run in 0..L {
+            if !self.finite[run] && self.summaries[run].is_none() {
+                self.end(run, tick, Ending::Diverged(now));
+            }
+        }
+        self.summaries.iter().all(Option::is_some)
+    }
+
+    fn end_all(&mut self, ticks: u64, ending: impl Fn(bool) -> Ending) {
+        for run in 0..L {
+            if self.summaries[run].is_none() {
+                self.end(run, ticks, ending(self.finite[run]));
+            }
+        }
+    }
+
+    /// Writes down what came out of a run after so many ticks.
+    fn end(&mut self, run: usize, ticks: u64, ending: Ending) {
+        let stop = match ending {
+            Ending::Complete => self.shape.end,
+            Ending::Diverged(at) | Ending::Interrupted(at) => at,
+        };
+        // Packets are delivered up to the latest tick, and to the end of the scene if that was reached.
+        let delivered_until = match ending {
+            Ending::Complete => self.shape.end,
+            Ending::Diverged(at) if at == self.shape.end => at,
+            Ending::Diverged(_) | Ending::Interrupted(_) => Instant::from_nanos((ticks - 1) * nanos(self.shape.tick)),
+        };
+        if delivered_until < self.shape.end
+            && let Samples::Single(samples) = &mut self.samples
+        {
+            samples.end_early(run);
+        }
+        let peers = self.scenes[run].peers.iter().enumerate().map(|(place, peer)| {
+            let (position, velocity) = (0..A).map(|axis| self.blocks.object(axis, place, run)).unzip();
+            let stale_samples = match &self.samples {
+                Samples::Broadcast(_) => 0,
+                Samples::Single(samples) => samples.stale_samples(place, run),
+            };
+            PeerSummary { name: peer.name.clone(), position, velocity, stale_samples, refused_samples: 0 }
+        });
+        let places = 0..self.shape.peers;
+        let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
+        let links = pairs.map(|(from, to)| LinkSummary { from, to, stats: self.link_stats(from, to, run, ticks, delivered_until) });
+        self.summaries[run] = Some(Summary {
+            ending,
+            duration: stop - Instant::ZERO,
+            ticks,
+            peers: peers.collect(),
+            links: links.collect(),
+            access_lines: Vec::new(),
+            max_discrepancy: self.max_discrepancy[run],
+        });
+    }
+
+    /// The counters of a link after so many ticks, if what arrives by an instant is delivered.
+    fn link_stats(&self, from: usize, to: usize, run: usize, ticks: u64, until: Instant) -> LinkStats {
+        let delay = match (&self.samples, self.shape.delay) {
+            (Samples::Single(samples), _) => return samples.stats(from, to, run),
+            (Samples::Broadcast(_), delay) => nanos(delay.unwrap_or_default()),
+        };
+        // Over a constant delay a link need not count: sent at phase, phase + M, phase + 2M …
+        let sent_before = |ticks: u64| ticks.saturating_sub(self.shape.phases[from]).div_ceil(self.shape.send_every);
+        let last = until.as_nanos().checked_sub(delay).map(|nanos| nanos / crate::arrays::nanos(self.shape.tick));
+        let offered = sent_before(ticks);
+        let delivered = last.map_or(0, |last| sent_before(last.saturating_add(1).min(ticks)));
+        LinkStats::counted(offered, delivered, u128::from(delivered) * u128::from(delay), [])
+    }
+}
+
+/// A span of at most a year.
+fn nanos(span: std::time::Duration) -> u64 {
+    u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
+}

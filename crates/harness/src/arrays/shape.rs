@@ -1,0 +1,64 @@
+//! Which scenes can be run in arrays, and which of them side by side.
+
+use std::time::Duration;
+
+use cohaptic_peer::Gains;
+use cohaptic_scene::{Scene, Strategies};
+use cohaptic_units::Instant;
+use cohaptic_wan::LinkModel;
+
+use crate::plan::{Plan, Ticking};
+
+/// What two scenes must have in common to be run side by side.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Shape {
+    pub(super) peers: usize,
+    pub(super) axes: usize,
+    pub(super) tick: Duration,
+    pub(super) end: Instant,
+    /// Ticks from one sample to the next.
+    pub(super) send_every: u64,
+    /// The tick at which each peer sends first.
+    pub(super) phases: Vec<u64>,
+    /// The delay of all links, if they do nothing but delay, all alike.
+    pub(super) delay: Option<Duration>,
+}
+
+/// A year: far from where instants end, so that sums of a few need no care.
+const LONGEST: Duration = Duration::from_secs(365 * 86_400);
+
+impl Shape {
+    /// The shape of a scene that can be run in arrays: everybody ticks together, nothing changes on the way, and over the links nothing waits. `None` for
+    /// any other, and for strategies that are not average-position coordination.
+    pub(crate) fn of(scene: &Scene, plan: &Plan, strategies: &impl Strategies) -> Option<(Self, Gains)> {
+        let gains = strategies.towards_mean(scene)?;
+        let clock = scene.peers.first()?.clock;
+        let fits = plan.ticking == Ticking::Lockstep
+            && !plan.general_links
+            && scene.timeline.is_empty()
+            && scene.duration <= LONGEST
+            && clock.tick <= LONGEST
+            && scene.peers.len() <= usize::from(u16::MAX)
+            && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none())
+            && scene.links.used().all(|(link, _)| link.is_direct());
+        fits.then(|| {
+            let shape = Self {
+                peers: scene.peers.len(),
+                axes: plan.axes.count(),
+                tick: clock.tick,
+                end: Instant::ZERO.saturating_add(scene.duration),
+                send_every: u64::try_from(scene.coordination.update.as_nanos() / clock.tick.as_nanos()).unwrap_or(u64::MAX),
+                phases: scene.peers.iter().map(|peer| peer.phase).collect(),
+                delay: one_delay(scene),
+            };
+            (shape, gains)
+        })
+    }
+}
+
+/// The delay of all links, if they have one and nothing else.
+fn one_delay(scene: &Scene) -> Option<Duration> {
+    let mut delays = scene.links.used().map(|(link, _)| link.is_constant_delay().then(|| LinkModel::mean_delay(link)));
+    let first = delays.next()??;
+    (first <= LONGEST && delays.all(|delay| delay == Some(first))).then_some(first)
+}
