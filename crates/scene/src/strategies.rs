@@ -1,7 +1,7 @@
 //! Which strategy each peer runs: the scene's, or one of the caller's own.
 
-use cohaptic_peer::{Gains, Strategy};
 use cohaptic_peer::coordination::BuiltIn;
+use cohaptic_peer::{Gains, Strategy};
 
 use crate::Scene;
 

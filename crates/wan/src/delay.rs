@@ -9,7 +9,7 @@ use cohaptic_units::print::Span;
 
 use crate::Distribution;
 use crate::law::{Law, LawError};
-use crate::normal::standard_normal;
+use crate::normal::{in_the_core, outside_the_core, standard_normal};
 use crate::random::{PacketDraws, Purpose};
 
 /// Random variation of the delay around its mean.
@@ -237,6 +237,11 @@ impl DelayStage {
         Self { mean_nanos: u64::try_from(delay.mean.as_nanos()).unwrap_or(u64::MAX), law }
     }
 
+    /// Whether a delay depends on those before.
+    pub(crate) const fn remembers(&self) -> bool {
+        matches!(self.law, StageLaw::Correlated(_))
+    }
+
     /// New laws for later packets. Correlated delays go on from where they are.
     pub(crate) fn reconfigure(&mut self, delay: &Delay) {
         let before = core::mem::replace(self, Self::new(delay));
@@ -257,10 +262,12 @@ impl DelayStage {
         match &self.law {
             StageLaw::Constant => self.mean_nanos,
             StageLaw::Normal { sd_nanos } => {
-                let mut more = packet.more(purpose);
-                let deviation = libm::rint(sd_nanos * standard_normal(word, || more.next_word()));
-                #[expect(clippy::cast_possible_truncation, reason = "saturates, beyond 292 years")]
-                self.mean_nanos.saturating_add_signed(deviation as i64)
+                let normal = in_the_core(word).unwrap_or_else(|| {
+                    let mut more = packet.more(purpose);
+                    outside_the_core(word, || more.next_word())
+                });
+                let deviation = sd_nanos * normal;
+                self.mean_nanos.saturating_add_signed(nearest(deviation))
             }
             StageLaw::Independent(_) | StageLaw::Correlated(_) => self.draw_by_law(purpose, now, word, packet),
         }
@@ -298,6 +305,18 @@ fn nanos(span: Duration) -> f64 {
     span.as_nanos() as f64
 }
 
+/// The nearest whole number, of two the even one; saturates beyond 2^63.
+///
+/// Adding 1.5·2^52 leaves no room for a fraction, and the whole number in the lower bits: below 2^51 that is `rint` in an addition and a subtraction, where
+/// `libm`'s is a call.
+#[inline]
+#[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "saturates; a difference of bits that may be negative")]
+fn nearest(number: f64) -> i64 {
+    const ROOM: f64 = 6_755_399_441_055_744.0;
+    const SMALL: f64 = 2_251_799_813_685_248.0;
+    if number.abs() < SMALL { (number + ROOM).to_bits().wrapping_sub(ROOM.to_bits()) as i64 } else { libm::rint(number) as i64 }
+}
+
 /// A delay as a whole number of nanoseconds.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "laws are not below their floor; saturates beyond 584 years")]
 fn count(nanos: f64) -> u64 {
@@ -310,6 +329,17 @@ mod tests {
     use crate::random::Stream;
 
     const MILLISECOND: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn the_nearest_whole_number_is_what_rint_says() {
+        let halves = (-9..=9).map(|number| f64::from(number) / 2.0);
+        let edges =
+            [0.0, -0.0, 2_251_799_813_685_247.5, -2_251_799_813_685_247.5, 2_251_799_813_685_248.5, 4.5e15, -4.5e15, 1e19, -1e19, f64::INFINITY];
+        let drawn = (0..100_000).map(|n| (Stream::new(3, b"nearest").packet(n).first(Purpose::Jitter) as i64) as f64 / 2_f64.powi((n % 80) as i32));
+        for number in halves.chain(edges).chain(drawn) {
+            assert_eq!(nearest(number), libm::rint(number) as i64, "{number}");
+        }
+    }
 
     /// Delays \[ms\] of packets so far apart.
     fn draws(delay: &Delay, count: u64, gap: Duration) -> Vec<f64> {

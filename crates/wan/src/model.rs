@@ -141,7 +141,7 @@ impl LinkModel {
         }
     }
 
-    /// Whether what becomes of a packet is known as soon as it is offered, and nothing is copied: what a [`crate::DirectLink`] can be.
+    /// Whether what becomes of a packet is known as soon as it is offered, and nothing is copied: what [`crate::DirectLinks`] takes.
     #[must_use]
     pub fn is_direct(&self) -> bool {
         match self {

@@ -29,12 +29,6 @@ impl OrderStage {
         self.policy = policy;
     }
 
-    /// The latest arrival so far.
-    #[inline]
-    pub(crate) const fn latest(&self) -> Instant {
-        self.latest
-    }
-
     /// The arrival that the policy allows for one that is wanted.
     #[inline]
     pub(crate) fn arrival(&mut self, wanted: Instant) -> Instant {

@@ -29,8 +29,7 @@ pub(crate) struct Seldom {
 }
 
 impl LinkStats {
-    /// What a driver has counted that keeps what is on the way over a [`crate::DirectLink`] itself: packets offered, delivered, and dropped for a cause; the
-    /// delays of those delivered in all \[ns\].
+    /// What was counted elsewhere: packets offered, delivered, and dropped for a cause; the delays of those delivered in all \[ns\].
     #[must_use]
     pub fn counted(offered: u64, delivered: u64, delay_nanos: u128, dropped: impl IntoIterator<Item = (DropCause, u64)>) -> Self {
         let mut stats = Self { flow: Flow { offered, delivered, delay_nanos }, seldom: Seldom::default() };

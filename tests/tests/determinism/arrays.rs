@@ -72,11 +72,8 @@ proptest! {
 /// Of the scenes of other shapes none is lost or mixed up.
 #[test]
 fn shipped_scenes_side_by_side_come_to_what_each_comes_to_alone() {
-    let mut scenes: Vec<Scene> = shipped_scenes()
-        .iter()
-        .map(|path| Scene::read(path, &[]).unwrap())
-        .filter(|scene| scene.peers.len() <= 10)
-        .collect();
+    let mut scenes: Vec<Scene> =
+        shipped_scenes().iter().map(|path| Scene::read(path, &[]).unwrap()).filter(|scene| scene.peers.len() <= 10).collect();
     for scene in &mut scenes {
         scene.duration = scene.duration.min(Duration::from_millis(500));
         scene.expect = None;

@@ -6,7 +6,7 @@ use cohaptic_peer::{Contact, Enclosure, Gains, HandForce, Plant, State, StepMap}
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use super::eight::{Eight, Mask, WIDTH};
+use super::eight::{Eight, Mask, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
 
 /// All bodies on all axes.
@@ -240,7 +240,8 @@ impl<const A: usize> Blocks<A> {
     #[inline(always)]
     fn finite<const L: usize>(&self, size: Eight) -> [bool; L] {
         // A sum of sizes is finite only if they all are. Were it not for overflow it would also be so the other way round.
-        if size.0.iter().all(|size| *size < f64::INFINITY) { [true; L] } else { self.look_at_each() }
+        let [a, b, c, d, e, f, g, h] = size.0;
+        if ((a + e) + (b + f)) + ((c + g) + (d + h)) < f64::INFINITY { [true; L] } else { self.look_at_each() }
     }
 
     #[cold]
@@ -259,14 +260,15 @@ impl<const A: usize> Blocks<A> {
 
 /// The distance from the least to the greatest of each run.
 #[inline(always)]
-fn distances<const L: usize>(low: Eight, high: Eight) -> [f64; L] {
-    let (mut least, mut greatest) = ([f64::INFINITY; L], [f64::NEG_INFINITY; L]);
-    for lane in 0..WIDTH {
-        let run = lane % L;
-        least[run] = if low.0[lane] < least[run] { low.0[lane] } else { least[run] };
-        greatest[run] = if high.0[lane] > greatest[run] { high.0[lane] } else { greatest[run] };
+fn distances<const L: usize>(mut low: Eight, mut high: Eight) -> [f64; L] {
+    let mut width = WIDTH;
+    while width > L {
+        width /= 2;
+        for lane in 0..width {
+            (low.0[lane], high.0[lane]) = (smaller(low.0[lane], low.0[lane + width]), larger(high.0[lane], high.0[lane + width]));
+        }
     }
-    std::array::from_fn(|run| greatest[run] - least[run])
+    std::array::from_fn(|run| high.0[run] - low.0[run])
 }
 
 impl Block {

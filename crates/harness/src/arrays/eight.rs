@@ -28,17 +28,29 @@ impl Eight {
         Self(self.0.map(f64::abs))
     }
 
-    /// The smaller of each pair; of two equal ones, or where one is not a number, the second.
+    /// The smaller of each pair.
     #[inline(always)]
     pub(super) fn smaller(self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
+        Self(std::array::from_fn(|i| smaller(self.0[i], other.0[i])))
     }
 
-    /// The larger of each pair; of two equal ones, or where one is not a number, the second.
+    /// The larger of each pair.
     #[inline(always)]
     pub(super) fn larger(self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
+        Self(std::array::from_fn(|i| larger(self.0[i], other.0[i])))
     }
+}
+
+/// The smaller of two; if they are equal, or one is not a number, the second. One instruction, which [`f64::min`] is not.
+#[inline(always)]
+pub(super) fn smaller(one: f64, other: f64) -> f64 {
+    if one < other { one } else { other }
+}
+
+/// The larger of two; if they are equal, or one is not a number, the second.
+#[inline(always)]
+pub(super) fn larger(one: f64, other: f64) -> f64 {
+    if one > other { one } else { other }
 }
 
 impl Mask {

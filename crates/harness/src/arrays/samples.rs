@@ -1,11 +1,15 @@
 //! Samples between peers: what is on the way, and what each peer holds of the others.
 
+use cohaptic_peer::State;
+use cohaptic_scene::Scene;
+
 use super::blocks::Blocks;
 
 pub(super) use broadcast::Broadcast;
 pub(super) use single::Single;
 
 mod broadcast;
+mod quads;
 mod single;
 
 /// A sample of every run, along all axes.
@@ -16,6 +20,15 @@ struct Sample<const A: usize, const L: usize> {
 }
 
 impl<const A: usize, const L: usize> Sample<A, L> {
+    /// Where a peer begins.
+    fn initial(scenes: &[&Scene], peer: usize) -> Self {
+        let states: Vec<State<A>> = scenes.iter().map(|scene| scene.initial_state(peer)).collect();
+        Self {
+            position: std::array::from_fn(|axis| std::array::from_fn(|run| states[run].position[axis])),
+            velocity: std::array::from_fn(|axis| std::array::from_fn(|run| states[run].velocity[axis])),
+        }
+    }
+
     /// What a peer sends now.
     #[inline(always)]
     fn of(blocks: &Blocks<A>, peer: usize) -> Self {
@@ -27,27 +40,6 @@ impl<const A: usize, const L: usize> Sample<A, L> {
         }
         sample
     }
-}
-
-/// The mean of samples of each run, which lie one after the other, in the order in which [`cohaptic_peer::Held::refresh`] adds them.
-#[inline(always)]
-fn mean<const L: usize>(values: &[f64], count: f64) -> [f64; L] {
-    let mut sums = [[0.0; L]; 4];
-    let mut quads = values.chunks_exact(4 * L);
-    for quad in &mut quads {
-        for place in 0..4 {
-            for run in 0..L {
-                sums[place][run] += quad[place * L + run];
-            }
-        }
-    }
-    for (place, values) in quads.remainder().chunks_exact(L).enumerate() {
-        for run in 0..L {
-            sums[place][run] += values[run];
-        }
-    }
-    let [a, b, c, d] = sums;
-    std::array::from_fn(|run| ((a[run] + b[run]) + (c[run] + d[run])) / count)
 }
 
 /// How many others there are, as a number to divide by.

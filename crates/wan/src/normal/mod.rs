@@ -13,8 +13,14 @@ use tables::{F, R, X};
 #[must_use]
 #[inline]
 pub fn standard_normal(word: u64, more: impl FnMut() -> u64) -> f64 {
+    in_the_core(word).unwrap_or_else(|| outside_the_core(word, more))
+}
+
+/// The standard normal number of a uniform word, in the 98.8 % of the cases in which it takes no more than that one.
+#[inline(always)]
+pub(crate) fn in_the_core(word: u64) -> Option<f64> {
     let (layer, size) = point(word);
-    if size < X[layer + 1] { signed(word, size) } else { outside_the_core(word, more) }
+    (size < X[layer + 1]).then(|| signed(word, size))
 }
 
 /// The layer, and how far to the right in it. They and the sign are different bits of the word.
@@ -24,14 +30,15 @@ fn point(word: u64) -> (usize, f64) {
     (layer, unit(word) * X[layer])
 }
 
+/// Without a branch, which a processor would get wrong every second time: that took a fifth off a packet with jitter.
 #[inline]
 fn signed(word: u64, size: f64) -> f64 {
-    if word & 0x100 == 0 { size } else { -size }
+    f64::from_bits(size.to_bits() | (word & 0x100) << 55)
 }
 
 /// The first point lies in a wedge or in the tail: goes on with more words until one lies under the density.
 #[cold]
-fn outside_the_core(mut word: u64, mut more: impl FnMut() -> u64) -> f64 {
+pub(crate) fn outside_the_core(mut word: u64, mut more: impl FnMut() -> u64) -> f64 {
     loop {
         let (layer, size) = point(word);
         if size < X[layer + 1] {

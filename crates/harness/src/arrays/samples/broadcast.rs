@@ -6,7 +6,8 @@ use std::collections::VecDeque;
 
 use cohaptic_scene::Scene;
 
-use super::{Sample, mean, others};
+use super::quads::{self, Quad};
+use super::{Sample, others};
 use crate::arrays::blocks::Blocks;
 
 /// What is on the way, and what is held from each sender.
@@ -15,11 +16,10 @@ pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
     delay_ticks: u64,
     on_the_way: VecDeque<Sent<A, L>>,
     peers: usize,
-    /// By axis, then sender, then run.
-    positions: [Vec<f64>; A],
-    velocities: [Vec<f64>; A],
+    /// What is held from each sender but the first, by axis, as the first peer holds it; and from the first.
+    held: [Vec<Quad<L>>; A],
+    first: Sample<A, L>,
     changed: bool,
-    scratch: (Vec<f64>, Vec<f64>),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -34,18 +34,18 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
     pub(in crate::arrays) fn new(scenes: &[&Scene], delay_ticks: u64) -> Self {
         let peers = scenes[0].peers.len();
-        let initial = |axis: usize, pick: fn(&cohaptic_peer::State<A>) -> &[f64; A]| {
-            (0..peers).flat_map(move |peer| scenes.iter().map(move |scene| pick(&scene.initial_state(peer))[axis])).collect()
-        };
-        Self {
+        let mut broadcast = Self {
             delay_ticks,
             on_the_way: VecDeque::new(),
             peers,
-            positions: std::array::from_fn(|axis| initial(axis, |state| &state.position)),
-            velocities: std::array::from_fn(|axis| initial(axis, |state| &state.velocity)),
+            held: std::array::from_fn(|_| quads::empty(peers - 1)),
+            first: Sample::initial(scenes, 0),
             changed: true,
-            scratch: (vec![0.0; peers * L], vec![0.0; peers * L]),
+        };
+        for sender in 0..peers {
+            broadcast.hold(sender, &Sample::initial(scenes, sender));
         }
+        broadcast
     }
 
     /// A peer sends to all others.
@@ -55,37 +55,49 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         self.on_the_way.push_back(Sent { due, sender, sample: Sample::of(blocks, sender) });
     }
 
-    /// What has arrived is held from now on, and the means are those of what is held.
-    #[inline(always)]
-    pub(in crate::arrays) fn deliver(&mut self, tick: u64, blocks: &mut Blocks<A>) {
+    /// What has arrived is held from now on.
+    pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
         while let Some(&Sent { sender, sample, .. }) = self.on_the_way.front().filter(|sent| sent.due <= tick) {
             self.on_the_way.pop_front();
-            for axis in 0..A {
-                self.positions[axis][sender * L..(sender + 1) * L].copy_from_slice(&sample.position[axis]);
-                self.velocities[axis][sender * L..(sender + 1) * L].copy_from_slice(&sample.velocity[axis]);
-            }
+            self.hold(sender, &sample);
             self.changed = true;
-        }
-        if self.changed {
-            self.changed = false;
-            self.refresh(blocks);
         }
     }
 
     #[inline(always)]
-    fn refresh(&mut self, blocks: &mut Blocks<A>) {
+    fn hold(&mut self, sender: usize, sample: &Sample<A, L>) {
+        let Some(place) = sender.checked_sub(1) else {
+            self.first = *sample;
+            return;
+        };
+        for axis in 0..A {
+            for run in 0..L {
+                quads::set(&mut self.held[axis], place, run, sample.position[axis][run], sample.velocity[axis][run]);
+            }
+        }
+    }
+
+    /// The means are those of what is held.
+    #[inline(always)]
+    pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks<A>) {
+        if !std::mem::take(&mut self.changed) {
+            return;
+        }
         let count = others(self.peers);
         for axis in 0..A {
-            // The receiver's own sample comes first and those of the others follow in their order: from one receiver to the next two samples change places.
-            self.scratch.0.copy_from_slice(&self.positions[axis]);
-            self.scratch.1.copy_from_slice(&self.velocities[axis]);
-            let (positions, velocities) = (&mut self.scratch.0[..], &mut self.scratch.1[..]);
+            let held = &mut self.held[axis];
+            // From one receiver to the next, its own sample is replaced by that of the receiver before.
+            let mut own = (self.first.position[axis], self.first.velocity[axis]);
             for peer in 0..self.peers {
-                for run in (0..L).filter(|_| peer > 0) {
-                    positions.swap(run, peer * L + run);
-                    velocities.swap(run, peer * L + run);
+                if peer > 0 {
+                    quads::swap(held, peer - 1, &mut own);
                 }
-                blocks.set_target(axis, peer, mean::<L>(&positions[L..], count), mean::<L>(&velocities[L..], count));
+                let (x, v) = quads::mean(held, count);
+                blocks.set_target(axis, peer, x, v);
+            }
+            // And back.
+            for peer in (1..self.peers).rev() {
+                quads::swap(held, peer - 1, &mut own);
             }
         }
     }

@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
-use cohaptic_wan::{DirectLink, DropCause, LinkName, LinkStats};
+use cohaptic_wan::{Arrivals, DirectLinks, LinkName, LinkStats};
 
-use super::{Sample, mean, others};
+use super::quads::{self, Quad};
+use super::{Sample, others};
 use crate::arrays::blocks::Blocks;
-use crate::arrays::eight::WIDTH;
 
 /// Ticks ahead that lie in the wheel, a power of two; what arrives later than that is kept aside.
 const HORIZON: u64 = 256;
@@ -20,162 +20,171 @@ const HORIZON: u64 = 256;
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct Single<const A: usize, const L: usize> {
     peers: usize,
-    tick_nanos: u64,
+    ticks: Ticks,
     end: Instant,
     /// By sender, then receiver, then run; the diagonal is never used.
-    links: Vec<Link>,
-    wheel: Vec<Bucket<A>>,
+    links: DirectLinks,
+    wheel: Box<[Bucket<A>; HORIZON as usize]>,
     beyond: BTreeMap<u64, Bucket<A>>,
-    /// By axis, then receiver, sender with the receiver left out, and run.
-    positions: [Vec<f64>; A],
-    velocities: [Vec<f64>; A],
-    /// The lowest sequence number that is newer than what is held.
+    /// Memory of buckets that were emptied, the latest last: it is what the cache holds. With memory of its own in each bucket a packet took 10 ns more.
+    emptied: Vec<Vec<Packet<A>>>,
+    /// Samples held, by axis, then receiver, then sender with the receiver left out. Each receiver has [`row_of`] places, of which the last may be empty.
+    held: [Vec<Quad<L>>; A],
+    /// By place, then run: the lowest sequence number that is newer than what is held.
     next: Vec<u64>,
     changed: Vec<bool>,
     /// By receiver, then run: samples that arrived after a newer one.
     stale: Vec<u64>,
 }
 
-#[derive(Clone, Debug)]
-struct Link {
-    link: DirectLink,
-    offered: u64,
-    /// Those that arrive by the end of the scene, and their delays.
-    delivered: u64,
-    delay_nanos: u128,
-    outage: u64,
-    lost: u64,
-}
-
 /// What is in force at a tick.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 struct Bucket<const A: usize> {
     packets: Vec<Packet<A>>,
     /// Whether one of them overtook another that may be here too.
     is_mixed: bool,
 }
 
+impl<const A: usize> Default for Bucket<A> {
+    fn default() -> Self {
+        Self { packets: Vec::new(), is_mixed: false }
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Packet<const A: usize> {
     arrival: Instant,
     sequence: u64,
-    sent: Instant,
-    /// Where its receiver holds what it says: receiver, sender with the receiver left out, run.
+    /// Where its receiver holds what it says.
     place: u32,
     receiver: u16,
-    sender: u16,
+    run: u16,
     position: [f64; A],
     velocity: [f64; A],
+}
+
+/// How many places a receiver has for what it holds: whole quads.
+const fn row_of(peers: usize) -> usize {
+    (peers - 1).next_multiple_of(4)
+}
+
+/// How many ticks a span takes, rounded up.
+#[derive(Clone, Copy, Debug)]
+struct Ticks {
+    nanos: u64,
+    /// ⌈2^64/nanos⌉, if ticks are shorter than 2^31 ns.
+    reciprocal: Option<u64>,
+}
+
+impl Ticks {
+    fn new(nanos: u64) -> Self {
+        Self { nanos, reciprocal: (2..1 << 31).contains(&nanos).then(|| u64::MAX / nanos + 1) }
+    }
+
+    /// A division takes a third of the time of all that happens to a packet. With r = ⌈2^64/d⌉ = (2^64 + e)/d, 0 ≤ e < d, the product n·r/2^64 is
+    /// n/d + n·e/(d·2^64), which has the same whole part as n/d while n·e < 2^64: for n and d below 2^32.
+    #[inline(always)]
+    fn count(self, span: u64) -> u64 {
+        match self.reciprocal {
+            Some(reciprocal) if span < 1 << 31 => ((u128::from(span + self.nanos - 1) * u128::from(reciprocal)) >> 64) as u64,
+            _ => span.div_ceil(self.nanos),
+        }
+    }
 }
 
 impl<const A: usize, const L: usize> Single<A, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
     pub(in crate::arrays) fn new(scenes: &[&Scene], end: Instant, tick_nanos: u64) -> Self {
         let peers = scenes[0].peers.len();
-        let mut links = Vec::with_capacity(peers * peers * L);
+        let mut links = DirectLinks::new(end);
         for from in 0..peers {
             for to in 0..peers {
                 for scene in scenes {
                     // The diagonal has a link that nothing is ever sent over, so that a place is found by multiplying.
                     let (from, to) = if from == to { (0, 1) } else { (from, to) };
                     let name = LinkName::between(&scene.peers[from].name, &scene.peers[to].name);
-                    let link = DirectLink::new(scene.seed, &name, scene.links.between(from, to)).expect("the shape of a scene says so");
-                    links.push(Link { link, offered: 0, delivered: 0, delay_nanos: 0, outage: 0, lost: 0 });
+                    assert!(links.add(scene.seed, &name, scene.links.between(from, to)), "the shape of a scene says that its links are direct");
                 }
             }
         }
-        let initial = |axis: usize, pick: fn(&cohaptic_peer::State<A>) -> &[f64; A]| {
-            let places = (0..peers).flat_map(|receiver| (0..peers).filter(move |sender| *sender != receiver));
-            places.flat_map(|sender| scenes.iter().map(move |scene| pick(&scene.initial_state(sender))[axis])).collect()
-        };
-        Self {
+        let row = row_of(peers);
+        let mut single = Self {
             peers,
-            tick_nanos,
+            ticks: Ticks::new(tick_nanos),
             end,
             links,
-            wheel: vec![Bucket::default(); HORIZON as usize],
+            wheel: Box::new(std::array::from_fn(|_| Bucket::default())),
             beyond: BTreeMap::new(),
-            positions: std::array::from_fn(|axis| initial(axis, |state| &state.position)),
-            velocities: std::array::from_fn(|axis| initial(axis, |state| &state.velocity)),
-            next: vec![0; peers * (peers - 1) * L],
+            emptied: Vec::new(),
+            held: std::array::from_fn(|_| (0..peers).flat_map(|_| quads::empty(peers - 1)).collect()),
+            next: vec![0; peers * row * L],
             changed: vec![true; peers],
             stale: vec![0; peers * L],
-        }
-    }
-
-    /// A peer sends to all others in the runs that go on.
-    #[inline(always)]
-    pub(in crate::arrays) fn send(&mut self, tick: u64, now: Instant, sender: usize, blocks: &Blocks<A>, goes_on: &[bool; L]) {
-        let sample = Sample::<A, L>::of(blocks, sender);
-        let row = self.peers * L;
-        let mut first = 0;
-        while first < row {
-            // All draws of some packets before any other work: so a processor computes several at once.
-            let end = row.min(first + WIDTH);
-            let mut words = [[0; 2]; WIDTH];
-            for (words, link) in words.iter_mut().zip(&self.links[sender * row + first..sender * row + end]) {
-                *words = link.link.words();
-            }
-            for (words, number) in words.into_iter().zip(first..end) {
-                let (receiver, run) = (number / L, number % L);
-                if receiver != sender && goes_on[run] {
-                    self.offer(tick, now, sender, receiver, run, words, &sample);
+        };
+        for sender in 0..peers {
+            let sample = Sample::<A, L>::initial(scenes, sender);
+            for receiver in (0..peers).filter(|receiver| *receiver != sender) {
+                for (axis, run) in (0..A).flat_map(|axis| (0..L).map(move |run| (axis, run))) {
+                    let place = receiver * row_of(peers) + sender - usize::from(sender > receiver);
+                    quads::set(&mut single.held[axis], place, run, sample.position[axis][run], sample.velocity[axis][run]);
                 }
             }
-            first = end;
+        }
+        single
+    }
+
+    /// A peer sends to all others. A run that has ended goes on sending; nobody looks.
+    #[inline(never)]
+    pub(in crate::arrays) fn send(&mut self, tick: u64, now: Instant, sender: usize, blocks: &Blocks<A>) {
+        let sample = Sample::<A, L>::of(blocks, sender);
+        let Self { peers, ticks, links, wheel, beyond, emptied, .. } = self;
+        let (row, places) = (*peers * L, row_of(*peers));
+        let mut arrivals = Arrivals::NONE;
+        for first in (0..row).step_by(DirectLinks::AT_ONCE) {
+            // Eight links lead to eight receivers of one run or to one receiver of eight runs; some of them, or all, to the sender itself.
+            let own = (sender * L).wrapping_sub(first);
+            let but = if own < DirectLinks::AT_ONCE { ((1_u16 << L) - 1) << own } else { 0 };
+            links.offer(now, sender * row + first, DirectLinks::AT_ONCE.min(row - first), but as u8, &mut arrivals);
+            for place in arrivals.places() {
+                let (receiver, run, at) = ((first + place) / L, (first + place) % L, arrivals.at[place]);
+                // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
+                let ticks = ticks.count(at.as_nanos() - now.as_nanos());
+                let due = tick.saturating_add(ticks);
+                let bucket = if ticks < HORIZON { &mut wheel[(due % HORIZON) as usize] } else { beyond.entry(due).or_default() };
+                if bucket.packets.capacity() == 0 {
+                    bucket.packets = emptied.pop().unwrap_or_default();
+                }
+                bucket.is_mixed |= arrivals.overtakes(place);
+                bucket.packets.push(Packet {
+                    arrival: at,
+                    sequence: arrivals.sequences[place],
+                    place: (receiver * places + sender - usize::from(sender > receiver)) as u32,
+                    receiver: receiver as u16,
+                    run: run as u16,
+                    position: std::array::from_fn(|axis| sample.position[axis][run]),
+                    velocity: std::array::from_fn(|axis| sample.velocity[axis][run]),
+                });
+            }
         }
     }
 
-    #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "one call, in a loop that is worth it")]
-    fn offer(&mut self, tick: u64, now: Instant, sender: usize, receiver: usize, run: usize, words: [u64; 2], sample: &Sample<A, L>) {
-        let link = &mut self.links[(sender * self.peers + receiver) * L + run];
-        let sequence = link.offered;
-        link.offered += 1;
-        let arrival = match link.link.offer(now, words) {
-            Ok(arrival) => arrival,
-            Err(DropCause::Outage) => return link.outage += 1,
-            Err(_) => return link.lost += 1,
-        };
-        let delay = arrival.at.as_nanos() - now.as_nanos();
-        if arrival.at <= self.end {
-            link.delivered += 1;
-            link.delay_nanos += u128::from(delay);
-        }
-        // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
-        let ticks = match (u32::try_from(delay), u32::try_from(self.tick_nanos)) {
-            (Ok(delay), Ok(tick)) => u64::from(delay.div_ceil(tick)),
-            _ => delay.div_ceil(self.tick_nanos),
-        };
-        let due = tick.saturating_add(ticks);
-        let bucket = if ticks < HORIZON { &mut self.wheel[(due % HORIZON) as usize] } else { self.beyond.entry(due).or_default() };
-        bucket.is_mixed |= arrival.overtakes;
-        let place = (receiver * (self.peers - 1) + sender - usize::from(sender > receiver)) * L + run;
-        bucket.packets.push(Packet {
-            arrival: arrival.at,
-            sequence,
-            sent: now,
-            place: place as u32,
-            receiver: receiver as u16,
-            sender: sender as u16,
-            position: std::array::from_fn(|axis| sample.position[axis][run]),
-            velocity: std::array::from_fn(|axis| sample.velocity[axis][run]),
-        });
-    }
-
-    /// What has arrived is held from now on, and the means are those of what is held.
-    #[inline(always)]
-    pub(in crate::arrays) fn deliver(&mut self, tick: u64, blocks: &mut Blocks<A>) {
+    /// What has arrived is held from now on.
+    pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
         self.take_in(tick, Instant::MAX);
+    }
+
+    /// The means are those of what is held.
+    #[inline(always)]
+    pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks<A>) {
         let count = others(self.peers);
         for peer in 0..self.peers {
             if !std::mem::take(&mut self.changed[peer]) {
                 continue;
             }
-            let row = (self.peers - 1) * L;
+            let quads = row_of(self.peers) / 4;
             for axis in 0..A {
-                let (positions, velocities) = (&self.positions[axis][peer * row..][..row], &self.velocities[axis][peer * row..][..row]);
-                blocks.set_target(axis, peer, mean::<L>(positions, count), mean::<L>(velocities, count));
+                let (x, v) = quads::mean(&self.held[axis][peer * quads..(peer + 1) * quads], count);
+                blocks.set_target(axis, peer, x, v);
             }
         }
     }
@@ -186,23 +195,25 @@ impl<const A: usize, const L: usize> Single<A, L> {
     }
 
     /// Takes in what is due at that tick and arrived by `until`.
-    #[inline(always)]
+    #[inline(never)]
     fn take_in(&mut self, tick: u64, until: Instant) {
         let place = (tick % HORIZON) as usize;
         if !self.beyond.is_empty() {
             self.come_near(tick);
         }
         let mut bucket = std::mem::take(&mut self.wheel[place]);
+        if bucket.packets.is_empty() {
+            return;
+        }
         if bucket.is_mixed {
             bucket.packets.sort_unstable_by_key(|packet| (packet.arrival, packet.sequence));
-            bucket.is_mixed = false;
         }
         for packet in bucket.packets.drain(..) {
             if packet.arrival <= until {
                 self.receive(&packet);
             }
         }
-        self.wheel[place] = bucket;
+        self.emptied.push(bucket.packets);
     }
 
     /// What is due at that tick and was sent long ago.
@@ -217,28 +228,29 @@ impl<const A: usize, const L: usize> Single<A, L> {
 
     #[inline(always)]
     fn receive(&mut self, packet: &Packet<A>) {
-        let place = packet.place as usize;
-        if packet.sequence < self.next[place] {
-            self.stale[usize::from(packet.receiver) * L + place % L] += 1;
+        let (place, run) = (packet.place as usize, usize::from(packet.run));
+        let next = &mut self.next[place * L + run];
+        if packet.sequence < *next {
+            self.stale[usize::from(packet.receiver) * L + run] += 1;
             return;
         }
-        self.next[place] = packet.sequence + 1;
+        *next = packet.sequence + 1;
         for axis in 0..A {
-            self.positions[axis][place] = packet.position[axis];
-            self.velocities[axis][place] = packet.velocity[axis];
+            quads::set(&mut self.held[axis], place, run, packet.position[axis], packet.velocity[axis]);
         }
         self.changed[usize::from(packet.receiver)] = true;
     }
 
     /// A run ends before the end of the scene: what is still on the way in it never arrives.
-    pub(in crate::arrays) fn end_early(&mut self, run: usize) {
+    ///
+    /// `sent` says when a packet of a sender was sent.
+    pub(in crate::arrays) fn end_early(&mut self, run: usize, sent: impl Fn(usize, u64) -> Instant) {
         for bucket in self.wheel.iter().chain(self.beyond.values()) {
-            for packet in &bucket.packets {
-                if packet.place as usize % L == run && packet.arrival <= self.end {
-                    let link = &mut self.links[(usize::from(packet.sender) * self.peers + usize::from(packet.receiver)) * L + run];
-                    link.delivered -= 1;
-                    link.delay_nanos -= u128::from(packet.arrival.as_nanos() - packet.sent.as_nanos());
-                }
+            for packet in bucket.packets.iter().filter(|packet| usize::from(packet.run) == run) {
+                let receiver = usize::from(packet.receiver);
+                let place = packet.place as usize - receiver * row_of(self.peers);
+                let sender = place + usize::from(place >= receiver);
+                self.links.forget((sender * self.peers + receiver) * L + run, sent(sender, packet.sequence), packet.arrival);
             }
         }
     }
@@ -250,7 +262,6 @@ impl<const A: usize, const L: usize> Single<A, L> {
 
     /// The counters of a link.
     pub(in crate::arrays) fn stats(&self, from: usize, to: usize, run: usize) -> LinkStats {
-        let Link { offered, delivered, delay_nanos, outage, lost, .. } = self.links[(from * self.peers + to) * L + run];
-        LinkStats::counted(offered, delivered, delay_nanos, [(DropCause::Outage, outage), (DropCause::Loss, lost)])
+        self.links.stats((from * self.peers + to) * L + run)
     }
 }
