@@ -1,0 +1,1 @@
+//! The rows as those who read them meet them.
