@@ -4,23 +4,35 @@
 //! otherwise) and differs from run to run; an error is computed against a reference that is named in the row, and is the same every time unless the row
 //! says that it was measured too.
 //!
+//! [`text`], [`csv`], [`plots`] and [`html`] show rows, and look at nothing but them.
+//!
 //! It does not say which method is best: that depends on the error that one can live with, and this is what the rows are for.
 
 pub mod analysis;
 mod cost;
+mod csv;
 mod error;
+mod groups;
+mod html;
 pub mod least;
 pub mod motion;
 pub mod network;
+mod numbers;
+mod plots;
 pub mod real_time;
 mod row;
 mod subject;
+mod text;
 pub mod time;
 mod watch;
 
+pub use csv::csv;
 pub use error::AccuracyError;
+pub use html::{About, html};
+pub use plots::{Plot, plots};
 pub use row::Row;
 pub use subject::Subject;
+pub use text::text;
 pub use watch::{Unwatched, Watch};
 
 /// How closely everything is looked at.
