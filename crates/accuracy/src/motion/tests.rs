@@ -62,6 +62,14 @@ fn the_boundary_converges_with_the_order_too() {
     }
 }
 
+/// A spring that is moved with the new velocity is stable up to K·h²·(1/mH + 1/mO) = 4, far beyond what holds for one that is sampled and held.
+#[test]
+fn one_step_of_euler_calls_stable_what_is_not() {
+    let work = work(&STIFF);
+    let found = boundary::critical(&work.pair, STIFF.boundary.unwrap(), &boundary::quadruple(&Method::Euler(1).maps(&work.pair))).unwrap();
+    assert!(found.rounded() > 10.0 * work.critical.unwrap().rounded(), "{found:?}");
+}
+
 /// A damped free mass under a constant force: v = f/b·(1 − e^{−bt/m}), x = f/b·(t − m/b·(1 − e^{−bt/m})), with the exponential of another author.
 #[test]
 fn the_reference_is_the_closed_form_of_a_free_device() {
