@@ -4,7 +4,7 @@
 pub(crate) fn short(value: Option<f64>) -> String {
     match value {
         None => "–".to_owned(),
-        Some(value) if value == 0.0 => "0".to_owned(),
+        Some(0.0) => "0".to_owned(),
         Some(value) if !(0.01..1e5).contains(&value.abs()) => format!("{value:.2e}"),
         Some(value) => {
             let magnitude = value.abs();

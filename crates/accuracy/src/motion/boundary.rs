@@ -124,7 +124,7 @@ fn real_root(start: Quad, residue: impl Fn(Quad) -> Quad) -> Option<Quad> {
     for _ in 0..STEPS {
         let (here, dk) = (residue(k), k * Quad::of(SHARE));
         let step = here * dk / (residue(k + dk) - here);
-        k = k - step;
+        k -= step;
         if absolute(step) < absolute(k) * Quad::of(ENOUGH) {
             return Some(k);
         }
@@ -146,8 +146,8 @@ fn pair_root(start: Quad, tangent: Quad, residue: impl Fn(Quad, Complex<Quad>) -
         let (by_k, by_t) = (slope(residue(k + dk, t), dk), slope(residue(k, t + dt), dt));
         let area = by_k.re * by_t.im - by_k.im * by_t.re;
         let step = (here.re * by_t.im - here.im * by_t.re) / area;
-        t = t - (by_k.re * here.im - by_k.im * here.re) / area;
-        k = k - step;
+        t -= (by_k.re * here.im - by_k.im * here.re) / area;
+        k -= step;
         if absolute(step) < absolute(k) * Quad::of(ENOUGH) {
             return Some(k);
         }

@@ -85,10 +85,13 @@ fn the_reference_is_the_closed_form_of_a_free_device() {
     }
 }
 
+/// A number of more digits than one has.
+type Sum = (f64, f64);
+
 /// After 500 ticks, by a program of its own: mpmath 1.3.0 with 60 digits, its matrix exponential, the loop written anew. Each number as a sum of two.
 #[test]
 fn the_reference_is_that_of_another_program() {
-    let expected: [(MotionScene, [[(f64, f64); 2]; 4]); 2] = [
+    let expected: [(MotionScene, [[Sum; 2]; 4]); 2] = [
         (
             COUPLED,
             [

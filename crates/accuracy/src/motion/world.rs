@@ -66,7 +66,7 @@ impl Pair {
             coordination: (scene.coordination.gains.stiffness, scene.coordination.gains.damping),
             touch: [touch(0), touch(1)],
             plants: [device(0), device(1), copy, copy],
-            hands: (0..ticks).map(|tick| instant(tick)).map(|at| [force(0, at), force(1, at)]).collect(),
+            hands: (0..ticks).map(instant).map(|at| [force(0, at), force(1, at)]).collect(),
             update: motion.update,
             delay: motion.delay,
         }

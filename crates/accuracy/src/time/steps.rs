@@ -69,6 +69,6 @@ pub(crate) fn carry(traffic: &Traffic, step: Duration, rounding: Rounding, mut s
             show(Arrival { from, to, delay: now - taken });
         }
         number += 1;
-        now = now + step;
+        now += step;
     }
 }

@@ -29,8 +29,7 @@ fn an_error_of_zero_is_at_the_foot_and_said() {
     assert_eq!(plot.svg.matches("<polygon").count(), 1 + 1);
     let lowest = |tag: &str, attribute: &str| {
         let start = plot.svg.find(tag).unwrap();
-        let value = plot.svg[start..].split_once(attribute).unwrap().1.split_once('"').unwrap().0.to_owned();
-        value
+        plot.svg[start..].split_once(attribute).unwrap().1.split_once('"').unwrap().0.to_owned()
     };
     let circle: f64 = lowest("<circle", "cy=\"").parse().unwrap();
     let polygon = lowest("<polygon", "points=\"");
