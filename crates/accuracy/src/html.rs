@@ -93,7 +93,7 @@ fn write_group(page: &mut String, group: &Group<'_>) {
     let _ = write!(
         page,
         "<div class=\"wide\">\n<table>\n<thead><tr><th scope=\"col\">method</th><th scope=\"col\">setting</th><th scope=\"col\" class=\"number\">{}</th>\
-         <th scope=\"col\" class=\"number\">{}</th><th scope=\"col\">note</th></tr></thead>\n<tbody>\n",
+         <th scope=\"col\" class=\"number\">error: {}</th><th scope=\"col\">note</th></tr></thead>\n<tbody>\n",
         escape(group.cost_unit),
         escape(group.error_unit)
     );

@@ -172,7 +172,7 @@ fn all<'a>(root: &Drawing<'a>, group: &Group<'_>, drawn: &Drawn<'_>) -> DrawingR
     chart
         .configure_mesh()
         .x_desc(group.cost_unit)
-        .y_desc(group.error_unit)
+        .y_desc(format!("error: {}", group.error_unit))
         .x_label_formatter(&number)
         .y_label_formatter(&number)
         .bold_line_style(GREY.mix(0.3))
