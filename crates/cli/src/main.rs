@@ -1,9 +1,10 @@
 //! `cohaptic`: runs, checks, explains and analyses scenes of people who move one object together over a bad network, in virtual time and by the
-//! wall clock; drives and estimates links; reproduces a paper.
+//! wall clock; drives and estimates links; reproduces a paper; sets speed against error.
 //!
 //! This is the only crate that prints. Results go to standard output, everything else to standard error. Exit status: 0 done, 1 an expectation
 //! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted.
 
+mod accuracy;
 mod admittance;
 mod arguments;
 mod check;
@@ -50,6 +51,7 @@ fn main() -> ExitCode {
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),
         Command::Paper(arguments) => paper::paper(&arguments),
+        Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
     };
     match done {
         Ok(code) => code,

@@ -45,6 +45,13 @@ impl Progress {
         Self(bar)
     }
 
+    /// Progress through measurements of which nobody knows how many there will be.
+    pub(crate) fn through_measurements() -> Self {
+        let bar = bar(0);
+        bar.set_style(style("{spinner} {pos} rows measured, {elapsed} passed: {msg}"));
+        Self(bar)
+    }
+
     /// Progress through a number of steps.
     pub(crate) fn through_steps(count: usize) -> Self {
         let bar = bar(count as u64);

@@ -1,5 +1,6 @@
 //! What can be said on the command line.
 
+mod accuracy;
 mod admittance;
 mod falcon;
 mod links;
@@ -14,6 +15,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub(crate) use accuracy::AccuracyArguments;
 pub(crate) use admittance::AdmittanceArguments;
 pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
@@ -64,6 +66,8 @@ pub(crate) enum Command {
     Fit(FitArguments),
     /// Computes every figure and claim of Rakhsha and Constantinescu (2015) again, and says which hold
     Paper(PaperArguments),
+    /// Measures what every method costs and how wrong it is, on the same work
+    Accuracy(AccuracyArguments),
 }
 
 /// What all commands on one scene take.

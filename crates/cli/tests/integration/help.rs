@@ -7,9 +7,23 @@ use crate::scenes::TWO;
 fn help_names_the_commands() {
     let text = Desk::new().text("--help");
     assert!(
-        ["run", "check", "explain", "stability", "admittance", "relay", "router", "link", "fit", "paper", "Exit status: 0 done", "130 interrupted"]
-            .iter()
-            .all(|word| text.contains(word)),
+        [
+            "run",
+            "check",
+            "explain",
+            "stability",
+            "admittance",
+            "relay",
+            "router",
+            "link",
+            "fit",
+            "paper",
+            "accuracy",
+            "Exit status: 0 done",
+            "130 interrupted"
+        ]
+        .iter()
+        .all(|word| text.contains(word)),
         "{text}"
     );
     assert!(Desk::new().text("--version").starts_with("cohaptic "));
@@ -56,6 +70,7 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
             ],
         ),
         ("paper", &["--out <DIR>", "--quick", "--json"]),
+        ("accuracy", &["--out <DIR>", "--quick", "--only <SUBJECT>", "--json"]),
     ] {
         let text = Desk::new().text(&format!("{command} --help"));
         for part in options.iter().chain(&["Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output"]) {

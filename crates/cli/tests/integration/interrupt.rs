@@ -83,7 +83,7 @@ fn after_an_interruption_the_variant_does_not_begin() {
 
 /// Whether a process has a handler for SIGINT, number 2: bit 1 of the signals that it catches.
 #[cfg(target_os = "linux")]
-fn listens(id: u32) -> bool {
+pub(crate) fn listens(id: u32) -> bool {
     let status = std::fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default();
     let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
     caught.is_some_and(|mask| mask & 0b10 != 0)

@@ -1,0 +1,118 @@
+//! Ways of one body from tick to tick, with its force held.
+
+use cohaptic_peer::{Plant, StepMap};
+
+use super::number::Number;
+
+/// A way of one body on one axis over one tick.
+pub(crate) trait Advance<T> {
+    /// Moves (x, v) by one tick under the held force.
+    fn advance(&self, position: &mut T, velocity: &mut T, force: T);
+}
+
+/// The program's own map, with the short form for what nothing ties to ground: what its peers do at every tick, whichever integrator made the map.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Program {
+    map: StepMap,
+    free: bool,
+}
+
+impl Program {
+    pub(crate) fn new(map: StepMap) -> Self {
+        Self { map, free: map.is_free() }
+    }
+}
+
+impl Advance<f64> for Program {
+    #[inline(always)]
+    fn advance(&self, position: &mut f64, velocity: &mut f64, force: f64) {
+        if self.free {
+            self.map.advance_free(position, velocity, force);
+        } else {
+            self.map.advance(position, velocity, force);
+        }
+    }
+}
+
+/// A body and the length of a sub-step, as loops that step have them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stepped {
+    inverse_mass: f64,
+    damping: f64,
+    stiffness: f64,
+    h: f64,
+    steps: u32,
+}
+
+impl Stepped {
+    /// That many sub-steps in a tick of that length \[s\].
+    pub(crate) fn new(plant: &Plant, tick: f64, steps: u32) -> Self {
+        Self { inverse_mass: 1.0 / plant.mass, damping: plant.damping, stiffness: plant.stiffness, h: tick / f64::from(steps), steps }
+    }
+
+    #[inline(always)]
+    fn acceleration(&self, x: f64, v: f64, force: f64) -> f64 {
+        (force - self.damping * v - self.stiffness * x) * self.inverse_mass
+    }
+}
+
+/// Semi-implicit Euler, step by step: velocity first, then position with the new velocity.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Euler(pub(crate) Stepped);
+
+impl Advance<f64> for Euler {
+    #[inline(always)]
+    fn advance(&self, position: &mut f64, velocity: &mut f64, force: f64) {
+        for _ in 0..self.0.steps {
+            *velocity += self.0.h * self.0.acceleration(*position, *velocity, force);
+            *position += self.0.h * *velocity;
+        }
+    }
+}
+
+/// The classical Runge–Kutta method, step by step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RungeKutta(pub(crate) Stepped);
+
+impl Advance<f64> for RungeKutta {
+    #[inline(always)]
+    fn advance(&self, position: &mut f64, velocity: &mut f64, force: f64) {
+        let h = self.0.h;
+        let half = 0.5 * h;
+        for _ in 0..self.0.steps {
+            let (x, v) = (*position, *velocity);
+            let a1 = self.0.acceleration(x, v, force);
+            let v2 = v + half * a1;
+            let a2 = self.0.acceleration(x + half * v, v2, force);
+            let v3 = v + half * a2;
+            let a3 = self.0.acceleration(x + half * v2, v3, force);
+            let v4 = v + h * a3;
+            let a4 = self.0.acceleration(x + h * v3, v4, force);
+            *position = x + h / 6.0 * (v + 2.0 * (v2 + v3) + v4);
+            *velocity = v + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4);
+        }
+    }
+}
+
+/// A linear map in any numbers: increments by (x, v), row by row, and by the force.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Map<T> {
+    pub(crate) state: [[T; 2]; 2],
+    pub(crate) force: [T; 2],
+}
+
+impl<T: Number> Map<T> {
+    /// The coefficients of a map of the program, each exactly.
+    pub(crate) fn of(map: &StepMap) -> Self {
+        let (state, force) = map.coefficients();
+        Self { state: state.map(|row| row.map(T::of)), force: force.map(T::of) }
+    }
+}
+
+impl<T: Number> Advance<T> for Map<T> {
+    fn advance(&self, position: &mut T, velocity: &mut T, force: T) {
+        let (x, v) = (*position, *velocity);
+        *position = x + (self.state[0][0] * x + self.state[0][1] * v + self.force[0] * force);
+        *velocity = v + (self.state[1][0] * x + self.state[1][1] * v + self.force[1] * force);
+    }
+}

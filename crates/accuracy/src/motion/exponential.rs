@@ -1,0 +1,53 @@
+//! The exact map of a tick with twice the digits.
+
+use cohaptic_peer::Plant;
+
+use super::advance::Map;
+use super::number::{Number, absolute};
+
+/// Terms of the series: the first one left out is below 0.5³⁰/31! = 1.1e-43 of the first.
+const TERMS: u32 = 30;
+
+/// The map of one tick of `nanos` \[ns\]. Mass, damping and stiffness are the program's numbers, exactly; the tick is nanos/10⁹, not the nearest
+/// number to it.
+///
+/// The columns of exp(X) − I, X = h·[0 1 0; −k/m −b/m 1/m; 0 0 0], are summed by themselves: each term is X times the one before over its number. A
+/// step in which a row of X has a norm above ½ is halved first, and two halves are one after the other.
+pub(crate) fn exact_map<T: Number>(plant: &Plant, nanos: f64) -> Map<T> {
+    let mut h = T::of(nanos) / T::of(1e9);
+    let (k, b, inverse) = (T::of(plant.stiffness), T::of(plant.damping), T::of(1.0) / T::of(plant.mass));
+    let norm = |h: T| {
+        let row = absolute(k * inverse * h) + absolute(b * inverse * h) + absolute(inverse * h);
+        if row > h { row } else { h }
+    };
+    let mut halvings = 0;
+    while norm(h) > T::of(0.5) && halvings < 1000 {
+        h = h * T::of(0.5);
+        halvings += 1;
+    }
+    let column = |start: [T; 3]| {
+        let (mut term, mut sum) = (start, [T::of(0.0); 2]);
+        for n in 1..=TERMS {
+            let share = h / T::of(f64::from(n));
+            term = [share * term[1], share * ((term[2] - b * term[1] - k * term[0]) * inverse), T::of(0.0)];
+            sum = [sum[0] + term[0], sum[1] + term[1]];
+        }
+        sum
+    };
+    let (one, zero) = (T::of(1.0), T::of(0.0));
+    let (by_x, by_v, by_f) = (column([one, zero, zero]), column([zero, one, zero]), column([zero, zero, one]));
+    let mut map = Map { state: [[by_x[0], by_v[0]], [by_x[1], by_v[1]]], force: by_f };
+    for _ in 0..halvings {
+        map = twice(&map);
+    }
+    map
+}
+
+/// A map after itself: E ← 2E + E·E, the force held over both.
+fn twice<T: Number>(map: &Map<T>) -> Map<T> {
+    let Map { state: e, force: g } = map;
+    let product = |i: usize, j: usize| e[i][0] * e[0][j] + e[i][1] * e[1][j];
+    let state = [0, 1].map(|i| [0, 1].map(|j| e[i][j] + e[i][j] + product(i, j)));
+    let force = [0, 1].map(|i| g[i] + g[i] + (e[i][0] * g[0] + e[i][1] * g[1]));
+    Map { state, force }
+}

@@ -1,0 +1,168 @@
+//! Motion between ticks: the exact propagator beside integrators that step.
+//!
+//! All methods do the same: two peers compute their forces at ticks of 1 ms and hold them. They differ in how a body with a held force gets to the next
+//! tick. The reference is the same loop with at least 100 bits and the exact exponential.
+
+mod advance;
+mod boundary;
+mod exponential;
+mod method;
+mod number;
+mod scenes;
+#[cfg(test)]
+mod tests;
+mod world;
+
+use std::path::Path;
+use std::time::Duration;
+
+use cohaptic_stability::{Boundary, BoundaryOptions, Family, KeyRange};
+use qd::Quad;
+
+use crate::cost::median_time;
+use crate::{AccuracyError, Options, Row, Subject, Watch};
+use advance::Map;
+use method::Method;
+use number::{Number, absolute};
+use scenes::{MotionScene, SCENES, TICK_NANOS};
+use world::{Body, Pair, energy, run};
+
+const COST: &str = "ns a tick";
+const POSITION: &str = "position [m]";
+const ENERGY: &str = "energy [J]";
+const STIFFNESS: &str = "critical stiffness [N/m]";
+const LOOP: &str = "the same loop with 100 bits and the exact exponential";
+const ROOT: &str = "root of the characteristic equation with 100 bits and the exact exponential";
+
+/// The rows of this subject.
+///
+/// # Errors
+///
+/// As [`crate::measure`].
+pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    let mut rows = Vec::new();
+    for motion in &SCENES {
+        let work = Work::prepare(motion, options)?;
+        for method in Method::all(options) {
+            if watch.stops() {
+                return Err(AccuracyError::Stopped);
+            }
+            for row in work.rows(motion, method) {
+                watch.row(&row);
+                rows.push(row);
+            }
+        }
+        if let Some(row) = work.second_witness(motion)? {
+            watch.row(&row);
+            rows.push(row);
+        }
+    }
+    Ok(rows)
+}
+
+/// A scene, and what is right.
+pub(crate) struct Work {
+    pub(crate) pair: Pair,
+    /// The bodies after every tick.
+    pub(crate) reference: Vec<[Body<Quad>; 4]>,
+    pub(crate) critical: Option<Quad>,
+    rounds: usize,
+}
+
+impl Work {
+    pub(crate) fn prepare(motion: &MotionScene, options: Options) -> Result<Self, AccuracyError> {
+        let (ticks, rounds) = if options.quick { (1000, 7) } else { (4000, 31) };
+        let pair = Pair::of(motion, &motion.scene()?, ticks);
+        let maps: [Map<Quad>; 4] = pair.plants.map(|plant| exponential::exact_map(&plant, TICK_NANOS));
+        let mut reference = Vec::with_capacity(ticks);
+        run(&pair, &maps, |_, bodies| reference.push(*bodies));
+        let critical = motion.boundary.and_then(|range| boundary::critical(&pair, range, &maps));
+        Ok(Self { pair, reference, critical, rounds })
+    }
+
+    /// What a method costs and how wrong it is.
+    fn rows(&self, motion: &MotionScene, method: Method) -> Vec<Row> {
+        let work = || method.run(&self.pair, |_, _| {});
+        let cost = nanos(median_time(self.rounds, work)) / f64_of(self.pair.hands.len());
+        let (position, energy) = self.errors(method);
+        let row = |error: Option<f64>, error_unit, reference, note: &str| Row {
+            subject: Subject::Motion,
+            case: motion.name.to_owned(),
+            method: method.name().to_owned(),
+            setting: method.setting(),
+            cost: Some(cost),
+            cost_unit: COST,
+            error,
+            error_unit,
+            reference,
+            note: note.to_owned(),
+        };
+        let note = |error: Option<f64>| if error.is_none() { "diverged: not a finite number within the run" } else { "" };
+        let mut rows = vec![row(position, POSITION, LOOP, note(position)), row(energy, ENERGY, LOOP, note(energy))];
+        if let (Some(range), Some(right)) = (motion.boundary, self.critical) {
+            let found = boundary::critical(&self.pair, range, &boundary::quadruple(&method.maps(&self.pair)));
+            let error = found.map(|found| absolute(found - right).rounded());
+            let note = if error.is_none() { "it sees no stiffness in the range at which the loop turns unstable" } else { "" };
+            rows.push(row(error, STIFFNESS, ROOT, note));
+        }
+        rows
+    }
+
+    /// The largest error of a position \[m\], and of the energy \[J\], at any tick; `None` if there is none that is finite.
+    pub(crate) fn errors(&self, method: Method) -> (Option<f64>, Option<f64>) {
+        let (mut position, mut stored) = (0.0, 0.0);
+        method.run(&self.pair, |tick, bodies| {
+            let exactly = bodies.map(|body| Body { x: Quad::of(body.x), v: Quad::of(body.v) });
+            let right = &self.reference[tick];
+            for (body, right) in exactly.iter().zip(right) {
+                position = worse(position, absolute(body.x - right.x).rounded());
+            }
+            stored = worse(stored, absolute(energy(&self.pair, &exactly) - energy(&self.pair, right)).rounded());
+        });
+        let finite = |error: f64| error.is_finite().then_some(error);
+        (finite(position), finite(stored))
+    }
+
+    /// The boundary as `cohaptic stability boundary` finds it: another matrix, made by other code, without the digits.
+    fn second_witness(&self, motion: &MotionScene) -> Result<Option<Row>, AccuracyError> {
+        let (Some((along, low, high)), Some(right)) = (motion.boundary, self.critical) else { return Ok(None) };
+        let start = crate::cost::processor_time();
+        let Some(found) = program_boundary(motion, (along.key(), low, high))? else { return Ok(None) };
+        let cost = crate::cost::processor_time() - start;
+        Ok(Some(Row {
+            subject: Subject::Motion,
+            case: motion.name.to_owned(),
+            method: "stability boundary of the program".to_owned(),
+            setting: String::new(),
+            cost: Some(nanos(cost) / 1e6),
+            cost_unit: "ms a boundary",
+            error: Some(absolute(Quad::of(found) - right).rounded()),
+            error_unit: STIFFNESS,
+            reference: ROOT,
+            note: "a second witness: another matrix by other code, halved until a radius cannot be told from 1".to_owned(),
+        }))
+    }
+}
+
+/// The first crossing that the program finds \[N/m\].
+pub(crate) fn program_boundary(motion: &MotionScene, (key, low, high): (&str, f64, f64)) -> Result<Option<f64>, AccuracyError> {
+    let range = KeyRange { key: key.to_owned(), low, high, unit: String::new() };
+    let options = BoundaryOptions { tolerance: 1e-9, ..BoundaryOptions::of(&range) };
+    let family = Family::new(motion.text, Path::new("motion.toml"), &[], vec![range])?;
+    let boundary = Boundary::find(&family, options, &[], |_| (), || false)?;
+    Ok(boundary.crossings.first().map(|crossing| crossing.value))
+}
+
+/// The larger one; what is no number is worse than any.
+fn worse(before: f64, now: f64) -> f64 {
+    if now.is_nan() { f64::INFINITY } else { before.max(now) }
+}
+
+fn nanos(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e9
+}
+
+#[expect(clippy::cast_precision_loss, reason = "far below 2^53")]
+fn f64_of(count: usize) -> f64 {
+    count as f64
+}

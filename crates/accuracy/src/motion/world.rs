@@ -1,0 +1,202 @@
+//! The loop that all methods share: what two peers do at a tick, in any numbers. Forces are computed at ticks and held, as docs/model.md says.
+
+use cohaptic_peer::{ArmConfig, Contact, Hand, Plant, Signal};
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+
+use super::advance::Advance;
+use super::number::Number;
+use super::scenes::{Along, MotionScene, TICK_NANOS};
+
+/// Position and velocity of a body on one axis.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Body<T> {
+    pub(crate) x: T,
+    pub(crate) v: T,
+}
+
+/// How a device touches its copy, on one axis.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Touch {
+    Nothing,
+    Grasp,
+    /// It pushes and cannot pull: 1 towards larger positions, −1 towards smaller ones.
+    Push(f64),
+}
+
+/// What the two peers are.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Pair {
+    pub(crate) coupling: (f64, f64),
+    pub(crate) coordination: (f64, f64),
+    pub(crate) touch: [Touch; 2],
+    /// Devices with their arms, then copies.
+    pub(crate) plants: [Plant; 4],
+    /// The force of each hand at each tick \[N\].
+    pub(crate) hands: Vec<[f64; 2]>,
+    pub(crate) update: usize,
+    pub(crate) delay: usize,
+}
+
+impl Pair {
+    /// What the scene says, for that many ticks.
+    pub(crate) fn of(motion: &MotionScene, scene: &Scene, ticks: usize) -> Self {
+        let arm = |peer: usize| match &scene.peers[peer].hand {
+            Some(Hand::Arm { arm, .. }) => *arm,
+            Some(Hand::Force(_)) | None => ArmConfig { mass: 0.0, damping: 0.0, stiffness: 0.0 },
+        };
+        let device = |peer: usize| {
+            let (device, arm) = (scene.peers[peer].device, arm(peer));
+            Plant { mass: device.mass + arm.mass, damping: device.damping + arm.damping, stiffness: arm.stiffness }
+        };
+        let copy = Plant { mass: scene.object.mass / 2.0, damping: scene.object.damping, stiffness: 0.0 };
+        // Arms of these scenes want to stay where they are, which is no held force.
+        let force = |peer: usize, at: Instant| match &scene.peers[peer].hand {
+            Some(Hand::Force(signal)) => Signal::value::<1>(signal, at)[0],
+            Some(Hand::Arm { .. }) | None => 0.0,
+        };
+        let touch = |peer: usize| match scene.peers[peer].contact {
+            Contact::None => Touch::Nothing,
+            Contact::Grasp => Touch::Grasp,
+            Contact::Push(direction) => Touch::Push(if direction.positive { 1.0 } else { -1.0 }),
+        };
+        let gains = scene.peers[0].coupling;
+        Self {
+            coupling: (gains.stiffness, gains.damping),
+            coordination: (scene.coordination.gains.stiffness, scene.coordination.gains.damping),
+            touch: [touch(0), touch(1)],
+            plants: [device(0), device(1), copy, copy],
+            hands: (0..ticks).map(instant).map(|at| [force(0, at), force(1, at)]).collect(),
+            update: motion.update,
+            delay: motion.delay,
+        }
+    }
+
+    /// The same without hands, and with another gain in place of one: what the stability of the loop depends on.
+    pub(crate) fn with<T: Number>(&self, along: Along, stiffness: T) -> Loop<T> {
+        let mut gains = self.gains();
+        match along {
+            Along::Coupling => gains.coupling.0 = stiffness,
+            Along::Coordination => gains.coordination.0 = stiffness,
+        }
+        gains
+    }
+
+    /// What the loop of forces is made of.
+    pub(crate) fn gains<T: Number>(&self) -> Loop<T> {
+        let both = |(stiffness, damping): (f64, f64)| (T::of(stiffness), T::of(damping));
+        Loop { coupling: both(self.coupling), coordination: both(self.coordination), touch: self.touch, update: self.update, delay: self.delay }
+    }
+}
+
+fn instant(tick: usize) -> Instant {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number of nanoseconds")]
+    Instant::from_nanos(tick as u64 * TICK_NANOS as u64)
+}
+
+/// What the forces of a tick depend on besides the motion.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Loop<T> {
+    pub(crate) coupling: (T, T),
+    pub(crate) coordination: (T, T),
+    pub(crate) touch: [Touch; 2],
+    pub(crate) update: usize,
+    pub(crate) delay: usize,
+}
+
+/// The two peers and what is on the way between them.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct World<T> {
+    /// Two devices, then two copies.
+    pub(crate) bodies: [Body<T>; 4],
+    /// What each peer holds of the other.
+    pub(crate) held: [Body<T>; 2],
+    /// The copies as they were at the latest sendings: sample s in place s modulo the length.
+    pub(crate) sent: Vec<[Body<T>; 2]>,
+}
+
+impl<T: Number> World<T> {
+    /// At rest at the origin.
+    pub(crate) fn rest(gains: &Loop<T>) -> Self {
+        let rest = Body { x: T::of(0.0), v: T::of(0.0) };
+        Self { bodies: [rest; 4], held: [rest; 2], sent: vec![[rest; 2]; gains.delay / gains.update + 1] }
+    }
+
+    /// What happens at tick `tick`, until the next one.
+    #[inline(always)]
+    pub(crate) fn tick(&mut self, gains: &Loop<T>, movers: &[impl Advance<T>; 4], tick: usize, hands: [T; 2]) {
+        let places = self.sent.len();
+        if tick.is_multiple_of(gains.update) {
+            self.sent[tick / gains.update % places] = [self.bodies[2], self.bodies[3]];
+        }
+        if let Some(sending) = tick.checked_sub(gains.delay)
+            && sending.is_multiple_of(gains.update)
+        {
+            let [left, right] = self.sent[sending / gains.update % places];
+            self.held = [right, left];
+        }
+        for peer in 0..2 {
+            let (device, copy, held) = (self.bodies[peer], self.bodies[2 + peer], self.held[peer]);
+            let coupling = coupling_force(gains.touch[peer], gains.coupling, device, copy);
+            let (stiffness, damping) = gains.coordination;
+            let coordination = stiffness * (copy.x - held.x) + damping * (copy.v - held.v);
+            let Body { x, v } = &mut self.bodies[peer];
+            movers[peer].advance(x, v, hands[peer] - coupling);
+            let Body { x, v } = &mut self.bodies[2 + peer];
+            movers[2 + peer].advance(x, v, coupling - coordination);
+        }
+    }
+}
+
+#[inline(always)]
+fn coupling_force<T: Number>(touch: Touch, (stiffness, damping): (T, T), device: Body<T>, copy: Body<T>) -> T {
+    let (depth, closing) = (device.x - copy.x, device.v - copy.v);
+    let nothing = T::of(0.0);
+    match touch {
+        Touch::Nothing => nothing,
+        Touch::Grasp => stiffness * depth + damping * closing,
+        Touch::Push(sign) => {
+            let sign = T::of(sign);
+            let (depth, closing) = (sign * depth, sign * closing);
+            if depth <= nothing {
+                return nothing;
+            }
+            let force = stiffness * depth + damping * closing;
+            if force > nothing { sign * force } else { nothing }
+        }
+    }
+}
+
+/// Runs from rest and shows the bodies after every tick.
+#[inline(always)]
+pub(crate) fn run<T: Number>(pair: &Pair, movers: &[impl Advance<T>; 4], mut show: impl FnMut(usize, &[Body<T>; 4])) -> World<T> {
+    let gains = pair.gains();
+    let mut world = World::rest(&gains);
+    for (tick, hands) in pair.hands.iter().enumerate() {
+        world.tick(&gains, movers, tick, hands.map(T::of));
+        show(tick, &world.bodies);
+    }
+    world
+}
+
+/// The mechanical energy \[J\]: the motion of devices, arms and copies; the springs of arms, of couplings that touch, and of the coordination as it would
+/// be without delay, ½·KT·(xO1 − xO2)².
+pub(crate) fn energy<T: Number>(pair: &Pair, bodies: &[Body<T>; 4]) -> T {
+    let mut twice = T::of(0.0);
+    for (plant, body) in pair.plants.iter().zip(bodies) {
+        twice = twice + T::of(plant.mass) * body.v * body.v + T::of(plant.stiffness) * body.x * body.x;
+    }
+    for peer in 0..2 {
+        let depth = bodies[peer].x - bodies[2 + peer].x;
+        let touches = match pair.touch[peer] {
+            Touch::Nothing => false,
+            Touch::Grasp => true,
+            Touch::Push(sign) => T::of(sign) * depth > T::of(0.0),
+        };
+        if touches {
+            twice = twice + T::of(pair.coupling.0) * depth * depth;
+        }
+    }
+    let apart = bodies[2].x - bodies[3].x;
+    T::of(0.5) * (twice + T::of(pair.coordination.0) * apart * apart)
+}

@@ -1,0 +1,49 @@
+//! What is looked at.
+
+use crate::{AccuracyError, Options, Row, Watch, analysis, least, motion, network, real_time, time};
+
+/// What a group of methods is for.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Subject {
+    /// Moving masses from tick to tick.
+    Motion,
+    /// When things happen: events in nanoseconds, or steps.
+    Time,
+    /// Random delays and losses.
+    Network,
+    /// Whether a scene is stable.
+    Analysis,
+    /// Leaving on time by the wall clock.
+    RealTime,
+    /// What each thing that a scene can need costs.
+    LeastModel,
+}
+
+impl Subject {
+    /// Every subject, in the order in which they are measured and shown.
+    pub const ALL: [Self; 6] = [Self::Motion, Self::Time, Self::Network, Self::Analysis, Self::RealTime, Self::LeastModel];
+
+    /// The name, as on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Motion => "motion",
+            Self::Time => "time",
+            Self::Network => "network",
+            Self::Analysis => "analysis",
+            Self::RealTime => "real-time",
+            Self::LeastModel => "least-model",
+        }
+    }
+
+    pub(crate) fn rows(self, options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+        match self {
+            Self::Motion => motion::rows(options, watch),
+            Self::Time => time::rows(options, watch),
+            Self::Network => network::rows(options, watch),
+            Self::Analysis => analysis::rows(options, watch),
+            Self::RealTime => real_time::rows(options, watch),
+            Self::LeastModel => least::rows(options, watch),
+        }
+    }
+}

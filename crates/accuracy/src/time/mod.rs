@@ -1,0 +1,189 @@
+//! Time: events in whole nanoseconds beside steps of a millisecond.
+//!
+//! Other simulators of control over networks go in steps and have every time as a number of steps. What that does to delays, and to the answer whether a
+//! scene is stable, is set beside what it costs; and where it does nothing at all, as for peers that tick together every millisecond when delays are
+//! rounded up, that is a row too.
+
+mod events;
+mod steps;
+#[cfg(test)]
+mod tests;
+mod traffic;
+mod verdicts;
+
+use std::time::Duration;
+
+use cohaptic_stability::Method;
+
+use crate::cost::median_time;
+use crate::{AccuracyError, Options, Row, Subject, Watch};
+use steps::Rounding;
+use traffic::{Errors, Traffic};
+use verdicts::{Times, grid};
+
+const COST: &str = "ns a packet";
+const MEAN: &str = "mean delay [s]";
+const WORST: &str = "worst delay of a packet [s]";
+const WRONG: &str = "wrong verdicts [1]";
+const DELAYS: &str = "instant of sampling plus the delay of the link";
+const VERDICTS: &str = "stability analysis of the scene as written, reduced";
+
+/// Clocks that are looked at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Clocks {
+    name: &'static str,
+    tick: Duration,
+    /// From each peer to the next.
+    offset: Duration,
+}
+
+/// All of them.
+pub(crate) const CLOCKS: [Clocks; 3] = [
+    Clocks { name: "1 ms ticks in lockstep", tick: Duration::from_millis(1), offset: Duration::ZERO },
+    Clocks { name: "1 ms ticks, clocks 0.37 ms apart", tick: Duration::from_millis(1), offset: Duration::from_micros(370) },
+    Clocks { name: "0.7 ms ticks in lockstep", tick: Duration::from_micros(700), offset: Duration::ZERO },
+];
+
+/// The steps \[ns\] that are looked at.
+const STEPS: [u64; 4] = [1_000_000, 100_000, 10_000, 1_000];
+
+/// The rows of this subject.
+///
+/// # Errors
+///
+/// As [`crate::measure`].
+pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    let mut rows = Vec::new();
+    for clocks in CLOCKS {
+        let work = Work::new(clocks, options, watch)?;
+        for way in Way::all() {
+            if watch.stops() {
+                return Err(AccuracyError::Stopped);
+            }
+            for row in work.rows(way, watch)? {
+                watch.row(&row);
+                rows.push(row);
+            }
+        }
+    }
+    Ok(rows)
+}
+
+/// How time goes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Way {
+    Events,
+    Steps(Duration, Rounding),
+}
+
+impl Way {
+    fn all() -> impl Iterator<Item = Self> {
+        let steps = |rounding| STEPS.map(move |nanos| Self::Steps(Duration::from_nanos(nanos), rounding));
+        std::iter::once(Self::Events).chain(Rounding::BOTH.into_iter().flat_map(steps))
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Events => "events in nanoseconds",
+            Self::Steps(_, Rounding::Up) => "steps, rounded up",
+            Self::Steps(_, Rounding::Nearest) => "steps, rounded to the nearest",
+        }
+    }
+
+    fn setting(self) -> String {
+        match self {
+            Self::Events => String::new(),
+            Self::Steps(step, _) => format!("{step:?} a step"),
+        }
+    }
+}
+
+struct Work {
+    clocks: Clocks,
+    traffic: Traffic,
+    /// Each scene of the grid, and whether it is stable, where that can be told.
+    scenes: Vec<(Times, f64, bool)>,
+    rounds: usize,
+}
+
+impl Work {
+    fn new(clocks: Clocks, options: Options, watch: &dyn Watch) -> Result<Self, AccuracyError> {
+        let (sendings, side, rounds) = if options.quick { (250, 11, 5) } else { (1250, 25, 15) };
+        let Clocks { tick, offset, .. } = clocks;
+        let mut scenes = Vec::new();
+        for (delay, stiffness) in grid(side) {
+            if watch.stops() {
+                return Err(AccuracyError::Stopped);
+            }
+            let times = Times { tick, offset, delay };
+            scenes.extend(times.verdict(stiffness, Method::Reduced)?.map(|stable| (times, stiffness, stable)));
+        }
+        Ok(Self { clocks, traffic: Traffic::new(tick * 8, offset, sendings), scenes, rounds })
+    }
+
+    fn rows(&self, way: Way, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+        let traffic = &self.traffic;
+        let mut errors = Errors::default();
+        let mut failure = None;
+        let cost = match way {
+            Way::Events => {
+                events::carry(traffic, |arrival| errors.add(traffic, arrival))?;
+                median_time(self.rounds, || {
+                    let mut sum = Duration::ZERO;
+                    failure = events::carry(traffic, |arrival| sum += arrival.delay).err();
+                    sum
+                })
+            }
+            Way::Steps(step, rounding) => {
+                steps::carry(traffic, step, rounding, |arrival| errors.add(traffic, arrival));
+                median_time(self.rounds, || {
+                    let mut sum = Duration::ZERO;
+                    steps::carry(traffic, step, rounding, |arrival| sum += arrival.delay);
+                    sum
+                })
+            }
+        };
+        if let Some(failure) = failure {
+            return Err(failure);
+        }
+        let row = |error, error_unit, reference, note: String| Row {
+            subject: Subject::Time,
+            case: self.clocks.name.to_owned(),
+            method: way.name().to_owned(),
+            setting: way.setting(),
+            cost: Some(cost.as_secs_f64() * 1e9 / traffic.packets()),
+            cost_unit: COST,
+            error: Some(error),
+            error_unit,
+            reference,
+            note,
+        };
+        let mut rows = vec![row(errors.of_mean(), MEAN, DELAYS, String::new()), row(errors.worst(), WORST, DELAYS, String::new())];
+        let (share, note) = self.wrong(way, watch)?;
+        rows.push(row(share, WRONG, VERDICTS, note));
+        Ok(rows)
+    }
+
+    /// The share of the grid in which the verdict is not that of the scene as written, and what else to know.
+    fn wrong(&self, way: Way, watch: &dyn Watch) -> Result<(f64, String), AccuracyError> {
+        let (mut wrong, mut hidden) = (0_u32, 0_u32);
+        for (times, stiffness, right) in &self.scenes {
+            if watch.stops() {
+                return Err(AccuracyError::Stopped);
+            }
+            let found = match way {
+                Way::Events => times.verdict(*stiffness, Method::Full)?,
+                Way::Steps(step, rounding) => times.in_steps(step, rounding).verdict(*stiffness, Method::Reduced)?,
+            };
+            wrong += u32::from(found != Some(*right));
+            hidden += u32::from(found == Some(true) && !right);
+        }
+        let how = match way {
+            Way::Events => "by unit vectors through the program's peers at the scene's own instants",
+            Way::Steps(..) => "ticks, offsets and delays as numbers of steps",
+        };
+        let all = u32::try_from(self.scenes.len()).unwrap_or(u32::MAX);
+        let note = format!("{how}: {wrong} of {all} scenes, {hidden} of them called stable that are not");
+        Ok((f64::from(wrong) / f64::from(all.max(1)), note))
+    }
+}

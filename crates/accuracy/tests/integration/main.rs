@@ -1,0 +1,25 @@
+//! The rows as those who read them meet them: files that read back, documents that are well-formed, an end in good order.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
+#![allow(clippy::float_cmp, reason = "what is written is what was measured, to the bit")]
+
+mod documents;
+mod plots;
+mod watching;
+
+use cohaptic_accuracy::{Row, Subject};
+
+/// A row of made-up numbers.
+pub(crate) fn row(method: &str, cost: Option<f64>, error: Option<f64>) -> Row {
+    Row {
+        subject: Subject::Motion,
+        case: "a case".to_owned(),
+        method: method.to_owned(),
+        setting: "4 steps".to_owned(),
+        cost,
+        cost_unit: "ns a tick",
+        error,
+        error_unit: "position [m]",
+        reference: "a formula",
+        note: String::new(),
+    }
+}

@@ -1,0 +1,51 @@
+//! Who watches sees every row, and can end the work.
+
+use std::cell::RefCell;
+
+use cohaptic_accuracy::{AccuracyError, Options, Row, Subject, Unwatched, Watch, measure};
+
+/// Keeps what it sees and stops after so many rows.
+struct Until {
+    rows: RefCell<Vec<Row>>,
+    most: usize,
+}
+
+impl Watch for Until {
+    fn row(&self, row: &Row) {
+        self.rows.borrow_mut().push(row.clone());
+    }
+
+    fn stops(&self) -> bool {
+        self.rows.borrow().len() >= self.most
+    }
+}
+
+const QUICK: Options = Options { quick: true };
+
+#[test]
+fn a_watcher_sees_every_row_in_order() {
+    let watch = Until { rows: RefCell::default(), most: usize::MAX };
+    let rows = measure(&[Subject::Motion], QUICK, &watch).unwrap();
+    assert_eq!(*watch.rows.borrow(), rows);
+    assert!(rows.iter().all(|row| row.subject == Subject::Motion));
+}
+
+#[test]
+fn the_work_ends_soon_after_it_is_asked_to() {
+    for subject in [Subject::Motion, Subject::Time] {
+        let watch = Until { rows: RefCell::default(), most: 5 };
+        assert!(matches!(measure(&[subject], QUICK, &watch), Err(AccuracyError::Stopped)));
+        let seen = watch.rows.borrow().len();
+        assert!((5..10).contains(&seen), "{seen} rows");
+    }
+}
+
+/// Costs are measured; errors are computed, and the same every time.
+#[test]
+fn errors_are_the_same_every_time() {
+    let errors = || -> Vec<(String, String, Option<u64>)> {
+        let rows = measure(&[Subject::Motion, Subject::Time], QUICK, &Unwatched).unwrap();
+        rows.into_iter().map(|row| (row.method, row.setting, row.error.map(f64::to_bits))).collect()
+    };
+    assert_eq!(errors(), errors());
+}

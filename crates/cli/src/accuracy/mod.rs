@@ -1,0 +1,103 @@
+//! `cohaptic accuracy`.
+
+mod files;
+mod machine;
+
+use std::cell::RefCell;
+use std::fmt::Write as _;
+use std::process::ExitCode;
+use std::time::Instant as Clock;
+
+use cohaptic_accuracy::{About, AccuracyError, Options, Row, Subject, Watch, measure, text};
+use serde::Serialize;
+
+use crate::arguments::AccuracyArguments;
+use crate::failure::{Failure, INTERRUPTED};
+use crate::progress::Progress;
+use crate::{interrupt, output};
+
+#[derive(Serialize)]
+struct Document<'a> {
+    rows: Vec<RowDocument<'a>>,
+    /// Whether the rows are only those that were measured until Ctrl-C, or until a fault.
+    interrupted: bool,
+    wall_s: f64,
+}
+
+#[derive(Serialize)]
+struct RowDocument<'a> {
+    subject: &'a str,
+    case: &'a str,
+    method: &'a str,
+    setting: &'a str,
+    cost: Option<f64>,
+    cost_unit: &'a str,
+    error: Option<f64>,
+    error_unit: &'a str,
+    reference: &'a str,
+    note: &'a str,
+}
+
+/// Shows how far the work is, and keeps every row, so that none is lost if the work is ended early.
+struct Keeper {
+    bar: Progress,
+    rows: RefCell<Vec<Row>>,
+}
+
+impl Watch for Keeper {
+    fn row(&self, row: &Row) {
+        self.bar.one_more();
+        self.bar.note(format!("{}, {}", row.subject.name(), row.case));
+        self.rows.borrow_mut().push(row.clone());
+    }
+
+    fn stops(&self) -> bool {
+        interrupt::asked()
+    }
+}
+
+/// Measures speed against error.
+pub(crate) fn accuracy(arguments: &AccuracyArguments) -> Result<ExitCode, Failure> {
+    if let Some(folder) = &arguments.out {
+        // A folder that cannot be had is found out before the work, not after it.
+        std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
+    }
+    let subjects: &[Subject] = if arguments.only.is_empty() { &Subject::ALL } else { &arguments.only };
+    let keeper = Keeper { bar: Progress::through_measurements(), rows: RefCell::default() };
+    let start = Clock::now();
+    let measured = measure(subjects, Options { quick: arguments.quick }, &keeper);
+    let wall_s = start.elapsed().as_secs_f64();
+    keeper.bar.clear();
+    // A fault of a scene of the program's own, which loses what was measured before it as little as Ctrl-C does.
+    let (interrupted, fault) = match measured {
+        Ok(_) => (false, None),
+        Err(AccuracyError::Stopped) => (true, None),
+        Err(error) => (true, Some(Failure::System(format!("the measurement ended early: {error}")))),
+    };
+    let rows = keeper.rows.into_inner();
+    let about = About { line: machine::line(arguments), partial: interrupted };
+    // What was measured is printed even if the disk is full.
+    let written = arguments.out.as_ref().map_or(Ok(()), |folder| files::write(folder, &rows, &about));
+    if arguments.json {
+        output::json(&Document { rows: rows.iter().map(document).collect(), interrupted, wall_s })?;
+    } else {
+        let mut shown = text(&rows);
+        if interrupted {
+            let _ = writeln!(shown, "INTERRUPTED after {wall_s:.1} s: these are the {} rows measured until then", rows.len());
+        }
+        if let (Some(folder), Ok(())) = (&arguments.out, &written) {
+            let _ = writeln!(shown, "{}", folder.join("index.html").display());
+        }
+        output::text(&shown)?;
+    }
+    written?;
+    if let Some(fault) = fault {
+        return Err(fault);
+    }
+    Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+fn document(row: &Row) -> RowDocument<'_> {
+    let Row { subject, case, method, setting, cost, cost_unit, error, error_unit, reference, note } = row;
+    RowDocument { subject: subject.name(), case, method, setting, cost: *cost, cost_unit, error: *error, error_unit, reference, note }
+}

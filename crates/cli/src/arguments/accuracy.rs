@@ -1,0 +1,32 @@
+//! `accuracy`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use cohaptic_accuracy::Subject;
+
+use super::EXIT_STATUS;
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_STATUS)]
+pub(crate) struct AccuracyArguments {
+    /// Write index.html, the plots (SVG) and rows.csv into this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Fewer settings and less work: under a minute
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Only these: motion, time, network, analysis, real-time, least-model
+    #[arg(long, value_name = "SUBJECT", value_delimiter = ',', value_parser = subject)]
+    pub(crate) only: Vec<Subject>,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn subject(text: &str) -> Result<Subject, String> {
+    Subject::ALL.into_iter().find(|subject| subject.name() == text).ok_or_else(|| {
+        let names = Subject::ALL.map(Subject::name).join(", ");
+        format!("there is no such subject; expected one of {names}")
+    })
+}
