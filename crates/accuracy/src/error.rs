@@ -1,5 +1,9 @@
 //! Why there are no rows.
 
+use cohaptic_scene::SceneError;
+use cohaptic_stability::{AnalysisError, BoundaryError, FamilyError};
+use cohaptic_wan::{NetworkError, TimeWentBack};
+
 /// Why a measurement came to no end.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -7,4 +11,25 @@ pub enum AccuracyError {
     /// Whoever watches asked for it.
     #[error("stopped")]
     Stopped,
+    /// A scene of this crate is refused.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A scene of this crate cannot be analysed.
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
+    /// A family of scenes of this crate cannot be analysed.
+    #[error(transparent)]
+    Family(#[from] FamilyError),
+    /// A boundary of this crate cannot be found.
+    #[error(transparent)]
+    Boundary(#[from] BoundaryError<FamilyError>),
+    /// A network of this crate refuses a packet.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// A network of this crate was asked for the past.
+    #[error(transparent)]
+    Time(#[from] TimeWentBack),
+    /// The system refuses to wait.
+    #[error("waiting for a packet's time: {0}")]
+    Wait(#[from] std::io::Error),
 }

@@ -1,0 +1,85 @@
+//! The exact probability of an event of a short scene: every pattern of losses, each with its probability.
+
+use std::sync::Arc;
+
+use cohaptic_harness::{Model, NoObserver, Simulation};
+use cohaptic_scene::{LinkTable, Scene};
+use cohaptic_wan::{Delay, LinkConfig, LinkModel, Loss, Pattern};
+
+use crate::AccuracyError;
+
+/// How probable a loss is.
+pub(super) const LOSS: f64 = 0.2;
+/// Further apart than this is what is asked about \[m\].
+pub(super) const LIMIT: f64 = 0.0125;
+/// Samples of each link that arrive before the end.
+const SAMPLES: u32 = 7;
+
+/// Two peers who begin to move apart, over links of 16 ms that lose every fifth sample: 64 ms of it.
+///
+/// Seven samples of each link, sent at 0, 8, … 48 ms, arrive until the end; what is sent later arrives after it and cannot count.
+const SCENE: &str = r#"
+    scene        = { duration = "64ms", count = 2 }
+    object       = { mass = 0.45 }
+    coordination = { strategy = "average-position", stiffness = 1800.0, damping = 5.0, update = "8ms" }
+    peer         = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+    link         = { delay = "16ms", loss = "20%" }
+
+    [[peers]]
+    name = "peer1"
+    velocity = -0.5
+    [[peers]]
+    name = "peer2"
+    velocity = 0.5
+"#;
+
+pub(super) fn scene() -> Result<Scene, AccuracyError> {
+    Ok(Scene::parse(SCENE, "monte-carlo.toml".as_ref(), &[])?)
+}
+
+/// Whether the copies were ever further apart than the limit.
+pub(super) fn happens(scene: &Scene) -> bool {
+    let Ok(summary) = Simulation::new(scene, Model::Least).run(&mut NoObserver);
+    summary.max_discrepancy > LIMIT
+}
+
+/// What all patterns come to.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Exact {
+    /// The probability of the event.
+    pub(super) probability: f64,
+    /// The probability of all patterns together: 1, but for rounding.
+    pub(super) all: f64,
+    /// How many patterns there are.
+    pub(super) patterns: u32,
+}
+
+/// Runs the scene once for every pattern of losses.
+pub(super) fn exact(scene: &Scene, mut check: impl FnMut() -> Result<(), AccuracyError>) -> Result<Exact, AccuracyError> {
+    let links: Vec<Arc<LinkModel>> = (0..1_u32 << SAMPLES).map(|lost| Arc::new(losing(scene, lost))).collect();
+    let mut scene = scene.clone();
+    let patterns = 1 << (2 * SAMPLES);
+    let mut exact = Exact { probability: 0.0, all: 0.0, patterns };
+    for pattern in 0..patterns {
+        let [one, other] = [pattern >> SAMPLES, pattern & ((1 << SAMPLES) - 1)].map(|lost| Arc::clone(&links[lost as usize]));
+        scene.links = LinkTable::new(2, one, [((1, 0), other)]);
+        let lost = pattern.count_ones();
+        let weight = LOSS.powi(lost.cast_signed()) * (1.0 - LOSS).powi((2 * SAMPLES - lost).cast_signed());
+        exact.all += weight;
+        if happens(&scene) {
+            exact.probability += weight;
+        }
+        if pattern.is_multiple_of(256) {
+            check()?;
+        }
+    }
+    Ok(exact)
+}
+
+/// The link of the scene, but that it loses those of its first samples whose bits are set, and no other.
+fn losing(scene: &Scene, lost: u32) -> LinkModel {
+    let chosen = (0..SAMPLES).filter(|sample| lost >> sample & 1 == 1).map(|sample| u64::from(sample)..u64::from(sample) + 1).collect();
+    let loss = Pattern::of_packets(chosen, None).map_or(Loss::None, Loss::Pattern);
+    let delay = Delay::constant(scene.links.between(0, 1).mean_delay());
+    LinkConfig { loss, delay, ..LinkConfig::default() }.into()
+}
