@@ -1,6 +1,6 @@
 //! The least model against the general one: what each thing that a scene can need costs, and that the answer is the same to the bit.
 //!
-//! A [base scene](scenes) has three peers, a constant delay, and nothing else; each other scene has exactly one thing more. Base and variant take turns,
+//! The base scene has three peers, a constant delay, and nothing else; each other scene has exactly one thing more. Base and variant take turns,
 //! so that noise hits both. The error is the largest difference between an object's positions under [`Model::Least`] and under [`Model::General`], which
 //! simulates all that the program has whether the scene needs it or not: it must be zero.
 
@@ -82,7 +82,7 @@ fn variant_row(variant: Variant, base: &Scene, effort: Effort) -> Result<Row, Ac
     let times = rounds.medians(&mut works);
     let [alone, more] = [a_tick(&times[0], base), a_tick(&times[1], &scene)];
     let simulated = scene.duration.as_secs_f64() / times[1].as_secs_f64();
-    let note = format!("{:.2} times the base, {:+.0} ns; {simulated:.0} s simulated in a second{}", more / alone, more - alone, variant.words());
+    let note = format!("{:.2} times the base, {:+.1} ns; {simulated:.0} s simulated in a second{}", more / alone, more - alone, variant.words());
     Ok(Row {
         subject: Subject::LeastModel,
         case: "three peers, constant delay, and".to_owned(),

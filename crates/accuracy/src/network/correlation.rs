@@ -6,7 +6,7 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Correlation, Delay, Distribution, Fate, Jitter, Link, LinkConfig, LinkModel, LinkName};
 
 use super::losses::kernel;
-use super::{Done, Effort, row};
+use super::{Done, Effort, real, row};
 use crate::cost::processor_time;
 use crate::least::rounds::nanos;
 use crate::{AccuracyError, Row};
@@ -15,8 +15,8 @@ const ASKED: f64 = 0.75;
 const MEAN: Duration = Duration::from_millis(24);
 const SD: Duration = Duration::from_millis(2);
 
-/// Runs of packets, of which the figures are the average: a link's first delay and its seed should not matter.
-const RUNS: usize = 4;
+/// The figures are the average of links with these seeds.
+const SEEDS: [u64; 4] = [1, 2, 3, 4];
 
 pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
     for (name, distribution, words) in [
@@ -46,18 +46,18 @@ fn ours(distribution: Distribution) -> LinkModel {
 }
 
 fn of_model(case: &str, method: &str, model: &LinkModel, what: &str, effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
-    let packets = effort.correlated_packets / RUNS;
+    let packets = effort.correlated_packets / SEEDS.len();
     let (mut at_lag_one, mut variance) = (0.0, 0.0);
     let start = processor_time();
-    for seed in 1..=4 {
+    for seed in SEEDS {
         let seen = moments(&delays(model, seed, packets));
-        at_lag_one += seen[0] / 4.0;
-        variance += seen[1] / 4.0;
+        at_lag_one += seen[0] / real(SEEDS.len());
+        variance += seen[1] / real(SEEDS.len());
         done.check()?;
     }
-    let n = real(packets * RUNS);
+    let n = real(packets * SEEDS.len());
     let cost = (nanos(processor_time() - start) / n, "ns a packet");
-    let row = Row { reference: "what was asked", ..row(case, method, format!("{} packets", packets * RUNS), cost) };
+    let row = Row { reference: "what was asked", ..row(case, method, format!("{} packets", packets * SEEDS.len()), cost) };
     // Bartlett's formulas for a Gaussian chain: what n packets leave open.
     let square = ASKED * ASKED;
     let (of_lag, of_sd) = (((1.0 - square) / n).sqrt(), (0.5 * (1.0 + square) / (1.0 - square) / n).sqrt());
@@ -112,9 +112,4 @@ fn moments(delays: &[f64]) -> [f64; 2] {
     let variance = delays.iter().map(|delay| (delay - mean).powi(2)).sum::<f64>() / n;
     let covariance = delays.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum::<f64>() / n;
     [covariance / variance, variance]
-}
-
-#[expect(clippy::cast_precision_loss, reason = "counts are small")]
-const fn real(count: usize) -> f64 {
-    count as f64
 }

@@ -10,7 +10,7 @@ use cohaptic_wan::random::unit;
 use super::errors::{Look, probability};
 use super::other_ways::{KernelTable, samplers};
 use super::ways::{Fine, MEAN, Netem, SD, draw, further_laws, laws, next_word};
-use super::{Done, Effort, row};
+use super::{Done, Effort, real, row};
 use crate::least::rounds::{Work, nanos};
 use crate::{AccuracyError, Row};
 
@@ -198,9 +198,4 @@ fn kernel_uniform_error(law: &Law, look: Look) -> Wrong {
     let tail = tail_error(law, look, MEAN + (place - 0.5 * width) * 1e-6);
     let note = "computed; the remainder of 32 bits, so that shorter delays are more probable, and whole nanoseconds".to_owned();
     Wrong { distance: bias + 1.0 / width, tail, note }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "counts are small")]
-const fn real(count: usize) -> f64 {
-    count as f64
 }

@@ -5,7 +5,7 @@ use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{Bursts, Chance, Fate, FourState, GilbertElliott, KernelNetem, Link, LinkConfig, LinkModel, LinkName, Loss};
 
 use super::chain::{Expected, LossChain};
-use super::{Done, Effort, row};
+use super::{Done, Effort, real, row};
 use crate::cost::processor_time;
 use crate::least::rounds::nanos;
 use crate::{AccuracyError, Row};
@@ -145,11 +145,6 @@ impl Seen {
     fn run(self) -> f64 {
         real(self.lost) / real(self.begun.max(1))
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "counts are small")]
-const fn real(count: usize) -> f64 {
-    count as f64
 }
 
 #[cfg(test)]
