@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use cohaptic_benches::samplers::{Fine, Netem, draw, laws, next_word, unit};
+use cohaptic_accuracy::network::ways::{Fine, Netem, draw, laws, next_word, unit};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 
 fn samplers(criterion: &mut Criterion) {

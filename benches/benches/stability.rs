@@ -1,9 +1,9 @@
 //! Verdicts on the stability of scenes, by every way: `cargo bench -p cohaptic-benches --bench stability`.
 #![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
 
+use cohaptic_accuracy::analysis::growth::growth;
+use cohaptic_accuracy::analysis::references::references;
 use cohaptic_benches::bare_pair::BarePair;
-use cohaptic_benches::growth::growth;
-use cohaptic_benches::references::references;
 use cohaptic_benches::verdicts::{eight_different, equal, family};
 use cohaptic_stability::{FamilyScratch, Grid, Map, Method, analyse};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};

@@ -9,11 +9,8 @@
 
 pub mod bare;
 pub mod bare_pair;
-pub mod growth;
 pub mod machine;
 pub mod one_link;
-pub mod references;
-pub mod samplers;
 pub mod verdicts;
 
 use cohaptic_harness::{Model, NoObserver, Simulation, Summary};

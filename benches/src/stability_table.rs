@@ -5,10 +5,10 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
+use cohaptic_accuracy::analysis::growth::growth;
+use cohaptic_accuracy::analysis::references::{Reference, references};
 use cohaptic_benches::bare_pair::BarePair;
-use cohaptic_benches::growth::growth;
 use cohaptic_benches::machine::{median, process_time, processor, time};
-use cohaptic_benches::references::{Reference, references};
 use cohaptic_benches::verdicts::{eight_different, equal, family, figure_3};
 use cohaptic_peer::Gains;
 use cohaptic_stability::{FamilyScratch, Grid, Map, Method, Radius, analyse};

@@ -29,4 +29,7 @@ pub enum AccuracyError {
     /// A network of this crate was asked for the past.
     #[error(transparent)]
     Time(#[from] TimeWentBack),
+    /// The system refuses to wait.
+    #[error("waiting for a packet's time: {0}")]
+    Wait(#[from] std::io::Error),
 }

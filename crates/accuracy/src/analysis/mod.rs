@@ -1,12 +1,80 @@
-//! Stability: several ways to one verdict.
+//! Whether a scene is stable: what a verdict costs by each method, and how far it is from numbers of fifty digits; and by runs that are left to chance,
+//! how much so many of them tell.
 
-use crate::{AccuracyError, Options, Row, Watch};
+mod boundary;
+mod every_pattern;
+pub mod growth;
+mod mean_square;
+mod monte_carlo;
+mod radius;
+pub mod references;
+
+use crate::network::Done;
+use crate::{AccuracyError, Options, Row, Subject, Watch};
+
+/// How much work there is in the rows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Effort {
+    /// In how many rounds the cost of a verdict is measured.
+    pub rounds: usize,
+    /// Over how many frames a disturbance is simulated.
+    pub growth_frames: &'static [u32],
+    /// How many seconds are simulated for the verdicts of a boundary.
+    pub boundary_seconds: &'static [u64],
+    /// How many runs there are of a scene that is left to chance.
+    pub runs: &'static [u32],
+}
+
+impl Effort {
+    /// Seconds.
+    pub const QUICK: Self = Self { rounds: 5, growth_frames: &[50, 200, 800], boundary_seconds: &[1, 4, 16], runs: &[100, 1000, 10_000] };
+
+    /// About a minute.
+    pub const FULL: Self =
+        Self { rounds: 15, growth_frames: &[50, 200, 800, 3200], boundary_seconds: &[1, 4, 16, 64, 256], runs: &[100, 1000, 10_000, 100_000] };
+
+    /// The one of these options.
+    #[must_use]
+    pub const fn of(options: Options) -> Self {
+        if options.quick { Self::QUICK } else { Self::FULL }
+    }
+}
 
 /// The rows of this subject.
 ///
 /// # Errors
 ///
 /// As [`crate::measure`].
-pub fn rows(_options: Options, _watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    Ok(Vec::new())
+pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    rows_with(Effort::of(options), watch)
+}
+
+/// The same with another effort.
+///
+/// # Errors
+///
+/// As [`crate::measure`].
+pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    let mut done = Done { rows: Vec::new(), watch };
+    radius::measure(effort, &mut done)?;
+    boundary::measure(effort, &mut done)?;
+    mean_square::measure(effort, &mut done)?;
+    monte_carlo::measure(effort, &mut done)?;
+    Ok(done.rows)
+}
+
+/// A row of this subject that has no error yet.
+fn row(case: &str, method: &str, setting: String, (cost, cost_unit): (f64, &'static str), reference: &'static str) -> Row {
+    Row {
+        subject: Subject::Analysis,
+        case: case.to_owned(),
+        method: method.to_owned(),
+        setting,
+        cost: Some(cost),
+        cost_unit,
+        error: None,
+        error_unit: "",
+        reference,
+        note: String::new(),
+    }
 }

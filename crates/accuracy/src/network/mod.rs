@@ -1,12 +1,136 @@
 //! Laws of delay and models of loss: what a draw costs, and how far what is drawn is from what was asked.
+//!
+//! - [`ways`] to draw a delay: tables as netem has them and finer ones, the inverse of the law, what the program draws, and others' samplers;
+//! - [`errors`] of a way: computed from its table or its function, so that they are the same every time. What can only be drawn is drawn often, and
+//!   the row says how much of its error is that of so many draws.
+//! - loss models: how many packets it takes until the mean loss and the mean run of losses are known to some error, beside what theory says;
+//! - jitter that hangs together from packet to packet: what was asked for, and what comes out.
 
-use crate::{AccuracyError, Options, Row, Watch};
+mod chain;
+mod correlation;
+mod delays;
+pub mod errors;
+mod losses;
+mod other_ways;
+pub mod ways;
+
+use std::time::Duration;
+
+use crate::least::rounds::Rounds;
+use crate::network::errors::Look;
+use crate::{AccuracyError, Options, Row, Subject, Watch};
+
+/// How much work there is in the rows.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Effort {
+    /// How closely computed errors are looked for.
+    pub look: Look,
+    /// How many draws there are of a way whose error cannot be computed.
+    pub draws: usize,
+    /// In how many rounds costs are measured.
+    pub rounds: usize,
+    /// How many packets are sent for the correlation of jitter.
+    pub correlated_packets: usize,
+    /// For each number of packets through a loss model, how many runs of so many there are.
+    pub loss_runs: &'static [(usize, usize)],
+}
+
+impl Effort {
+    /// Seconds.
+    pub const QUICK: Self = Self {
+        look: Look { quantile: 0.999, places_a_cell: 2, places_a_side: 4000 },
+        draws: 200_000,
+        rounds: 7,
+        correlated_packets: 200_000,
+        loss_runs: &[(1000, 100), (10_000, 30), (100_000, 10)],
+    };
+
+    /// About a minute.
+    pub const FULL: Self = Self {
+        look: Look { quantile: 0.999, places_a_cell: 16, places_a_side: 40_000 },
+        draws: 2_000_000,
+        rounds: 31,
+        correlated_packets: 2_000_000,
+        loss_runs: &[(1000, 400), (10_000, 200), (100_000, 50), (1_000_000, 10)],
+    };
+
+    /// The one of these options.
+    #[must_use]
+    pub const fn of(options: Options) -> Self {
+        if options.quick { Self::QUICK } else { Self::FULL }
+    }
+
+    pub(crate) const fn rounds(self) -> Rounds {
+        Rounds { count: self.rounds, span: Duration::from_micros(200) }
+    }
+}
 
 /// The rows of this subject.
 ///
 /// # Errors
 ///
 /// As [`crate::measure`].
-pub fn rows(_options: Options, _watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    Ok(Vec::new())
+pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    rows_with(Effort::of(options), watch)
+}
+
+/// The same with another effort.
+///
+/// # Errors
+///
+/// As [`crate::measure`].
+pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    let mut done = Done { rows: Vec::new(), watch };
+    delays::measure(effort, &mut done)?;
+    losses::measure(effort, &mut done)?;
+    correlation::measure(effort, &mut done)?;
+    Ok(done.rows)
+}
+
+/// The rows so far, and who watches.
+pub(crate) struct Done<'a> {
+    pub(crate) rows: Vec<Row>,
+    pub(crate) watch: &'a dyn Watch,
+}
+
+impl Done<'_> {
+    /// A row is done.
+    ///
+    /// # Errors
+    ///
+    /// [`AccuracyError::Stopped`] if the work is to be given up.
+    pub(crate) fn push(&mut self, row: Row) -> Result<(), AccuracyError> {
+        self.watch.row(&row);
+        self.rows.push(row);
+        self.check()
+    }
+
+    /// # Errors
+    ///
+    /// [`AccuracyError::Stopped`] if the work is to be given up.
+    pub(crate) fn check(&self) -> Result<(), AccuracyError> {
+        if self.watch.stops() { Err(AccuracyError::Stopped) } else { Ok(()) }
+    }
+}
+
+/// A row of this subject without its case, method and errors.
+fn row(case: &str, method: &str, setting: String, (cost, cost_unit): (f64, &'static str)) -> Row {
+    Row {
+        subject: Subject::Network,
+        case: case.to_owned(),
+        method: method.to_owned(),
+        setting,
+        cost: Some(cost),
+        cost_unit,
+        error: None,
+        error_unit: "",
+        reference: "",
+        note: String::new(),
+    }
+}
+
+/// A count as a number.
+#[expect(clippy::cast_precision_loss, reason = "counts are small")]
+const fn real(count: usize) -> f64 {
+    count as f64
 }

@@ -1,12 +1,89 @@
-//! Leaving on time by the wall clock: sleeping beside spinning.
+//! Leaving on time by the wall clock: processor time a packet against how late it leaves, asleep and awake.
+//!
+//! A [`Link`](cohaptic_wan::Link) says when each of its packets leaves; something waits for that time. Both numbers are measured and not computed: they
+//! are those of this machine with what else it did just then. The ways take turns, so that this hits all of them.
 
-use crate::{AccuracyError, Options, Row, Watch};
+mod release;
+
+use std::time::Duration;
+
+use self::release::{Releases, Way};
+use crate::{AccuracyError, Options, Row, Subject, Watch};
+
+/// How much work there is in the rows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Effort {
+    /// How often each way has its turn.
+    pub rounds: u32,
+    /// How long a turn is \[ms\].
+    pub turn_millis: u64,
+}
+
+impl Effort {
+    /// Six seconds.
+    pub const QUICK: Self = Self { rounds: 2, turn_millis: 300 };
+
+    /// A minute.
+    pub const FULL: Self = Self { rounds: 6, turn_millis: 1000 };
+
+    /// The one of these options.
+    #[must_use]
+    pub const fn of(options: Options) -> Self {
+        if options.quick { Self::QUICK } else { Self::FULL }
+    }
+}
 
 /// The rows of this subject.
 ///
 /// # Errors
 ///
 /// As [`crate::measure`].
-pub fn rows(_options: Options, _watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    Ok(Vec::new())
+pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    rows_with(Effort::of(options), watch)
+}
+
+/// The same with another effort.
+///
+/// # Errors
+///
+/// As [`crate::measure`].
+pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    let mut all: Vec<Releases> = Way::ALL.into_iter().map(Releases::new).collect();
+    for round in 0..effort.rounds {
+        for releases in &mut all {
+            if watch.stops() {
+                return Err(AccuracyError::Stopped);
+            }
+            releases.turn(u64::from(round), Duration::from_millis(effort.turn_millis))?;
+        }
+    }
+    let mut rows = Vec::new();
+    for row in all.iter().flat_map(rows_of) {
+        watch.row(&row);
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+fn rows_of(releases: &Releases) -> [Row; 2] {
+    let summary = releases.lateness.summary();
+    let note =
+        format!("measured over {} packets, one a millisecond; the latest {:.0} µs; {}", summary.count, micros(summary.max), releases.way.words());
+    let row = |error: Duration, error_unit| Row {
+        subject: Subject::RealTime,
+        case: "release of 24 packets under way".to_owned(),
+        method: releases.way.name().to_owned(),
+        setting: releases.way.setting(),
+        cost: Some(micros(releases.processor) / f64::from(u32::try_from(summary.count.max(1)).unwrap_or(u32::MAX))),
+        cost_unit: "µs of processor time a packet",
+        error: Some(micros(error)),
+        error_unit,
+        reference: "the instant at which the link lets it go",
+        note: note.clone(),
+    };
+    [row(summary.p50, "lateness, median [µs]"), row(summary.p99, "lateness, 99 % [µs]")]
+}
+
+fn micros(span: Duration) -> f64 {
+    span.as_secs_f64() * 1e6
 }

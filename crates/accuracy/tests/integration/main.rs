@@ -2,8 +2,13 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 #![allow(clippy::float_cmp, reason = "what is written is what was measured, to the bit")]
 
+mod analysis;
 mod documents;
+mod least;
+mod network;
 mod plots;
+mod real_time;
+mod rows;
 mod watching;
 
 use cohaptic_accuracy::{Row, Subject};

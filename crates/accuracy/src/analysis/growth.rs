@@ -1,4 +1,5 @@
 //! The spectral radius as a simulation shows it: by how much a disturbance grows from frame to frame.
+#![expect(clippy::cast_precision_loss, reason = "peers and frames are few")]
 
 use std::time::Duration;
 
@@ -6,18 +7,19 @@ use cohaptic_harness::{Model, Observer, Simulation, TickRow};
 use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
 
-/// Frames that are simulated.
-const FRAMES: u32 = 200;
-/// The largest displacement in these frames is compared with that in as many frames [`APART`] later.
-const WINDOW: std::ops::Range<usize> = 60..100;
-const APART: usize = 100;
-
-/// The estimate of the radius from 200 frames, as anyone would get it without the matrix: everybody begins displaced, and the largest relative
-/// displacement among 40 frames is compared with that of 100 frames later. `None` if it cannot be told.
+/// The estimate of the radius from 200 frames: [`growth_over`].
 #[must_use]
 pub fn growth(scene: &Scene) -> Option<f64> {
+    growth_over(scene, 200)
+}
+
+/// The estimate of the radius from so many frames, as anyone would get it without the matrix: everybody begins displaced, and the largest relative
+/// displacement from three tenths to half of the time is compared with that half of the time later. `None` if it cannot be told: the disturbance has died
+/// out below all numbers, or grown beyond them.
+#[must_use]
+pub fn growth_over(scene: &Scene, frames: u32) -> Option<f64> {
     let mut scene = scene.clone();
-    scene.duration = scene.coordination.update * FRAMES;
+    scene.duration = scene.coordination.update * frames;
     scene.timeline.clear();
     for (place, peer) in scene.peers.iter_mut().enumerate() {
         // Steps of the golden angle: no two alike.
@@ -31,12 +33,15 @@ pub fn growth(scene: &Scene) -> Option<f64> {
         tick: scene.peers[0].clock.tick.as_secs_f64(),
         touching,
         copies: vec![0.0; peers],
-        largest: vec![0.0; FRAMES as usize],
+        largest: vec![0.0; frames as usize],
     };
     let Ok(_) = Simulation::new(&scene, Model::Least).run(&mut seen);
     let largest = |frames: std::ops::Range<usize>| seen.largest[frames].iter().copied().fold(0.0, f64::max);
-    let (early, late) = (largest(WINDOW), largest(WINDOW.start + APART..WINDOW.end + APART));
-    let growth = (late / early).powf(1.0 / APART as f64);
+    let all = frames as usize;
+    let (begin, end) = (all * 3 / 10, all / 2);
+    let apart = all / 2;
+    let (early, late) = (largest(begin..end), largest(begin + apart..end + apart));
+    let growth = (late / early).powf(1.0 / apart as f64);
     (early > 0.0 && late > 0.0 && growth.is_finite()).then_some(growth)
 }
 
@@ -72,7 +77,7 @@ impl Observer for Seen {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::references::references;
+    use crate::analysis::references::references;
 
     #[test]
     fn a_disturbance_grows_by_about_the_radius() {

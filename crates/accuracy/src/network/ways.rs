@@ -1,4 +1,10 @@
-//! Ways to draw a delay, for the comparison of their speed and their errors.
+//! Ways to draw a delay: by tables as others do, by inverting the law, and as the program draws.
+#![expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a way does what is shortest; every number here is small"
+)]
 
 use cohaptic_wan::law::{Distribution, Law};
 
@@ -14,6 +20,23 @@ pub fn laws() -> [(&'static str, Law); 4] {
         ("Pareto", Distribution::Pareto, 0.0),
         ("gamma", Distribution::Gamma, 20.0),
         ("lognormal", Distribution::LogNormal, 20.0),
+    ]
+    .map(|(name, distribution, floor)| (name, Law::new(&distribution, MEAN, SD, Some(floor)).expect("a law")))
+}
+
+/// The laws that are compared beside those of [`laws`], with the same mean and deviation.
+///
+/// # Panics
+///
+/// If one of them were refused, which a test would show.
+#[must_use]
+pub fn further_laws() -> [(&'static str, Law); 4] {
+    [
+        ("uniform", Distribution::Uniform, 0.0),
+        ("Pareto-normal", Distribution::ParetoNormal, 0.0),
+        ("Weibull", Distribution::Weibull, 20.0),
+        // So far below that nothing is cut off.
+        ("Laplace", Distribution::Laplace, -200.0),
     ]
     .map(|(name, distribution, floor)| (name, Law::new(&distribution, MEAN, SD, Some(floor)).expect("a law")))
 }

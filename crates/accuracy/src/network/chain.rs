@@ -1,0 +1,102 @@
+//! What theory says of a Markov chain's averages: their long-run variance, hence the error to expect of so many packets.
+
+/// A chain of loss: which state a packet is in, and in which states packets are lost.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct LossChain {
+    /// The probability of going from one state (row) to another (column) with each packet.
+    pub(super) transitions: Vec<Vec<f64>>,
+    /// The long-run fraction of packets in each state.
+    pub(super) stationary: Vec<f64>,
+    pub(super) lost: Vec<bool>,
+}
+
+/// What so many packets show on average, and how far off the average of one run is.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Expected {
+    /// The fraction lost.
+    pub(super) mean: f64,
+    /// The mean number lost in a row.
+    pub(super) run: f64,
+    /// The asymptotic variance of the fraction lost, over n packets to be divided by n; relative to its square.
+    pub(super) mean_variance: f64,
+    /// The same of the mean run, relative to its square.
+    pub(super) run_variance: f64,
+}
+
+impl LossChain {
+    /// A chain of two states, the second one lost: how probable a loss is after a packet received, and after one lost.
+    pub(super) fn of_two(after_received: f64, after_lost: f64) -> Self {
+        let lost = after_received / (1.0 - after_lost + after_received);
+        Self {
+            transitions: vec![vec![1.0 - after_received, after_received], vec![1.0 - after_lost, after_lost]],
+            stationary: vec![1.0 - lost, lost],
+            lost: vec![false, true],
+        }
+    }
+
+    /// The number of losses L and of their beginnings S are sums along the chain of pairs of successive states. The fraction lost is L/n, the mean run
+    /// L/S, whose error is that of L/ℓ − S/s to first order, with ℓ and s the fractions.
+    pub(super) fn expected(&self) -> Expected {
+        let states = self.stationary.len();
+        let pairs: Vec<(usize, usize)> = (0..states).flat_map(|from| (0..states).map(move |to| (from, to))).collect();
+        let weights: Vec<f64> = pairs.iter().map(|(from, to)| self.stationary[*from] * self.transitions[*from][*to]).collect();
+        let over = |of: &dyn Fn(usize, usize) -> bool| pairs.iter().map(|(from, to)| f64::from(u8::from(of(*from, *to)))).collect::<Vec<f64>>();
+        let losses = over(&|_, to| self.lost[to]);
+        let begins = over(&|from, to| self.lost[to] && !self.lost[from]);
+        let average = |values: &[f64]| values.iter().zip(&weights).map(|(value, weight)| value * weight).sum::<f64>();
+        let (mean, share) = (average(&losses), average(&begins));
+        let ratio: Vec<f64> = losses.iter().zip(&begins).map(|(loss, begin)| loss / mean - begin / share).collect();
+        let scaled: Vec<f64> = losses.iter().map(|loss| loss / mean).collect();
+        let variance = |values: &[f64]| self.long_run_variance(&pairs, &weights, values, average(values));
+        Expected { mean, run: mean / share, mean_variance: variance(&scaled), run_variance: variance(&ratio) }
+    }
+
+    /// Var + 2·Σ covariances at lags 1, 2, …: summed until they no longer count.
+    fn long_run_variance(&self, pairs: &[(usize, usize)], weights: &[f64], values: &[f64], mean: f64) -> f64 {
+        let centred: Vec<f64> = values.iter().map(|value| value - mean).collect();
+        let covariance = |ahead: &[f64]| centred.iter().zip(ahead).zip(weights).map(|((value, ahead), weight)| value * ahead * weight).sum::<f64>();
+        let variance = covariance(&centred);
+        let (mut sum, mut ahead) = (variance, centred.clone());
+        for _ in 0..100_000 {
+            // What the value is expected to be one packet later, of each pair.
+            ahead = pairs
+                .iter()
+                .map(|(_, now)| {
+                    pairs.iter().zip(&ahead).filter(|((from, _), _)| from == now).map(|((_, to), value)| self.transitions[*now][*to] * value).sum()
+                })
+                .collect();
+            let term = 2.0 * covariance(&ahead);
+            sum += term;
+            if ahead.iter().all(|value| value.abs() < 1e-14) {
+                break;
+            }
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of independent losses: the relative variance of the mean is (1 − p)/p; runs of losses are geometric with mean 1/(1 − p), of which there are
+    /// n·p·(1 − p), each of relative variance p, so p/(p·(1 − p)) = 1/(1 − p).
+    #[test]
+    fn independent_losses_have_the_variances_of_binomial_and_geometric_laws() {
+        let p = 0.05;
+        let expected = LossChain::of_two(p, p).expected();
+        assert!((expected.mean - p).abs() < 1e-15 && (expected.run - 1.0 / (1.0 - p)).abs() < 1e-14);
+        assert!((expected.mean_variance - (1.0 - p) / p).abs() < 1e-11);
+        assert!((expected.run_variance - 1.0 / (1.0 - p)).abs() < 1e-11);
+    }
+
+    /// With autocorrelation ρ at lag one the variance of the mean is that of independent losses times (1 + ρ)/(1 − ρ).
+    #[test]
+    fn correlated_losses_have_bartletts_variance() {
+        let (p, rho) = (0.1, 0.6);
+        let expected = LossChain::of_two(p * (1.0 - rho), p + rho * (1.0 - p)).expected();
+        assert!((expected.mean - p).abs() < 1e-15);
+        assert!((expected.run - 1.0 / ((1.0 - rho) * (1.0 - p))).abs() < 1e-12);
+        assert!((expected.mean_variance - (1.0 - p) / p * (1.0 + rho) / (1.0 - rho)).abs() < 1e-10);
+    }
+}
