@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use crate::bench::{Bench, StopAfter, VARY};
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(16))]
 
     /// Ended again and again, with any number of threads, parts torn off or half written by a kill: the table is the one of a campaign that nothing disturbed.
     #[test]
