@@ -7,9 +7,23 @@ use crate::scenes::TWO;
 fn help_names_the_commands() {
     let text = Desk::new().text("--help");
     assert!(
-        ["run", "check", "explain", "stability", "admittance", "relay", "router", "link", "fit", "paper", "Exit status: 0 done", "130 interrupted"]
-            .iter()
-            .all(|word| text.contains(word)),
+        [
+            "run",
+            "check",
+            "explain",
+            "campaign",
+            "stability",
+            "admittance",
+            "relay",
+            "router",
+            "link",
+            "fit",
+            "paper",
+            "Exit status: 0 done",
+            "130 interrupted"
+        ]
+        .iter()
+        .all(|word| text.contains(word)),
         "{text}"
     );
     assert!(Desk::new().text("--version").starts_with("cohaptic "));
@@ -21,6 +35,20 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
         ("run", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--against <KEY=VALUE>", "--out <DIR>", "--no-plot", "--general"][..]),
         ("check", &["<SCENE>...", "--set <KEY=VALUE>", "--json", "--jobs <N>", "--general"]),
         ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json"]),
+        (
+            "campaign",
+            &[
+                "<SCENE>",
+                "--set <KEY=VALUE>",
+                "--json",
+                "--vary <KEY=VALUES>",
+                "--runs <N>",
+                "--out <DIR>",
+                "--format <FORMAT>",
+                "--threads <N>",
+                "--part <N>",
+            ],
+        ),
         ("stability point", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--method <METHOD>"]),
         (
             "stability map",

@@ -6,6 +6,7 @@
 
 mod admittance;
 mod against;
+mod campaign;
 mod check;
 mod desk;
 mod errors;
