@@ -132,7 +132,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
         ("--vary coordination.stiffness", &["--vary: no key"]),
         ("--vary coordination.stiffness=-5..1/3", &["--vary coordination.stiffness=-5", "^", "note: in the combination coordination.stiffness=-5"]),
         ("--vary object.mass=1,2 --vary link.delay=8ms,8", &["--vary link.delay=8:", "^", "note: in the combination object.mass=1, link.delay=8"]),
-        ("--vary peer.tick=1ms,3ms", &["random.toml:", "update", "note: in the combination peer.tick=3ms"]),
+        ("--vary peer.tick=1ms,3ms", &["--vary peer.tick=3ms: ", "coordination.update", "^", "note: in the combination peer.tick=3ms"]),
         ("--vary object.mass=1,2 --set link.delay=8", &["--set link.delay=8", "^"]),
         ("--vary object.mass=1,2 --vary object.mass=3", &["--vary: object.mass is varied twice"]),
         ("--vary scene.seed=1,2 --runs 2", &["--runs: scene.seed is varied"]),
@@ -281,7 +281,7 @@ mod interrupted {
     fn a_parquet_file_that_finds_no_room_leaves_nothing_either() {
         let desk = Desk::with("random.toml", RANDOM);
         let line = "campaign random.toml --vary link.loss=0%,10% --runs 100 --part 8";
-        // A part has about 15 kB, the table 25 of them.
+        // A part has about 7 kB, the table 25 times as much but for what stands at the end of each.
         let outcome = cramped(&desk, 96, &format!("{line} --out table"));
         outcome.assert_refused(3, &["cannot write table/runs.parquet", "File too large", "200 of 200 runs are kept"]);
         assert_eq!(desk.files("table").len(), 1 + 25);
