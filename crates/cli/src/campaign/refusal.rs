@@ -24,8 +24,7 @@ pub(super) fn failure(error: CampaignError, arguments: &CampaignArguments) -> Fa
             Failure::Input(format!("--out: {error}"))
         }
         error @ CampaignError::Stopped => Failure::Interrupted(error.to_string()),
-        error if error.is_io() => Failure::System(error.to_string()),
-        error => Failure::Input(error.to_string()),
+        error @ (CampaignError::Damaged { .. } | CampaignError::Busy { .. } | CampaignError::File { .. } | _) => Failure::System(error.to_string()),
     }
 }
 
