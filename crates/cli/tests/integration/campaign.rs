@@ -148,7 +148,8 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
     }
     desk.cohaptic("campaign random.toml").assert_refused(2, &["--out"]);
     desk.cohaptic("campaign gone.toml --out out").assert_refused(3, &["gone.toml: cannot be read"]);
-    desk.cohaptic("campaign random.toml --vary peers.left.hand.file=gone.csv --out out").assert_refused(3, &["gone.csv", "note: in the combination"]);
+    desk.cohaptic("campaign random.toml --vary peers.right.hand.file=gone.csv --out out")
+        .assert_refused(3, &["gone.csv", "note: in the combination"]);
     desk.write("file", "mine");
     desk.cohaptic("campaign random.toml --out file").assert_refused(2, &["--out: file is no folder"]);
     desk.write("thesis/chapter.tex", "mine");
