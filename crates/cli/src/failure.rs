@@ -26,6 +26,14 @@ pub(crate) enum Failure {
         option: &'static str,
         error: SceneError,
     },
+    /// The scene is refused with the values of one combination of a campaign.
+    Combination {
+        error: Box<SceneError>,
+        /// Whether the fault is in one of these values.
+        is_varied: bool,
+        /// Which combination it is, as a line of its own.
+        combination: String,
+    },
     Record(RecordError),
     /// A fault in the keys of a link.
     LinkKeys(SceneError),
@@ -52,6 +60,11 @@ impl Failure {
             Self::Scene(error) => (error.to_string(), scene_status(error)),
             // The scene knows of overrides, and not which option they came from.
             Self::Override { option, error } => (error.to_string().replacen("--set", option, 1), scene_status(error)),
+            Self::Combination { error, is_varied, combination } => {
+                let message = error.to_string();
+                let message = if *is_varied { message.replacen("--set", "--vary", 1) } else { message };
+                (message + combination, scene_status(error))
+            }
             Self::Record(error) => (error.to_string(), INPUT_OUTPUT),
             // The scene knows of overrides, and not that these are words of their own.
             Self::LinkKeys(error) => (error.to_string().replacen("--set link.", "", 1), scene_status(error)),

@@ -7,6 +7,7 @@
 mod accuracy;
 mod admittance;
 mod arguments;
+mod campaign;
 mod check;
 mod documents;
 mod explain;
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => check::check(&arguments),
         Command::Explain(arguments) => explain::explain(&arguments),
+        Command::Campaign(arguments) => campaign::campaign(&arguments),
         Command::Stability(arguments) => stability::stability(&arguments),
         Command::Admittance(arguments) => admittance::admittance(&arguments),
         Command::Live(arguments) => live::live(&arguments),

@@ -38,6 +38,21 @@ impl Progress {
         Self(bar)
     }
 
+    /// Progress through the combinations of a campaign that are checked.
+    pub(crate) fn through_combinations(count: u64) -> Self {
+        let bar = bar(count);
+        bar.set_style(style("checking combinations {bar:30} {pos}/{len}, {eta} left"));
+        Self(bar)
+    }
+
+    /// Progress through the runs of a campaign, some of which are done already.
+    pub(crate) fn through_runs(count: u64, done: u64) -> Self {
+        let bar = bar(count).with_position(done);
+        bar.set_style(style("{bar:30} {percent:>3} %  {pos}/{len} runs, {per_sec}, {eta} left"));
+        bar.reset_eta();
+        Self(bar)
+    }
+
     /// Progress through values of which nobody knows how many there will be.
     pub(crate) fn through_values() -> Self {
         let bar = bar(0);
@@ -86,6 +101,10 @@ impl Progress {
 
     pub(crate) fn one_more(&self) {
         self.0.inc(1);
+    }
+
+    pub(crate) fn more(&self, number: u64) {
+        self.0.inc(number);
     }
 
     pub(crate) fn clear(&self) {

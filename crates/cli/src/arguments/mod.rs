@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod admittance;
+mod campaign;
 mod falcon;
 mod links;
 mod paper;
@@ -17,6 +18,7 @@ use clap::{Args, Parser, Subcommand};
 
 pub(crate) use accuracy::AccuracyArguments;
 pub(crate) use admittance::AdmittanceArguments;
+pub(crate) use campaign::{CampaignArguments, TableFormat};
 pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
 };
@@ -48,6 +50,8 @@ pub(crate) enum Command {
     Check(CheckArguments),
     /// Says what a scene makes the program model, what it leaves out and why, and what it costs
     Explain(ExplainArguments),
+    /// Runs a scene many times, over values of its keys and over seeds, into one table: on all cores, and resumable
+    Campaign(CampaignArguments),
     /// Says whether a scene is stable without simulating it, maps where it is, and finds where that changes
     Stability(StabilityArguments),
     /// Says what the hand of one peer feels, frequency by frequency, without simulating it

@@ -5,7 +5,7 @@ mod map;
 mod point;
 mod quantity;
 mod rows_file;
-mod source;
+pub(crate) mod source;
 
 use std::process::ExitCode;
 

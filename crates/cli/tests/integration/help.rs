@@ -11,6 +11,7 @@ fn help_names_the_commands() {
             "run",
             "check",
             "explain",
+            "campaign",
             "stability",
             "admittance",
             "relay",
@@ -35,6 +36,20 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
         ("run", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--against <KEY=VALUE>", "--out <DIR>", "--no-plot", "--general"][..]),
         ("check", &["<SCENE>...", "--set <KEY=VALUE>", "--json", "--jobs <N>", "--general"]),
         ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json"]),
+        (
+            "campaign",
+            &[
+                "<SCENE>",
+                "--set <KEY=VALUE>",
+                "--json",
+                "--vary <KEY=VALUES>",
+                "--runs <N>",
+                "--out <DIR>",
+                "--format <FORMAT>",
+                "--threads <N>",
+                "--part <N>",
+            ],
+        ),
         ("stability point", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--method <METHOD>"]),
         (
             "stability map",

@@ -7,6 +7,7 @@
 mod accuracy;
 mod admittance;
 mod against;
+mod campaign;
 mod check;
 mod desk;
 mod errors;

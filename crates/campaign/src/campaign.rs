@@ -1,0 +1,191 @@
+//! A campaign in its folder.
+
+use std::fs::File;
+use std::path::Path;
+
+use crate::error::CampaignError;
+use crate::folder::{Folder, Manifest, write_whole};
+use crate::plan::{Parts, Plan};
+use crate::report::{Report, Tally};
+use crate::table::{Column, Head, Row, TableError, columns};
+use crate::watch::Watch;
+use crate::work::Work;
+
+/// A campaign in its folder, which no other process works on as long as this value lives.
+#[derive(Debug)]
+pub struct Campaign {
+    plan: Plan,
+    manifest: Manifest,
+    parts: Parts,
+    columns: Vec<Column>,
+    folder: Folder,
+}
+
+/// How [`Campaign::run`] ended.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Outcome {
+    /// All runs are done, and the table is there.
+    Finished(Report),
+    /// The watch ended it. The same plan in the same folder goes on.
+    Interrupted {
+        /// How many runs are kept, those of earlier times among them.
+        kept: u64,
+    },
+}
+
+impl Campaign {
+    /// Begins a campaign in a folder, or goes on with the one there if it is the same. A new one is checked first, every combination, on all threads of the
+    /// pool that it is called in; nothing is written before.
+    ///
+    /// # Errors
+    ///
+    /// [`CampaignError`] if a combination is refused, if the folder is no folder, has other files or another campaign in it, if another process works on it,
+    /// or if it cannot be read or written.
+    pub fn open(plan: Plan, folder: &Path, watch: &dyn Watch) -> Result<Self, CampaignError> {
+        let begun = Folder::has_campaign(folder)?;
+        let new = if begun { None } else { Some(Self::new_manifest(&plan, watch)?) };
+        let folder = Folder::take(folder)?;
+        let manifest = match new {
+            // Unless somebody else began one meanwhile.
+            Some(manifest) if !folder.manifest().exists() => {
+                if let Err(error) = manifest.write(&folder.manifest()) {
+                    folder.give_up();
+                    return Err(error);
+                }
+                manifest
+            }
+            Some(_) | None => Self::same_manifest(&plan, &folder)?,
+        };
+        folder.sweep()?;
+        let parts = manifest.parts(plan.runs());
+        let columns = columns(plan.variations(), &manifest.roster);
+        Ok(Self { plan, manifest, parts, columns, folder })
+    }
+
+    fn new_manifest(plan: &Plan, watch: &dyn Watch) -> Result<Manifest, CampaignError> {
+        let checked = plan.check(watch)?;
+        let parts = Parts::of(plan, &checked, columns(plan.variations(), &checked.roster).len())?;
+        Ok(Manifest::new(plan, plan.fingerprint()?, checked.roster, parts))
+    }
+
+    /// The manifest in the folder, which must be that of this plan.
+    fn same_manifest(plan: &Plan, folder: &Folder) -> Result<Manifest, CampaignError> {
+        let manifest = Manifest::read(&folder.manifest())?;
+        let mut differences = manifest.differences(plan);
+        if differences.is_empty() && !manifest.has_fingerprint(plan.fingerprint()?) {
+            differences.push("a file that the scene names says something else there than it does here".to_owned());
+        }
+        if differences.is_empty() { Ok(manifest) } else { Err(CampaignError::Other { path: folder.path().to_path_buf(), differences }) }
+    }
+
+    /// The plan.
+    #[must_use]
+    pub const fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The columns of the table.
+    #[must_use]
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Whether the table is there.
+    #[must_use]
+    pub fn is_finished(&self) -> bool {
+        self.folder.table(self.plan.format()).exists()
+    }
+
+    /// How many runs are kept so far.
+    #[must_use]
+    pub fn kept(&self) -> u64 {
+        if self.is_finished() {
+            return self.plan.runs();
+        }
+        (0..self.parts.count()).filter(|part| self.has(*part)).map(|part| self.parts.len(part)).sum()
+    }
+
+    /// Does the runs that are missing, on all threads of the pool that it is called in, and puts the table together. A campaign that is finished is left as
+    /// it is.
+    ///
+    /// # Errors
+    ///
+    /// [`CampaignError::File`] if a file cannot be written: whole parts are kept, of others nothing is left, and once there is room the campaign goes on.
+    /// [`CampaignError::Damaged`] if a part or the table is not as it was written.
+    pub fn run(&mut self, watch: &dyn Watch) -> Result<Outcome, CampaignError> {
+        let mut computed = 0;
+        if !self.is_finished() {
+            let missing: Vec<u64> = (0..self.parts.count()).filter(|part| !self.has(*part)).collect();
+            let keep = |part: u64, rows: &[Row]| self.keep(part, rows);
+            let work = Work { plan: &self.plan, roster: &self.manifest.roster, parts: self.parts, watch, keep: &keep };
+            computed = work.run(&missing)?;
+            let kept = self.kept();
+            if kept < self.plan.runs() {
+                return Ok(Outcome::Interrupted { kept });
+            }
+            self.merge()?;
+        }
+        let report = self.report(computed)?;
+        self.folder.remove_parts(self.parts.count(), self.plan.format())?;
+        Ok(Outcome::Finished(report))
+    }
+
+    fn has(&self, part: u64) -> bool {
+        self.folder.part(part, self.plan.format()).exists()
+    }
+
+    fn head<'a>(&'a self, about: &'a str) -> Head<'a> {
+        Head { columns: &self.columns, about, program: self.plan.program() }
+    }
+
+    fn keep(&self, part: u64, rows: &[Row]) -> Result<(), CampaignError> {
+        let path = self.folder.part(part, self.plan.format());
+        let about = self.manifest.text();
+        let written = write_whole(&path, |file| self.plan.format().write(file, self.head(&about), rows));
+        written.map_err(|error| unwritten(&path, error))
+    }
+
+    fn merge(&self) -> Result<(), CampaignError> {
+        let format = self.plan.format();
+        let parts: Vec<_> = (0..self.parts.count()).map(|part| (self.folder.part(part, format), self.parts.len(part))).collect();
+        let about = self.manifest.text();
+        let path = self.folder.table(format);
+        let merged = write_whole(&path, |file| format.merge(file, self.head(&about), parts.iter().map(|(path, rows)| (path.as_path(), *rows))));
+        merged.map_err(|error| match error {
+            TableError::Part { path, error } => unread(&path, *error, "remove it and repeat the command, which computes it again"),
+            error @ (TableError::Io(_) | TableError::Content(_)) => unwritten(&path, error),
+        })
+    }
+
+    /// Sums the table up.
+    fn report(&self, computed: u64) -> Result<Report, CampaignError> {
+        const WAY_OUT: &str = "remove the folder, or choose another one";
+        let path = self.folder.table(self.plan.format());
+        let file = File::open(&path).map_err(|error| CampaignError::File { verb: "read", path: path.clone(), error })?;
+        let mut tally = Tally::new(self.plan.runs_of_each());
+        let read = self.plan.format().read_gists(file, &mut |gist| tally.add(gist));
+        read.map_err(|error| unread(&path, error, WAY_OUT))?;
+        let (found, runs) = (tally.runs(), self.plan.runs());
+        if found != runs {
+            return Err(CampaignError::Damaged { path, message: format!("{found} rows: expected {runs}"), way_out: WAY_OUT });
+        }
+        Ok(Report { file: path, runs, computed, combinations: tally.combinations() })
+    }
+}
+
+fn unwritten(path: &Path, error: TableError) -> CampaignError {
+    let error = match error {
+        TableError::Io(error) => error,
+        error @ (TableError::Content(_) | TableError::Part { .. }) => std::io::Error::other(error.to_string()),
+    };
+    CampaignError::File { verb: "write", path: path.to_path_buf(), error }
+}
+
+fn unread(path: &Path, error: TableError, way_out: &'static str) -> CampaignError {
+    match error {
+        TableError::Io(error) => CampaignError::File { verb: "read", path: path.to_path_buf(), error },
+        error @ (TableError::Content(_) | TableError::Part { .. }) => {
+            CampaignError::Damaged { path: path.to_path_buf(), message: error.to_string(), way_out }
+        }
+    }
+}

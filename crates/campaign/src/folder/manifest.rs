@@ -1,0 +1,156 @@
+//! What a campaign is, as a file in its folder: the same command goes on, another one is refused.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::write_whole;
+use crate::error::CampaignError;
+use crate::plan::{Parts, Plan};
+use crate::table::Roster;
+
+/// How files of a campaign are laid out. Another layout is another number.
+const LAYOUT: u32 = 1;
+
+/// What a campaign is.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Manifest {
+    layout: u32,
+    program: String,
+    /// The text of the scene.
+    scene: String,
+    /// Of the scenes, with what the files say that they name.
+    fingerprint: String,
+    set: Vec<String>,
+    vary: Vec<String>,
+    /// Of each combination.
+    runs: u64,
+    /// Parquet or CSV.
+    format: String,
+    /// As asked for; absent if that was left to the program.
+    part: Option<u64>,
+    /// How many runs a part has.
+    part_runs: u64,
+    pub(crate) roster: Roster,
+}
+
+impl Manifest {
+    /// Of a plan that was checked.
+    pub(crate) fn new(plan: &Plan, fingerprint: u64, roster: Roster, parts: Parts) -> Self {
+        Self {
+            layout: LAYOUT,
+            program: plan.program().to_owned(),
+            scene: plan.text().to_owned(),
+            fingerprint: format!("{fingerprint:016x}"),
+            set: plan.set().to_vec(),
+            vary: plan.variations().iter().map(|vary| vary.text().to_owned()).collect(),
+            runs: plan.runs_of_each(),
+            format: plan.format().name().to_owned(),
+            part: plan.part(),
+            part_runs: parts.size,
+            roster,
+        }
+    }
+
+    pub(crate) fn read(path: &Path) -> Result<Self, CampaignError> {
+        let bytes = std::fs::read(path).map_err(|error| CampaignError::File { verb: "read", path: path.to_path_buf(), error })?;
+        let damaged =
+            |message: String| CampaignError::Damaged { path: path.to_path_buf(), message, way_out: "choose another folder, or remove this one" };
+        let layout = serde_json::from_slice::<Layout>(&bytes).map_err(|error| damaged(error.to_string()))?.layout;
+        if layout != LAYOUT {
+            return Err(damaged(format!("layout {layout}: expected {LAYOUT}")));
+        }
+        let manifest: Self = serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
+        if manifest.part_runs == 0 {
+            return Err(damaged("parts of 0 runs".to_owned()));
+        }
+        Ok(manifest)
+    }
+
+    pub(crate) fn write(&self, path: &Path) -> Result<(), CampaignError> {
+        let text = self.text();
+        let written = write_whole(path, |mut file| std::io::Write::write_all(&mut file, text.as_bytes()));
+        written.map_err(|error| CampaignError::File { verb: "write", path: path.to_path_buf(), error })
+    }
+
+    /// As it stands in the file.
+    pub(crate) fn text(&self) -> String {
+        // Text and numbers always have a form in JSON.
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// The parts that a campaign of that many runs is cut into.
+    pub(crate) const fn parts(&self, runs: u64) -> Parts {
+        Parts { runs, size: self.part_runs }
+    }
+
+    /// What this campaign, which is there, has that the plan has not, in words; nothing if it is the same one. Files that scenes name are not compared.
+    pub(crate) fn differences(&self, plan: &Plan) -> Vec<String> {
+        let mut differences = Vec::new();
+        let mut compare = |what: &str, there: String, here: String| {
+            if there != here {
+                differences.push(format!("{what} is {there} there and {here} here"));
+            }
+        };
+        compare("the program", self.program.clone(), plan.program().to_owned());
+        compare("--set", list(&self.set), list(plan.set()));
+        let vary: Vec<String> = plan.variations().iter().map(|vary| vary.text().to_owned()).collect();
+        compare("--vary", list(&self.vary), list(&vary));
+        compare("--runs", self.runs.to_string(), plan.runs_of_each().to_string());
+        compare("--format", self.format.clone(), plan.format().name().to_owned());
+        let part = |part: Option<u64>| part.map_or_else(|| "not given".to_owned(), |part| part.to_string());
+        compare("--part", part(self.part), part(plan.part()));
+        if self.scene != plan.text() {
+            differences.push(different_line(&self.scene, plan.text()));
+        }
+        differences
+    }
+
+    /// Whether the scenes and the files that they name say what they said when the campaign began.
+    pub(crate) fn has_fingerprint(&self, fingerprint: u64) -> bool {
+        self.fingerprint == format!("{fingerprint:016x}")
+    }
+}
+
+/// What every layout has.
+#[derive(Deserialize)]
+struct Layout {
+    layout: u32,
+}
+
+fn list(texts: &[String]) -> String {
+    if texts.is_empty() { "not given".to_owned() } else { texts.join(" ") }
+}
+
+/// Where two texts of scenes part.
+fn different_line(there: &str, here: &str) -> String {
+    let (mut there, mut here) = (there.lines(), here.lines());
+    let mut number = 1;
+    loop {
+        match (there.next(), here.next()) {
+            (None, None) => return "the scene has other line ends".to_owned(),
+            (there, here) if there == here => number += 1,
+            (there, here) => {
+                let shown = |line: Option<&str>| {
+                    line.map_or_else(|| "at its end".to_owned(), |line| format!("`{}`", line.trim().chars().take(80).collect::<String>()))
+                };
+                return format!("line {number} of the scene is {} there and {} here", shown(there), shown(here));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_said_where_scenes_part() {
+        assert_eq!(different_line("a\nb = 1\nc", "a\nb = 2\nc"), "line 2 of the scene is `b = 1` there and `b = 2` here");
+        assert_eq!(different_line("a\n", "a\nb\n"), "line 2 of the scene is at its end there and `b` here");
+        assert_eq!(different_line("a\n", "a\r\n"), "the scene has other line ends");
+    }
+}

@@ -1,0 +1,48 @@
+//! Many runs of one scene: keys varied over ranges and lists, seeds counted up, on all threads, kept in parts so that a campaign can be stopped anywhere and
+//! continued, and put together as one table.
+//!
+//! A [`Plan`] is what is asked for: a scene, keys that are [varied](Variation), and how many runs there are of each combination. [`Campaign::open`] checks all
+//! of it before anything is written, and binds it to a folder; [`Campaign::run`] does the runs that are missing. The table is the same to the last byte
+//! whatever the number of threads and however often it was interrupted, by Ctrl-C, a full disk or the loss of power.
+//!
+//! Every run is the run that [`cohaptic_harness::Simulation`] makes of the same scene with the same seed, to the last bit.
+//!
+//! Nothing here is printed and no clock is read.
+//!
+//! ```
+//! use cohaptic_campaign::{Asked, Campaign, Format, NoWatch, Outcome, Plan, Variation};
+//!
+//! let text = r#"
+//!     scene = { duration = "100ms", count = 2 }
+//!     object = { mass = 0.45 }
+//!     coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+//!     peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+//!     link = { delay = "24ms", loss = "10%" }
+//! "#;
+//! let folder = tempfile::tempdir()?;
+//! let variations = vec![Variation::parse("coordination.stiffness=500..1500/3")?];
+//! let asked = Asked { text, file: "two.toml".as_ref(), set: &[], variations, runs: 10, format: Format::Csv, part: None, program: "an example" };
+//! let mut campaign = Campaign::open(Plan::new(asked)?, &folder.path().join("out"), &NoWatch)?;
+//! let Outcome::Finished(report) = campaign.run(&NoWatch)? else { unreachable!() };
+//! assert_eq!((report.combinations.len(), report.runs), (3, 30));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod campaign;
+mod error;
+mod folder;
+mod plan;
+mod report;
+mod side_by_side;
+mod table;
+mod vary;
+mod watch;
+mod work;
+
+pub use campaign::{Campaign, Outcome};
+pub use error::CampaignError;
+pub use plan::{Asked, MOST_COMBINATIONS, MOST_RUNS, Plan};
+pub use report::{CombinationReport, Report};
+pub use table::{Column, Format, Kind, Value};
+pub use vary::{MOST_VALUES, Variation, VaryError, split_at_commas};
+pub use watch::{NoWatch, Watch};

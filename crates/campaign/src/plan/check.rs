@@ -1,0 +1,86 @@
+//! Reads the scene of every combination before anything runs.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use cohaptic_scene::Scene;
+use rayon::prelude::*;
+
+use super::Plan;
+use crate::error::CampaignError;
+use crate::table::Roster;
+use crate::watch::Watch;
+
+/// So many combinations are checked between two looks at whether to go on.
+const BLOCK: u64 = 64;
+
+/// What the scenes of a campaign have in common.
+#[derive(Clone, Debug)]
+pub(crate) struct Checked {
+    pub(crate) roster: Roster,
+    /// How many events the longest run has, about: ticks and packets.
+    pub(crate) events: u64,
+}
+
+impl Plan {
+    /// Checks every combination, on all threads of the pool that it is called in.
+    ///
+    /// # Errors
+    ///
+    /// Of the first combination that is refused; [`CampaignError::Stopped`] if nobody wanted to know any more.
+    pub(crate) fn check(&self, watch: &dyn Watch) -> Result<Checked, CampaignError> {
+        let blocks = self.combinations.div_ceil(BLOCK);
+        // Blocks behind one that is refused need not be looked at: the first error is the one that is shown.
+        let refused = AtomicU64::new(u64::MAX);
+        let check = |block: u64| {
+            if refused.load(Ordering::Relaxed) < block {
+                return Err(CampaignError::Stopped);
+            }
+            let checked = self.check_block(block, watch);
+            if checked.is_err() {
+                refused.fetch_min(block, Ordering::Relaxed);
+            }
+            checked
+        };
+        let checked: Vec<Result<Checked, CampaignError>> = (0..blocks).into_par_iter().map(check).collect();
+        let mut all: Option<Checked> = None;
+        for checked in checked {
+            all = Some(join(all, checked?));
+        }
+        all.ok_or(CampaignError::Stopped)
+    }
+
+    fn check_block(&self, block: u64, watch: &dyn Watch) -> Result<Checked, CampaignError> {
+        if !watch.keep_going() {
+            return Err(CampaignError::Stopped);
+        }
+        let combinations = block * BLOCK..((block + 1) * BLOCK).min(self.combinations);
+        let count = combinations.end - combinations.start;
+        let mut all: Option<Checked> = None;
+        for combination in combinations {
+            let scene = self.scene(combination)?;
+            all = Some(join(all, Checked { roster: Roster::of(&scene), events: events(&scene) }));
+        }
+        watch.checked(count);
+        all.ok_or(CampaignError::Stopped)
+    }
+}
+
+fn join(all: Option<Checked>, other: Checked) -> Checked {
+    match all {
+        None => other,
+        Some(mut all) => {
+            all.roster.add(&other.roster);
+            all.events = all.events.max(other.events);
+            all
+        }
+    }
+}
+
+/// Ticks of all peers, and packets on all links.
+fn events(scene: &Scene) -> u64 {
+    let count = |period: std::time::Duration| scene.duration.as_nanos() / period.as_nanos().max(1);
+    let ticks: u128 = scene.peers.iter().map(|peer| count(peer.clock.tick)).sum();
+    let peers = scene.peers.len() as u128;
+    let packets = count(scene.coordination.update) * peers * (peers - 1);
+    u64::try_from(ticks + packets).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,110 @@
+//! Comma-separated values.
+
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Read as _, Seek as _, SeekFrom, Write as _};
+use std::path::Path;
+
+use super::format::{GIST, rows_missing};
+use super::{Column, Gist, Gists, Row, TableError, Value};
+
+pub(super) fn write(file: &File, columns: &[Column], rows: &[Row]) -> io::Result<()> {
+    let mut to = csv::Writer::from_writer(BufWriter::new(file));
+    to.write_record(columns.iter().map(|column| &column.name)).map_err(unwritten)?;
+    for row in rows {
+        to.write_record(row.iter().map(text)).map_err(unwritten)?;
+    }
+    to.into_inner().map_err(|error| io::Error::other(error.to_string()))?.flush()
+}
+
+/// A number with the fewest digits that read back the same.
+fn text(value: &Value) -> String {
+    match value {
+        Value::Absent => String::new(),
+        Value::Integer(integer) => integer.to_string(),
+        Value::Number(number) => format!("{number:?}"),
+        Value::Text(text) => text.to_string(),
+    }
+}
+
+fn unwritten(error: csv::Error) -> io::Error {
+    let message = error.to_string();
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        csv::ErrorKind::Utf8 { .. }
+        | csv::ErrorKind::UnequalLengths { .. }
+        | csv::ErrorKind::Seek
+        | csv::ErrorKind::Serialize(_)
+        | csv::ErrorKind::Deserialize { .. }
+        | _ => io::Error::other(message),
+    }
+}
+
+pub(super) fn merge<'a>(file: &File, columns: &[Column], parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
+    let mut header = Vec::new();
+    csv::Writer::from_writer(&mut header).write_record(columns.iter().map(|column| &column.name)).map_err(unwritten)?;
+    let mut to = BufWriter::new(file);
+    to.write_all(&header)?;
+    let mut buffer = vec![0; 1 << 16];
+    for (path, expected) in parts {
+        let mut part = open(path, &header, expected).map_err(TableError::of_part(path))?;
+        // Not io::copy, which does not say on which side it failed.
+        loop {
+            let read = part.read(&mut buffer).map_err(|error| TableError::of_part(path)(error.into()))?;
+            if read == 0 {
+                break;
+            }
+            to.write_all(&buffer[..read])?;
+        }
+    }
+    Ok(to.flush()?)
+}
+
+/// A part that is as it was written, behind its header.
+fn open(path: &Path, header: &[u8], expected: u64) -> Result<File, TableError> {
+    let mut from = File::open(path)?;
+    let mut found = vec![0; header.len()];
+    match from.read_exact(&mut found) {
+        Ok(()) if found == header => {}
+        Ok(()) => return Err(TableError::Content("other columns than this campaign has".to_owned())),
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Err(TableError::Content("not even a header".to_owned())),
+        Err(error) => return Err(error.into()),
+    }
+    let rows = rows(path)?;
+    if rows != expected {
+        return Err(rows_missing(rows, expected));
+    }
+    from.seek(SeekFrom::Start(header.len() as u64))?;
+    Ok(from)
+}
+
+/// How many whole rows a part has, behind its header.
+fn rows(path: &Path) -> Result<u64, TableError> {
+    let mut reader = csv::Reader::from_reader(BufReader::new(File::open(path)?));
+    let (mut record, mut rows) = (csv::ByteRecord::new(), 0);
+    while reader.read_byte_record(&mut record).map_err(unread)? {
+        rows += 1;
+    }
+    let mut last = [0];
+    let mut file = File::open(path)?;
+    file.seek(SeekFrom::End(-1))?;
+    file.read_exact(&mut last)?;
+    if last == *b"\n" { Ok(rows) } else { Err(TableError::Content("the last row has no end".to_owned())) }
+}
+
+fn unread(error: csv::Error) -> TableError {
+    if error.is_io_error() { TableError::Io(unwritten(error)) } else { TableError::Content(error.to_string()) }
+}
+
+pub(super) fn read_gists(file: File, each: Gists<'_>) -> Result<(), TableError> {
+    let mut reader = csv::Reader::from_reader(BufReader::new(file));
+    let header = reader.headers().map_err(unread)?;
+    let place = |name: &str| header.iter().position(|found| found == name).ok_or_else(|| TableError::Content(format!("no column {name}")));
+    let (ending, discrepancy) = (place(GIST[0])?, place(GIST[1])?);
+    let mut record = csv::StringRecord::new();
+    while reader.read_record(&mut record).map_err(unread)? {
+        let discrepancy = record.get(discrepancy).unwrap_or_default();
+        let max_discrepancy = discrepancy.parse().map_err(|_| TableError::Content(format!("{discrepancy:?} is no number")))?;
+        each(Gist { diverged: record.get(ending) == Some("diverged"), max_discrepancy });
+    }
+    Ok(())
+}

@@ -1,0 +1,86 @@
+//! What a run comes to, as a row.
+
+use std::sync::Arc;
+
+use cohaptic_harness::{Ending, PeerSummary, Summary};
+use cohaptic_units::Instant;
+use cohaptic_wan::{DropCause, LinkStats};
+
+use super::{Roster, Row, Value};
+use crate::vary::Varied;
+
+/// Which run it is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub(crate) run: u64,
+    pub(crate) combination: u64,
+    pub(crate) seed: u64,
+}
+
+/// A value for each of [`columns`](super::columns()).
+pub(crate) fn row<'a>(place: Place, varied: impl Iterator<Item = &'a Varied>, summary: &Summary, roster: &Roster) -> Row {
+    let mut row = vec![integer(place.run), integer(place.combination), integer(place.seed)];
+    row.extend(varied.map(|varied| varied.value.clone()));
+    let (ending, ended) = match summary.ending {
+        Ending::Complete => ("complete", summary.duration.as_secs_f64()),
+        Ending::Diverged(at) => ("diverged", seconds(at)),
+        Ending::Interrupted(at) => ("interrupted", seconds(at)),
+    };
+    row.push(Value::Text(Arc::from(ending)));
+    row.push(Value::Number(ended));
+    row.push(integer(summary.ticks));
+    row.push(Value::Number(summary.max_discrepancy));
+    for (place, name) in roster.peers.iter().enumerate() {
+        let peer = peer(summary, place, name);
+        for quantity in [peer.map(|peer| &peer.position), peer.map(|peer| &peer.velocity)] {
+            let component = |axis| quantity.and_then(|components| components.get(axis)).map_or(Value::Absent, |value| Value::Number(*value));
+            row.extend((0..roster.axes).map(component));
+        }
+    }
+    row.push(integer(summary.peers.iter().map(|peer| peer.stale_samples).sum()));
+    row.push(integer(summary.peers.iter().map(|peer| peer.refused_samples).sum()));
+    counters(&mut row, summary.links.iter().map(|link| &link.stats));
+    if roster.access_lines {
+        counters(&mut row, summary.access_lines.iter().map(|line| &line.stats));
+    }
+    row
+}
+
+/// The peer of that name: nearly always the one in its place.
+fn peer<'a>(summary: &'a Summary, place: usize, name: &str) -> Option<&'a PeerSummary> {
+    let here = summary.peers.get(place).filter(|peer| peer.name == name);
+    here.or_else(|| summary.peers.iter().find(|peer| peer.name == name))
+}
+
+fn counters<'a>(row: &mut Row, stats: impl Iterator<Item = &'a LinkStats> + Clone) {
+    let sum = |count: &dyn Fn(&LinkStats) -> u64| integer(stats.clone().map(count).sum());
+    row.push(sum(&LinkStats::offered));
+    row.push(sum(&LinkStats::duplicated));
+    row.push(sum(&LinkStats::delivered));
+    row.extend(DropCause::ALL.into_iter().map(|cause| sum(&|stats| stats.dropped(cause))));
+    row.push(sum(&LinkStats::in_flight));
+    row.push(sum(&LinkStats::marked));
+    row.push(sum(&LinkStats::damaged));
+    row.push(mean_delay(stats));
+}
+
+/// Over all packets delivered by any of the links. Each link's mean is rounded down to a nanosecond, so this one is less than two too low.
+fn mean_delay<'a>(stats: impl Iterator<Item = &'a LinkStats>) -> Value {
+    let (mut nanos, mut delivered) = (0_u128, 0_u128);
+    for stats in stats {
+        if let Some(mean) = stats.mean_delay() {
+            nanos += mean.as_nanos() * u128::from(stats.delivered());
+            delivered += u128::from(stats.delivered());
+        }
+    }
+    let mean = nanos.checked_div(delivered).map(|mean| u64::try_from(mean).unwrap_or(u64::MAX));
+    mean.map_or(Value::Absent, |mean| Value::Number(seconds(Instant::from_nanos(mean))))
+}
+
+fn seconds(instant: Instant) -> f64 {
+    std::time::Duration::from_nanos(instant.as_nanos()).as_secs_f64()
+}
+
+fn integer(count: u64) -> Value {
+    Value::Integer(i64::try_from(count).unwrap_or(i64::MAX))
+}

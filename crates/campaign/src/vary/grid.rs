@@ -1,0 +1,82 @@
+//! `LOW..HIGH/COUNT` and `LOW..HIGH/COUNT:log`.
+
+use super::quantity::{quantity, written};
+use super::{MOST_VALUES, Varied, VaryError};
+use crate::table::Value;
+
+/// So many values from one end to the other, both among them.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Grid {
+    low: f64,
+    high: f64,
+    pub(super) unit: String,
+    count: usize,
+    /// Whether the ratio of neighbours is the same everywhere, and not their difference.
+    logarithmic: bool,
+}
+
+impl Grid {
+    /// `None` if the text does not begin with a number and two dots: it is a list then.
+    pub(super) fn parse(whole: &str, text: &str) -> Result<Option<Self>, VaryError> {
+        let whole = || whole.to_owned();
+        let Some((low, rest)) = text.split_once("..") else { return Ok(None) };
+        let Some((low, low_unit)) = quantity(low) else { return Ok(None) };
+        let Some((high, count)) = rest.rsplit_once('/') else { return Err(VaryError::NoCount { text: whole() }) };
+        let (high, high_unit) = quantity(high).ok_or_else(|| VaryError::End { text: whole(), end: high.trim().to_owned() })?;
+        let (count, logarithmic) = match count.trim().split_once(':') {
+            None => (count, false),
+            Some((count, kind)) if kind.trim() == "log" => (count, true),
+            Some(_) => return Err(VaryError::NoCount { text: whole() }),
+        };
+        let count: usize = count.trim().parse().map_err(|_| VaryError::NoCount { text: whole() })?;
+        if count < 2 {
+            return Err(VaryError::TooFew { text: whole(), count });
+        }
+        if count > MOST_VALUES {
+            return Err(VaryError::TooMany { text: whole() });
+        }
+        if low_unit != high_unit {
+            return Err(VaryError::Units { text: whole(), low: low_unit.to_owned(), high: high_unit.to_owned() });
+        }
+        if low >= high || !(high - low).is_finite() {
+            return Err(VaryError::Empty { text: whole(), low, high });
+        }
+        if logarithmic && low <= 0.0 {
+            return Err(VaryError::NoRatio { text: whole(), low });
+        }
+        Ok(Some(Self { low, high, unit: low_unit.to_owned(), count, logarithmic }))
+    }
+
+    pub(super) fn values(&self) -> Vec<Varied> {
+        let value = |place| {
+            let value = self.at(place);
+            Varied { text: written(value, &self.unit), value: Value::Number(value + 0.0) }
+        };
+        (0..self.count).map(value).collect()
+    }
+
+    /// The ends are as they are written; in between, multiplication comes before division, so that tenths are the tenths that a user would write.
+    #[expect(clippy::cast_precision_loss, reason = "at most a million values")]
+    fn at(&self, place: usize) -> f64 {
+        let Self { low, high, .. } = *self;
+        let last = self.count - 1;
+        if place == 0 || place == last {
+            return if place == 0 { low } else { high };
+        }
+        let (place, last) = (place as f64, last as f64);
+        let between = |low: f64, high: f64| (low * (last - place) + high * place) / last;
+        let value = if self.logarithmic {
+            fifteen_digits(libm::exp10(between(libm::log10(low), libm::log10(high))))
+        } else if (high * last).is_finite() && (low * last).is_finite() {
+            between(low, high)
+        } else {
+            low + (high - low) * (place / last)
+        };
+        value.clamp(low, high)
+    }
+}
+
+/// The same number to fifteen digits: more than that a power does not have, and 5 is not to be 4.999999999999999.
+fn fifteen_digits(value: f64) -> f64 {
+    format!("{value:.14e}").parse().unwrap_or(value)
+}

@@ -1,0 +1,21 @@
+//! Who looks on.
+
+/// Is told how far a campaign has come, and can end it. Called from many threads.
+pub trait Watch: Sync {
+    /// Whether to go on. Asked before every few combinations that are checked and before every few runs.
+    fn keep_going(&self) -> bool {
+        true
+    }
+
+    /// So many more combinations have been checked.
+    fn checked(&self, _combinations: u64) {}
+
+    /// So many more runs have been done.
+    fn ran(&self, _runs: u64) {}
+}
+
+/// Nobody looks on.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoWatch;
+
+impl Watch for NoWatch {}

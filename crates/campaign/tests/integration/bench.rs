@@ -1,0 +1,142 @@
+//! A folder, a scene, and campaigns over it.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use cohaptic_campaign::{Asked, Campaign, CampaignError, Format, NoWatch, Outcome, Plan, Report, Variation, Watch};
+use tempfile::TempDir;
+
+/// Two users for 40 ticks over links that lose and delay at random.
+pub(crate) const SCENE: &str = r#"
+[scene]
+duration = "40ms"
+seed     = 7
+
+[object]
+mass = 0.3
+
+[coordination]
+strategy  = "average-position"
+stiffness = 1000.0
+damping   = 20.0
+update    = "2ms"
+
+[peer]
+device   = { mass = 0.1, damping = 5.0 }
+coupling = { stiffness = 3500.0, damping = 5.0 }
+
+[[peers]]
+name = "left"
+hand = { force = 1.5 }
+
+[[peers]]
+name = "right"
+
+[link]
+delay  = "6ms"
+jitter = "1ms"
+loss   = "20%"
+"#;
+
+/// What varies in most tests: four combinations.
+pub(crate) const VARY: [&str; 2] = ["coordination.stiffness=500..1500/2", "link.loss=0%,40%"];
+
+pub(crate) struct Bench {
+    folder: TempDir,
+    pub(crate) text: String,
+    pub(crate) set: Vec<String>,
+    pub(crate) vary: Vec<String>,
+    pub(crate) runs: u64,
+    pub(crate) part: Option<u64>,
+    pub(crate) format: Format,
+    pub(crate) program: &'static str,
+}
+
+impl Bench {
+    pub(crate) fn new(vary: &[&str], runs: u64) -> Self {
+        let vary = vary.iter().map(|text| (*text).to_owned()).collect();
+        let folder = tempfile::tempdir().unwrap();
+        Self { folder, text: SCENE.to_owned(), set: Vec::new(), vary, runs, part: None, format: Format::Parquet, program: "a test" }
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The names of the files in a folder, sorted.
+    pub(crate) fn files(&self, folder: &str) -> Vec<String> {
+        let entries = std::fs::read_dir(self.path(folder)).unwrap().map(Result::unwrap);
+        let mut files: Vec<String> = entries.map(|entry| entry.file_name().into_string().unwrap()).collect();
+        files.sort();
+        files
+    }
+
+    pub(crate) fn plan(&self) -> Result<Plan, CampaignError> {
+        let variations = self.vary.iter().map(|text| Variation::parse(text)).collect::<Result<_, _>>()?;
+        let file = self.folder.path().join("scene.toml");
+        let Self { text, set, runs, format, part, program, .. } = self;
+        Plan::new(Asked { text, file: &file, set, variations, runs: *runs, format: *format, part: *part, program })
+    }
+
+    pub(crate) fn open(&self, folder: &str) -> Result<Campaign, CampaignError> {
+        Campaign::open(self.plan()?, &self.path(folder), &NoWatch)
+    }
+
+    /// Runs it with so many threads.
+    pub(crate) fn outcome(&self, folder: &str, threads: usize, watch: &dyn Watch) -> Result<Outcome, CampaignError> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Campaign::open(self.plan()?, &self.path(folder), watch)?.run(watch))
+    }
+
+    /// Runs it to its end.
+    pub(crate) fn finish(&self, folder: &str, threads: usize) -> Report {
+        finished(self.outcome(folder, threads, &NoWatch).unwrap())
+    }
+
+    /// The bytes of the table.
+    pub(crate) fn table(&self, folder: &str) -> Vec<u8> {
+        std::fs::read(self.path(folder).join(format!("runs.{}", self.format.name()))).unwrap()
+    }
+
+    /// The refusal, with all of these parts.
+    pub(crate) fn assert_refused(&self, folder: &str, parts: &[&str]) -> CampaignError {
+        let error = self.open(folder).map(drop).unwrap_err();
+        for part in parts {
+            assert!(error.to_string().contains(part), "no {part:?} in: {error}");
+        }
+        error
+    }
+}
+
+pub(crate) fn finished(outcome: Outcome) -> Report {
+    match outcome {
+        Outcome::Finished(report) => report,
+        Outcome::Interrupted { kept } => panic!("interrupted with {kept} runs"),
+    }
+}
+
+/// Ends a campaign when so many runs have been done.
+pub(crate) struct StopAfter(pub(crate) u64, AtomicU64);
+
+impl StopAfter {
+    pub(crate) const fn runs(runs: u64) -> Self {
+        Self(runs, AtomicU64::new(0))
+    }
+}
+
+impl Watch for StopAfter {
+    fn keep_going(&self) -> bool {
+        self.1.load(Ordering::SeqCst) < self.0
+    }
+
+    fn ran(&self, runs: u64) {
+        self.1.fetch_add(runs, Ordering::SeqCst);
+    }
+}
+
+/// A table of CSV: its header and rows.
+pub(crate) fn comma_separated(path: &Path) -> (Vec<String>, Vec<Vec<String>>) {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let header = reader.headers().unwrap().iter().map(str::to_owned).collect();
+    (header, reader.records().map(|record| record.unwrap().iter().map(str::to_owned).collect()).collect())
+}

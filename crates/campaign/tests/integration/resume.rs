@@ -1,0 +1,119 @@
+//! Campaigns that are ended anywhere and continued give the same bytes.
+
+use cohaptic_campaign::{Format, Outcome};
+use proptest::prelude::*;
+
+use crate::bench::{Bench, StopAfter, VARY};
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// Ended again and again, with any number of threads, parts torn off or half written by a kill: the table is the one of a campaign that nothing disturbed.
+    #[test]
+    fn however_it_was_interrupted_the_table_is_the_same(
+        stops in prop::collection::vec((0_u64..60, 1_usize..4, prop::option::of(0_usize..9), any::<bool>()), 0..5),
+        part in 1_u64..30, runs in 1_u64..20, csv: bool, threads in 1_usize..4,
+    ) {
+        let mut bench = Bench::new(&VARY, runs);
+        (bench.part, bench.format) = (Some(part), if csv { Format::Csv } else { Format::Parquet });
+        let whole = bench.finish("whole", 1);
+        for (stop, threads, lost, torn) in stops {
+            match bench.outcome("parts", threads, &StopAfter::runs(stop)).unwrap() {
+                Outcome::Finished(report) => prop_assert_eq!(report.combinations, whole.combinations.clone()),
+                Outcome::Interrupted { kept } => {
+                    // Only the last part may have fewer runs than the others.
+                    let parts = bench.files("parts").iter().filter(|name| name.starts_with("part-")).count() as u64;
+                    prop_assert!(kept <= parts * part && (parts == 0 || kept > (parts - 1) * part), "{} runs in {} parts of {}", kept, parts, part);
+                    prop_assert!(bench.files("parts").iter().all(|name| !name.ends_with(".partial") && !name.starts_with("runs")));
+                }
+            }
+            let parts: Vec<String> = bench.files("parts").into_iter().filter(|name| name.starts_with("part-")).collect();
+            if let Some(name) = lost.and_then(|place| parts.get(place)) {
+                std::fs::remove_file(bench.path("parts").join(name)).unwrap();
+            }
+            if torn {
+                // What a kill leaves: a file that has not its name yet, and the file of a lock that nobody holds.
+                let name = format!("parts/part-00000.{}.partial", bench.format.name());
+                std::fs::write(bench.path(&name), "PAR1 or half a row").unwrap();
+                std::fs::write(bench.path("parts/campaign.lock"), "").unwrap();
+            }
+        }
+        let report = bench.finish("parts", threads);
+        prop_assert_eq!(&report.combinations, &whole.combinations);
+        prop_assert!(bench.table("parts") == bench.table("whole"), "other bytes");
+        prop_assert_eq!(bench.files("parts"), bench.files("whole"));
+    }
+}
+
+#[test]
+fn threads_and_time_change_nothing() {
+    for format in [Format::Parquet, Format::Csv] {
+        let mut bench = Bench::new(&VARY, 23);
+        (bench.format, bench.part) = (format, Some(16));
+        for threads in [1, 2, 5] {
+            assert_eq!(bench.finish(&threads.to_string(), threads).computed, 92);
+            assert_eq!(bench.table(&threads.to_string()), bench.table("1"));
+        }
+    }
+}
+
+#[test]
+fn what_is_kept_is_not_computed_again() {
+    let mut bench = Bench::new(&VARY, 10);
+    bench.part = Some(8);
+    let Outcome::Interrupted { kept } = bench.outcome("out", 1, &StopAfter::runs(17)).unwrap() else { panic!("it was to be interrupted") };
+    // One thread does the chunks of 8 one after the other, and is asked before each: after 24 runs it ends.
+    assert_eq!((kept, bench.files("out").len()), (24, 4));
+    let campaign = bench.open("out").unwrap();
+    assert_eq!((campaign.kept(), campaign.is_finished(), campaign.plan().runs()), (24, false, 40));
+    drop(campaign);
+    let report = bench.finish("out", 2);
+    assert_eq!((report.runs, report.computed), (40, 16));
+    // And a finished one not at all.
+    let before = bench.path("out/runs.parquet").metadata().unwrap().modified().unwrap();
+    assert!(bench.open("out").unwrap().is_finished());
+    let again = bench.finish("out", 2);
+    assert_eq!((again.computed, &again.combinations), (0, &report.combinations));
+    assert_eq!(bench.path("out/runs.parquet").metadata().unwrap().modified().unwrap(), before);
+}
+
+/// Killed after the table got its name and before the parts were gone.
+#[test]
+fn parts_beside_the_table_are_removed() {
+    let mut bench = Bench::new(&VARY, 4);
+    bench.part = Some(8);
+    bench.finish("out", 1);
+    let table = bench.table("out");
+    std::fs::write(bench.path("out/part-00001.parquet"), "").unwrap();
+    bench.finish("out", 1);
+    assert_eq!((bench.files("out"), bench.table("out")), (vec!["campaign.json".to_owned(), "runs.parquet".to_owned()], table));
+}
+
+#[test]
+fn a_part_that_is_not_as_it_was_written_is_not_taken() {
+    for (format, damage) in
+        [(Format::Csv, "run\n1\n"), (Format::Csv, ""), (Format::Parquet, ""), (Format::Parquet, "PAR1, and nothing that ends like it")]
+    {
+        let mut bench = Bench::new(&VARY, 4);
+        (bench.part, bench.format) = (Some(8), format);
+        bench.finish("whole", 1);
+        bench.outcome("out", 1, &StopAfter::runs(1)).unwrap();
+        let name = format!("part-00000.{}", format.name());
+        std::fs::write(bench.path("out").join(&name), damage).unwrap();
+        let error = bench.outcome("out", 1, &cohaptic_campaign::NoWatch).unwrap_err();
+        assert!(error.to_string().contains(&name) && error.to_string().contains("remove it and repeat the command"), "{error}");
+        assert!(error.is_io());
+        std::fs::remove_file(bench.path("out").join(&name)).unwrap();
+        bench.finish("out", 1);
+        assert_eq!(bench.table("out"), bench.table("whole"));
+    }
+    // Whole rows, and too few of them.
+    let mut bench = Bench::new(&VARY, 4);
+    (bench.part, bench.format) = (Some(8), Format::Csv);
+    bench.outcome("out", 1, &StopAfter::runs(1)).unwrap();
+    let text = std::fs::read_to_string(bench.path("out/part-00000.csv")).unwrap();
+    let rows: Vec<&str> = text.split_inclusive('\n').collect();
+    std::fs::write(bench.path("out/part-00000.csv"), rows[..8].concat()).unwrap();
+    let error = bench.outcome("out", 1, &cohaptic_campaign::NoWatch).unwrap_err();
+    assert!(error.to_string().contains("7 rows: expected 8"), "{error}");
+}

@@ -1,0 +1,43 @@
+//! `campaign`.
+
+use std::num::{NonZeroU64, NonZeroUsize};
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::{EXIT_STATUS, SceneArguments};
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_STATUS)]
+pub(crate) struct CampaignArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+    /// Vary a key: --vary coordination.stiffness=0..6000/13 (13 values, both ends among them), --vary coordination.stiffness=10..1000/5:log (equal ratios),
+    /// --vary link.delay=8ms,24ms (these values). Again and again: every combination is run, the last key varying fastest
+    #[arg(long, value_name = "KEY=VALUES")]
+    pub(crate) vary: Vec<String>,
+    /// How many runs there are of each combination: with the seed of the scene, with the next one, and so on
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) runs: u64,
+    /// The folder of the campaign: the table, and until that is there the parts. The same command goes on with what is there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// As what the table is written
+    #[arg(long, value_enum, default_value_t = TableFormat::Parquet)]
+    pub(crate) format: TableFormat,
+    /// How many runs are made at the same time [default: one a core]. Results do not depend on it
+    #[arg(long, value_name = "N", visible_alias = "jobs")]
+    pub(crate) threads: Option<NonZeroUsize>,
+    /// How many runs are kept together, the most that a kill can cost on each thread [default: some seconds' worth]
+    #[arg(long, value_name = "N")]
+    pub(crate) part: Option<NonZeroU64>,
+}
+
+/// As what a table is written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub(crate) enum TableFormat {
+    /// runs.parquet
+    Parquet,
+    /// runs.csv
+    Csv,
+}

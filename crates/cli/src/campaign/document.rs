@@ -1,0 +1,66 @@
+//! The JSON document of a campaign.
+
+use std::path::Path;
+
+use cohaptic_campaign::CombinationReport;
+use serde::Serialize;
+
+use super::Finished;
+use crate::output;
+
+/// What `cohaptic campaign --json` prints.
+#[derive(Serialize)]
+pub(super) struct Document {
+    title: String,
+    runs: u64,
+    runs_computed: u64,
+    wall_s: f64,
+    runs_per_s: f64,
+    out: String,
+    file: String,
+    diverged: u64,
+    combinations: Vec<Combination>,
+}
+
+#[derive(Serialize)]
+struct Combination {
+    vary: Vec<String>,
+    runs: u64,
+    diverged: u64,
+    mean_discrepancy_m: Option<f64>,
+    largest_discrepancy_m: Option<f64>,
+    worst_run: Option<u64>,
+}
+
+impl Document {
+    pub(super) fn new(finished: &Finished, out: &Path) -> Self {
+        let report = &finished.report;
+        let combination = |(number, combination): (usize, &CombinationReport)| Combination {
+            vary: finished.plan.varied(number as u64),
+            runs: combination.runs,
+            diverged: combination.diverged,
+            mean_discrepancy_m: combination.mean_discrepancy,
+            largest_discrepancy_m: combination.largest_discrepancy,
+            worst_run: combination.worst_run,
+        };
+        Self {
+            title: finished.title.clone(),
+            runs: report.runs,
+            runs_computed: report.computed,
+            wall_s: finished.wall_s,
+            runs_per_s: finished.runs_per_s(),
+            out: output::path(out),
+            file: output::path(&report.file),
+            diverged: report.diverged(),
+            combinations: report.combinations.iter().enumerate().map(combination).collect(),
+        }
+    }
+}
+
+impl Finished {
+    /// Of those of this time.
+    #[expect(clippy::cast_precision_loss, reason = "fewer runs than 2^52")]
+    pub(super) fn runs_per_s(&self) -> f64 {
+        self.report.computed as f64 / self.wall_s
+    }
+}

@@ -1,0 +1,88 @@
+//! `cohaptic campaign`.
+
+mod document;
+mod refusal;
+mod watch;
+mod words;
+
+use std::num::{NonZeroU64, NonZeroUsize};
+use std::process::ExitCode;
+use std::time::Instant as Clock;
+
+use cohaptic_campaign::{Asked, Campaign, CampaignError, Format, Outcome, Plan, Report, Variation};
+
+use crate::arguments::{CampaignArguments, TableFormat};
+use crate::failure::Failure;
+use crate::output;
+use document::Document;
+use watch::Shown;
+
+/// The program, as a campaign remembers it.
+const PROGRAM: &str = concat!("cohaptic ", env!("CARGO_PKG_VERSION"));
+
+/// A campaign that is finished, and what it took.
+struct Finished {
+    plan: Plan,
+    title: String,
+    report: Report,
+    /// Of this time.
+    wall_s: f64,
+}
+
+/// Does the runs that are missing, and says what came out.
+pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failure> {
+    let plan = plan(arguments)?;
+    let threads = arguments.threads.map_or(0, NonZeroUsize::get);
+    let start = Clock::now();
+    let report = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(|| execute(arguments, plan.clone()))?,
+        Err(error) => return Err(Failure::System(format!("--threads {threads}: {error}"))),
+    };
+    let wall_s = start.elapsed().as_secs_f64();
+    let title = plan.scene(0).map_or_else(|_| output::path(&arguments.scene.scene), |scene| scene.title);
+    let finished = Finished { plan, title, report, wall_s };
+    if arguments.scene.json {
+        output::json(&Document::new(&finished, &arguments.out))?;
+    } else {
+        output::text(&words::describe(&finished))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn plan(arguments: &CampaignArguments) -> Result<Plan, Failure> {
+    let refused = |error: CampaignError| refusal::failure(error, arguments);
+    let variations =
+        arguments.vary.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<Variation>, _>>().map_err(|error| refused(error.into()))?;
+    let (file, set) = (&arguments.scene.scene, &arguments.scene.overrides.set);
+    let text = crate::stability::source::read(file, set)?;
+    let format = match arguments.format {
+        TableFormat::Parquet => Format::Parquet,
+        TableFormat::Csv => Format::Csv,
+    };
+    let part = arguments.part.map(NonZeroU64::get);
+    Plan::new(Asked { text: &text, file, set, variations, runs: arguments.runs, format, part, program: PROGRAM }).map_err(refused)
+}
+
+fn execute(arguments: &CampaignArguments, plan: Plan) -> Result<Report, Failure> {
+    let refused = |error: CampaignError| refusal::failure(error, arguments);
+    let (runs, combinations) = (plan.runs(), plan.combinations());
+    let checking = Shown::checking(combinations);
+    let opened = Campaign::open(plan, &arguments.out, &checking);
+    checking.clear();
+    let mut campaign = opened.map_err(refused)?;
+    let running = Shown::running(runs, campaign.kept());
+    let outcome = campaign.run(&running);
+    running.clear();
+    match outcome {
+        Ok(Outcome::Finished(report)) => Ok(report),
+        Ok(Outcome::Interrupted { kept }) => {
+            let out = output::path(&arguments.out);
+            Err(Failure::Interrupted(format!("{kept} of {runs} runs are kept in {out}; the same command goes on from there")))
+        }
+        Err(error @ CampaignError::File { .. }) => {
+            let kept = campaign.kept();
+            Err(Failure::System(format!("{error}\n{kept} of {runs} runs are kept: once that can be done, the same command goes on from there")))
+        }
+        Err(error) => Err(refused(error)),
+    }
+}

@@ -1,0 +1,67 @@
+//! A campaign in words.
+
+use std::fmt::Write as _;
+
+use cohaptic_campaign::CombinationReport;
+
+use super::Finished;
+use crate::run::words::length;
+
+/// So many combinations are named; all are in the table.
+const MOST_COMBINATIONS: usize = 20;
+
+pub(super) fn describe(finished: &Finished) -> String {
+    let Finished { plan, title, report, wall_s } = finished;
+    let (combinations, each) = (plan.combinations(), plan.runs_of_each());
+    let mut text = format!("{title}\n");
+    // Writing to a string does not fail.
+    let mut line = |line: &str| {
+        let _ = writeln!(text, "{line}");
+    };
+    line(&format!("  {} of {}, {each} of each", counted(report.runs, "run"), counted(combinations, "combination")));
+    if report.computed == 0 {
+        line("  all of them were there already: nothing was run");
+    } else {
+        let before = report.runs - report.computed;
+        let kept = if before > 0 { format!(", {before} were there already") } else { String::new() };
+        line(&format!("  {} run in {wall_s:.3} s: {:.0} a second{kept}", report.computed, finished.runs_per_s()));
+    }
+    match report.worst() {
+        Some(CombinationReport { largest_discrepancy: Some(largest), worst_run: Some(run), .. }) => {
+            let others = if report.diverged() > 0 { " of the others" } else { "" };
+            line(&format!("  {} diverged; the largest discrepancy{others} is {}, in run {run}", report.diverged(), length(*largest)));
+        }
+        Some(_) | None => line(&format!("  all {} diverged", report.runs)),
+    }
+    if !plan.variations().is_empty() {
+        line("");
+        table(finished).iter().for_each(|row| line(row));
+        if report.combinations.len() > MOST_COMBINATIONS {
+            line(&format!("  ... and {} more combinations", report.combinations.len() - MOST_COMBINATIONS));
+        }
+        line("");
+    }
+    line(&format!("  {}", report.file.display()));
+    text
+}
+
+/// A row for each combination, with its values and what became of its runs.
+fn table(finished: &Finished) -> Vec<String> {
+    let keys: Vec<String> = finished.plan.variations().iter().map(|vary| vary.key().to_owned()).collect();
+    let heads = ["diverged", "mean discrepancy", "largest"].map(str::to_owned);
+    let mut rows: Vec<Vec<String>> = vec![keys.iter().cloned().chain(heads).collect()];
+    for (number, combination) in finished.report.combinations.iter().enumerate().take(MOST_COMBINATIONS) {
+        let varied = finished.plan.varied(number as u64);
+        let values = varied.iter().map(|text| text.split_once('=').map_or_else(String::new, |(_, value)| value.to_owned()));
+        let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), length);
+        let figures = [combination.diverged.to_string(), metres(combination.mean_discrepancy), metres(combination.largest_discrepancy)];
+        rows.push(values.chain(figures).collect());
+    }
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..keys.len() + 3).map(width).collect();
+    rows.iter().map(|row| row.iter().zip(&widths).map(|(cell, width)| format!("  {cell:>width$}")).collect()).collect()
+}
+
+fn counted(number: u64, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
