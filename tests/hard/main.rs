@@ -1,0 +1,17 @@
+//! Hard cases: what is long, far, large, small, many, at the edge, or all at once.
+//!
+//! Each asserts a bound that is derived beside it; `docs/hard-cases.md` is the table. In all derivations u is 2⁻⁵³, the largest relative error of one rounding.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
+#![allow(clippy::float_cmp, reason = "what must be the same to the bit")]
+#![allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "ticks, packets and peers, far below 2^53"
+)]
+
+mod long_time;
+mod watch;
+
+/// u, half the distance from 1 to the next double: the largest relative error of one rounding.
+const ROUNDING: f64 = f64::EPSILON / 2.0;
