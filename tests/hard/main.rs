@@ -10,7 +10,13 @@
     reason = "ticks, packets and peers, far below 2^53"
 )]
 
+mod denormals;
+mod exact_sum;
+mod far_from_the_origin;
+mod gain;
+mod long_motion;
 mod long_time;
+mod many_peers;
 mod watch;
 
 /// u, half the distance from 1 to the next double: the largest relative error of one rounding.
