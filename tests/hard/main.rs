@@ -11,6 +11,7 @@
 )]
 
 mod denormals;
+mod edge_of_stability;
 mod exact_sum;
 mod far_from_the_origin;
 mod gain;
