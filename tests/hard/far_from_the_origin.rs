@@ -91,7 +91,8 @@ fn a_mirror_image_far_to_the_other_side_is_the_same_to_the_bit() {
     let other: Log = run(&mirrored(tied(FAR)).scene(), Model::Least);
     assert_eq!(one.ticks.len(), 60_000);
     for (one, other) in one.ticks.iter().zip(&other.ticks) {
-        let numbers = |tick: &cohaptic_tests::Tick| [tick.object.position[0], tick.object.velocity[0], tick.device.position[0], tick.coupling_force[0]];
+        let numbers =
+            |tick: &cohaptic_tests::Tick| [tick.object.position[0], tick.object.velocity[0], tick.device.position[0], tick.coupling_force[0]];
         assert_eq!(numbers(one), numbers(other).map(|number| -number), "at {}", one.at);
     }
 }
