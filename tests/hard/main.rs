@@ -16,6 +16,7 @@ mod long_motion;
 mod long_time;
 mod many_peers;
 mod million_in_flight;
+mod orders_of_magnitude;
 mod simultaneous;
 mod total_loss;
 mod watch;

@@ -59,7 +59,7 @@ fn a_sum_that_cancels_to_nothing_is_within_the_bound() {
 }
 
 /// The bound is no more than it must be: four ones, and then nothing but halves of the last digit of one, each of which is lost (a tie goes to the even
-/// neighbour). So (n − 4)·u of the bound of (n/4 + 2)·u·(4 + (n − 4)·u) is reached: all but 12 parts of n + 8.
+/// neighbour). So (n − 4)·u of the bound of (n/4 + 2)·u·(4 + (n − 4)·u) is reached, up to 4u of the division: all but 16 parts of n + 8.
 #[test]
 fn the_bound_is_reached() {
     let values: Vec<f64> = (0..OTHERS).map(|place| if place < 4 { 1.0 } else { ROUNDING }).collect();
