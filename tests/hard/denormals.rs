@@ -77,12 +77,11 @@ fn below_the_smallest_normal_numbers_a_scene_is_itself_within_the_gain_of_the_la
     let (small, large) = (run(&small.scene(), Model::Least), run(&large.scene(), Model::Least));
     let mut seen = false;
     for (tick, (small, large)) in relative(&small).into_iter().zip(relative(&large)).enumerate() {
-        for peer in 0..3 {
-            let expected = libm::ldexp(large[peer], -1000);
+        for ((small, large), bound) in small.into_iter().zip(large).zip(&bounds) {
+            let expected = libm::ldexp(large, -1000);
             // The expected number is a multiple of η too, to ½ of it.
-            let apart = (small[peer] - expected).abs();
-            assert!(apart <= bounds[peer] + SMALLEST, "tick {tick}: {:e} for {expected:e}, more than {:e} away", small[peer], bounds[peer]);
-            seen |= small[peer].abs() > 1000.0 * bounds[peer];
+            assert!((small - expected).abs() <= bound + SMALLEST, "tick {tick}: {small:e} for {expected:e}, more than {bound:e} away");
+            seen |= small.abs() > 1000.0 * bound;
         }
     }
     assert!(seen, "the bound, {bounds:?}, is below what moves");
@@ -100,8 +99,8 @@ fn what_fades_ends_at_the_last_digits() {
     let log = run(&draft.scene(), Model::Least);
     let positions = relative(&log);
     for (tick, positions) in positions.iter().enumerate().skip(60_000) {
-        for peer in 0..3 {
-            assert!(positions[peer].abs() <= bounds[peer] + SMALLEST, "tick {tick}: {:e}, more than {:e}", positions[peer], bounds[peer]);
+        for (position, bound) in positions.iter().zip(&bounds) {
+            assert!(position.abs() <= bound + SMALLEST, "tick {tick}: {position:e}, more than {bound:e}");
         }
     }
     assert!(log.ticks.iter().all(|tick| numbers(tick).iter().all(|number| number.is_finite())));
