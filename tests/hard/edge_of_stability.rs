@@ -11,7 +11,7 @@
 //! times in terms of what a row of |A| makes of the state (3 in FC, 3 in FT, one in their difference, 3 in the step's products and sums, one in the product with
 //! the coefficient, one in a mean), and 4 times in terms of the state itself (each position and velocity when it is added to, and when this test takes
 //! the difference from the first copy). All of these are computed along the run and added up: the logarithm of the growth over all frames is K·ln|λ| within
-//! their sum, so the growth per frame is known to 10⁻¹¹ or so.
+//! their sum, so the growth per frame is known to 10⁻¹³ or better.
 
 use cohaptic_harness::{Model, Simulation, TickRow};
 use cohaptic_peer::{Contact, Gains};

@@ -27,9 +27,9 @@ fn distance(actual: f64, expected: Quad) -> f64 {
     (Quad::from(actual) - expected).0.abs()
 }
 
-/// Two peers that nobody holds together unless the gains do, for that many ticks of so many µs.
+/// Two peers for that many ticks of so many µs, with a sample every 1000 of them.
 fn alone(tick: u64, ticks: u64) -> Draft {
-    let mut draft = Draft { duration: tick * ticks / 1000, update: tick, ..Draft::calm(2) };
+    let mut draft = Draft { duration: tick * ticks / 1000, update: 1000 * tick, ..Draft::calm(2) };
     for peer in &mut draft.peers {
         peer.tick = tick;
     }
@@ -43,7 +43,7 @@ fn alone(tick: u64, ticks: u64) -> Draft {
 fn copies_move_on(tick: u64, ticks: u64) {
     let mut draft = alone(tick, ticks);
     let (start, speed, h) = (0.125, -0.1, tick as f64 * 1e-6);
-    (draft.position[0], draft.velocity[0]) = (start, speed);
+    (draft.position[0], draft.velocity[0], draft.update) = (start, speed, tick);
     let (mut k, mut bound) = (0, 0.0);
     let Ok(_) = Simulation::new(&draft.scene(), Model::Least).run(&mut OnTick(|row: &TickRow<'_>| {
         let (x, v) = (row.object.position[0], row.object.velocity[0]);
