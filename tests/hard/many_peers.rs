@@ -71,6 +71,13 @@ fn the_bound_is_reached() {
     assert!(error / bound >= (n - 8.0) / (n + 8.0) - 1e-9 && error <= bound, "{}", error / bound);
 }
 
+/// One sum would lose all but one of them, (n − 1)·u, four times the bound; of four sums one loses a quarter.
+#[test]
+fn one_large_value_costs_one_of_four_sums() {
+    let values: Vec<f64> = (0..OTHERS).map(|place| if place == 0 { 1.0 } else { ROUNDING }).collect();
+    within_the_bound(&values);
+}
+
 proptest! {
     #![proptest_config(same_cases(200, 0x6d65_616e))]
 

@@ -76,7 +76,8 @@ fn a_step_is_exact_within_what_its_turns_cost_over_twelve_orders_of_magnitude() 
     let sizes = [1e-6, 1e-3, 1.0, 1e3, 1e6];
     let mut used = 0.0_f64;
     for (mass, stiffness) in sizes.into_iter().flat_map(|mass| sizes.map(|stiffness| (mass, stiffness))) {
-        for damping in [0.0, 1e-6, 1e-3, 1.0, 1e3, 1e6] {
+        // With 498 N·s/m and 1 kg ‖X‖ is just below ½, where the series leaves out most.
+        for damping in [0.0, 1e-6, 1e-3, 1.0, 498.0, 1e3, 1e6] {
             let plant = Plant { mass, damping, stiffness };
             let (error, bound) = error_and_bound(plant);
             assert!(error <= bound, "{plant:?}: {error:e}, more than {bound:e}");
