@@ -42,10 +42,10 @@ impl Rate {
         Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
     }
 
-    /// What this rate carries in `span`, in units of 10⁻⁹ bit, so that nothing is rounded.
+    /// What this rate carries in `span`, in units of 10⁻⁹ bit, so that nothing is rounded. Saturates; a span of at most 584 years never does.
     #[must_use]
     pub fn bits_sent(self, span: Duration) -> u128 {
-        span.as_nanos() * u128::from(self.0.get())
+        span.as_nanos().saturating_mul(u128::from(self.0.get()))
     }
 }
 
@@ -76,6 +76,13 @@ mod tests {
     fn the_largest_packet_at_the_lowest_rate_saturates() {
         let rate = Rate::bits_per_sec(1).unwrap();
         assert_eq!(rate.serialisation_time(Bytes::new(u64::MAX)), Duration::from_nanos(u64::MAX));
+    }
+
+    #[test]
+    fn the_highest_rate_over_the_longest_span_saturates() {
+        let rate = Rate::bits_per_sec(u64::MAX).unwrap();
+        assert_eq!(rate.bits_sent(Duration::from_nanos(u64::MAX)), u128::from(u64::MAX) * u128::from(u64::MAX));
+        assert_eq!(rate.bits_sent(Duration::MAX), u128::MAX);
     }
 
     #[test]

@@ -9,7 +9,7 @@ pub(super) struct Deadlines {
     first: usize,
 }
 
-/// Stands for no deadline: 584 years are never reached.
+/// Stands for no deadline: who waits for the last instant there is waits for ever.
 const NONE: Instant = Instant::MAX;
 
 impl Deadlines {
@@ -41,6 +41,8 @@ impl Deadlines {
 
     /// The first node from `from` on whose deadline is not after `now`.
     pub(super) fn due(&self, from: usize, now: Instant) -> Option<usize> {
+        // A packet may arrive at the last instant, where those without a deadline are not due.
+        let now = now.min(Instant::from_nanos(u64::MAX - 1));
         if from >= self.first || self.least[1] > now {
             return None;
         }
@@ -70,6 +72,15 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn at_the_last_instant_nobody_is_due_who_has_no_deadline() {
+        let mut tree = Deadlines::new(3);
+        tree.set(1, Some(Instant::from_nanos(u64::MAX - 1)));
+        tree.set(2, Some(Instant::MAX));
+        assert_eq!((tree.due(0, Instant::MAX), tree.due(2, Instant::MAX)), (Some(1), None));
+        assert_eq!(tree.next(), Some(Instant::from_nanos(u64::MAX - 1)));
+    }
 
     proptest! {
         #[test]

@@ -69,7 +69,7 @@ pub trait Node: Any {
     /// The instant that [`Node::poll_timeout`] named has come. Afterwards it must name a later one, or none.
     fn handle_timeout(&mut self, _now: Instant) {}
 
-    /// When the node wants to be woken; `None`: when a packet arrives. An instant that has passed is now.
+    /// When the node wants to be woken; `None`, or the last instant there is: when a packet arrives. An instant that has passed is now.
     fn poll_timeout(&mut self) -> Option<Instant> {
         None
     }

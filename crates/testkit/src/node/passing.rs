@@ -13,7 +13,7 @@ use crate::trace::{Happening, Lost, PacketName};
 
 /// What a node does that keeps time from passing.
 #[derive(Clone, Copy, Debug)]
-enum Does {
+pub(super) enum Does {
     Sends,
     Receives,
     Wakes,
@@ -45,16 +45,19 @@ impl NodeRun {
             if let Some(node) = &mut self.nodes[place] {
                 node.handle_timeout(self.now);
             }
-            self.ask(place);
+            self.ask(place, Does::Wakes);
         }
         self.hand_over();
     }
 
-    /// Asks a node what it wants to send, and when it wants to be woken.
-    pub(super) fn ask(&mut self, place: usize) {
+    /// Asks a node what it wants to send, and when it wants to be woken; `because` of what it is asked.
+    pub(super) fn ask(&mut self, place: usize, because: Does) {
         let Some(mut node) = self.nodes[place].take() else { return self.deadlines.set(place, None) };
+        let mut sent = 0;
         while let Some(transmit) = node.poll_transmit(self.now) {
-            self.count(Does::Sends, place);
+            sent += 1;
+            // Who sends one packet for each that comes answers; who sends most of all that is done now, asked but once, never ends to send.
+            self.count(if sent > self.patience / 2 { Does::Sends } else { because }, place);
             self.send(place, transmit);
         }
         // What is late is due now: so that nodes are woken in their order, however late they are.
@@ -141,7 +144,7 @@ impl NodeRun {
             if let Some(node) = &mut self.nodes[to] {
                 node.handle_packet(self.now, packet);
             }
-            self.ask(to);
+            self.ask(to, Does::Receives);
         }
     }
 

@@ -11,6 +11,7 @@ use cohaptic_units::print::Seconds;
 use cohaptic_wan::{LinkModel, LinkStats, Network, NetworkConfig};
 
 use super::deadlines::Deadlines;
+use super::passing::Does;
 use super::{Node, Nodes, Packet};
 use crate::artefacts::Artefacts;
 use crate::bed::place;
@@ -271,7 +272,7 @@ impl NodeRun {
             return;
         }
         for place in std::mem::take(&mut self.touched) {
-            self.ask(place);
+            self.ask(place, Does::Sends);
         }
         self.hand_over();
     }
