@@ -1,5 +1,7 @@
 //! What the pages of this package have in common.
 
+pub mod mesh;
+
 /// The processor and the system, as Linux names them.
 #[must_use]
 pub fn machine() -> String {

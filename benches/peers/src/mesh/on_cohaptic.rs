@@ -1,0 +1,61 @@
+//! This project: the scene as a user writes it, run as `cohaptic run` does with nothing recorded but counters.
+
+use cohaptic_harness::{Model, NoObserver, Simulation};
+use cohaptic_scene::Scene;
+
+use super::{COUPLING, DEVICE, GAINS, HAND_FORCE, Mesh, OBJECT_MASS, Outcome, SEED};
+
+/// The scene, of so many ticks.
+///
+/// # Panics
+///
+/// If the text below is no scene, which a test would show.
+#[must_use]
+pub fn scene(mesh: Mesh, ticks: u64) -> Scene {
+    let impairments = if mesh.impaired { "jitter = \"2ms\"\nloss = \"1%\"" } else { "" };
+    let text = format!(
+        r#"
+        [scene]
+        duration = "{ticks}ms"
+        seed = {SEED}
+        count = {peers}
+        [object]
+        mass = {OBJECT_MASS}
+        [coordination]
+        strategy = "average-position"
+        scaling = "inverse-n"
+        stiffness = {}
+        damping = {}
+        update = "8ms"
+        [peer]
+        device = {{ mass = {}, damping = {} }}
+        coupling = {{ stiffness = {}, damping = {} }}
+        [[peers]]
+        name = "peer1"
+        hand = {{ force = {HAND_FORCE} }}
+        [link]
+        delay = "24ms"
+        {impairments}
+        "#,
+        GAINS.stiffness,
+        GAINS.damping,
+        DEVICE.mass,
+        DEVICE.damping,
+        COUPLING.stiffness,
+        COUPLING.damping,
+        peers = mesh.peers,
+    );
+    Scene::parse(&text, "mesh.toml".as_ref(), &[]).expect("the mesh is a scene")
+}
+
+/// Runs it.
+#[must_use]
+pub fn run(scene: &Scene) -> Outcome {
+    let Ok(summary) = Simulation::new(scene, Model::Least).run(&mut NoObserver);
+    Outcome {
+        positions: summary.peers.iter().map(|peer| peer.position[0]).collect(),
+        delivered: summary.links.iter().map(|link| link.stats.delivered()).sum(),
+        // Each packet has its own instant in nanoseconds: a test compares them with the draws.
+        arrival_error_nanos: 0,
+    }
+}
