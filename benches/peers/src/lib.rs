@@ -1,5 +1,6 @@
 //! What the pages of this package have in common.
 
+pub mod link;
 pub mod mesh;
 
 /// The processor and the system, as Linux names them.
@@ -24,4 +25,11 @@ pub fn median(mut values: Vec<f64>) -> f64 {
 #[must_use]
 pub fn processor_time() -> std::time::Duration {
     rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime).try_into().unwrap_or_default()
+}
+
+/// The processor time that some work takes \[s\].
+pub fn seconds_of(work: impl FnOnce()) -> f64 {
+    let begin = processor_time();
+    work();
+    (processor_time() - begin).as_secs_f64()
 }

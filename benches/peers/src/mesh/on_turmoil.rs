@@ -57,14 +57,7 @@ fn name(peer: usize) -> String {
     format!("peer{}", peer + 1)
 }
 
-async fn peer(
-    mesh: Mesh,
-    me: usize,
-    ticks: u64,
-    body: Rc<RefCell<Body>>,
-    addresses: Vec<SocketAddr>,
-    worst: Rc<RefCell<u64>>,
-) -> turmoil::Result {
+async fn peer(mesh: Mesh, me: usize, ticks: u64, body: Rc<RefCell<Body>>, addresses: Vec<SocketAddr>, worst: Rc<RefCell<u64>>) -> turmoil::Result {
     let begin = tokio::time::Instant::now() + BEGIN;
     let socket = UdpSocket::bind(("0.0.0.0", PORT)).await?;
     let draws = Draws::from(mesh, me);
