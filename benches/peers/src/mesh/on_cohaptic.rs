@@ -9,11 +9,17 @@ use super::{COUPLING, DEVICE, GAINS, HAND_FORCE, Mesh, OBJECT_MASS, Outcome, SEE
 ///
 /// # Panics
 ///
-/// If the text below is no scene, which a test would show.
+/// If [`text`] is no scene, which a test would show.
 #[must_use]
 pub fn scene(mesh: Mesh, ticks: u64) -> Scene {
+    Scene::parse(&text(mesh, ticks), "mesh.toml".as_ref(), &[]).expect("the mesh is a scene")
+}
+
+/// The scene as a file.
+#[must_use]
+pub fn text(mesh: Mesh, ticks: u64) -> String {
     let impairments = if mesh.impaired { "jitter = \"2ms\"\nloss = \"1%\"" } else { "" };
-    let text = format!(
+    format!(
         r#"
         [scene]
         duration = "{ticks}ms"
@@ -44,8 +50,7 @@ pub fn scene(mesh: Mesh, ticks: u64) -> Scene {
         COUPLING.stiffness,
         COUPLING.damping,
         peers = mesh.peers,
-    );
-    Scene::parse(&text, "mesh.toml".as_ref(), &[]).expect("the mesh is a scene")
+    )
 }
 
 /// Runs it.
