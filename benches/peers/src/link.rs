@@ -36,7 +36,6 @@ pub struct Seen {
 
 impl Seen {
     fn add(&mut self, delay_nanos: u64) {
-        #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]
         let difference = delay_nanos as f64 / 1e6 - DELAY.as_secs_f64() * 1e3;
         self.delivered += 1;
         self.sum += difference;
@@ -45,7 +44,6 @@ impl Seen {
 
     /// Mean and deviation of their delays \[ms\].
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "millions")]
     pub fn delay(&self) -> [f64; 2] {
         let count = self.delivered as f64;
         let mean = self.sum / count;
@@ -217,7 +215,6 @@ fn cohaptic(config: &LinkConfig, packets: u64, mut look: impl FnMut(u64)) -> u64
 struct Packet(u64);
 
 impl WithLen for Packet {
-    #[expect(clippy::cast_possible_truncation, reason = "64")]
     fn len(&self) -> usize {
         SIZE as usize
     }
@@ -259,7 +256,6 @@ fn watch_str0m(config: NetemConfig, packets: u64) -> Seen {
     seen
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "10 ms")]
 fn ring(packets: u64, mut look: impl FnMut(u64)) -> u64 {
     let mut ring = VecDeque::new();
     let mut out = 0;
@@ -275,7 +271,6 @@ fn ring(packets: u64, mut look: impl FnMut(u64)) -> u64 {
 }
 
 /// Normal jitter and loss, drawn from the same addresses as the link's.
-#[expect(clippy::cast_possible_truncation, reason = "some milliseconds")]
 fn heap(packets: u64, mut look: impl FnMut(u64)) -> u64 {
     let stream = Stream::new(1, LinkName::between("a", "b").as_str().as_bytes());
     let lost = Probability::new(f64::from(LOSS)).expect("a probability");

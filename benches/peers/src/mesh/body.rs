@@ -46,7 +46,6 @@ pub struct Numbers {
 impl Numbers {
     /// Those of this mesh.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "few peers")]
     pub fn new(mesh: Mesh) -> Self {
         let n = mesh.peers as f64;
         Self {
@@ -86,7 +85,6 @@ pub struct Body {
 impl Body {
     /// The peer of that number, at rest at the origin.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "few peers")]
     pub fn new(mesh: Mesh, me: usize) -> Self {
         Self {
             numbers: Numbers::new(mesh),

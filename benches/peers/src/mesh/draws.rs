@@ -36,7 +36,6 @@ impl Draws {
     /// How long the packet of that number takes; `None` if it is lost.
     #[must_use]
     #[inline]
-    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "53 bits of a word; some milliseconds in nanoseconds")]
     pub fn delay(&self, sequence: u64) -> Option<u64> {
         let Some(stream) = self.stream else { return Some(DELAY_NANOS) };
         let words = stream.packet(sequence);

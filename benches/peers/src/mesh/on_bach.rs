@@ -51,7 +51,7 @@ async fn peer(mesh: Mesh, me: usize, ticks: u64, body: Rc<RefCell<Body>>, inboxe
     let draws = Draws::from(mesh, me);
     for tick in 0..ticks {
         let now = tick * TICK_NANOS;
-        if tick % TICKS_A_FRAME == 0 {
+        if tick.is_multiple_of(TICKS_A_FRAME) {
             let (sequence, [x, v]) = (tick / TICKS_A_FRAME, body.borrow().state());
             for (to, inbox) in inboxes.iter().enumerate().filter(|(to, _)| *to != me) {
                 if let Some(delay) = draws[to].delay(sequence) {

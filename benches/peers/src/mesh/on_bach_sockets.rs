@@ -40,7 +40,6 @@ pub(super) fn encode(packet: &Packet) -> [u8; SIZE] {
 
 /// The sample of a datagram.
 #[must_use]
-#[expect(clippy::cast_possible_truncation, reason = "the number of a peer")]
 pub(super) fn decode(datagram: &[u8]) -> Packet {
     let word = |place: usize| datagram[8 * place..8 * place + 8].iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte));
     Packet { from: word(0) as usize, sequence: word(1), arrival: word(2), x: f64::from_bits(word(3)), v: f64::from_bits(word(4)) }
@@ -93,7 +92,7 @@ async fn peer(mesh: Mesh, me: usize, ticks: u64, body: Rc<RefCell<Body>>, worst:
     receive(Rc::clone(&socket), Rc::clone(&body), worst).spawn();
     for tick in 0..ticks {
         let now = tick * TICK_NANOS;
-        if tick % TICKS_A_FRAME == 0 {
+        if tick.is_multiple_of(TICKS_A_FRAME) {
             let (sequence, [x, v]) = (tick / TICKS_A_FRAME, body.borrow().state());
             for (to, address) in others.iter().enumerate().filter(|(to, _)| *to != me) {
                 let arrival = draws[to].delay(sequence).map_or(0, |delay| now + delay);

@@ -64,3 +64,43 @@ pub fn run(scene: &Scene) -> Outcome {
         arrival_error_nanos: 0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use cohaptic_harness::{Observer, PacketRow};
+
+    use super::*;
+    use crate::mesh::draws::Draws;
+
+    /// Compares each packet with its draw.
+    struct Compare(Mesh, u64);
+
+    impl Observer for Compare {
+        type Error = Infallible;
+
+        fn wants_packets(&self) -> bool {
+            true
+        }
+
+        fn on_packet(&mut self, row: &PacketRow) -> Result<(), Infallible> {
+            let drawn = Draws::new(self.0, row.from, row.to).delay(row.sequence);
+            let delivered = matches!(row.fate, cohaptic_wan::Fate::Delivered(_));
+            assert_eq!(delivered.then(|| row.at.as_nanos() - row.sent.as_nanos()), drawn, "{row:?}");
+            self.1 += 1;
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn each_packet_takes_what_the_others_draw_for_it() {
+        for impaired in [false, true] {
+            let mesh = Mesh { peers: 3, impaired };
+            let mut compare = Compare(mesh, 0);
+            let Ok(_) = Simulation::new(&scene(mesh, 2_000), Model::Least).run(&mut compare);
+            // 250 frames of 6 packets, less than four of them on the way at the end.
+            assert!((1_476..=1_500).contains(&compare.1), "{}", compare.1);
+        }
+    }
+}

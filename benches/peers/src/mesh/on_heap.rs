@@ -71,7 +71,7 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
             }
             What::Ticks => {
                 let tick = at / TICK_NANOS;
-                if tick % TICKS_A_FRAME == 0 {
+                if tick.is_multiple_of(TICKS_A_FRAME) {
                     let (sequence, [x, v]) = (tick / TICKS_A_FRAME, bodies[peer].state());
                     for to in (0..n).filter(|&to| to != peer) {
                         if let Some(delay) = draws[peer][to].delay(sequence) {

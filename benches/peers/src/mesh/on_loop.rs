@@ -20,7 +20,7 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
     let mut worst = 0;
     for tick in 0..ticks {
         let now = tick * TICK_NANOS;
-        if tick % TICKS_A_FRAME == 0 {
+        if tick.is_multiple_of(TICKS_A_FRAME) {
             let sequence = tick / TICKS_A_FRAME;
             for from in 0..n {
                 let [x, v] = bodies[from].state();

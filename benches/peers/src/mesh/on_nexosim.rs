@@ -57,6 +57,9 @@ struct Peer {
     departures: Output<Sample>,
 }
 
+/// What each peer ends with, and its largest error of arrival.
+type Ends = Arc<Mutex<Vec<Option<(Body, u64)>>>>;
+
 struct Seat {
     me: usize,
     impaired: bool,
@@ -66,7 +69,7 @@ struct Seat {
     tick: u64,
     ticks: u64,
     worst: u64,
-    ends: Arc<Mutex<Vec<Option<(Body, u64)>>>>,
+    ends: Ends,
 }
 
 struct Proto(Peer, Seat);
@@ -89,7 +92,7 @@ impl Peer {
 
     #[nexosim(schedulable)]
     async fn tick(&mut self, (): (), cx: &Context<Self>, seat: &mut Seat) {
-        if seat.tick % TICKS_A_FRAME == 0 {
+        if seat.tick.is_multiple_of(TICKS_A_FRAME) {
             let [x, v] = seat.body.state();
             let sample = Sample { from: seat.me, sequence: seat.tick / TICKS_A_FRAME, sent: seat.tick * TICK_NANOS, x, v };
             if seat.impaired {

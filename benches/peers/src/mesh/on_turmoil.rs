@@ -67,7 +67,7 @@ async fn peer(mesh: Mesh, me: usize, ticks: u64, body: Rc<RefCell<Body>>, addres
         tokio::time::sleep_until(begin + Duration::from_nanos(tick * TICK_NANOS)).await;
         let now = tick * TICK_NANOS;
         let mut body = body.borrow_mut();
-        if tick % TICKS_A_FRAME == 0 {
+        if tick.is_multiple_of(TICKS_A_FRAME) {
             let (sequence, [x, v]) = (tick / TICKS_A_FRAME, body.state());
             for (to, address) in addresses.iter().enumerate().filter(|(to, _)| *to != me) {
                 if let Some(delay) = draws[to].delay(sequence) {

@@ -43,11 +43,11 @@ impl Program {
     #[must_use]
     pub const fn lacks(self) -> &'static str {
         match self {
-            Self::Cohaptic => "congestion control, layers below the datagram, topologies of routers",
+            Self::Cohaptic => "congestion control, layers below the datagram, networks of routers",
             Self::Loop => "time between ticks, any other scene, bytes, counters of links, records",
             Self::Heap => "any other scene, bytes, counters of links, records",
             Self::Nexosim => "links: no delay, loss, jitter, rate, queue or counter but what is written here; bytes",
-            Self::Bach => "loss, rate, correlation, counters of links; bytes",
+            Self::Bach => "random loss, rate, correlation, counters of links; bytes",
             Self::BachSockets => "a law of delay or loss (a monitor written here decides), rate, correlation, counters of links",
             Self::Turmoil => {
                 "time below a millisecond; normal jitter and loss of single packets (written here, at both ends); rate, queues, duplication, counters of links"
@@ -82,6 +82,7 @@ impl Program {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::TICK_NANOS;
 
     /// Two seconds: after that the samples of 250 frames have been lost, late and out of order.
     const TICKS: u64 = 2_000;
@@ -96,6 +97,11 @@ mod tests {
                 for (peer, (actual, expected)) in outcome.positions.iter().zip(&expected.positions).enumerate() {
                     assert_eq!(actual.to_bits(), expected.to_bits(), "{program:?}, {mesh:?}, peer {peer}: {actual} is not {expected}");
                 }
+                // Who has a packet at its instant, and who at the next tick.
+                let late = if outcome.arrival_error_nanos == 0 { 0 } else { TICK_NANOS };
+                assert!(outcome.arrival_error_nanos <= late, "{program:?}, {mesh:?}: {outcome:?}");
+                assert!(mesh.impaired || outcome.arrival_error_nanos == 0, "{program:?}, {mesh:?}: constant delays end at ticks");
+                assert!(program.resolution() == "1 ms" || program == Program::Bach || outcome.arrival_error_nanos == 0, "{program:?}, {mesh:?}");
                 // This project also delivers what arrives in the millisecond after the last tick.
                 let last = (mesh.peers * mesh.peers) as u64;
                 assert!((outcome.delivered..=outcome.delivered + last).contains(&expected.delivered), "{program:?}, {mesh:?}");

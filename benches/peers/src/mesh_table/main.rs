@@ -109,13 +109,11 @@ fn cell(mesh: Mesh) {
 }
 
 /// The ticks that are worth so many times those compared.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "some thousands")]
 fn length(times: f64) -> u64 {
     ((COMPARED as f64 * times) as u64).clamp(1_000, 20_000_000).next_multiple_of(8)
 }
 
 /// Simulated seconds a second, and nanoseconds a packet.
-#[expect(clippy::cast_precision_loss, reason = "some millions")]
 fn speed(seconds: f64, ticks: u64, delivered: u64) -> [f64; 2] {
     [ticks as f64 / 1e3 / seconds, seconds * 1e9 / delivered as f64]
 }
@@ -131,7 +129,6 @@ fn figures(value: f64) -> String {
     if value < 10.0 { format!("{value:.2}") } else { format!("{value:.0}") }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a million packets")]
 fn links() {
     println!("## One link alone\n");
     println!(

@@ -104,3 +104,39 @@ pub fn answer<T: DeserializeOwned>(mut command: Command) -> Ran<T> {
     assert!(output.status.success(), "{command:?}: {}: {errors}", output.status);
     Ran::Answered(serde_json::from_slice(&output.stdout).expect("a line of JSON"))
 }
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_benches_peers::mesh::{Mesh, on_cohaptic};
+
+    use super::*;
+    use crate::scene_file;
+
+    /// What is not installed is skipped here too, with the message of its script.
+    #[test]
+    fn those_that_are_installed_end_in_the_same_state() {
+        let folder = std::env::temp_dir().join(format!("cohaptic-others-test-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        for impaired in [false, true] {
+            let mesh = Mesh { peers: 3, impaired };
+            let path = folder.join("scene");
+            scene_file::write(&path, mesh, 400);
+            let expected = on_cohaptic::run(&on_cohaptic::scene(mesh, 400)).positions;
+            for foreign in Foreign::ALL {
+                match foreign.run(&path) {
+                    Ran::Skipped(why) => eprintln!("{}: skipped. {why}", foreign.name()),
+                    Ran::Answered(answer) => assert!(crate::compare(&answer.positions, &expected) < crate::SAME, "{answer:?} is not {expected:?}"),
+                }
+            }
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_script_that_lacks_something_is_skipped_with_its_message() {
+        let mut command = Command::new("sh");
+        command.args(["-c", "echo nothing here >&2; exit 77"]);
+        assert_eq!(answer::<Answer>(command), Ran::Skipped("nothing here".into()));
+        assert!(matches!(answer::<Answer>(Command::new("/no/such/program")), Ran::Skipped(_)));
+    }
+}

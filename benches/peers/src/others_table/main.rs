@@ -129,7 +129,6 @@ fn compare(actual: &[f64], expected: &[f64]) -> f64 {
 }
 
 /// The ticks that are worth so many times those compared; not so many that their delays fill a disk.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "some thousands")]
 fn length(times: f64) -> u64 {
     ((COMPARED as f64 * times) as u64).clamp(1_000, 10_000_000).next_multiple_of(8)
 }

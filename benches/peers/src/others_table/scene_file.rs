@@ -47,3 +47,28 @@ fn bytes(mesh: Mesh, ticks: u64) -> Vec<u8> {
     let delay = |sequence: u64, draws: &Draws| draws.delay(sequence).map_or(LOST, |delay| i64::try_from(delay).unwrap_or(i64::MAX));
     frames.flat_map(|sequence| draws.iter().flat_map(move |draws| delay(sequence, draws).to_le_bytes())).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_back_as_the_same_bits_and_delays_as_they_are_drawn() {
+        let mesh = Mesh { peers: 10, impaired: true };
+        let text = text(mesh);
+        let numbers: Vec<f64> = text
+            .lines()
+            .filter(|line| line.starts_with("copy") || line.starts_with("gains"))
+            .flat_map(|line| line.split(' ').skip(1))
+            .map(|number| number.parse().unwrap())
+            .collect();
+        let Numbers { copy, gains, .. } = Numbers::new(mesh);
+        assert_eq!(numbers, [copy.x[0], copy.x[1], copy.v[0], copy.v[1], gains.stiffness, gains.damping]);
+        let bytes = bytes(mesh, 1_000);
+        // Frame 100 from peer 3 to peer 7.
+        let place = ((100 * 10 + 3) * 10 + 7) * 8;
+        let delay = i64::from_le_bytes(bytes[place..place + 8].try_into().unwrap());
+        assert_eq!(delay, Draws::new(mesh, 3, 7).delay(100).map_or(LOST, |delay| i64::try_from(delay).unwrap()));
+        assert_eq!(bytes.len(), 125 * 100 * 8);
+    }
+}
