@@ -33,3 +33,20 @@ pub fn seconds_of(work: impl FnOnce()) -> f64 {
     work();
     (processor_time() - begin).as_secs_f64()
 }
+
+/// The version of a crate of others that is built here, from the lock file.
+#[must_use]
+pub fn version(name: &str) -> &'static str {
+    let entry = include_str!("../Cargo.lock").split("[[package]]").find_map(|entry| entry.trim_start().strip_prefix(&format!("name = \"{name}\"\n")));
+    entry.and_then(|entry| entry.strip_prefix("version = \"")?.split('"').next()).unwrap_or("of a version that the lock file does not tell")
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn versions_are_those_of_the_lock_file() {
+        for name in ["bach", "nexosim", "str0m-netem", "turmoil"] {
+            assert!(super::version(name).split('.').all(|part| part.parse::<u32>().is_ok()), "{name}: {}", super::version(name));
+        }
+    }
+}

@@ -154,12 +154,12 @@ impl Kind {
 impl By {
     /// How it is called in a table.
     #[must_use]
-    pub const fn name(self, kind: Kind) -> &'static str {
+    pub fn name(self, kind: Kind) -> String {
         match (self, kind) {
-            (Self::Cohaptic, _) => "cohaptic",
-            (Self::Str0m, _) => "str0m-netem 0.4",
-            (Self::Bare, Kind::Constant) => "a bare ring",
-            (Self::Bare, Kind::Uniform | Kind::NormalAndLoss | Kind::Bursts | Kind::UniformLossAndRate) => "a bare binary heap, same draws",
+            (Self::Cohaptic, _) => "cohaptic".into(),
+            (Self::Str0m, _) => format!("str0m-netem {}", crate::version("str0m-netem")),
+            (Self::Bare, Kind::Constant) => "a bare ring".into(),
+            (Self::Bare, Kind::Uniform | Kind::NormalAndLoss | Kind::Bursts | Kind::UniformLossAndRate) => "a bare binary heap, same draws".into(),
         }
     }
 

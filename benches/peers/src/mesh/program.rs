@@ -1,5 +1,7 @@
 //! The programs, in the order of the tables, and what they leave out.
 
+use crate::version;
+
 use super::{Mesh, Outcome, on_bach, on_bach_sockets, on_cohaptic, on_heap, on_loop, on_nexosim, on_turmoil};
 
 /// A program that runs the mesh.
@@ -27,15 +29,15 @@ impl Program {
 
     /// How it is called in a table.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> String {
         match self {
-            Self::Cohaptic => "cohaptic",
-            Self::Loop => "a bare loop over ticks",
-            Self::Heap => "a bare loop over a binary heap",
-            Self::Nexosim => "nexosim 1.0",
-            Self::Bach => "bach 0.2, queues",
-            Self::BachSockets => "bach 0.2, UDP sockets",
-            Self::Turmoil => "turmoil 0.7",
+            Self::Cohaptic => "cohaptic".into(),
+            Self::Loop => "a bare loop over ticks".into(),
+            Self::Heap => "a bare loop over a binary heap".into(),
+            Self::Nexosim => format!("nexosim {}", version("nexosim")),
+            Self::Bach => format!("bach {}, queues", version("bach")),
+            Self::BachSockets => format!("bach {}, UDP sockets", version("bach")),
+            Self::Turmoil => format!("turmoil {}", version("turmoil")),
         }
     }
 
