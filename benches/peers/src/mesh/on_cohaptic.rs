@@ -1,6 +1,8 @@
 //! This project: the scene as a user writes it, run as `cohaptic run` does with nothing recorded but counters.
 
-use cohaptic_harness::{Model, NoObserver, Simulation};
+use std::convert::Infallible;
+
+use cohaptic_harness::{Model, NoObserver, Observer, PacketRow, Simulation, Summary};
 use cohaptic_scene::Scene;
 
 use super::{COUPLING, DEVICE, GAINS, HAND_FORCE, Mesh, OBJECT_MASS, Outcome, SEED};
@@ -57,6 +59,35 @@ pub fn text(mesh: Mesh, ticks: u64) -> String {
 #[must_use]
 pub fn run(scene: &Scene) -> Outcome {
     let Ok(summary) = Simulation::new(scene, Model::Least).run(&mut NoObserver);
+    outcome(&summary)
+}
+
+/// Runs it with somebody who watches every packet, so that it runs event by event.
+#[must_use]
+pub fn run_watched(scene: &Scene) -> Outcome {
+    let mut watcher = Watcher(0);
+    let Ok(summary) = Simulation::new(scene, Model::Least).run(&mut watcher);
+    std::hint::black_box(watcher.0);
+    outcome(&summary)
+}
+
+/// Looks at every packet, and keeps as little of it as can be.
+struct Watcher(u64);
+
+impl Observer for Watcher {
+    type Error = Infallible;
+
+    fn wants_packets(&self) -> bool {
+        true
+    }
+
+    fn on_packet(&mut self, row: &PacketRow) -> Result<(), Infallible> {
+        self.0 ^= row.at.as_nanos();
+        Ok(())
+    }
+}
+
+fn outcome(summary: &Summary) -> Outcome {
     Outcome {
         positions: summary.peers.iter().map(|peer| peer.position[0]).collect(),
         delivered: summary.links.iter().map(|link| link.stats.delivered()).sum(),
@@ -67,10 +98,6 @@ pub fn run(scene: &Scene) -> Outcome {
 
 #[cfg(test)]
 mod tests {
-    use std::convert::Infallible;
-
-    use cohaptic_harness::{Observer, PacketRow};
-
     use super::*;
     use crate::mesh::draws::Draws;
 

@@ -7,8 +7,10 @@ use super::{Mesh, Outcome, on_bach, on_bach_sockets, on_cohaptic, on_heap, on_lo
 /// A program that runs the mesh.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Program {
-    /// This project.
+    /// This project, as it runs a scene that nobody watches.
     Cohaptic,
+    /// This project with somebody who watches every packet: event by event.
+    CohapticWatched,
     /// No event queue at all.
     Loop,
     /// A binary heap of events.
@@ -25,13 +27,15 @@ pub enum Program {
 
 impl Program {
     /// All of them.
-    pub const ALL: [Self; 7] = [Self::Cohaptic, Self::Loop, Self::Heap, Self::Nexosim, Self::Bach, Self::BachSockets, Self::Turmoil];
+    pub const ALL: [Self; 8] =
+        [Self::Cohaptic, Self::CohapticWatched, Self::Loop, Self::Heap, Self::Nexosim, Self::Bach, Self::BachSockets, Self::Turmoil];
 
     /// How it is called in a table.
     #[must_use]
     pub fn name(self) -> String {
         match self {
             Self::Cohaptic => "cohaptic".into(),
+            Self::CohapticWatched => "cohaptic, every packet watched".into(),
             Self::Loop => "a bare loop over ticks".into(),
             Self::Heap => "a bare loop over a binary heap".into(),
             Self::Nexosim => format!("nexosim {}", version("nexosim")),
@@ -45,7 +49,7 @@ impl Program {
     #[must_use]
     pub const fn lacks(self) -> &'static str {
         match self {
-            Self::Cohaptic => "congestion control, layers below the datagram, networks of routers",
+            Self::Cohaptic | Self::CohapticWatched => "congestion control, layers below the datagram, networks of routers",
             Self::Loop => "time between ticks, any other scene, bytes, counters of links, records",
             Self::Heap => "any other scene, bytes, counters of links, records",
             Self::Nexosim => "links: no delay, loss, jitter, rate, queue or counter but what is written here; bytes",
@@ -61,7 +65,7 @@ impl Program {
     #[must_use]
     pub const fn resolution(self) -> &'static str {
         match self {
-            Self::Cohaptic | Self::Heap | Self::Nexosim | Self::Bach | Self::BachSockets => "1 ns",
+            Self::Cohaptic | Self::CohapticWatched | Self::Heap | Self::Nexosim | Self::Bach | Self::BachSockets => "1 ns",
             Self::Loop | Self::Turmoil => "1 ms",
         }
     }
@@ -71,6 +75,7 @@ impl Program {
     pub fn run(self, mesh: Mesh, ticks: u64) -> Outcome {
         match self {
             Self::Cohaptic => on_cohaptic::run(&on_cohaptic::scene(mesh, ticks)),
+            Self::CohapticWatched => on_cohaptic::run_watched(&on_cohaptic::scene(mesh, ticks)),
             Self::Loop => on_loop::run(mesh, ticks),
             Self::Heap => on_heap::run(mesh, ticks),
             Self::Nexosim => on_nexosim::run(mesh, ticks),

@@ -40,7 +40,10 @@ fn mesh(folder: &Path) {
     println!(
         "jitter are read from a file, which costs them nothing. Processor time of what they simulate, without starting, reading and building; the median of {ROUNDS}"
     );
-    println!("rounds in which all alternate. *Ends* says how far the copies are from cohaptic's after {} simulated seconds.\n", COMPARED / 1000);
+    println!(
+        "rounds in which all alternate. *Ends* says how far the copies are from cohaptic's after {} simulated seconds. cohaptic is that of the first\nrow above, unwatched; its second row says how fast it is event by event.\n",
+        COMPARED / 1000
+    );
     println!("| peers | links | program | simulated s per s | cohaptic is | ns a packet delivered | ends |");
     println!("| ---: | --- | --- | ---: | ---: | ---: | --- |");
     let mut missing: Vec<(Foreign, String)> = Vec::new();
