@@ -10,7 +10,7 @@ use cohaptic_benches_peers::{link, machine, median, seconds_of};
 
 /// Rounds of which the median is taken, in each of which all alternate.
 const ROUNDS: usize = 5;
-/// What a run of a program should take [s].
+/// What a run of a program should take \[s\].
 const WORTH: f64 = 0.4;
 /// Ticks of the runs that are compared to the bit.
 const COMPARED: u64 = 2_000;

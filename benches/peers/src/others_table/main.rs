@@ -12,11 +12,11 @@ use foreign::{Foreign, Ran};
 
 /// Rounds of which the median is taken, in each of which all alternate.
 const ROUNDS: usize = 3;
-/// What a run should take [s].
+/// What a run should take \[s\].
 const WORTH: f64 = 0.4;
 /// Ticks of the runs whose ends are compared.
 const COMPARED: u64 = 2_000;
-/// Compilers and libraries may round differently on other machines; what differs by more [m] has done other work.
+/// Compilers and libraries may round differently on other machines; what differs by more \[m\] has done other work.
 const SAME: f64 = 1e-9;
 
 fn main() {
