@@ -33,7 +33,6 @@ mod error;
 mod folder;
 mod plan;
 mod report;
-mod side_by_side;
 mod table;
 mod vary;
 mod watch;

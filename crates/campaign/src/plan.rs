@@ -14,7 +14,7 @@ use crate::error::CampaignError;
 use crate::table::Format;
 use crate::vary::{Variation, Varied, same_key};
 
-pub(crate) use parts::Parts;
+pub(crate) use parts::{CHUNK, Parts};
 
 /// The most combinations of values.
 pub const MOST_COMBINATIONS: u64 = 10_000_000;

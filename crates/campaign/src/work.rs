@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use cohaptic_harness::run_side_by_side;
 use cohaptic_scene::Scene;
 
 use crate::error::CampaignError;
-use crate::plan::{Parts, Plan};
-use crate::side_by_side::{CHUNK, run_side_by_side};
+use crate::plan::{CHUNK, Parts, Plan};
 use crate::table::{Place, Roster, Row, row};
 use crate::watch::Watch;
 

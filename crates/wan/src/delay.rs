@@ -335,7 +335,8 @@ mod tests {
         let halves = (-9..=9).map(|number| f64::from(number) / 2.0);
         let edges =
             [0.0, -0.0, 2_251_799_813_685_247.5, -2_251_799_813_685_247.5, 2_251_799_813_685_248.5, 4.5e15, -4.5e15, 1e19, -1e19, f64::INFINITY];
-        let drawn = (0..100_000).map(|n| (Stream::new(3, b"nearest").packet(n).first(Purpose::Jitter) as i64) as f64 / 2_f64.powi((n % 80) as i32));
+        let drawn =
+            (0..100_000).map(|n| Stream::new(3, b"nearest").packet(n).first(Purpose::Jitter).cast_signed() as f64 / 2_f64.powi((n % 80) as i32));
         for number in halves.chain(edges).chain(drawn) {
             assert_eq!(nearest(number), libm::rint(number) as i64, "{number}");
         }

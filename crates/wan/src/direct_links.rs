@@ -84,6 +84,10 @@ impl DirectLinks {
     }
 
     /// Adds a link, and says whether it could be added: one that is not [direct](LinkModel::is_direct) needs an engine, and is left out.
+    ///
+    /// # Panics
+    ///
+    /// With more than 2^32 links.
     #[must_use]
     pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) -> bool {
         let Some(config) = model.as_fixed().filter(|_| model.is_direct()) else { return false };
@@ -160,7 +164,7 @@ impl DirectLinks {
         let loss = match &config.loss {
             Loss::None => None,
             Loss::Independent(probability) => Some(*probability),
-            _ => return None,
+            Loss::Correlated(_) | Loss::GilbertElliott(_) | Loss::GilbertElliottInTime(_) | Loss::FourState(_) | Loss::Pattern(_) => return None,
         };
         let delay = DelayStage::new(&config.delay);
         if !config.outages.is_empty() || config.order != Order::AllowReordering || delay.remembers() {

@@ -5,8 +5,10 @@ use core::ops::Range;
 use super::Plan;
 use super::check::Checked;
 use crate::error::CampaignError;
-use crate::side_by_side::CHUNK;
 
+/// How many runs are handed over at once: as many as [`cohaptic_harness::run_side_by_side`] runs at the same time, and few enough that all threads are busy
+/// until the end.
+pub(crate) const CHUNK: u64 = 8;
 /// A part takes about so many events: some seconds of one thread.
 const EVENTS: u64 = 200_000_000;
 /// The most runs of a part whose size is not asked for, for their number of events.

@@ -1,6 +1,6 @@
+use super::CHUNK;
 use super::check::Checked;
 use super::*;
-use crate::side_by_side::CHUNK;
 use crate::table::Roster;
 
 fn plan(vary: &[&str], runs: u64, part: Option<u64>) -> Plan {

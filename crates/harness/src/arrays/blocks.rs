@@ -84,11 +84,11 @@ impl Map {
 
     fn set(&mut self, lane: usize, map: &StepMap) {
         let (state, force) = map.coefficients();
-        for row in 0..2 {
-            for column in 0..2 {
-                self.state[row][column].0[lane] = state[row][column];
-            }
-            self.force[row].0[lane] = force[row];
+        for (eight, number) in self.state.iter_mut().flatten().zip(state.iter().flatten()) {
+            eight.0[lane] = *number;
+        }
+        for (eight, number) in self.force.iter_mut().zip(force) {
+            eight.0[lane] = number;
         }
     }
 

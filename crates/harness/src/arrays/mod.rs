@@ -43,7 +43,6 @@ pub(crate) struct Arrays<'a, const A: usize, const L: usize> {
 
 /// How samples travel.
 #[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "there is one for each run")]
 enum Samples<const A: usize, const L: usize> {
     Broadcast(Broadcast<A, L>),
     Single(Single<A, L>),
@@ -114,8 +113,8 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
         self.blocks.move_hands(now);
         let Moved { discrepancy, finite } = self.processor.dispatch(Motion { samples: &mut self.samples, blocks: &mut self.blocks });
-        for run in 0..L {
-            self.max_discrepancy[run] = self.max_discrepancy[run].max(discrepancy[run]);
+        for (largest, discrepancy) in self.max_discrepancy.iter_mut().zip(discrepancy) {
+            *largest = largest.max(discrepancy);
         }
         self.finite = finite;
     }

@@ -13,8 +13,15 @@ use super::quads::{self, Quad};
 use super::{Sample, others};
 use crate::arrays::blocks::Blocks;
 
-/// Ticks ahead that lie in the wheel, a power of two; what arrives later than that is kept aside.
+/// Ticks ahead that lie in the wheel; what arrives later than that is kept aside.
 const HORIZON: u64 = 256;
+
+/// Where a tick lies in the wheel.
+#[inline(always)]
+fn slot(tick: u64) -> usize {
+    // The lower byte: the remainder by HORIZON.
+    usize::from(tick.to_le_bytes()[0])
+}
 
 /// The links, what is on the way, and what each peer holds of each other.
 #[derive(Clone, Debug)]
@@ -24,7 +31,7 @@ pub(in crate::arrays) struct Single<const A: usize, const L: usize> {
     end: Instant,
     /// By sender, then receiver, then run; the diagonal is never used.
     links: DirectLinks,
-    wheel: Box<[Bucket<A>; HORIZON as usize]>,
+    wheel: Box<[Bucket<A>; 256]>,
     beyond: BTreeMap<u64, Bucket<A>>,
     /// Memory of buckets that were emptied, the latest last: it is what the cache holds. With memory of its own in each bucket a packet took 10 ns more.
     emptied: Vec<Vec<Packet<A>>>,
@@ -135,6 +142,7 @@ impl<const A: usize, const L: usize> Single<A, L> {
 
     /// A peer sends to all others. A run that has ended goes on sending; nobody looks.
     #[inline(never)]
+    #[expect(clippy::cast_possible_truncation, reason = "there are at most 4096 peers, and eight runs")]
     pub(in crate::arrays) fn send(&mut self, tick: u64, now: Instant, sender: usize, blocks: &Blocks<A>) {
         let sample = Sample::<A, L>::of(blocks, sender);
         let Self { peers, ticks, links, wheel, beyond, emptied, .. } = self;
@@ -150,7 +158,7 @@ impl<const A: usize, const L: usize> Single<A, L> {
                 // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
                 let ticks = ticks.count(at.as_nanos() - now.as_nanos());
                 let due = tick.saturating_add(ticks);
-                let bucket = if ticks < HORIZON { &mut wheel[(due % HORIZON) as usize] } else { beyond.entry(due).or_default() };
+                let bucket = if ticks < HORIZON { &mut wheel[slot(due)] } else { beyond.entry(due).or_default() };
                 if bucket.packets.capacity() == 0 {
                     bucket.packets = emptied.pop().unwrap_or_default();
                 }
@@ -197,7 +205,7 @@ impl<const A: usize, const L: usize> Single<A, L> {
     /// Takes in what is due at that tick and arrived by `until`.
     #[inline(never)]
     fn take_in(&mut self, tick: u64, until: Instant) {
-        let place = (tick % HORIZON) as usize;
+        let place = slot(tick);
         if !self.beyond.is_empty() {
             self.come_near(tick);
         }
@@ -220,7 +228,7 @@ impl<const A: usize, const L: usize> Single<A, L> {
     #[cold]
     fn come_near(&mut self, tick: u64) {
         if let Some(bucket) = self.beyond.remove(&tick) {
-            let near = &mut self.wheel[(tick % HORIZON) as usize];
+            let near = &mut self.wheel[slot(tick)];
             near.packets.extend(bucket.packets);
             near.is_mixed = true;
         }
