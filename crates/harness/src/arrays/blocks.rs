@@ -21,6 +21,8 @@ pub(super) struct Blocks<const A: usize> {
     walls: Option<Vec<Option<Enclosure>>>,
     /// Hands whose force varies: peer, run and force.
     hands: Vec<(usize, usize, HandForce<A>)>,
+    /// The runs that have not ended.
+    goes_on: Mask,
 }
 
 /// Eight devices with their copies of the object, along one axis.
@@ -164,6 +166,7 @@ impl<const A: usize> Blocks<A> {
             late: any_late.then_some(late),
             walls: walls.iter().any(Option::is_some).then_some(walls),
             hands: hands.into_iter().filter(varies).collect(),
+            goes_on: Mask::ALL,
         }
     }
 
@@ -189,6 +192,13 @@ impl<const A: usize> Blocks<A> {
             let block = &mut self.blocks[block];
             block.target_x.0[lane..].fill(x[L - 1]);
             block.target_v.0[lane..].fill(v[L - 1]);
+        }
+    }
+
+    /// A run has ended: it is not looked at any more whether its numbers are finite.
+    pub(super) fn end(&mut self, run: usize) {
+        for lane in (run..WIDTH).step_by(self.places.runs) {
+            self.goes_on.set(lane, false);
         }
     }
 
@@ -240,7 +250,7 @@ impl<const A: usize> Blocks<A> {
     #[inline(always)]
     fn finite<const L: usize>(&self, size: Eight) -> [bool; L] {
         // A sum of sizes is finite only if they all are. Were it not for overflow it would also be so the other way round.
-        let [a, b, c, d, e, f, g, h] = size.0;
+        let [a, b, c, d, e, f, g, h] = (size & self.goes_on).0;
         if ((a + e) + (b + f)) + ((c + g) + (d + h)) < f64::INFINITY { [true; L] } else { self.look_at_each() }
     }
 

@@ -55,6 +55,7 @@ pub(super) fn larger(one: f64, other: f64) -> f64 {
 
 impl Mask {
     pub(super) const NONE: Self = Self([0; WIDTH]);
+    pub(super) const ALL: Self = Self([u64::MAX; WIDTH]);
 
     pub(super) fn set(&mut self, place: usize, holds: bool) {
         self.0[place] = if holds { u64::MAX } else { 0 };

@@ -181,6 +181,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         let places = 0..self.shape.peers;
         let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
         let links = pairs.map(|(from, to)| LinkSummary { from, to, stats: self.link_stats(from, to, run, ticks, delivered_until) });
+        self.blocks.end(run);
         self.summaries[run] = Some(Summary {
             ending,
             duration: stop - Instant::ZERO,
