@@ -30,7 +30,7 @@ fn point(word: u64) -> (usize, f64) {
     (layer, unit(word) * X[layer])
 }
 
-/// Without a branch, which a processor would get wrong every second time: that took a fifth off a packet with jitter.
+/// Without a branch, which a processor would get wrong every second time: that took 14 % off a packet on a link with jitter.
 #[inline]
 fn signed(word: u64, size: f64) -> f64 {
     f64::from_bits(size.to_bits() | (word & 0x100) << 55)

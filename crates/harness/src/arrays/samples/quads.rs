@@ -3,7 +3,7 @@
 /// Samples of L runs, four senders together: four positions, then four velocities.
 ///
 /// A mean adds every fourth sample to one of four sums, as [`cohaptic_peer::Held::refresh`] does; here those are the lanes of a register, with the sums of the
-/// velocities beside them. That took 40 % off a tick of ten peers over links with jitter, where seven of ten have heard something new.
+/// velocities beside them. It took 5 % off a tick of ten peers over links with jitter, where seven of ten have heard something new.
 pub(super) type Quad<const L: usize> = [[f64; L]; 8];
 
 /// What lies where there is no sender. Adding it changes no sum, of whatever sign its zero is.
