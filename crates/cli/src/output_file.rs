@@ -6,11 +6,15 @@ use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
 
-/// Writes a whole file, which has its name only then.
-pub(crate) fn write_file(path: &Path, content: &str) -> Result<(), Failure> {
+/// Writes a whole file, which has its name only then. If it cannot be written, on a disk that is full for instance, nothing of it is left.
+pub(crate) fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
     let (file, mut to) = OutputFile::create(path)?;
-    let written = to.write_all(content.as_bytes()).and_then(|()| to.flush()).map(|()| to);
-    file.finish(written)
+    let written = to.write_all(content.as_ref()).and_then(|()| to.flush());
+    if written.is_err() {
+        // What it holds can be made again, unlike a record. That it could not be written is the error to report, not that it is still there.
+        let _ = std::fs::remove_file(&file.partial);
+    }
+    file.finish(written.map(|()| to))
 }
 
 /// A field of a CSV file, quoted where it must be (RFC 4180).

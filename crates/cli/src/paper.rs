@@ -1,7 +1,6 @@
 //! `cohaptic paper`.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
@@ -11,7 +10,7 @@ use serde::Serialize;
 
 use crate::arguments::PaperArguments;
 use crate::failure::{Failure, INTERRUPTED};
-use crate::output_file::OutputFile;
+use crate::output_file::write_file;
 use crate::progress::Progress;
 use crate::{interrupt, output};
 
@@ -109,25 +108,19 @@ fn document(reproduction: &Reproduction, has_files: bool) -> Document<'_> {
 
 fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure> {
     for figure in &reproduction.figures {
-        write(&folder.join(format!("{}.svg", figure.id)), figure.on_white().as_bytes())?;
-        write(&folder.join(format!("{}.csv", figure.id)), figure.csv.as_bytes())?;
+        write_file(&folder.join(format!("{}.svg", figure.id)), figure.on_white().as_bytes())?;
+        write_file(&folder.join(format!("{}.csv", figure.id)), figure.csv.as_bytes())?;
     }
     for claim in &reproduction.claims {
         if let Some(scene) = &claim.scene {
-            write(&folder.join(format!("{}.toml", claim.id)), scene.as_bytes())?;
+            write_file(&folder.join(format!("{}.toml", claim.id)), scene.as_bytes())?;
         }
     }
     // Without the time that it took: the same bytes every time.
     let mut claims = serde_json::to_vec_pretty(&document(reproduction, true)).unwrap_or_default();
     claims.push(b'\n');
-    write(&folder.join("claims.json"), &claims)?;
-    write(&folder.join("index.html"), page::html(reproduction).as_bytes())
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let (file, mut to) = OutputFile::create(path)?;
-    let written = to.write_all(bytes).and_then(|()| to.flush());
-    file.finish(written.map(|()| to))
+    write_file(&folder.join("claims.json"), &claims)?;
+    write_file(&folder.join("index.html"), page::html(reproduction).as_bytes())
 }
 
 /// How wide the text is.
