@@ -66,7 +66,7 @@ enum How {
 
 const ALL_ROWS: fn(&str) -> bool = |_| true;
 const ENDS: fn(&str) -> bool = |row| row.contains("| 4096 steps |") || row.contains("| **draw** |");
-const TEN_HOSTS: fn(&str) -> bool = |row| row.starts_with("| 10 | 8 |");
+const THREE_HOSTS: fn(&str) -> bool = |row| row.starts_with("| 3 | 8 |");
 const TEN_PEERS: fn(&str) -> bool = |row| row.starts_with("| 10 |");
 
 impl Step {
@@ -142,7 +142,7 @@ are: [samplers.md](samplers.md)."
 [stability-speed.md](stability-speed.md)."
             }
             Self::Testkit => {
-                "How fast and how exact is [the test kit](testing.md) beside turmoil, on the same programs? Of ten hosts that send a datagram every 8 ms; the others:
+                "How fast and how exact is [the test kit](testing.md) beside turmoil, on the same programs? Of three hosts that send a datagram every 8 ms; the others:
 [testkit-speed.md](testkit-speed.md)."
             }
             Self::Peers => {
@@ -164,7 +164,7 @@ one link alone, a stability map, and what each of the others does not model: [pe
             Self::Stability => source("stability-speed.md", How::Program("stability-table"), &[("## Equal peers, Td = Tn", ALL_ROWS)]),
             Self::Testkit => {
                 let how = How::Shell("cd benches/peers && cargo run --release", "../../docs/");
-                source("testkit-speed.md", how, &[("## Datagrams all the time", TEN_HOSTS)])
+                source("testkit-speed.md", how, &[("## Datagrams all the time", THREE_HOSTS)])
             }
             Self::Peers => {
                 let line = "cd benches/peers && (cargo run --release --bin mesh-table && others/run)";

@@ -63,6 +63,31 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
     }
 }
 
+/// Alone in a folder, without the programs that measure, and where there is no shell.
+#[test]
+fn a_step_that_fails_changes_nothing_and_an_optional_one_is_said_on_the_page() {
+    // Another name for the same file: a copy could still be open for writing, in a process that another test begins just then.
+    let alone = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let program = alone.path().join("measured-page");
+    fs::hard_link(env!("CARGO_BIN_EXE_measured-page"), &program).unwrap();
+    let folder = tempdir().unwrap();
+    let file = folder.path().join("measured.md");
+    let run = |step: &str| {
+        let mut command = Command::new(&program);
+        command.args(["--smoke", step, "--into"]).arg(folder.path()).env("PATH", alone.path()).output().unwrap()
+    };
+    for step in ["speed", "campaign", "accuracy"] {
+        let output = run(step);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success() && said.contains("cannot run ") && said.contains(&format!("error: not measured: {step};")), "{said}");
+        assert!(!file.exists());
+    }
+    assert!(run("peers").status.success());
+    let page = fs::read_to_string(&file).unwrap();
+    assert!(page.contains("**Not measured then:** cannot run cd benches/peers && "), "{page}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
 /// What a page shows is there, and nothing is kept that no page shows.
 #[test]
 fn the_plots_are_those_that_the_page_shows() {
