@@ -16,7 +16,8 @@ How fast, how exact, on which machine, by which command. This page is written by
 
 which also writes the pages of single parts that it names. With the name of a section it does only that one (`benches/measure speed accuracy`) and leaves the
 others as they are, so every section has its own date and machine. Commands are typed in the folder of the project; `cohaptic` stands for `target/release/cohaptic`, which
-`cargo build --release` makes. A test runs each of them in its smallest form, so that none is here that no longer runs.
+`cargo build --release` makes. Tests run each of them in its smallest form, so that none is here that no longer runs; of those that need the crates of others, or
+wait by the wall clock, they look the programs up (`benches/tests/integration/commands.rs`).
 
 Nothing here is typed by hand. Where a figure was asked for, it stands beside the one measured, whether it is met or not.
 ";

@@ -15,7 +15,7 @@ pub(crate) struct Programs {
 impl Programs {
     pub(crate) fn beside_this_one(effort: Effort) -> Result<Self, String> {
         let here = std::env::current_exe().map_err(|error| format!("cannot tell where this program is: {error}"))?;
-        Ok(Self { folder: here.parent().unwrap_or(Path::new(".")).to_owned(), effort })
+        Ok(Self { folder: here.with_file_name(""), effort })
     }
 
     /// The folder that commands on the page are typed in.

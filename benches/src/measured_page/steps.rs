@@ -52,9 +52,11 @@ struct Source {
     name: &'static str,
     /// The command that prints it.
     how: How,
-    /// Headings, and which rows of the first table below are taken.
-    tables: &'static [(&'static str, fn(&str) -> bool)],
+    tables: &'static [Taken],
 }
+
+/// A heading, and which rows of the first table below it are taken.
+type Taken = (&'static str, fn(&str) -> bool);
 
 #[derive(Debug)]
 enum How {
