@@ -9,8 +9,10 @@
 
 pub mod bare;
 pub mod bare_pair;
+pub mod effort;
 pub mod machine;
 pub mod one_link;
+pub mod pages;
 pub mod verdicts;
 
 use cohaptic_harness::{Model, NoObserver, Simulation, Summary};
@@ -59,19 +61,31 @@ impl Mesh {
     ];
 
     /// The scene, of that many simulated seconds.
+    #[must_use]
+    pub fn scene(self, seconds: u64) -> Scene {
+        self.scene_with_seed(seconds, 1)
+    }
+
+    /// The links, in words.
+    #[must_use]
+    pub const fn links(self) -> &'static str {
+        if self.impaired { "24 ms ± 2 ms normal, 1 % loss" } else { "24 ms" }
+    }
+
+    /// The scene with other random numbers.
     ///
     /// # Panics
     ///
     /// If the scene below is no scene, which a test would show.
     #[must_use]
-    pub fn scene(self, seconds: u64) -> Scene {
+    pub fn scene_with_seed(self, seconds: u64, seed: u64) -> Scene {
         let Self { peers, impaired } = self;
         let impairments = if impaired { "jitter = \"2ms\"\nloss = \"1%\"" } else { "" };
         let text = format!(
             r#"
             [scene]
             duration = "{seconds}s"
-            seed = 1
+            seed = {seed}
             count = {peers}
             [object]
             mass = {OBJECT_MASS}

@@ -1,81 +1,90 @@
-//! Writes `docs/link-speed.md`: `cargo run --release -p cohaptic-benches --bin link-table > docs/link-speed.md`. Takes about a minute.
+//! Writes `docs/link-speed.md`: `cargo run --release -p cohaptic-benches --bin link-table > docs/link-speed.md`. Takes about a minute; `--quick` less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of packets")]
 
 use std::hint::black_box;
 use std::time::Duration;
 
-use cohaptic_benches::machine::{median, processor, time};
+use cohaptic_benches::effort::Effort;
+use cohaptic_benches::machine::{median, time};
 use cohaptic_benches::one_link::{constant, drive, heap, hold, jitter_and_loss, ring, stages, str0m, str0m_configs};
 
-const PACKETS: u64 = 1_000_000;
-const ROUNDS: usize = 9;
+/// How much is measured.
+#[derive(Clone, Copy)]
+struct Work {
+    rounds: usize,
+    packets: u64,
+}
 
 /// Something that is measured, and what it is called.
 type Subject = (&'static str, Box<dyn Fn() -> u64>);
 
-fn main() {
-    println!("# One link: speed\n");
-    println!("Packets per second of processor time through one link, on one core. This page is written by\n");
-    println!("    cargo run --release -p cohaptic-benches --bin link-table > docs/link-speed.md\n");
-    println!("and measured on: {}.\n", processor());
+fn main() -> Result<(), String> {
+    let effort = Effort::parse(std::env::args().skip(1))?;
+    let work = Work { rounds: effort.of(9, 3, 1), packets: effort.of(1_000_000, 1_000_000, 20_000) };
+    let Work { rounds, packets } = work;
+    let what = "Packets per second of processor time through one link, on one core.";
+    println!("{}", effort.head("One link: speed", what, "link-table", "docs/link-speed.md"));
     println!(
         "A steady stream of 64-byte packets 1 µs apart over 10 ms, so that 10⁴ are in flight; each is offered, and polled when it comes out. The median of"
     );
-    println!("{ROUNDS} rounds of {PACKETS} packets, in each of which all rows of a table are run one after the other.\n");
-    beside_others();
-    stage_by_stage();
+    println!("{rounds} rounds of {packets} packets, in each of which all rows of a table are run one after the other.\n");
+    beside_others(work);
+    stage_by_stage(work);
+    Ok(())
 }
 
-fn beside_others() {
+fn beside_others(work: Work) {
+    let packets = work.packets;
     let [plain, jittery, full] = str0m_configs();
     let (_, all) = stages().pop().expect("there are stages");
     let subjects: Vec<Subject> = vec![
-        ("cohaptic", Box::new(|| drive(&constant(), PACKETS))),
-        ("str0m-netem 0.4", Box::new(move || str0m(plain, PACKETS))),
-        ("a bare ring", Box::new(|| ring(PACKETS))),
-        ("cohaptic", Box::new(|| drive(&jitter_and_loss(), PACKETS))),
-        ("str0m-netem 0.4 (uniform jitter)", Box::new(move || str0m(jittery, PACKETS))),
-        ("a bare binary heap, same draws", Box::new(|| heap(PACKETS))),
-        ("cohaptic", Box::new(move || drive(&all, PACKETS))),
-        ("str0m-netem 0.4 (jitter, loss, duplication, reordering, rate)", Box::new(move || str0m(full, PACKETS))),
-        ("a bare binary heap: taking one of 10⁴ events, pushing it again", Box::new(|| hold(PACKETS))),
+        ("cohaptic", Box::new(move || drive(&constant(), packets))),
+        ("str0m-netem 0.4", Box::new(move || str0m(plain, packets))),
+        ("a bare ring", Box::new(move || ring(packets))),
+        ("cohaptic", Box::new(move || drive(&jitter_and_loss(), packets))),
+        ("str0m-netem 0.4 (uniform jitter)", Box::new(move || str0m(jittery, packets))),
+        ("a bare binary heap, same draws", Box::new(move || heap(packets))),
+        ("cohaptic", Box::new(move || drive(&all, packets))),
+        ("str0m-netem 0.4 (jitter, loss, duplication, reordering, rate)", Box::new(move || str0m(full, packets))),
+        ("a bare binary heap: taking one of 10⁴ events, pushing it again", Box::new(move || hold(packets))),
     ];
-    let times = measure(&subjects);
+    let times = measure(&subjects, work.rounds);
     let links = ["constant delay", "normal jitter, 1 % loss", "all stages but slots (below)"];
     let asked = [50, 10, 3];
     println!("| link | what | million packets/s | asked for |\n| --- | --- | ---: | ---: |");
     for (place, ((name, _), time)) in subjects.iter().zip(times).enumerate() {
         let asked = if place % 3 == 0 { asked[place / 3].to_string() } else { String::new() };
-        println!("| {} | {name} | {:.1} | {asked} |", links[place / 3], millions(time));
+        println!("| {} | {name} | {:.1} | {asked} |", links[place / 3], millions(time, packets));
     }
 }
 
-fn stage_by_stage() {
+fn stage_by_stage(work: Work) {
+    let packets = work.packets;
     println!("\n## What each stage costs\n");
     println!(
         "A constant delay and one stage beside it. A stage that is not configured is not there: the first row is a link with none, next to a ring that is"
     );
     println!("written by hand.\n");
-    let mut subjects: Vec<Subject> = vec![("a bare ring", Box::new(|| ring(PACKETS)))];
+    let mut subjects: Vec<Subject> = vec![("a bare ring", Box::new(move || ring(packets)))];
     for (name, config) in stages() {
-        subjects.push((name, Box::new(move || drive(&config, PACKETS))));
+        subjects.push((name, Box::new(move || drive(&config, packets))));
     }
-    let times = measure(&subjects);
+    let times = measure(&subjects, work.rounds);
     println!("| stage | ns a packet | million packets/s |\n| --- | ---: | ---: |");
     for ((name, _), time) in subjects.iter().zip(times) {
-        println!("| {name} | {:.1} | {:.1} |", time.as_secs_f64() * 1e9 / PACKETS as f64, millions(time));
+        println!("| {name} | {:.1} | {:.1} |", time.as_secs_f64() * 1e9 / packets as f64, millions(time, packets));
     }
     println!("\nThe same as criterion benches: `cargo bench -p cohaptic-benches --bench link`.");
 }
 
-fn millions(time: Duration) -> f64 {
-    PACKETS as f64 / time.as_secs_f64() / 1e6
+fn millions(time: Duration, packets: u64) -> f64 {
+    packets as f64 / time.as_secs_f64() / 1e6
 }
 
-fn measure(subjects: &[Subject]) -> Vec<Duration> {
+fn measure(subjects: &[Subject], rounds: usize) -> Vec<Duration> {
     let mut times = vec![Vec::new(); subjects.len()];
-    for _ in 0..ROUNDS {
+    for _ in 0..rounds {
         for ((_, work), times) in subjects.iter().zip(&mut times) {
             times.push(time(|| {
                 black_box(work());

@@ -1,4 +1,5 @@
-//! Writes `docs/samplers.md`: `cargo run --release -p cohaptic-benches --bin samplers-table > docs/samplers.md`. Takes about a minute.
+//! Writes `docs/samplers.md`: `cargo run --release -p cohaptic-benches --bin samplers-table > docs/samplers.md`. Takes about a minute; `--quick`
+//! less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 
 use std::hint::black_box;
@@ -6,23 +7,34 @@ use std::time::Instant;
 
 use cohaptic_accuracy::network::errors::{Errors, Look, probability};
 use cohaptic_accuracy::network::ways::{Fine, Netem, draw, laws, next_word, unit};
-use cohaptic_benches::machine::processor;
+use cohaptic_benches::effort::Effort;
 use cohaptic_wan::law::Law;
 
-fn main() {
-    println!("# Samplers\n");
-    println!("What a random delay costs, and how far from its law it is. This page is written by\n");
-    println!("    cargo run --release -p cohaptic-benches --bin samplers-table > docs/samplers.md\n");
-    println!("and measured on: {}.\n", processor());
+/// How much is measured.
+#[derive(Clone, Copy)]
+struct Work {
+    rounds: usize,
+    draws: u32,
+}
+
+fn main() -> Result<(), String> {
+    let effort = Effort::parse(std::env::args().skip(1))?;
+    let work = Work { rounds: effort.of(31, 9, 1), draws: effort.of(400_000, 400_000, 1000) };
+    let Work { rounds, draws } = work;
+    let look = effort.of(Look::CLOSE, Look::CLOSE, Look { places_a_cell: 1, places_a_side: 400, ..Look::CLOSE });
+    let what = "What a random delay costs, and how far from its law it is.";
+    println!("{}", effort.head("Samplers", what, "samplers-table", "docs/samplers.md"));
     println!(
         "All laws have mean 24 and standard deviation 2; gamma and lognormal begin at 20. A draw includes its uniform word (SplitMix64); times are medians"
     );
-    println!("of 31 rounds in which all ways alternate, {DRAWS} draws each. Errors are computed, not sampled:\n");
+    println!("of {rounds} rounds in which all ways alternate, {draws} draws each. Errors are computed, not sampled:\n");
     println!(
         "- *distance*: the largest difference between the distribution function delivered and the true one (Kolmogorov). Of steps at every jump; of"
     );
     println!(
-        "  interpolated tables at 16 points of every cell; of the exact ways as |F(delay(p)) − p| at 80 000 places (the quantiles are tested against 40 digits)."
+        "  interpolated tables at {} points of every cell; of the exact ways as |F(delay(p)) − p| at {} places (the quantiles are tested against 40 digits).",
+        look.places_a_cell,
+        2 * look.places_a_side
     );
     println!("- *99.99 %*: the error of the delay exceeded once in 10 000, relative to its distance from the mean.");
     println!(
@@ -47,9 +59,8 @@ fn main() {
     let [(_, normal), ..] = laws();
     for (name, law) in laws() {
         let (netem, fine) = (Netem::new(&law), Fine::new(&law));
-        let nanos = times(&law, &netem, &fine);
+        let nanos = times(&law, &netem, &fine, work);
         // The largest numbers: 53 bits for the inverse; 64 for the Pareto law's draw, and what the ziggurat reaches for the others.
-        let look = Look::CLOSE;
         let inverse = look.exact(&law, 8.29, |z| law.quantile(probability(&normal, z)), &normal);
         let of_draw = look.exact(&law, if name == "Pareto" { 9.16 } else { 13.0 }, |z| law.at_normal(z), &normal);
         let map = if name == "gamma" { "13 kB" } else { "" };
@@ -63,32 +74,30 @@ fn main() {
         "\nThe speed of tables is that of a table alone in the cache: 512 kB compete with all else that a simulation touches. The same ways as criterion"
     );
     println!("benches: `cargo bench -p cohaptic-benches --bench samplers`.");
+    Ok(())
 }
 
-const DRAWS: u32 = 400_000;
-
 /// Nanoseconds a draw of each way.
-fn times(law: &Law, netem: &Netem, fine: &Fine) -> [f64; 5] {
-    const ROUNDS: usize = 31;
+fn times(law: &Law, netem: &Netem, fine: &Fine, Work { rounds: count, draws }: Work) -> [f64; 5] {
     let mut rounds: [Vec<f64>; 5] = Default::default();
     let mut state = 1;
-    for _ in 0..ROUNDS {
-        rounds[0].push(time(|| netem.draw(next_word(&mut state))));
-        rounds[1].push(time(|| fine.step(next_word(&mut state))));
-        rounds[2].push(time(|| fine.interpolated(next_word(&mut state))));
-        rounds[3].push(time(|| law.quantile(unit(next_word(&mut state)))));
-        rounds[4].push(time(|| draw(law, &mut state)));
+    for _ in 0..count {
+        rounds[0].push(time(draws, || netem.draw(next_word(&mut state))));
+        rounds[1].push(time(draws, || fine.step(next_word(&mut state))));
+        rounds[2].push(time(draws, || fine.interpolated(next_word(&mut state))));
+        rounds[3].push(time(draws, || law.quantile(unit(next_word(&mut state)))));
+        rounds[4].push(time(draws, || draw(law, &mut state)));
     }
     rounds.map(|mut times| {
         times.sort_by(f64::total_cmp);
-        times[ROUNDS / 2]
+        times[count / 2]
     })
 }
 
-fn time(mut work: impl FnMut() -> f64) -> f64 {
+fn time(draws: u32, mut work: impl FnMut() -> f64) -> f64 {
     let start = Instant::now();
-    for _ in 0..DRAWS {
+    for _ in 0..draws {
         black_box(work());
     }
-    start.elapsed().as_secs_f64() * 1e9 / f64::from(DRAWS)
+    start.elapsed().as_secs_f64() * 1e9 / f64::from(draws)
 }

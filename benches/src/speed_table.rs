@@ -1,22 +1,76 @@
-//! Writes `docs/speed.md`: `cargo run --release -p cohaptic-benches --bin speed-table > docs/speed.md`. Takes about a minute.
+//! Writes `docs/speed.md`: `cargo run --release -p cohaptic-benches --bin speed-table > docs/speed.md`. Takes some minutes; `--quick` less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "seconds and rounds are small")]
 
 use std::hint::black_box;
+use std::time::Duration;
 
-use cohaptic_benches::machine::{median, peak_memory, processor, time};
+use cohaptic_benches::effort::Effort;
+use cohaptic_benches::machine::{median, peak_memory, time};
 use cohaptic_benches::{Mesh, bare};
+use cohaptic_harness::run_side_by_side;
+use cohaptic_scene::Scene;
 
-/// What the project asks of itself in each cell: times real time.
-const ASKED: [f64; 6] = [12_000.0, 8_000.0, 2_500.0, 1_200.0, 120.0, 50.0];
-/// And the largest ratio of the bare loop's speed to the program's.
-const ASKED_RATIO: f64 = 2.5;
+/// What the project asks of itself in each cell of [`Mesh::ALL`]: times real time, and the largest ratio of the bare loop's speed to the program's.
+const ASKED: [(f64, f64); 6] = [(12_000.0, 2.5), (8_000.0, 2.5), (5_000.0, 1.25), (2_500.0, 1.25), (120.0, 2.5), (50.0, 2.5)];
+/// How many runs go side by side.
+const SIDE_BY_SIDE: u64 = 8;
 
-fn main() {
-    println!("# Speed\n");
-    println!("Simulated seconds per second of processor time, on one core. This page is written by\n");
-    println!("    cargo run --release -p cohaptic-benches --bin speed-table > docs/speed.md\n");
-    println!("and measured on: {}.\n", processor());
+/// How much is measured.
+#[derive(Clone, Copy)]
+struct Work {
+    rounds: usize,
+    /// A run of `most / N² + least` simulated seconds, which takes about as long for all N.
+    most: u64,
+    least: u64,
+    /// What each of many runs simulates \[s\].
+    seconds_a_run: u64,
+    /// What the runs simulate after which memory is looked at \[s\].
+    memory: &'static [(&'static str, u64)],
+}
+
+impl Work {
+    const fn of(effort: Effort) -> Self {
+        const HOUR: u64 = 3_600;
+        match effort {
+            Effort::Full => {
+                Self { rounds: 9, most: 20_000, least: 20, seconds_a_run: 10, memory: &[("a minute", 60), ("an hour", HOUR), ("a day", 24 * HOUR)] }
+            }
+            Effort::Quick => Self { rounds: 3, most: 5_000, least: 5, seconds_a_run: 10, memory: &[("a minute", 60), ("an hour", HOUR)] },
+            Effort::Smoke => Self { rounds: 1, most: 0, least: 1, seconds_a_run: 1, memory: &[("a second", 1), ("a minute", 60)] },
+        }
+    }
+
+    /// About half a second of work, if it is the whole.
+    const fn seconds(self, mesh: Mesh) -> u64 {
+        self.most / (mesh.peers * mesh.peers) as u64 + self.least
+    }
+
+    /// Medians of the processor time of two kinds of work in alternating rounds, so that a noisy moment hits both.
+    fn alternate(self, mut one: impl FnMut(), mut other: impl FnMut()) -> [f64; 2] {
+        let mut rounds = [Vec::new(), Vec::new()];
+        for _ in 0..self.rounds {
+            rounds[0].push(time(&mut one));
+            rounds[1].push(time(&mut other));
+        }
+        rounds.map(|times| median(times).as_secs_f64())
+    }
+}
+
+fn main() -> Result<(), String> {
+    let effort = Effort::parse(std::env::args().skip(1))?;
+    let work = Work::of(effort);
+    let what = "Simulated seconds per second of processor time, on one core.";
+    println!("{}", effort.head("Speed", what, "speed-table", "docs/speed.md"));
+    // The most memory is that of all before.
+    let memory = memory(work);
+    one_run(work);
+    many_runs(work);
+    print_memory(&memory);
+    Ok(())
+}
+
+fn one_run(work: Work) {
     println!("## A full mesh\n");
     println!(
         "N peers at 1 kHz, each grasping the object through a device, one of them pushed by a constant hand; 125 samples of 64 bytes a second to each"
@@ -27,45 +81,73 @@ fn main() {
     println!(
         "arrays, written by hand for this one scene: no bytes on the wire, one axis, one strategy, no order of events but its own. Each figure is the"
     );
-    println!("median of nine rounds in which the two alternate.\n");
+    println!("median of {} rounds in which the two alternate.\n", work.rounds);
     println!("| peers | links | cohaptic | asked for | bare loop | ratio | asked for |");
     println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: |");
-    for (mesh, asked) in Mesh::ALL.into_iter().zip(ASKED) {
-        let (program, bare) = measure(mesh);
-        let links = if mesh.impaired { "24 ms ± 2 ms normal, 1 % loss" } else { "24 ms" };
-        let peers = mesh.peers;
-        println!("| {peers} | {links} | {program:.0}× | {asked:.0}× | {bare:.0}× | {:.2} | {ASKED_RATIO} |", bare / program);
+    for (mesh, (asked, asked_ratio)) in Mesh::ALL.into_iter().zip(ASKED) {
+        let seconds = work.seconds(mesh);
+        let scene = mesh.scene(seconds);
+        let times = work.alternate(|| drop(black_box(Mesh::run(&scene))), || drop(black_box(bare::run(mesh, seconds * 1000))));
+        let [program, bare] = times.map(|time| seconds as f64 / time);
+        let (peers, links) = (mesh.peers, mesh.links());
+        println!("| {peers} | {links} | {program:.0}× | {asked:.0}× | {bare:.0}× | {:.2} | {asked_ratio} |", bare / program);
     }
-    println!(
-        "\nFor scale, figures for other simulators on this work, taken from the project's requirements and not measured by this command: at 3, 10 and 50"
-    );
-    println!(
-        "peers with jitter and loss, the bare scheduler of ns-3 2090×, 190× and 6×, nexosim 1100×, 125× and 2×, turmoil 260×, 57× and 3×, SimPy 190×, 30×"
-    );
-    println!("and 1×.");
-    println!("\nThe same cells as criterion benches: `cargo bench -p cohaptic-benches`.\n");
-    println!("## Memory\n");
-    println!("The most memory that the process has held, after runs of 3 peers with jitter and loss, one after the other in one process.\n");
-    println!("| simulated | took | most memory |");
-    println!("| --- | ---: | ---: |");
-    for (name, seconds) in [("a minute", 60), ("an hour", 3_600), ("a day", 86_400)] {
-        let scene = Mesh { peers: 3, impaired: true }.scene(seconds);
-        let took = time(|| drop(black_box(Mesh::run(&scene))));
-        println!("| {name} | {:.2} s | {} |", took.as_secs_f64(), peak_memory());
-    }
+    println!("\nOther simulators on these scenes, all in one run: [peers-speed.md](peers-speed.md).");
+    println!("The same cells as criterion benches: `cargo bench -p cohaptic-benches --bench mesh`.\n");
 }
 
-/// Times real time of the program and of the bare loop: the median of alternating rounds, so that a noisy moment hits both.
-fn measure(mesh: Mesh) -> (f64, f64) {
-    const ROUNDS: usize = 9;
-    // About half a second of work each.
-    let seconds = 20_000 / (mesh.peers * mesh.peers) as u64 + 20;
-    let scene = mesh.scene(seconds);
-    let mut rounds = [Vec::new(), Vec::new()];
-    for _ in 0..ROUNDS {
-        rounds[0].push(time(|| drop(black_box(Mesh::run(&scene)))));
-        rounds[1].push(time(|| drop(black_box(bare::run(mesh, seconds * 1000)))));
+/// Runs one after the other, and the same runs side by side.
+fn many_runs(work: Work) {
+    let seconds_a_run = work.seconds_a_run;
+    println!("## Many runs of one scene\n");
+    println!(
+        "Runs of {seconds_a_run} simulated seconds of the mesh above that differ in their seed, as [a campaign](campaign.md) does them: {SIDE_BY_SIDE} side by side on one core, a number of"
+    );
+    println!(
+        "each in one register, beside the same runs one at a time. What comes out is compared first, and is the same to the bit. Runs a second of"
+    );
+    println!("processor time, the median of {} rounds in which the two alternate.\n", work.rounds);
+    println!("| peers | links | one at a time | {SIDE_BY_SIDE} side by side | gain |");
+    println!("| ---: | --- | ---: | ---: | ---: |");
+    for mesh in Mesh::ALL {
+        let scenes: Vec<Scene> = (1..=SIDE_BY_SIDE).map(|seed| mesh.scene_with_seed(seconds_a_run, seed)).collect();
+        let alone: Vec<_> = scenes.iter().map(Mesh::run).collect();
+        assert!(run_side_by_side(&scenes) == alone, "runs of {mesh:?} side by side are not what they are alone");
+        let repetitions = (work.seconds(mesh) / (SIDE_BY_SIDE * seconds_a_run)).max(1);
+        let times = work.alternate(
+            || {
+                for scene in (0..repetitions).flat_map(|_| &scenes) {
+                    black_box(Mesh::run(scene));
+                }
+            },
+            || (0..repetitions).for_each(|_| drop(black_box(run_side_by_side(&scenes)))),
+        );
+        let [alone, together] = times.map(|time| (repetitions * SIDE_BY_SIDE) as f64 / time);
+        println!("| {} | {} | {alone:.1} | {together:.1} | {:.2}× |", mesh.peers, mesh.links(), together / alone);
     }
-    let [program, bare] = rounds.map(|times| seconds as f64 / median(times).as_secs_f64());
-    (program, bare)
+    println!();
+}
+
+/// Name, processor time, and the most memory so far.
+type MemoryRow = (&'static str, Duration, String);
+
+fn memory(work: Work) -> Vec<MemoryRow> {
+    let row = |&(name, seconds)| {
+        let scene = Mesh { peers: 3, impaired: true }.scene(seconds);
+        let took = time(|| drop(black_box(Mesh::run(&scene))));
+        (name, took, peak_memory())
+    };
+    work.memory.iter().map(row).collect()
+}
+
+fn print_memory(rows: &[MemoryRow]) {
+    println!("## Memory\n");
+    println!(
+        "The most memory that the process has held, after runs of 3 peers with jitter and loss, one after the other in one process, before all else on\nthis page.\n"
+    );
+    println!("| simulated | took | most memory |");
+    println!("| --- | ---: | ---: |");
+    for (name, took, most) in rows {
+        println!("| {name} | {:.2} s | {most} |", took.as_secs_f64());
+    }
 }

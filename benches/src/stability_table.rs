@@ -1,4 +1,5 @@
-//! Writes `docs/stability-speed.md`: `cargo run --release -p cohaptic-benches --bin stability-table > docs/stability-speed.md`. Takes some minutes.
+//! Writes `docs/stability-speed.md`: `cargo run --release -p cohaptic-benches --bin stability-table > docs/stability-speed.md`. Takes some minutes;
+//! `--quick` less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of verdicts")]
 
@@ -8,55 +9,90 @@ use std::time::{Duration, Instant};
 use cohaptic_accuracy::analysis::growth::growth;
 use cohaptic_accuracy::analysis::references::{Reference, references};
 use cohaptic_benches::bare_pair::BarePair;
-use cohaptic_benches::machine::{median, process_time, processor, time};
+use cohaptic_benches::effort::Effort;
+use cohaptic_benches::machine::{median, process_time, time};
 use cohaptic_benches::verdicts::{eight_different, equal, family, figure_3};
 use cohaptic_peer::Gains;
 use cohaptic_stability::{FamilyScratch, Grid, Map, Method, Radius, analyse};
 
-const ROUNDS: usize = 9;
+/// How much is measured.
+#[derive(Clone, Copy)]
+struct Work {
+    /// Rounds of which the median is taken.
+    rounds: usize,
+    /// What all repetitions of a subject in one round take together \[s\].
+    worth: f64,
+    /// Cells along each axis of a map.
+    cells: usize,
+    /// Samples that take so many frames.
+    frames: &'static [u32],
+    /// The largest number of equal peers.
+    most_peers: usize,
+}
 
 /// Something that is measured.
 type Subject<'a> = Box<dyn FnMut() + 'a>;
 
-fn main() {
-    println!("# Stability: speed and error\n");
-    println!("Processor time of verdicts on one core, but for the maps. This page is written by\n");
-    println!("    cargo run --release -p cohaptic-benches --bin stability-table > docs/stability-speed.md\n");
-    println!("and measured on: {}. Each figure is the median of {ROUNDS} rounds in which all rows or columns of a table alternate.\n", processor());
-    equal_peers();
-    figure();
-    different_peers();
-    long_delays();
-    speed_against_error();
-    println!("\nThe same work as criterion benches: `cargo bench -p cohaptic-benches --bench stability`.");
-}
-
-/// Time of each subject once, medians of alternating rounds of so many repetitions.
-fn medians(subjects: &mut [(u32, Subject<'_>)]) -> Vec<Duration> {
-    let mut rounds = vec![Vec::new(); subjects.len()];
-    for _ in 0..ROUNDS {
-        for ((repetitions, subject), times) in subjects.iter_mut().zip(&mut rounds) {
-            let took = time(|| (0..*repetitions).for_each(|_| subject()));
-            times.push(took / *repetitions);
+impl Work {
+    const fn of(effort: Effort) -> Self {
+        match effort {
+            Effort::Full => Self { rounds: 9, worth: 0.05, cells: 200, frames: &[10, 30, 100, 300, 1000], most_peers: 100_000 },
+            Effort::Quick => Self { rounds: 3, worth: 0.02, cells: 100, frames: &[10, 30, 100, 300], most_peers: 100_000 },
+            Effort::Smoke => Self { rounds: 1, worth: 0.0, cells: 4, frames: &[10, 30], most_peers: 2_000 },
         }
     }
-    rounds.into_iter().map(median).collect()
+
+    /// Time of each subject once, medians of alternating rounds of so many repetitions.
+    fn medians(self, subjects: &mut [(u32, Subject<'_>)]) -> Vec<Duration> {
+        let mut rounds = vec![Vec::new(); subjects.len()];
+        for _ in 0..self.rounds {
+            for ((repetitions, subject), times) in subjects.iter_mut().zip(&mut rounds) {
+                let took = time(|| (0..*repetitions).for_each(|_| subject()));
+                times.push(took / *repetitions);
+            }
+        }
+        rounds.into_iter().map(median).collect()
+    }
+
+    /// What it is worth, at least once.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 1 and a million")]
+    fn repetitions(self, subject: &mut Subject<'_>) -> u32 {
+        subject();
+        let once = time(&mut *subject).as_secs_f64();
+        (self.worth / once.max(1e-7)).clamp(1.0, 1e6) as u32
+    }
+
+    fn measured(self, subjects: Vec<Subject<'_>>) -> Vec<Duration> {
+        let mut counted: Vec<(u32, Subject<'_>)> = subjects.into_iter().map(|mut subject| (self.repetitions(&mut subject), subject)).collect();
+        self.medians(&mut counted)
+    }
+
+    /// The median of some, or the only one if it takes long.
+    fn once_or_median(self, mut subject: impl FnMut()) -> Duration {
+        let first = time(&mut subject);
+        if first > Duration::from_millis(500) || self.rounds == 1 {
+            return first;
+        }
+        self.measured(vec![Box::new(subject)])[0]
+    }
 }
 
-/// About a twentieth of a second of it, at least once.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 1 and a million")]
-fn repetitions(subject: &mut Subject<'_>) -> u32 {
-    subject();
-    let once = time(&mut *subject).as_secs_f64();
-    (0.05 / once.max(1e-7)).clamp(1.0, 1e6) as u32
+fn main() -> Result<(), String> {
+    let effort = Effort::parse(std::env::args().skip(1))?;
+    let work = Work::of(effort);
+    let what = "Processor time of verdicts on one core, but for the maps.";
+    println!("{}", effort.head("Stability: speed and error", what, "stability-table", "docs/stability-speed.md"));
+    println!("Each figure is the median of {} rounds in which all rows or columns of a table alternate.\n", work.rounds);
+    equal_peers(work);
+    figure(work);
+    different_peers(work);
+    long_delays(work);
+    speed_against_error(work);
+    println!("\nThe same work as criterion benches: `cargo bench -p cohaptic-benches --bench stability`.");
+    Ok(())
 }
 
-fn measured(subjects: Vec<Subject<'_>>) -> Vec<Duration> {
-    let mut counted: Vec<(u32, Subject<'_>)> = subjects.into_iter().map(|mut subject| (repetitions(&mut subject), subject)).collect();
-    medians(&mut counted)
-}
-
-fn equal_peers() {
+fn equal_peers(work: Work) {
     println!("## Equal peers, Td = Tn\n");
     println!(
         "Verdicts a second along the map KT × KC of N equal peers with average-position coordination, B = 5 N·s/m, both keys changing from verdict to"
@@ -70,12 +106,12 @@ fn equal_peers() {
     println!("radii beyond 10¹⁰, from badly scaled matrices.\n");
     println!("| peers | a copy | radius | asked for | with bounds | asked for | bare pair | bare pair / radius |");
     println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
-    for (peers, split) in [(3, true), (8, true), (1000, true), (1000, false), (100_000, false)] {
+    for (peers, split) in [(3, true), (8, true), (1000, true), (1000, false), (work.most_peers, false)] {
         let family = family(peers, &[format!("object.split-mass={split}")]);
         let pair = BarePair::new(&family.scene(&[1000.0, 3500.0]).expect("in the range"));
         let (mut first, mut second, mut third) = (Walk::default(), Walk::default(), Walk::default());
         let (mut one, mut other) = (FamilyScratch::default(), FamilyScratch::default());
-        let times = measured(vec![
+        let times = work.measured(vec![
             Box::new(|| drop(black_box(family.radius(&first.next(), &mut one)))),
             Box::new(|| drop(black_box(family.bounded_radius(&second.next(), &mut other)))),
             Box::new(|| {
@@ -104,12 +140,13 @@ impl Walk {
     }
 }
 
-fn figure() {
+fn figure(work: Work) {
+    let Work { rounds: count, cells: side, .. } = work;
     let families = figure_3();
-    let grid = Grid::new(200, 200).expect("a grid");
+    let grid = Grid::new(side, side).expect("a grid");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
     let mut rounds = (Vec::new(), Vec::new());
-    for _ in 0..ROUNDS {
+    for _ in 0..count {
         let (wall, processor) = (Instant::now(), process_time());
         for family in &families {
             black_box(pool.install(|| Map::fill(family, grid, |_| {}, || false)).expect("a map"));
@@ -117,10 +154,10 @@ fn figure() {
         rounds.0.push(wall.elapsed());
         rounds.1.push(process_time() - processor);
     }
-    let cells = families.len() * 200 * 200;
+    let cells = families.len() * side * side;
     println!("\n## The paper's Figure 3\n");
     println!(
-        "{} curves, a map of 200 × 200 cells each: {cells} radii without bounds, on two threads of two cores that others use too.\n",
+        "{} curves, a map of {side} × {side} cells each: {cells} radii without bounds, on two threads of two cores that others use too.\n",
         families.len()
     );
     println!("| wall | asked for | processor | processor a cell |");
@@ -129,7 +166,7 @@ fn figure() {
     println!("| {wall:.2} s | 5 s | {processor:.2} s | {:.2} µs |", processor / cells as f64 * 1e6);
 }
 
-fn different_peers() {
+fn different_peers(work: Work) {
     println!("\n## Eight peers, all different\n");
     println!(
         "From the scene to the verdict with its bounds, everything anew. *Reduced* finds no two peers equal, and only saves what nothing depends on.\n"
@@ -139,14 +176,14 @@ fn different_peers() {
     for (name, delay, asked) in [("Tn", 8, "350 µs"), ("6 Tn", 48, "20 ms")] {
         let scene = eight_different(delay);
         let of = |method| analyse(&scene, method).expect("an analysis");
-        let times = measured(vec![Box::new(|| drop(black_box(of(Method::Full)))), Box::new(|| drop(black_box(of(Method::Reduced))))]);
+        let times = work.measured(vec![Box::new(|| drop(black_box(of(Method::Full)))), Box::new(|| drop(black_box(of(Method::Reduced))))]);
         let states = |method| of(method).modes[0].parts[0].size;
         let (full, reduced) = (states(Method::Full), states(Method::Reduced));
         println!("| {name} | {full} | {} | {asked} | {} | {reduced} |", taken(times[0]), taken(times[1]));
     }
 }
 
-fn long_delays() {
+fn long_delays(work: Work) {
     println!("\n## Long delays\n");
     println!(
         "Three equal peers, KT = 20 N/m, KC = 3500 N/m, samples that take D frames: the radius of both blocks as matrices of D + 3 and D + 4 rows,"
@@ -157,18 +194,18 @@ fn long_delays() {
     println!("takes: the matrix with bounds up to 500 rows, the determinant beyond.\n");
     println!("| D | matrix, no bounds | chosen | its error | determinant | its error | apart |");
     println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
-    for frames in [10, 30, 100, 300, 1000_u32] {
+    for &frames in work.frames {
         let changes = [format!("link.delay={}ms", 8 * frames), "coordination.stiffness=20".into()];
         let scene = equal(3, &changes);
         let family = family(3, &changes[..1]);
         let values = [20.0, 3500.0];
         let mut scratch = FamilyScratch::default();
         let of = || determinant(&scene, frames);
-        let plain = once_or_median(|| drop(black_box(family.radius(&values, &mut scratch))));
+        let plain = work.once_or_median(|| drop(black_box(family.radius(&values, &mut scratch))));
         let mut bounded = None;
-        let with_bounds = once_or_median(|| bounded = analyse(&scene, Method::Reduced).ok().map(|analysis| analysis.radius));
+        let with_bounds = work.once_or_median(|| bounded = analyse(&scene, Method::Reduced).ok().map(|analysis| analysis.radius));
         let (matrix, found) = (bounded.expect("an analysis"), of());
-        let times = once_or_median(|| {
+        let times = work.once_or_median(|| {
             black_box(of());
         });
         println!(
@@ -183,21 +220,12 @@ fn long_delays() {
     }
 }
 
-/// The median of some, or the only one if it takes long.
-fn once_or_median(mut work: impl FnMut()) -> Duration {
-    let first = time(&mut work);
-    if first > Duration::from_millis(500) {
-        return first;
-    }
-    measured(vec![Box::new(work)])[0]
-}
-
 fn determinant(scene: &cohaptic_scene::Scene, frames: u32) -> Radius {
     let [apart, together] = BarePair::new(scene).loops(frames, scene.coordination.gains, scene.peers[0].coupling);
     apart.bounded_radius(0.0).or(together.bounded_radius(0.0))
 }
 
-fn speed_against_error() {
+fn speed_against_error(work: Work) {
     println!("\n## Speed against error\n");
     println!(
         "Time of a verdict from the scene on, error of its radius against a reference of 50 digits (`crates/stability/tests/reference/radii.json`), and"
@@ -221,20 +249,20 @@ fn speed_against_error() {
         };
         let by_method = |method| {
             let mut found = Radius { value: 0.0, error: 0.0 };
-            let time = once_or_median(|| found = analyse(scene, method).expect("an analysis").radius);
+            let time = work.once_or_median(|| found = analyse(scene, method).expect("an analysis").radius);
             (time, found.value, Some(found.error))
         };
         row("full", (short && peers < 100).then(|| by_method(Method::Full)));
         row("reduced", Some(by_method(Method::Reduced)));
         let of_determinant = |frames| {
             let mut found = Radius { value: 0.0, error: 0.0 };
-            let time = once_or_median(|| found = determinant(scene, frames));
+            let time = work.once_or_median(|| found = determinant(scene, frames));
             (time, found.value, Some(found.error))
         };
         row("determinant", frames.map(of_determinant));
         let of_growth = || {
             let mut found = None;
-            let time = once_or_median(|| found = growth(scene));
+            let time = work.once_or_median(|| found = growth(scene));
             found.map(|value| (time, value, None))
         };
         row("growth", (short && peers < 100).then(of_growth).flatten());

@@ -29,6 +29,7 @@ mod watch;
 pub use csv::csv;
 pub use error::AccuracyError;
 pub use html::{About, html};
+pub use numbers::short;
 pub use plots::{Plot, plots};
 pub use row::Row;
 pub use subject::Subject;

@@ -1,7 +1,8 @@
 //! Numbers as people read them: three digits.
 
 /// A number with three digits; a dash if there is none.
-pub(crate) fn short(value: Option<f64>) -> String {
+#[must_use]
+pub fn short(value: Option<f64>) -> String {
     match value {
         None => "–".to_owned(),
         Some(0.0) => "0".to_owned(),

@@ -22,6 +22,7 @@ mod link;
 mod live;
 #[cfg(unix)]
 mod live_falcons;
+mod measured;
 mod output;
 mod overrides;
 mod paper;

@@ -1,0 +1,76 @@
+//! Writes `docs/measured.md` and the pages that have a program of their own: `benches/measure`, which builds what is needed first.
+#![allow(clippy::print_stderr, reason = "a line for each step is what people look at while it runs")]
+
+mod accuracy;
+mod arguments;
+mod campaign;
+mod page;
+mod programs;
+mod steps;
+mod whole_file;
+
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use arguments::Arguments;
+use clap::Parser as _;
+use page::Page;
+use programs::Programs;
+use steps::Measured;
+
+fn main() -> ExitCode {
+    match measure(&Arguments::parse()) {
+        Ok(failed) if failed.is_empty() => ExitCode::SUCCESS,
+        Ok(failed) => {
+            eprintln!("error: not measured: {}; what the page said of it before still stands", failed.join(", "));
+            ExitCode::FAILURE
+        }
+        Err(why) => {
+            eprintln!("error: {why}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Does the steps that are asked for, each of which is on the page as soon as it is done. Gives the names of those that failed.
+fn measure(arguments: &Arguments) -> Result<Vec<&'static str>, String> {
+    let (docs, effort, steps) = (&arguments.into, arguments.effort(), arguments.steps());
+    let file = docs.join("measured.md");
+    // Found out before hours of work: a page that this program has not written.
+    let mut page = read(&file)?;
+    let programs = Programs::beside_this_one(effort)?;
+    let mut failed = Vec::new();
+    for (number, &step) in steps.iter().enumerate() {
+        eprintln!("[{}/{}] {} ({})", number + 1, steps.len(), step.name(), step.takes());
+        let start = Instant::now();
+        let measured = match step.measure(&programs) {
+            Ok(measured) => measured,
+            Err(why) if step.is_optional() => {
+                eprintln!("      {why}\n      which the page says");
+                Measured::nothing(&why)
+            }
+            Err(why) => {
+                eprintln!("      {why}");
+                failed.push(step.name());
+                continue;
+            }
+        };
+        for (path, content) in &measured.files {
+            whole_file::write(&docs.join(path), content)?;
+        }
+        page.set(step, step.section(&programs, &measured.body));
+        whole_file::write(&file, &page.text())?;
+        eprintln!("      done in {:.1} s", start.elapsed().as_secs_f64());
+    }
+    Ok(failed)
+}
+
+fn read(file: &Path) -> Result<Page, String> {
+    match fs::read_to_string(file) {
+        Ok(text) => Page::parse(&text).map_err(|why| format!("{}: {why}", file.display())),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Page::default()),
+        Err(error) => Err(format!("cannot read {}: {error}", file.display())),
+    }
+}

@@ -1,0 +1,55 @@
+//! Runs what measures.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use cohaptic_benches::effort::Effort;
+
+/// The programs that measure, as they lie beside this one.
+#[derive(Debug)]
+pub(crate) struct Programs {
+    folder: PathBuf,
+    pub(crate) effort: Effort,
+}
+
+impl Programs {
+    pub(crate) fn beside_this_one(effort: Effort) -> Result<Self, String> {
+        let here = std::env::current_exe().map_err(|error| format!("cannot tell where this program is: {error}"))?;
+        Ok(Self { folder: here.with_file_name(""), effort })
+    }
+
+    /// The folder that commands on the page are typed in.
+    pub(crate) fn root() -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+    }
+
+    /// What a program of this package prints: a page.
+    pub(crate) fn table(&self, program: &str) -> Result<String, String> {
+        let option = Some(self.effort.option()).filter(|option| !option.is_empty());
+        self.printed(Command::new(self.beside(program)).args(option), program)
+    }
+
+    /// What `cohaptic` prints with these words behind it, none of which has a space in it.
+    pub(crate) fn cohaptic(&self, words: &str) -> Result<String, String> {
+        eprintln!("      cohaptic {words}");
+        self.printed(Command::new(self.beside("cohaptic")).args(words.split(' ')), "cohaptic")
+    }
+
+    /// What a line prints that is typed into a shell.
+    pub(crate) fn shell(&self, line: &str) -> Result<String, String> {
+        self.printed(Command::new("sh").args(["-c", line]).env("COHAPTIC", self.beside("cohaptic")), line)
+    }
+
+    fn beside(&self, program: &str) -> PathBuf {
+        self.folder.join(format!("{program}{}", std::env::consts::EXE_SUFFIX))
+    }
+
+    fn printed(&self, command: &mut Command, name: &str) -> Result<String, String> {
+        let command = command.current_dir(Self::root()).stdin(Stdio::null()).stderr(Stdio::inherit());
+        let output = command.output().map_err(|error| format!("cannot run {name}: {error} (looked in {})", self.folder.display()))?;
+        if !output.status.success() {
+            return Err(format!("{name} failed: {}", output.status));
+        }
+        String::from_utf8(output.stdout).map_err(|_| format!("{name} printed what is not UTF-8"))
+    }
+}

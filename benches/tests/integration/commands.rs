@@ -1,0 +1,206 @@
+//! Every command of every page is of one of these kinds; one that is of none fails the test, so that nobody adds one that is not run.
+//!
+//! | command | is |
+//! | --- | --- |
+//! | a program of this package | run, with the least work: see below, one test each |
+//! | `benches/measure` | run by `script.rs`, as the program that it starts |
+//! | `cohaptic …` | run by `crates/cli/tests/integration/measured.rs`, which is where that program can be had |
+//! | of `benches/realtime` | not run here: they wait by the wall clock, for an hour even. Package, program and arguments are looked up |
+//! | of `benches/peers` | not run here: a workspace of its own with the crates of others, which CI does not build. Folder, programs and scripts are looked up |
+
+use std::process::Command;
+
+use cohaptic_benches::effort::Effort;
+use cohaptic_benches::pages::commands;
+
+use crate::manifests::{PACKAGES, default_program, programs};
+use crate::{pages, root};
+
+/// What a command is, as far as it is understood.
+#[derive(PartialEq, Eq, Debug)]
+enum Kind {
+    /// A program of this package that writes this page, and with which effort.
+    Table { program: String, page: String, effort: Effort },
+    /// The script that writes the page on which all is.
+    Script,
+    /// Of the command line, with these words.
+    Cohaptic,
+    /// Programs of another package, by folder and name.
+    Elsewhere(&'static str, Vec<String>),
+}
+
+/// `None` for a command that this test does not know.
+fn kind(command: &str) -> Option<Kind> {
+    if command == "benches/measure" {
+        return Some(Kind::Script);
+    }
+    if command.starts_with("cohaptic ") {
+        return Some(Kind::Cohaptic);
+    }
+    if let Some(inside) = command.strip_prefix("cd benches/peers && ") {
+        return peers(inside);
+    }
+    let (what, rest) = command.strip_prefix("cargo run --release -p ")?.split_once(" --bin ")?;
+    match what {
+        "cohaptic-benches" => {
+            let (run, page) = rest.split_once(" > docs/")?;
+            let (program, effort) = match run.split_once(" -- ") {
+                Some((program, option)) => (program, Effort::named(option)?),
+                None => (run, Effort::Full),
+            };
+            Some(Kind::Table { program: program.to_owned(), page: page.to_owned(), effort })
+        }
+        "cohaptic-benches-realtime" => {
+            let program = match rest {
+                // The arguments are those that benches/realtime/tests run it with: a span and a page.
+                "soak -- 1h --out docs/soak.md" => "soak",
+                _ => rest.split_once(" > docs/").filter(|(_, page)| !page.contains(' '))?.0,
+            };
+            Some(Kind::Elsewhere("benches/realtime", vec![program.to_owned()]))
+        }
+        _ => None,
+    }
+}
+
+/// A line that is typed in `benches/peers`: what prints the page, and its page.
+fn peers(line: &str) -> Option<Kind> {
+    const FOLDER: &str = "benches/peers";
+    let (run, page) = line.split_once(" > ../../docs/")?;
+    let parts: Vec<&str> = run.trim_start_matches('(').trim_end_matches(')').split(" && ").collect();
+    let program = |part: &&str| match *part {
+        "cargo run --release" => Some(default_program(FOLDER)),
+        // A script that says itself what it starts.
+        "others/run" => {
+            let script = std::fs::read_to_string(root().join(FOLDER).join("others/run")).ok()?;
+            Some(script.trim_end().rsplit_once("cargo run --release --quiet --bin ")?.1.to_owned())
+        }
+        part => Some(part.strip_prefix("cargo run --release --bin ")?.to_owned()),
+    };
+    let found: Option<Vec<String>> = parts.iter().map(program).collect();
+    found.filter(|_| !page.contains(' ')).map(|programs| Kind::Elsewhere(FOLDER, programs))
+}
+
+fn all() -> Vec<(&'static str, String, Kind)> {
+    let mut all = Vec::new();
+    for (page, text) in pages() {
+        for command in commands(&text) {
+            let kind = kind(command).unwrap_or_else(|| panic!("docs/{page}: this test does not know how to run {command:?}"));
+            all.push((page, command.to_owned(), kind));
+        }
+    }
+    all
+}
+
+#[test]
+fn every_page_has_its_command_and_every_command_is_known() {
+    let all = all();
+    for (page, text) in pages() {
+        let its: Vec<&Kind> = all.iter().filter(|(of, _, _)| *of == page).map(|(_, _, kind)| kind).collect();
+        let [first, rest @ ..] = &its[..] else { panic!("docs/{page} has no command") };
+        if page == "measured.md" {
+            assert_eq!(*first, &Kind::Script);
+            assert!(rest.contains(&&Kind::Cohaptic));
+        } else {
+            assert!(rest.is_empty() && text.contains("This page is written by\n\n    "), "docs/{page}");
+        }
+    }
+    for (page, command, kind) in &all {
+        if let Kind::Table { page: written, .. } = kind {
+            assert!(*page == "measured.md" || page == written, "docs/{page} is not written by {command}");
+        }
+        // A command on two pages is the same on both.
+        let whole = command.replace(" -- --quick", "");
+        let known = all.iter().any(|(of, other, _)| *of != "measured.md" && other.replace(" -- --quick", "") == whole);
+        assert!(known || matches!(kind, Kind::Script | Kind::Cohaptic), "{command}");
+    }
+}
+
+#[test]
+fn every_program_that_writes_a_page_has_its_command_on_one() {
+    let all = all();
+    for (name, folder) in PACKAGES {
+        for program in programs(folder) {
+            let found = all.iter().any(|(_, _, kind)| match kind {
+                Kind::Table { program: other, .. } => name == "cohaptic-benches" && *other == program,
+                // That the script starts this program is tested in script.rs.
+                Kind::Script => program == "measured-page",
+                Kind::Elsewhere(of, others) => *of == folder && others.contains(&program),
+                Kind::Cohaptic => false,
+            });
+            assert!(found, "{program} of {name} is on no page");
+        }
+    }
+    for (_, command, kind) in &all {
+        let (folder, used) = match kind {
+            Kind::Table { program, .. } => ("benches", std::slice::from_ref(program)),
+            Kind::Elsewhere(folder, used) => (*folder, &used[..]),
+            Kind::Script | Kind::Cohaptic => continue,
+        };
+        assert!(used.iter().all(|program| programs(folder).contains(program)), "{command}");
+    }
+}
+
+#[test]
+fn what_is_not_a_command_of_ours_is_not_known() {
+    for command in [
+        "cargo run --release -p cohaptic-benches --bin speed-table -- --fast > docs/speed.md",
+        "cargo run --release -p cohaptic-benches --bin speed-table",
+        "cargo run --release -p cohaptic-wan --bin x > docs/x.md",
+        "cd benches/peers && cargo test > ../../docs/x.md",
+        "cargo run --release -p cohaptic-benches-realtime --bin soak -- 2h --out docs/soak.md",
+        "rm -r docs",
+    ] {
+        assert_eq!(kind(command), None, "{command}");
+    }
+}
+
+/// Runs a program of this package with the least work, and looks at what it prints: a page with its own command and the tables of the one in `docs/`.
+pub(crate) fn prints_its_page(path: &str, program: &str) {
+    let all = all();
+    let of_program = all.iter().find_map(|(_, _, kind)| match kind {
+        Kind::Table { program: of, page, .. } if of == program => Some(page.clone()),
+        Kind::Table { .. } | Kind::Script | Kind::Cohaptic | Kind::Elsewhere(..) => None,
+    });
+    let page = of_program.unwrap_or_else(|| panic!("{program} is on no page"));
+    let output = Command::new(path).arg("--smoke").output().unwrap();
+    assert!(output.status.success(), "{program}: {}", String::from_utf8_lossy(&output.stderr));
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(commands(&printed), [format!("{} > docs/{page}", Effort::Smoke.command(program))]);
+    let headings = |text: &str| text.lines().filter(|line| line.starts_with('#')).map(str::to_owned).collect::<Vec<_>>();
+    let heads = |text: &str| text.lines().filter(|line| line.starts_with("| ---")).map(str::to_owned).collect::<Vec<_>>();
+    let shipped = std::fs::read_to_string(root().join("docs").join(&page)).unwrap();
+    assert_eq!(
+        (headings(&printed), heads(&printed)),
+        (headings(&shipped), heads(&shipped)),
+        "docs/{page} is not what {program} writes; write it anew"
+    );
+    let refused = Command::new(path).arg("--fast").output().unwrap();
+    assert!(!refused.status.success() && refused.stdout.is_empty() && String::from_utf8_lossy(&refused.stderr).contains("--fast"));
+}
+
+#[test]
+fn speed_table_prints_its_page() {
+    prints_its_page(env!("CARGO_BIN_EXE_speed-table"), "speed-table");
+}
+
+#[test]
+fn link_table_prints_its_page() {
+    prints_its_page(env!("CARGO_BIN_EXE_link-table"), "link-table");
+}
+
+#[test]
+fn samplers_table_prints_its_page() {
+    prints_its_page(env!("CARGO_BIN_EXE_samplers-table"), "samplers-table");
+}
+
+#[test]
+fn stability_table_prints_its_page() {
+    prints_its_page(env!("CARGO_BIN_EXE_stability-table"), "stability-table");
+}
+
+/// One that is added to Cargo.toml needs a test above.
+#[test]
+fn every_program_of_this_package_is_run() {
+    let run = ["speed-table", "samplers-table", "link-table", "stability-table", "measured-page"];
+    assert_eq!(programs("benches"), run);
+}

@@ -1,0 +1,34 @@
+//! The pages of measured figures: every command on them runs, every program that writes one has its command on one.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
+
+mod commands;
+mod manifests;
+mod script;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The folder of the project.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// The pages whose every command is looked at.
+const PAGES: [&str; 10] = [
+    "measured.md",
+    "speed.md",
+    "link-speed.md",
+    "samplers.md",
+    "stability-speed.md",
+    "testkit-speed.md",
+    "peers-speed.md",
+    "relay-speed.md",
+    "live-speed.md",
+    "soak.md",
+];
+
+/// Name and text of each.
+fn pages() -> Vec<(&'static str, String)> {
+    let read = |name: &'static str| (name, fs::read_to_string(root().join("docs").join(name)).unwrap_or_else(|error| panic!("{name}: {error}")));
+    PAGES.into_iter().map(read).collect()
+}

@@ -1,0 +1,63 @@
+//! Every `cohaptic …` command on `docs/measured.md` runs as it stands there, with less work. Its other commands are those of `benches/tests/integration`.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+
+use crate::desk::{Desk, Outcome, parse};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The words behind `cohaptic` of each command.
+fn commands() -> Vec<Vec<String>> {
+    let page = std::fs::read_to_string(root().join("docs/measured.md")).unwrap();
+    let words = |line: &str| line.split(' ').map(str::to_owned).collect();
+    page.lines().filter_map(|line| line.strip_prefix("    cohaptic ")).map(words).collect()
+}
+
+/// Puts another value in the place of an option's.
+fn set(words: &mut [String], option: &str, value: &str) {
+    let place = words.iter().position(|word| word == option).unwrap_or_else(|| panic!("no {option} in {words:?}"));
+    value.clone_into(&mut words[place + 1]);
+}
+
+/// Typed in the folder of the project, as the page says.
+fn text(words: &[String]) -> String {
+    let outcome = Outcome::of(Command::new(env!("CARGO_BIN_EXE_cohaptic")).args(words).current_dir(root()).output().unwrap());
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""), "{words:?}");
+    outcome.stdout
+}
+
+#[test]
+fn the_commands_of_the_page_of_measured_figures_run() {
+    let desk = Desk::new();
+    let mut seen = Vec::new();
+    for (number, mut words) in commands().into_iter().enumerate() {
+        let folder = format!("out{number}");
+        let kind = words[0].clone();
+        set(&mut words, "--out", desk.path(&folder).to_str().unwrap());
+        match kind.as_str() {
+            "campaign" => {
+                set(&mut words, "--runs", "9");
+                let document = parse(&text(&words));
+                assert_eq!((document["runs"].as_u64(), document["runs_computed"].as_u64()), (Some(9), Some(9)), "{words:?}");
+                assert_eq!(desk.files(&folder), ["campaign.json", "runs.parquet"]);
+            }
+            "accuracy" => {
+                words.retain(|word| word != "--quick");
+                words.extend(["--quick", "--only", "motion"].map(str::to_owned));
+                assert_eq!(parse(&text(&words))["interrupted"], false);
+                // The plots of this subject that the page shows.
+                let page = std::fs::read_to_string(root().join("docs/measured.md")).unwrap();
+                let shown: Vec<&str> = page.split("](images/measured/").skip(1).filter_map(|rest| Some(rest.split_once(')')?.0)).collect();
+                let of_motion: Vec<&&str> = shown.iter().filter(|plot| plot.starts_with("motion-")).collect();
+                assert!(!of_motion.is_empty() && of_motion.iter().all(|plot| desk.path(&format!("{folder}/{plot}")).is_file()), "{of_motion:?}");
+            }
+            _ => panic!("docs/measured.md: this test does not know how to run cohaptic {}", words.join(" ")),
+        }
+        seen.push(kind);
+    }
+    assert!(["campaign", "accuracy"].iter().all(|kind| seen.iter().any(|found| found == kind)), "{seen:?}");
+}
