@@ -65,7 +65,7 @@ impl Campaign {
     fn new_manifest(plan: &Plan, watch: &dyn Watch) -> Result<Manifest, CampaignError> {
         let checked = plan.check(watch)?;
         let parts = Parts::of(plan, &checked, columns(plan.variations(), &checked.roster).len())?;
-        Ok(Manifest::new(plan, plan.fingerprint()?, checked.roster, parts))
+        Ok(Manifest::new(plan, plan.fingerprint_of(&checked.numbers), checked.roster, parts))
     }
 
     /// The manifest in the folder, which must be that of this plan.

@@ -86,7 +86,9 @@ impl Plan {
             CampaignError::Size(format!("{} combinations: expected at most {MOST_COMBINATIONS}", counts.join(" × ")))
         })?;
         if combinations.checked_mul(runs).is_none_or(|all| all > MOST_RUNS) {
-            return Err(CampaignError::Size(format!("{runs} runs of {combinations} combinations: expected at most {MOST_RUNS} runs in all")));
+            return Err(CampaignError::Size(format!(
+                "{runs} runs of each combination, of which there are {combinations}: expected at most {MOST_RUNS} runs in all"
+            )));
         }
         let (text, file, set, program) = (text.to_owned(), file.to_path_buf(), set.to_vec(), program.to_owned());
         Ok(Self { text, file, set, variations, runs, combinations, format, part, program })
@@ -169,9 +171,8 @@ impl Plan {
         let most = i64::MAX.unsigned_abs();
         if scene.seed > most - (self.runs - 1) {
             let message = format!(
-                "scene.seed: {} more seeds from {} on are not all seeds of a scene: expected the last to be at most {most}",
-                self.runs - 1,
-                scene.seed
+                "scene.seed: the seeds of {} runs from {} on are not all seeds of a scene: expected the last to be at most {most}",
+                self.runs, scene.seed
             );
             return Err(CampaignError::NotRun { message, varied });
         }

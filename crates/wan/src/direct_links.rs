@@ -365,7 +365,8 @@ mod tests {
 
     #[test]
     fn what_is_forgotten_is_on_the_way_for_ever() {
-        let mut links = DirectLinks::new(Instant::MAX);
+        // One that would have arrived at the very last instant.
+        let mut links = DirectLinks::new(Instant::from_nanos(5_000_000));
         assert!(links.add(1, &LinkName::between("a", "b"), &model("delay 5ms")));
         let mut arrivals = Arrivals::NONE;
         links.offer(Instant::ZERO, 0, 1, 0, &mut arrivals);

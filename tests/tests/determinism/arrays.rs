@@ -20,6 +20,58 @@ fn difference(one: &Summary, other: &Summary) -> Option<String> {
     Some(format!("line {line}: {found} is not {expected}"))
 }
 
+/// Three peers for three seconds, over links with these keys.
+fn three(link: &str) -> Scene {
+    let text = format!(
+        r#"
+        scene = {{ duration = "3s", count = 3 }}
+        object = {{ mass = 0.45 }}
+        coordination = {{ strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }}
+        peer = {{ device = {{ mass = 0.1, damping = 5.0 }}, coupling = {{ stiffness = 3500.0, damping = 5.0 }} }}
+        peers = [{{ name = "peer1", hand = {{ force = 1.5 }} }}]
+        link = {{ {link} }}
+        "#
+    );
+    Scene::parse(&text, "three.toml".as_ref(), &[]).unwrap()
+}
+
+/// Eight of them with different seeds, the fourth of which diverges.
+fn eight_of(scene: &Scene) -> Vec<Scene> {
+    let mut scenes = vec![scene.clone(); 8];
+    for (seed, scene) in (0..).zip(&mut scenes) {
+        scene.seed = seed;
+    }
+    scenes[3].coordination.gains.stiffness = 3e7;
+    scenes
+}
+
+/// Each alone, and all side by side, against what their events come to.
+fn compare(scenes: &[Scene]) {
+    for (scene, together) in scenes.iter().zip(run_side_by_side(scenes)) {
+        assert!(same_shape(scene, scene), "it is run in arrays");
+        let expected = run(scene, Model::General);
+        assert_eq!(difference(&run(scene, Model::Least), &expected), None, "alone, {:?}", scene.duration);
+        assert_eq!(difference(&together, &expected), None, "side by side, {:?}", scene.duration);
+    }
+}
+
+/// Ends a run when it has been asked that often.
+struct Impatient(u32);
+
+impl Observer for Impatient {
+    type Error = std::convert::Infallible;
+
+    fn keep_going(&mut self, _now: Instant) -> bool {
+        self.0 -= 1;
+        self.0 > 0
+    }
+}
+
+fn run_interrupted(scene: &Scene, model: Model, breaths: u32) -> Summary {
+    let Ok(summary) = Simulation::new(scene, model).run(&mut Impatient(breaths));
+    summary
+}
+
 proptest! {
     #![proptest_config(cases(1500))]
 
@@ -49,21 +101,9 @@ proptest! {
     /// A run that is ended on the way has done what one with events has.
     #[test]
     fn a_run_that_is_interrupted_comes_to_the_same(mut drafts in drafts::alike(Just(1)), breaths in 1..3_u32) {
-        struct Impatient(u32);
-        impl Observer for Impatient {
-            type Error = std::convert::Infallible;
-
-            fn keep_going(&mut self, _now: Instant) -> bool {
-                self.0 -= 1;
-                self.0 > 0
-            }
-        }
         let draft = &mut drafts[0];
         draft.duration = 2500;
-        let interrupted = |model| {
-            let Ok(summary) = Simulation::new(&draft.scene(), model).run(&mut Impatient(breaths));
-            summary
-        };
+        let interrupted = |model| run_interrupted(&draft.scene(), model, breaths);
         let difference = difference(&interrupted(Model::Least), &interrupted(Model::General));
         prop_assert!(difference.is_none(), "{}", difference.unwrap());
     }
@@ -89,16 +129,8 @@ fn shipped_scenes_side_by_side_come_to_what_each_comes_to_alone() {
 /// Eight runs of one scene of which some diverge: each ends when it would alone.
 #[test]
 fn each_run_ends_when_it_would_alone() {
-    let text = r#"
-        scene = { duration = "3s", count = 3 }
-        object = { mass = 0.45 }
-        coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
-        peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
-        peers = [{ name = "peer1", hand = { force = 1.5 } }]
-        link = { delay = "24ms", jitter = "3ms", loss = "5%" }
-    "#;
     let stiffness = |gain: f64| {
-        let mut scene = Scene::parse(text, "three.toml".as_ref(), &[]).unwrap();
+        let mut scene = three("delay = \"24ms\", jitter = \"3ms\", loss = \"5%\"");
         scene.coordination.gains.stiffness = gain;
         scene
     };
@@ -109,4 +141,123 @@ fn each_run_ends_when_it_would_alone() {
     for (scene, together) in scenes.iter().zip(&together) {
         assert_eq!(difference(together, &run(scene, Model::General)), None);
     }
+}
+
+/// What is 256 ticks or more on the way waits elsewhere than the rest, and the ticks of more than 2^31 ns are counted in another way: delays at these edges
+/// and on both sides of them, with packets that overtake others across them, in runs that are whole, that diverge and that are interrupted.
+#[test]
+fn what_is_long_on_the_way_comes_to_the_same() {
+    let spread =
+        |mean: &str, sd: &str| format!("delay = \"{mean}\", jitter = {{ sd = \"{sd}\", distribution = \"uniform\" }}, order = \"allow-reordering\"");
+    for (link, duration) in [
+        ("delay = \"255000001ns\", loss = \"5%\"".to_owned(), 600),
+        ("delay = \"256ms\", loss = \"5%\"".to_owned(), 600),
+        ("delay = \"257ms\", loss = \"5%\"".to_owned(), 1100),
+        (spread("256ms", "20ms"), 1500),
+        (spread("300ms", "150ms"), 1500),
+        (spread("2200ms", "100ms"), 3000),
+        ("delay = \"2147483647ns\", loss = \"5%\"".to_owned(), 2300),
+        ("delay = \"2147000001ns\", loss = \"5%\"".to_owned(), 2300),
+        ("delay = \"2148000001ns\", loss = \"5%\"".to_owned(), 2300),
+    ] {
+        let mut scene = three(&link);
+        scene.duration = Duration::from_millis(duration);
+        compare(&eight_of(&scene));
+        if duration > 1024 {
+            let [least, general] = [Model::Least, Model::General].map(|model| run_interrupted(&scene, model, 1));
+            assert!(matches!(general.ending, Ending::Interrupted(_)), "{link}");
+            assert_eq!(difference(&least, &general), None, "{link}");
+        }
+    }
+}
+
+/// A run that diverges at the end of its scene, or a part of a tick before it: packets that arrive until then are delivered, unlike those of the latest tick
+/// of one that diverges earlier. Here some arrive at every tick.
+#[test]
+fn a_run_that_diverges_at_the_very_end_comes_to_the_same() {
+    for link in ["delay = \"2ms\"", "delay = \"2ms\", jitter = \"200us\""] {
+        let mut scene = three(link);
+        scene.coordination.update = Duration::from_millis(1);
+        scene.coordination.gains.stiffness = 3e7;
+        let Ending::Diverged(at) = run(&scene, Model::General).ending else { panic!("{link}: it diverges") };
+        let at = at - Instant::ZERO;
+        for early in [0, 1, 300_000, 999_999, 1_000_000, 1_000_001].map(Duration::from_nanos) {
+            scene.duration = at - early;
+            let ending = run(&scene, Model::General).ending;
+            assert_eq!(ending == Ending::Complete, early >= Duration::from_millis(1), "{early:?} before: {ending:?}");
+            compare(&eight_of(&scene));
+        }
+    }
+}
+
+/// A device that is torn away by its hand leaves the numbers a tick before its copy of the object does: that is when the run has diverged.
+#[test]
+fn a_device_that_diverges_alone_ends_the_run() {
+    let mut scenes = eight_of(&three("delay = \"24ms\", jitter = \"3ms\""));
+    for (scene, force) in scenes.iter_mut().zip(["1e308", "1.5", "1e307", "-1e308", "1.5", "1.5", "1e308", "1.5"]) {
+        let hand = Scene::parse(
+            &format!(
+                r#"
+                scene = {{ duration = "3s", count = 3 }}
+                object = {{ mass = 1e9 }}
+                coordination = {{ strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }}
+                peer = {{ device = {{ mass = 1e-4 }}, coupling = {{ stiffness = 1e-3, damping = 0.0 }} }}
+                peers = [{{ name = "peer1", hand = {{ force = {force} }} }}]
+                link = {{ delay = "24ms", jitter = "3ms" }}
+                "#
+            ),
+            "torn.toml".as_ref(),
+            &[],
+        );
+        *scene = hand.unwrap();
+    }
+    let endings: Vec<bool> = scenes.iter().map(|scene| run(scene, Model::General).ending == Ending::Complete).collect();
+    assert_eq!(endings, [false, true, false, false, true, true, false, true]);
+    compare(&scenes);
+}
+
+/// A sample that comes too late arrives at the very end of the scene, a nanosecond before, and a nanosecond behind it.
+#[test]
+fn a_stale_sample_at_the_very_end_counts() {
+    let mut scene = three("delay = \"24ms\", jitter = { sd = \"8ms\", distribution = \"uniform\" }, order = \"allow-reordering\"");
+    let stale = |summary: &Summary| summary.peers.iter().map(|peer| peer.stale_samples).sum::<u64>();
+    // The number grows with the duration, so the instant at which it first does is found by halving.
+    let (mut before, mut at) = (0, 3_000_000_000);
+    while at - before > 1 {
+        let middle = before + (at - before) / 2;
+        scene.duration = Duration::from_nanos(middle);
+        if stale(&run(&scene, Model::General)) == 0 { before = middle } else { at = middle }
+    }
+    for (duration, expected) in [(at - 1, 0), (at, 1), (at + 1, 1)] {
+        scene.duration = Duration::from_nanos(duration);
+        assert_eq!(stale(&run(&scene, Model::Least)), expected, "a scene of {duration} ns");
+        let mut scenes = eight_of(&scene);
+        scenes.iter_mut().for_each(|like| like.seed = scene.seed);
+        compare(&scenes);
+    }
+}
+
+/// What two scenes must have in common, each thing by itself.
+#[test]
+fn scenes_of_other_shapes_are_not_run_side_by_side() {
+    let scene = three("delay = \"24ms\"");
+    let differs = |change: &dyn Fn(&mut Scene)| {
+        let mut other = scene.clone();
+        change(&mut other);
+        assert!(same_shape(&other, &other), "it is run in arrays");
+        let [there, back] = [(&scene, &other), (&other, &scene)].map(|(one, other)| same_shape(one, other));
+        assert_eq!(there, back);
+        compare(&[scene.clone(), other.clone(), scene.clone(), other.clone(), other, scene.clone()]);
+        !there
+    };
+    assert!(differs(&|other| other.peers[1].phase = 3));
+    assert!(differs(&|other| other.duration -= Duration::from_nanos(1)));
+    assert!(differs(&|other| other.coordination.update = Duration::from_millis(4)));
+    assert!(differs(&|other| other.peers.iter_mut().for_each(|peer| peer.clock.tick = Duration::from_millis(2))));
+    assert!(differs(&|other| other.links = three("delay = \"25ms\"").links));
+    assert!(differs(&|other| other.links = three("delay = \"24ms\", loss = \"1%\"").links));
+    assert!(!differs(&|other| other.seed = 9));
+    assert!(!differs(&|other| other.object.mass = 0.5));
+    assert!(!differs(&|other| other.coordination.gains.damping = 6.0));
+    assert!(!differs(&|other| other.peers[2].compute_delay = true));
 }

@@ -1,11 +1,13 @@
 //! Reads the scene of every combination before anything runs.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
 use super::Plan;
+use super::fingerprint::number_of;
 use crate::error::CampaignError;
 use crate::table::Roster;
 use crate::watch::Watch;
@@ -19,6 +21,8 @@ pub(crate) struct Checked {
     pub(crate) roster: Roster,
     /// How many events the longest run has, about: ticks and packets.
     pub(crate) events: u64,
+    /// The numbers of those scenes that the fingerprint looks at, by combination: to read them a second time would take as long as the check.
+    pub(crate) numbers: BTreeMap<u64, u64>,
 }
 
 impl Plan {
@@ -58,7 +62,9 @@ impl Plan {
         let mut all: Option<Checked> = None;
         for combination in combinations {
             let scene = self.scene(combination)?;
-            all = Some(join(all, Checked { roster: Roster::of(&scene), events: events(&scene) }));
+            let (roster, events) = (Roster::of(&scene), events(&scene));
+            let number = self.is_looked_at(combination).then(|| (combination, number_of(scene)));
+            all = Some(join(all, Checked { roster, events, numbers: number.into_iter().collect() }));
         }
         watch.checked(count);
         all.ok_or(CampaignError::Stopped)
@@ -71,6 +77,7 @@ fn join(all: Option<Checked>, other: Checked) -> Checked {
         Some(mut all) => {
             all.roster.add(&other.roster);
             all.events = all.events.max(other.events);
+            all.numbers.extend(other.numbers);
             all
         }
     }

@@ -1,3 +1,5 @@
+use std::collections::BTreeMap;
+
 use super::CHUNK;
 use super::check::Checked;
 use super::*;
@@ -27,7 +29,7 @@ fn nothing_varied_is_one_combination() {
 
 fn parts(runs: u64, events: u64, columns: usize, part: Option<u64>) -> Parts {
     let roster = Roster { peers: Vec::new(), always: 0, axes: 1, fewest_axes: 1, access_lines: false };
-    Parts::of(&plan(&[], runs, part), &Checked { roster, events }, columns).unwrap()
+    Parts::of(&plan(&[], runs, part), &Checked { roster, events, numbers: BTreeMap::new() }, columns).unwrap()
 }
 
 #[test]
@@ -86,4 +88,17 @@ fn the_fingerprint_is_that_of_what_the_scenes_say_and_not_of_where_they_are() {
     assert_eq!(first, number(&text.replace("24ms", "24000us"), "a.toml", "object.mass=1,2"));
     assert_ne!(first, number(&text.replace("24ms", "25ms"), "a.toml", "object.mass=1,2"));
     assert_ne!(first, number(text, "a.toml", "object.mass=1,3"));
+}
+
+/// A campaign that begins takes it from the scenes that it checks; one that goes on reads those anew.
+#[test]
+fn the_fingerprint_of_the_check_is_that_of_the_scenes() {
+    for vary in [&[][..], &["object.mass=1..2/70"], &["object.mass=1,2,3", "link.delay=20ms,24ms", "coordination.stiffness=500..1000/13"]] {
+        let variations = vary.iter().map(|text| Variation::parse(text).unwrap()).collect();
+        let asked = Asked { text: SCENE, file: Path::new("a.toml"), set: &[], variations, runs: 2, format: Format::Csv, part: None, program: "" };
+        let plan = Plan::new(asked).unwrap();
+        let checked = plan.check(&crate::NoWatch).unwrap();
+        assert_eq!(checked.numbers.len(), 1 + plan.variations().iter().map(|vary| vary.count() - 1).sum::<usize>());
+        assert_eq!(plan.fingerprint_of(&checked.numbers), plan.fingerprint().unwrap());
+    }
 }

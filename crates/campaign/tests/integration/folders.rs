@@ -34,7 +34,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
     }
     let mut bench = Bench::new(&[], 3);
     bench.set = vec!["scene.seed=9223372036854775806".to_owned()];
-    bench.assert_refused("out", &["scene.seed: 2 more seeds from 9223372036854775806"]);
+    bench.assert_refused("out", &["scene.seed: the seeds of 3 runs from 9223372036854775806"]);
     bench.runs = 2;
     bench.finish("out", 1);
     let mut bench = Bench::new(&[], 1000);

@@ -273,3 +273,22 @@ impl<const A: usize, const L: usize> Single<A, L> {
         self.links.stats((from * self.peers + to) * L + run)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At every edge: of a tick, of the range in which the reciprocal is exact, of the range of ticks that have one.
+    #[test]
+    fn ticks_are_counted_as_by_dividing() {
+        for nanos in [1, 2, 3, 7, 999_983, 1_000_000, 125_000_001, (1 << 31) - 1, 1 << 31, (1 << 31) + 1, 1 << 50] {
+            let ticks = Ticks::new(nanos);
+            let edges = [1, 2, 1000, (1 << 31) / nanos, (1 << 31) / nanos + 1, (1 << 32) / nanos, (1 << 62) / nanos].map(|count| count * nanos);
+            for edge in edges.into_iter().chain([1 << 31, 1 << 32, 1 << 62]) {
+                for span in [0, edge - 1, edge, edge + 1] {
+                    assert_eq!(ticks.count(span), span.div_ceil(nanos), "{span} ns in ticks of {nanos} ns");
+                }
+            }
+        }
+    }
+}
