@@ -5,7 +5,7 @@ mod refusal;
 mod watch;
 mod words;
 
-use std::num::{NonZeroU64, NonZeroUsize};
+use std::num::NonZeroU64;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
@@ -32,7 +32,7 @@ struct Finished {
 /// Does the runs that are missing, and says what came out.
 pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failure> {
     let plan = plan(arguments)?;
-    let threads = arguments.threads.map_or(0, NonZeroUsize::get);
+    let threads = usize::from(arguments.threads.unwrap_or(0));
     let start = Clock::now();
     let report = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(|| execute(arguments, plan.clone()))?,

@@ -285,7 +285,7 @@ mod tests {
             let ticks = Ticks::new(nanos);
             let edges = [1, 2, 1000, (1 << 31) / nanos, (1 << 31) / nanos + 1, (1 << 32) / nanos, (1 << 62) / nanos].map(|count| count * nanos);
             for edge in edges.into_iter().chain([1 << 31, 1 << 32, 1 << 62]) {
-                for span in [0, edge - 1, edge, edge + 1] {
+                for span in [0, edge.saturating_sub(1), edge, edge + 1] {
                     assert_eq!(ticks.count(span), span.div_ceil(nanos), "{span} ns in ticks of {nanos} ns");
                 }
             }
