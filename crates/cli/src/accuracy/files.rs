@@ -15,7 +15,7 @@ const PARTIAL: &str = "rows-interrupted.csv";
 /// Writes all files, the page last. Each has its name only when it is whole.
 pub(super) fn write(folder: &Path, rows: &[Row], about: &About) -> Result<(), Failure> {
     let (name, other) = if about.partial { (PARTIAL, WHOLE) } else { (WHOLE, PARTIAL) };
-    write_file(&folder.join(name), &csv(rows))?;
+    write_file(&folder.join(name), csv(rows))?;
     // Of the measurement before, which the pictures and the page no longer belong to.
     let old = folder.join(other);
     match std::fs::remove_file(&old) {
@@ -23,7 +23,7 @@ pub(super) fn write(folder: &Path, rows: &[Row], about: &About) -> Result<(), Fa
         Ok(()) | Err(_) => {}
     }
     for plot in plots(rows) {
-        write_file(&folder.join(format!("{}.svg", plot.id)), &plot.on_white())?;
+        write_file(&folder.join(format!("{}.svg", plot.id)), plot.on_white())?;
     }
-    write_file(&folder.join("index.html"), &html(rows, about))
+    write_file(&folder.join("index.html"), html(rows, about))
 }
