@@ -14,12 +14,12 @@ pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap]) -> Re
     let mut files = Vec::new();
     for (number, map) in maps.iter_mut().enumerate() {
         let path = folder.join(if number == 0 { "map.csv".to_owned() } else { format!("map-{}.csv", number + 1) });
-        write_file(&path, &table(order, map))?;
+        write_file(&path, table(order, map))?;
         map.file = Some(output::path(&path));
         files.push(output::path(&path));
     }
     let path = folder.join("map.svg");
-    write_file(&path, &picture(order, maps))?;
+    write_file(&path, picture(order, maps))?;
     files.push(output::path(&path));
     Ok(files)
 }
