@@ -82,7 +82,9 @@ fn variant_row(variant: Variant, base: &Scene, effort: Effort) -> Result<Row, Ac
     let times = rounds.medians(&mut works);
     let [alone, more] = [a_tick(&times[0], base), a_tick(&times[1], &scene)];
     let simulated = scene.duration.as_secs_f64() / times[1].as_secs_f64();
-    let note = format!("{:.2} times the base, {:+.1} ns; {simulated:.0} s simulated in a second{}", more / alone, more - alone, variant.words());
+    // Half up, and never "-0.0".
+    let tenths = ((more - alone) * 10.0 + 0.5).floor() / 10.0;
+    let note = format!("{:.2} times the base, {tenths:+.1} ns; {simulated:.0} s simulated in a second{}", more / alone, variant.words());
     Ok(Row {
         subject: Subject::LeastModel,
         case: "three peers, constant delay, and".to_owned(),
