@@ -2,11 +2,11 @@
 
 use std::convert::Infallible;
 
-use cohaptic_harness::{Model, Observer, Simulation, TickRow};
+use cohaptic_harness::{Model, NoObserver, Observer, Simulation, TickRow};
 use cohaptic_scene::Scene;
 
-/// The largest difference between a position of a copy in the least model and in the general one, at any tick and at the end; infinite if the runs
-/// have not the same ticks, or if one has a number where the other has none \[m\].
+/// The largest difference between a position of a copy in the least model and in the general one, at any tick, at the end, and at the end of a run that
+/// nobody watches, which may take another way; infinite if the runs have not the same ticks, or if one has a number where the other has none \[m\].
 pub(super) fn largest_difference(scene: &Scene) -> f64 {
     let [least, general] = [Model::Least, Model::General].map(|model| seen(scene, model));
     if least.len() != general.len() {
@@ -18,12 +18,13 @@ pub(super) fn largest_difference(scene: &Scene) -> f64 {
     differences.fold(0.0, f64::max)
 }
 
-/// Every position, in the order in which the ticks come: instant by instant, peer by peer, axis by axis.
+/// Every position, in the order in which the ticks come: instant by instant, peer by peer, axis by axis; then those at the end, and at the end unwatched.
 fn seen(scene: &Scene, model: Model) -> Vec<f64> {
     let mut positions = Positions(Vec::new());
-    let Ok(summary) = Simulation::new(scene, model).run(&mut positions);
+    let Ok(watched) = Simulation::new(scene, model).run(&mut positions);
+    let Ok(alone) = Simulation::new(scene, model).run(&mut NoObserver);
     let mut all = positions.0;
-    all.extend(summary.peers.iter().flat_map(|peer| peer.position.iter().copied()));
+    all.extend([watched, alone].iter().flat_map(|summary| &summary.peers).flat_map(|peer| peer.position.iter().copied()));
     all
 }
 
