@@ -21,6 +21,7 @@ mod numbers;
 mod plots;
 pub mod real_time;
 mod row;
+mod scale;
 mod subject;
 mod text;
 pub mod time;

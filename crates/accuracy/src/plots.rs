@@ -9,6 +9,7 @@ use plotters::prelude::*;
 
 use crate::Row;
 use crate::groups::{Group, groups};
+use crate::scale::Scale;
 
 /// One plot.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -71,8 +72,8 @@ fn slug(text: &str) -> String {
 struct Drawn<'a> {
     /// Cost and error of each row of each method. An error of zero is at the floor.
     methods: Vec<(&'a str, Vec<Point>)>,
-    x: (f64, f64),
-    y: (f64, f64),
+    x: Scale,
+    y: Scale,
     zeros: usize,
     left_out: usize,
 }
@@ -92,17 +93,17 @@ impl<'a> Drawn<'a> {
         };
         let all: Vec<(f64, f64)> = group.rows.iter().filter_map(|row| usable(row)).collect();
         let zeros = all.iter().filter(|(_, error)| *error == 0.0).count();
-        let (x, mut y) = (decades(all.iter().map(|(cost, _)| *cost)), decades(all.iter().map(|(_, error)| *error)));
+        let (x, mut y) = (Scale::over(all.iter().map(|(cost, _)| *cost)), Scale::over(all.iter().map(|(_, error)| *error)));
         if zeros > 0 {
             // The floor is a decade below the least error, so that zero is not taken for it.
-            y.0 -= 1.0;
+            y.low -= 1.0;
         }
         let mut methods = Vec::new();
         for method in group.methods() {
             let rows = group.rows.iter().filter(|row| row.method == method);
             let point = |(cost, error): (f64, f64)| {
                 let is_zero = error == 0.0;
-                Point { cost: libm::log10(cost), error: if is_zero { y.0 } else { libm::log10(error) }, is_zero }
+                Point { cost: libm::log10(cost), error: if is_zero { y.low } else { libm::log10(error) }, is_zero }
             };
             let points: Vec<Point> = rows.filter_map(|row| usable(row)).map(point).collect();
             if !points.is_empty() {
@@ -123,18 +124,6 @@ impl<'a> Drawn<'a> {
         }
         sentences.join(" ")
     }
-}
-
-/// The whole decades that hold all numbers above zero, at least one.
-fn decades(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for exponent in values.filter(|value| *value > 0.0).map(libm::log10) {
-        (low, high) = (low.min(exponent.floor()), high.max(exponent.ceil()));
-    }
-    if low > high {
-        return (-16.0, -15.0);
-    }
-    (low, high.max(low + 1.0))
 }
 
 const WIDTH: u32 = 760;
@@ -166,15 +155,11 @@ fn all<'a>(root: &Drawing<'a>, group: &Group<'_>, drawn: &Drawn<'_>) -> DrawingR
         .margin(10)
         .x_label_area_size(42)
         .y_label_area_size(66)
-        .build_cartesian_2d(drawn.x.0..drawn.x.1, drawn.y.0..drawn.y.1)?;
-    // Between two whole decades, too, a scale names the number and not its logarithm.
-    let number = |exponent: &f64| if exponent.fract() == 0.0 { format!("1e{exponent}") } else { format!("{:.1e}", libm::exp10(*exponent)) };
+        .build_cartesian_2d(drawn.x, drawn.y)?;
     chart
         .configure_mesh()
         .x_desc(group.cost_unit)
         .y_desc(format!("error: {}", group.error_unit))
-        .x_label_formatter(&number)
-        .y_label_formatter(&number)
         .bold_line_style(GREY.mix(0.3))
         .light_line_style(TRANSPARENT)
         .draw()?;
@@ -186,7 +171,7 @@ fn all<'a>(root: &Drawing<'a>, group: &Group<'_>, drawn: &Drawn<'_>) -> DrawingR
             None => chart.draw_series(LineSeries::new(line.iter().copied(), style))?,
             Some((dash, gap)) => chart.draw_series(DashedLineSeries::new(line.iter().copied(), dash, gap, style))?,
         };
-        chart.draw_series(line.iter().map(|at| Circle::new(*at, 3, style.filled())))?;
+        chart.draw_series(line.iter().map(|at| Circle::new(*at, radius(place), style.filled())))?;
         let zeros = points.iter().filter(|point| point.is_zero);
         // A triangle of plotters points up; a negative size turns it round.
         chart.draw_series(zeros.map(|point| TriangleMarker::new((point.cost, point.error), -7, style.filled())))?;
@@ -199,6 +184,11 @@ fn look(place: usize) -> (ShapeStyle, Option<(u32, u32)>) {
     (COLOURS[place % COLOURS.len()].stroke_width(2), DASHES[place % DASHES.len()])
 }
 
+/// The first points are larger, so that they are seen around others at the same place \[pixels\].
+fn radius(place: usize) -> i32 {
+    [5, 4].get(place).copied().unwrap_or(3)
+}
+
 fn draw_legend<'a>(area: &Drawing<'a>, drawn: &Drawn<'_>) -> DrawingResult<'a> {
     const LEFT: i32 = 76;
     const RIGHT: i32 = LEFT + 56;
@@ -209,7 +199,7 @@ fn draw_legend<'a>(area: &Drawing<'a>, drawn: &Drawn<'_>) -> DrawingResult<'a> {
             None => area.draw(&PathElement::new([(LEFT, y), (RIGHT, y)], style))?,
             Some((dash, gap)) => area.draw(&DashedPathElement::new([(LEFT, y), (RIGHT, y)], dash, gap, style))?,
         }
-        area.draw(&Circle::new((LEFT.midpoint(RIGHT), y), 3, style.filled()))?;
+        area.draw(&Circle::new((LEFT.midpoint(RIGHT), y), radius(place), style.filled()))?;
         area.draw(&Text::new((*method).to_owned(), (RIGHT + 12, y - 7), ("sans-serif", 14)))?;
         y += ENTRY.cast_signed();
     }
