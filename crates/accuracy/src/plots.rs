@@ -153,6 +153,7 @@ fn all<'a>(root: &Drawing<'a>, group: &Group<'_>, drawn: &Drawn<'_>) -> DrawingR
     let mut chart = ChartBuilder::on(&picture)
         .caption(group.title(), ("sans-serif", 15))
         .margin(10)
+        .margin_right(20)
         .x_label_area_size(42)
         .y_label_area_size(66)
         .build_cartesian_2d(drawn.x, drawn.y)?;
