@@ -92,7 +92,13 @@ fn one_run(work: Work) {
         let (peers, links) = (mesh.peers, mesh.links());
         println!("| {peers} | {links} | {program:.0}× | {asked:.0}× | {bare:.0}× | {:.2} | {asked_ratio} |", bare / program);
     }
-    println!("\nOther simulators on these scenes, all in one run: [peers-speed.md](peers-speed.md).");
+    println!(
+        "\nThe loop is the straightforward one, and not the least there can be: where the ratio is below 1, the program keeps a sample once"
+    );
+    println!(
+        "for all who get it, and does for several peers at once what the loop does one by one. A leaner loop, without counters, and other simulators on"
+    );
+    println!("these scenes, all in one run: [peers-speed.md](peers-speed.md).");
     println!("The same cells as criterion benches: `cargo bench -p cohaptic-benches --bench mesh`.\n");
 }
 
@@ -148,6 +154,6 @@ fn print_memory(rows: &[MemoryRow]) {
     println!("| simulated | took | most memory |");
     println!("| --- | ---: | ---: |");
     for (name, took, most) in rows {
-        println!("| {name} | {:.2} s | {most} |", took.as_secs_f64());
+        println!("| {name} | {:.3} s | {most} |", took.as_secs_f64());
     }
 }
