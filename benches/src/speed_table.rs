@@ -92,9 +92,7 @@ fn one_run(work: Work) {
         let (peers, links) = (mesh.peers, mesh.links());
         println!("| {peers} | {links} | {program:.0}× | {asked:.0}× | {bare:.0}× | {:.2} | {asked_ratio} |", bare / program);
     }
-    println!(
-        "\nThe loop is the straightforward one, and not the least there can be: where the ratio is below 1, the program keeps a sample once"
-    );
+    println!("\nThe loop is the straightforward one, and not the least there can be: where the ratio is below 1, the program keeps a sample once");
     println!(
         "for all who get it, and does for several peers at once what the loop does one by one. A leaner loop, without counters, and other simulators on"
     );

@@ -54,7 +54,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
         progress.one_more();
         checked
     };
-    let jobs = arguments.jobs.map_or(0, std::num::NonZeroUsize::get);
+    let jobs = usize::from(arguments.jobs.unwrap_or(0));
     let scenes: Vec<Checked> = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
         Ok(pool) => pool.install(|| files.into_par_iter().map(check).collect()),
         // Without threads it takes longer.

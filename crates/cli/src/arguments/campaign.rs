@@ -5,10 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::threads::threads;
 use super::{EXIT_STATUS, SceneArguments};
-
-/// Tens of thousands of threads, which is what a slip of the finger asks for, keep a machine busy with them alone.
-const MOST_THREADS: i64 = 1024;
 
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_STATUS)]
@@ -29,7 +27,7 @@ pub(crate) struct CampaignArguments {
     #[arg(long, value_enum, default_value_t = TableFormat::Parquet)]
     pub(crate) format: TableFormat,
     /// How many runs are made at the same time [default: one a core]. Results do not depend on it
-    #[arg(long, value_name = "N", visible_alias = "jobs", value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS))]
+    #[arg(long, value_name = "N", visible_alias = "jobs", value_parser = threads())]
     pub(crate) threads: Option<u16>,
     /// How many runs are kept together, the most that a kill can cost on each thread [default: some seconds' worth]
     #[arg(long, value_name = "N")]

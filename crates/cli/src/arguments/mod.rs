@@ -11,6 +11,7 @@ mod relay;
 mod router;
 mod scenes;
 mod stability;
+mod threads;
 
 use std::path::PathBuf;
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::threads::threads;
 use super::{EXIT_STATUS, Overrides, SceneArguments};
 
 #[derive(Debug, Args)]
@@ -41,8 +42,8 @@ pub(crate) struct CheckArguments {
     #[arg(long)]
     pub(crate) json: bool,
     /// How many scenes run at the same time [default: one a core]. Results do not depend on it
-    #[arg(long, value_name = "N")]
-    pub(crate) jobs: Option<std::num::NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = threads())]
+    pub(crate) jobs: Option<u16>,
     /// Simulate everything the program has, needed or not: slower, and the same answer to the last bit
     #[arg(long)]
     pub(crate) general: bool,

@@ -1,12 +1,12 @@
 //! `stability` and its commands.
 
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueEnum};
 use cohaptic_stability::Method;
 
+use super::threads::threads;
 use super::{EXIT_STATUS, SceneArguments};
 
 #[derive(Debug, Args)]
@@ -114,8 +114,8 @@ pub(crate) struct MapArguments {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// How many cells are computed at the same time [default: one a core]. Results do not depend on it
-    #[arg(long, value_name = "N")]
-    pub(crate) jobs: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = threads())]
+    pub(crate) jobs: Option<u16>,
 }
 
 #[derive(Debug, Args)]

@@ -34,7 +34,7 @@ pub(super) fn fill(order: &Order, arguments: &MapArguments) -> Result<Filled, Fa
     };
     let begun_before = !known.is_empty();
     let keeper = Keeper { file: Mutex::new((file, None)), broken: AtomicBool::new(false) };
-    let jobs = arguments.jobs.map_or(0, std::num::NonZeroUsize::get);
+    let jobs = usize::from(arguments.jobs.unwrap_or(0));
     let work = || in_turn(order, sorted(known, order), &keeper);
     let filled = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
         Ok(pool) => pool.install(work),
