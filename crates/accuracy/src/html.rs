@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use cohaptic_harness::record::svg::escape;
+
 use crate::groups::{Group, groups};
 use crate::numbers::short;
 use crate::{Row, Subject, plots};
@@ -64,21 +66,6 @@ pub fn html(rows: &[Row], about: &About) -> String {
     }
     page.push_str("</main>\n</body>\n</html>\n");
     page
-}
-
-/// Text as it may stand between tags and in quoted attributes.
-pub(crate) fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            _ => escaped.push(letter),
-        }
-    }
-    escaped
 }
 
 fn write_group(page: &mut String, group: &Group<'_>) {

@@ -11,6 +11,7 @@
 pub mod analysis;
 mod cost;
 mod csv;
+mod done;
 mod error;
 mod groups;
 mod html;
@@ -20,6 +21,7 @@ pub mod network;
 mod numbers;
 mod plots;
 pub mod real_time;
+mod rounds;
 mod row;
 mod scale;
 mod subject;

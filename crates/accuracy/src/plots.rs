@@ -3,7 +3,7 @@
 //! An error of zero has no logarithm. It is drawn at the foot of the plot, below all other errors, as a triangle that points down, and the legend says
 //! so. What has no error or no cost is not drawn; the caption counts it.
 
-use cohaptic_harness::record::svg::{COLOURS, Drawing, DrawingResult};
+use cohaptic_harness::record::svg::{self, COLOURS, Drawing, DrawingResult};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
@@ -137,15 +137,7 @@ const DASHES: [Option<(u32, u32)>; 5] = [None, Some((10, 5)), Some((3, 4)), Some
 fn draw(group: &Group<'_>, drawn: &Drawn<'_>) -> String {
     let entries = u32::try_from(drawn.methods.len() + usize::from(drawn.zeros > 0)).unwrap_or(u32::MAX / ENTRY);
     let legend = entries.saturating_mul(ENTRY) + 12;
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, (WIDTH, HEIGHT.saturating_add(legend))).into_drawing_area();
-        all(&root, group, drawn).expect("drawing to memory does not fail");
-    }
-    // What is black has the colour of the text around it; and what a screen reader says.
-    let svg = svg.replace("\"#000000\"", "\"currentColor\"").replacen("<svg ", "<svg role=\"img\" ", 1);
-    let title = crate::html::escape(&group.title());
-    svg.find('>').map_or_else(|| svg.clone(), |end| format!("{}<title>{title}</title>{}", &svg[..=end], &svg[end + 1..]))
+    svg::within_a_page((WIDTH, HEIGHT.saturating_add(legend)), &group.title(), |root| all(root, group, drawn))
 }
 
 fn all<'a>(root: &Drawing<'a>, group: &Group<'_>, drawn: &Drawn<'_>) -> DrawingResult<'a> {
@@ -177,8 +169,7 @@ fn all<'a>(root: &Drawing<'a>, group: &Group<'_>, drawn: &Drawn<'_>) -> DrawingR
         // A triangle of plotters points up; a negative size turns it round.
         chart.draw_series(zeros.map(|point| TriangleMarker::new((point.cost, point.error), -7, style.filled())))?;
     }
-    draw_legend(&legend, drawn)?;
-    root.present()
+    draw_legend(&legend, drawn)
 }
 
 fn look(place: usize) -> (ShapeStyle, Option<(u32, u32)>) {

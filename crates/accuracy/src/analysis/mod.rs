@@ -9,7 +9,7 @@ mod monte_carlo;
 mod radius;
 pub mod references;
 
-use crate::network::Done;
+use crate::done::Done;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
 
 /// How much work there is in the rows.

@@ -6,7 +6,6 @@
 
 mod csv;
 mod positions;
-pub(crate) mod rounds;
 mod scenes;
 
 use std::convert::Infallible;
@@ -17,8 +16,9 @@ use cohaptic_harness::{Model, NoObserver, Observer, PacketRow, Simulation};
 use cohaptic_scene::Scene;
 
 use self::csv::CsvSink;
-use self::rounds::{Rounds, Work, nanos};
 use self::scenes::{Recorded, Variant};
+use crate::cost::nanos;
+use crate::rounds::{Rounds, Work};
 use crate::{AccuracyError, Options, Row, Subject, Watch};
 
 /// How much work there is in the rows.

@@ -7,8 +7,7 @@ use cohaptic_wan::{Correlation, Delay, Distribution, Fate, Jitter, Link, LinkCon
 
 use super::losses::kernel;
 use super::{Done, Effort, real, row};
-use crate::cost::processor_time;
-use crate::least::rounds::nanos;
+use crate::cost::{nanos, processor_time};
 use crate::{AccuracyError, Row};
 
 const ASKED: f64 = 0.75;

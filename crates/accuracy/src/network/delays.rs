@@ -11,7 +11,8 @@ use super::errors::{Look, probability};
 use super::other_ways::{KernelTable, samplers};
 use super::ways::{Fine, MEAN, Netem, SD, draw, further_laws, laws, next_word};
 use super::{Done, Effort, real, row};
-use crate::least::rounds::{Work, nanos};
+use crate::cost::nanos;
+use crate::rounds::Work;
 use crate::{AccuracyError, Row};
 
 const DISTANCE: &str = "Kolmogorov distance [1]";

@@ -6,8 +6,7 @@ use cohaptic_wan::{Bursts, Chance, Fate, FourState, GilbertElliott, KernelNetem,
 
 use super::chain::{Expected, LossChain};
 use super::{Done, Effort, real, row};
-use crate::cost::processor_time;
-use crate::least::rounds::nanos;
+use crate::cost::{nanos, processor_time};
 use crate::{AccuracyError, Row};
 
 const MEAN: &str = "mean loss [relative]";

@@ -16,8 +16,9 @@ pub mod ways;
 
 use std::time::Duration;
 
-use crate::least::rounds::Rounds;
+use crate::done::Done;
 use crate::network::errors::Look;
+use crate::rounds::Rounds;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
 
 /// How much work there is in the rows.
@@ -85,32 +86,6 @@ pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, Accuracy
     losses::measure(effort, &mut done)?;
     correlation::measure(effort, &mut done)?;
     Ok(done.rows)
-}
-
-/// The rows so far, and who watches.
-pub(crate) struct Done<'a> {
-    pub(crate) rows: Vec<Row>,
-    pub(crate) watch: &'a dyn Watch,
-}
-
-impl Done<'_> {
-    /// A row is done.
-    ///
-    /// # Errors
-    ///
-    /// [`AccuracyError::Stopped`] if the work is to be given up.
-    pub(crate) fn push(&mut self, row: Row) -> Result<(), AccuracyError> {
-        self.watch.row(&row);
-        self.rows.push(row);
-        self.check()
-    }
-
-    /// # Errors
-    ///
-    /// [`AccuracyError::Stopped`] if the work is to be given up.
-    pub(crate) fn check(&self) -> Result<(), AccuracyError> {
-        if self.watch.stops() { Err(AccuracyError::Stopped) } else { Ok(()) }
-    }
 }
 
 /// A row of this subject without its case, method and errors.

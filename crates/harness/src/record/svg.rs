@@ -1,4 +1,4 @@
-//! What every plot has in common: a drawing in memory that becomes one valid SVG document, and colours.
+//! What every plot has in common: a drawing in memory that becomes one valid SVG document or a part of a page, and colours.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -35,6 +35,38 @@ pub fn document(size: (u32, u32), draw: impl for<'a> FnOnce(&Drawing<'a>) -> Dra
         root.fill(&WHITE).and_then(|()| draw(&root)).and_then(|()| root.present()).expect("drawing to memory does not fail");
     }
     svg.chars().map(|letter| if is_xml(letter) { letter } else { char::REPLACEMENT_CHARACTER }).collect()
+}
+
+/// The same as a part of a page of HTML: without a background, in the colour of the text around it where it is black, and with what a screen reader says.
+///
+/// # Panics
+///
+/// As [`document`].
+pub fn within_a_page(size: (u32, u32), title: &str, draw: impl for<'a> FnOnce(&Drawing<'a>) -> DrawingResult<'a>) -> String {
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        draw(&root).and_then(|()| root.present()).expect("drawing to memory does not fail");
+    }
+    let svg = svg.replace("\"#000000\"", "\"currentColor\"").replacen("<svg ", "<svg role=\"img\" ", 1);
+    let title = escape(title);
+    svg.find('>').map_or_else(|| svg.clone(), |end| format!("{}<title>{title}</title>{}", &svg[..=end], &svg[end + 1..]))
+}
+
+/// Text as it may stand between tags and in quoted attributes.
+#[must_use]
+pub fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            _ => escaped.push(letter),
+        }
+    }
+    escaped
 }
 
 /// Whether XML 1.0 can hold a character, escaped or not: see its production `Char`. A title may have others.

@@ -2,7 +2,7 @@
 //!
 //! There is no background, and what is black in the drawing has the colour of the text around it, so that a figure can stand on a dark page.
 
-use cohaptic_harness::record::svg::{COLOURS, Drawing, DrawingResult};
+use cohaptic_harness::record::svg::{self, COLOURS, Drawing, DrawingResult};
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 
@@ -61,16 +61,7 @@ impl Line {
 pub(crate) fn draw(panels: &[Panel], columns: usize, title: &str) -> String {
     let rows = panels.len().div_ceil(columns);
     let pixels = |count: usize, each: u32| u32::try_from(count).unwrap_or(1) * each;
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, (pixels(columns, WIDTH), pixels(rows, HEIGHT))).into_drawing_area();
-        all(&root, panels, (rows, columns)).expect("drawing to memory does not fail");
-    }
-    let svg = svg.replace("\"#000000\"", "\"currentColor\"");
-    // What a screen reader says.
-    let title = crate::page::escape(title);
-    let svg = svg.replacen("<svg ", "<svg role=\"img\" ", 1);
-    svg.find('>').map_or_else(|| svg.clone(), |end| format!("{}<title>{title}</title>{}", &svg[..=end], &svg[end + 1..]))
+    svg::within_a_page((pixels(columns, WIDTH), pixels(rows, HEIGHT)), title, |root| all(root, panels, (rows, columns)))
 }
 
 fn all<'a>(root: &Drawing<'a>, panels: &[Panel], grid: (usize, usize)) -> DrawingResult<'a> {
@@ -82,7 +73,7 @@ fn all<'a>(root: &Drawing<'a>, panels: &[Panel], grid: (usize, usize)) -> Drawin
             draw_panel(area, panel, low..high)?;
         }
     }
-    root.present()
+    Ok(())
 }
 
 fn draw_panel<'a, X>(area: &Drawing<'a>, panel: &Panel, x: X) -> DrawingResult<'a>

@@ -4,6 +4,8 @@ mod style;
 
 use std::fmt::Write as _;
 
+use cohaptic_harness::record::svg::escape;
+
 use crate::{Claim, Figure, Reproduction, Table, Verdict};
 
 /// The page.
@@ -32,21 +34,6 @@ pub fn html(reproduction: &Reproduction) -> String {
     }
     page.push_str("</main>\n</body>\n</html>\n");
     page
-}
-
-/// Text as it may stand between tags and in quoted attributes.
-pub(crate) fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            _ => escaped.push(letter),
-        }
-    }
-    escaped
 }
 
 /// The first word or two, which also say the verdict without colour.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::cost::processor_time;
+use crate::cost::{median, processor_time};
 
 /// How long and how often something is measured.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -40,15 +40,4 @@ impl Rounds {
         let once = (processor_time() - start).as_secs_f64();
         (self.span.as_secs_f64() / once.max(1e-7)).clamp(1.0, 1e6) as u32
     }
-}
-
-/// The median of some times, at least one.
-pub(crate) fn median(mut times: Vec<Duration>) -> Duration {
-    times.sort();
-    times[times.len() / 2]
-}
-
-/// A span in nanoseconds.
-pub(crate) fn nanos(span: Duration) -> f64 {
-    span.as_secs_f64() * 1e9
 }

@@ -1,0 +1,29 @@
+//! What is done.
+
+use crate::{AccuracyError, Row, Watch};
+
+/// The rows so far, and who watches.
+pub(crate) struct Done<'a> {
+    pub(crate) rows: Vec<Row>,
+    pub(crate) watch: &'a dyn Watch,
+}
+
+impl Done<'_> {
+    /// A row is done.
+    ///
+    /// # Errors
+    ///
+    /// [`AccuracyError::Stopped`] if the work is to be given up.
+    pub(crate) fn push(&mut self, row: Row) -> Result<(), AccuracyError> {
+        self.watch.row(&row);
+        self.rows.push(row);
+        self.check()
+    }
+
+    /// # Errors
+    ///
+    /// [`AccuracyError::Stopped`] if the work is to be given up.
+    pub(crate) fn check(&self) -> Result<(), AccuracyError> {
+        if self.watch.stops() { Err(AccuracyError::Stopped) } else { Ok(()) }
+    }
+}
