@@ -2,7 +2,6 @@
 
 mod grid;
 mod list;
-mod quantity;
 
 use grid::Grid;
 use list::List;

@@ -36,6 +36,7 @@ mod link_table;
 mod model;
 mod names;
 mod overrides;
+mod quantity_text;
 mod read;
 mod relay_file;
 pub mod router_file;
@@ -57,6 +58,7 @@ pub use link_keys::{
 };
 pub use link_table::LinkTable;
 pub use model::*;
+pub use quantity_text::{number_and_unit, text_of_quantity};
 pub use read::scene_files;
 pub use relay_file::{RelayChange, RelayFile, RelayLimits, RelayProgram};
 pub use strategies::{FromScene, Strategies};

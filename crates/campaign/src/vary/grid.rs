@@ -1,6 +1,7 @@
 //! `LOW..HIGH/COUNT` and `LOW..HIGH/COUNT:log`.
 
-use super::quantity::{quantity, written};
+use cohaptic_scene::{number_and_unit, text_of_quantity};
+
 use super::{MOST_VALUES, Varied, VaryError};
 use crate::table::Value;
 
@@ -20,9 +21,9 @@ impl Grid {
     pub(super) fn parse(whole: &str, text: &str) -> Result<Option<Self>, VaryError> {
         let whole = || whole.to_owned();
         let Some((low, rest)) = text.split_once("..") else { return Ok(None) };
-        let Some((low, low_unit)) = quantity(low) else { return Ok(None) };
+        let Some((low, low_unit)) = number_and_unit(low) else { return Ok(None) };
         let Some((high, count)) = rest.rsplit_once('/') else { return Err(VaryError::NoCount { text: whole() }) };
-        let (high, high_unit) = quantity(high).ok_or_else(|| VaryError::End { text: whole(), end: high.trim().to_owned() })?;
+        let (high, high_unit) = number_and_unit(high).ok_or_else(|| VaryError::End { text: whole(), end: high.trim().to_owned() })?;
         let (count, logarithmic) = match count.trim().split_once(':') {
             None => (count, false),
             Some((count, kind)) if kind.trim() == "log" => (count, true),
@@ -50,7 +51,7 @@ impl Grid {
     pub(super) fn values(&self) -> Vec<Varied> {
         let value = |place| {
             let value = self.at(place);
-            Varied { text: written(value, &self.unit), value: Value::Number(value + 0.0) }
+            Varied { text: text_of_quantity(value, &self.unit), value: Value::Number(value + 0.0) }
         };
         (0..self.count).map(value).collect()
     }

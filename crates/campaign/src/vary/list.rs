@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::quantity::quantity;
+use cohaptic_scene::number_and_unit;
+
 use super::{MOST_VALUES, Varied, VaryError};
 use crate::table::{Kind, Value};
 
@@ -40,7 +41,7 @@ fn typed(texts: &[String]) -> (String, Kind, Vec<Value>) {
     if let Some(integers) = texts.iter().map(|text| text.parse().ok().map(Value::Integer)).collect::<Option<Vec<Value>>>() {
         return (String::new(), Kind::Integer, integers);
     }
-    let quantities = texts.iter().map(|text| quantity(unquoted(text))).collect::<Option<Vec<(f64, &str)>>>().unwrap_or_default();
+    let quantities = texts.iter().map(|text| number_and_unit(unquoted(text))).collect::<Option<Vec<(f64, &str)>>>().unwrap_or_default();
     match quantities.first() {
         Some((_, unit)) if quantities.iter().all(|(_, other)| other == unit) => {
             let numbers = quantities.iter().map(|(value, _)| Value::Number(value + 0.0)).collect();

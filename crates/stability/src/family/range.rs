@@ -1,5 +1,7 @@
 //! A key of a scene that is left open, and between which values.
 
+use cohaptic_scene::{number_and_unit, text_of_quantity};
+
 /// A key of a scene, and the values that it takes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct KeyRange {
@@ -75,8 +77,8 @@ impl KeyRange {
             .ok_or_else(|| KeyRangeError::NoKey { text: whole() })?;
         let (low, high) = range.split_once("..").ok_or_else(|| KeyRangeError::NoRange { text: whole() })?;
         let no_end = |end: &str| KeyRangeError::End { text: whole(), end: end.trim().to_owned() };
-        let (low, low_unit) = quantity(low.trim()).ok_or_else(|| no_end(low))?;
-        let (high, high_unit) = quantity(high.trim()).ok_or_else(|| no_end(high))?;
+        let (low, low_unit) = number_and_unit(low).ok_or_else(|| no_end(low))?;
+        let (high, high_unit) = number_and_unit(high).ok_or_else(|| no_end(high))?;
         if low_unit != high_unit {
             return Err(KeyRangeError::Units { text: whole(), low: low_unit.to_owned(), high: high_unit.to_owned() });
         }
@@ -89,13 +91,7 @@ impl KeyRange {
     /// The override that gives the key that value: `KEY=VALUE`, with as many digits as the value has.
     #[must_use]
     pub fn text(&self, value: f64) -> String {
-        let Self { key, unit, .. } = self;
-        // Keys that take an integer are content with nothing else; beyond 2^53 no number is written as one.
-        if !unit.is_empty() || (libm::trunc(value) - value).abs() == 0.0 && value.abs() < 9_007_199_254_740_992.0 {
-            format!("{key}={}{unit}", value + 0.0)
-        } else {
-            format!("{key}={value:?}")
-        }
+        format!("{}={}", self.key, text_of_quantity(value, &self.unit))
     }
 
     /// A value inside that is no round number and is at another place for every key, to see where values land.
@@ -103,15 +99,6 @@ impl KeyRange {
         let share = if number == 0 { 0.618_033_988_749_894_9 } else { 0.414_213_562_373_095_1 };
         self.low + (self.high - self.low) * share
     }
-}
-
-/// The longest number that the text begins with, and what is left as its unit.
-fn quantity(text: &str) -> Option<(f64, &str)> {
-    let ends = (1..=text.len()).rev().filter(|end| text.is_char_boundary(*end));
-    let (end, value) = ends.filter_map(|end| text[..end].parse::<f64>().ok().map(|value| (end, value))).next()?;
-    let unit = text[end..].trim();
-    let is_unit = unit.chars().all(|c| c.is_alphabetic() || c == '%');
-    (value.is_finite() && is_unit).then_some((value, unit))
 }
 
 #[cfg(test)]
