@@ -250,6 +250,11 @@ impl DelayStage {
         }
     }
 
+    /// Whether a delay needs a random word.
+    pub(crate) const fn is_random(&self) -> bool {
+        !matches!(self.law, StageLaw::Constant)
+    }
+
     /// The delay \[ns\] of one packet, if there is jitter from `word`, the first of its words for jitter. Rounded to the nearest nanosecond.
     #[inline]
     pub(crate) fn draw_nanos(&mut self, now: Instant, word: u64, packet: PacketDraws) -> u64 {

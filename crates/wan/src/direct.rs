@@ -63,6 +63,10 @@ impl Direct {
         Ok(self.order.arrival(now.saturating_add_nanos(delay)))
     }
 
+    pub(crate) const fn has_outages(&self) -> bool {
+        self.outages.is_some()
+    }
+
     /// Whether the link is down for a packet that is offered `now`.
     #[inline]
     pub(crate) fn is_down(&mut self, now: Instant) -> bool {

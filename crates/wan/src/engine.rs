@@ -70,6 +70,9 @@ impl<T: Clone> Engine<T> {
     /// When [`Engine::pass`] must be called.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         let next = self.kind.next_at();
+        if self.retiring.is_empty() {
+            return next;
+        }
         self.retiring.iter().filter_map(Kind::next_at).chain(next).min()
     }
 

@@ -24,13 +24,13 @@ impl<T: Clone> KernelStage<T> {
         let original = packet.clone();
         self.qdisc.enqueue(now, size, packet.info.ecn_capable, packet, &mut |output| {
             outputs.push(match output {
-                QdiscOutput::Duplicated => Output { packet: Carried { copy: 1, ..original.clone() }, exit: Exit::Copied(now) },
+                QdiscOutput::Duplicated => Output { packet: original.clone().as_copy(1), exit: Exit::Copied(now) },
                 QdiscOutput::Dropped { item, copy, reason } => {
                     let cause = match reason {
                         DropReason::Loss => DropCause::Loss,
                         DropReason::Limit => DropCause::Limit,
                     };
-                    Output { packet: Carried { copy, ..item }, exit: Exit::Dropped(now, cause) }
+                    Output { packet: item.as_copy(copy), exit: Exit::Dropped(now, cause) }
                 }
             });
         });
@@ -54,7 +54,7 @@ impl<T: Clone> KernelStage<T> {
 
     fn leave(&mut self, now: Instant, outputs: &mut Outputs<T>) {
         while let Some(left) = self.qdisc.dequeue(now) {
-            let mut packet = Carried { copy: left.copy, ..left.item };
+            let mut packet = left.item.as_copy(left.copy);
             packet.marks.congestion |= left.marked;
             if let Some(bit) = left.corrupted {
                 packet.marks.damage(Damage::of(vec![u64::from(bit.byte) * 8 + u64::from(bit.bit)]), true);

@@ -9,7 +9,7 @@ use cohaptic_units::{Bytes, Instant};
 
 use crate::event_queue::Event;
 use crate::filter::{Filter, Offered};
-use crate::packet::{Carried, Exit, Marks, Outputs, PacketInfo};
+use crate::packet::{Exit, Marks, Outputs, Packet, PacketInfo};
 use crate::pipeline::{Outcome, Pipeline, check_time};
 use crate::{Damage, DropCause, EventQueue, Fate, LinkModel, LinkName, LinkStats, PacketRecord, TimeWentBack};
 
@@ -221,7 +221,7 @@ impl<P: Clone> Link<P> {
         let inside = self.stats.in_flight() - 1;
         let mut outputs = core::mem::take(&mut self.outputs);
         if let Some(engine) = self.pipeline.engine() {
-            let carried = Carried { number: packet.sequence, copy: 0, info, marks: Marks::default(), item: packet };
+            let carried = Packet::new(packet.sequence, info, Marks::default(), packet);
             engine.offer(now, carried, inside, &mut outputs);
         }
         self.come_out(outputs);
@@ -268,7 +268,7 @@ impl<P: Clone> Link<P> {
     /// Deals with what has come out of the engine.
     fn come_out(&mut self, mut outputs: Outputs<InLink<P>>) {
         for output in outputs.drain(..) {
-            let Carried { copy, marks, item, .. } = output.packet;
+            let Packet { copy, marks, item, .. } = *output.packet;
             match output.exit {
                 Exit::Arrives(at) => {
                     self.stats.seldom.marked += u64::from(marks.congestion);

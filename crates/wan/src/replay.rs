@@ -41,7 +41,7 @@ impl<T: Clone> ReplayStage<T> {
                 Fate::Dropped(cause) => (record.copy, Exit::Dropped(at, cause)),
                 Fate::Duplicated => (copies.next().unwrap_or(record.copy), Exit::Copied(at)),
             };
-            let mut packet = Carried { copy, ..packet.clone() };
+            let mut packet = packet.clone().as_copy(copy);
             packet.marks.congestion |= record.marked;
             if record.damaged {
                 packet.marks.damage(Some(Damage::unknown()), false);

@@ -173,7 +173,7 @@ impl<T> SlotStage<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::packet::Marks;
+    use crate::packet::{Marks, Packet};
 
     fn run(config: Slots, offers: &[u64]) -> Vec<(u64, u64)> {
         let draws = Stream::new(1, b"slots");
@@ -189,7 +189,7 @@ mod tests {
         for &t in offers {
             pass(&mut stage, t, &mut left);
             let now = Instant::from_nanos(t);
-            let packet = Carried { number: 0, copy: 0, info: Bytes::new(40).into(), marks: Marks::default(), item: t };
+            let packet = Packet::new(0, Bytes::new(40).into(), Marks::default(), t);
             stage.offer(now, packet, draws);
         }
         pass(&mut stage, u64::MAX, &mut left);

@@ -5,7 +5,7 @@
 //! netem      mtu ► outage ► duplication ► loss ► corruption ► limit ► reorder, trace, delay, order ► bucket ► bottleneck ► slots
 //! ```
 //!
-//! A stage that is not configured is `None` and passed over. A packet walks from stage to stage until one keeps it, drops it, or lets it out.
+//! A stage that is not configured is `None`, and no packet comes to it. A packet walks from stage to stage until one keeps it, drops it, or lets it out.
 
 use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::vec::Vec;
@@ -69,6 +69,7 @@ const NETEM: [Stage; 10] = [
 #[derive(Clone, Debug)]
 pub(crate) struct Staged<T> {
     layout: &'static [Stage; 10],
+    route: Route,
     mtu: Option<Bytes>,
     /// Outages, loss, delay and order.
     direct: Direct,
@@ -91,6 +92,39 @@ pub(crate) struct Staged<T> {
     next_change: Option<Instant>,
     /// Memory for what leaves a stage, to be used again.
     released: VecDeque<Carried<T>>,
+}
+
+/// The stages that there are, in the order of the layout.
+#[derive(Clone, Debug)]
+struct Route {
+    stages: [Stage; 10],
+    count: usize,
+    /// The place of the first that may keep a packet.
+    keeping: usize,
+    /// By stage: the place of the first one behind it.
+    behind: [usize; 10],
+}
+
+impl Route {
+    fn new(layout: &[Stage; 10], is_there: impl Fn(Stage) -> bool) -> Self {
+        let mut route = Self { stages: *layout, count: 0, keeping: 0, behind: [0; 10] };
+        for &stage in layout {
+            if is_there(stage) {
+                route.stages[route.count] = stage;
+                route.count += 1;
+            }
+            route.behind[stage as usize] = route.count;
+            if stage == Stage::Limit {
+                route.keeping = route.count;
+            }
+        }
+        route
+    }
+
+    /// Those that may keep a packet: what stands behind the limit.
+    fn keeping(&self) -> &[Stage] {
+        &self.stages[self.keeping..self.count]
+    }
 }
 
 /// A packet on the line between two stages, ordered so that the heap gives the earliest.
@@ -126,6 +160,7 @@ impl<T: Clone> Staged<T> {
     pub(crate) fn new(now: Instant, direct: Direct, config: LinkConfig, modulation: Option<ModulationStage>) -> Self {
         let mut stages = Self {
             layout: &PHYSICAL,
+            route: Route::new(&PHYSICAL, |_| false),
             mtu: None,
             direct,
             marks_instead_of_loss: false,
@@ -258,6 +293,7 @@ impl<T: Clone> Staged<T> {
                 None
             }
         };
+        self.route = Route::new(self.layout, |stage| self.has(stage));
         if config.reorder.is_none() {
             for packet in self.reorder.dismantle() {
                 self.propagate(now, packet, Travel::InOrder, outputs);
@@ -269,10 +305,25 @@ impl<T: Clone> Staged<T> {
         }
     }
 
+    fn has(&self, stage: Stage) -> bool {
+        match stage {
+            Stage::Mtu => self.mtu.is_some(),
+            Stage::Outage => self.direct.has_outages(),
+            Stage::Loss => self.direct.loss.is_some() || self.trace.is_some(),
+            Stage::Duplication => self.duplication.is_some(),
+            Stage::Corruption => self.corruption.is_some(),
+            Stage::Limit => self.limit.is_some(),
+            Stage::Bucket => self.bucket.is_some(),
+            Stage::Bottleneck => self.bottleneck.is_some(),
+            Stage::Slots => self.slots.is_some(),
+            Stage::Propagation => true,
+        }
+    }
+
     /// What happens next and in which stage; of simultaneous events the one furthest along, so that it makes room for the others.
     fn next_event(&self) -> Option<(Instant, Stage)> {
         let mut next: Option<(Instant, Stage)> = None;
-        for &stage in self.layout.iter().rev() {
+        for &stage in self.route.keeping().iter().rev() {
             let at = match stage {
                 Stage::Bucket => self.bucket.as_ref().and_then(TokenBucketStage::next_at),
                 Stage::Bottleneck => self.bottleneck.as_ref().and_then(BottleneckStage::next_at),
@@ -320,23 +371,22 @@ impl<T: Clone> Staged<T> {
             }
             Stage::Mtu | Stage::Outage | Stage::Loss | Stage::Duplication | Stage::Corruption | Stage::Limit => {}
         }
-        for packet in released.drain(..) {
+        while let Some(packet) = released.pop_front() {
             self.walk_on(stage, now, packet, outputs);
         }
         self.released = released;
     }
 
     fn walk_on(&mut self, after: Stage, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) {
-        let place = self.layout.iter().position(|stage| *stage == after).map_or(0, |place| place + 1);
         // The limit stands before all stages that keep packets.
-        self.walk(place, now, packet, 0, outputs);
+        self.walk(self.route.behind[after as usize], now, packet, 0, outputs);
     }
 
     /// Leads a packet through the stages from that one on.
     fn walk(&mut self, from: usize, now: Instant, mut packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
-        for place in from..self.layout.len() {
-            let draws = self.direct.draws.copy(packet.number, packet.copy);
-            match self.layout[place] {
+        let draws = self.direct.draws.copy(packet.number, packet.copy);
+        for place in from..self.route.count {
+            match self.route.stages[place] {
                 Stage::Mtu => {
                     if self.mtu.is_some_and(|mtu| packet.info.size > mtu) {
                         return drop(outputs, now, DropCause::Mtu, packet);
@@ -359,7 +409,7 @@ impl<T: Clone> Staged<T> {
                     if let Some(chance) = &mut self.duplication
                         && chance.happens(draws.first(Purpose::Duplication))
                     {
-                        let copy = Carried { copy: 1, ..packet.clone() };
+                        let copy = packet.clone().as_copy(1);
                         outputs.push(Output { packet: copy.clone(), exit: Exit::Copied(now) });
                         let before = outputs.len();
                         self.walk(place + 1, now, packet, inside, outputs);
@@ -414,6 +464,9 @@ impl<T: Clone> Staged<T> {
 
     /// Puts a packet into its place among the others, and lets it propagate.
     fn place(&mut self, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) {
+        if self.reorder.is_idle() {
+            return self.propagate(now, packet, Travel::InOrder, outputs);
+        }
         let draws = self.direct.draws.copy(packet.number, packet.copy);
         let mut behind = Vec::new();
         match self.reorder.place(now, packet, || draws.first(Purpose::Reordering), &mut behind) {
@@ -432,7 +485,8 @@ impl<T: Clone> Staged<T> {
         let draws = self.direct.draws.copy(packet.number, packet.copy);
         let mut delay = || {
             let traced = self.trace.as_ref().map_or(0, |trace| trace.at(now).0);
-            self.direct.delay.draw_nanos(now, draws.first(Purpose::Jitter), draws).saturating_add(traced)
+            let word = if self.direct.delay.is_random() { draws.first(Purpose::Jitter) } else { 0 };
+            self.direct.delay.draw_nanos(now, word, draws).saturating_add(traced)
         };
         let wanted = match travel {
             Travel::InOrder => now.saturating_add_nanos(delay()),

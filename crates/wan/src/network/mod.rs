@@ -21,7 +21,7 @@ use pending::{Hop, InNetwork, Path, Pending, Place, SizeAndMarks};
 
 use crate::direct::Words;
 use crate::filter::{Filter, Offered};
-use crate::packet::{Carried, Exit, Marks, Outputs, PacketInfo};
+use crate::packet::{Exit, Marks, Outputs, Packet, PacketInfo};
 use crate::pipeline::{Outcome, Pipeline, check_time};
 use crate::stats::{Flow, Seldom};
 use crate::{Damage, DropCause, EventQueue, Fate, LinkModel, LinkName, LinkStats, TimeWentBack};
@@ -453,7 +453,7 @@ impl<P: Clone> Network<P> {
         };
         let mut outputs = core::mem::take(&mut self.outputs);
         if let Some(engine) = self.line_mut(hop, line).pipeline.engine() {
-            engine.offer(now, Carried { number, copy: 0, info, marks, item: packet }, inside, &mut outputs);
+            engine.offer(now, Packet::new(number, info, marks, packet), inside, &mut outputs);
         }
         self.come_out(hop, line, outputs);
     }
@@ -471,7 +471,7 @@ impl<P: Clone> Network<P> {
     /// Deals with what has come out of a line's engine, and asks it when to be woken.
     fn come_out(&mut self, hop: Hop, line: u32, mut outputs: Outputs<InNetwork<P>>) {
         for output in outputs.drain(..) {
-            let Carried { copy, marks, item: mut packet, .. } = output.packet;
+            let Packet { copy, marks, item: mut packet, .. } = *output.packet;
             let before = packet.size;
             packet.size = packet
                 .size

@@ -295,7 +295,7 @@ fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, packet: Car
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::packet::Marks;
+    use crate::packet::{Marks, Packet};
 
     /// 64 bytes take 512 µs.
     fn megabit(limit: Option<QueueLimit>, discipline: Discipline) -> BottleneckStage<char> {
@@ -309,7 +309,7 @@ mod tests {
     /// Offers a packet and gives what was dropped.
     fn offer(stage: &mut BottleneckStage<char>, now: u64, size: u64, item: char) -> Vec<char> {
         let info = Bytes::new(size).into();
-        let packet = Carried { number: 0, copy: 0, info, marks: Marks::default(), item };
+        let packet = Packet::new(0, info, Marks::default(), item);
         let mut outputs = Vec::new();
         stage.offer(micros(now), packet, || 0, &mut outputs);
         outputs.into_iter().map(|output| output.packet.item).collect()

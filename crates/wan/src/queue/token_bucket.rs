@@ -215,7 +215,7 @@ impl<T> TokenBucketStage<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::packet::Marks;
+    use crate::packet::{Marks, Packet};
 
     /// A byte a microsecond, 100 at once.
     fn bucket(peak: Option<Peak>) -> TokenBucketStage<char> {
@@ -239,7 +239,7 @@ mod tests {
         let mut at_once = Vec::new();
         for &t in offers {
             pass(&mut stage, micros(t));
-            let packet = Carried { number: 0, copy: 0, info: Bytes::new(size).into(), marks: Marks::default(), item: 'x' };
+            let packet = Packet::new(0, Bytes::new(size).into(), Marks::default(), 'x');
             at_once.extend(stage.offer(micros(t), packet, &mut outputs).map(|_| t));
         }
         pass(&mut stage, Instant::MAX);
