@@ -2,11 +2,10 @@
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of packets")]
 
-use std::hint::black_box;
 use std::time::Duration;
 
 use cohaptic_benches::effort::Effort;
-use cohaptic_benches::machine::{median, time};
+use cohaptic_benches::machine::medians_in_turn;
 use cohaptic_benches::one_link::{constant, drive, heap, hold, jitter_and_loss, ring, stages, str0m, str0m_configs};
 
 /// How much is measured.
@@ -49,11 +48,12 @@ fn beside_others(work: Work) {
         ("str0m-netem 0.4 (jitter, loss, duplication, reordering, rate)", Box::new(move || str0m(full, packets))),
         ("a bare binary heap: taking one of 10⁴ events, pushing it again", Box::new(move || hold(packets))),
     ];
-    let times = measure(&subjects, work.rounds);
+    let (names, works): (Vec<_>, Vec<_>) = subjects.into_iter().unzip();
+    let times = medians_in_turn(&works, work.rounds);
     let links = ["constant delay", "normal jitter, 1 % loss", "all stages but slots (below)"];
     let asked = [50, 10, 3];
     println!("| link | what | million packets/s | asked for |\n| --- | --- | ---: | ---: |");
-    for (place, ((name, _), time)) in subjects.iter().zip(times).enumerate() {
+    for (place, (name, time)) in names.iter().zip(times).enumerate() {
         let asked = if place % 3 == 0 { asked[place / 3].to_string() } else { String::new() };
         println!("| {} | {name} | {:.1} | {asked} |", links[place / 3], millions(time, packets));
     }
@@ -70,9 +70,10 @@ fn stage_by_stage(work: Work) {
     for (name, config) in stages() {
         subjects.push((name, Box::new(move || drive(&config, packets))));
     }
-    let times = measure(&subjects, work.rounds);
+    let (names, works): (Vec<_>, Vec<_>) = subjects.into_iter().unzip();
+    let times = medians_in_turn(&works, work.rounds);
     println!("| stage | ns a packet | million packets/s |\n| --- | ---: | ---: |");
-    for ((name, _), time) in subjects.iter().zip(times) {
+    for (name, time) in names.iter().zip(times) {
         println!("| {name} | {:.1} | {:.1} |", time.as_secs_f64() * 1e9 / packets as f64, millions(time, packets));
     }
     println!("\nThe same as criterion benches: `cargo bench -p cohaptic-benches --bench link`.");
@@ -80,16 +81,4 @@ fn stage_by_stage(work: Work) {
 
 fn millions(time: Duration, packets: u64) -> f64 {
     packets as f64 / time.as_secs_f64() / 1e6
-}
-
-fn measure(subjects: &[Subject], rounds: usize) -> Vec<Duration> {
-    let mut times = vec![Vec::new(); subjects.len()];
-    for _ in 0..rounds {
-        for ((_, work), times) in subjects.iter().zip(&mut times) {
-            times.push(time(|| {
-                black_box(work());
-            }));
-        }
-    }
-    times.into_iter().map(median).collect()
 }

@@ -1,5 +1,6 @@
 //! What the tables say of the machine, and how they measure time on it.
 
+use std::hint::black_box;
 use std::process::Command;
 use std::time::Duration;
 
@@ -77,6 +78,18 @@ fn said(program: &str, arguments: &[&str]) -> Option<String> {
 #[must_use]
 pub fn peak_memory() -> String {
     field("/proc/self/status", "VmHWM").unwrap_or_else(|| "not told by this system".into())
+}
+
+/// The median processor time of each work in so many rounds, in which all take turns: a noisy moment hits all of them, and no row of a table alone.
+#[must_use]
+pub fn medians_in_turn<T>(works: &[impl Fn() -> T], rounds: usize) -> Vec<Duration> {
+    let mut times = vec![Vec::new(); works.len()];
+    for _ in 0..rounds.max(1) {
+        for (work, times) in works.iter().zip(&mut times) {
+            times.push(time(|| drop(black_box(work()))));
+        }
+    }
+    times.into_iter().map(median).collect()
 }
 
 /// The median of some times.

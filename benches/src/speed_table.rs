@@ -6,7 +6,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use cohaptic_benches::effort::Effort;
-use cohaptic_benches::machine::{median, peak_memory, time};
+use cohaptic_benches::machine::{medians_in_turn, peak_memory, time};
 use cohaptic_benches::{Mesh, bare};
 use cohaptic_harness::run_side_by_side;
 use cohaptic_scene::Scene;
@@ -45,16 +45,6 @@ impl Work {
     const fn seconds(self, mesh: Mesh) -> u64 {
         self.most / (mesh.peers * mesh.peers) as u64 + self.least
     }
-
-    /// Medians of the processor time of two kinds of work in alternating rounds, so that a noisy moment hits both.
-    fn alternate(self, mut one: impl FnMut(), mut other: impl FnMut()) -> [f64; 2] {
-        let mut rounds = [Vec::new(), Vec::new()];
-        for _ in 0..self.rounds {
-            rounds[0].push(time(&mut one));
-            rounds[1].push(time(&mut other));
-        }
-        rounds.map(|times| median(times).as_secs_f64())
-    }
 }
 
 fn main() -> Result<(), String> {
@@ -81,14 +71,19 @@ fn one_run(work: Work) {
     println!(
         "arrays, written by hand for this one scene: no bytes on the wire, one axis, one strategy, no order of events but its own. Each figure is the"
     );
-    println!("median of {} rounds in which the two alternate.\n", work.rounds);
+    println!("median of {} rounds in which all of them alternate.\n", work.rounds);
     println!("| peers | links | cohaptic | asked for | bare loop | ratio | asked for |");
     println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: |");
-    for (mesh, (asked, asked_ratio)) in Mesh::ALL.into_iter().zip(ASKED) {
-        let seconds = work.seconds(mesh);
-        let scene = mesh.scene(seconds);
-        let times = work.alternate(|| drop(black_box(Mesh::run(&scene))), || drop(black_box(bare::run(mesh, seconds * 1000))));
-        let [program, bare] = times.map(|time| seconds as f64 / time);
+    let scenes = Mesh::ALL.map(|mesh| mesh.scene(work.seconds(mesh)));
+    let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
+    for (mesh, scene) in Mesh::ALL.into_iter().zip(&scenes) {
+        works.push(Box::new(|| drop(black_box(Mesh::run(scene)))));
+        works.push(Box::new(move || drop(black_box(bare::run(mesh, work.seconds(mesh) * 1000)))));
+    }
+    let times = medians_in_turn(&works, work.rounds);
+    for ((mesh, times), (asked, asked_ratio)) in Mesh::ALL.into_iter().zip(times.chunks(2)).zip(ASKED) {
+        let speed = |time: Duration| work.seconds(mesh) as f64 / time.as_secs_f64();
+        let (program, bare) = (speed(times[0]), speed(times[1]));
         let (peers, links) = (mesh.peers, mesh.links());
         println!("| {peers} | {links} | {program:.0}× | {asked:.0}× | {bare:.0}× | {:.2} | {asked_ratio} |", bare / program);
     }
@@ -110,23 +105,26 @@ fn many_runs(work: Work) {
     println!(
         "each in one register, beside the same runs one at a time. What comes out is compared first, and is the same to the bit. Runs a second of"
     );
-    println!("processor time, the median of {} rounds in which the two alternate.\n", work.rounds);
+    println!("processor time, the median of {} rounds in which all of them alternate.\n", work.rounds);
     println!("| peers | links | one at a time | {SIDE_BY_SIDE} side by side | gain |");
     println!("| ---: | --- | ---: | ---: | ---: |");
-    for mesh in Mesh::ALL {
-        let scenes: Vec<Scene> = (1..=SIDE_BY_SIDE).map(|seed| mesh.scene_with_seed(seconds_a_run, seed)).collect();
+    let all = Mesh::ALL.map(|mesh| -> Vec<Scene> { (1..=SIDE_BY_SIDE).map(|seed| mesh.scene_with_seed(seconds_a_run, seed)).collect() });
+    let repetitions = |mesh: Mesh| (work.seconds(mesh) / (SIDE_BY_SIDE * seconds_a_run)).max(1);
+    let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
+    for (mesh, scenes) in Mesh::ALL.into_iter().zip(&all) {
         let alone: Vec<_> = scenes.iter().map(Mesh::run).collect();
-        assert!(run_side_by_side(&scenes) == alone, "runs of {mesh:?} side by side are not what they are alone");
-        let repetitions = (work.seconds(mesh) / (SIDE_BY_SIDE * seconds_a_run)).max(1);
-        let times = work.alternate(
-            || {
-                for scene in (0..repetitions).flat_map(|_| &scenes) {
-                    black_box(Mesh::run(scene));
-                }
-            },
-            || (0..repetitions).for_each(|_| drop(black_box(run_side_by_side(&scenes)))),
-        );
-        let [alone, together] = times.map(|time| (repetitions * SIDE_BY_SIDE) as f64 / time);
+        assert!(run_side_by_side(scenes) == alone, "runs of {mesh:?} side by side are not what they are alone");
+        works.push(Box::new(move || {
+            for scene in (0..repetitions(mesh)).flat_map(|_| scenes) {
+                black_box(Mesh::run(scene));
+            }
+        }));
+        works.push(Box::new(move || (0..repetitions(mesh)).for_each(|_| drop(black_box(run_side_by_side(scenes))))));
+    }
+    let times = medians_in_turn(&works, work.rounds);
+    for (mesh, times) in Mesh::ALL.into_iter().zip(times.chunks(2)) {
+        let speed = |time: Duration| (repetitions(mesh) * SIDE_BY_SIDE) as f64 / time.as_secs_f64();
+        let (alone, together) = (speed(times[0]), speed(times[1]));
         println!("| {} | {} | {alone:.1} | {together:.1} | {:.2}× |", mesh.peers, mesh.links(), together / alone);
     }
     println!();
