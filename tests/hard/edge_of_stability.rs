@@ -15,7 +15,7 @@
 
 use cohaptic_harness::{Model, Simulation, TickRow};
 use cohaptic_peer::{Contact, Gains};
-use cohaptic_stability::{Boundary, BoundaryOptions, KeyRange, Method, Monodromy, StateKind, Verdict, analyse, monodromy};
+use cohaptic_stability::{Boundary, BoundaryOptions, Cell, KeyRange, Method, Monodromy, StateKind, Verdict, analyse, monodromy};
 use cohaptic_tests::Draft;
 
 use crate::ROUNDING;
@@ -57,7 +57,7 @@ fn grasped(stiffness: f64) -> Draft {
 fn edge(scene: fn(f64) -> Draft, low: f64, high: f64) -> f64 {
     let range = KeyRange { key: "stiffness".to_owned(), low, high, unit: String::new() };
     let options = BoundaryOptions { samples: 40, ..BoundaryOptions::of(&range) };
-    let radius = |value: f64| analyse(&scene(value).scene(), Method::Reduced).map(|analysis| analysis.radius);
+    let radius = |value: f64| analyse(&scene(value).scene(), Method::Reduced).map(|analysis| Cell::certain(analysis.radius));
     let boundary = Boundary::search(&range, options, &[], radius, |_| (), || false).unwrap();
     assert!(boundary.is_settled() && boundary.marginal.is_empty());
     let [crossing] = boundary.crossings[..] else { panic!("one edge between {low} and {high}: {boundary:?}") };

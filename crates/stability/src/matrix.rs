@@ -19,6 +19,13 @@ impl Matrix {
         Self { rows, columns, entries: vec![0.0; rows * columns] }
     }
 
+    /// Becomes a matrix of that shape, all entries zero, in the memory that it has.
+    pub(crate) fn reset(&mut self, rows: usize, columns: usize) {
+        self.entries.clear();
+        self.entries.resize(rows * columns, 0.0);
+        (self.rows, self.columns) = (rows, columns);
+    }
+
     /// Ones on the diagonal.
     #[must_use]
     pub fn identity(size: usize) -> Self {

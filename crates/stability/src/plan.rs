@@ -4,6 +4,7 @@ use cohaptic_peer::{Gains, Plant};
 use cohaptic_scene::Scene;
 
 use crate::lifted::{Autonomous, Body, Lifted, Node};
+use crate::mean_square::{EqualScratch, Followed};
 use crate::network::NominalNetwork;
 use crate::parts::loose_device;
 use crate::small::{SmallFrame, SmallNode};
@@ -22,6 +23,8 @@ pub(crate) struct Plan {
     apart: Vec<Option<Apart>>,
     /// −1/(N−1).
     difference: Matrix,
+    /// How the second moment is followed; an error says why it is not.
+    followed: Result<Followed, AnalysisError>,
 }
 
 /// How the members of a class differ.
@@ -40,6 +43,7 @@ pub(crate) struct PlanScratch {
     together: Matrix,
     apart: Matrix,
     workspace: Workspace,
+    equal: EqualScratch,
 }
 
 /// What the step maps of a class were computed from.
@@ -78,7 +82,13 @@ impl Plan {
         });
         let apart = apart.collect();
         let difference = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
-        Ok(Self { tied: structure.tied, together, apart, difference, structure })
+        let followed = Followed::of(scenes[0], network, &structure);
+        Ok(Self { tied: structure.tied, together, apart, difference, followed, structure })
+    }
+
+    /// How the second moment is followed; an error says why it is not.
+    pub(crate) const fn followed(&self) -> &Result<Followed, AnalysisError> {
+        &self.followed
     }
 
     /// The classes, by their members.
@@ -89,11 +99,9 @@ impl Plan {
     /// The largest radius of all parts. Without `BOUND` its error is zero and means nothing.
     pub(crate) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut PlanScratch) -> Radius {
         self.refresh(scene, scratch);
-        let PlanScratch { nodes, bodies, together, apart, workspace } = scratch;
+        let PlanScratch { nodes, bodies, together, apart, workspace, .. } = scratch;
         let structure = &self.structure;
-        let coordination = structure.coordination(scene);
-        let tied = self.tied || (0..nodes.len()).any(|class| structure.touching[class] && arm(self.representative(scene, class)).stiffness > 0.0);
-        let quotient = Lifted { coordination, tied, ..structure.quotient(scene, nodes) };
+        let quotient = self.quotient(scene, nodes);
         let mut worst = part::<BOUND>(self.together.as_ref(), &quotient, together, workspace);
         for (class, part_of) in self.apart.iter().enumerate() {
             if let (Some(Apart { small, frames }), Some(timetable)) = (part_of, &structure.apart[class]) {
@@ -106,6 +114,31 @@ impl Plan {
             }
         }
         worst
+    }
+
+    /// The radius of the second moment over a frame, without a bound of its error; `None` if it is not followed here, or the numbers leave their range.
+    pub(crate) fn mean_square(&self, scene: &Scene, scratch: &mut PlanScratch) -> Option<f64> {
+        let square = |this: &Self, scratch: &mut PlanScratch| this.radius::<false>(scene, scratch).value.powi(2);
+        let Ok(Followed::Equal { frame, held }) = &self.followed else {
+            return matches!(self.followed, Ok(Followed::Certain)).then(|| square(self, scratch));
+        };
+        let gains = self.structure.coordination(scene);
+        if gains.stiffness + gains.damping <= 0.0 {
+            // Nothing is done with what arrives.
+            return Some(square(self, scratch).max(*held));
+        }
+        self.refresh(scene, scratch);
+        let PlanScratch { nodes, bodies, equal, .. } = scratch;
+        let found = frame.radius(&self.quotient(scene, nodes), equal)?.max(*held);
+        Some(bodies.iter().filter_map(|bodies| bodies.loose).fold(found, |found, loose| found.max(loose.value.powi(2))))
+    }
+
+    /// The system of the classes' averages with the numbers of that scene.
+    fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
+        let structure = &self.structure;
+        let armed = |class: usize| structure.touching[class] && arm(self.representative(scene, class)).stiffness > 0.0;
+        let tied = self.tied || (0..nodes.len()).any(armed);
+        Lifted { coordination: structure.coordination(scene), tied, ..structure.quotient(scene, nodes) }
     }
 
     fn representative<'a>(&self, scene: &'a Scene, class: usize) -> &'a cohaptic_scene::PeerSpec {

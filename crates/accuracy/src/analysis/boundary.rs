@@ -46,7 +46,7 @@ pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), Accurac
         push(method.word(), String::new(), found, "each from the scene on")?;
     }
     let mut scratch = FamilyScratch::default();
-    let found = halve(ALL, |stiffness| Ok(family.radius(&[stiffness], &mut scratch)? > 1.0))?;
+    let found = halve(ALL, |stiffness| Ok(family.radius(&[stiffness], &mut scratch)?.radius > 1.0))?;
     push("family", String::new(), found, "reduced, with what the scenes share prepared once, radii without bounds")?;
     let found = searched(&family, &key)?;
     push("search", String::new(), found, "`Boundary::find`, which looks for every crossing in the range and not for one, to 1e-9 of the range")?;

@@ -1,7 +1,9 @@
 //! One curve: the scene as it stands, or with what `--curve` changes.
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Admittance, FrequencyResponse, LowFrequencyFit, Verdict, ideal};
+use cohaptic_stability::{
+    Admittance, AnalysisError, FrequencyResponse, LowFrequencyFit, MeanSquare, QUICK_UNKNOWNS, Verdict, has_chance, ideal, mean_square_within,
+};
 
 use crate::arguments::AdmittanceArguments;
 use crate::failure::{self, Failure, not_analysed};
@@ -12,6 +14,7 @@ pub(super) struct Subject {
     variant: Variant,
     scene: Scene,
     pub(super) admittance: Admittance,
+    chance: Option<Result<MeanSquare, AnalysisError>>,
 }
 
 /// The admittance in one scene.
@@ -24,6 +27,8 @@ pub(super) struct Curve {
     pub(super) admittance: Admittance,
     pub(super) response: FrequencyResponse,
     pub(super) fit: LowFrequencyFit,
+    /// Where links leave something to chance: the second moment of the scene, or why it cannot be followed.
+    pub(super) chance: Option<Result<MeanSquare, AnalysisError>>,
     /// The mass of the whole object \[kg\].
     pub(super) mass: f64,
 }
@@ -40,7 +45,8 @@ impl Subject {
         let scene = Scene::read(file, &overrides).map_err(|error| failure::of_variant(error, variant.option, &variant.overrides))?;
         let peer = place_of(&arguments.peer, &scene, &variant)?;
         let admittance = Admittance::of(&scene, peer).map_err(|error| not_analysed(file, &error))?;
-        Ok(Self { variant, scene, admittance })
+        let chance = has_chance(&scene).then(|| mean_square_within(&scene, QUICK_UNKNOWNS));
+        Ok(Self { variant, scene, admittance, chance })
     }
 }
 
@@ -58,10 +64,11 @@ fn place_of(wanted: &str, scene: &Scene, variant: &Variant) -> Result<usize, Fai
 }
 
 impl Curve {
-    pub(super) fn of(Subject { variant, scene, admittance }: Subject, frequencies: &[f64]) -> Result<Self, Failure> {
+    pub(super) fn of(Subject { variant, scene, admittance, chance }: Subject, frequencies: &[f64]) -> Result<Self, Failure> {
         let response = admittance.response(frequencies).map_err(|error| Failure::Input(error.to_string()))?;
         let fit = admittance.fit_low_frequency();
-        Ok(Self { name: variant.name, overrides: variant.overrides, title: scene.title, admittance, response, fit, mass: scene.object.mass })
+        let (name, overrides, mass) = (variant.name, variant.overrides, scene.object.mass);
+        Ok(Self { name, overrides, title: scene.title, admittance, response, fit, chance, mass })
     }
 
     /// What the whole object alone would be at each frequency \[dB\].
@@ -69,10 +76,27 @@ impl Curve {
         20.0 * ideal(self.mass, hz).norm().log10()
     }
 
+    /// What the numbers leave out.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let mut notes = self.admittance.notes().to_vec();
+        if let Some(chance) = &self.chance {
+            notes.push("the admittance is that with every delay its mean and nothing lost".to_owned());
+            if let Err(error) = chance {
+                notes.push(format!("the verdict is nominal: {error}"));
+            }
+        }
+        notes
+    }
+
     /// What the numbers must not be taken for, if there is a reason to.
     pub(super) fn warning(&self) -> Option<&'static str> {
         match self.admittance.verdict() {
-            Verdict::Stable => None,
+            Verdict::Stable => match &self.chance {
+                Some(Ok(moment)) if moment.verdict() == Verdict::Unstable => Some(
+                    "the scene is unstable in the mean square: these numbers are those with nothing left to chance, and around them the motion grows without end",
+                ),
+                _ => None,
+            },
             Verdict::Marginal => {
                 Some("the scene cannot be told from an unstable one: whether it has a steady state is open, and only that could be measured")
             }

@@ -11,7 +11,7 @@ pub(super) struct Document<'a> {
     title: &'a str,
     peer: &'a str,
     #[serde(flatten)]
-    scene: Option<CurveDocument<'a>>,
+    scene: Option<CurveDocument>,
     /// Those of `--curve`.
     curves: Vec<Named<'a>>,
     files: &'a [String],
@@ -22,11 +22,11 @@ struct Named<'a> {
     name: &'a str,
     overrides: &'a [String],
     #[serde(flatten)]
-    curve: CurveDocument<'a>,
+    curve: CurveDocument,
 }
 
 #[derive(Serialize)]
-struct CurveDocument<'a> {
+struct CurveDocument {
     verdict: &'static str,
     spectral_radius: f64,
     error_bound: f64,
@@ -36,7 +36,18 @@ struct CurveDocument<'a> {
     stiffness: Limit,
     object_mass_kg: f64,
     points: Vec<Point>,
-    notes: &'a [String],
+    /// That of the second moment, where links leave something to chance and it can be followed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean_square: Option<MeanSquareDocument>,
+    notes: Vec<String>,
+}
+
+/// The growth of the second moment in a frame.
+#[derive(Serialize)]
+struct MeanSquareDocument {
+    verdict: &'static str,
+    radius: f64,
+    error_bound: f64,
 }
 
 /// A number that was extrapolated, and about how far it may be off.
@@ -67,8 +78,8 @@ impl<'a> Document<'a> {
     }
 }
 
-impl<'a> CurveDocument<'a> {
-    fn of(curve: &'a Curve) -> Self {
+impl CurveDocument {
+    fn of(curve: &Curve) -> Self {
         let limit = |Estimate { value, error }: Estimate| Limit { value, error };
         let radius = curve.admittance.radius();
         let points = curve.response.points.iter().map(|point| Point {
@@ -87,7 +98,12 @@ impl<'a> CurveDocument<'a> {
             stiffness: limit(curve.fit.stiffness),
             object_mass_kg: curve.mass,
             points: points.collect(),
-            notes: curve.admittance.notes(),
+            mean_square: curve.chance.as_ref().and_then(|chance| chance.as_ref().ok()).map(|moment| MeanSquareDocument {
+                verdict: moment.verdict().word(),
+                radius: moment.radius.value,
+                error_bound: moment.radius.error,
+            }),
+            notes: curve.notes(),
         }
     }
 }

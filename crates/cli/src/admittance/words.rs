@@ -20,7 +20,7 @@ pub(super) fn describe(peer: &str, curves: &[Curve], files: &[String]) -> String
         let _ = writeln!(text, "\n  moved slowly, {peer} feels");
         felt(&mut text, curve);
         let _ = writeln!(text, "  {}", verdict(curve));
-        for note in curve.admittance.notes() {
+        for note in curve.notes() {
             let _ = writeln!(text, "  note: {note}");
         }
     }
@@ -64,14 +64,29 @@ fn limit(Estimate { value, error }: Estimate, unit: &str) -> String {
     if value.is_finite() && error.is_finite() { format!("{value:.6} +- {error:.1e} {unit}") } else { "no definite size".to_owned() }
 }
 
-fn verdict(curve: &Curve) -> String {
-    let radius = curve.admittance.radius();
-    let word = match radius.verdict() {
+/// A verdict as it is printed: one that people must not overlook in capitals.
+fn shown(verdict: Verdict) -> &'static str {
+    match verdict {
         Verdict::Stable => "stable",
         Verdict::Marginal => "MARGINAL",
         Verdict::Unstable => "UNSTABLE",
-    };
-    format!("the scene is {word}: spectral radius {:.12} +- {:.1e}", radius.value, radius.error)
+    }
+}
+
+fn verdict(curve: &Curve) -> String {
+    let radius = curve.admittance.radius();
+    let word = shown(radius.verdict());
+    let nominal = format!("spectral radius {:.12} +- {:.1e}", radius.value, radius.error);
+    match &curve.chance {
+        None => format!("the scene is {word}: {nominal}"),
+        Some(Err(_)) => format!("with nothing left to chance the scene is {word}: {nominal}"),
+        Some(Ok(moment)) => format!(
+            "in the mean square the scene is {}: mean-square radius {:.12} +- {:.1e}\n  with nothing left to chance it is {word}: {nominal}",
+            shown(moment.verdict()),
+            moment.radius.value,
+            moment.radius.error
+        ),
+    }
 }
 
 #[cfg(test)]

@@ -126,7 +126,7 @@ pub(crate) struct BoundaryArguments {
     /// The key, and from where to where it is searched: --along coordination.stiffness=0..6000
     #[arg(long, value_name = "KEY=LO..HI")]
     pub(crate) along: String,
-    /// How exactly a crossing is found, in the unit of the key [default: a billionth of the range]
+    /// How exactly a crossing is found, in the unit of the key [default: a billionth of the range; in the mean square a ten-millionth]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
     /// How many values are looked at first, the ends among them [default: 400]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cohaptic_scene::{Scene, SceneError};
-use cohaptic_stability::{Family, FamilyError, KeyRange};
+use cohaptic_stability::{Criterion, Family, FamilyError, KeyRange};
 
 use super::rows_file::fingerprint;
 use crate::failure::{Failure, not_analysed};
@@ -77,11 +77,22 @@ pub(super) fn fingerprint_of(family: &Family) -> Result<u64, FamilyError> {
     Ok(fingerprint(&format!("{:?}", at_low(family)?)))
 }
 
-/// What the radii of a family leave out, where its links leave something to chance.
-pub(super) fn nominal(family: &Family) -> Vec<&'static str> {
-    let chance = at_low(family).is_ok_and(|scene| cohaptic_stability::has_chance(&scene));
-    let note = "links leave something to chance: these radii are those with nothing left to chance; stability point follows the second moment";
-    chance.then_some(note).into_iter().collect()
+/// What a radius of that criterion is called.
+pub(super) const fn name(criterion: Criterion) -> &'static str {
+    match criterion {
+        Criterion::SpectralRadius => "spectral radius",
+        Criterion::MeanSquare => "mean-square radius",
+    }
+}
+
+/// What that many radii leave out, because the second moment cannot be followed there; `None` if there are none.
+pub(super) fn nominal(count: usize, what: &str) -> Option<String> {
+    (count > 0).then(|| {
+        format!(
+            "{count} {what} are nominal: the second moment cannot be followed there, and their radius is the square of the spectral radius with every delay its \
+             mean and nothing lost; stability point says why"
+        )
+    })
 }
 
 /// The scene with every open key at its lower end; it does not know the name of its file.

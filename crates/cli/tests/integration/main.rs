@@ -36,6 +36,7 @@ mod run;
 mod running;
 mod scenes;
 mod stability_boundary;
+mod stability_chance;
 mod stability_map;
 mod stability_point;
 mod svg;

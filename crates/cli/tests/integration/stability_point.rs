@@ -185,15 +185,13 @@ fn peers_may_hear_only_their_neighbours() {
     }
 }
 
-/// Maps and boundaries are of radii with nothing left to chance, and say so.
 #[test]
-fn maps_of_random_links_say_that_they_are_nominal() {
+fn what_is_not_followed_in_the_mean_square_says_so() {
     let desk = Desk::with("paper.toml", PAPER);
-    for command in [
-        "map paper.toml --x coordination.stiffness=100..200 --y coordination.damping=1..2 --grid 2x2",
-        "boundary paper.toml --along coordination.stiffness=100..200",
-    ] {
-        let notes = |options: &str| desk.json(&format!("stability {command} --json {options}"))["notes"].as_array().unwrap().len();
-        assert_eq!((notes(""), notes("--set link.loss=5%")), (0, 1), "{command}");
+    for command in ["stability point paper.toml --graph ring", "admittance paper.toml --peer peer1 --points 3"] {
+        let notes = |options: &str| desk.json(&format!("{command} --json {options}"))["notes"].as_array().unwrap().len();
+        assert_eq!((notes(""), notes("--set link.loss=5%") > 0), (0, true), "{command}");
+        let text = desk.text(&format!("{command} --set link.loss=5%"));
+        assert!(text.contains("with every delay its mean and nothing lost"), "{text}");
     }
 }

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use crate::{Radius, Verdict};
+use crate::{Cell, Verdict};
 
 /// The radius within an interval is taken to leave the chord by at most so many times what the second differences around it say.
 const SAFETY: f64 = 4.0;
 
 /// The values looked at so far, in order.
 #[derive(Clone, PartialEq, Debug, Default)]
-pub(super) struct Samples(BTreeMap<Ordered, Radius>);
+pub(super) struct Samples(BTreeMap<Ordered, Cell>);
 
 /// A number that is ordered as [`f64::total_cmp`] says.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -34,12 +34,12 @@ impl Samples {
         self.0.len()
     }
 
-    pub(super) fn extend(&mut self, found: impl Iterator<Item = (f64, Radius)>) {
-        self.0.extend(found.map(|(value, radius)| (Ordered(value), radius)));
+    pub(super) fn extend(&mut self, found: impl Iterator<Item = (f64, Cell)>) {
+        self.0.extend(found.map(|(value, cell)| (Ordered(value), cell)));
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = (f64, Radius)> {
-        self.0.iter().map(|(value, radius)| (value.0, *radius))
+    pub(super) fn iter(&self) -> impl Iterator<Item = (f64, Cell)> {
+        self.0.iter().map(|(value, cell)| (value.0, *cell))
     }
 }
 
@@ -55,7 +55,7 @@ struct Sample {
 }
 
 impl Sample {
-    fn of((at, radius): (f64, Radius)) -> Self {
+    fn of((at, Cell { radius, .. }): (f64, Cell)) -> Self {
         // Beyond e^±50 nothing is gained by going on, and infinities have no second difference.
         const LARGEST: f64 = 50.0;
         let log = |value: f64| if value.is_nan() { 0.0 } else { libm::log(value.max(0.0)).clamp(-LARGEST, LARGEST) };

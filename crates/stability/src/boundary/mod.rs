@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use crate::map::{Scratches, nodes};
-use crate::{Family, FamilyError, KeyRange, Radius, Verdict};
+use crate::{Cell, Family, FamilyError, KeyRange, Verdict};
 use intervals::{Samples, wanted};
 
 /// How closely a boundary is looked for.
@@ -73,8 +73,9 @@ pub struct Boundary {
     pub finest: f64,
     /// The longest distance between two neighbouring ones.
     pub coarsest: f64,
-    /// Every value that was looked at and its radius, ascending: given to [`Boundary::find`] again, none of them is computed again.
-    pub known: Vec<(f64, Radius)>,
+    /// Every value that was looked at and its radius, by the criterion of the family, ascending: given to [`Boundary::find`] again, none of them is computed
+    /// again.
+    pub known: Vec<(f64, Cell)>,
     settled: bool,
 }
 
@@ -112,7 +113,7 @@ impl Boundary {
     pub fn find(
         family: &Family,
         options: BoundaryOptions,
-        known: &[(f64, Radius)],
+        known: &[(f64, Cell)],
         progress: impl Fn(usize) + Sync,
         stop: impl Fn() -> bool + Sync,
     ) -> Result<Self, BoundaryError<FamilyError>> {
@@ -136,8 +137,8 @@ impl Boundary {
     pub fn search<E: Send>(
         range: &KeyRange,
         options: BoundaryOptions,
-        known: &[(f64, Radius)],
-        radius: impl Fn(f64) -> Result<Radius, E> + Sync,
+        known: &[(f64, Cell)],
+        radius: impl Fn(f64) -> Result<Cell, E> + Sync,
         progress: impl Fn(usize) + Sync,
         stop: impl Fn() -> bool + Sync,
     ) -> Result<Self, BoundaryError<E>> {
@@ -145,14 +146,14 @@ impl Boundary {
         if samples < 2 || samples > most || !(tolerance > 0.0 && tolerance.is_finite()) {
             return Err(BoundaryError::Options { samples, tolerance, most });
         }
-        let known: BTreeMap<u64, Radius> = known.iter().map(|(value, radius)| (value.to_bits(), *radius)).collect();
+        let known: BTreeMap<u64, Cell> = known.iter().map(|(value, cell)| (value.to_bits(), *cell)).collect();
         let looked_at = AtomicUsize::new(0);
-        let look = |value: f64| -> Result<Option<(f64, Radius)>, E> {
+        let look = |value: f64| -> Result<Option<(f64, Cell)>, E> {
             if stop() {
                 return Ok(None);
             }
             let found = match known.get(&value.to_bits()) {
-                Some(radius) => *radius,
+                Some(cell) => *cell,
                 None => radius(value)?,
             };
             progress(looked_at.fetch_add(1, Ordering::Relaxed) + 1);
@@ -167,7 +168,7 @@ impl Boundary {
                 settled = false;
                 break;
             }
-            let found: Vec<Option<(f64, Radius)>> =
+            let found: Vec<Option<(f64, Cell)>> =
                 next.par_iter().map(|value| look(*value)).collect::<Result<_, E>>().map_err(BoundaryError::Radius)?;
             settled = found.iter().all(Option::is_some);
             seen.extend(found.into_iter().flatten());
@@ -179,6 +180,12 @@ impl Boundary {
         Ok(Self::of(&seen, tolerance, settled))
     }
 
+    /// How many of the values are nominal: see [`Cell::is_nominal`].
+    #[must_use]
+    pub fn nominal(&self) -> usize {
+        self.known.iter().filter(|(_, cell)| cell.is_nominal).count()
+    }
+
     /// Whether every interval was looked at as closely as it needs: not if the search was stopped, or had looked at as many values as it may.
     #[must_use]
     pub const fn is_settled(&self) -> bool {
@@ -186,20 +193,20 @@ impl Boundary {
     }
 
     fn of(seen: &Samples, tolerance: f64, settled: bool) -> Self {
-        let known: Vec<(f64, Radius)> = seen.iter().collect();
+        let known: Vec<(f64, Cell)> = seen.iter().collect();
         let gaps = || known.windows(2).map(|pair| pair[1].0 - pair[0].0);
         let mut marginal: Vec<Stretch> = Vec::new();
         let mut crossings: Vec<Crossing> = Vec::new();
         // The verdict on this side of the line, and where it was seen last; what is marginal waits until it is known how wide it is.
-        let first = known.first().map_or(Verdict::Marginal, |(_, radius)| radius.verdict());
+        let first = known.first().map_or(Verdict::Marginal, |(_, cell)| cell.radius.verdict());
         let mut place = 0;
         let mut before: Option<(f64, Verdict)> = None;
         while place < known.len() {
-            let (low, verdict) = (known[place].0, known[place].1.verdict());
-            let run = known[place..].iter().take_while(|(_, radius)| radius.verdict() == verdict).count();
+            let (low, verdict) = (known[place].0, known[place].1.radius.verdict());
+            let run = known[place..].iter().take_while(|(_, cell)| cell.radius.verdict() == verdict).count();
             let high = known[place + run - 1].0;
             place += run;
-            let after = known.get(place).map(|(value, radius)| (*value, radius.verdict()));
+            let after = known.get(place).map(|(value, cell)| (*value, cell.radius.verdict()));
             let narrow = high - low <= tolerance;
             match (verdict, before, after) {
                 (Verdict::Marginal, Some((_, side)), Some((_, other))) if narrow => {

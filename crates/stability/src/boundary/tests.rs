@@ -1,6 +1,7 @@
 //! Lines whose crossings are known in closed form.
 
 use super::*;
+use crate::Radius;
 
 fn range() -> KeyRange {
     KeyRange { key: "key".to_owned(), low: 0.0, high: 10.0, unit: String::new() }
@@ -9,7 +10,7 @@ fn range() -> KeyRange {
 /// A line with that logarithm of the radius, as sure of it as rounding allows.
 #[track_caller]
 fn along(level: impl Fn(f64) -> f64 + Sync) -> Boundary {
-    let radius = |value: f64| Ok::<_, ()>(Radius { value: libm::exp(level(value)), error: 1e-14 });
+    let radius = |value: f64| Ok::<_, ()>(Cell::certain(Radius { value: libm::exp(level(value)), error: 1e-14 }));
     let boundary = Boundary::search(&range(), BoundaryOptions::of(&range()), &[], radius, |_| (), || false).unwrap();
     assert!(boundary.is_settled());
     // A search that goes through every double would never end; these end after a few hundred values more than the first.
@@ -120,7 +121,7 @@ fn a_search_goes_on_where_it_was_stopped() {
     let computed = AtomicUsize::new(0);
     let radius = |value: f64| {
         computed.fetch_add(1, Ordering::Relaxed);
-        Ok::<_, ()>(Radius { value: libm::exp(level(value)), error: 1e-14 })
+        Ok::<_, ()>(Cell::certain(Radius { value: libm::exp(level(value)), error: 1e-14 }))
     };
     let options = BoundaryOptions::of(&range());
     let stop = || computed.load(Ordering::Relaxed) >= 700;
@@ -141,7 +142,7 @@ fn one_thread_finds_what_many_find() {
 
 #[test]
 fn a_search_that_may_not_look_any_further_says_so() {
-    let radius = |value: f64| Ok::<_, FamilyError>(Radius { value: libm::exp(value - CENTRE), error: 0.0 });
+    let radius = |value: f64| Ok::<_, FamilyError>(Cell::certain(Radius { value: libm::exp(value - CENTRE), error: 0.0 }));
     let options = BoundaryOptions { most: 410, ..BoundaryOptions::of(&range()) };
     let boundary = Boundary::search(&range(), options, &[], radius, |_| (), || false).unwrap();
     assert!(!boundary.is_settled() && boundary.samples == 410);

@@ -4,6 +4,7 @@
 //! a key does nothing but set certain numbers, the key is *learned*, and from then on only those numbers are written. A key that is not learned, such
 //! as a delay, is read anew for each value.
 
+mod criterion;
 mod error;
 mod leaves;
 mod prepared;
@@ -17,11 +18,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use cohaptic_scene::Scene;
 
+pub use criterion::{Cell, Criterion};
 pub use error::FamilyError;
 pub use range::{KeyRange, KeyRangeError};
 
-use crate::Radius;
 use crate::plan::PlanScratch;
+use crate::{Radius, has_chance};
 use leaves::Probe;
 use prepared::Prepared;
 
@@ -36,6 +38,7 @@ pub struct Family {
     overrides: Vec<String>,
     keys: Vec<KeyRange>,
     learned: Vec<bool>,
+    criterion: Criterion,
     /// Scenes by the values of the keys that are not learned.
     prepared: Mutex<BTreeMap<Vec<u64>, Arc<Prepared>>>,
     /// Tells this family from others, also from those that are gone.
@@ -77,12 +80,17 @@ impl Family {
         }
         let learned = vec![false; keys.len()];
         let (text, file, overrides) = (text.to_owned(), file.to_path_buf(), overrides.to_vec());
-        let mut family = Self { text, file, overrides, keys, learned, prepared: Mutex::default(), identity: Arc::new(()) };
+        let criterion = Criterion::SpectralRadius;
+        let mut family = Self { text, file, overrides, keys, learned, criterion, prepared: Mutex::default(), identity: Arc::new(()) };
         let low: Vec<f64> = family.keys.iter().map(|range| range.low).collect();
         let high: Vec<f64> = family.keys.iter().map(|range| range.high).collect();
         let at_low = family.scene(&low).map_err(|error| family.no_number(error))?;
         let at_high = family.scene(&high).map_err(|error| family.no_number(error))?;
         crate::plan::plans(&[&at_low])?;
+        // What is left to chance at one end may be nothing at the other: no loss, no jitter. In between a key may take no value at all.
+        let inside: Vec<f64> = family.keys.iter().enumerate().map(|(key, range)| range.odd(key)).collect();
+        let chance = has_chance(&at_low) || has_chance(&at_high) || family.scene(&inside).is_ok_and(|scene| has_chance(&scene));
+        family.criterion = if chance { Criterion::MeanSquare } else { Criterion::SpectralRadius };
         drop((at_low, at_high));
         for key in 0..family.keys.len() {
             family.learned[key] = family.is_learned(key, &low);
@@ -118,25 +126,31 @@ impl Family {
         Ok(Scene::parse(&self.text, &self.file, &overrides)?)
     }
 
-    /// The spectral radius with those values of the keys, without a bound of its error: below 1 the scene is stable.
+    /// Which radii the family has.
+    #[must_use]
+    pub const fn criterion(&self) -> Criterion {
+        self.criterion
+    }
+
+    /// The radius with those values of the keys, by the family's criterion and without a bound of its error: below 1 the scene is stable.
     ///
     /// # Errors
     ///
     /// As [`Family::scene`], and if the scene cannot be analysed.
-    pub fn radius(&self, values: &[f64], scratch: &mut FamilyScratch) -> Result<f64, FamilyError> {
-        self.evaluate::<false>(values, scratch).map(|radius| radius.value)
+    pub fn radius(&self, values: &[f64], scratch: &mut FamilyScratch) -> Result<Cell<f64>, FamilyError> {
+        self.evaluate::<false>(values, scratch).map(|cell| Cell { radius: cell.radius.value, is_nominal: cell.is_nominal })
     }
 
-    /// The spectral radius with those values of the keys.
+    /// The radius with those values of the keys, by the family's criterion.
     ///
     /// # Errors
     ///
     /// As [`Family::radius`].
-    pub fn bounded_radius(&self, values: &[f64], scratch: &mut FamilyScratch) -> Result<Radius, FamilyError> {
+    pub fn bounded_radius(&self, values: &[f64], scratch: &mut FamilyScratch) -> Result<Cell<Radius>, FamilyError> {
         self.evaluate::<true>(values, scratch)
     }
 
-    fn evaluate<const BOUND: bool>(&self, values: &[f64], scratch: &mut FamilyScratch) -> Result<Radius, FamilyError> {
+    fn evaluate<const BOUND: bool>(&self, values: &[f64], scratch: &mut FamilyScratch) -> Result<Cell<Radius>, FamilyError> {
         self.check(values)?;
         let is_last = scratch
             .last
@@ -147,14 +161,26 @@ impl Family {
             let (scene, plans) = prepared.scratch();
             scratch.last = Some(Last { fixed: self.fixed_bits(values).collect(), prepared, scene, plans, family: self.identity.clone() });
         }
-        let Some(last) = &mut scratch.last else { return Ok(Radius { value: f64::NAN, error: f64::INFINITY }) };
-        let learned = values.iter().zip(&self.learned).filter(|(_, learned)| **learned).map(|(value, _)| *value);
-        let radius = last.prepared.radius::<BOUND>(learned, (&mut last.scene, &mut last.plans));
-        if !last.prepared.is_varied() {
+        let Some(Last { prepared, scene, plans, .. }) = &mut scratch.last else {
+            return Ok(Cell::certain(Radius { value: f64::NAN, error: f64::INFINITY }));
+        };
+        // Two keys at most.
+        let (mut learned, mut count) = ([0.0; 2], 0);
+        for (value, _) in values.iter().zip(&self.learned).filter(|(_, learned)| **learned) {
+            learned[count] = *value;
+            count += 1;
+        }
+        let learned = &learned[..count];
+        prepared.write(learned, scene);
+        let cell = match self.criterion {
+            Criterion::SpectralRadius => Cell::certain(prepared.radius::<BOUND>(scene, plans)),
+            Criterion::MeanSquare => prepared.mean_square::<BOUND>(learned, scene, plans)?,
+        };
+        if !prepared.is_varied() {
             // It stands for these values only.
             scratch.last = None;
         }
-        Ok(radius)
+        Ok(cell)
     }
 
     /// One value for each key, each in its range.

@@ -2,16 +2,20 @@
 
 use cohaptic_scene::Scene;
 
+use super::criterion::Cell;
 use super::leaves::{Leaf, Probe, learn};
+use crate::mean_square::Followed;
 use crate::plan::{Plan, PlanScratch, plans};
-use crate::{AnalysisError, Radius};
+use crate::{AnalysisError, Radius, has_chance, mean_square};
 
 /// A scene with learned keys.
 #[derive(Debug)]
 pub(super) struct Prepared {
     pub(super) scene: Scene,
-    /// For each learned key, the numbers that the radius depends on.
+    /// For each learned key, the numbers that the radius depends on: of equal peers those of the first.
     leaves: Vec<Vec<Leaf>>,
+    /// For each learned key, the numbers of the others, where the second moment may be followed peer by peer.
+    others: Vec<Vec<Leaf>>,
     /// One for each combination of contacts.
     plans: Vec<Plan>,
 }
@@ -26,11 +30,14 @@ impl Prepared {
         let mut looked_at: Vec<usize> = plans.iter().flat_map(|plan| plan.classes().iter().map(|class| class[0])).collect();
         looked_at.sort_unstable();
         looked_at.dedup();
+        let is_other = |leaf: &Leaf| matches!(leaf, Leaf::Peer(place, _) if looked_at.binary_search(place).is_err());
+        let has_chance = has_chance(&probes[0].scene);
+        let others = leaves.iter().map(|leaves| leaves.iter().copied().filter(|leaf| has_chance && is_other(leaf)).collect()).collect();
         for leaves in &mut leaves {
-            leaves.retain(|leaf| !matches!(leaf, Leaf::Peer(place, _) if looked_at.binary_search(place).is_err()));
+            leaves.retain(|leaf| !is_other(leaf));
         }
         let scene = probes.swap_remove(0).scene;
-        Ok(Some(Self { scene, leaves, plans }))
+        Ok(Some(Self { scene, leaves, others, plans }))
     }
 
     pub(super) fn is_varied(&self) -> bool {
@@ -48,13 +55,41 @@ impl Prepared {
         (self.scene.clone(), self.plans.iter().map(|_| PlanScratch::default()).collect())
     }
 
-    /// The largest radius of all combinations of contacts, with those values of the learned keys.
-    pub(super) fn radius<const BOUND: bool>(&self, values: impl Iterator<Item = f64>, (scene, scratch): (&mut Scene, &mut [PlanScratch])) -> Radius {
-        for (leaves, value) in self.leaves.iter().zip(values) {
-            for leaf in leaves {
-                leaf.set(scene, value);
-            }
+    /// Writes those values of the learned keys into the scene.
+    pub(super) fn write(&self, values: &[f64], scene: &mut Scene) {
+        set(&self.leaves, values, scene);
+    }
+
+    /// The largest radius of the second moment of all combinations of contacts, with those values of the learned keys, which have been written; where it
+    /// cannot be followed, the square of the nominal one.
+    pub(super) fn mean_square<const BOUND: bool>(
+        &self,
+        values: &[f64],
+        scene: &mut Scene,
+        scratch: &mut [PlanScratch],
+    ) -> Result<Cell, AnalysisError> {
+        let is_certain = |plan: &Plan| matches!(plan.followed(), Ok(Followed::Certain));
+        if self.plans.iter().all(is_certain) {
+            return Ok(Cell { radius: self.radius::<BOUND>(scene, scratch).over(2), is_nominal: false });
         }
+        let quick = |scratch: &mut [PlanScratch]| {
+            self.plans.iter().zip(scratch).try_fold(0.0, |worst: f64, (plan, scratch)| Some(worst.max(plan.mean_square(scene, scratch)?)))
+        };
+        if !BOUND && let Some(value) = quick(scratch) {
+            return Ok(Cell { radius: Radius { value, error: 0.0 }, is_nominal: false });
+        }
+        set(&self.others, values, scene);
+        match mean_square(scene) {
+            Ok(found) => Ok(Cell { radius: found.radius, is_nominal: false }),
+            Err(AnalysisError::ChanceWithoutMoments { .. } | AnalysisError::TooManyMoments { .. }) => {
+                Ok(Cell { radius: self.radius::<BOUND>(scene, scratch).over(2), is_nominal: true })
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The largest radius of all combinations of contacts.
+    pub(super) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut [PlanScratch]) -> Radius {
         let radii = self.plans.iter().zip(scratch).map(|(plan, scratch)| plan.radius::<BOUND>(scene, scratch));
         let worst = |one: Radius, other: Radius| {
             if BOUND {
@@ -66,5 +101,14 @@ impl Prepared {
             }
         };
         radii.reduce(worst).unwrap_or(Radius { value: 0.0, error: 0.0 })
+    }
+}
+
+/// Writes the value of each key into its numbers.
+fn set(leaves: &[Vec<Leaf>], values: &[f64], scene: &mut Scene) {
+    for (leaves, value) in leaves.iter().zip(values) {
+        for leaf in leaves {
+            leaf.set(scene, *value);
+        }
     }
 }

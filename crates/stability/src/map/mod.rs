@@ -1,4 +1,4 @@
-//! Maps: the spectral radius over a grid of two keys.
+//! Maps: the radius over a grid of two keys, by the criterion of the family.
 
 mod contour;
 #[cfg(test)]
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 pub use contour::Polyline;
 
-use crate::{Family, FamilyError, FamilyScratch, KeyRange};
+use crate::{Cell, Criterion, Family, FamilyError, FamilyScratch, KeyRange};
 
 /// More cells than this are refused.
 const MOST_CELLS: usize = 100_000_000;
@@ -82,7 +82,7 @@ impl Grid {
     }
 }
 
-/// The spectral radius over a grid.
+/// The radius over a grid, by the criterion of the family.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Map {
     /// The values of the first key, ascending.
@@ -91,6 +91,17 @@ pub struct Map {
     pub y: Vec<f64>,
     /// The radius at each value of y, for each value of x; a row is empty if the filling was stopped before it was reached.
     pub radius: Vec<Vec<f64>>,
+    /// For each of them whether the cell is nominal: see [`Cell::is_nominal`](crate::Cell::is_nominal).
+    pub nominal: Vec<Vec<bool>>,
+}
+
+/// The cells of one value of y, for each value of x; empty if they are not known.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct MapRow {
+    /// The radii.
+    pub radius: Vec<f64>,
+    /// For each of them whether the cell is nominal.
+    pub nominal: Vec<bool>,
 }
 
 impl Map {
@@ -116,19 +127,20 @@ impl Map {
     pub fn resume(
         family: &Family,
         grid: Grid,
-        mut known: Vec<Vec<f64>>,
-        done: impl Fn(usize, &[f64]) + Sync,
+        mut known: Vec<MapRow>,
+        done: impl Fn(usize, &MapRow) + Sync,
         stop: impl Fn() -> bool + Sync,
     ) -> Result<Self, MapError> {
         let [first, second] = family.keys() else {
             return Err(MapError::Keys { keys: family.keys().len() });
         };
-        let odd = |(row, cells): &(usize, &Vec<f64>)| !cells.is_empty() && cells.len() != grid.columns || *row >= grid.rows;
+        let fits = |cells: usize| cells == 0 || cells == grid.columns;
+        let odd = |(row, cells): &(usize, &MapRow)| !fits(cells.radius.len()) || cells.nominal.len() != cells.radius.len() || *row >= grid.rows;
         if let Some((row, cells)) = known.iter().enumerate().find(odd) {
-            return Err(MapError::Known { row, cells: cells.len(), columns: if row < grid.rows { grid.columns } else { 0 } });
+            return Err(MapError::Known { row, cells: cells.radius.len(), columns: if row < grid.rows { grid.columns } else { 0 } });
         }
         let (x, y) = (nodes(first, grid.columns), nodes(second, grid.rows));
-        known.resize_with(grid.rows, Vec::new);
+        known.resize_with(grid.rows, MapRow::default);
         let stopped = AtomicBool::new(false);
         let stop = || {
             if stop() {
@@ -137,7 +149,7 @@ impl Map {
             stopped.load(Ordering::Relaxed)
         };
         let pool = Scratches::default();
-        let filled = known.par_iter_mut().enumerate().filter(|(_, row)| row.is_empty()).try_for_each(|(number, row)| {
+        let filled = known.par_iter_mut().enumerate().filter(|(_, row)| row.radius.is_empty()).try_for_each(|(number, row)| {
             if stop() {
                 return Ok(());
             }
@@ -153,7 +165,8 @@ impl Map {
             }
         });
         filled?;
-        Ok(Self { x, y, radius: known })
+        let (radius, nominal) = known.into_iter().map(|row| (row.radius, row.nominal)).unzip();
+        Ok(Self { x, y, radius, nominal })
     }
 
     /// Whether every row has been computed.
@@ -178,13 +191,17 @@ impl Map {
 }
 
 /// One row; `None` if it was stopped.
-fn cells(family: &Family, x: &[f64], y: f64, scratch: &mut FamilyScratch, stop: &impl Fn() -> bool) -> Result<Option<Vec<f64>>, FamilyError> {
-    let mut row = Vec::with_capacity(x.len());
+fn cells(family: &Family, x: &[f64], y: f64, scratch: &mut FamilyScratch, stop: &impl Fn() -> bool) -> Result<Option<MapRow>, FamilyError> {
+    // Cells whose second moment is followed one by one take long.
+    let often = if family.criterion() == Criterion::MeanSquare { 1 } else { 256 };
+    let mut row = MapRow { radius: Vec::with_capacity(x.len()), nominal: Vec::with_capacity(x.len()) };
     for (column, x) in x.iter().enumerate() {
-        if column % 256 == 255 && stop() {
+        if (column + 1) % often == 0 && stop() {
             return Ok(None);
         }
-        row.push(family.radius(&[*x, y], scratch)?);
+        let Cell { radius, is_nominal } = family.radius(&[*x, y], scratch)?;
+        row.radius.push(radius);
+        row.nominal.push(is_nominal);
     }
     Ok(Some(row))
 }

@@ -53,19 +53,20 @@ fn known_rows_are_not_computed_again() {
     let first = rows.into_inner().unwrap();
     assert!(first.iter().all(|row| part.radius[*row] == whole.radius[*row]));
     // A mark shows that the row was taken as it is.
-    let mut known = part.radius;
-    known[first[0]] = vec![7.0; 6];
+    let known_row = |radius: Vec<f64>| MapRow { nominal: vec![false; radius.len()], radius };
+    let mut known: Vec<MapRow> = part.radius.into_iter().map(known_row).collect();
+    known[first[0]] = MapRow { radius: vec![7.0; 6], nominal: vec![true; 6] };
     let again = Mutex::new(Vec::new());
-    let put_away = |row: usize, cells: &[f64]| again.lock().unwrap().push((row, cells.to_vec()));
+    let put_away = |row: usize, cells: &MapRow| again.lock().unwrap().push((row, cells.clone()));
     let resumed = Map::resume(&family, grid, known, put_away, || false).unwrap();
     assert!(resumed.is_complete());
     let again = again.into_inner().unwrap();
     assert_eq!(first.len() + again.len(), 9);
-    assert!(again.iter().all(|(row, cells)| !first.contains(row) && *cells == whole.radius[*row]));
-    assert_eq!(resumed.radius[first[0]], [7.0; 6]);
-    let odd = Map::resume(&family, grid, vec![vec![1.0; 5]], |_, _| (), || false);
+    assert!(again.iter().all(|(row, cells)| !first.contains(row) && cells.radius == whole.radius[*row]));
+    assert_eq!((&resumed.radius[first[0]], &resumed.nominal[first[0]]), (&vec![7.0; 6], &vec![true; 6]));
+    let odd = Map::resume(&family, grid, vec![known_row(vec![1.0; 5])], |_, _| (), || false);
     assert!(matches!(odd, Err(MapError::Known { row: 0, cells: 5, columns: 6 })));
-    let odd = Map::resume(&family, grid, vec![Vec::new(); 10], |_, _| (), || false);
+    let odd = Map::resume(&family, grid, vec![MapRow::default(); 10], |_, _| (), || false);
     assert!(matches!(odd, Err(MapError::Known { row: 9, .. })));
 }
 
@@ -74,7 +75,8 @@ fn made_up(columns: usize, rows: usize, level: impl Fn(f64, f64) -> f64) -> Map 
     let range = |text| KeyRange::parse(text).unwrap();
     let (x, y) = (nodes(&range("x=-2..2"), columns), nodes(&range("y=-1..1"), rows));
     let radius = y.iter().map(|y| x.iter().map(|x| libm::exp(level(*x, *y))).collect()).collect();
-    Map { x, y, radius }
+    let nominal = vec![vec![false; columns]; rows];
+    Map { x, y, radius, nominal }
 }
 
 /// Twice the area to the left of a closed line, by the shoelace formula.

@@ -17,6 +17,7 @@
 
 mod arrivals;
 mod build;
+mod equal;
 mod events;
 mod held;
 mod law;
@@ -25,6 +26,7 @@ mod symmetric;
 #[cfg(test)]
 mod tests;
 mod tracked;
+mod variance;
 
 use std::time::Duration;
 
@@ -32,6 +34,7 @@ use cohaptic_scene::Scene;
 
 use self::arrivals::Hazards;
 use self::build::{Instants, Line, events};
+pub(crate) use self::equal::{Equal, EqualScratch};
 use self::law::{LinkLaw, is_random};
 use self::positive::{Positive, radius_of_positive};
 use self::symmetric::Symmetric;
@@ -180,11 +183,10 @@ fn of_contacts(
     let random = random_links(scene)?;
     let gains = structure.coordination(scene);
     let nothing = Found { radius: nominal_squared, held: NOTHING, method: MeanSquareMethod::Nominal, frame, unknowns: 0 };
-    let alike = structure.classes.len() == 1 && only_model(scene);
     let mut found = if random.is_empty() {
         nothing
     } else {
-        match alike.then(|| symmetric(scene, network, &structure, notes)).transpose()?.flatten() {
+        match alike(scene, &structure).then(|| symmetric(scene, network, &structure, notes)).transpose()?.flatten() {
             Some(found) => found,
             None => one_by_one(scene, network, &structure, &combination.contacts, &random, most, notes)?,
         }
@@ -282,30 +284,94 @@ impl Found {
 /// A link on which nothing ever arrives: what is held stays for certain.
 const SILENT: Radius = Radius { value: 1.0, error: 0.0 };
 
+/// When the samples of equal peers over equal links are sent and may arrive.
+struct Alike {
+    /// Of one peer, without deliveries.
+    timetable: Timetable,
+    instants: Instants,
+    /// `None` if nothing ever arrives.
+    hazards: Option<(Hazards, LinkLaw)>,
+}
+
+impl Alike {
+    fn of(scene: &Scene, network: &NominalNetwork, notes: &mut Vec<String>) -> Result<Self, AnalysisError> {
+        let timetable = Timetable::new(&[NodeClock::of(scene, 0)], &[])?;
+        let instants = Instants::of(&timetable, 1);
+        let hazards = hazards(scene, network, (0, 1), timetable.frame, &instants.sends[0], &instants.ticks[0], notes)?;
+        Ok(Self { timetable, instants, hazards })
+    }
+
+    /// The hazards, if links lose independently, nothing overtakes, and the frame is that of the scene.
+    fn independent(&self, structure: &Structure) -> Option<&Hazards> {
+        let (hazards, law) = self.hazards.as_ref()?;
+        (hazards.places == 1 && law.chain.is_none() && self.timetable.frame == structure.timetable.frame).then_some(hazards)
+    }
+
+    /// The probability, per frame, that nothing arrives on a link.
+    fn held(&self, hazards: &Hazards) -> Radius {
+        let line = Line { from: 0, to: 0, chance: Some((hazards.clone(), None)) };
+        line.staying(&self.instants, self.timetable.frame).unwrap_or(NOTHING)
+    }
+}
+
+/// Whether all peers are equal, over equal links.
+fn alike(scene: &Scene, structure: &Structure) -> bool {
+    structure.classes.len() == 1 && only_model(scene)
+}
+
 /// Equal peers over equal links, if these lose independently and nothing overtakes.
 fn symmetric(scene: &Scene, network: &NominalNetwork, structure: &Structure, notes: &mut Vec<String>) -> Result<Option<Found>, AnalysisError> {
-    let timetable = Timetable::new(&[NodeClock::of(scene, 0)], &[])?;
+    let alike = Alike::of(scene, network, notes)?;
+    let (timetable, instants) = (&alike.timetable, &alike.instants);
     let frame = timetable.frame;
-    let instants = Instants::of(&timetable, 1);
-    let hazards = hazards(scene, network, (0, 1), frame, &instants.sends[0], &instants.ticks[0], notes)?;
     let node = structure.node(scene, 0);
-    let lifted = structure.quotient(scene, std::slice::from_ref(&node));
-    let lifted = Lifted { timetable: &timetable, ..lifted };
-    let Some((hazards, law)) = hazards else {
+    let lifted = Lifted { timetable, ..structure.quotient(scene, std::slice::from_ref(&node)) };
+    if alike.hazards.is_none() {
         // Nobody hears of anybody: each peer alone, pulled to where the others were at the beginning.
         let alone = Lifted { tied: true, ..lifted };
-        return Ok(Some(Found::of(&events(&alone, &[], &instants), SILENT, MeanSquareMethod::Symmetric, frame)));
-    };
-    if hazards.places > 1 || law.chain.is_some() || frame != structure.timetable.frame {
-        return Ok(None);
+        return Ok(Some(Found::of(&events(&alone, &[], instants), SILENT, MeanSquareMethod::Symmetric, frame)));
     }
-    let operator = Symmetric::new(scene.peers.len(), &lifted, &hazards);
+    let Some(hazards) = alike.independent(structure) else {
+        return Ok(None);
+    };
+    let operator = Symmetric::new(scene.peers.len(), &lifted, hazards);
     if operator.unknowns() > MOST_UNKNOWNS {
         return Err(AnalysisError::TooManyMoments { joint: Some(1), unknowns: Some(operator.unknowns()), most: MOST_UNKNOWNS });
     }
-    let line = Line { from: 0, to: 0, chance: Some((hazards, None)) };
-    let held = line.staying(&instants, frame).unwrap_or(NOTHING);
-    Ok(Some(Found::of(&operator, held, MeanSquareMethod::Symmetric, frame)))
+    Ok(Some(Found::of(&operator, alike.held(hazards), MeanSquareMethod::Symmetric, frame)))
+}
+
+/// How the second moment of scenes that differ in numbers only is followed again and again, in one combination of contacts.
+#[derive(Clone, Debug)]
+pub(crate) enum Followed {
+    /// Nothing is left to chance: the square of the spectral radius.
+    Certain,
+    /// Equal peers over equal links that lose independently; and what is held without acting.
+    Equal { frame: Equal, held: f64 },
+    /// By [`mean_square`], each time anew.
+    Anew,
+}
+
+impl Followed {
+    /// How the scenes are followed of which this is one, whose classes are those of all of them.
+    ///
+    /// # Errors
+    ///
+    /// As [`mean_square`], as far as that can be said before its computation.
+    pub(crate) fn of(scene: &Scene, network: &NominalNetwork, structure: &Structure) -> Result<Self, AnalysisError> {
+        if random_links(scene)?.is_empty() {
+            return Ok(Self::Certain);
+        }
+        if !alike(scene, structure) {
+            return Ok(Self::Anew);
+        }
+        let alike = Alike::of(scene, network, &mut Vec::new())?;
+        let Some(hazards) = alike.independent(structure) else {
+            return Ok(Self::Anew);
+        };
+        let held = alike.held(hazards).value;
+        Ok(Self::Equal { frame: Equal::new(scene.peers.len(), alike.timetable.clone(), hazards), held })
+    }
 }
 
 fn one_by_one(

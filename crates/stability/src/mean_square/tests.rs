@@ -84,6 +84,50 @@ fn by_symmetry_and_one_by_one_agree() {
     }
 }
 
+/// From the mean motion and its noise.
+fn by_noise(overrides: &[&str]) -> f64 {
+    let scene = scene(overrides);
+    let network = NominalNetwork::of(&scene).unwrap();
+    let contacts = combinations(&scene).unwrap().remove(0).contacts;
+    let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
+    let Followed::Equal { frame, .. } = Followed::of(&scene, &network, &structure).unwrap() else { panic!("{overrides:?}: not equal peers") };
+    let node = structure.node(&scene, 0);
+    frame.radius(&structure.quotient(&scene, std::slice::from_ref(&node)), &mut EqualScratch::default()).unwrap()
+}
+
+/// The second moment itself, with its bound, and the mean motion with its noise share neither a matrix nor a formula.
+#[test]
+fn the_noise_of_losses_makes_the_radius_of_the_second_moment() {
+    let links = [
+        &["link.loss=0.1"][..],
+        &["link.loss=0.6", "link.delay=0ms"],
+        &["link.loss=0.9", "link.delay=24ms"],
+        &["link.loss=0.001", "link.delay=5.3ms"],
+        &["link.loss=0.05", "link.delay=19.4ms", "coordination.strategy=proportional-derivative"],
+        &["link.loss=0.2", "link.jitter={ sd = '2ms', distribution = 'uniform' }", "link.delay=12ms"],
+        &["link.jitter={ sd = '0.5ms' }", "link.delay=20ms", "object.damping=1.0"],
+        &["link.loss=0.3", "peer.hand={ arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } }"],
+        &["link.loss=0.3", "peer.contact=none"],
+        &["link.loss=0.3", "peer.compute-delay=1", "coordination.stiffness=100"],
+        &["link.loss=0.5", "coordination.stiffness=6000", "object.split-mass=false"],
+        &["link.loss=0.05", "coordination.damping=0", "peer.coupling.damping=0", "coordination.stiffness=300"],
+        &["link.loss=0.05", "coordination.stiffness=0"],
+    ];
+    for count in ["2", "3", "4", "5", "8", "1000", "100000"] {
+        let count = format!("scene.count={count}");
+        for link in links {
+            let overrides = [link, &[count.as_str()]].concat();
+            let scene = scene(&overrides);
+            let network = NominalNetwork::of(&scene).unwrap();
+            let contacts = combinations(&scene).unwrap().remove(0).contacts;
+            let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
+            let expected = symmetric(&scene, &network, &structure, &mut Vec::new()).unwrap().unwrap().radius;
+            let found = by_noise(&overrides);
+            assert!((found - expected.value).abs() <= expected.error + 1e-11 * expected.value, "{overrides:?}: {found}, expected {expected:?}");
+        }
+    }
+}
+
 /// A frame of equal peers whose delay is whole frames, written down apart from the rest of this crate: positions and velocities of samples are kept, and
 /// everything is taken relative to the first copy.
 struct Explicit {

@@ -8,6 +8,7 @@ mod enclosure;
 mod francis;
 mod hessenberg;
 mod large;
+mod schur;
 mod square;
 mod triangle;
 
@@ -19,6 +20,7 @@ use num_complex::Complex64;
 use crate::{Matrix, Radius};
 use enclosure::{Enclosure, Interval};
 use large::Large;
+pub(crate) use schur::Schur;
 use square::{balance, exponent_of, power_of_two};
 use triangle::{Triangle, precise};
 

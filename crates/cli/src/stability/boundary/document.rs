@@ -13,6 +13,8 @@ pub(super) struct Document<'a> {
     unit: &'a str,
     low: f64,
     high: f64,
+    /// By which radius the scene is judged.
+    criterion: &'static str,
     /// The verdict at the lower end.
     first: &'static str,
     crossings: Vec<CrossingDocument>,
@@ -22,7 +24,9 @@ pub(super) struct Document<'a> {
     finest: f64,
     coarsest: f64,
     settled: bool,
-    notes: &'a [&'static str],
+    /// How many of the values looked at are nominal.
+    nominal: usize,
+    notes: Vec<String>,
     files: &'a [String],
 }
 
@@ -48,6 +52,7 @@ impl<'a> Document<'a> {
             unit: &order.range.unit,
             low: order.range.low,
             high: order.range.high,
+            criterion: order.family.criterion().word(),
             first: found.first.word(),
             crossings: crossings
                 .map(|crossing| CrossingDocument { value: crossing.value, from: crossing.from.word(), to: crossing.to.word() })
@@ -58,7 +63,8 @@ impl<'a> Document<'a> {
             finest: found.finest,
             coarsest: found.coarsest,
             settled: found.is_settled(),
-            notes: &order.notes,
+            nominal: found.nominal(),
+            notes: super::notes(found),
             files,
         }
     }

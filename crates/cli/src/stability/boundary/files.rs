@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cohaptic_stability::Boundary;
+use cohaptic_stability::{Boundary, Cell, Criterion};
 
 use super::Order;
 use super::picture::Picture;
@@ -11,6 +11,7 @@ use crate::failure::Failure;
 use crate::output;
 use crate::output_file::{field, write_file};
 use crate::stability::quantity::label;
+use crate::stability::source;
 
 /// Writes `boundary.csv`, `samples.csv` and `boundary.svg`, and gives their paths.
 pub(super) fn write(folder: &Path, order: &Order, found: &Boundary) -> Result<Vec<String>, Failure> {
@@ -33,18 +34,25 @@ fn crossings(order: &Order, found: &Boundary) -> String {
 }
 
 fn samples(order: &Order, found: &Boundary) -> String {
-    let mut text = format!("{},spectral_radius,error_bound,verdict\n", field(&order.range.key));
-    for (value, radius) in &found.known {
-        text.push_str(&format!("{value:?},{:?},{:?},{}\n", radius.value, radius.error, radius.verdict().word()));
+    let is_mean_square = order.family.criterion() == Criterion::MeanSquare;
+    let columns = if is_mean_square { "mean_square_radius,error_bound,verdict,judged" } else { "spectral_radius,error_bound,verdict" };
+    let mut text = format!("{},{columns}\n", field(&order.range.key));
+    for (value, Cell { radius, is_nominal }) in &found.known {
+        text.push_str(&format!("{value:?},{:?},{:?},{}", radius.value, radius.error, radius.verdict().word()));
+        if is_mean_square {
+            text.push_str(if *is_nominal { ",nominal" } else { ",mean-square" });
+        }
+        text.push('\n');
     }
     text
 }
 
 fn picture(order: &Order, found: &Boundary) -> String {
-    let samples: Vec<(f64, f64)> = found.known.iter().map(|(value, radius)| (*value, radius.value)).collect();
+    let samples: Vec<(f64, f64)> = found.known.iter().map(|(value, cell)| (*value, cell.radius.value)).collect();
     let crossings: Vec<(f64, String)> = found.crossings.iter().map(|crossing| (crossing.value, crossing_in_words(&order.range, crossing))).collect();
     let picture = Picture {
         title: &order.title,
+        radius: source::name(order.family.criterion()),
         label: &label(&order.range),
         range: (order.range.low, order.range.high),
         samples: &samples,

@@ -7,7 +7,7 @@ mod words;
 
 use std::process::ExitCode;
 
-use cohaptic_stability::{Boundary, BoundaryError, BoundaryOptions, Family, KeyRange, Radius};
+use cohaptic_stability::{Boundary, BoundaryError, BoundaryOptions, Cell, Criterion, Family, KeyRange, Radius};
 
 use super::rows_file::{Row, RowsFile, fingerprint};
 use super::source::{self, Said};
@@ -20,6 +20,9 @@ use document::Document;
 /// The file in which values looked at are kept.
 const ROWS: &str = "boundary.rows.partial";
 
+/// How exactly a crossing in the mean square is found if nothing is said, as a share of the range: its bounds are wider than those of a spectral radius.
+const TOLERANCE_OF_SQUARES: f64 = 1e-7;
+
 /// Everything that is asked for, checked: nothing is written before there is one.
 struct Order {
     title: String,
@@ -28,8 +31,6 @@ struct Order {
     family: Family,
     /// What values looked at belong to.
     header: Vec<String>,
-    /// What the radii leave out.
-    notes: Vec<&'static str>,
 }
 
 /// Finds every crossing along a key.
@@ -81,22 +82,29 @@ impl Order {
         let text = source::read(file, set)?;
         let refused = |error| failure(arguments, &range, BoundaryError::Radius(error));
         let family = Family::new(&text, file, set, vec![range.clone()]).map_err(refused)?;
+        if let (Criterion::MeanSquare, None) = (family.criterion(), arguments.tolerance) {
+            options.tolerance = TOLERANCE_OF_SQUARES * (range.high - range.low);
+        }
         let title = source::at_low(&family).map_err(refused)?.title;
         let header = vec![
             format!("cohaptic {} stability boundary: values looked at; the same command goes on from here", env!("CARGO_PKG_VERSION")),
             format!("scene text {:016x}", fingerprint(&text)),
             format!("set {set:?}"),
             format!("along {:?} of the scene {:016x}", arguments.along, source::fingerprint_of(&family).map_err(refused)?),
-            "each row: its number, the value, the spectral radius and its error".to_owned(),
+            "each row: its number, the value, the radius, its error, and 1 if it is nominal".to_owned(),
         ];
-        let notes = source::nominal(&family);
-        Ok(Self { title, range, options, family, header, notes })
+        Ok(Self { title, range, options, family, header })
     }
 }
 
+/// What the radii leave out.
+fn notes(found: &Boundary) -> Vec<String> {
+    source::nominal(found.nominal(), "of the values looked at").into_iter().collect()
+}
+
 fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic_stability::FamilyError>> {
-    let known: Vec<(f64, Radius)> =
-        known.iter().filter_map(|(_, row)| Some((*row.first()?, Radius { value: *row.get(1)?, error: *row.get(2)? }))).collect();
+    let cell = |row: &[f64]| Some(Cell { radius: Radius { value: *row.get(1)?, error: *row.get(2)? }, is_nominal: *row.get(3)? != 0.0 });
+    let known: Vec<(f64, Cell)> = known.iter().filter_map(|(_, row)| Some((*row.first()?, cell(row)?))).collect();
     let progress = Progress::through_values();
     let found = Boundary::find(&order.family, order.options, &known, |count| progress.reach_number(count as u64), interrupt::asked);
     progress.clear();
@@ -119,8 +127,9 @@ fn interrupted(found: &Boundary, rows: Option<RowsFile>, known: &[Row], argument
         (Some(folder), Some(mut rows)) => {
             let is_known = |value: f64| known.iter().any(|(_, row)| row.first().is_some_and(|known| known.to_bits() == value.to_bits()));
             let mut new = found.known.iter().filter(|(value, _)| !is_known(*value)).enumerate();
-            if let Err(failure) = new.try_for_each(|(number, (value, radius))| rows.add(known.len() + number, &[*value, radius.value, radius.error]))
-            {
+            if let Err(failure) = new.try_for_each(|(number, (value, Cell { radius, is_nominal }))| {
+                rows.add(known.len() + number, &[*value, radius.value, radius.error, f64::from(u8::from(*is_nominal))])
+            }) {
                 return failure;
             }
             format!("they are kept in {}, and the same command goes on from there", output::path(&folder.join(ROWS)))

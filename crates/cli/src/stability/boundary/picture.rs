@@ -8,6 +8,8 @@ use crate::lines::{Look, Sample, draw_legend, draw_line, legend_height};
 /// What is shown.
 pub(super) struct Picture<'a> {
     pub(super) title: &'a str,
+    /// What the radius is called.
+    pub(super) radius: &'a str,
     /// The key and its unit.
     pub(super) label: &'a str,
     /// From where to where the key was searched.
@@ -33,7 +35,7 @@ impl Picture<'_> {
         let margin = (0.05 * (high - low)).max(1e-3);
         let range = (low - margin).max(0.0)..high + margin;
         let title = if cut { format!("{} (what goes far beyond is cut off)", self.title) } else { self.title.to_owned() };
-        let mut entries = vec![(Sample::Line(RADIUS), "spectral radius".to_owned()), (Sample::Line(Look::grey()), "1".to_owned())];
+        let mut entries = vec![(Sample::Line(RADIUS), self.radius.to_owned()), (Sample::Line(Look::grey()), "1".to_owned())];
         entries.extend(self.crossings.iter().map(|(_, words)| (Sample::Line(crossing()), words.clone())));
         let entries = &entries[..entries.len().min(MOST_ENTRIES)];
         svg::document((SIZE.0, SIZE.1 + legend_height(entries.len())), |root| {
@@ -44,7 +46,7 @@ impl Picture<'_> {
                 .x_label_area_size(40)
                 .y_label_area_size(68)
                 .build_cartesian_2d(self.range.0..self.range.1, range.clone())?;
-            chart.configure_mesh().x_desc(self.label).y_desc("spectral radius").light_line_style(TRANSPARENT).draw()?;
+            chart.configure_mesh().x_desc(self.label).y_desc(self.radius).light_line_style(TRANSPARENT).draw()?;
             draw_line(&mut chart, &[(self.range.0, 1.0), (self.range.1, 1.0)], Look::grey())?;
             for (value, _) in self.crossings {
                 draw_line(&mut chart, &[(*value, range.start), (*value, range.end)], crossing())?;

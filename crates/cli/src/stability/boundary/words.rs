@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_stability::{Boundary, Crossing, KeyRange};
+use cohaptic_stability::{Boundary, Criterion, Crossing, KeyRange};
 
 use super::Order;
 
@@ -13,7 +13,8 @@ pub(super) fn describe(order: &Order, found: &Boundary, files: &[String]) -> Str
     let mut line = |line: String| {
         let _ = writeln!(text, "  {line}");
     };
-    line(format!("{} from {}", found.first.word(), range.text(range.low)));
+    let judged = if order.family.criterion() == Criterion::MeanSquare { " in the mean square" } else { "" };
+    line(format!("{}{judged} from {}", found.first.word(), range.text(range.low)));
     for crossing in &found.crossings {
         line(crossing_in_words(range, crossing));
     }
@@ -35,7 +36,7 @@ pub(super) fn describe(order: &Order, found: &Boundary, files: &[String]) -> Str
     if !found.is_settled() {
         line("NOT SETTLED: it ended after the most values that it may look at; a larger tolerance or a shorter range decides".to_owned());
     }
-    order.notes.iter().for_each(|note| line(format!("note: {note}")));
+    super::notes(found).iter().for_each(|note| line(format!("note: {note}")));
     files.iter().for_each(|file| line(file.clone()));
     text
 }

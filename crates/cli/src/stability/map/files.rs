@@ -2,12 +2,15 @@
 
 use std::path::Path;
 
+use cohaptic_stability::Criterion;
+
 use super::picture::{Axis, Outline, Picture};
 use super::{Order, VariantMap};
 use crate::failure::Failure;
 use crate::output;
 use crate::output_file::{field, write_file};
 use crate::stability::quantity::label;
+use crate::stability::source;
 
 /// Writes `map.csv`, `map-2.csv` ... and `map.svg`, and gives their paths.
 pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap]) -> Result<Vec<String>, Failure> {
@@ -25,11 +28,21 @@ pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap]) -> Re
 }
 
 /// One row a cell, x running fastest.
-fn table(order: &Order, VariantMap { map, verdicts, .. }: &VariantMap) -> String {
-    let mut text = format!("{},{},spectral_radius,verdict\n", field(&order.x().key), field(&order.y().key));
-    for ((y, row), verdicts) in map.y.iter().zip(&map.radius).zip(verdicts) {
-        for ((x, radius), verdict) in map.x.iter().zip(row).zip(verdicts) {
-            text.push_str(&format!("{x:?},{y:?},{radius:?},{}\n", verdict.word()));
+fn table(order: &Order, VariantMap { map, criterion, verdicts, .. }: &VariantMap) -> String {
+    let keys = format!("{},{}", field(&order.x().key), field(&order.y().key));
+    let mut text = match criterion {
+        Criterion::SpectralRadius => format!("{keys},spectral_radius,verdict\n"),
+        Criterion::MeanSquare => format!("{keys},mean_square_radius,verdict,judged\n"),
+    };
+    for (((y, row), verdicts), nominal) in map.y.iter().zip(&map.radius).zip(verdicts).zip(&map.nominal) {
+        for (((x, radius), verdict), nominal) in map.x.iter().zip(row).zip(verdicts).zip(nominal) {
+            text.push_str(&format!("{x:?},{y:?},{radius:?},{}", verdict.word()));
+            match (criterion, nominal) {
+                (Criterion::SpectralRadius, _) => {}
+                (Criterion::MeanSquare, false) => text.push_str(",mean-square"),
+                (Criterion::MeanSquare, true) => text.push_str(",nominal"),
+            }
+            text.push('\n');
         }
     }
     text
@@ -38,7 +51,8 @@ fn table(order: &Order, VariantMap { map, verdicts, .. }: &VariantMap) -> String
 fn picture(order: &Order, maps: &[VariantMap]) -> String {
     let Some(first) = maps.first() else { return String::new() };
     let outline = |map: &VariantMap| Outline { name: map.name.clone(), lines: map.map.contour() };
-    let title = format!("{}: spectral radius 1", order.title);
+    let radius = source::name(first.criterion);
+    let title = format!("{}: {radius} 1", order.title);
     Picture {
         title: &title,
         x: Axis { label: label(order.x()), values: &first.map.x },

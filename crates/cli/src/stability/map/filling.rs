@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use cohaptic_stability::{Map, MapError};
+use cohaptic_stability::{Map, MapError, MapRow};
 
 use super::Order;
 use crate::arguments::MapArguments;
@@ -64,10 +64,12 @@ struct Keeper {
 }
 
 impl Keeper {
-    fn keep(&self, number: usize, cells: &[f64]) {
+    fn keep(&self, number: usize, row: &MapRow) {
+        let nominal = row.nominal.iter().map(|nominal| f64::from(u8::from(*nominal)));
+        let cells: Vec<f64> = row.radius.iter().copied().chain(nominal).collect();
         let mut guard = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let (file, broken) = &mut *guard;
-        if let Some(Err(failure)) = file.as_mut().map(|file| file.add(number, cells)) {
+        if let Some(Err(failure)) = file.as_mut().map(|file| file.add(number, &cells)) {
             broken.get_or_insert(failure);
             self.broken.store(true, Ordering::Relaxed);
         }
@@ -75,14 +77,14 @@ impl Keeper {
 }
 
 /// Fills one map after the other, up to the first that is not whole; and how many cells that took.
-fn in_turn(order: &Order, known: Vec<Vec<Vec<f64>>>, keeper: &Keeper) -> Result<(Vec<Map>, usize), (usize, MapError)> {
+fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper) -> Result<(Vec<Map>, usize), (usize, MapError)> {
     let (columns, rows) = (order.grid.columns(), order.grid.rows());
-    let there: usize = known.iter().flatten().filter(|row| !row.is_empty()).count();
+    let there: usize = known.iter().flatten().filter(|row| !row.radius.is_empty()).count();
     let progress = Progress::through_rows(rows * order.families.len());
     progress.reach_number(there as u64);
     let mut maps = Vec::new();
     for (variant, (family, known)) in order.families.iter().zip(known).enumerate() {
-        let done = |row: usize, cells: &[f64]| {
+        let done = |row: usize, cells: &MapRow| {
             keeper.keep(variant * rows + row, cells);
             progress.one_more();
         };
@@ -104,12 +106,13 @@ fn in_turn(order: &Order, known: Vec<Vec<Vec<f64>>>, keeper: &Keeper) -> Result<
 }
 
 /// The rows of each variant by their places; empty where they are not known.
-fn sorted(known: Vec<Row>, order: &Order) -> Vec<Vec<Vec<f64>>> {
+fn sorted(known: Vec<Row>, order: &Order) -> Vec<Vec<MapRow>> {
     let (columns, rows) = (order.grid.columns(), order.grid.rows());
-    let mut sorted = vec![vec![Vec::new(); rows]; order.variants.len()];
-    for (number, cells) in known.into_iter().filter(|(_, cells)| cells.len() == columns) {
+    let mut sorted = vec![vec![MapRow::default(); rows]; order.variants.len()];
+    for (number, cells) in known.into_iter().filter(|(_, cells)| cells.len() == 2 * columns) {
         if let Some(row) = sorted.get_mut(number / rows).and_then(|variant| variant.get_mut(number % rows)) {
-            *row = cells;
+            let nominal = cells[columns..].iter().map(|nominal| *nominal != 0.0).collect();
+            *row = MapRow { radius: cells[..columns].to_vec(), nominal };
         }
     }
     sorted
@@ -130,7 +133,7 @@ fn header(order: &Order, arguments: &MapArguments) -> Result<Vec<String>, Failur
         let scene = fingerprint_of(family).map_err(|error| order.failure(number, arguments, error.into()))?;
         lines.push(format!("map {} {:?} of the scene {scene:016x}", number + 1, variant.overrides));
     }
-    lines.push("each row: its number, and the spectral radius of each cell".to_owned());
+    lines.push("each row: its number, the radius of each cell, and for each cell 1 if it is nominal".to_owned());
     Ok(lines)
 }
 

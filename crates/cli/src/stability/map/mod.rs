@@ -11,7 +11,7 @@ mod words;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_stability::{Family, Grid, KeyRange, Map, MapError, Verdict};
+use cohaptic_stability::{Criterion, Family, Grid, KeyRange, Map, MapError, Verdict};
 
 use super::source::{self, Said};
 use crate::arguments::MapArguments;
@@ -30,8 +30,6 @@ struct Order {
     variants: Vec<Variant>,
     /// One for each variant.
     families: Vec<Family>,
-    /// What the radii leave out.
-    notes: Vec<&'static str>,
 }
 
 /// A map of one variant.
@@ -39,6 +37,8 @@ struct VariantMap {
     name: String,
     overrides: Vec<String>,
     map: Map,
+    /// By which radius it judges.
+    criterion: Criterion,
     /// Of every cell, row after row.
     verdicts: Vec<Vec<Verdict>>,
     /// Its table, if it was written.
@@ -53,7 +53,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let named = maps.into_iter().enumerate().map(|(number, map)| {
         let Variant { name, overrides, .. } = &order.variants[number];
         let verdicts = verdicts::verdicts(&order.families[number], &map).map_err(|error| order.failure(number, arguments, error.into()))?;
-        Ok(VariantMap { name: name.clone(), overrides: overrides.clone(), map, verdicts, file: None })
+        Ok(VariantMap { name: name.clone(), overrides: overrides.clone(), criterion: order.families[number].criterion(), map, verdicts, file: None })
     });
     let mut maps = named.collect::<Result<Vec<VariantMap>, Failure>>()?;
     let wall_s = start.elapsed().as_secs_f64();
@@ -93,8 +93,7 @@ impl Order {
             Some(Ok(scene)) => scene.title,
             Some(Err(_)) | None => output::path(file),
         };
-        let notes = families.iter().map(source::nominal).find(|notes| !notes.is_empty()).unwrap_or_default();
-        Ok(Self { text, title, ranges, grid, variants, families, notes })
+        Ok(Self { text, title, ranges, grid, variants, families })
     }
 
     /// What went wrong with a map, in the words of the user's options.
@@ -117,6 +116,11 @@ impl Order {
 }
 
 impl VariantMap {
+    /// How many of its cells leave out what their links leave to chance.
+    fn nominal_cells(&self) -> usize {
+        self.map.nominal.iter().flatten().filter(|nominal| **nominal).count()
+    }
+
     /// What share of its cells is stable.
     fn stable_fraction(&self) -> f64 {
         let cells = || self.verdicts.iter().flatten();

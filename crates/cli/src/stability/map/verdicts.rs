@@ -1,18 +1,23 @@
 //! What the radii of a map say. A map has them without bounds of their errors, which is enough far from 1; near it they are computed again, with one.
 
-use cohaptic_stability::{Family, FamilyError, FamilyScratch, Map, Radius, Verdict};
+use cohaptic_stability::{Criterion, Family, FamilyError, FamilyScratch, Map, Radius, Verdict};
+use rayon::prelude::*;
 
-/// A radius this close to 1 is computed again: far more than any radius of a scene that can be run is off.
+/// A spectral radius this close to 1 is computed again: far more than any radius of a scene that can be run is off.
 const NEAR: f64 = 1e-3;
+/// A mean-square radius this close to 1 is computed again, which takes a thousand times as long: a hundred times as far as those were seen off that are
+/// computed without a bound (`crates/stability/src/mean_square/tests.rs`).
+const NEAR_OF_SQUARES: f64 = 1e-7;
 
 /// The verdict on every cell.
 pub(super) fn verdicts(family: &Family, map: &Map) -> Result<Vec<Vec<Verdict>>, FamilyError> {
-    let mut scratch = FamilyScratch::default();
-    let mut verdict = |x: f64, y: f64, value: f64| {
-        let is_near = (value - 1.0).abs() < NEAR;
-        let radius = if is_near { family.bounded_radius(&[x, y], &mut scratch)? } else { Radius { value, error: 0.0 } };
+    let near = if family.criterion() == Criterion::MeanSquare { NEAR_OF_SQUARES } else { NEAR };
+    let verdict = |x: f64, y: f64, value: f64, scratch: &mut FamilyScratch| {
+        let is_near = (value - 1.0).abs() < near;
+        let radius = if is_near { family.bounded_radius(&[x, y], scratch)?.radius } else { Radius { value, error: 0.0 } };
         Ok(radius.verdict())
     };
-    let rows = map.y.iter().zip(&map.radius);
-    rows.map(|(y, row)| map.x.iter().zip(row).map(|(x, value)| verdict(*x, *y, *value)).collect()).collect()
+    let rows = map.y.par_iter().zip(&map.radius);
+    rows.map_init(FamilyScratch::default, |scratch, (y, row)| map.x.iter().zip(row).map(|(x, value)| verdict(*x, *y, *value, scratch)).collect())
+        .collect()
 }

@@ -2,11 +2,12 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_stability::{Map, Verdict};
+use cohaptic_stability::{Criterion, Verdict};
 
-use super::document::Document;
+use super::document::{Document, notes};
 use super::{Order, VariantMap, glance};
 use crate::stability::quantity::label;
+use crate::stability::source;
 
 /// More pictures than this do not fit on a screen.
 const MOST_PICTURES: usize = 4;
@@ -26,14 +27,15 @@ pub(super) fn describe(order: &Order, maps: &[VariantMap], document: &Document<'
         }
         let _ = writeln!(
             text,
-            "  {:.2} % of {} cells are stable{}",
+            "  {:.2} % of {} cells are stable{}{}",
             100.0 * map.stable_fraction(),
             order.grid.columns() * order.grid.rows(),
-            least(order, &map.map)
+            if map.criterion == Criterion::MeanSquare { " in the mean square" } else { "" },
+            least(order, map)
         );
     }
     let _ = writeln!(text, "\n{} cells computed in {:.3} s: {:.0} a second", document.cells_computed, document.wall_s, document.cells_per_s);
-    for note in &order.notes {
+    for note in notes(maps) {
         let _ = writeln!(text, "note: {note}");
     }
     for file in document.files {
@@ -43,10 +45,10 @@ pub(super) fn describe(order: &Order, maps: &[VariantMap], document: &Document<'
 }
 
 /// The least radius, and where it is.
-fn least(order: &Order, map: &Map) -> String {
+fn least(order: &Order, VariantMap { map, criterion, .. }: &VariantMap) -> String {
     let cells = map.y.iter().zip(&map.radius).flat_map(|(y, row)| map.x.iter().zip(row).map(move |(x, radius)| (*radius, *x, *y)));
     let least = cells.filter(|(radius, ..)| radius.is_finite()).min_by(|one, other| one.0.total_cmp(&other.0));
     least.map_or_else(String::new, |(radius, x, y)| {
-        format!("; the least spectral radius is {radius:.6}, at {} and {}", order.x().text(x), order.y().text(y))
+        format!("; the least {} is {radius:.6}, at {} and {}", source::name(*criterion), order.x().text(x), order.y().text(y))
     })
 }

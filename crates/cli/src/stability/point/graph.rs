@@ -3,11 +3,14 @@
 use std::path::Path;
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Graph, Judgement, Matrix, analyse_on};
+use cohaptic_stability::{Graph, Judgement, Matrix, analyse_on, has_chance};
 
 use crate::failure::Failure;
 
-/// The verdict if each peer hears only its neighbours. Links that leave something to chance count as if they did not.
+/// What the verdict leaves out where links leave something to chance.
+const NOMINAL: &str = "the verdict is nominal, with every delay its mean and nothing lost: the second moment is not followed on a graph";
+
+/// The verdict if each peer hears only its neighbours. Links that leave something to chance count as if they did not, and a note says so.
 pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failure> {
     let refused = |message: String| Failure::Input(format!("{}: --graph {graph}: {message}", path.display()));
     let graph = match graph {
@@ -16,7 +19,10 @@ pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, F
         "star" => Graph::Star,
         file => weights(Path::new(file))?,
     };
-    let analysis = analyse_on(scene, &graph).map_err(|error| refused(error.to_string()))?;
+    let mut analysis = analyse_on(scene, &graph).map_err(|error| refused(error.to_string()))?;
+    if has_chance(scene) {
+        analysis.notes.push(NOMINAL.to_owned());
+    }
     Ok(Judgement { verdict: analysis.verdict(), analysis, mean_square: None })
 }
 

@@ -1,0 +1,314 @@
+//! Equal peers over equal links that lose independently: the mean-square radius from two small matrices, without a bound of its error.
+//!
+//! A delivery with the probability p = 1 − q turns what is held, h, into h + p·(u − h) + ξ, where u is the sample and ξ a noise of mean zero and variance
+//! p·q·E(u − h)², independent of everything before it and from link to link. So the scene is its *mean* motion, in which every link passes on p of each
+//! sample, driven by noise whose variance follows from the motion: multiplicative noise, for which stability in the mean square is a gain condition
+//! (Willems & Blankenship 1971; Elia 2005, Theorem 6.4; Lu & Skelton 2002).
+//!
+//! The mean motion of equal peers falls into the common motion and the differences, as in [`Structure`](crate::structure::Structure): a node that hears
+//! itself with the weight w = 1, or w = −1/(N−1). With n what is held if nothing were lost but on average, and ζ the mean over the senders of the noise that
+//! is still held, each has the states y = (a, n), a those of the peer and its samples on the way:
+//!
+//! ```text
+//! a ← F·a + f·(w·n + ζ)                            motion
+//! n ← q·n + p·u        ζ ← q·ζ + ξ                 delivery
+//! E ξ² = p·q·σ/(N − 1),    σ = E(u_j − h_ij)² = E(u − n)² − 2·E(u − n)·ζ_ij + E ζ_ij²
+//! ```
+//!
+//! Let γ be the factor by which the second moment grows in a frame, X the solution of γX = M·X·Mᵀ + Σ b_e·b_eᵀ for the frame's matrix M of (y, ζ) and the
+//! unit noise b_e of each delivery. Then σ at each delivery is linear in the variances of the noise, with coefficients ≥ 0 that fall with γ, and
+//! the radius is the γ at which the spectral radius of that relation is 1; or that of M squared, if it is larger.
+//!
+//! [`Symmetric`](super::symmetric::Symmetric) computes the same radius by the second moment itself, some thirty times as slowly and with a bound; each is
+//! tested against the other.
+
+use num_complex::Complex64;
+
+use super::arrivals::Hazards;
+use super::variance::Variance;
+use crate::Matrix;
+use crate::lifted::Lifted;
+use crate::lifted::node::{Scale, Scratch};
+use crate::spectrum::{Schur, Workspace};
+use crate::structure::count;
+use crate::timetable::{Event, Timetable};
+
+/// How near to the true γ the search ends, relative to it.
+const TOLERANCE: f64 = 1e-13;
+/// More steps than this are not needed by any function with one sign change.
+const STEPS: usize = 200;
+
+/// A frame of equal peers, without the numbers of their bodies and gains.
+#[derive(Clone, Debug)]
+pub(crate) struct Equal {
+    peers: f64,
+    /// The events of one node, without deliveries.
+    timetable: Timetable,
+    deliveries: Vec<Delivery>,
+    depth: usize,
+    /// By what a frame multiplies the noise that is held: the probability that nothing arrives.
+    kept: f64,
+}
+
+/// What may be taken in at a tick.
+#[derive(Clone, Debug)]
+struct Delivery {
+    tick: usize,
+    /// Counted from the first sample sent in the frame.
+    sample: i64,
+    arrives: f64,
+    /// What is left at this delivery of a unit of the noise held when the frame begins, and of that of each delivery before.
+    left: Vec<f64>,
+    /// What is left of its own noise at the end of the frame.
+    at_end: f64,
+}
+
+/// Room for the computation, to be used again.
+#[derive(Debug, Default)]
+pub(crate) struct EqualScratch {
+    rows: Matrix,
+    node: Scratch,
+    target: Vec<f64>,
+    common: Block,
+    apart: Block,
+    relation: Matrix,
+    workspace: Workspace,
+}
+
+/// The mean motion of one kind, in the coordinates of its triangular form.
+#[derive(Debug, Default)]
+struct Block {
+    schur: Schur,
+    size: usize,
+    /// For each delivery, how u − n depends on the noise held when the frame begins and on that of each delivery before.
+    direct: Vec<Vec<f64>>,
+    variance: Variance,
+}
+
+impl Equal {
+    /// Of that many peers with the clock of that timetable of a single node; `hazards` are those of every link.
+    pub(crate) fn new(peers: usize, timetable: Timetable, hazards: &Hazards) -> Self {
+        let listed = hazards.at.iter().enumerate().flat_map(|(tick, at)| at.iter().map(move |hazard| (tick, *hazard)));
+        let mut deliveries: Vec<Delivery> = Vec::new();
+        let mut left = vec![1.0];
+        for (tick, hazard) in listed {
+            let missed = 1.0 - hazard.hazard;
+            deliveries.push(Delivery { tick, sample: hazard.sample, arrives: hazard.hazard, left: left.clone(), at_end: 1.0 });
+            left.iter_mut().for_each(|left| *left *= missed);
+            left.push(1.0);
+        }
+        for (delivery, left) in deliveries.iter_mut().zip(&left[1..]) {
+            delivery.at_end = *left;
+        }
+        Self { peers: count(peers), timetable, deliveries, depth: hazards.depth(), kept: left[0] }
+    }
+
+    /// The radius of the second moment of what acts, over a frame; `None` where the numbers leave their range.
+    ///
+    /// `lifted` has one node; its timetable and weights are not looked at.
+    pub(crate) fn radius(&self, lifted: &Lifted<'_>, scratch: &mut EqualScratch) -> Option<f64> {
+        let EqualScratch { rows, node, target, common, apart, relation, workspace } = scratch;
+        let n1 = self.peers - 1.0;
+        self.block(lifted, 1.0, lifted.tied, (rows, node, target), common)?;
+        self.block(lifted, -1.0 / n1, true, (rows, node, target), apart)?;
+        let lowest = common.modulus().max(apart.modulus()).max(self.kept).powi(2);
+        // The coefficients of the relation only fall as γ grows, so its inverse rises.
+        let mut rise = |gamma: f64| {
+            self.relation(gamma, common, apart, relation);
+            1.0 / workspace.radius(relation) - 1.0
+        };
+        let found = root(lowest.max(f64::MIN_POSITIVE), &mut rise);
+        found.is_finite().then_some(found)
+    }
+
+    /// The frame of the mean motion of a node that hears itself with that weight.
+    fn block(
+        &self,
+        lifted: &Lifted<'_>,
+        weight: f64,
+        tied: bool,
+        (rows, scratch, target): (&mut Matrix, &mut Scratch, &mut Vec<f64>),
+        block: &mut Block,
+    ) -> Option<()> {
+        let node = &lifted.nodes[0];
+        let gains = lifted.coordination;
+        let unit = gains.stiffness + gains.damping / lifted.time;
+        let (position_share, velocity_share) = (gains.stiffness / unit, gains.damping / lifted.time / unit);
+        let scale = Scale { time: lifted.time, compliance: node.compliance(lifted.time) };
+        let own = node.rows(0);
+        let (states, depth, sent) = (node.states(), self.depth, self.timetable.sent[0]);
+        // Rows: of the peer, its samples on the way, those of this frame, n, ζ. Columns: the states when the frame begins, ζ, the noise of each delivery.
+        let (mean, noise) = (states + depth + sent, states + depth + sent + 1);
+        let reference = (!tied).then_some(own.object);
+        let size = states + depth + 1 - usize::from(!tied);
+        let columns = size + 1 + self.deliveries.len();
+        rows.reset(noise + 1, columns);
+        let begins = (0..states + depth).chain([mean]).filter(|row| Some(*row) != reference);
+        for (column, row) in begins.clone().enumerate() {
+            rows[(row, column)] = 1.0;
+        }
+        rows[(noise, size)] = 1.0;
+        scratch.resize(columns);
+        target.resize(columns, 0.0);
+        block.size = size;
+        block.direct.clear();
+        // u − n at each delivery is a row below those of the end of the frame.
+        let mut outputs = Matrix::zeros(self.deliveries.len(), size);
+        let (mut tick, mut sample, mut next) = (0, 0, 0);
+        for event in &self.timetable.events {
+            match *event {
+                Event::Sample { .. } => {
+                    let row = states + depth + sample;
+                    for column in 0..columns {
+                        rows[(row, column)] = position_share * rows[(own.object, column)] + velocity_share * rows[(own.object + 1, column)];
+                    }
+                    sample += 1;
+                }
+                Event::Deliver { .. } => {}
+                Event::Tick { span, .. } => {
+                    while let Some(delivery) = self.deliveries.get(next).filter(|delivery| delivery.tick == tick) {
+                        let place = i64::try_from(states + depth).ok()? + delivery.sample;
+                        let row = usize::try_from(place).ok()?;
+                        let (arrives, missed) = (delivery.arrives, 1.0 - delivery.arrives);
+                        for column in 0..columns {
+                            let (fresh, held) = (rows[(row, column)], rows[(mean, column)]);
+                            if column < size {
+                                outputs[(next, column)] = fresh - held;
+                            }
+                            rows[(mean, column)] = missed * held + arrives * fresh;
+                            rows[(noise, column)] *= missed;
+                            target[column] = fresh - held;
+                        }
+                        block.direct.push(target[size..=size + next].to_vec());
+                        rows[(noise, size + 1 + next)] += 1.0;
+                        next += 1;
+                    }
+                    for (column, target) in target.iter_mut().enumerate() {
+                        *target = unit * (weight * rows[(mean, column)] + rows[(noise, column)]);
+                    }
+                    node.tick(rows, own, gains, target, None, span, scale, scratch);
+                    tick += 1;
+                }
+            }
+        }
+        // Where nothing ties the scene to ground positions are relative to the copy's; a sample moves with KT only.
+        let moves = |row: usize| {
+            if row >= states {
+                position_share
+            } else if row == own.object || Some(row) == own.device {
+                1.0
+            } else {
+                0.0
+            }
+        };
+        let ends: Vec<(usize, f64)> = begins
+            .map(|row| (if row >= states && row < mean { row + sent } else { row }, if reference.is_some() { moves(row) } else { 0.0 }))
+            .collect();
+        block.schur.load(size, (self.deliveries.len(), 1 + self.deliveries.len()), |row, column| match ends.get(row) {
+            Some((end, moved)) => rows[(*end, column)] - moved * rows[(own.object, column)],
+            None => outputs[(row - size, column)],
+        });
+        block.schur.triangularise().then_some(())
+    }
+
+    /// By what the variances of the deliveries follow from one another if the second moment grows by γ in a frame.
+    fn relation(&self, gamma: f64, common: &mut Block, apart: &mut Block, relation: &mut Matrix) {
+        let (n, n1, size) = (self.peers, self.peers - 1.0, self.deliveries.len());
+        relation.reset(size, size);
+        for (from, source) in self.deliveries.iter().enumerate() {
+            let variance = source.arrives * (1.0 - source.arrives) / n1;
+            if variance == 0.0 {
+                continue;
+            }
+            common.solve(gamma, self.kept, from, source.at_end);
+            apart.solve(gamma, self.kept, from, source.at_end);
+            let held = common.variance.of_noise();
+            for (to, delivery) in self.deliveries.iter().enumerate() {
+                let within = if from < to { delivery.left[from + 1] } else { 0.0 };
+                let [one, other] = [&*common, &*apart].map(|block| block.seen(to, from, (delivery.left[0], within)));
+                let square = (one.square + n1 * other.square) / n - 2.0 / n * (one.product - other.product);
+                let noise = n1 * (delivery.left[0].powi(2) * held + within * within);
+                // A variance: where it comes out below zero it is rounding.
+                relation[(to, from)] = (variance * (square + noise)).max(0.0);
+            }
+        }
+    }
+}
+
+/// Second moments of u − n: with itself, and with ζ.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    square: f64,
+    product: f64,
+}
+
+impl Block {
+    /// The largest modulus of an eigenvalue.
+    fn modulus(&self) -> f64 {
+        (0..self.size).map(|place| self.schur.at(place, place).norm()).fold(0.0, f64::max)
+    }
+
+    /// The second moment of (y, ζ) for unit noise at that delivery.
+    fn solve(&mut self, gamma: f64, kept: f64, delivery: usize, at_end: f64) {
+        let Self { schur, size, variance, .. } = self;
+        let size = *size;
+        let matrix = |row: usize, column: usize| match (row < size, column < size) {
+            // What is held when the frame begins is the first input.
+            (true, _) => schur.at(row, column),
+            (false, true) => Complex64::default(),
+            (false, false) => Complex64::from(kept),
+        };
+        let input = |row: usize| if row < size { schur.at(row, size + 1 + delivery) } else { Complex64::from(at_end) };
+        variance.solve(gamma, size + 1, matrix, input);
+    }
+
+    /// What is seen at a delivery of unit noise at another one: of what lasts from frame to frame, and, of a noise before it, within this one.
+    /// `left`: what is left of ζ from the beginning of the frame, and of that noise.
+    fn seen(&self, to: usize, from: usize, (left, within): (f64, f64)) -> Seen {
+        let direct = &self.direct[to];
+        let size = self.size;
+        let output = |place: usize| if place < size { self.schur.at(size + to, place) } else { Complex64::from(direct[0]) };
+        let (square, product) = self.variance.of_output(output);
+        let at_once = if from < to { direct[from + 1] } else { 0.0 };
+        Seen { square: square + at_once * at_once, product: left * product + at_once * within }
+    }
+}
+
+/// Where a function that rises with γ becomes zero; `lowest` if it is not below zero just above there.
+///
+/// The inverse of the relation's radius is nearly a straight line from its pole on, so secants are near at once; bisection is what is left if not.
+fn root(lowest: f64, rise: &mut impl FnMut(f64) -> f64) -> f64 {
+    let mut before = (lowest * (1.0 + 1e-12), 0.0);
+    before.1 = rise(before.0);
+    if before.1.is_nan() || before.1 >= 0.0 {
+        return if before.1.is_nan() { f64::NAN } else { lowest };
+    }
+    let (mut low, mut high) = (before.0, f64::INFINITY);
+    // From the pole, where the inverse is zero, through the first point.
+    let mut gamma = lowest + (before.0 - lowest) / (1.0 + before.1).max(f64::EPSILON);
+    for _ in 0..STEPS {
+        let value = rise(gamma);
+        if value.is_nan() {
+            return f64::NAN;
+        }
+        if value < 0.0 {
+            low = low.max(gamma);
+        } else {
+            high = high.min(gamma);
+        }
+        let secant = gamma - value * (gamma - before.0) / (value - before.1);
+        let inside = secant > low && secant < high && secant.is_finite();
+        let next = match (inside, high.is_finite()) {
+            (true, _) => secant,
+            (false, true) => 0.5 * (low + high),
+            (false, false) => low + 2.0 * (low - lowest),
+        };
+        // A secant that no longer moves, or bounds between which there is nothing.
+        if value == 0.0 || (secant - gamma).abs() <= TOLERANCE * gamma || (high.is_finite() && high - low <= TOLERANCE * high) {
+            return if inside { secant } else { gamma };
+        }
+        before = (gamma, value);
+        gamma = next;
+    }
+    gamma
+}
