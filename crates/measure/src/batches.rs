@@ -86,29 +86,15 @@ pub(crate) fn student(probability: f64, freedom: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
-    use crate::test_rng::TestRng;
-
-    fn autoregressive(seed: u64, phi: f64, n: usize) -> Vec<f64> {
-        let mut rng = TestRng::new(seed);
-        let mut last: f64 = StandardNormal.sample(&mut rng);
-        (0..n)
-            .map(|_| {
-                let noise: f64 = StandardNormal.sample(&mut rng);
-                last = phi * last + (1.0 - phi * phi).sqrt() * noise;
-                last
-            })
-            .collect()
-    }
+    use crate::test_rng::autoregressive;
 
     #[test]
     fn a_longer_memory_makes_fewer_batches() {
         let of = |phi: f64| Batches::of(&autoregressive(1, phi, 24_000), 5, 0.0);
         assert_eq!(of(0.0), Ok(Batches { count: 30, correction: 1.0 }));
         // φ = 0.997: τ = (1 + φ)/(1 − φ) = 666 numbers, of which 24 000 are 36: 36/4 = 9 batches, if the memory were known. It is estimated with a
-        // standard error of √(2·(2·5 + 1)/36) = 78 % at the most, so that all one can say is that there are fewer.
+        // standard error of √(2·(2·3 + 1)/36) = 62 % at the most, so that all one can say is that there are fewer.
         assert!(of(0.997).map_or(0, |batches| batches.count) < 15);
         // φ = 0.9999 does not forget in 24 000.
         assert!(matches!(of(0.9999), Err(TooFew::LongMemory { memory, allowed }) if memory > allowed));

@@ -164,23 +164,8 @@ const fn floor(place: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
-    use crate::test_rng::TestRng;
-
-    /// Lag-one autocorrelation φ, deviation 1, mean `mean`.
-    fn autoregressive(seed: u64, phi: f64, n: usize) -> Vec<f64> {
-        let mut rng = TestRng::new(seed);
-        let mut last: f64 = StandardNormal.sample(&mut rng);
-        (0..n)
-            .map(|_| {
-                let noise: f64 = StandardNormal.sample(&mut rng);
-                last = phi * last + (1.0 - phi * phi).sqrt() * noise;
-                last
-            })
-            .collect()
-    }
+    use crate::test_rng::{TestRng, autoregressive};
 
     /// Of 600 series for each memory, the true mean lies more than 2.045 of its standard errors away in 5 % (Student, 29 degrees of freedom): more than 54 of
     /// 600 with probability 2.6·10⁻⁵, fewer than 10 of the 500 that are told at least with 1.4·10⁻⁴ (binomial). Lengths from 300 numbers to 20 000;

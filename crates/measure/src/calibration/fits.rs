@@ -24,7 +24,7 @@ struct Truth {
 impl Truth {
     fn random(rng: &mut TestRng) -> Self {
         use Distribution::{Gamma, Laplace, LogNormal, Normal, Uniform, Weibull};
-        let law = [Normal, Uniform, Laplace, LogNormal, Gamma, Weibull][(rng.unit() * 6.0) as usize].clone();
+        let law = rng.pick(&[Normal, Uniform, Laplace, LogNormal, Gamma, Weibull]).clone();
         let p = 0.01 + 0.1 * rng.unit();
         Self {
             law: Law::new(&law, 0.04, 0.001 + 0.003 * rng.unit(), Some(0.03)).unwrap(),

@@ -23,16 +23,15 @@ fn probability(value: f64) -> Probability {
 /// A link with jitter of a random law and memory, and losses of a random model.
 fn random_link(rng: &mut TestRng) -> LinkConfig {
     use Distribution::{Gamma, Laplace, LogNormal, Normal, Pareto, ParetoNormal, Uniform, Weibull};
-    let pick = |rng: &mut TestRng, of: f64| (rng.unit() * of) as usize;
-    let distribution = [Normal, Uniform, Laplace, LogNormal, Gamma, Weibull, Pareto, ParetoNormal][pick(rng, 8.0)].clone();
-    let correlation = match pick(rng, 3.0) {
+    let distribution = rng.pick(&[Normal, Uniform, Laplace, LogNormal, Gamma, Weibull, Pareto, ParetoNormal]).clone();
+    let correlation = match rng.pick(&[0, 1, 2]) {
         0 => Correlation::None,
         1 => Correlation::PerPacket(0.95 * rng.unit()),
         _ => Correlation::InTime(Duration::from_secs_f64(0.03 * rng.unit() + 1e-4)),
     };
     let jitter = Jitter { correlation, ..Jitter::new(Duration::from_secs_f64(0.001 + 0.007 * rng.unit()), distribution) };
     let share = 0.01 + 0.2 * rng.unit();
-    let loss = match pick(rng, 4.0) {
+    let loss = match rng.pick(&[0, 1, 2, 3]) {
         0 => Loss::None,
         1 => Loss::Independent(probability(share)),
         2 => Loss::Correlated(Chance::correlated(probability(share), 0.8 * rng.unit()).unwrap()),
@@ -140,7 +139,7 @@ fn of_delays(tally: &mut Tally, config: &LinkConfig, achieved: &Achieved) {
     let (delay, law) = (achieved.delay.as_ref().unwrap(), config.delay.law().unwrap());
     let independent = config.delay.jitter().unwrap().correlation == Correlation::None;
     // One quantile of each link, by turns, as those of one link hang together.
-    let place = achieved.loss.received as usize % delay.quantile_intervals_95_s.len();
+    let place = usize::try_from(achieved.loss.received).unwrap() % delay.quantile_intervals_95_s.len();
     if let Some((name, [low, high])) = delay.quantile_intervals_95_s.iter().nth(place) {
         let truth = law.quantile(name.parse().unwrap()) / 1e9;
         let kind = if independent { "independent" } else { "correlated" };
