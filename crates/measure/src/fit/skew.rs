@@ -12,9 +12,9 @@
 //! whose error came out too small, so each is judged at a quarter of the level (Bonferroni): whichever is taken, a drift that is not there is found in at
 //! most 1 % of all measurements.
 //!
-//! The line below all points of least distance (Moon, Skelly & Towsley 1999, INFOCOM) needs no blocks, and is 2.5 times as close for independent delays of laws with an
-//! edge; but how close it is depends on the law and the memory of the delays near the edge, so that no error can be stated with it, and without an edge it
-//! follows single points.
+//! The line below all points of least distance (Moon, Skelly & Towsley 1999, INFOCOM) needs no blocks, and is 2.5 times as close for independent delays
+//! of laws with an edge; but how close it is depends on the law and the memory of the delays near the edge, so that no error can be stated with it, and
+//! without an edge it follows single points.
 
 mod blocks;
 
