@@ -41,8 +41,7 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     let (measurements, matched) = read(arguments)?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", output::path(&arguments.file)));
     let (measurements, skew) = if arguments.skew {
-        let (corrected, skew) =
-            measurements.without_skew().ok_or_else(|| named(&"no two packets arrived that were sent at different times: expected some"))?;
+        let (corrected, skew) = measurements.without_skew().map_err(|error| named(&error))?;
         (corrected, Some(skew))
     } else {
         (measurements, None)
@@ -72,6 +71,12 @@ fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Fai
     }
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, error))?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", output::path(path)));
+    if captures::is_capture(&bytes) {
+        return Err(named(
+            &"found the capture of one end: expected two, since a delay is the time from the one to the other: cohaptic fit SENDER RECEIVER \
+              (of what `cohaptic link` did, give the file of --fates instead)",
+        ));
+    }
     let text = String::from_utf8_lossy(&bytes);
     if text.trim_start_matches('\u{feff}').starts_with(FateRow::HEADER) {
         return Ok((Measurements::from_fates(&FateLog::parse(&text).map_err(|error| named(&error))?), None));
@@ -109,7 +114,7 @@ fn describe(fitted: &Fitted, scene: &str, skew: Option<Skew>, matched: Option<Ma
         ));
     }
     if let Some(skew) = skew {
-        line(format!("clocks drift by {:.3} us/s, removed", skew.seconds_per_second * 1e6));
+        line(describe_skew(&skew));
     }
     let error = goodness.mean_se_s.map_or_else(String::new, |error| format!(" +- {}", milliseconds(error)));
     line(format!(
@@ -143,6 +148,14 @@ fn describe(fitted: &Fitted, scene: &str, skew: Option<Skew>, matched: Option<Ma
         line(format!("  {:<60}{:>10.5} %{:>14.1}", model(loss), loss.mean_loss * 100.0, loss.bic - best));
     }
     text
+}
+
+fn describe_skew(skew: &Skew) -> String {
+    let [drift, error, low, high] =
+        [skew.seconds_per_second, skew.standard_error, skew.interval_99[0], skew.interval_99[1]].map(|drift| format!("{:.3}", drift * 1e6));
+    let location = skew.location.name();
+    let removed = if skew.significant { "removed" } else { "not significant at 1 %, left in" };
+    format!("clocks drift by {drift} +- {error} us/s, in 99 % from {low} to {high} ({location} of each of {} blocks): {removed}", skew.blocks)
 }
 
 fn model(loss: &LossFit) -> String {

@@ -1,8 +1,7 @@
 //! What a link achieved, to be set beside what it was asked for.
 //!
-//! Every figure is one that the literature defines, and has a standard error or an interval wherever there is a textbook one. An interval for a
-//! *proportion* (Wilson) or a *quantile* (order statistics) holds for independent packets; where they are correlated, compare with the standard
-//! error by batch means, which takes correlation into account.
+//! Every figure is one that the literature defines, and has a standard error or an interval wherever there is a textbook one. Those of means, *proportions*
+//! (Wilson) and *quantiles* (order statistics) take from batch means how much packets hang together.
 //!
 //! | what | definition |
 //! | --- | --- |

@@ -4,10 +4,10 @@
 //! not lost. So a figure is near the one asked for whatever the other stages do. A delay is compared only where nothing but its law makes it (no queue,
 //! no slots, no reordering, no order that makes packets wait).
 //!
-//! Standard errors are those of 30 batch means, which take correlation into account, but not below those of independent packets. A quantile is judged by
-//! the share of packets that are not above the one asked for.
+//! Standard errors are those of 30 batch means, or of fewer where packets remember for long, which take correlation into account, but not below those of
+//! independent packets. A quantile is judged by the share of packets that are not above the one asked for.
 
-use cohaptic_wan::{DropCause, Fate, PacketRecord};
+use cohaptic_wan::{Distribution, DropCause, Fate, PacketRecord};
 use serde::Serialize;
 
 use crate::asked::{Asked, QUANTILES};
@@ -23,13 +23,14 @@ pub struct Figure {
     pub asked: f64,
     /// What was achieved; `None` if no packet can tell.
     pub achieved: Option<f64>,
-    /// The standard error of what was achieved; `None` where packets are too few, zero where nothing varies.
+    /// The standard error of what was achieved; `None` where packets are too few or remember for too long, or where the law has no such error (the deviation
+    /// and the autocorrelation of Pareto's laws, whose fourth moment is infinite); zero where nothing varies.
     pub standard_error: Option<f64>,
     /// Whether what was asked for lies more than four standard errors away.
     pub outside: bool,
 }
 
-/// How many standard errors are too many: 1 in 2500 with 29 degrees of freedom (Student).
+/// How many standard errors are too many: 1 in 2500 with 29 degrees of freedom (Student), 1 in 600 where there are only 10 batches.
 const TOO_MANY: f64 = 4.0;
 /// Delays count whole nanoseconds.
 const ROUNDING_S: f64 = 1e-9;
@@ -102,10 +103,12 @@ impl Beside {
             figures.push(figure("mean_s", wanted, mean, mean_error, ROUNDING_S));
         }
         let sd = variance.map(f64::sqrt);
+        // Of Pareto's tail the fourth moment is infinite, and so is the variance of squares.
+        let squares_vary = !delay.law().is_some_and(|law| matches!(law.distribution(), Distribution::Pareto | Distribution::ParetoNormal));
         if let (Some(wanted), Some(mean)) = (asked.sd_s, mean) {
             let squares: Vec<f64> = delays.iter().map(|delay| (delay - mean).powi(2)).collect();
             let error = sd.and_then(|sd| if sd > 0.0 { Some(series::batch_standard_error(&squares)? / (2.0 * sd)) } else { Some(0.0) });
-            figures.push(figure("sd_s", wanted, sd, error, ROUNDING_S));
+            figures.push(figure("sd_s", wanted, sd, error.filter(|_| squares_vary), ROUNDING_S));
         }
         let Some(law) = delay.law() else { return };
         let mut sorted = delays.clone();
@@ -116,16 +119,22 @@ impl Beside {
             let share = law.cdf(wanted * 1e9 + 0.5);
             let below: Vec<f64> = delays.iter().map(|delay| f64::from(u8::from(*delay <= wanted + 0.5 * ROUNDING_S))).collect();
             let judged = of_share("", share, wanted, &below, quantile(&sorted, p));
-            // The error of a quantile is that of the share over the density, here from the distance over which the share changes by one error.
+            // The error of a quantile is that of the share over the density, here from the distance over which the share changes by one error, to the side on
+            // which that is farther.
             let error = judged.standard_error.and_then(|error| {
-                let [low, high] = [p - error, p + error].map(|p| law.quantile(p.clamp(0.0, 1.0)));
-                (p > error && p + error < 1.0).then_some((high - low) / 2e9)
+                let [low, middle, high] = [p - error, p, p + error].map(|p| law.quantile(p.clamp(0.0, 1.0)));
+                (p > error && p + error < 1.0).then_some((high - middle).max(middle - low) / 1e9)
             });
             figures.push(Figure { name: format!("quantile_{name}_s"), standard_error: error, ..judged });
         }
         let unbroken = self.packets.iter().all(|seen| !seen.copied);
         if let (Some(&wanted), true) = (asked.autocorrelation.first(), unbroken) {
-            let achieved = series::autocorrelation(&by_packet, 1).first().copied();
+            // Of the pairs alone: where packets are lost, the variance over all delays is another one than theirs.
+            let achieved = mean.and_then(|mean| {
+                let pairs = by_packet.windows(2).filter_map(|pair| Some((pair[0]? - mean, pair[1]? - mean)));
+                let (products, squares) = pairs.fold((0.0, 0.0), |(products, squares), (x, y)| (products + x * y, squares + (x * x + y * y) / 2.0));
+                (squares > 0.0).then_some(products / squares)
+            });
             let error = achieved.zip(mean).zip(variance).and_then(|((r, mean), variance)| {
                 // The influence of each pair on the autocorrelation.
                 let influence = |pair: &[Option<f64>]| {
@@ -136,7 +145,7 @@ impl Beside {
                 let independent = series::variance(&influences).map(|variance| (variance / count(influences.len())).sqrt());
                 worst(series::batch_standard_error(&influences), independent)
             });
-            figures.push(figure("autocorrelation_1", wanted, achieved, error, 0.0));
+            figures.push(figure("autocorrelation_1", wanted, achieved, error.filter(|_| squares_vary), 0.0));
         }
     }
 }
@@ -230,6 +239,15 @@ mod tests {
         assert_eq!(outside("delay 40ms duplicate 2% corrupt 2%", "delay 40ms duplicate 3% corrupt 1%"), ["duplicated", "damaged"]);
         let law = outside("delay 40ms 4ms distribution normal", "delay 40ms 6.928203ms");
         assert!(law.contains(&"quantile_0.99_s".to_owned()) && !law.contains(&"mean_s".to_owned()) && !law.contains(&"sd_s".to_owned()), "{law:?}");
+    }
+
+    /// Pareto's law of tail index 3 has no fourth moment: the variance of its squares, from which the error of a deviation comes, is infinite.
+    #[test]
+    fn an_error_that_does_not_exist_is_not_stated() {
+        let words = "delay 40ms 4ms distribution pareto";
+        let without: Vec<String> =
+            figures(words, words).into_iter().filter(|figure| figure.standard_error.is_none()).map(|figure| figure.name).collect();
+        assert_eq!(without, ["sd_s", "autocorrelation_1"]);
     }
 
     #[test]

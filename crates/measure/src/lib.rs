@@ -34,7 +34,10 @@
 
 pub mod achieved;
 pub mod asked;
+mod batches;
 pub mod beside;
+#[cfg(test)]
+mod calibration;
 pub mod fates;
 pub mod fit;
 pub mod pcapng;

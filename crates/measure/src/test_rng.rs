@@ -3,6 +3,7 @@
 use core::convert::Infallible;
 
 use rand_core::TryRng;
+use rand_distr::{Distribution, StandardNormal};
 
 pub(crate) struct TestRng(u64);
 
@@ -25,6 +26,14 @@ impl TestRng {
     }
 }
 
+impl TestRng {
+    /// One of these, each as likely as another.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and below the length of a list")]
+    pub(crate) fn pick<'a, T>(&mut self, of: &'a [T]) -> &'a T {
+        &of[(self.unit() * of.len() as f64) as usize]
+    }
+}
+
 impl TryRng for TestRng {
     type Error = Infallible;
 
@@ -42,4 +51,17 @@ impl TryRng for TestRng {
         }
         Ok(())
     }
+}
+
+/// A normal series of mean 0 and deviation 1 with the autocorrelation φ at lag one.
+pub(crate) fn autoregressive(seed: u64, phi: f64, n: usize) -> Vec<f64> {
+    let mut rng = TestRng::new(seed);
+    let mut last: f64 = StandardNormal.sample(&mut rng);
+    (0..n)
+        .map(|_| {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            last = phi * last + (1.0 - phi * phi).sqrt() * noise;
+            last
+        })
+        .collect()
 }

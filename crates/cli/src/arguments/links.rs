@@ -54,14 +54,14 @@ pub(crate) enum Profile {
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_STATUS)]
 pub(crate) struct FitArguments {
-    /// A CSV of one-way measurements (t,delay or sent,arrived), a file of fates, or the capture of the sender
+    /// A CSV of one-way measurements (t,delay or sent,arrived), a file of fates, or the capture of the sender (which takes that of the receiver too)
     pub(crate) file: PathBuf,
     /// The capture of the receiver
     pub(crate) receiver: Option<PathBuf>,
     /// Only datagrams to this UDP port, of captures
     #[arg(long, value_name = "N", requires = "receiver")]
     pub(crate) port: Option<u16>,
-    /// Remove a linear drift of one clock against the other first
+    /// Estimate the linear drift of one clock against the other, and remove it first where it is significant at 1 %
     #[arg(long)]
     pub(crate) skew: bool,
     /// Print one JSON document and nothing else

@@ -41,25 +41,63 @@ fn the_correlation_is_that_of_delays_and_not_of_their_scores() {
     assert!((rho - 0.9).abs() < 0.01, "{rho}");
 }
 
-#[test]
-fn measurements_are_read_and_a_drift_is_removed() {
-    let desk = Desk::new();
-    desk.text("link delay 20ms 2ms --packets 5000 --fates f.csv");
+/// The fates of that link as measurements of a clock that gains so many nanoseconds each millisecond.
+fn drifting(desk: &Desk, link: &str, nanos_each_ms: i32) {
+    desk.text(&format!("{link} --fates f.csv"));
     let log = desk.read("f.csv");
-    let mut rows: Vec<[u64; 2]> = log.lines().skip(1).map(|row| [2, 4].map(|place| row.split(',').nth(place).unwrap().parse().unwrap())).collect();
+    let mut rows: Vec<[i64; 2]> = log.lines().skip(1).map(|row| [2, 4].map(|place| row.split(',').nth(place).unwrap().parse().unwrap())).collect();
     rows.sort_unstable();
     let mut csv = "t_ns,delay_ns\n".to_owned();
     for [offered, at] in rows {
-        // One clock is faster by 1 ms a second.
-        let _ = writeln!(csv, "{offered},{}", at - offered + offered / 1000);
+        let _ = writeln!(csv, "{offered},{}", at - offered + offered / 1_000_000 * i64::from(nanos_each_ms));
     }
     desk.write("m.csv", csv);
+}
+
+#[test]
+fn measurements_are_read_and_a_drift_is_removed() {
+    let desk = Desk::new();
+    drifting(&desk, "link delay 20ms 2ms --packets 5000", 1000);
     let document = desk.json("fit m.csv --skew --json");
     assert!((number(&document["skew"]["seconds_per_second"]) - 1e-3).abs() < 1e-5, "{document:#}");
     assert!((number(&document["link"]["delay_s"]) - 0.02).abs() < 2e-4);
     let text = desk.text("fit m.csv --skew");
-    for part in ["[link]\ndelay = ", "jitter = {", "5000 packets, 5000 arrived", "clocks drift by", "Kolmogorov", "uniform", "BIC"] {
+    for part in ["[link]\ndelay = ", "jitter = {", "5000 packets, 5000 arrived", "clocks drift by", ": removed", "Kolmogorov", "uniform", "BIC"] {
         assert!(text.contains(part), "no {part:?} in:\n{text}");
+    }
+}
+
+/// 40 000 packets in 40 s at 40 ms ± 4 ms, normal: the slope of delays in time is known to 4 ms·√(12/40 000)/40 s = 1.7 µs/s, and the mean to 20 µs, or, of
+/// the first packet, to 1.7 µs/s·20 s = 40 µs. Five of each.
+#[test]
+fn a_drift_is_removed_only_where_there_is_one() {
+    let desk = Desk::new();
+    for (nanos_each_ms, seed) in [(0, 1), (0, 2), (20, 3), (-20, 4), (100, 5), (-1000, 6)] {
+        drifting(&desk, &format!("link delay 40ms 4ms distribution normal --packets 40000 --seed {seed}"), nanos_each_ms);
+        let document = desk.json("fit m.csv --skew --json");
+        let (skew, drift) = (&document["skew"], 1e-6 * f64::from(nanos_each_ms));
+        assert!((number(&skew["seconds_per_second"]) - drift).abs() < 5.0 * 1.7e-6, "{document:#}");
+        assert!((1.2e-6..2.4e-6).contains(&number(&skew["standard_error"])), "{document:#}");
+        assert!(number(&skew["interval_99"][0]) <= drift && drift <= number(&skew["interval_99"][1]), "{document:#}");
+        assert_eq!(skew["significant"], nanos_each_ms != 0, "{document:#}");
+        assert!((number(&document["link"]["delay_s"]) - 0.04).abs() < 5.0 * 40e-6, "{document:#}");
+        if nanos_each_ms == 0 {
+            assert_eq!(document["link"], desk.json("fit m.csv --json")["link"]);
+            assert!(desk.text("fit m.csv --skew").contains(" us/s, in 99 % from -"));
+            assert!(desk.text("fit m.csv --skew").contains(": not significant at 1 %, left in"));
+        }
+    }
+}
+
+#[test]
+fn one_capture_says_that_two_are_needed() {
+    let desk = Desk::new();
+    desk.text("link delay 20ms 2ms --packets 100 --pcapng one.pcapng");
+    desk.cohaptic("fit one.pcapng")
+        .assert_refused(2, &["one.pcapng: found the capture of one end: expected two", "cohaptic fit SENDER RECEIVER", "--fates"]);
+    for magic in [[0xd4, 0xc3, 0xb2, 0xa1], [0xa1, 0xb2, 0x3c, 0x4d]] {
+        desk.write("old.pcap", magic);
+        desk.cohaptic("fit old.pcap --skew").assert_refused(2, &["old.pcap: found the capture of one end: expected two"]);
     }
 }
 

@@ -9,8 +9,8 @@ use crate::series::count_u64;
 
 /// Takes the records of one link as they happen and gives its figures at any time.
 ///
-/// It holds 16 bytes for every packet, and as many for every place where arrivals do not follow the order of sending; [`Accumulator::finish`] needs
-/// about 32 bytes a packet more while it runs.
+/// It holds 17 bytes for every packet, and 16 for every place where arrivals do not follow the order of sending; [`Accumulator::finish`] needs about 48
+/// bytes a packet more while it runs.
 #[derive(Clone, Debug, Default)]
 pub struct Accumulator {
     /// Packets by sequence.

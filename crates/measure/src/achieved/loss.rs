@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::accumulator::Outcome;
 use super::delay::LAGS;
-use crate::series::{self, count_u64};
+use crate::series::{self, NORMAL_975, count_u64, wilson};
 
 /// Figures of which packets arrived, in the order of sending.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -19,7 +19,7 @@ pub struct LossFigures {
     /// The share of packets lost; `None` if none has ended.
     #[serde(rename = "loss", skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// Wilson's interval for it at confidence 0.95, for independent losses. Bursts make it too narrow: compare [`LossFigures::standard_error`].
+    /// Wilson's interval for it at confidence 0.95; from 300 packets on, batch means take bursts into account.
     #[serde(rename = "loss_interval_95", skip_serializing_if = "Option::is_none")]
     pub interval_95: Option<[f64; 2]>,
     /// The standard error of the share by 30 batch means, which takes bursts into account. `None` of fewer than 300 packets.
@@ -28,7 +28,8 @@ pub struct LossFigures {
     /// The mean number of packets lost one after another.
     #[serde(rename = "loss_run_mean", skip_serializing_if = "Option::is_none")]
     pub run_mean: Option<f64>,
-    /// The standard error of that mean, sd/√(number of runs): runs of a Markov chain are independent.
+    /// The standard error of that mean: sd/√(number of runs), as runs of a Markov chain are independent, and not less than what Wilson's interval of the
+    /// share of lost packets that end a run says, which matters where runs are few or all are equal.
     #[serde(rename = "loss_run_mean_se", skip_serializing_if = "Option::is_none")]
     pub run_mean_se: Option<f64>,
     /// How many runs of each length. Runs at the ends of the measurement are cut off by it and counted as they are.
@@ -59,7 +60,7 @@ impl LossFigures {
             received,
             lost,
             value: (ended > 0).then(|| count_u64(lost) / count_u64(ended)),
-            interval_95: series::wilson(lost, ended),
+            interval_95: series::share_interval(&indicator),
             standard_error: series::batch_standard_error(&indicator),
             run_mean: mean_of_lengths(&runs),
             run_mean_se: standard_error_of_lengths(&runs),
@@ -117,5 +118,8 @@ fn standard_error_of_lengths(runs: &BTreeMap<u64, u64>) -> Option<f64> {
     let mean = mean_of_lengths(runs)?;
     let times: u64 = runs.values().sum();
     let squares: f64 = runs.iter().map(|(&length, &times)| count_u64(times) * (count_u64(length) - mean).powi(2)).sum();
-    (times > 1).then(|| (squares / count_u64(times - 1) / count_u64(times)).sqrt())
+    let packets: u64 = runs.iter().map(|(length, times)| length * times).sum();
+    // 1/mean is the share of packets that end a run.
+    let reach = wilson(times, packets).map_or(0.0, |[low, high]| (1.0 / low - mean).max(mean - 1.0 / high) / NORMAL_975);
+    (times > 1).then(|| (squares / count_u64(times - 1) / count_u64(times)).sqrt().max(reach))
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::series::{count_u64, wilson};
+use crate::series::{count_u64, share_interval};
 
 /// Figures of the order in which packets arrived; extra copies are passed over.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -12,7 +12,7 @@ pub struct OrderFigures {
     /// section 3.3). `None` if nothing arrived.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reordered: Option<f64>,
-    /// Wilson's interval for it at confidence 0.95, for independent packets, which reordering seldom leaves.
+    /// Wilson's interval for it at confidence 0.95; from 300 packets on, batch means take into account that reordered packets come together.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reordered_interval_95: Option<[f64; 2]>,
     /// The mean extent of the reordered packets \[arrivals\]: i − j for the i-th arrival, where j is the first arrival of a packet sent later (RFC 4737,
@@ -30,6 +30,8 @@ pub(super) struct OrderOfArrival {
     received: u64,
     next_expected: u64,
     reordered: u64,
+    /// Whether each arrival was.
+    was_reordered: Vec<bool>,
     extent_sum: u64,
     extent_max: u64,
     /// The arrivals (place, number) that exceeded all numbers before, but only those that left numbers out or came after a reordered one: in between,
@@ -42,6 +44,7 @@ impl OrderOfArrival {
     pub(super) fn arrives(&mut self, sequence: u64) {
         let place = self.received;
         self.received += 1;
+        self.was_reordered.push(sequence < self.next_expected);
         if sequence >= self.next_expected {
             let follows = sequence == self.next_expected && self.records.last().is_some_and(|(at, number)| place - at == sequence - number);
             if !follows {
@@ -59,9 +62,10 @@ impl OrderOfArrival {
     }
 
     pub(super) fn figures(&self) -> OrderFigures {
+        let indicator: Vec<f64> = self.was_reordered.iter().map(|reordered| f64::from(u8::from(*reordered))).collect();
         OrderFigures {
             reordered: (self.received > 0).then(|| count_u64(self.reordered) / count_u64(self.received)),
-            reordered_interval_95: wilson(self.reordered, self.received),
+            reordered_interval_95: share_interval(&indicator),
             reordering_extent_mean: (self.reordered > 0).then(|| count_u64(self.extent_sum) / count_u64(self.reordered)),
             reordering_extent_max: (self.reordered > 0).then_some(self.extent_max),
         }

@@ -101,6 +101,15 @@ impl End {
     }
 }
 
+/// Whether a file that begins like this is a capture: pcap of either byte order, with microseconds or nanoseconds, or pcapng.
+#[must_use]
+pub fn is_capture(beginning: &[u8]) -> bool {
+    const PCAPNG: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
+    const PCAP: [[u8; 4]; 2] = [[0xA1, 0xB2, 0xC3, 0xD4], [0xA1, 0xB2, 0x3C, 0x4D]];
+    let Some(&[a, b, c, d]) = beginning.first_chunk() else { return false };
+    [a, b, c, d] == PCAPNG || PCAP.contains(&[a, b, c, d]) || PCAP.contains(&[d, c, b, a])
+}
+
 /// Reads the captures of both ends. `port`: only datagrams to that UDP port count, which keeps other traffic from being taken for losses.
 ///
 /// # Errors

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::law::normal_quantile;
 use super::search::{maximise, standard_error};
-use crate::series::count;
+use crate::series::{NORMAL_975, count};
 
 /// The correlation of delays in time.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -21,7 +21,8 @@ use crate::series::count;
 pub struct CorrelationFit {
     /// The correlation time τ \[s\].
     pub time_s: f64,
-    /// Its standard error \[s\], from the curvature of the likelihood with the variance estimated too; `None` where that is flat.
+    /// Its standard error \[s\], from the curvature of the likelihood of ln τ with the variance estimated too: so much that 1.96 of it reach the farther
+    /// end of the interval of ln τ. `None` where the likelihood is flat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_se_s: Option<f64>,
     /// The correlation of the normal scores over the typical spacing Δ of packets: e^{−Δ/τ}.
@@ -70,7 +71,7 @@ pub(super) fn fit(arrivals: &[(f64, f64)], spacing: f64) -> Option<CorrelationFi
     let lag_one = (-spacing / time_s).exp();
     Some(CorrelationFit {
         time_s,
-        time_se_s: relative_error.map(|error| error * time_s),
+        time_se_s: relative_error.map(|error| (NORMAL_975 * error).exp_m1() / NORMAL_975 * time_s),
         lag_one,
         // dφ/d ln τ = φ·Δ/τ.
         lag_one_se: relative_error.map(|error| error * lag_one * spacing / time_s),

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::hidden_markov;
 use super::search::maximise;
-use crate::series::count;
+use crate::series::{count, share_error};
 
 /// A model of which packets are lost.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -54,7 +54,8 @@ pub enum LossModel {
 pub struct LossFit {
     /// The model.
     pub model: LossModel,
-    /// Standard errors of the first and second parameter of the model, where there is a closed form: √(p(1−p)/n) of a share of n.
+    /// Standard errors of the first and second parameter of the model, where there is a closed form: of a share p of n, √(p(1−p)/n), or so much more that
+    /// 1.96 of them reach the farther end of Wilson's interval, which matters where little happened.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_errors: Option<[f64; 2]>,
     /// The share of packets lost that the model has in the long run.
@@ -85,8 +86,7 @@ pub(super) fn fit_all(packets: &[(f64, bool)], evenly_spaced: bool) -> Vec<LossF
         return vec![judged(LossModel::None, 0.0, 0.0, 0.0, None)];
     }
     let independent = log_share(losses, n) + log_share(n - losses, n);
-    let mut fits =
-        vec![judged(LossModel::Independent { probability: share }, 1.0, share, independent, Some([(share * (1.0 - share) / n).sqrt(), 0.0]))];
+    let mut fits = vec![judged(LossModel::Independent { probability: share }, 1.0, share, independent, Some([error_of_share(losses, n), 0.0]))];
     if evenly_spaced {
         if let Some((p, r, standard_errors, log_likelihood)) = simple_gilbert(&lost) {
             let model = LossModel::GilbertElliott { p, r, h: 0.0, k: 1.0 };
@@ -114,6 +114,13 @@ fn log_share(happened: f64, of: f64) -> f64 {
     if happened > 0.0 { happened * (happened / of).ln() } else { 0.0 }
 }
 
+/// The standard error of a share, both numbers being counts.
+fn error_of_share(happened: f64, of: f64) -> f64 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts")]
+    let [happened, of] = [happened as u64, of as u64];
+    share_error(happened, of)
+}
+
 /// p, r, their standard errors and ln L, the first packet by the share of its state in the long run. `None` if the chain never left one of its states.
 fn simple_gilbert(lost: &[bool]) -> Option<(f64, f64, [f64; 2], f64)> {
     let mut counts = [[0_usize; 2]; 2];
@@ -129,7 +136,7 @@ fn simple_gilbert(lost: &[bool]) -> Option<(f64, f64, [f64; 2], f64)> {
     let first = if lost[0] { p / (p + r) } else { r / (p + r) };
     let log_likelihood =
         first.ln() + log_share(stays_good, good) + log_share(turns_bad, good) + log_share(turns_good, bad) + log_share(stays_bad, bad);
-    Some((p, r, [(p * (1.0 - p) / good).sqrt(), (r * (1.0 - r) / bad).sqrt()], log_likelihood))
+    Some((p, r, [error_of_share(turns_bad, good), error_of_share(turns_good, bad)], log_likelihood))
 }
 
 /// The share π of time that is bad, the rate λ = 1/(mean good) + 1/(mean bad) at which the chain forgets \[1/s\], and ln L. `None` if it never changed.

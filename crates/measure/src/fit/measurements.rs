@@ -2,7 +2,7 @@
 
 use cohaptic_wan::{Fate, FateLog};
 
-use super::skew::Skew;
+use super::skew::{Skew, SkewError};
 
 /// One packet: when it was sent, and how long it took.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -15,7 +15,11 @@ pub struct Measurement {
 
 /// Packets in the order of sending, all numbers finite.
 #[derive(Clone, PartialEq, Debug, Default)]
-pub struct Measurements(Vec<Measurement>);
+pub struct Measurements {
+    packets: Vec<Measurement>,
+    /// The drift that was taken off.
+    removed: Option<Skew>,
+}
 
 /// Why measurements are refused. Packets are counted from 1.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
@@ -58,7 +62,7 @@ impl Measurements {
             }
             before_s = sent_s;
         }
-        Ok(Self(packets))
+        Ok(Self { packets, removed: None })
     }
 
     /// The packets of a fate log: each was sent when it was offered and took as long as the first of its copies to arrive.
@@ -77,18 +81,23 @@ impl Measurements {
             }
         }
         // A log stands in the order of sending, and its instants are finite.
-        Self(packets)
+        Self { packets, removed: None }
     }
 
     /// The packets, in the order of sending.
     #[must_use]
     pub fn packets(&self) -> &[Measurement] {
-        &self.0
+        &self.packets
+    }
+
+    /// The drift that was taken off, which the mean of the delays is no more certain than.
+    pub(super) const fn removed(&self) -> Option<&Skew> {
+        self.removed.as_ref()
     }
 
     /// The packets that arrived: (sending, delay) \[s\].
     pub(super) fn arrivals(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        self.0.iter().filter_map(|packet| Some((packet.sent_s, packet.delay_s?)))
+        self.packets.iter().filter_map(|packet| Some((packet.sent_s, packet.delay_s?)))
     }
 
     /// The same with every delay longer by `by_s` \[s\], for two clocks whose offset is known or assumed. From one-way measurements alone the offset
@@ -98,23 +107,27 @@ impl Measurements {
     ///
     /// [`MeasurementsError::NotFinite`] if a sum is not finite.
     pub fn shifted(&self, by_s: f64) -> Result<Self, MeasurementsError> {
-        Self::new(self.0.iter().map(|packet| Measurement { delay_s: packet.delay_s.map(|delay| delay + by_s), ..*packet }).collect())
+        let later = |packet: &Measurement| Measurement { delay_s: packet.delay_s.map(|delay| delay + by_s), ..*packet };
+        Ok(Self { removed: self.removed, ..Self::new(self.packets.iter().map(later).collect())? })
     }
 
-    /// The same without the linear drift of one clock against the other, and that drift. The delay of the first packet stays as it is. `None` if fewer
-    /// than two instants of sending arrived.
+    /// The linear drift of one clock against the other, and these measurements without it where it is significant: a drift that may be chance stays in
+    /// ([`Skew::significant`]). The delay of the first packet stays as it is.
     ///
-    /// See [`Skew`] for the method, and for what it takes for drift.
-    #[must_use]
-    pub fn without_skew(&self) -> Option<(Self, Skew)> {
+    /// See [`Skew`] for what else looks like drift.
+    ///
+    /// # Errors
+    ///
+    /// [`SkewError`] if fewer than 50 packets arrived, all of these were sent at one instant, or the delays hang together for too long.
+    pub fn without_skew(&self) -> Result<(Self, Skew), SkewError> {
         let arrivals: Vec<(f64, f64)> = self.arrivals().collect();
         let skew = Skew::of(&arrivals)?;
-        let origin = self.0.first()?.sent_s;
+        let Some(first) = self.packets.first().filter(|_| skew.significant) else { return Ok((self.clone(), skew)) };
         let corrected = |packet: &Measurement| Measurement {
-            delay_s: packet.delay_s.map(|delay| delay - skew.seconds_per_second * (packet.sent_s - origin)),
+            delay_s: packet.delay_s.map(|delay| delay - skew.seconds_per_second * (packet.sent_s - first.sent_s)),
             ..*packet
         };
-        Some((Self(self.0.iter().map(corrected).collect()), skew))
+        Ok((Self { packets: self.packets.iter().map(corrected).collect(), removed: Some(skew) }, skew))
     }
 }
 

@@ -22,6 +22,18 @@ fn delays(matched: &Matched) -> Vec<(f64, Option<f64>)> {
 }
 
 #[test]
+fn captures_are_known_by_how_they_begin() {
+    // draft-ietf-opsawg-pcap, section 4: 0xA1B2C3D4 with microseconds, 0xA1B23C4D with nanoseconds, in the order of the writer's bytes.
+    for magic in [[0xA1, 0xB2, 0xC3, 0xD4], [0xD4, 0xC3, 0xB2, 0xA1], [0xA1, 0xB2, 0x3C, 0x4D], [0x4D, 0x3C, 0xB2, 0xA1]] {
+        assert!(is_capture(&magic));
+    }
+    assert!(is_capture(&capture(&[])));
+    for other in [b"t,delay".as_slice(), b"\n\r", b"", &[0xA1, 0xB2, 0xC3, 0x4D]] {
+        assert!(!is_capture(other));
+    }
+}
+
+#[test]
 fn datagrams_are_matched_by_what_they_carry() {
     let sent = capture(&[(0, 1_000, b"a"), (1, 2_000, b"b"), (2, 3_000, b"c")]);
     // b is lost, c overtakes a and comes twice, x is foreign.
