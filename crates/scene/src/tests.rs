@@ -71,7 +71,7 @@ fn the_scene_without_faults_is_taken() {
 #[test]
 fn the_display_form_shows_the_line_with_carets_below_the_place() {
     let error = refused(&SCENE.replace("delay = \"24ms\"", "delay     = \"8 parsecs\""), &[]);
-    let expected = r#"x.toml:17:13: link.delay: unknown unit "parsecs" in "8 parsecs": expected a duration such as "8ms", "1.5s" or "250us"
+    let expected = r#"x.toml:17:13: link.delay: unknown unit "parsecs" in "8 parsecs": expected a duration such as "8ms", "1.5s" or "250us" (units: ns, us, ms, s, min, h)
    |
 17 | delay     = "8 parsecs"
    |             ^^^^^^^^^^^"#;

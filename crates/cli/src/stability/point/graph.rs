@@ -6,6 +6,7 @@ use cohaptic_scene::Scene;
 use cohaptic_stability::{Graph, Judgement, Matrix, analyse_on};
 
 use crate::failure::Failure;
+use crate::text_file;
 
 /// The verdict if each peer hears only its neighbours. Links that leave something to chance count as if they did not.
 pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failure> {
@@ -22,7 +23,7 @@ pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, F
 
 /// A file of weights: one line a peer, numbers between commas.
 fn weights(file: &Path) -> Result<Graph, Failure> {
-    let text = std::fs::read_to_string(file).map_err(|error| Failure::File { verb: "read", path: file.to_path_buf(), error })?;
+    let text = text_file::read(file)?;
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let entry = |entry: &str| {
