@@ -211,7 +211,10 @@ fn what_turns_the_writing_is_shown_as_an_escape() {
         assert!(outcome.stderr.contains(&format!("no{shown}where.toml")) && !outcome.stderr.contains(c), "{}", outcome.stderr);
         let outcome = desk.cohaptic(&format!("fit no{c}where.csv"));
         assert!(outcome.stderr.contains(&format!("no{shown}where.csv")) && !outcome.stderr.contains(c), "{}", outcome.stderr);
-        let outcome = desk.cohaptic(&format!("run two.toml --no{c}plot"));
-        assert!(outcome.stderr.contains(&shown) && !outcome.stderr.contains(c), "{}", outcome.stderr);
+        // With the option that was perhaps meant, and with advice that repeats what was typed.
+        for line in [format!("run two.toml --no{c}plot"), format!("run two.toml --{c}"), format!("check two.toml -{c}")] {
+            let outcome = desk.cohaptic(&line);
+            assert!(outcome.stderr.contains(&shown) && !outcome.stderr.contains(c), "{}", outcome.stderr);
+        }
     }
 }
