@@ -117,7 +117,7 @@ fn a_fault_names_line_key_and_what_was_expected() {
         assert!(diagnostic.message().contains(words) && diagnostic.message().contains("expected") || words.contains("mean"), "{error}");
     }
     let one = "programs = [{ name = \"a\", port = \"[::1]:1\" }]";
-    assert!(parse(one).unwrap_err().to_string().contains("a relay with 1 programs: expected at least two"));
+    assert!(parse(one).unwrap_err().to_string().contains("a relay with 1 program: expected at least two"));
     assert!(parse("").unwrap_err().to_string().contains("programs: missing key"));
 }
 
