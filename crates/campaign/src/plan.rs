@@ -165,7 +165,7 @@ impl Plan {
             Err(error) => return Err(CampaignError::Scene { error: Box::new(error), varied }),
         };
         if let Some(reason) = cohaptic_harness::too_large(&scene) {
-            return Err(CampaignError::NotRun { message: reason, varied });
+            return Err(CampaignError::NotRun { message: format!("scene.count: {reason}"), varied });
         }
         // Seeds are at most what a scene file may say, so that every run can be repeated alone.
         let most = i64::MAX.unsigned_abs();

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::arguments::CheckArguments;
-use crate::failure::{BAD_INPUT, EXPECTATION, Failure, INTERRUPTED, scene_status};
+use crate::failure::{self, EXPECTATION, Failure, INTERRUPTED, scene_status};
 use crate::progress::Progress;
 use crate::{interrupt, output};
 
@@ -74,14 +74,8 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
     match Scene::read(file, overrides) {
         Err(error) => Checked::unreadable(file, &error),
         Ok(scene) => {
-            if let Some(reason) = cohaptic_harness::too_large(&scene) {
-                return Checked {
-                    file: output::path(file),
-                    passed: false,
-                    failures: vec![reason],
-                    expects: scene.expect.is_some(),
-                    status: BAD_INPUT,
-                };
+            if let Some(error) = failure::too_large(&scene, overrides) {
+                return Checked { expects: scene.expect.is_some(), ..Checked::unreadable(file, &error) };
             }
             let failures = harness::check_with(&scene, model, judged, || !interrupt::asked());
             let status = if failures.is_empty() { 0 } else { EXPECTATION };

@@ -4,8 +4,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use clap::builder::StyledStr;
+use clap::error::{ContextKind, ContextValue};
 use cohaptic_harness::record::RecordError;
-use cohaptic_scene::SceneError;
+use cohaptic_scene::{Diagnostic, Scene, SceneError, at_peer};
+use cohaptic_units::{Visible, visible_lines};
 
 use crate::output;
 
@@ -76,15 +79,42 @@ impl Failure {
         };
         // If standard error cannot be written to either, the exit status is all that is left to say it with.
         let kind = if status == INTERRUPTED { "interrupted" } else { "error" };
-        let _ = io::Write::write_all(&mut io::stderr(), format!("{kind}: {message}\n").as_bytes());
+        let _ = io::Write::write_all(&mut io::stderr(), visible_lines(&format!("{kind}: {message}\n")).as_bytes());
         ExitCode::from(status)
     }
 }
 
 /// Why the variant of a scene that can be read cannot be had, where an option other than `--set` said what is different.
 pub(crate) fn of_variant(error: SceneError, option: &'static str, overrides: &[String]) -> Failure {
-    let text = error.diagnostic().and_then(cohaptic_scene::Diagnostic::override_text);
+    let text = error.diagnostic().and_then(Diagnostic::override_text);
     if text.is_some_and(|text| overrides.iter().any(|given| given == text)) { Failure::Override { option, error } } else { Failure::Scene(error) }
+}
+
+/// The refusal of an argument, in which nothing that was typed disturbs a terminal.
+pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
+    let shown = |text: &String| Visible(text).to_string();
+    let texts: Vec<(ContextKind, ContextValue)> = error
+        .context()
+        .filter_map(|(kind, value)| match value {
+            ContextValue::String(text) => Some((kind, ContextValue::String(shown(text)))),
+            ContextValue::Strings(texts) => Some((kind, ContextValue::Strings(texts.iter().map(shown).collect()))),
+            // Advice repeats what was typed; it loses its colours.
+            ContextValue::StyledStrs(texts) => {
+                Some((kind, ContextValue::StyledStrs(texts.iter().map(|text| StyledStr::from(shown(&text.to_string()))).collect())))
+            }
+            ContextValue::None | ContextValue::Bool(_) | ContextValue::StyledStr(_) | ContextValue::Number(_) | _ => None,
+        })
+        .collect();
+    for (kind, value) in texts {
+        error.insert(kind, value);
+    }
+    error
+}
+
+/// Why a scene that makes sense is not simulated, at the place where there are too many peers; `None` if it can be.
+pub(crate) fn too_large(scene: &Scene, overrides: &[String]) -> Option<SceneError> {
+    let reason = cohaptic_harness::too_large(scene)?;
+    Some(at_peer(&scene.file, overrides, cohaptic_harness::MOST_PEERS, &reason))
 }
 
 /// Why a scene that makes sense cannot be analysed.

@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use crate::arguments::FitArguments;
 use crate::failure::Failure;
-use crate::output;
 use crate::output_file::OutputFile;
+use crate::{output, text_file};
 
 /// What `cohaptic fit --json` prints.
 #[derive(Serialize)]
@@ -77,11 +77,11 @@ fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Fai
               (of what `cohaptic link` did, give the file of --fates instead)",
         ));
     }
-    let text = String::from_utf8_lossy(&bytes);
+    let text = text_file::of_bytes(bytes, path)?;
     if text.trim_start_matches('\u{feff}').starts_with(FateRow::HEADER) {
         return Ok((Measurements::from_fates(&FateLog::parse(&text).map_err(|error| named(&error))?), None));
     }
-    Ok((Measurements::from_csv(bytes.as_slice()).map_err(|error| named(&error))?, None))
+    Ok((Measurements::from_csv(text.as_bytes()).map_err(|error| named(&error))?, None))
 }
 
 fn open(path: &Path) -> Result<File, Failure> {

@@ -28,6 +28,7 @@ mod router;
 mod run;
 mod stability;
 mod terminal_plot;
+mod text_file;
 mod variants;
 
 use std::process::ExitCode;
@@ -37,7 +38,7 @@ use clap::Parser as _;
 use arguments::{Arguments, Command};
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| failure::visible(error).exit());
     interrupt::listen();
     let done = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),

@@ -3,6 +3,7 @@
 use std::io::{self, Write as _};
 use std::path::Path;
 
+use cohaptic_units::visible_lines;
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -11,7 +12,7 @@ use crate::failure::Failure;
 /// terminal.
 pub(crate) fn text(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    let text = escape(text);
+    let text = visible_lines(text);
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(Failure::StandardOutput)
 }
 
@@ -25,16 +26,4 @@ pub(crate) fn json(document: &impl Serialize) -> Result<(), Failure> {
 /// A path as text. What is not Unicode in it is replaced: JSON cannot hold it.
 pub(crate) fn path(path: &Path) -> String {
     path.to_string_lossy().into_owned()
-}
-
-fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for letter in text.chars() {
-        if letter.is_control() && letter != '\n' {
-            escaped.extend(letter.escape_default());
-        } else {
-            escaped.push(letter);
-        }
-    }
-    escaped
 }

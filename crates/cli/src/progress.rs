@@ -3,7 +3,7 @@
 use std::io::IsTerminal as _;
 use std::time::Duration;
 
-use cohaptic_units::Instant;
+use cohaptic_units::{Instant, Visible};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 pub(crate) struct Progress(ProgressBar);
@@ -13,7 +13,7 @@ impl Progress {
     pub(crate) fn through_scene(title: &str, duration: Duration) -> Self {
         let bar = bar(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX));
         bar.set_style(style("{prefix} {bar:30} {percent:>3} %  {elapsed} passed, {eta} left{msg}"));
-        bar.set_prefix(title.to_owned());
+        bar.set_prefix(Visible(title).to_string());
         Self(bar)
     }
 
@@ -78,7 +78,7 @@ impl Progress {
     pub(crate) fn of_traffic(title: &str) -> Self {
         let bar = bar(0);
         bar.set_style(style("{prefix}: {msg}, {elapsed} passed"));
-        bar.set_prefix(title.to_owned());
+        bar.set_prefix(Visible(title).to_string());
         Self(bar)
     }
 

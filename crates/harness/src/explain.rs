@@ -4,7 +4,7 @@ mod links;
 
 use cohaptic_peer::{Contact, Hand, Integrator, wire};
 use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
-use cohaptic_units::print::Span;
+use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
 
 use self::links::describe_link;
@@ -125,8 +125,8 @@ impl Rows {
         }
         let integrator = match scene.integrator {
             Integrator::Exact => "the matrix exponential of each body with its held inputs".to_owned(),
-            Integrator::SemiImplicitEuler { steps } => format!("semi-implicit Euler, {steps} steps a tick"),
-            Integrator::RungeKutta4 { steps } => format!("Runge-Kutta of order 4, {steps} steps a tick"),
+            Integrator::SemiImplicitEuler { steps } => format!("semi-implicit Euler, {} a tick", Counted(steps, "step")),
+            Integrator::RungeKutta4 { steps } => format!("Runge-Kutta of order 4, {} a tick", Counted(steps, "step")),
         };
         self.model("motion", integrator, "forces are held over a tick, so a step is one linear map, computed once");
         if scene.object.enclosure.is_none() {
@@ -137,13 +137,13 @@ impl Rows {
         if scene.timeline.is_empty() {
             self.leave_out("changes: the timeline is empty");
         } else {
-            self.model("timeline", format!("{} changes", scene.timeline.len()), "each applied at its instant, before anything else");
+            self.model("timeline", Counted(scene.timeline.len(), "change").to_string(), "each applied at its instant, before anything else");
         }
     }
 
     fn peers(&mut self, scene: &Scene, plan: &Plan) {
         let copy = if scene.object.split_mass { "the mass of the object is split" } else { "every copy has the whole mass" };
-        self.model("object", format!("{} copies of {} kg", scene.peers.len(), scene.copy_mass()), copy);
+        self.model("object", format!("{} of {} kg", Counted(scene.peers.len(), "copy"), Number(scene.copy_mass())), copy);
         for (group, peers) in groups(scene, plan) {
             let part = format!("peer {}", names(&peers));
             match group {
@@ -166,7 +166,7 @@ impl Rows {
             Scaling::None => "as written",
             Scaling::InverseN => "scaled by 4(N-1)/N^2",
         };
-        let model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), gains.stiffness, gains.damping);
+        let model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), Number(gains.stiffness), Number(gains.damping));
         self.model("coordination", model, format!("gains {scaling}; the mean of the samples held is kept until one changes"));
         let len = wire::datagram_len(scene.axes.count());
         self.model(

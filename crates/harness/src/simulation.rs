@@ -19,7 +19,7 @@ pub fn too_large(scene: &Scene) -> Option<String> {
     let peers = scene.peers.len();
     (peers > MOST_PEERS).then(|| {
         let links = peers as u128 * (peers as u128 - 1);
-        format!("scene.count: {peers} peers are too many to be simulated, with {links} links between them: expected at most {MOST_PEERS} peers")
+        format!("{peers} peers are too many to be simulated, with {links} links between them: expected at most {MOST_PEERS} peers")
     })
 }
 

@@ -63,7 +63,7 @@ fn unreadable(path: &Path, source: &io::Error, place: Option<&Diagnostic>) -> St
 /// Its display form spans several lines and holds no control characters:
 ///
 /// ```text
-/// two.toml:6:9: link.delay: unknown unit "parsecs" in "24 parsecs": expected a duration such as "8ms", "1.5s" or "250us"
+/// two.toml:6:9: link.delay: unknown unit "parsecs" in "24 parsecs": expected a duration such as "8ms", "1.5s" or "250us" (units: ns, us, ms, s, min, h)
 ///   |
 /// 6 | delay = "24 parsecs"
 ///   |         ^^^^^^^^^^^^

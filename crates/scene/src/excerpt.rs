@@ -5,6 +5,8 @@
 use core::fmt;
 use core::ops::Range;
 
+use cohaptic_units::Visible;
+
 /// The longest line that is shown whole [character].
 const LONGEST: usize = 200;
 
@@ -72,25 +74,16 @@ impl Excerpt {
     }
 }
 
-/// A text as it is shown: control characters, and those that change the direction of writing, as escapes.
+/// A text as it is shown.
 pub(crate) fn escape(text: &str) -> String {
-    Shown::of(text).0.into_iter().collect()
+    Visible(text).to_string()
 }
 
 struct Shown(Vec<char>);
 
 impl Shown {
     fn of(text: &str) -> Self {
-        let mut shown = Vec::with_capacity(text.len());
-        for c in text.chars() {
-            let turns_writing = matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
-            if c.is_control() || turns_writing {
-                shown.extend(c.escape_default());
-            } else {
-                shown.push(c);
-            }
-        }
-        Self(shown)
+        Self(escape(text).chars().collect())
     }
 }
 

@@ -27,7 +27,9 @@
 //! # Ok::<(), cohaptic_scene::SceneError>(())
 //! ```
 
+mod address;
 mod assembly;
+mod content;
 mod context;
 mod error;
 mod excerpt;
@@ -51,6 +53,8 @@ mod toml_text;
 mod tree;
 mod values;
 
+pub use address::{AddressError, address};
+pub use content::{Fingerprint, FingerprintError, SceneContent, scene_content, scene_content_of_text};
 pub use error::{Diagnostic, SceneError};
 pub use link_keys::{
     KeysOfLinks, LinkKeys, link_from_keys, link_key_changes, link_key_changes_of_text, link_keys, link_keys_of_text, relay_link_keys,
@@ -59,6 +63,6 @@ pub use link_keys::{
 pub use link_table::LinkTable;
 pub use model::*;
 pub use quantity_text::{number_and_unit, text_of_quantity};
-pub use read::scene_files;
+pub use read::{at_peer, scene_files};
 pub use relay_file::{RelayChange, RelayFile, RelayLimits, RelayProgram};
 pub use strategies::{FromScene, Strategies};

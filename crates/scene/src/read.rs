@@ -1,10 +1,13 @@
 //! From files and texts to scenes.
 
 use core::ops::Range;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use toml::de::DeTable;
 
+use crate::content::Fingerprint;
 use crate::context::{Context, Faults};
 use crate::error::{Diagnostic, SceneError};
 use crate::model::Scene;
@@ -15,7 +18,7 @@ use crate::sections::{
 };
 use crate::source::{BEGINNING, Place, Sources};
 use crate::table_reader::TableReader;
-use crate::tree::{Node, TooDeep, join};
+use crate::tree::{Node, TooDeep, Value, join};
 
 const TOO_DEEP: &str = "nested too deeply: expected at most 16 levels";
 
@@ -63,6 +66,32 @@ impl Scene {
     }
 }
 
+/// What is wrong with a scene that can be read, at the place where its `peer`-th peer is made, counted from 0: its entry `[[peers]]`, or `scene.count`.
+#[must_use]
+pub fn at_peer(path: &Path, overrides: &[String], peer: usize, message: &str) -> SceneError {
+    let fault = |text: &str| {
+        let sources = Sources { file: path, text, overrides };
+        let refused = parse_document(sources, true, |document, context| {
+            let value = |table: &Node, key: &str| table.as_table()?.get(key).map(|entry| Arc::clone(&entry.node));
+            let count = value(document, "scene").and_then(|header| value(&header, "count"));
+            let peers = value(document, "peers");
+            let entry = match peers.as_ref().map(|peers| &peers.value) {
+                Some(Value::List(entries)) => entries.get(peer).cloned(),
+                _ => None,
+            };
+            let (place, key) = match count.or(entry).or(peers) {
+                Some(node) => (node.place, node.path.clone()),
+                None => (BEGINNING, String::new()),
+            };
+            context.fault(place, &key, message);
+            Some(())
+        });
+        refused.map(|_| ())
+    };
+    // Not reached: there is a fault in every case.
+    with_text(path, fault).err().unwrap_or_else(|| SceneError::NoScene { folder: path.to_path_buf() })
+}
+
 /// What `read` makes of the text of a file.
 pub(crate) fn with_text<T>(path: &Path, read: impl FnOnce(&str) -> Result<T, SceneError>) -> Result<T, SceneError> {
     let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
@@ -82,12 +111,25 @@ pub(crate) fn parse_scene(sources: Sources<'_>, live: bool) -> Result<(Scene, No
     parse_document(sources, live, read_document)
 }
 
+/// [`parse_scene`], and what is in each file that the scene names.
+pub(crate) fn parse_whole(sources: Sources<'_>, live: bool) -> Result<(Scene, Node, BTreeMap<PathBuf, Fingerprint>), SceneError> {
+    parse_with_files(sources, live, read_document)
+}
+
 /// What `read` makes of a text, and the document that it is with the overrides in it.
 pub(crate) fn parse_document<T>(
     sources: Sources<'_>,
     live: bool,
     read: impl FnOnce(&Node, Context<'_>) -> Option<T>,
 ) -> Result<(T, Node), SceneError> {
+    parse_with_files(sources, live, read).map(|(whole, document, _)| (whole, document))
+}
+
+fn parse_with_files<T>(
+    sources: Sources<'_>,
+    live: bool,
+    read: impl FnOnce(&Node, Context<'_>) -> Option<T>,
+) -> Result<(T, Node, BTreeMap<PathBuf, Fingerprint>), SceneError> {
     let mut document = parse_toml(sources.text, sources)?;
     let faults = Faults::default();
     let files = Files::default();
@@ -96,7 +138,7 @@ pub(crate) fn parse_document<T>(
     let whole = read(&document, context);
     match (faults.into_first(), whole) {
         (Some(error), _) => Err(error),
-        (None, Some(whole)) => Ok((whole, document)),
+        (None, Some(whole)) => Ok((whole, document, files.into_held())),
         // Not reached: a reader that answers nothing has reported why. An error all the same, because text must never be able to cause a panic.
         (None, None) => Err(invalid(sources.diagnostic(BEGINNING, String::new(), "the file is refused: expected another one".to_owned()))),
     }

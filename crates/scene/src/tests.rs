@@ -71,7 +71,7 @@ fn the_scene_without_faults_is_taken() {
 #[test]
 fn the_display_form_shows_the_line_with_carets_below_the_place() {
     let error = refused(&SCENE.replace("delay = \"24ms\"", "delay     = \"8 parsecs\""), &[]);
-    let expected = r#"x.toml:17:13: link.delay: unknown unit "parsecs" in "8 parsecs": expected a duration such as "8ms", "1.5s" or "250us"
+    let expected = r#"x.toml:17:13: link.delay: unknown unit "parsecs" in "8 parsecs": expected a duration such as "8ms", "1.5s" or "250us" (units: ns, us, ms, s, min, h)
    |
 17 | delay     = "8 parsecs"
    |             ^^^^^^^^^^^"#;
@@ -140,7 +140,7 @@ fn a_missing_key_is_said_at_the_head_of_its_table() {
         ("mass = 0.1, ", "", "10:10: peer.device.mass: missing key"),
         ("coupling = { stiffness = 3500.0, damping = 5.0 }", "", "12:1: peers.left.coupling: missing key"),
         ("name = \"left\"", "", "12:1: peers.0.name: missing key"),
-        ("[[peers]]\nname = \"left\"\n", "", "12:1: peers: a scene with 1 peers: expected at least two entries [[peers]], or scene.count"),
+        ("[[peers]]\nname = \"left\"\n", "", "12:1: peers: a scene with 1 peer: expected at least two entries [[peers]], or scene.count"),
     ]);
     check_added(&[
         ("[[links]]\nto = \"right\"", "18:1: links.0.from: missing key: expected the name of the peer that sends"),

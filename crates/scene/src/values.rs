@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 
+use cohaptic_units::print::Counted;
 use cohaptic_units::{Bytes, Instant, ParseError, Probability, Rate, parse};
 
 use crate::context::Context;
@@ -97,7 +98,7 @@ impl Quantity {
         if let Value::List(elements) = &node.value {
             if elements.len() > 3 || elements.is_empty() || count.is_some_and(|count| count != elements.len()) {
                 let expected = count.map_or_else(|| "1, 2 or 3".to_owned(), |count| count.to_string());
-                let message = format!("found a list of {} numbers: expected as many as the scene has axes, {expected}", elements.len());
+                let message = format!("found a list of {}: expected as many as the scene has axes, {expected}", Counted(elements.len(), "number"));
                 context.fault_at(node, message);
                 return None;
             }

@@ -27,6 +27,7 @@ pub mod print;
 mod probability;
 mod rate;
 mod size;
+mod visible;
 
 pub use frequency::{Hertz, RadPerSec};
 pub use instant::Instant;
@@ -34,3 +35,4 @@ pub use parse::ParseError;
 pub use probability::{Probability, ProbabilityError};
 pub use rate::Rate;
 pub use size::Bytes;
+pub use visible::{Visible, is_hidden, visible_lines};

@@ -5,14 +5,14 @@
 use alloc::string::{String, ToString};
 use core::time::Duration;
 
-use crate::{Bytes, Probability, Rate};
+use crate::{Bytes, Probability, Rate, Visible};
 
 /// Why a text is not the quantity that was expected.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParseError {
     /// The text does not begin with a decimal number, or has a sign or an exponent.
-    #[error("\"{text}\" does not begin with a plain decimal number: expected {expected}")]
+    #[error("\"{}\" does not begin with a plain decimal number: expected {expected}", Visible(text))]
     Number {
         /// The text as given.
         text: String,
@@ -20,7 +20,7 @@ pub enum ParseError {
         expected: &'static str,
     },
     /// The number has no unit, or one that this quantity does not have.
-    #[error("{} in \"{text}\": expected {expected}", if unit.is_empty() { "no unit".to_string() } else { alloc::format!("unknown unit \"{unit}\"") })]
+    #[error("{} in \"{}\": expected {expected} (units: {units})", no_unit(unit), Visible(text))]
     Unit {
         /// The text as given.
         text: String,
@@ -28,9 +28,11 @@ pub enum ParseError {
         unit: String,
         /// What would have been right.
         expected: &'static str,
+        /// The units that there are, in words.
+        units: &'static str,
     },
     /// The number is too large, or zero where zero has no meaning.
-    #[error("\"{text}\" is out of range: expected {expected}")]
+    #[error("\"{}\" is out of range: expected {expected}", Visible(text))]
     Range {
         /// The text as given.
         text: String,
@@ -39,15 +41,37 @@ pub enum ParseError {
     },
 }
 
-/// Reads a duration: a decimal number and `ns`, `us`, `ms`, `s`, `min` or `h`. Rounded once, to the nearest nanosecond.
+fn no_unit(unit: &str) -> String {
+    if unit.is_empty() { "no unit".to_string() } else { alloc::format!("unknown unit \"{}\"", Visible(unit)) }
+}
+
+/// Reads a duration: a decimal number and `ns`, `us` (or `µs`, with the micro sign U+00B5 or the Greek letter U+03BC), `ms`, `s`, `min` or `h`. `nsec`, `usec`,
+/// `msec` and `sec` are the same. Rounded once, to the nearest nanosecond.
 ///
 /// # Errors
 ///
 /// [`ParseError`] if there is no number, no such unit, or more than 584 years.
 pub fn duration(text: &str) -> Result<Duration, ParseError> {
     const EXPECTED: &str = "a duration such as \"8ms\", \"1.5s\" or \"250us\"";
-    let units = [("ns", 1), ("us", 1_000), ("µs", 1_000), ("ms", 1_000_000), ("s", 1_000_000_000), ("min", 60_000_000_000), ("h", 3_600_000_000_000)];
-    let nanos = quantity(text, &units, EXPECTED)?;
+    const UNITS: &str = "ns, us, ms, s, min, h";
+    const US: u64 = 1_000;
+    const MS: u64 = 1_000_000;
+    const S: u64 = 1_000_000_000;
+    let units = [
+        ("ns", 1),
+        ("nsec", 1),
+        ("us", US),
+        ("usec", US),
+        ("\u{b5}s", US),
+        ("\u{3bc}s", US),
+        ("ms", MS),
+        ("msec", MS),
+        ("s", S),
+        ("sec", S),
+        ("min", 60 * S),
+        ("h", 3600 * S),
+    ];
+    let nanos = quantity(text, &units, EXPECTED, UNITS)?;
     Ok(Duration::from_nanos(nanos))
 }
 
@@ -59,7 +83,7 @@ pub fn duration(text: &str) -> Result<Duration, ParseError> {
 pub fn rate(text: &str) -> Result<Rate, ParseError> {
     const EXPECTED: &str = "a rate above zero such as \"10Mbit\" or \"64kbit\" (bits per second)";
     let units = [("bit", 1), ("kbit", 1_000), ("Mbit", 1_000_000), ("Gbit", 1_000_000_000)];
-    let bits = quantity(text, &units, EXPECTED)?;
+    let bits = quantity(text, &units, EXPECTED, "bit, kbit, Mbit, Gbit")?;
     Rate::bits_per_sec(bits).ok_or_else(|| ParseError::Range { text: text.to_string(), expected: EXPECTED })
 }
 
@@ -70,7 +94,7 @@ pub fn rate(text: &str) -> Result<Rate, ParseError> {
 /// [`ParseError`] if there is no number, no such unit, or more than 2⁶⁴ bytes.
 pub fn size(text: &str) -> Result<Bytes, ParseError> {
     const EXPECTED: &str = "a size such as \"64B\", \"1500B\" or \"64kB\"";
-    quantity(text, &[("B", 1), ("kB", 1_000), ("MB", 1_000_000)], EXPECTED).map(Bytes::new)
+    quantity(text, &[("B", 1), ("kB", 1_000), ("MB", 1_000_000)], EXPECTED, "B, kB, MB").map(Bytes::new)
 }
 
 /// Reads a probability in percent: `"1.5%"`. A probability from 0 to 1 is written as a plain number, which is not text.
@@ -82,7 +106,8 @@ pub fn probability(text: &str) -> Result<Probability, ParseError> {
     const EXPECTED: &str = "a probability such as 0.015 or \"1.5%\"";
     let (number, unit) = split(text, EXPECTED)?;
     if unit != "%" {
-        return Err(ParseError::Unit { text: text.to_string(), unit: unit.to_string(), expected: EXPECTED });
+        let (text, unit) = (text.to_string(), unit.to_string());
+        return Err(ParseError::Unit { text, unit, expected: EXPECTED, units: "%" });
     }
     let percent: f64 = number.parse().map_err(|_| ParseError::Number { text: text.to_string(), expected: EXPECTED })?;
     Probability::new(percent / 100.0).map_err(|_| ParseError::Range { text: text.to_string(), expected: EXPECTED })
@@ -101,11 +126,11 @@ fn split<'a>(text: &'a str, expected: &'static str) -> Result<(&'a str, &'a str)
 }
 
 /// The value of `text` in the base unit, exact up to one rounding, half up.
-fn quantity(text: &str, units: &[(&str, u64)], expected: &'static str) -> Result<u64, ParseError> {
+fn quantity(text: &str, scales: &[(&str, u64)], expected: &'static str, units: &'static str) -> Result<u64, ParseError> {
     let (number, unit) = split(text, expected)?;
     let out_of_range = || ParseError::Range { text: text.to_string(), expected };
-    let &(_, scale) =
-        units.iter().find(|(name, _)| *name == unit).ok_or_else(|| ParseError::Unit { text: text.to_string(), unit: unit.to_string(), expected })?;
+    let unknown = || ParseError::Unit { text: text.to_string(), unit: unit.to_string(), expected, units };
+    let &(_, scale) = scales.iter().find(|(name, _)| *name == unit).ok_or_else(unknown)?;
     let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
     let mut value: u128 = 0;
     for digit in whole.bytes() {
@@ -164,8 +189,18 @@ mod tests {
         assert!(matches!(probability("0.5"), Err(ParseError::Unit { .. })));
         assert_eq!(
             duration("8 parsecs").unwrap_err().to_string(),
-            "unknown unit \"parsecs\" in \"8 parsecs\": expected a duration such as \"8ms\", \"1.5s\" or \"250us\""
+            "unknown unit \"parsecs\" in \"8 parsecs\": expected a duration such as \"8ms\", \"1.5s\" or \"250us\" (units: ns, us, ms, s, min, h)"
         );
+        assert!(rate("10mbit").unwrap_err().to_string().ends_with("(units: bit, kbit, Mbit, Gbit)"));
+        assert!(size("64K").unwrap_err().to_string().ends_with("(units: B, kB, MB)"));
+    }
+
+    #[test]
+    fn a_unit_of_time_has_many_spellings() {
+        for text in ["250us", "250usec", "250\u{b5}s", "250\u{3bc}s", "0.25ms", "0.25msec", "0.00025sec", "250000nsec", "0.25 \u{3bc}s"] {
+            let nanos = if text == "0.25 \u{3bc}s" { 250 } else { 250_000 };
+            assert_eq!(duration(text), Ok(Duration::from_nanos(nanos)), "{text}");
+        }
     }
 
     #[test]

@@ -37,6 +37,37 @@ impl fmt::Display for Span {
     }
 }
 
+/// So many of something: `1 change`, `2 changes`, `0 entries`, `3 axes`.
+#[derive(Clone, Copy, Debug)]
+pub struct Counted<'a, N>(pub N, pub &'a str);
+
+impl<N: Copy + fmt::Display + PartialEq + From<u8>> fmt::Display for Counted<'_, N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(number, one) = *self;
+        if number == N::from(1) {
+            return write!(f, "{number} {one}");
+        }
+        match (one.strip_suffix('y'), one.strip_suffix("is")) {
+            (Some(stem), _) if !stem.ends_with(['a', 'e', 'o', 'u']) => write!(f, "{number} {stem}ies"),
+            (_, Some(stem)) => write!(f, "{number} {stem}es"),
+            _ => write!(f, "{number} {one}s"),
+        }
+    }
+}
+
+/// A number as people write it: `0.45`, `1000`, and in powers of ten where it has many digits before or behind the point: `1e300`. Both read back as the same.
+#[derive(Clone, Copy, Debug)]
+pub struct Number(pub f64);
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = if self.0 < 0.0 { -self.0 } else { self.0 };
+        // Not finite numbers are words in either form.
+        let is_plain = size == 0.0 || (1e-6..1e15).contains(&size);
+        if is_plain { write!(f, "{}", self.0) } else { write!(f, "{:e}", self.0) }
+    }
+}
+
 fn decimal(f: &mut fmt::Formatter<'_>, whole: u64, mut rest: u64, mut digits: usize) -> fmt::Result {
     write!(f, "{whole}")?;
     if rest == 0 {
@@ -53,6 +84,21 @@ fn decimal(f: &mut fmt::Formatter<'_>, whole: u64, mut rest: u64, mut digits: us
 mod tests {
     use super::*;
     use alloc::format;
+
+    #[test]
+    fn what_is_counted_is_one_or_many() {
+        let print = |number: usize, one| format!("{}", Counted(number, one));
+        assert_eq!([print(1, "change"), print(2, "change"), print(0, "entry"), print(3, "axis")], ["1 change", "2 changes", "0 entries", "3 axes"]);
+        assert_eq!([print(1, "axis"), print(2, "delay"), print(1, "copy")], ["1 axis", "2 delays", "1 copy"]);
+    }
+
+    #[test]
+    fn numbers_with_many_digits_are_written_with_an_exponent() {
+        let print = |number| format!("{}", Number(number));
+        assert_eq!([print(0.45), print(1000.0), print(-2.5), print(0.0)], ["0.45", "1000", "-2.5", "0"]);
+        assert_eq!([print(1e300), print(-1.5e-9), print(1e15), print(f64::INFINITY)], ["1e300", "-1.5e-9", "1e15", "inf"]);
+        assert_eq!([print(999_999_999_999_999.0), print(1e-6)], ["999999999999999", "0.000001"]);
+    }
 
     #[test]
     fn seconds_are_exact() {

@@ -7,7 +7,6 @@ use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
 use super::Plan;
-use super::fingerprint::number_of;
 use crate::error::CampaignError;
 use crate::table::Roster;
 use crate::watch::Watch;
@@ -63,7 +62,7 @@ impl Plan {
         for combination in combinations {
             let scene = self.scene(combination)?;
             let (roster, events) = (Roster::of(&scene), events(&scene));
-            let number = self.is_looked_at(combination).then(|| (combination, number_of(scene)));
+            let number = self.is_looked_at(combination).then(|| (combination, scene.fingerprint().get()));
             all = Some(join(all, Checked { roster, events, numbers: number.into_iter().collect() }));
         }
         watch.checked(count);

@@ -1,5 +1,7 @@
 //! Which frequencies are looked at.
 
+use cohaptic_units::print::{Counted, Number};
+
 use crate::arguments::AdmittanceArguments;
 use crate::failure::Failure;
 
@@ -19,7 +21,10 @@ pub(super) fn of(arguments: &AdmittanceArguments, highest: f64) -> Result<Vec<f6
     let points = arguments.points.map_or(POINTS, std::num::NonZeroUsize::get);
     if points == 1 || from >= to {
         return Err(Failure::Input(format!(
-            "{points} frequencies from {from} Hz to {to} Hz: expected at least 2, the first below the last; --at takes one alone"
+            "{} from {} Hz to {} Hz: expected at least 2, the first below the last; --at takes one alone",
+            Counted(points, "frequency"),
+            Number(from),
+            Number(to)
         )));
     }
     if points > MOST {
@@ -35,5 +40,9 @@ fn checked(option: &str, hz: f64, highest: f64) -> Result<f64, Failure> {
     if hz > 0.0 && hz <= highest {
         return Ok(hz);
     }
-    Err(Failure::Input(format!("{option} {hz}: expected a frequency above 0 and at most {highest} Hz, half the rate of the peer's ticks")))
+    Err(Failure::Input(format!(
+        "{option} {}: expected a frequency above 0 and at most {} Hz, half the rate of the peer's ticks",
+        Number(hz),
+        Number(highest)
+    )))
 }

@@ -15,7 +15,11 @@ pub(super) fn describe(peer: &str, curves: &[Curve], files: &[String]) -> String
         if let Some(warning) = curve.warning() {
             let _ = writeln!(text, "  WARNING: {warning}");
         }
-        let _ = writeln!(text, "\n  velocity over force at the device of {peer}, beside that of a free mass of {} kg", curve.mass);
+        let _ = writeln!(
+            text,
+            "\n  velocity over force at the device of {peer}, beside that of a free mass of {} kg",
+            cohaptic_units::print::Number(curve.mass)
+        );
         table(&mut text, curve);
         let _ = writeln!(text, "\n  moved slowly, {peer} feels");
         felt(&mut text, curve);

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::numbers::{real, some};
 use super::{EXIT_STATUS, SceneArguments};
 
 #[derive(Debug, Args)]
@@ -16,16 +17,16 @@ pub(crate) struct AdmittanceArguments {
     #[arg(long, value_name = "NAME")]
     pub(crate) peer: String,
     /// The lowest frequency [default: 0.01]
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
     pub(crate) from: Option<f64>,
     /// The highest frequency, at most half the rate of the peer's ticks [default: 100, or less if that is too high]
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
     pub(crate) to: Option<f64>,
     /// How many frequencies from the lowest to the highest, each the same factor above the one before [default: 60]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = some)]
     pub(crate) points: Option<NonZeroUsize>,
     /// These frequencies instead: --at 0.01,1,10
-    #[arg(long, value_name = "HZ,...", value_delimiter = ',', allow_negative_numbers = true, conflicts_with_all = ["from", "to", "points"])]
+    #[arg(long, value_name = "HZ,...", value_parser = real, value_delimiter = ',', allow_negative_numbers = true, conflicts_with_all = ["from", "to", "points"])]
     pub(crate) at: Vec<f64>,
     /// Another curve beside it, with these keys overridden too, again and again:
     /// --curve scene.count=3,coordination.strategy=proportional-derivative

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::threads::threads;
+use super::numbers::{any_integer, integer, threads};
 use super::{EXIT_STATUS, SceneArguments};
 
 #[derive(Debug, Args)]
@@ -18,7 +18,7 @@ pub(crate) struct CampaignArguments {
     #[arg(long, value_name = "KEY=VALUES")]
     pub(crate) vary: Vec<String>,
     /// How many runs there are of each combination: with the seed of the scene, with the next one, and so on
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 1)]
     pub(crate) runs: u64,
     /// The folder of the campaign: the table, and until that is there the parts. The same command goes on with what is there
     #[arg(long, value_name = "DIR")]
@@ -27,10 +27,10 @@ pub(crate) struct CampaignArguments {
     #[arg(long, value_enum, default_value_t = TableFormat::Parquet)]
     pub(crate) format: TableFormat,
     /// How many runs are made at the same time [default: one a core]. Results do not depend on it
-    #[arg(long, value_name = "N", visible_alias = "jobs", value_parser = threads())]
+    #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
     /// How many runs are kept together, the most that a kill can cost on each thread [default: some seconds' worth]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<NonZeroU64>(1, u64::MAX))]
     pub(crate) part: Option<NonZeroU64>,
 }
 

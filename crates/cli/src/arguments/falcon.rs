@@ -7,6 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use cohaptic_units::parse;
 
 use super::EXIT_STATUS;
+use super::numbers::{any_integer, probability};
 
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_STATUS)]
@@ -105,10 +106,10 @@ pub(crate) struct SimulateArguments {
     #[arg(long, value_name = "NEWTONS", value_parser = strong, default_value_t = 4.0)]
     pub(crate) limit: f64,
     /// A byte to the host is changed, and one that nobody sent comes before it, each with this probability
-    #[arg(long, value_name = "PROBABILITY", value_parser = parse::probability)]
+    #[arg(long, value_name = "PROBABILITY", value_parser = probability)]
     pub(crate) garbage: Option<cohaptic_units::Probability>,
     /// A byte is lost, either way, with this probability
-    #[arg(long, value_name = "PROBABILITY", value_parser = parse::probability)]
+    #[arg(long, value_name = "PROBABILITY", value_parser = probability)]
     pub(crate) drop: Option<cohaptic_units::Probability>,
     /// The plug is pulled then
     #[arg(long, value_name = "TIME", value_parser = parse::duration)]
@@ -117,7 +118,7 @@ pub(crate) struct SimulateArguments {
     #[arg(long = "for", value_name = "TIME", value_parser = some_time, default_value = "6s")]
     pub(crate) length: Duration,
     /// The seed of faults and of what encoders show before they are homed
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 1)]
     pub(crate) seed: u64,
     /// Print one JSON document and nothing else
     #[arg(long)]

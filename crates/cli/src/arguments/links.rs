@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::EXIT_STATUS;
+use super::numbers::{any_integer, integer};
 
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_STATUS)]
@@ -16,7 +17,7 @@ pub(crate) struct LinkArguments {
     #[arg(long, value_name = "FATES.csv")]
     pub(crate) from: Option<PathBuf>,
     /// How many packets are sent [default: 100000, with --from as many as the file has]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<std::num::NonZeroU64>(1, u64::MAX))]
     pub(crate) packets: Option<std::num::NonZeroU64>,
     /// The time from one packet to the next
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cohaptic_units::parse::duration)]
@@ -25,7 +26,7 @@ pub(crate) struct LinkArguments {
     #[arg(long, value_name = "SIZE", default_value = "64B", value_parser = cohaptic_units::parse::size)]
     pub(crate) size: cohaptic_units::Bytes,
     /// The seed of all random numbers
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 1)]
     pub(crate) seed: u64,
     /// What words of tc-netem mean: what they say, or what Linux 6.6 does
     #[arg(long, value_enum, default_value_t = Profile::Exact)]
@@ -59,7 +60,7 @@ pub(crate) struct FitArguments {
     /// The capture of the receiver
     pub(crate) receiver: Option<PathBuf>,
     /// Only datagrams to this UDP port, of captures
-    #[arg(long, value_name = "N", requires = "receiver")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u16>(0, 65_535), requires = "receiver")]
     pub(crate) port: Option<u16>,
     /// Estimate the linear drift of one clock against the other, and remove it first where it is significant at 1 %
     #[arg(long)]

@@ -1,17 +1,18 @@
 //! What can be said on the command line.
 
 mod accuracy;
+mod address;
 mod admittance;
 mod campaign;
 mod falcon;
 mod links;
+mod numbers;
 mod paper;
 mod realtime;
 mod relay;
 mod router;
 mod scenes;
 mod stability;
-mod threads;
 
 use std::path::PathBuf;
 

@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use cohaptic_units::parse;
 
+use super::address::looked_up;
 use super::{EXIT_STATUS, Overrides};
 
 /// How to be on time, and who may look.
@@ -22,7 +23,7 @@ pub(crate) struct RealTimeArguments {
     #[arg(long, value_name = "TIME", value_parser = parse::duration)]
     pub(crate) tolerance: Option<Duration>,
     /// Serve live control and /metrics over HTTP at this address [without one: a free port of 127.0.0.1]. The URL with its token is printed
-    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
+    #[arg(long, value_name = "ADDRESS", value_parser = looked_up, num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
     pub(crate) control: Option<SocketAddr>,
     /// A file with the token of live control [default: a random one]
     #[arg(long, value_name = "FILE", requires = "control")]
@@ -49,7 +50,7 @@ pub(crate) struct LiveArguments {
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,
     /// Where peers in other programs (kind = "udp") send their samples
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:7400")]
+    #[arg(long, value_name = "ADDRESS", value_parser = looked_up, default_value = "127.0.0.1:7400")]
     pub(crate) listen: SocketAddr,
     /// The session key: every datagram must carry a tag made with it
     #[arg(long, value_name = "FILE")]

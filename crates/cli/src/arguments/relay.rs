@@ -5,9 +5,10 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use clap::Args;
-use clap::builder::RangedU64ValueParser;
 use cohaptic_units::{Bytes, parse};
 
+use super::address::looked_up;
+use super::numbers::integer;
 use super::{EXIT_STATUS, Overrides, RealTimeArguments};
 
 #[derive(Debug, Args)]
@@ -23,10 +24,10 @@ pub(crate) struct RelayArguments {
     #[arg(long)]
     pub(crate) json: bool,
     /// Where clients send to, what is meant for --to; port 0 is a free one
-    #[arg(long, value_name = "ADDRESS", requires = "to", conflicts_with = "set")]
+    #[arg(long, value_name = "ADDRESS", value_parser = looked_up, requires = "to", conflicts_with = "set")]
     pub(crate) listen: Option<SocketAddr>,
     /// Whom clients speak to
-    #[arg(long, value_name = "ADDRESS", requires = "listen")]
+    #[arg(long, value_name = "ADDRESS", value_parser = looked_up, requires = "listen")]
     pub(crate) to: Option<SocketAddr>,
     /// The link from there to the clients, up to the next option [default: the same in both directions]
     #[arg(long, value_name = "SPEC", num_args = 1.., requires = "listen", allow_negative_numbers = true)]
@@ -37,10 +38,10 @@ pub(crate) struct RelayArguments {
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,
     /// The seed of all random numbers [default: that of the file, or 0]
-    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u64>::new().range(0..=i64::MAX.unsigned_abs()))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(0, i64::MAX.unsigned_abs()))]
     pub(crate) seed: Option<u64>,
     /// So many datagrams may be on their way at once; what comes beyond is dropped [default: that of the file, or 262144]
-    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u64>::new().range(1..=1 << 24))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(1, 1 << 24))]
     pub(crate) packets: Option<u64>,
     /// So many bytes of them [default: that of the file, or 64MB]
     #[arg(long, value_name = "SIZE", value_parser = room)]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::threads::threads;
+use super::numbers::threads;
 use super::{EXIT_STATUS, Overrides, SceneArguments};
 
 #[derive(Debug, Args)]
@@ -22,6 +22,9 @@ pub(crate) struct RunArguments {
     /// Replay a live session: its inputs.csv, with the scene and the --set of that session. Fates and motion are the same to the last bit
     #[arg(long, value_name = "FILE", conflicts_with_all = ["against", "general"])]
     pub(crate) inputs: Option<PathBuf>,
+    /// Replay even if the scene or its --set are not those of the session, and say what differs
+    #[arg(long, requires = "inputs")]
+    pub(crate) force: bool,
     /// Do not draw positions in the terminal. Nothing is looked at then but counters, which is fastest
     #[arg(long)]
     pub(crate) no_plot: bool,
@@ -42,7 +45,7 @@ pub(crate) struct CheckArguments {
     #[arg(long)]
     pub(crate) json: bool,
     /// How many scenes run at the same time [default: one a core]. Results do not depend on it
-    #[arg(long, value_name = "N", value_parser = threads())]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) jobs: Option<u16>,
     /// Simulate everything the program has, needed or not: slower, and the same answer to the last bit
     #[arg(long)]

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, Subcommand, ValueEnum};
 use cohaptic_stability::Method;
 
-use super::threads::threads;
+use super::numbers::{any_integer, integer, real, threads};
 use super::{EXIT_STATUS, SceneArguments};
 
 #[derive(Debug, Args)]
@@ -40,7 +40,7 @@ pub(crate) struct PointArguments {
     #[arg(long, value_name = "GRAPH", conflicts_with_all = ["method", "losses_in_a_row", "delay_within"])]
     pub(crate) graph: Option<String>,
     /// The worst case too: at most so many samples lost in a row
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u32>(0, u32::MAX.into()))]
     pub(crate) losses_in_a_row: Option<u32>,
     /// The worst case too: every sample takes any time from LO to HI, such as 20ms..26ms
     #[arg(long, value_name = "LO..HI", value_parser = delays)]
@@ -49,10 +49,10 @@ pub(crate) struct PointArguments {
     #[arg(long, value_enum, value_name = "WHICH", default_value_t = LinksName::Together)]
     pub(crate) links: LinksName,
     /// How near the bounds of the worst case shall be
-    #[arg(long, value_name = "DISTANCE", default_value_t = 1e-3)]
+    #[arg(long, value_name = "DISTANCE", value_parser = real, default_value_t = 1e-3)]
     pub(crate) accuracy: f64,
     /// How many products of matrices the search for the worst case may look at
-    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 100_000)]
     pub(crate) products: u64,
 }
 
@@ -114,7 +114,7 @@ pub(crate) struct MapArguments {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// How many cells are computed at the same time [default: one a core]. Results do not depend on it
-    #[arg(long, value_name = "N", value_parser = threads())]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) jobs: Option<u16>,
 }
 
@@ -127,10 +127,10 @@ pub(crate) struct BoundaryArguments {
     #[arg(long, value_name = "KEY=LO..HI")]
     pub(crate) along: String,
     /// How exactly a crossing is found, in the unit of the key [default: a billionth of the range; in the mean square a ten-millionth]
-    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    #[arg(long, value_name = "T", value_parser = real, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
     /// How many values are looked at first, the ends among them [default: 400]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(0, u64::MAX))]
     pub(crate) samples: Option<usize>,
     /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep there what is done if it is interrupted
     #[arg(long, value_name = "DIR")]

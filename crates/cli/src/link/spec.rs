@@ -1,6 +1,5 @@
 //! What the link is told to do: from words, keys or a file.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -14,7 +13,7 @@ use cohaptic_wan::{KernelNetem, LinkConfig, LinkModel};
 
 use crate::arguments::{LinkArguments, Profile};
 use crate::failure::Failure;
-use crate::output;
+use crate::{output, text_file};
 
 /// A link, and what it is asked for.
 pub(super) struct Spec {
@@ -31,7 +30,7 @@ impl Spec {
         if let Some(path) = &arguments.from {
             return replay(path);
         }
-        let is_keys = arguments.spec.iter().any(|word| word.contains('='));
+        let is_keys = is_keys(&arguments.spec)?;
         let said = arguments.spec.join(" ");
         if is_keys && arguments.profile == Profile::Kernel66 {
             return Err(Failure::Input("--profile kernel-6.6 is for words of tc-netem: expected those, or no profile".to_owned()));
@@ -39,6 +38,20 @@ impl Spec {
         let (model, asked) = if is_keys { of_keys(arguments)? } else { of_words(arguments, &said)? };
         Ok(Self { said, model, asked, packets: None })
     }
+}
+
+/// Whether a link is said in keys, as opposed to words of tc-netem; a failure if it is said half in one way and half in the other.
+fn is_keys(spec: &[String]) -> Result<bool, Failure> {
+    let (keys, words): (Vec<&str>, Vec<&str>) = spec.iter().map(String::as_str).partition(|word| word.contains('='));
+    if keys.is_empty() || words.is_empty() {
+        return Ok(words.is_empty());
+    }
+    Err(Failure::Input(format!(
+        "a link is said either in words of tc-netem or in keys of a scene, not in both: {} is of the first kind, {} of the second. Expected all of one kind, such as \
+         delay 20ms loss 1%, or delay=20ms loss=1%; a value with spaces stands in quotes, 'jitter={{ sd = \"2ms\" }}'",
+        words.join(" "),
+        keys.join(" ")
+    )))
 }
 
 fn of_keys(arguments: &LinkArguments) -> Result<(LinkModel, Asked), Failure> {
@@ -53,7 +66,7 @@ pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Fa
     if spec.is_empty() {
         return Ok((LinkModel::default(), nothing));
     }
-    if spec.iter().any(|word| word.contains('=')) {
+    if is_keys(spec)? {
         let model = link_from_keys(spec).map_err(Failure::LinkKeys)?;
         let keys = spec.iter().filter_map(|text| text.split_once('='));
         return Ok((model, keys.fold(nothing, |keys, (key, value)| keys.with(key.trim(), value))));
@@ -117,11 +130,11 @@ fn slot_distribution(netem: &Netem) -> Option<cohaptic_wan::netem::Distribution>
 /// The text of `NAME.dist` in the current folder; `None` if there is no such file.
 fn table(name: &TableName, fault: &mut Option<Failure>) -> Option<String> {
     let path = Path::new(name.as_str()).with_extension("dist");
-    match std::fs::read_to_string(&path) {
+    match text_file::read(&path) {
         Ok(text) => Some(text),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
-        Err(error) => {
-            *fault = Some(Failure::File { verb: "read", path, error });
+        Err(Failure::File { error, .. }) if error.kind() == std::io::ErrorKind::NotFound => None,
+        Err(failure) => {
+            *fault = Some(failure);
             None
         }
     }
@@ -145,8 +158,8 @@ fn below(said: &str, option: &str) -> String {
 
 fn replay(path: &Path) -> Result<Spec, Failure> {
     let unreadable = |error| Failure::File { verb: "read", path: path.to_path_buf(), error };
-    let file = File::open(path).map_err(unreadable)?;
-    let log = fates::read(file).map_err(|error| match error {
+    let text = text_file::read(path)?;
+    let log = fates::read(text.as_bytes()).map_err(|error| match error {
         ReadError::Io(error) => unreadable(error),
         other @ (ReadError::Log(_) | _) => Failure::Input(format!("{}: {other}", output::path(path))),
     })?;

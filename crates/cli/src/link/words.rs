@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use cohaptic_measure::achieved::Achieved;
 use cohaptic_measure::beside::Figure;
+use cohaptic_units::print::Counted;
 
 use super::Measured;
 use super::spec::Spec;
@@ -15,7 +16,7 @@ pub(super) fn describe(spec: &Spec, measured: &Measured) -> String {
         let _ = writeln!(text, "{}", line.trim_end());
     };
     if measured.interrupted {
-        line(format!("  INTERRUPTED after {} of {} packets", measured.sent, measured.wanted));
+        line(format!("  INTERRUPTED after {} of {}", measured.sent, Counted(measured.wanted, "packet")));
     }
     line(format!("  {:<24}{:>18}{:>18}{:>14}", "", "asked", "achieved", "std. error"));
     for figure in &measured.figures {
@@ -32,7 +33,7 @@ pub(super) fn describe(spec: &Spec, measured: &Measured) -> String {
         line("  * asked for is more than 4 standard errors away".to_owned());
     }
     let fates = &measured.achieved.fates;
-    let mut parts = vec![format!("{} packets sent", fates.offered), format!("{} delivered", fates.delivered)];
+    let mut parts = vec![format!("{} sent", Counted(fates.offered, "packet")), format!("{} delivered", fates.delivered)];
     let counts = [("copies", fates.duplicated), ("marked", fates.marked), ("delivered damaged", fates.damaged)];
     parts.extend(counts.into_iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} {name}")));
     parts.extend(fates.dropped.iter().filter(|(_, count)| **count > 0).map(|(cause, count)| format!("{count} dropped ({cause})")));

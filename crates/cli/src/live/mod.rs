@@ -15,7 +15,7 @@ use std::thread;
 use std::time::Duration;
 
 use cohaptic_live::{Report, Session, SessionConfig, SessionError, SessionKey, SystemEntropy};
-use cohaptic_scene::{KeysOfLinks, Scene, link_key_changes, link_keys};
+use cohaptic_scene::{KeysOfLinks, Scene, SceneContent, link_key_changes, link_keys, scene_content};
 use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 
@@ -23,7 +23,7 @@ use crate::arguments::LiveArguments;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
 use crate::realtime::{KeyedLinks, LiveControl};
-use crate::{interrupt, output};
+use crate::{failure, interrupt, output};
 use conductor::Host;
 use document::Document;
 use prepare::ready_falcons;
@@ -53,8 +53,8 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     }
     let overrides = overrides.as_slice();
     let scene = Scene::read_live(path, overrides)?;
-    if let Some(reason) = cohaptic_harness::too_large(&scene) {
-        return Err(Failure::Input(format!("{}: {reason}", path.display())));
+    if let Some(error) = failure::too_large(&scene, overrides) {
+        return Err(error.into());
     }
     let pairs = status::pairs(&scene);
     let number = |pair| pairs.iter().position(|known| *known == pair).expect("a pair of peers is a link");
@@ -65,7 +65,8 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let (changes, wanted) = channel();
     let elapsed = Elapsed::default();
     let editor = TimedLinks { links: KeyedLinks { keys, folder, changes }, planned, elapsed: elapsed.clone() };
-    let session = open(arguments, &scene)?;
+    let content = scene_content(path, overrides)?;
+    let session = open(arguments, &scene, content)?;
     let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
     prepare::announce(&scene, session.address(), arguments.key_file.is_some());
     let control = LiveControl::open(&arguments.real_time, status::description(&scene, &pairs), Box::new(editor))?;
@@ -85,7 +86,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
 }
 
 /// Everything that must be had before time begins; `None` if the user did not want to wait for it.
-fn open(arguments: &LiveArguments, scene: &Scene) -> Result<Option<Session>, Failure> {
+fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Result<Option<Session>, Failure> {
     let real_time = &arguments.real_time;
     let key = match &arguments.key_file {
         None => None,
@@ -98,10 +99,11 @@ fn open(arguments: &LiveArguments, scene: &Scene) -> Result<Option<Session>, Fai
         wishes: real_time.wishes(),
         tolerance: real_time.tolerance(),
         out: arguments.out.clone(),
+        content,
         ..SessionConfig::new(arguments.listen)
     };
     let Some(mut falcons) = ready_falcons(scene, arguments.firmware.as_deref(), real_time.wishes())? else { return Ok(None) };
-    Session::open(scene, config, |peer| falcons.take(peer)).map(Some).map_err(failure)
+    Session::open(scene, config, |peer| falcons.take(peer)).map(Some).map_err(refused)
 }
 
 fn conduct(scene: &Scene, session: Session, mut host: Host, control: &LiveControl) -> Result<Report, Failure> {
@@ -116,13 +118,13 @@ fn conduct(scene: &Scene, session: Session, mut host: Host, control: &LiveContro
             progress.reach(Instant::ZERO.saturating_add(latest.elapsed));
             progress.note(status::note(scene, &latest));
         }
-        running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(failure)
+        running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(refused)
     });
     progress.clear();
     report
 }
 
-fn failure(error: SessionError) -> Failure {
+fn refused(error: SessionError) -> Failure {
     if let SessionError::Record(error) = error {
         return error.into();
     }

@@ -10,6 +10,8 @@ use cohaptic_falcon::boot::Progress;
 use cohaptic_live::falcons::{Falcons, SIMULATED_HOMING};
 use cohaptic_realtime::Wishes;
 use cohaptic_scene::{PeerKind, Scene};
+use cohaptic_units::print::Counted;
+use cohaptic_units::visible_lines;
 
 use crate::failure::Failure;
 use crate::interrupt;
@@ -57,10 +59,10 @@ pub(super) fn announce(scene: &Scene, address: Option<SocketAddr>, has_key: bool
     let peers = scene.peers.iter().enumerate().filter(|(_, peer)| matches!(peer.kind, PeerKind::Udp(_)));
     let peers: Vec<String> = peers.map(|(place, peer)| format!("{} at place {place}", peer.name)).collect();
     let key = if has_key { "with its key" } else { "without a key" };
-    say(&format!("listening on {address} for {}: session {}, {} axes, {key}", peers.join(", "), scene.seed, scene.axes.count()));
+    say(&format!("listening on {address} for {}: session {}, {}, {key}", peers.join(", "), scene.seed, Counted(scene.axes.count(), "axis")));
 }
 
 fn say(line: &str) {
     // What cannot be said does not keep the session from beginning.
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{}", visible_lines(line));
 }

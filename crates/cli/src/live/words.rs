@@ -6,7 +6,7 @@ use cohaptic_harness::Ending;
 use cohaptic_harness::live::SeatStats;
 use cohaptic_live::Report;
 use cohaptic_scene::Scene;
-use cohaptic_units::print::Span;
+use cohaptic_units::print::{Counted, Span};
 
 use crate::documents::micros;
 use crate::realtime::{late, notes};
@@ -21,14 +21,14 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     let summary = &report.summary;
     let lasted = Span(summary.duration);
     match summary.ending {
-        Ending::Complete => line(format!("{lasted}, {} ticks", summary.ticks)),
+        Ending::Complete => line(format!("{lasted}, {}", Counted(summary.ticks, "tick"))),
         Ending::Diverged(at) => line(format!("DIVERGED: at {at} a position or a velocity is no finite number any more")),
-        Ending::Interrupted(_) => line(format!("ended after {lasted} of {}, {} ticks", Span(scene.duration), summary.ticks)),
+        Ending::Interrupted(_) => line(format!("ended after {lasted} of {}, {}", Span(scene.duration), Counted(summary.ticks, "tick"))),
     }
     line(format!("the run is {}", report.validity));
     line(format!("lateness of ticks: {}", late(&report.ticks)));
     if report.releases.count > 0 {
-        line(format!("lateness of {} datagrams to other programs: {}", report.releases.count, late(&report.releases)));
+        line(format!("lateness of {} to other programs: {}", Counted(report.releases.count, "datagram"), late(&report.releases)));
     }
     line(format!("at the end logical time was {:.1} µs behind the clock", micros(report.behind)));
     line(format!("largest discrepancy between two copies: {}", length(summary.max_discrepancy)));
@@ -39,14 +39,14 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     }
     line(packets(summary));
     if let Some((door, socket)) = &report.door {
-        line(format!("door at {}: {} samples let in, {} sent", socket.address, door.admitted, door.sent));
+        line(format!("door at {}: {} let in, {} sent", socket.address, Counted(door.admitted, "sample"), door.sent));
         let refused: Vec<String> = door.refusals().filter(|(_, count)| *count > 0).map(|(cause, count)| format!("{count} {cause}")).collect();
         if !refused.is_empty() {
             line(format!("refused: {}", refused.join(", ")));
         }
         let lost = socket.counts.failures.in_all() + socket.counts.oversized + socket.kernel_drops.unwrap_or(0);
         if lost > 0 {
-            line(format!("{lost} datagrams were lost at the socket"));
+            line(format!("lost at the socket: {}", Counted(lost, "datagram")));
         }
     }
     for file in report.files.iter().filter(|file| file.extension().is_some_and(|extension| extension == "svg")) {
@@ -60,7 +60,7 @@ fn came(seat: &SeatStats) -> String {
     let late = if seat.late > 0 { format!(", {} of them {:.0} µs late at most", seat.late, micros(seat.most_late)) } else { String::new() };
     match seat.joined {
         0 => "; it never came".to_owned(),
-        1 => format!("; {} samples taken{late}", seat.taken),
-        joined => format!("; it came {joined} times, {} samples taken{late}", seat.taken),
+        1 => format!("; {} taken{late}", Counted(seat.taken, "sample")),
+        joined => format!("; it came {joined} times, {} taken{late}", Counted(seat.taken, "sample")),
     }
 }

@@ -7,6 +7,7 @@ use cohaptic_control::{Board, Description, LinkEditor, ServeError, Server, Serve
 
 use crate::arguments::RealTimeArguments;
 use crate::failure::Failure;
+use crate::text_file;
 
 /// The board of a run, with a server before it if somebody asked for one.
 pub(crate) struct LiveControl {
@@ -22,7 +23,7 @@ impl LiveControl {
         let token = match &arguments.token_file {
             None => None,
             Some(path) => {
-                let text = std::fs::read_to_string(path).map_err(|error| Failure::File { verb: "read", path: path.clone(), error })?;
+                let text = text_file::read(path)?;
                 Some(text.trim().parse().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?)
             }
         };

@@ -5,7 +5,8 @@ use std::io::{self, Write as _};
 use std::time::{Duration, Instant as Clock};
 
 use cohaptic_control::Snapshot;
-use cohaptic_units::print::Span;
+use cohaptic_units::print::{Counted, Span};
+use cohaptic_units::visible_lines;
 use cohaptic_wan::{DropCause, LinkStats};
 
 use super::{AskedDelay, Look};
@@ -15,7 +16,7 @@ use crate::failure::Failure;
 /// Says something on standard error.
 pub(crate) fn say(line: &str) {
     // What cannot be said does not keep the run from beginning.
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{}", visible_lines(line));
 }
 
 /// How long a run is to last, if that was said.
@@ -55,7 +56,7 @@ pub(crate) fn status(snapshot: &Snapshot) -> String {
     let in_links: u64 = snapshot.links.iter().map(cohaptic_control::LinkCounters::dropped_in_all).sum();
     let beside: u64 = snapshot.refused.iter().map(|(_, count)| count).sum();
     let p99 = snapshot.lateness.first().map_or(0.0, |lateness| micros(lateness.p99));
-    format!("{packets} packets over links, {} dropped, release error p99 {p99:.0} µs", in_links + beside)
+    format!("{} over links, {} dropped, release error p99 {p99:.0} µs", Counted(packets, "packet"), in_links + beside)
 }
 
 /// `4000 offered, 3960 delivered, 40 dropped (loss), 8 on the way; mean delay 24.031 ms, asked 24.000 ms`. `beside` is what was dropped outside the link.

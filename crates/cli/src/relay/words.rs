@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use cohaptic_relay::{LinkReport, PortReport, Report};
+use cohaptic_units::print::Counted;
 
 use super::document::{Totals, refused};
 use super::setup::Setup;
@@ -22,7 +23,11 @@ pub(super) fn describe(setup: &Setup, report: &Report, asked: &[AskedDelay]) -> 
     };
     let Totals { packets, dropped, sent, unsent } = Totals::of(report);
     let held = report.held.0;
-    line(format!("{packets} datagrams came in within {}, {sent} sent on, {dropped} dropped, {held} on the way at the end", lasted(report.elapsed)));
+    line(format!(
+        "{} came in within {}, {sent} sent on, {dropped} dropped, {held} on the way at the end",
+        Counted(packets, "datagram"),
+        lasted(report.elapsed)
+    ));
     line(format!("the run is {}", report.validity));
     if report.release.count() > 0 {
         line(format!("release error: {}", late(&report.release.summary())));
@@ -35,7 +40,7 @@ pub(super) fn describe(setup: &Setup, report: &Report, asked: &[AskedDelay]) -> 
         line(format!("dropped at the door: {refused}"));
     }
     if report.without_socket > 0 {
-        line(format!("{} clients were sent away: no socket could be had (`ulimit -n`)", report.without_socket));
+        line(format!("sent away, because no socket could be had (`ulimit -n`): {}", Counted(report.without_socket, "client")));
     }
     if unsent > 0 {
         line(format!("{unsent} had come out of their links and were not sent yet"));
@@ -56,7 +61,7 @@ fn links(links: &[LinkReport], asked: &[AskedDelay], line: &mut impl FnMut(Strin
         line(format!("{from} -> {to}: {}", carried(stats, asked, &beside)));
     }
     if used.len() > MOST_LINKS {
-        line(format!("... and {} more links: --json has them", used.len() - MOST_LINKS));
+        line(format!("... and {}: --json has all", Counted(used.len() - MOST_LINKS, "more link")));
     }
     if used.is_empty() {
         line("nothing went over any link".to_owned());

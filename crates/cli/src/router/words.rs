@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use cohaptic_router::{LaneSnapshot, Received, Written};
 use cohaptic_scene::router_file::{RouterFile, Side};
+use cohaptic_units::print::Counted;
 
 use super::attached;
 use super::conduct::{Ending, Ran};
@@ -22,7 +23,7 @@ pub(super) fn describe(file: &RouterFile, ran: &Ran) -> String {
     if let Ending::Failed(error) = ending {
         line(format!("FAILED after {span}: {error}"));
     }
-    line(format!("{} packets came in within {span}, {} dropped, {held} on the way at the end", report.packets(), report.dropped()));
+    line(format!("{} came in within {span}, {} dropped, {held} on the way at the end", Counted(report.packets(), "packet"), report.dropped()));
     line(format!("the run is {validity}"));
     if report.release.count > 0 {
         line(format!("release error: {}", late(&report.release)));

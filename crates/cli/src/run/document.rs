@@ -21,6 +21,9 @@ pub(super) struct Document {
     access_lines: Vec<AccessDocument>,
     max_discrepancy_m: f64,
     files: Vec<String>,
+    /// In what the scene differs from that of the session that is replayed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) replayed_otherwise: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) against: Option<Box<Self>>,
 }
@@ -41,6 +44,7 @@ impl Document {
             access_lines: summary.access_lines.iter().map(|line| AccessDocument::new(scene, line)).collect(),
             max_discrepancy_m: summary.max_discrepancy,
             files: run.files.iter().map(|file| output::path(file)).collect(),
+            replayed_otherwise: Vec::new(),
             against: None,
         }
     }

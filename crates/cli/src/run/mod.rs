@@ -11,7 +11,7 @@ use std::time::Instant as Clock;
 
 use cohaptic_harness::live::{Inputs, replay};
 use cohaptic_harness::record::{Bands, RecordError, Recorder};
-use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow, too_large};
+use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -30,19 +30,23 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         // As the session read it.
         Some(_) => Scene::read_live(&arguments.scene.scene, overrides)?,
     };
+    if let Some(error) = failure::too_large(&scene, overrides) {
+        return Err(error.into());
+    }
     // Both scenes are read before either runs: a mistake in the second is not found after a long first run.
     let variant = if arguments.against.is_empty() {
         None
     } else {
         let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
         let mut variant = Scene::read(&arguments.scene.scene, &both).map_err(|error| failure::of_variant(error, "--against", &arguments.against))?;
+        if let Some(error) = failure::too_large(&variant, &both) {
+            return Err(error.into());
+        }
         variant.title = format!("{}, with {}", variant.title, arguments.against.join(", "));
         Some(variant)
     };
-    if let Some(reason) = [Some(&scene), variant.as_ref()].into_iter().flatten().find_map(too_large) {
-        return Err(Failure::Input(format!("{}: {reason}", arguments.scene.scene.display())));
-    }
-    let inputs = arguments.inputs.as_deref().map(|file| replayed::read(file, &scene, overrides)).transpose()?;
+    let inputs = arguments.inputs.as_deref().map(|file| replayed::read(file, &scene, arguments)).transpose()?;
+    let (inputs, replayed_otherwise) = inputs.unzip();
     let what = inputs.as_ref().map_or(What::Simulated, What::Replayed);
     let first = run_one(arguments, &scene, what, arguments.out.clone())?;
     let second = match &variant {
@@ -53,6 +57,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     };
     if arguments.scene.json {
         let mut document = Document::new(&scene, &first);
+        document.replayed_otherwise = replayed_otherwise.unwrap_or_default();
         document.against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| Box::new(Document::new(variant, run)));
         output::json(&document)?;
     } else {

@@ -1,16 +1,54 @@
-//! What came from outside in a live session.
+//! What came from outside in a live session, and whether it came into this scene.
 
+use std::io::{self, Write as _};
 use std::path::Path;
 
-use cohaptic_harness::live::Inputs;
-use cohaptic_scene::{Scene, link_keys};
+use cohaptic_harness::live::{Inputs, InputsError, RecordedScene};
+use cohaptic_scene::{Scene, link_keys, scene_content};
+use cohaptic_units::visible_lines;
 
+use crate::arguments::RunArguments;
 use crate::failure::Failure;
+use crate::{output, text_file};
 
-/// Reads `inputs.csv` of a session of that scene.
-pub(super) fn read(file: &Path, scene: &Scene, overrides: &[String]) -> Result<Inputs, Failure> {
-    let text = std::fs::read_to_string(file).map_err(|error| Failure::File { verb: "read", path: file.to_path_buf(), error })?;
+/// So many differences are listed.
+const MOST: usize = 20;
+
+/// Reads `inputs.csv` of a session, and says in what the scene differs from that of the session; if it does, it is refused without `--force`.
+pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments) -> Result<(Inputs, Vec<String>), Failure> {
+    let (path, overrides) = (&arguments.scene.scene, &arguments.scene.overrides.set);
+    let text = text_file::read(file)?;
+    let unreadable = |error: InputsError| Failure::Input(format!("{}: {error}", output::path(file)));
+    let of_the_session = RecordedScene::read(&text).map_err(unreadable)?;
+    let differences: Vec<String> = match of_the_session {
+        Some(recorded) => {
+            let now = RecordedScene::of(scene, scene_content(path, overrides)?);
+            recorded.differences(&now).iter().map(ToString::to_string).collect()
+        }
+        None => vec!["not known: the record is of a version that did not say with which scene it was made".to_owned()],
+    };
+    if !differences.is_empty() {
+        let said = listed(&differences);
+        let (record, scene) = (output::path(file), output::path(path));
+        let message = format!("{record} is the record of a session with another scene than {scene} with these overrides. What differs:\n{said}");
+        if !arguments.force {
+            let way_out = "expected the scene and every --set of the session, which its summary ends with; --force replays it all the same";
+            return Err(Failure::Input(format!("{message}{way_out}")));
+        }
+        // What cannot be said on standard error stands in the document.
+        let _ = write!(io::stderr(), "warning: {}", visible_lines(&message));
+    }
     // Any link will do: all have the modulators of the scene.
-    let keys = link_keys(&scene.file, overrides)?.into_values().next().unwrap_or_default();
-    Inputs::read(&text, scene, &keys).map_err(|error| Failure::Input(format!("{}: {error}", file.display())))
+    let keys = link_keys(path, overrides)?.into_values().next().unwrap_or_default();
+    let inputs = Inputs::read(&text, scene, &keys).map_err(unreadable)?;
+    Ok((inputs, differences))
+}
+
+/// A line for each, up to a number of them.
+fn listed(differences: &[String]) -> String {
+    let mut text: String = differences.iter().take(MOST).map(|difference| format!("  {difference}\n")).collect();
+    if let Some(more) = differences.len().checked_sub(MOST).filter(|more| *more > 0) {
+        text.push_str(&format!("  and {more} more\n"));
+    }
+    text
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use cohaptic_harness::record::SANE_POSITION;
 use cohaptic_harness::{Ending, Summary};
 use cohaptic_scene::Scene;
-use cohaptic_units::print::Span;
+use cohaptic_units::print::{Counted, Span};
 use cohaptic_wan::DropCause;
 
 use super::Run;
@@ -30,7 +30,7 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
         Ending::Interrupted(_) => line(format!("  INTERRUPTED after {simulated} of {}", Span(scene.duration))),
     }
     let factor = summary.duration.as_secs_f64() / run.wall_s;
-    line(format!("  {simulated} simulated, {} ticks, in {:.3} s: {factor:.0} times real time", summary.ticks, run.wall_s));
+    line(format!("  {simulated} simulated, {}, in {:.3} s: {factor:.0} times real time", Counted(summary.ticks, "tick"), run.wall_s));
     let apart = if summary.max_discrepancy > SANE_POSITION { ": they came apart" } else { "" };
     line(format!("  largest discrepancy between two copies: {}{apart}", length(summary.max_discrepancy)));
     for peer in summary.peers.iter().take(MOST_PEERS) {
@@ -38,7 +38,7 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
         line(format!("  {} ends at {}", peer.name, position.join(", ")));
     }
     if summary.peers.len() > MOST_PEERS {
-        line(format!("  ... and {} more peers", summary.peers.len() - MOST_PEERS));
+        line(format!("  ... and {}", Counted(summary.peers.len() - MOST_PEERS, "more peer")));
     }
     line(format!("  {}", packets(summary)));
     for file in run.files.iter().filter(|file| file.extension().is_some_and(|extension| extension == "svg")) {
@@ -64,10 +64,10 @@ pub(crate) fn packets(summary: &Summary) -> String {
     let delivered: u64 = lines(false).map(|stats| stats.delivered()).sum::<u64>()
         + summary.links.iter().filter(|link| !has_line(link.to, false)).map(|link| link.stats.delivered()).sum::<u64>();
     let stats = || summary.links.iter().map(|link| link.stats).chain(summary.access_lines.iter().map(|line| line.stats));
-    let mut parts = vec![format!("{sent} packets sent over {} links", summary.links.len()), format!("{delivered} delivered")];
+    let mut parts = vec![format!("{} sent over {}", Counted(sent, "packet"), Counted(summary.links.len(), "link")), format!("{delivered} delivered")];
     let copies: u64 = stats().map(|stats| stats.duplicated()).sum();
     if copies > 0 {
-        parts.push(format!("{copies} copies made"));
+        parts.push(format!("{} made", Counted(copies, "copy")));
     }
     for cause in DropCause::ALL {
         let dropped: u64 = stats().map(|stats| stats.dropped(cause)).sum();

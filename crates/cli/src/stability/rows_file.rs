@@ -136,9 +136,9 @@ fn refused(path: &Path, Difference { found, expected }: &Difference) -> Failure 
     ))
 }
 
-/// A number that other texts do not have: FNV-1a of 64 bits (Fowler, Noll & Vo 1991). It is no protection against malice.
+/// That of a text, as a number.
 pub(crate) fn fingerprint(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    cohaptic_scene::Fingerprint::of(text).get()
 }
 
 #[cfg(test)]

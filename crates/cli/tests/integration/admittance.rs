@@ -183,7 +183,7 @@ fn what_is_wrong_is_refused_and_nothing_is_written() {
         ("--peer left --from -1", &["--from -1: expected a frequency above 0"]),
         ("--peer left --from 200", &["from 200 Hz to 100 Hz", "the first below the last"]),
         ("--peer left --to 1000", &["--to 1000"]),
-        ("--peer left --points 1", &["1 frequencies"]),
+        ("--peer left --points 1", &["1 frequency from 0.01 Hz to 100 Hz"]),
         ("--peer left --points 0", &["--points"]),
         ("--peer left --curve link.delay", &["--curve link.delay: \"link.delay\" has no ="]),
         ("--peer left --curve link.dlay=1ms", &["--curve link.dlay=1ms: link.dlay: unknown key"]),

@@ -138,8 +138,8 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
         ("--vary scene.seed=1,2 --runs 2", &["--runs: scene.seed is varied"]),
         ("--runs 0", &["0 runs"]),
         ("--runs x", &["--runs"]),
-        ("--threads 0", &["--threads", "1..=1024"]),
-        ("--threads 100000", &["--threads", "1..=1024"]),
+        ("--threads 0", &["--threads", "from 1 to 1024"]),
+        ("--threads 100000", &["--threads", "from 1 to 1024"]),
         ("--part 0", &["--part"]),
         ("--format xlsx", &["parquet, csv"]),
     ] {

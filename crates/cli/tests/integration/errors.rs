@@ -144,7 +144,7 @@ fn too_many_peers_to_simulate_are_refused_before_anything_is_written() {
                  coordination = { strategy = \"average-position\", stiffness = 1, update = \"8ms\" }\npeer = { contact = \"none\", device.mass = 1 }\n";
     let desk = Desk::with("many.toml", scene);
     let words = "100000 peers are too many to be simulated, with 9999900000 links between them: expected at most 4096";
-    desk.cohaptic("run many.toml --out out").assert_refused(2, &["error: many.toml: scene.count: ", words]);
+    desk.cohaptic("run many.toml --out out").assert_refused(2, &["error: many.toml:1:37: scene.count: ", words, "^^^^^^"]);
     assert!(!desk.path("out").exists());
     let checked = desk.cohaptic("check many.toml");
     assert_eq!(checked.status, Some(2));

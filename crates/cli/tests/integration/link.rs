@@ -134,7 +134,7 @@ fn what_cannot_be_read_is_shown_with_the_word() {
         ("link", 2, &["<SPEC>"][..]),
         ("link delay 20ms loss 250%", 2, &["error: ", "\ndelay 20ms loss 250%\n                ^^^^ expected a percentage"]),
         ("link delay=20ms los=1%", 2, &["error: los=1%: link.los: unknown key", "loss"]),
-        ("link delay=20ms loss", 2, &["no = in the override"]),
+        ("link delay=20ms loss", 2, &["not in both: loss is of the first kind, delay=20ms of the second"]),
         ("link delay=20ms --profile kernel-6.6", 2, &["words of tc-netem"]),
         ("link delay 1ms --every soon", 2, &["--every", "soon"]),
         ("link delay 1ms --packets 0", 2, &["--packets"]),

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use cohaptic_harness::live::{Inputs, replay};
 use cohaptic_harness::record::{InputRecorder, Recorder};
-use cohaptic_scene::{Scene, link_keys};
+use cohaptic_scene::{Scene, link_keys, scene_content};
 use serde_json::Value;
 
 use crate::desk::{Desk, parse, shipped};
@@ -112,7 +112,9 @@ impl Session {
         let keys = link_keys(&path, &self.overrides).unwrap().into_values().next().unwrap();
         let inputs = Inputs::read(&self.desk.read("out/inputs.csv"), &scene, &keys).unwrap();
         let again = self.desk.path("again");
-        let mut observer = (Recorder::create(&again, &scene).unwrap(), InputRecorder::create(&again, &scene).unwrap());
+        let of_the_session: Vec<String> = self.overrides.iter().cloned().chain(["scene.duration=2.5s".to_owned(), "expect={}".to_owned()]).collect();
+        let content = scene_content(&path, &of_the_session).unwrap();
+        let mut observer = (Recorder::create(&again, &scene).unwrap(), InputRecorder::create(&again, &scene, content).unwrap());
         let summary = replay(&scene, &inputs, &mut observer).unwrap();
         observer.0.finish(&summary).unwrap();
         observer.1.finish().unwrap();

@@ -23,12 +23,15 @@ mod live;
 #[cfg(unix)]
 mod live_falcons;
 mod measured;
+mod messages;
 mod output;
 mod overrides;
 mod paper;
 mod records;
 #[cfg(target_os = "linux")]
 mod relay;
+#[cfg(unix)]
+mod replays;
 #[cfg(target_os = "linux")]
 mod router;
 mod run;
@@ -40,3 +43,4 @@ mod stability_chance;
 mod stability_map;
 mod stability_point;
 mod svg;
+mod sweep;

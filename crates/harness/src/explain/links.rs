@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_units::Probability;
-use cohaptic_units::print::Span;
+use cohaptic_units::print::{Counted, Span};
 use cohaptic_wan::{
     Bottleneck, Chance, Checksum, Correlation, Corruption, Counts, Delay, Discipline, Displacement, Distribution, Flips, Framing, Jitter, Layout,
     LinkConfig, LinkModel, Loss, Order, Outages, QueueLimit, Reorder, Service, SlotGap, Slots, Sojourn, TokenBucket,
@@ -20,7 +20,7 @@ pub(super) fn describe_link(model: &LinkModel) -> String {
             });
             format!("as \"{}\" goes; {}", modulated.modulator().name(), states.collect::<Vec<_>>().join("; "))
         }
-        LinkModel::Replay(log) => format!("a replay of {} packets, and nothing after them", log.packets()),
+        LinkModel::Replay(log) => format!("a replay of {}, and nothing after it", Counted(log.packets(), "packet")),
         LinkModel::Kernel(netem) => format!("netem of Linux 6.6, to the bit: {}", netem.words()),
         _ => "a link".into(),
     }
@@ -35,7 +35,7 @@ fn describe_config(config: &LinkConfig) -> String {
     stages.extend(describe_loss(loss).map(|loss| if *marks_instead_of_loss { format!("{loss} (marked, not lost)") } else { loss }));
     stages.extend((!duplication.is_never()).then(|| format!("{} sent twice", chance(*duplication))));
     stages.extend(corruption.as_ref().map(describe_corruption));
-    stages.extend(limit.map(|limit| format!("at most {limit} packets inside")));
+    stages.extend(limit.map(|limit| format!("at most {} inside", Counted(limit, "packet"))));
     stages.extend(token_bucket.map(|bucket| describe_bucket(&bucket)));
     stages.extend(config.bottleneck.as_ref().map(describe_bottleneck));
     stages.extend(config.slots.as_ref().map(describe_slots));
@@ -55,7 +55,7 @@ fn describe_config(config: &LinkConfig) -> String {
 fn describe_outages(outages: &Outages) -> Option<String> {
     let mut kinds = Vec::new();
     if !outages.scheduled().is_empty() {
-        kinds.push(format!("{} outages", outages.scheduled().len()));
+        kinds.push(Counted(outages.scheduled().len(), "outage").to_string());
     }
     kinds.extend(outages.random().map(|random| format!("random outages (up {}, down {})", sojourn(random.up), sojourn(random.down))));
     kinds.extend(outages.idle().map(|idle| format!("an outage of {} after {} without a packet", Span(idle.down), Span(idle.after))));
@@ -84,7 +84,7 @@ fn describe_loss(loss: &Loss) -> Option<String> {
 
 fn describe_corruption(corruption: &Corruption) -> String {
     let bits = match corruption.bits {
-        Flips::Bits { packets, count } => format!("{count} {} flipped in {}", if count == 1 { "bit" } else { "bits" }, chance(packets)),
+        Flips::Bits { packets, count } => format!("{} flipped in {}", Counted(count, "bit"), chance(packets)),
         Flips::Rate(rate) => format!("each bit flipped with {:e}", rate.get()),
         _ => "bits flipped".into(),
     };
@@ -121,7 +121,7 @@ fn describe_bottleneck(bottleneck: &Bottleneck) -> String {
 fn limit(limit: Option<QueueLimit>) -> String {
     match limit {
         None => "unlimited".into(),
-        Some(QueueLimit::Packets(packets)) => format!("{packets} packets"),
+        Some(QueueLimit::Packets(packets)) => Counted(packets, "packet").to_string(),
         Some(QueueLimit::Bytes(bytes)) => bytes.to_string(),
         Some(QueueLimit::Time(wait)) => Span(wait).to_string(),
         Some(_) => "limited".into(),
@@ -141,8 +141,8 @@ fn describe_slots(slots: &Slots) -> String {
         SlotGap::Drawn(gap) => format!("every {}", mean_and_jitter(gap)),
         _ => "now and then".into(),
     };
-    let packets = slots.packets.map(|packets| format!("{packets} packets"));
-    let bytes = slots.bytes.map(|bytes| format!("{bytes} bytes"));
+    let packets = slots.packets.map(|packets| Counted(packets.get(), "packet").to_string());
+    let bytes = slots.bytes.map(|bytes| Counted(bytes.get(), "byte").to_string());
     let share: Vec<String> = [packets, bytes].into_iter().flatten().collect();
     format!("slots {gap}{}", if share.is_empty() { String::new() } else { format!(" for {}", share.join(" or ")) })
 }

@@ -7,6 +7,7 @@ use cohaptic_scene::{LinkKeys, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
+use super::recorded::is_about_the_scene;
 use super::rows::{HEADER, read_row};
 use crate::observer::StateRow;
 
@@ -113,7 +114,8 @@ impl Inputs {
         }
         let folder = scene.file.parent().unwrap_or_else(|| Path::new(""));
         let mut rows: Vec<(Instant, Recorded)> = Vec::new();
-        for (line, row) in (2..).zip(lines) {
+        // What they say of their scene is for [`RecordedScene`](super::RecordedScene).
+        for (line, row) in (2..).zip(lines).skip_while(|(_, row)| is_about_the_scene(row)) {
             let (at, what) = read_row(line, row, scene, keys, folder)?;
             if let Some((before, last)) = rows.last()
                 && (at < *before || *last == Recorded::End)

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! at_ns,input,peer,to,value
+//! 0,program,,,0.1.0
 //! 8000000,sample,left,,43485054010001000…
 //! 9000000,device,hand,,0.01 -0.5
 //! 9000000,link,left,hand,"{ delay = ""40ms"", loss = 0.1 }"
@@ -9,7 +10,7 @@
 //! ```
 //!
 //! A sample is written in hexadecimal. A device shows position and velocity on each axis in turn (`x vx y vy`), with digits that read back as the same numbers,
-//! or `none`. A link has all its keys, as a TOML table.
+//! or `none`. A link has all its keys, as a TOML table. The rows before these say [with which scene](super::RecordedScene) they were recorded.
 
 use std::fmt;
 use std::path::Path;

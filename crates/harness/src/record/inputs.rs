@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Scene, SceneContent};
 
 use super::file::{PartialFile, create_folder, push_display};
 use crate::Observer;
-use crate::live::{HEADER, InputLine, InputRow};
+use crate::live::{InputLine, InputRow, RecordedScene};
 use crate::record::RecordError;
 
 /// Writes `inputs.csv`: what comes into a [live session](crate::live) from outside, one line each, from which it can be [replayed](crate::live::replay).
@@ -18,15 +18,16 @@ pub struct InputRecorder {
 }
 
 impl InputRecorder {
-    /// Begins to record into a folder, which is made if there is none.
+    /// Begins to record into a folder, which is made if there is none. `content`: the keys and files of the scene, from [`cohaptic_scene::scene_content`], with
+    /// which a replay with another scene can say what differs.
     ///
     /// # Errors
     ///
     /// [`RecordError`] if the folder or the file cannot be made.
-    pub fn create(folder: &Path, scene: &Scene) -> Result<Self, RecordError> {
+    pub fn create(folder: &Path, scene: &Scene, content: SceneContent) -> Result<Self, RecordError> {
         create_folder(folder)?;
         let mut file = PartialFile::create(folder.join("inputs.csv"))?;
-        file.write(format!("{HEADER}\n").as_bytes())?;
+        file.write(RecordedScene::of(scene, content).to_string().as_bytes())?;
         Ok(Self { file, names: scene.peers.iter().map(|peer| peer.name.clone()).collect(), line: Vec::new() })
     }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use cohaptic_harness::live::{Inputs, LiveDevice, LiveScene, Transmit, replay};
 use cohaptic_harness::record::{InputRecorder, Recorder};
 use cohaptic_harness::{Model, Simulation, Summary};
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Scene, SceneContent};
 
 use crate::scenes::Written;
 
@@ -36,7 +36,8 @@ pub(crate) fn session(
     drive: impl FnOnce(&mut LiveScene, &mut Observing, &mut Vec<Transmit>),
 ) -> Session {
     let folder = tempfile::tempdir().unwrap();
-    let mut observer = (Recorder::create(folder.path(), scene).unwrap(), InputRecorder::create(folder.path(), scene).unwrap());
+    let mut observer =
+        (Recorder::create(folder.path(), scene).unwrap(), InputRecorder::create(folder.path(), scene, SceneContent::default()).unwrap());
     let mut live = LiveScene::new(scene, devices);
     let mut transmits = Vec::new();
     drive(&mut live, &mut observer, &mut transmits);
@@ -60,7 +61,8 @@ pub(crate) fn again(written: &Written, session: &Session) -> (Files, Summary) {
     let inputs = Inputs::read(text, &written.scene, &written.keys).unwrap_or_else(|error| panic!("{error}\n{text}"));
     let folder = tempfile::tempdir().unwrap();
     let scene = &written.scene;
-    let mut observer = (Recorder::create(folder.path(), scene).unwrap(), InputRecorder::create(folder.path(), scene).unwrap());
+    let mut observer =
+        (Recorder::create(folder.path(), scene).unwrap(), InputRecorder::create(folder.path(), scene, SceneContent::default()).unwrap());
     let summary = replay(scene, &inputs, &mut observer).unwrap();
     observer.0.finish(&summary).unwrap();
     observer.1.finish().unwrap();

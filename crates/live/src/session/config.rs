@@ -8,6 +8,7 @@ use std::time::Duration;
 use cohaptic_harness::record::RecordError;
 use cohaptic_realtime::udp::BindError;
 use cohaptic_realtime::{Pacing, Tolerance, Wishes};
+use cohaptic_scene::SceneContent;
 
 use crate::{DoorError, SessionKey};
 
@@ -28,6 +29,9 @@ pub struct SessionConfig {
     pub tolerance: Tolerance,
     /// Where to record; `None`: nowhere.
     pub out: Option<PathBuf>,
+    /// The keys and files of the scene, from [`cohaptic_scene::scene_content`], which the record keeps: a replay with another scene says what differs.
+    /// Without them it says only that something does.
+    pub content: SceneContent,
 }
 
 impl SessionConfig {
@@ -42,6 +46,7 @@ impl SessionConfig {
             wishes: Wishes::default(),
             tolerance: Tolerance { limit: Duration::from_millis(1) },
             out: None,
+            content: SceneContent::default(),
         }
     }
 }

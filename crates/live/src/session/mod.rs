@@ -83,7 +83,7 @@ impl Session {
     /// If the scene is [`cohaptic_harness::too_large`].
     pub fn open(scene: &Scene, config: SessionConfig, devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Result<Self, SessionError> {
         let outside = Outside::open(scene, &config)?;
-        let recording = config.out.as_deref().map(|folder| Recording::create(folder, scene)).transpose()?;
+        let recording = config.out.as_deref().map(|folder| Recording::create(folder, scene, config.content.clone())).transpose()?;
         let peers = scene.peers.len();
         Ok(Self { live: LiveScene::new(scene, devices), outside, watch: Watch::new(peers, recording), config, peers })
     }

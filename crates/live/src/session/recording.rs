@@ -11,7 +11,7 @@ use cohaptic_harness::live::InputRow;
 use cohaptic_harness::record::{InputRecorder, RecordError, Recorder};
 use cohaptic_harness::{Observer as _, PacketRow, Summary, TickRow};
 use cohaptic_realtime::Lateness;
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Scene, SceneContent};
 
 use super::lateness_file;
 use super::releases::{Release, Releases};
@@ -54,9 +54,9 @@ impl Recording {
     /// # Errors
     ///
     /// [`RecordError`] if the folder or a file in it cannot be made.
-    pub(crate) fn create(folder: &Path, scene: &Scene) -> Result<Self, RecordError> {
+    pub(crate) fn create(folder: &Path, scene: &Scene, content: SceneContent) -> Result<Self, RecordError> {
         let recorder = Recorder::create(folder, scene)?;
-        let files = Files { recorder, inputs: InputRecorder::create(folder, scene)?, releases: Releases::create(folder, scene)? };
+        let files = Files { recorder, inputs: InputRecorder::create(folder, scene, content)?, releases: Releases::create(folder, scene)? };
         let axes = scene.axes.count();
         let (rows, waiting) = sync_channel(ROWS);
         let writer = thread::spawn(move || files.write(&waiting, axes));

@@ -2,6 +2,8 @@
 
 use std::net::SocketAddr;
 
+use cohaptic_units::print::Counted;
+
 use super::RelayProgram;
 use crate::context::Context;
 use crate::names::Names;
@@ -38,7 +40,7 @@ pub(super) fn read_programs(node: &Node, allow_remote: Option<bool>, context: Co
 /// Reports a file with fewer than two programs.
 pub(super) fn check_enough(names: &Names, node: &Node, context: Context<'_>) {
     if names.len() < 2 {
-        context.fault_at(node, format!("a relay with {} programs: expected at least two entries [[programs]]", names.len()));
+        context.fault_at(node, format!("a relay with {}: expected at least two entries [[programs]]", Counted(names.len(), "program")));
     }
 }
 
@@ -47,7 +49,7 @@ fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Nam
     let (port_node, address_node) = (table.get("port"), table.get("address"));
     let name = table.required("name", "the name of the program", |node, context| read_name(node, names, context));
     let port = table.required("port", "the address that stands for it, such as \"127.0.0.1:7001\"", |node, context| {
-        read_address(node, "an address with a port, such as \"127.0.0.1:7001\" or \"[::1]:7001\"", allow_remote, context)
+        read_address(node, "an address with a port, such as \"127.0.0.1:7001\", \"[::1]:7001\" or \"localhost:7001\"", allow_remote, context)
     });
     let address = table.maybe("address", |node, context| {
         const EXPECTED: &str = "an address with a port above zero, such as \"127.0.0.1:9001\"; without this key it is learnt";
@@ -80,9 +82,12 @@ fn read_name(node: &Node, names: &mut Names, context: Context<'_>) -> Option<Str
 
 fn read_address(node: &Node, expected: &str, allow_remote: Option<bool>, context: Context<'_>) -> Option<SocketAddr> {
     let text = values::text(node, context, expected)?;
-    let Ok(address) = text.parse::<SocketAddr>() else {
-        context.fault_at(node, format!("{} is no address with a port: expected {expected}", quote(text)));
-        return None;
+    let address = match crate::address(text) {
+        Ok(address) => address,
+        Err(error) => {
+            context.fault_at(node, format!("{} {error}: expected {expected}", quote(text)));
+            return None;
+        }
     };
     if !allow_remote? && !address.ip().is_loopback() {
         let message =

@@ -1,6 +1,7 @@
 //! Where a peer lives: `kind`, `silence` and `falcon` of a peer.
 
 use cohaptic_peer::DeviceConfig;
+use cohaptic_units::print::Counted;
 
 use crate::context::Context;
 use crate::model::{FalconDevice, FalconSpec, PeerKind, Silence};
@@ -74,7 +75,7 @@ fn read_origin(node: &Node, context: Context<'_>) -> Option<[f64; 3]> {
     const EXPECTED: &str = "a list of three numbers [m], a place in the coordinates of the device";
     let elements = values::list(node, context, EXPECTED)?;
     let [x, y, z] = elements.as_slice() else {
-        context.fault_at(node, format!("found a list of {} numbers: expected {EXPECTED}", elements.len()));
+        context.fault_at(node, format!("found a list of {}: expected {EXPECTED}", Counted(elements.len(), "number")));
         return None;
     };
     let read = |node| values::POSITION.read(node, context);

@@ -4,6 +4,7 @@ use core::ops::Range;
 use std::sync::Arc;
 
 use cohaptic_peer::{Table as MotionTable, TableError};
+use cohaptic_units::print::Counted;
 use cohaptic_units::{Instant, parse};
 
 use super::named_file::{Fault, file_path, read_file};
@@ -53,7 +54,7 @@ fn parse_rows(text: &str, header: &[&str]) -> Result<MotionTable, Fault> {
             }
         } else {
             if record.len() != header.len() {
-                let message = format!("{} columns: expected {}, {columns}", record.len(), header.len());
+                let message = format!("{}: expected {}, {columns}", Counted(record.len(), "column"), header.len());
                 return Err(Fault { span: line, message });
             }
             let fault =

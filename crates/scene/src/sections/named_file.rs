@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use crate::content::Fingerprint;
 use crate::context::Context;
 use crate::error::{Diagnostic, Origin};
 use crate::excerpt::Excerpt;
@@ -15,9 +16,20 @@ use crate::values;
 
 /// What has been learnt from files, by path and by what they were read as: each is read once. `None`: it was refused.
 #[derive(Debug, Default)]
-pub(crate) struct Files(RefCell<BTreeMap<(PathBuf, String), Known>>);
+pub(crate) struct Files {
+    known: RefCell<BTreeMap<(PathBuf, String), Known>>,
+    /// What was in each file that could be read.
+    held: RefCell<BTreeMap<PathBuf, Fingerprint>>,
+}
 
 type Known = Option<Rc<dyn Any>>;
+
+impl Files {
+    /// What was in each file that could be read.
+    pub(crate) fn into_held(self) -> BTreeMap<PathBuf, Fingerprint> {
+        self.held.into_inner()
+    }
+}
 
 /// What is wrong in the text of a file, and where.
 #[derive(Debug)]
@@ -72,19 +84,20 @@ pub(crate) fn read_file<T: Clone + 'static>(
     parse: impl FnOnce(&str) -> Result<T, Fault>,
 ) -> Option<T> {
     let key = (path.to_path_buf(), form.to_owned());
-    if let Some(known) = context.files.0.borrow().get(&key) {
+    if let Some(known) = context.files.known.borrow().get(&key) {
         return known.as_ref().and_then(|known| known.downcast_ref()).cloned();
     }
     let read = load(node, context, path).and_then(|text| {
         let refused = |Fault { span, message }: Fault| refuse(node, context, path, &text, span, message);
         parse(&text).map_err(refused).ok()
     });
-    context.files.0.borrow_mut().insert(key, read.clone().map(|read| Rc::new(read) as Rc<dyn Any>));
+    context.files.known.borrow_mut().insert(key, read.clone().map(|read| Rc::new(read) as Rc<dyn Any>));
     read
 }
 
 fn load(node: &Node, context: Context<'_>, path: &Path) -> Option<String> {
     let bytes = std::fs::read(path).map_err(|error| context.unreadable(node, path.to_path_buf(), error)).ok()?;
+    context.files.held.borrow_mut().insert(path.to_path_buf(), Fingerprint::of_bytes(&bytes));
     match String::from_utf8(bytes) {
         Ok(text) => Some(text),
         Err(error) => {

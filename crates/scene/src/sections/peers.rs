@@ -4,6 +4,7 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 
 use cohaptic_peer::Gains;
+use cohaptic_units::print::Counted;
 
 use super::peer::{NESTED, PeerKeys, read_peer};
 use crate::context::Context;
@@ -51,7 +52,7 @@ pub(crate) fn read_names(peers: Option<&Node>, count: Option<u64>, context: Cont
 pub(crate) fn check_enough(names: &Names, peers: Option<&Node>, context: Context<'_>) {
     if names.len() < 2 {
         let (place, path) = peers.map_or((BEGINNING, "peers"), |node| (node.place, node.path.as_str()));
-        let message = format!("a scene with {} peers: expected at least two entries [[peers]], or scene.count", names.len());
+        let message = format!("a scene with {}: expected at least two entries [[peers]], or scene.count", Counted(names.len(), "peer"));
         context.fault(place, path, message);
     }
 }

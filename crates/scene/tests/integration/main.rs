@@ -10,3 +10,4 @@ mod many_peers;
 mod mutations;
 mod relay_file;
 mod router_file;
+mod sweep;

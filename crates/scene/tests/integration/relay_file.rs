@@ -89,7 +89,13 @@ fn what_is_not_written_has_a_default_and_overrides_replace_what_is() {
 fn a_fault_names_line_key_and_what_was_expected() {
     for (found, replaced, line, key, words) in [
         ("\"127.0.0.1:7002\"", "\"192.0.2.1:7002\"", 17, "programs.b.port", "192.0.2.1:7002 is not on this machine: expected a loopback"),
-        ("\"127.0.0.1:7002\"", "\"localhost:7002\"", 17, "programs.b.port", "\"localhost:7002\" is no address with a port: expected"),
+        (
+            "\"127.0.0.1:7002\"",
+            "\"host.example:7002\"",
+            17,
+            "programs.b.port",
+            "\"host.example:7002\" names a host that would have to be looked up: expected",
+        ),
         ("\"127.0.0.1:7002\"", "\"127.0.0.1:7001\"", 17, "programs.b.port", "127.0.0.1:7001 stands for program \"a\" already"),
         ("\"127.0.0.1:7002\"", "\"[::1]:7002\"", 13, "programs.a.address", "cannot be reached from [::1]:7002, the port of program \"b\""),
         ("\"127.0.0.1:9001\"", "\"127.0.0.1:0\"", 13, "programs.a.address", "nobody can be reached at 127.0.0.1:0"),
@@ -111,7 +117,7 @@ fn a_fault_names_line_key_and_what_was_expected() {
         assert!(diagnostic.message().contains(words) && diagnostic.message().contains("expected") || words.contains("mean"), "{error}");
     }
     let one = "programs = [{ name = \"a\", port = \"[::1]:1\" }]";
-    assert!(parse(one).unwrap_err().to_string().contains("a relay with 1 programs: expected at least two"));
+    assert!(parse(one).unwrap_err().to_string().contains("a relay with 1 program: expected at least two"));
     assert!(parse("").unwrap_err().to_string().contains("programs: missing key"));
 }
 

@@ -92,7 +92,7 @@ pub(super) enum Bare {
     Nanoseconds,
 }
 
-pub(super) const TIME: &str = "a time such as 10ms, 250us or 1.5s, below 292 years";
+pub(super) const TIME: &str = "a time such as 10ms, 250us or 1.5s, below 292 years (units: s, ms, us, ns)";
 
 /// Reads a time, rounded to the nearest nanosecond.
 pub(super) fn time(text: &str, bare: Bare) -> Option<Duration> {
@@ -109,6 +109,9 @@ pub(super) fn time(text: &str, bare: Bare) -> Option<Duration> {
         ("us", US),
         ("usec", US),
         ("usecs", US),
+        // The micro sign and the Greek letter; `tc` has neither.
+        ("\u{b5}s", US),
+        ("\u{3bc}s", US),
         ("ns", 1),
         ("nsec", 1),
         ("nsecs", 1),
@@ -137,7 +140,7 @@ pub(super) fn percent(text: &str) -> Option<Percent> {
     Percent::new(number.value)
 }
 
-pub(super) const RATE: &str = "a rate of at least 8bit such as 10mbit, 64kbit or 1.5mbps (the last is bytes per second)";
+pub(super) const RATE: &str = "a rate of at least 8bit such as 10mbit, 64kbit or 1.5mbps (units: bit, kbit, mbit, gbit, tbit and, for bytes per second, bps, kbps, mbps, gbps, tbps)";
 
 /// Reads a rate as bytes per second, cut off as `tc` does.
 pub(super) fn rate(text: &str) -> Option<NonZeroU64> {

@@ -6,6 +6,7 @@ use cohaptic_scene::Scene;
 use cohaptic_stability::{Graph, Judgement, Matrix, analyse_on, has_chance};
 
 use crate::failure::Failure;
+use crate::text_file;
 
 /// What the verdict leaves out where links leave something to chance.
 const NOMINAL: &str = "the verdict is nominal, with every delay its mean and nothing lost: the second moment is not followed on a graph";
@@ -28,7 +29,7 @@ pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, F
 
 /// A file of weights: one line a peer, numbers between commas.
 fn weights(file: &Path) -> Result<Graph, Failure> {
-    let text = std::fs::read_to_string(file).map_err(|error| Failure::File { verb: "read", path: file.to_path_buf(), error })?;
+    let text = text_file::read(file)?;
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let entry = |entry: &str| {

@@ -1,0 +1,74 @@
+//! Numbers on the command line: what is none is refused in words, with the range that is taken.
+
+use std::num::NonZeroUsize;
+
+use cohaptic_units::{Probability, parse};
+
+/// An integer in a range, both ends included.
+pub(crate) fn integer<T: TryFrom<u64>>(least: u64, most: u64) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let number = text.parse().ok().filter(|number| (least..=most).contains(number));
+        number.and_then(|number: u64| T::try_from(number).ok()).ok_or_else(|| expected(least, most))
+    }
+}
+
+/// Any integer that is not negative.
+pub(crate) fn any_integer(text: &str) -> Result<u64, String> {
+    integer(0, u64::MAX)(text)
+}
+
+/// An integer of at least one.
+pub(crate) fn some(text: &str) -> Result<NonZeroUsize, String> {
+    let number = text.parse().ok();
+    number.ok_or_else(|| expected(1, u64::MAX))
+}
+
+/// How many threads: tens of thousands, which is what a slip of the finger asks for, keep a machine busy with them alone.
+pub(crate) fn threads(text: &str) -> Result<u16, String> {
+    integer(1, 1024)(text)
+}
+
+/// A number, whatever its range.
+pub(crate) fn real(text: &str) -> Result<f64, String> {
+    text.trim().parse().map_err(|_| "expected a number such as 0.25, 100 or 1e-3".to_owned())
+}
+
+/// A probability, as a number from 0 to 1 or in percent.
+pub(crate) fn probability(text: &str) -> Result<Probability, String> {
+    let number = || text.trim().parse().ok().and_then(|number| Probability::new(number).ok());
+    parse::probability(text).ok().or_else(number).ok_or_else(|| "expected a probability such as 0.015 or 1.5%".to_owned())
+}
+
+fn expected(least: u64, most: u64) -> String {
+    if most == u64::MAX {
+        format!("expected an integer of at least {least}, below 2^64")
+    } else {
+        format!("expected an integer from {least} to {most}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_have_a_range_and_say_it() {
+        assert_eq!((threads("1"), threads("1024"), any_integer("18446744073709551615")), (Ok(1), Ok(1024), Ok(u64::MAX)));
+        for text in ["", "0", "1025", "-1", "1.5", "many", "1e3", "99999999999999999999999"] {
+            assert_eq!(threads(text), Err("expected an integer from 1 to 1024".to_owned()), "{text}");
+        }
+        assert_eq!(any_integer("-1"), Err("expected an integer of at least 0, below 2^64".to_owned()));
+        assert_eq!(some("0"), Err("expected an integer of at least 1, below 2^64".to_owned()));
+        assert_eq!(integer::<u16>(0, 65_535)("65536"), Err("expected an integer from 0 to 65535".to_owned()));
+    }
+
+    #[test]
+    fn a_probability_is_a_number_or_a_percentage() {
+        for text in ["0.015", "1.5%", " 0.015 ", "1.5 %"] {
+            assert!((probability(text).unwrap().get() - 0.015).abs() < 1e-17, "{text}");
+        }
+        for text in ["", "1.1", "101%", "-0.1", "NaN", "half", "1.5ms"] {
+            assert_eq!(probability(text), Err("expected a probability such as 0.015 or 1.5%".to_owned()), "{text}");
+        }
+    }
+}

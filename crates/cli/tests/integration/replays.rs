@@ -1,0 +1,116 @@
+//! A replay of a live session with a scene that is not that of the session.
+
+use crate::desk::Desk;
+use crate::scenes::TWO;
+
+/// A hand whose force stands in a file.
+fn with_hand() -> String {
+    TWO.replace("{ force = 1.5 }", "{ file = \"hand.csv\" }")
+}
+
+/// A desk with a session of 40 ms on it, recorded into `out`.
+fn session() -> Desk {
+    let desk = Desk::with("two.toml", &with_hand());
+    desk.write("hand.csv", "t,fx\n0,1.5\n1,1.5\n");
+    desk.text("live two.toml --for 40ms --no-priority --out out --set link.loss=10%");
+    desk
+}
+
+/// The overrides of that session.
+const SET: &str = "--set link.loss=10% --set scene.duration=40ms";
+
+const WAY_OUT: &str = "expected the scene and every --set of the session, which its summary ends with; --force replays it all the same\n";
+
+fn message(differences: &str) -> String {
+    format!(
+        "error: out/inputs.csv is the record of a session with another scene than two.toml with these overrides. What differs:\n{differences}{WAY_OUT}"
+    )
+}
+
+#[test]
+fn a_scene_that_says_the_same_is_the_same() {
+    let desk = session();
+    // What changes nothing that happens: expectations, the title, comments, the way in which a value is written, the name of the file.
+    let same = with_hand().replace("\"24ms\"", "\"24000us\" # as before").replace("Two users", "Others") + "\n[expect]\nstable = true\n";
+    desk.write("same.toml", same);
+    desk.text(&format!("run same.toml {SET} --inputs out/inputs.csv --no-plot"));
+}
+
+#[test]
+fn another_scene_is_refused_key_by_key() {
+    for (change, set, differences) in [
+        (("", ""), "--set link.loss=10%", "  scene.duration: \"40ms\" in the record, \"200ms\" now\n"),
+        (("", ""), "--set scene.duration=40ms", "  link.loss: \"10%\" in the record, not there now\n"),
+        (("\"24ms\"", "\"25ms\""), SET, "  link.delay: \"24ms\" in the record, \"25ms\" now\n"),
+        (("name = \"right\"", "name = \"right\"\ncontact = \"none\""), SET, "  peers.right.contact: not in the record, \"none\" now\n"),
+        (
+            ("mass = 0.3", "mass = 0.4"),
+            "--set scene.duration=40ms",
+            "  link.loss: \"10%\" in the record, not there now\n  object.mass: 0.3 in the record, 0.4 now\n",
+        ),
+        (
+            ("[link]", "[[timeline]]\nat = \"10ms\"\nlink = \"all\"\nset = { loss = 0.5 }\n\n[link]"),
+            SET,
+            "  timeline.0.at: not in the record, \"10ms\" now\n  timeline.0.link: not in the record, \"all\" now\n  \
+               timeline.0.set.loss: not in the record, 0.5 now\n",
+        ),
+    ] {
+        let desk = session();
+        desk.write("two.toml", with_hand().replacen(change.0, change.1, 1));
+        let outcome = desk.cohaptic(&format!("run two.toml {set} --inputs out/inputs.csv --out again"));
+        assert_eq!((outcome.status, outcome.stdout.as_str(), outcome.stderr), (Some(2), "", message(differences)));
+        assert!(!desk.path("again").exists());
+    }
+}
+
+#[test]
+fn a_file_that_the_scene_names_counts() {
+    let desk = session();
+    desk.write("hand.csv", "t,fx\n0,1.5\n1,1.25\n");
+    let outcome = desk.cohaptic(&format!("run two.toml {SET} --inputs out/inputs.csv"));
+    assert_eq!((outcome.status, outcome.stderr), (Some(2), message("  the file hand.csv: something else in the record than now\n")));
+}
+
+#[test]
+fn force_replays_it_and_says_what_differs() {
+    let desk = session();
+    let line = format!("run two.toml {SET} --set link.delay=8ms --inputs out/inputs.csv --force --no-plot");
+    let outcome = desk.cohaptic(&line);
+    let warning = "warning: out/inputs.csv is the record of a session with another scene than two.toml with these overrides. What differs:\n  \
+                   link.delay: \"24ms\" in the record, \"8ms\" now\n";
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), warning));
+    assert!(outcome.stdout.contains("40ms simulated, 40 ticks"), "{}", outcome.stdout);
+    let document = crate::desk::parse(&desk.cohaptic(&format!("{line} --json")).stdout);
+    assert_eq!(document["replayed_otherwise"], serde_json::json!(["link.delay: \"24ms\" in the record, \"8ms\" now"]));
+    // The same scene says nothing.
+    let document = desk.json(&format!("run two.toml {SET} --inputs out/inputs.csv --json --force"));
+    assert!(document.get("replayed_otherwise").is_none());
+}
+
+/// Records of versions that did not say with which scene they were made cannot be checked.
+#[test]
+fn a_record_that_does_not_know_its_scene_is_refused_without_force() {
+    let desk = session();
+    let record: String = desk
+        .read("out/inputs.csv")
+        .lines()
+        .filter(|line| !["0,program", "0,scene", "0,file", "0,key"].iter().any(|row| line.starts_with(row)))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    desk.write("out/inputs.csv", record);
+    let line = format!("run two.toml {SET} --inputs out/inputs.csv --no-plot");
+    let unknown = "  not known: the record is of a version that did not say with which scene it was made\n";
+    let outcome = desk.cohaptic(&line);
+    assert_eq!((outcome.status, outcome.stderr), (Some(2), message(unknown)));
+    let outcome = desk.cohaptic(&format!("{line} --force"));
+    assert_eq!(outcome.status, Some(0));
+    assert!(outcome.stderr.starts_with("warning: ") && outcome.stderr.ends_with(unknown), "{}", outcome.stderr);
+}
+
+#[test]
+fn a_record_that_is_damaged_is_refused_at_its_line() {
+    let desk = session();
+    desk.write("out/inputs.csv", desk.read("out/inputs.csv").replacen("0,scene,,,", "0,scene,,,x", 1));
+    let outcome = desk.cohaptic(&format!("run two.toml {SET} --inputs out/inputs.csv"));
+    outcome.assert_refused(2, &["error: out/inputs.csv: line 3, column value: found \"x", "expected 16 hexadecimal digits"]);
+}

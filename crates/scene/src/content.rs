@@ -1,0 +1,216 @@
+//! What a scene says: as one number, and key by key, so that a record can tell whether it belongs to a scene and, if it does not, what differs.
+
+use core::fmt::{self, Write as _};
+use core::str::FromStr;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::SceneError;
+use crate::model::Scene;
+use crate::read::{parse_whole, with_text};
+use crate::source::Sources;
+use crate::toml_text::{key_text, value_text};
+use crate::tree::{Node, Value, join};
+
+/// A number that other texts do not have: FNV-1a of 64 bits (Fowler, Noll & Vo 1991). It is no protection against malice.
+///
+/// Its display form is 16 hexadecimal digits, which it is read from again.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub struct Fingerprint(u64);
+
+impl Fingerprint {
+    const NONE: Self = Self(0xcbf2_9ce4_8422_2325);
+
+    /// That of a text.
+    #[must_use]
+    pub fn of(text: impl fmt::Display) -> Self {
+        let mut fingerprint = Self::NONE;
+        // Writing a number does not fail.
+        let _ = write!(fingerprint, "{text}");
+        fingerprint
+    }
+
+    /// That of bytes.
+    #[must_use]
+    pub fn of_bytes(bytes: &[u8]) -> Self {
+        Self::NONE.and(bytes)
+    }
+
+    /// As a number.
+    #[must_use]
+    pub const fn get(self) -> u64 {
+        self.0
+    }
+
+    fn and(self, bytes: &[u8]) -> Self {
+        Self(bytes.iter().fold(self.0, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)))
+    }
+}
+
+impl fmt::Write for Fingerprint {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        *self = self.and(text.as_bytes());
+        Ok(())
+    }
+}
+
+impl fmt::Display for Fingerprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:016x}", self.0)
+    }
+}
+
+/// A text is no fingerprint.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("expected 16 hexadecimal digits")]
+pub struct FingerprintError;
+
+impl FromStr for Fingerprint {
+    type Err = FingerprintError;
+
+    fn from_str(text: &str) -> Result<Self, FingerprintError> {
+        let digits = text.len() == 16 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
+        u64::from_str_radix(text, 16).ok().filter(|_| digits).map(Self).ok_or(FingerprintError)
+    }
+}
+
+impl Scene {
+    /// That of all that the scene says, and that the files say which it names. The same scene under another name, in another folder, with other words for the
+    /// same values has the same one; a title that is written counts as nothing.
+    #[must_use]
+    pub fn fingerprint(mut self) -> Fingerprint {
+        self.file = PathBuf::new();
+        self.title.clear();
+        Fingerprint::of(format_args!("{self:?}"))
+    }
+}
+
+/// The keys of a scene as they are written, overrides included, and the files that it names.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct SceneContent {
+    /// Each value as TOML, by its dotted path: `link.delay` is `"24ms"`. Entries of lists are called as in overrides; `peers` and `modulators`, whose order
+    /// counts, have their names besides. Title and expectations, which change nothing that happens, are left out.
+    pub keys: BTreeMap<String, String>,
+    /// What each file holds, by its path relative to the folder of the scene.
+    pub files: BTreeMap<String, Fingerprint>,
+}
+
+/// The keys of a scene file, read as for a live session, and the files that it names.
+///
+/// # Errors
+///
+/// As [`Scene::read_live`].
+pub fn scene_content(path: &Path, overrides: &[String]) -> Result<SceneContent, SceneError> {
+    with_text(path, |text| scene_content_of_text(text, path, overrides))
+}
+
+/// [`scene_content`] of a scene that is a text; `file` as in [`Scene::parse`].
+///
+/// # Errors
+///
+/// As [`Scene::parse_live`].
+pub fn scene_content_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<SceneContent, SceneError> {
+    let (_, document, files) = parse_whole(Sources { file, text, overrides }, true)?;
+    let mut keys = BTreeMap::new();
+    collect(&document, "", &mut keys);
+    keys.retain(|key, _| key != "scene.title" && key != "expect" && !key.starts_with("expect."));
+    let folder = file.parent().unwrap_or_else(|| Path::new(""));
+    let name = |path: PathBuf| path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
+    Ok(SceneContent { keys, files: files.into_iter().map(|(path, bytes)| (name(path), bytes)).collect() })
+}
+
+/// Every value below a node that is no table.
+fn collect(node: &Node, path: &str, keys: &mut BTreeMap<String, String>) {
+    match &node.value {
+        Value::Table(table) => {
+            for entry in &table.0 {
+                collect(&entry.node, &join(path, &entry.name), keys);
+            }
+        }
+        Value::List(elements) if !elements.is_empty() && elements.iter().all(|element| element.as_table().is_some()) => {
+            let name = |element: &Node| element.as_table()?.get("name").map(|entry| value_text(&entry.node));
+            let names: Option<Vec<String>> = elements.iter().map(|element| name(element)).collect();
+            if let Some(names) = names {
+                keys.insert(path.to_owned(), format!("[{}]", names.join(", ")));
+            }
+            for element in elements {
+                collect(element, &element.path, keys);
+            }
+        }
+        Value::List(_) | Value::Text(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date => {
+            keys.insert(path.to_owned(), value_text(node));
+        }
+    }
+}
+
+impl SceneContent {
+    /// A key or the name of a file and what it is, as one line of TOML: `"link.delay" = "24ms"`. [`SceneContent::read_line`] takes it.
+    #[must_use]
+    pub fn line(name: &str, value: &str) -> String {
+        format!("{} = {value}", key_text(name))
+    }
+
+    /// The name and the value of a line, the value as TOML. `None` for anything else.
+    #[must_use]
+    pub fn read_line(line: &str) -> Option<(String, String)> {
+        let document = Node::document(toml::de::DeTable::parse(line).ok()?.get_ref()).ok()?;
+        let [only] = document.as_table()?.0.as_slice() else { return None };
+        Some((only.name.clone(), value_text(&only.node)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "scene = { duration = \"1s\", title = \"a title\" }\nobject = { mass = 1.0 }\n\
+        coordination = { strategy = \"average-position\", stiffness = 1.0, damping = 1.0, update = \"1ms\" }\n\
+        peer = { device = { mass = 1.0, damping = 1.0 }, coupling = { stiffness = 1.0, damping = 1.0 } }\n\
+        peers = [{ name = \"left\", contact = \"none\", hand = { file = \"hand.csv\" } }, { name = \"right\" }]\nlink = { delay = \"24ms\" }\n\
+        timeline = [{ at = \"0.5s\", link = \"all\", set = { loss = 0.5 } }]\n[expect]\nstable = true\n";
+
+    fn desk() -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("hand.csv"), "t,fx\n0,1\n").unwrap();
+        let file = folder.path().join("two.toml");
+        (folder, file)
+    }
+
+    /// The published values of FNV-1a of 64 bits (Fowler, Noll & Vo; `draft-eastlake-fnv`, appendix C).
+    #[test]
+    fn fingerprints_are_fnv_1a() {
+        for (text, number) in [("", 0xcbf2_9ce4_8422_2325), ("a", 0xaf63_dc4c_8601_ec8c), ("foobar", 0x8594_4171_f739_67e8)] {
+            assert_eq!(Fingerprint::of(text).get(), number);
+            assert_eq!(Fingerprint::of_bytes(text.as_bytes()).get(), number);
+        }
+        assert_eq!("85944171f73967e8".parse(), Ok(Fingerprint::of("foobar")));
+        for text in ["", "85944171f73967e", "85944171f73967e80", "+5944171f73967e8", "85944171f73967eg"] {
+            assert_eq!(text.parse::<Fingerprint>(), Err(FingerprintError), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_a_scene_says_is_its_keys_with_the_overrides_and_what_its_files_hold() {
+        let (_folder, file) = desk();
+        let content = scene_content_of_text(TEXT, &file, &["peers.right.device.mass=2".to_owned(), "link.delay=8ms".to_owned()]);
+        let content = content.unwrap_or_else(|error| panic!("{error}"));
+        let value = |key: &str| content.keys.get(key).map(String::as_str);
+        assert_eq!(value("link.delay"), Some("\"8ms\""));
+        assert_eq!(value("peers"), Some("[\"left\", \"right\"]"));
+        assert_eq!(value("peers.left.contact"), Some("\"none\""));
+        assert_eq!(value("peers.right.device.mass"), Some("2"));
+        assert_eq!(value("timeline.0.set.loss"), Some("0.5"));
+        assert_eq!((value("scene.title"), value("expect.stable")), (None, None));
+        assert_eq!(content.files, BTreeMap::from([("hand.csv".to_owned(), Fingerprint::of("t,fx\n0,1\n"))]));
+    }
+
+    #[test]
+    fn a_line_is_read_back() {
+        for (name, value) in [("link.delay", "\"24ms\""), ("peers.a \"b\"\n.x", "[1.0, 2]"), ("a", "\"\\u0007\"")] {
+            assert_eq!(SceneContent::read_line(&SceneContent::line(name, value)), Some((name.to_owned(), value.to_owned())));
+        }
+        for line in ["", "a", "a = ", "a = 1\nb = 2"] {
+            assert_eq!(SceneContent::read_line(line), None, "{line:?}");
+        }
+    }
+}

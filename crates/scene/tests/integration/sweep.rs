@@ -1,0 +1,109 @@
+//! Every key of a scene with values that it does not take: the answer is in words of scenes, and never what Rust says of a number.
+
+use std::panic::catch_unwind;
+use std::path::Path;
+
+use cohaptic_scene::{RelayFile, Scene, link_from_keys, scene_content};
+
+use crate::every_key::path;
+
+/// What the standard library says of texts that it does not read, and how it shows its own types.
+const RAW: [&str; 18] = [
+    "invalid digit found",
+    "would be zero for non-zero type",
+    "from empty string",
+    "number too large to fit",
+    "number too small to fit",
+    "invalid float literal",
+    "out of range integral type",
+    "invalid utf-8 sequence",
+    "did not contain valid UTF-8",
+    "socket address syntax",
+    "IP address syntax",
+    "was not `true` or `false`",
+    "ParseIntError",
+    "ParseFloatError",
+    "Utf8Error",
+    "InvalidDigit",
+    "Some(",
+    "Err(",
+];
+
+const VALUES: [&str; 30] = [
+    "abc",
+    "''",
+    "' '",
+    "-1",
+    "-0.5",
+    "0",
+    "1.5",
+    "1e300",
+    "1e-300",
+    "nan",
+    "inf",
+    "99999999999999999999999999999999999999999999999",
+    "0x10000000000000000",
+    "8 parsecs",
+    "8",
+    "-8ms",
+    "1.2.3s",
+    "99999999999999999999h",
+    "10mb",
+    "101%",
+    "-1%",
+    "x%",
+    "0 packets",
+    "-1 packets",
+    "99999999999999999999 packets",
+    "[]",
+    "[1, 2, 3, 4]",
+    "{}",
+    "1979-05-27",
+    "'a\u{202e}b'",
+];
+
+fn assert_in_words(what: &str, message: &str) {
+    for raw in RAW {
+        assert!(!message.contains(raw), "{what}: {raw:?} in {message}");
+    }
+    assert!(message.contains("expected"), "{what}: {message}");
+    assert!(!message.contains('\u{202e}'), "{what}: {message}");
+}
+
+#[test]
+fn a_wrong_value_of_any_key_is_refused_in_words() {
+    let file = path();
+    let keys: Vec<String> = scene_content(&file, &[]).unwrap().keys.into_keys().collect();
+    assert!(keys.len() > 100, "only {} keys", keys.len());
+    let mut refused = 0_usize;
+    for key in &keys {
+        for value in VALUES {
+            let set = format!("{key}={value}");
+            let read = catch_unwind(|| Scene::read(&file, std::slice::from_ref(&set))).unwrap_or_else(|_| panic!("{set}"));
+            if let Err(error) = read {
+                refused += 1;
+                assert_in_words(&set, &error.to_string());
+            }
+        }
+    }
+    // A key takes some of these values at most: three quarters are wrong for each.
+    assert!(refused > keys.len() * VALUES.len() * 3 / 4, "{refused} of {}", keys.len() * VALUES.len());
+}
+
+#[test]
+fn a_wrong_value_of_a_link_or_of_a_relay_is_refused_in_words() {
+    let relay = "programs = [{ name = \"a\", port = \"127.0.0.1:7001\", address = \"127.0.0.1:7003\" }, { name = \"b\", port = \"localhost:7002\" }]";
+    for value in VALUES.into_iter().chain(["localhost", "localhost:", "host.example:7", "127.0.0.1", "127.0.0.1:65536", "[::1]"]) {
+        for key in ["delay", "jitter", "loss", "duplicate", "rate", "queue", "mtu", "order", "limit", "netem", "reorder", "outages", "trace"] {
+            if let Err(error) = link_from_keys(&[format!("{key}={value}")]) {
+                assert_in_words(&format!("{key}={value}"), &error.to_string());
+            }
+        }
+        for key in ["programs.a.port", "programs.a.address", "relay.seed", "relay.most-packets", "relay.most-bytes", "relay.tolerance"] {
+            if let Err(error) = RelayFile::parse(relay, Path::new("relay.toml"), &[format!("{key}={value}")]) {
+                assert_in_words(&format!("{key}={value}"), &error.to_string());
+            }
+        }
+    }
+    assert!(RelayFile::parse(relay, Path::new("relay.toml"), &[]).is_ok_and(|file| file.programs[1].port.to_string() == "127.0.0.1:7002"));
+}
