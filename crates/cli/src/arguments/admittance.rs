@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{EXIT_STATUS, SceneArguments};
+use super::SceneArguments;
+use super::examples::{self, after};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::ADMITTANCE))]
 pub(crate) struct AdmittanceArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,

@@ -16,33 +16,36 @@ use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use crate::arguments::RunArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::{failure, interrupt, output};
+use crate::{failure, input, interrupt, output};
 use document::Document;
 use words::describe;
 
 /// Runs a scene, or a scene and a variant of it, and says what happened.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
-    let overrides = &arguments.scene.overrides.set;
+    let path = &arguments.scene.scene;
+    let overrides = &overrides(arguments);
     let scene = match &arguments.inputs {
-        None => Scene::read(&arguments.scene.scene, overrides)?,
+        None => input::with(path, |text, file| Scene::parse(text, file, overrides))?,
         // As the session read it.
-        Some(_) => Scene::read_live(&arguments.scene.scene, overrides)?,
+        Some(_) => input::with(path, |text, file| Scene::parse_live(text, file, overrides))?,
     };
     // Both scenes are read before either runs: a mistake in the second is not found after a long first run.
     let variant = if arguments.against.is_empty() {
         None
     } else {
         let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
-        let mut variant = Scene::read(&arguments.scene.scene, &both).map_err(|error| failure::of_variant(error, "--against", &arguments.against))?;
+        let variant = input::with(path, |text, file| Scene::parse(text, file, &both));
+        let mut variant = variant.map_err(|error| failure::of_variant(error, "--against", &arguments.against))?;
         variant.title = format!("{}, with {}", variant.title, arguments.against.join(", "));
         Some(variant)
     };
     if let Some(reason) = [Some(&scene), variant.as_ref()].into_iter().flatten().find_map(too_large) {
-        return Err(Failure::Input(format!("{}: {reason}", arguments.scene.scene.display())));
+        return Err(Failure::Input(format!("{}: {reason}", input::named(path).display())));
     }
-    let inputs = arguments.inputs.as_deref().map(|file| replayed::read(file, &scene, overrides)).transpose()?;
+    let inputs = arguments.inputs.as_deref().map(|file| replayed::read(file, path, &scene, overrides)).transpose()?;
     let what = inputs.as_ref().map_or(What::Simulated, What::Replayed);
     let first = run_one(arguments, &scene, what, arguments.out.clone())?;
     let second = match &variant {
@@ -54,15 +57,22 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     if arguments.scene.json {
         let mut document = Document::new(&scene, &first);
         document.against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| Box::new(Document::new(variant, run)));
-        output::json(&document)?;
+        output::json(DocumentSchema::Run, &document)?;
     } else {
         let mut text = format!("{}\n{}", scene.title, describe(&scene, &first));
         if let Some((variant, run)) = variant.as_ref().zip(second.as_ref()) {
             let _ = write!(text, "\nAgainst {}:\n{}", arguments.against.join(", "), describe(variant, run));
         }
         output::text(&text)?;
+        output::wrote([Some(&first), second.as_ref()].into_iter().flatten().flat_map(|run| &run.files));
     }
     Ok(if interrupt::asked() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// What is put into the scene: all `--set`, and then the seed.
+fn overrides(arguments: &RunArguments) -> Vec<String> {
+    let seed = arguments.seed.map(|seed| format!("scene.seed={seed}"));
+    arguments.scene.overrides.set.iter().cloned().chain(seed).collect()
 }
 
 /// A run and what it left behind.

@@ -9,7 +9,7 @@ use crate::failure::Failure;
 
 /// The verdict if each peer hears only its neighbours. Links that leave something to chance count as if they did not.
 pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failure> {
-    let refused = |message: String| Failure::Input(format!("{}: --graph {graph}: {message}", path.display()));
+    let refused = |message: String| Failure::Input(format!("{}: --graph {graph}: {message}", crate::input::named(path).display()));
     let graph = match graph {
         "complete" => Graph::Complete,
         "ring" => Graph::Ring,
