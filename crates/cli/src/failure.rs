@@ -103,10 +103,12 @@ impl Failure {
     /// A message of the scene, which knows of overrides and not with which option they were given.
     fn in_words_of_options(&self, message: String) -> String {
         let option = self.option();
-        match self {
-            Self::LinkKeys(_) => message.replacen("--set link.", "", 1),
-            _ if option != "--set" => message.replacen("--set", option, 1),
-            _ => message,
+        if matches!(self, Self::LinkKeys(_)) {
+            message.replacen("--set link.", "", 1)
+        } else if option == "--set" {
+            message
+        } else {
+            message.replacen("--set", option, 1)
         }
     }
 

@@ -46,9 +46,10 @@ pub(super) fn print_usage(message: &str, status: u8) -> Result<(), Failure> {
 }
 
 fn place<'a>(failure: &Failure, diagnostic: &'a Diagnostic) -> Place<'a> {
-    let argument = diagnostic.override_text().map(|text| match failure {
-        Failure::LinkKeys(_) => text.strip_prefix("link.").unwrap_or(text).to_owned(),
-        _ => format!("{} {text}", failure.option()),
+    let argument = diagnostic.override_text().map(|text| {
+        // Keys of a link are words of their own, and no override.
+        let is_word = matches!(failure, Failure::LinkKeys(_));
+        if is_word { text.strip_prefix("link.").unwrap_or(text).to_owned() } else { format!("{} {text}", failure.option()) }
     });
     let key = diagnostic.key();
     Place {

@@ -99,11 +99,11 @@ pub enum Form {
     /// A table.
     Table(&'static Table),
     /// A list.
-    List(&'static Form),
+    List(&'static Self),
     /// A list of exactly two.
-    Pair(&'static Form),
+    Pair(&'static Self),
     /// Any of these.
-    AnyOf(&'static [Form]),
+    AnyOf(&'static [Self]),
 }
 
 /// What a number means: unit and range, as the reader has them.

@@ -34,7 +34,19 @@ fn tables_at(form: &'static Form, path: &[&str], names: usize) -> Vec<&'static T
             None => forms.iter().flat_map(|form| tables_at(form, path, names)).collect(),
         },
         Form::List(element) | Form::Pair(element) => path.get(names..).map_or_else(Vec::new, |rest| tables_at(element, rest, 1)),
-        _ => Vec::new(),
+        Form::Text
+        | Form::File
+        | Form::Boolean
+        | Form::Integer(..)
+        | Form::Number(_)
+        | Form::Vector(_)
+        | Form::Triple(_)
+        | Form::Duration
+        | Form::Rate
+        | Form::Size
+        | Form::Probability
+        | Form::Like(_)
+        | Form::Words(_) => Vec::new(),
     }
 }
 
@@ -67,7 +79,19 @@ fn tables() -> BTreeMap<*const Table, (String, &'static Table)> {
             Form::Table(table) => walk(way, table, all),
             Form::AnyOf(forms) => forms.iter().for_each(|form| walk_form(way, form, all)),
             Form::List(form) | Form::Pair(form) => walk_form(way, form, all),
-            _ => {}
+            Form::Text
+            | Form::File
+            | Form::Boolean
+            | Form::Integer(..)
+            | Form::Number(_)
+            | Form::Vector(_)
+            | Form::Triple(_)
+            | Form::Duration
+            | Form::Rate
+            | Form::Size
+            | Form::Probability
+            | Form::Like(_)
+            | Form::Words(_) => {}
         }
     }
     let mut all = BTreeMap::new();
@@ -233,7 +257,7 @@ fn objects(value: &Value) -> Vec<(String, usize)> {
             core::iter::once((String::new(), members.len())).chain(inner).collect()
         }
         Value::Array(elements) => elements.iter().enumerate().flat_map(|(place, inner)| within(place.to_string(), inner)).collect(),
-        _ => Vec::new(),
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => Vec::new(),
     }
 }
 
