@@ -15,6 +15,6 @@ pub(crate) fn schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
         FileKind::Relay => FileSchema::Relay,
         FileKind::Router => FileSchema::Router,
     };
-    output::raw(format!("{:#}\n", json_schema(kind)).as_bytes())?;
+    output::raw(format!("{}\n", json_schema(kind)).as_bytes())?;
     Ok(ExitCode::SUCCESS)
 }

@@ -158,7 +158,7 @@ const REORDER: Form = Form::AnyOf(&[Form::Probability, Form::Table(&REORDER_TABL
 static REORDER_TABLE: Table = Table::of(&[
     &CHANCES,
     &[
-        usual("gap", Form::Integer(1, MOST_OF_32_BITS), "1", "Such a packet jumps ahead, at most each so-manieth one"),
+        usual("gap", Form::Integer(1, MOST_OF_32_BITS), "1", "Such a packet jumps ahead, at most one in this number of packets"),
         optional("behind", Form::Integer(1, MOST_OF_32_BITS), "Such a packet is held until so many others have passed it; needs at-most"),
         optional("at-most", Form::Duration, "How long a packet is held behind others at most"),
         optional("later", Form::Duration, "Such a packet takes so much longer"),
