@@ -11,9 +11,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::arguments::CheckArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{self, EXPECTATION, Failure, INTERRUPTED, scene_status};
 use crate::progress::Progress;
-use crate::{interrupt, output};
+use crate::{input, interrupt, output};
 
 #[derive(Serialize)]
 struct Document {
@@ -36,7 +37,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     let mut files: Vec<Result<PathBuf, Checked>> = Vec::new();
     let mut first_error = None;
     for path in &arguments.scenes {
-        match scene_files(path) {
+        match files_of(path) {
             Ok(found) => files.extend(found.into_iter().map(Ok)),
             Err(error) => {
                 files.push(Err(Checked::unreadable(path, &error)));
@@ -54,8 +55,8 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
         progress.one_more();
         checked
     };
-    let jobs = usize::from(arguments.jobs.unwrap_or(0));
-    let scenes: Vec<Checked> = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
+    let threads = usize::from(arguments.threads.unwrap_or(0));
+    let scenes: Vec<Checked> = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(|| files.into_par_iter().map(check).collect()),
         // Without threads it takes longer.
         Err(_) => files.into_iter().map(check).collect(),
@@ -63,15 +64,20 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     progress.clear();
     let status = scenes.iter().map(|scene| scene.status).max().unwrap_or(0);
     if arguments.json {
-        output::json(&Document { scenes })?;
+        output::json(DocumentSchema::Check, &Document { scenes })?;
     } else {
         output::text(&describe(&scenes))?;
     }
     Ok(ExitCode::from(if interrupt::asked() { INTERRUPTED } else { status }))
 }
 
+/// The scenes that a path means; standard input means itself.
+fn files_of(path: &Path) -> Result<Vec<PathBuf>, SceneError> {
+    if input::is_standard_input(path) { Ok(vec![path.to_path_buf()]) } else { scene_files(path) }
+}
+
 fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
-    match Scene::read(file, overrides) {
+    match input::with(file, |text, file| Scene::parse(text, file, overrides)) {
         Err(error) => Checked::unreadable(file, &error),
         Ok(scene) => {
             if let Some(error) = failure::too_large(&scene, overrides) {
@@ -79,7 +85,7 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
             }
             let failures = harness::check_with(&scene, model, judged, || !interrupt::asked());
             let status = if failures.is_empty() { 0 } else { EXPECTATION };
-            Checked { file: output::path(file), passed: failures.is_empty(), failures, expects: scene.expect.is_some(), status }
+            Checked { file: output::path(input::named(file)), passed: failures.is_empty(), failures, expects: scene.expect.is_some(), status }
         }
     }
 }
@@ -112,7 +118,7 @@ fn judged(scene: &Scene, stable: bool) -> Judged {
 
 impl Checked {
     fn unreadable(path: &Path, error: &SceneError) -> Self {
-        Self { file: output::path(path), passed: false, failures: vec![error.to_string()], expects: false, status: scene_status(error) }
+        Self { file: output::path(input::named(path)), passed: false, failures: vec![error.to_string()], expects: false, status: scene_status(error) }
     }
 }
 

@@ -8,8 +8,9 @@ use cohaptic_scene::Scene;
 use serde::Serialize;
 
 use crate::arguments::ExplainArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::output;
+use crate::{input, output};
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -44,10 +45,10 @@ struct Cost {
 
 /// Says what a scene makes the program model.
 pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure> {
-    let scene = Scene::read(&arguments.scene.scene, &arguments.scene.overrides.set)?;
+    let scene = input::with(&arguments.scene.scene, |text, file| Scene::parse(text, file, &arguments.scene.overrides.set))?;
     let explanation = harness::explain(&scene);
     if arguments.scene.json {
-        output::json(&document(&scene, &explanation))?;
+        output::json(DocumentSchema::Explain, &document(&scene, &explanation))?;
     } else {
         output::text(&describe(&scene, &explanation))?;
     }

@@ -1,16 +1,20 @@
 //! Why a command ended without its result, and with which exit status.
 
-use std::io;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use anstream::{AutoStream, ColorChoice};
+use anstyle::{AnsiColor, Style};
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue};
 use cohaptic_harness::record::RecordError;
 use cohaptic_scene::{Diagnostic, Scene, SceneError, at_peer};
 use cohaptic_units::{Visible, visible_lines};
 
-use crate::output;
+use crate::{input, output};
+
+mod document;
 
 /// An expectation failed.
 pub(crate) const EXPECTATION: u8 = 1;
@@ -20,6 +24,8 @@ pub(crate) const BAD_INPUT: u8 = 2;
 pub(crate) const INPUT_OUTPUT: u8 = 3;
 /// Interrupted, as shells say it: 128 and the number of SIGINT.
 pub(crate) const INTERRUPTED: u8 = 130;
+/// Nobody reads standard output any more, as shells say it: 128 and the number of SIGPIPE.
+const CLOSED: u8 = 141;
 
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -57,31 +63,96 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// Says on standard error what went wrong, and gives the exit status.
+    /// Says on standard error what went wrong, under `--json` in a document on standard output too, and gives the exit status.
     pub(crate) fn report(&self) -> ExitCode {
-        let (message, status) = match self {
-            Self::Scene(error) => (error.to_string(), scene_status(error)),
-            // The scene knows of overrides, and not which option they came from.
-            Self::Override { option, error } => (error.to_string().replacen("--set", option, 1), scene_status(error)),
-            Self::Combination { error, is_varied, combination } => {
-                let message = error.to_string();
-                let message = if *is_varied { message.replacen("--set", "--vary", 1) } else { message };
-                (message + combination, scene_status(error))
-            }
-            Self::Record(error) => (error.to_string(), INPUT_OUTPUT),
-            // The scene knows of overrides, and not that these are words of their own.
-            Self::LinkKeys(error) => (error.to_string().replacen("--set link.", "", 1), scene_status(error)),
-            Self::Input(message) => (message.clone(), BAD_INPUT),
-            Self::File { verb, path, error } => (format!("cannot {verb} {}: {error}", path.display()), INPUT_OUTPUT),
-            Self::Interrupted(message) => (message.clone(), INTERRUPTED),
-            Self::System(message) => (message.clone(), INPUT_OUTPUT),
-            Self::StandardOutput(error) => (format!("cannot write to standard output: {error}"), INPUT_OUTPUT),
-        };
+        let status = self.status();
+        // Whoever closes a pipe has read enough: that is no error, and there is nothing to be said.
+        if status == CLOSED {
+            return ExitCode::from(status);
+        }
+        let message = self.message();
+        let (kind, colour) = if status == INTERRUPTED { ("interrupted", AnsiColor::Yellow) } else { ("error", AnsiColor::Red) };
+        let style = if AutoStream::choice(&io::stderr()) == ColorChoice::Never { Style::new() } else { colour.on_default().bold() };
         // If standard error cannot be written to either, the exit status is all that is left to say it with.
-        let kind = if status == INTERRUPTED { "interrupted" } else { "error" };
-        let _ = io::Write::write_all(&mut io::stderr(), visible_lines(&format!("{kind}: {message}\n")).as_bytes());
+        let _ = io::stderr().write_all(
+            visible_lines(&format!("{kind}: {message}\n")).replacen(&format!("{kind}:"), &format!("{style}{kind}:{style:#}"), 1).as_bytes(),
+        );
+        if output::wants_json_error() {
+            let _ = document::print(self, &message, status);
+        }
         ExitCode::from(status)
     }
+
+    fn status(&self) -> u8 {
+        match self {
+            Self::Scene(error) | Self::Override { error, .. } | Self::LinkKeys(error) => scene_status(error),
+            Self::Combination { error, .. } => scene_status(error),
+            Self::Input(_) => BAD_INPUT,
+            Self::StandardOutput(error) if error.kind() == io::ErrorKind::BrokenPipe => CLOSED,
+            Self::Record(_) | Self::File { .. } | Self::System(_) | Self::StandardOutput(_) => INPUT_OUTPUT,
+            Self::Interrupted(_) => INTERRUPTED,
+        }
+    }
+
+    fn message(&self) -> String {
+        match self {
+            Self::Scene(error) | Self::Override { error, .. } | Self::LinkKeys(error) => self.in_words_of_options(error.to_string()),
+            Self::Combination { error, combination, .. } => self.in_words_of_options(error.to_string()) + combination,
+            Self::Record(error) => error.to_string(),
+            Self::Input(message) | Self::Interrupted(message) | Self::System(message) => message.clone(),
+            Self::File { verb, path, error } => format!("cannot {verb} {}: {error}", path.display()),
+            Self::StandardOutput(error) => format!("cannot write to standard output: {error}"),
+        }
+    }
+
+    /// A message of the scene, which knows of overrides and not with which option they were given.
+    fn in_words_of_options(&self, message: String) -> String {
+        let option = self.option();
+        if matches!(self, Self::LinkKeys(_)) {
+            message.replacen("--set link.", "", 1)
+        } else if option == "--set" {
+            message
+        } else {
+            message.replacen("--set", option, 1)
+        }
+    }
+
+    /// The option that a fault in an override was given with.
+    const fn option(&self) -> &'static str {
+        match self {
+            Self::Override { option, .. } => option,
+            Self::Combination { is_varied: true, .. } => "--vary",
+            Self::Combination { .. }
+            | Self::Scene(_)
+            | Self::Record(_)
+            | Self::LinkKeys(_)
+            | Self::Input(_)
+            | Self::File { .. }
+            | Self::StandardOutput(_)
+            | Self::System(_)
+            | Self::Interrupted(_) => "--set",
+        }
+    }
+
+    /// Why the scene is refused, if it is.
+    fn scene_error(&self) -> Option<&SceneError> {
+        match self {
+            Self::Scene(error) | Self::Override { error, .. } | Self::LinkKeys(error) => Some(error),
+            Self::Combination { error, .. } => Some(error),
+            Self::Record(_) | Self::Input(_) | Self::File { .. } | Self::StandardOutput(_) | Self::System(_) | Self::Interrupted(_) => None,
+        }
+    }
+}
+
+/// Reports arguments that make no sense as clap does, under `--json` in a document too, and gives the exit status. Help and version are no errors.
+pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
+    // As clap itself does it: what cannot be printed is not said.
+    let _ = error.print();
+    let status = u8::try_from(error.exit_code()).unwrap_or(BAD_INPUT);
+    if error.use_stderr() && output::wants_json_error() {
+        let _ = document::print_usage(&error.render().to_string(), status);
+    }
+    ExitCode::from(status)
 }
 
 /// Why the variant of a scene that can be read cannot be had, where an option other than `--set` said what is different.
@@ -114,12 +185,14 @@ pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
 /// Why a scene that makes sense is not simulated, at the place where there are too many peers; `None` if it can be.
 pub(crate) fn too_large(scene: &Scene, overrides: &[String]) -> Option<SceneError> {
     let reason = cohaptic_harness::too_large(scene)?;
-    Some(at_peer(&scene.file, overrides, cohaptic_harness::MOST_PEERS, &reason))
+    let path = if scene.file == input::named(Path::new("-")) { Path::new("-") } else { &scene.file };
+    let refused = |text: &str, file: &Path| Err::<(), SceneError>(at_peer(text, file, overrides, cohaptic_harness::MOST_PEERS, &reason));
+    input::with(path, refused).err()
 }
 
 /// Why a scene that makes sense cannot be analysed.
 pub(crate) fn not_analysed(scene: &Path, error: &impl std::fmt::Display) -> Failure {
-    Failure::Input(format!("{}: {error}", output::path(scene)))
+    Failure::Input(format!("{}: {error}", output::path(input::named(scene))))
 }
 
 /// The exit status for a scene that could not be had.

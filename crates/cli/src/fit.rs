@@ -11,6 +11,7 @@ use cohaptic_wan::{FateLog, FateRow};
 use serde::Serialize;
 
 use crate::arguments::FitArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::output_file::OutputFile;
 use crate::{output, text_file};
@@ -54,9 +55,10 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
         file.finish(written)?;
     }
     if arguments.json {
-        output::json(&Document { fitted: &fitted, scene: &scene, skew, matched })?;
+        output::json(DocumentSchema::Fit, &Document { fitted: &fitted, scene: &scene, skew, matched })?;
     } else {
         output::text(&describe(&fitted, &scene, skew, matched))?;
+        output::wrote(&arguments.out);
     }
     Ok(ExitCode::SUCCESS)
 }

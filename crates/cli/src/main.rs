@@ -2,22 +2,28 @@
 //! wall clock; drives and estimates links; reproduces a paper; sets speed against error.
 //!
 //! This is the only crate that prints. Results go to standard output, everything else to standard error. Exit status: 0 done, 1 an expectation
-//! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted.
+//! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, 141 standard
+//! output was closed.
 
 mod accuracy;
 mod admittance;
 mod arguments;
 mod campaign;
 mod check;
+mod completions;
+mod document_schema;
 mod documents;
 mod explain;
 mod failure;
 mod falcon;
 mod fit;
+mod init;
+mod input;
 mod interrupt;
 mod lines;
 mod link;
 mod live;
+mod man;
 mod output;
 mod output_file;
 mod paper;
@@ -26,6 +32,7 @@ mod realtime;
 mod relay;
 mod router;
 mod run;
+mod schema;
 mod stability;
 mod terminal_plot;
 mod text_file;
@@ -38,7 +45,13 @@ use clap::Parser as _;
 use arguments::{Arguments, Command};
 
 fn main() -> ExitCode {
-    let arguments = Arguments::try_parse().unwrap_or_else(|error| failure::visible(error).exit());
+    if std::env::args_os().skip(1).take_while(|argument| argument != "--").any(|argument| argument == "--json") {
+        output::want_json();
+    }
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return failure::wrong_usage(&failure::visible(error)),
+    };
     interrupt::listen();
     let done = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
@@ -55,6 +68,10 @@ fn main() -> ExitCode {
         Command::Fit(arguments) => fit::fit(&arguments),
         Command::Paper(arguments) => paper::paper(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
+        Command::Init(arguments) => init::init(&arguments),
+        Command::Schema(arguments) => schema::schema(&arguments),
+        Command::Completions(arguments) => completions::completions(&arguments),
+        Command::Man(arguments) => man::man(&arguments),
     };
     match done {
         Ok(code) => code,

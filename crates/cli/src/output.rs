@@ -2,25 +2,58 @@
 
 use std::io::{self, Write as _};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use cohaptic_units::visible_lines;
 use serde::Serialize;
 
+use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
+
+/// Whether the answer is to be a JSON document, also that to a wrong argument.
+static WANTS_JSON: AtomicBool = AtomicBool::new(false);
+
+/// Whether there is something on standard output already.
+static ANSWERED: AtomicBool = AtomicBool::new(false);
+
+/// Has errors answered by a JSON document.
+pub(crate) fn want_json() {
+    WANTS_JSON.store(true, Ordering::Relaxed);
+}
+
+/// Whether an error is to be answered by a JSON document: it was asked for, and nothing else was printed.
+pub(crate) fn wants_json_error() -> bool {
+    WANTS_JSON.load(Ordering::Relaxed) && !ANSWERED.load(Ordering::Relaxed)
+}
 
 /// Prints text, which ends with a line break. Titles and names of files may hold control characters, which are escaped before they disturb a
 /// terminal.
 pub(crate) fn text(text: &str) -> Result<(), Failure> {
-    let mut out = io::stdout().lock();
-    let text = visible_lines(text);
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(Failure::StandardOutput)
+    raw(visible_lines(text).as_bytes())
 }
 
-/// Prints one JSON document. Numbers that are not finite become `null`.
-pub(crate) fn json(document: &impl Serialize) -> Result<(), Failure> {
+/// Prints one JSON document, which says of which kind and version it is. Numbers that are not finite become `null`.
+pub(crate) fn json(schema: DocumentSchema, document: &impl Serialize) -> Result<(), Failure> {
+    ANSWERED.store(true, Ordering::Relaxed);
     let mut out = io::stdout().lock();
-    serde_json::to_writer_pretty(&mut out, document).map_err(io::Error::from).map_err(Failure::StandardOutput)?;
+    serde_json::to_writer_pretty(&mut out, &schema.of(document)).map_err(io::Error::from).map_err(Failure::StandardOutput)?;
     out.write_all(b"\n").and_then(|()| out.flush()).map_err(Failure::StandardOutput)
+}
+
+/// Prints a file as it is: a scene, a schema, a page for another program.
+pub(crate) fn raw(content: &[u8]) -> Result<(), Failure> {
+    ANSWERED.store(true, Ordering::Relaxed);
+    let mut out = io::stdout().lock();
+    out.write_all(content).and_then(|()| out.flush()).map_err(Failure::StandardOutput)
+}
+
+/// Says on standard error which files were written: one a line, for people. A JSON document names them itself.
+pub(crate) fn wrote(files: impl IntoIterator<Item = impl AsRef<Path>>) {
+    let mut to = io::stderr().lock();
+    for file in files {
+        // What cannot be said was written all the same.
+        let _ = writeln!(to, "wrote {}", escape(&path(file.as_ref())));
+    }
 }
 
 /// A path as text. What is not Unicode in it is replaced: JSON cannot hold it.

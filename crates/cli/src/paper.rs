@@ -9,6 +9,7 @@ use cohaptic_paper::{Options, PaperError, Reproduction, Watch, page, reproduce, 
 use serde::Serialize;
 
 use crate::arguments::PaperArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output_file::write_file;
 use crate::progress::Progress;
@@ -77,13 +78,10 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
     }
     let document = document(&reproduction, arguments.out.is_some());
     if arguments.json {
-        output::json(&Document { wall_s: Some(wall_s), ..document })?;
+        output::json(DocumentSchema::Paper, &Document { wall_s: Some(wall_s), ..document })?;
     } else {
-        let mut text = describe(&reproduction);
-        if let Some(folder) = &arguments.out {
-            let _ = writeln!(text, "{}", folder.join("index.html").display());
-        }
-        output::text(&text)?;
+        output::text(&describe(&reproduction))?;
+        output::wrote(arguments.out.as_ref().map(|folder| folder.join("index.html")));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -117,7 +115,7 @@ fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure
         }
     }
     // Without the time that it took: the same bytes every time.
-    let mut claims = serde_json::to_vec_pretty(&document(reproduction, true)).unwrap_or_default();
+    let mut claims = serde_json::to_vec_pretty(&DocumentSchema::Paper.of(&document(reproduction, true))).unwrap_or_default();
     claims.push(b'\n');
     write_file(&folder.join("claims.json"), &claims)?;
     write_file(&folder.join("index.html"), page::html(reproduction).as_bytes())

@@ -43,6 +43,7 @@ mod read;
 mod relay_file;
 pub mod router_file;
 mod scaling;
+pub mod schema;
 mod sections;
 mod source;
 mod strategies;
@@ -63,6 +64,6 @@ pub use link_keys::{
 pub use link_table::LinkTable;
 pub use model::*;
 pub use quantity_text::{number_and_unit, text_of_quantity};
-pub use read::{at_peer, scene_files};
+pub use read::{at_peer, file_text, scene_files, text_of};
 pub use relay_file::{RelayChange, RelayFile, RelayLimits, RelayProgram};
 pub use strategies::{FromScene, Strategies};

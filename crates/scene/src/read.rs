@@ -68,42 +68,54 @@ impl Scene {
 
 /// What is wrong with a scene that can be read, at the place where its `peer`-th peer is made, counted from 0: its entry `[[peers]]`, or `scene.count`.
 #[must_use]
-pub fn at_peer(path: &Path, overrides: &[String], peer: usize, message: &str) -> SceneError {
-    let fault = |text: &str| {
-        let sources = Sources { file: path, text, overrides };
-        let refused = parse_document(sources, true, |document, context| {
-            let value = |table: &Node, key: &str| table.as_table()?.get(key).map(|entry| Arc::clone(&entry.node));
-            let count = value(document, "scene").and_then(|header| value(&header, "count"));
-            let peers = value(document, "peers");
-            let entry = match peers.as_ref().map(|peers| &peers.value) {
-                Some(Value::List(entries)) => entries.get(peer).cloned(),
-                _ => None,
-            };
-            let (place, key) = match count.or(entry).or(peers) {
-                Some(node) => (node.place, node.path.clone()),
-                None => (BEGINNING, String::new()),
-            };
-            context.fault(place, &key, message);
-            Some(())
-        });
-        refused.map(|_| ())
-    };
+pub fn at_peer(text: &str, file: &Path, overrides: &[String], peer: usize, message: &str) -> SceneError {
+    let sources = Sources { file, text, overrides };
+    let refused = parse_document(sources, true, |document, context| {
+        let value = |table: &Node, key: &str| table.as_table()?.get(key).map(|entry| Arc::clone(&entry.node));
+        let count = value(document, "scene").and_then(|header| value(&header, "count"));
+        let peers = value(document, "peers");
+        let entry = match peers.as_ref().map(|peers| &peers.value) {
+            Some(Value::List(entries)) => entries.get(peer).cloned(),
+            _ => None,
+        };
+        let (place, key) = match count.or(entry).or(peers) {
+            Some(node) => (node.place, node.path.clone()),
+            None => (BEGINNING, String::new()),
+        };
+        context.fault(place, &key, message);
+        Some(())
+    });
     // Not reached: there is a fault in every case.
-    with_text(path, fault).err().unwrap_or_else(|| SceneError::NoScene { folder: path.to_path_buf() })
+    refused.err().unwrap_or_else(|| SceneError::NoScene { folder: file.to_path_buf() })
 }
 
 /// What `read` makes of the text of a file.
 pub(crate) fn with_text<T>(path: &Path, read: impl FnOnce(&str) -> Result<T, SceneError>) -> Result<T, SceneError> {
     let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
-    match core::str::from_utf8(&bytes) {
-        Ok(text) => read(text),
-        Err(error) => {
-            let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
-            // Up to the place, the text with replacements is the text itself.
-            let sources = Sources { file: path, text: &String::from_utf8_lossy(&bytes), overrides: &[] };
-            Err(invalid(sources.diagnostic(place, String::new(), "not UTF-8: expected a text file in TOML".to_owned())))
-        }
-    }
+    text_of(path, &bytes).and_then(read)
+}
+
+/// The text of a file that is to be read as a scene, a relay file or a router file.
+///
+/// # Errors
+///
+/// [`SceneError::Read`] if it cannot be read, [`SceneError::Invalid`] if it is no text.
+pub fn file_text(path: &Path) -> Result<String, SceneError> {
+    with_text(path, |text| Ok(text.to_owned()))
+}
+
+/// The text that the content of a file is. `file` stands in messages.
+///
+/// # Errors
+///
+/// [`SceneError::Invalid`] with the place of the first byte that is not UTF-8.
+pub fn text_of<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a str, SceneError> {
+    core::str::from_utf8(bytes).map_err(|error| {
+        let place = Place::new(0, error.valid_up_to()..error.valid_up_to() + 1);
+        // Up to the place, the text with replacements is the text itself.
+        let sources = Sources { file, text: &String::from_utf8_lossy(bytes), overrides: &[] };
+        invalid(sources.diagnostic(place, String::new(), "not UTF-8: expected a text file in TOML".to_owned()))
+    })
 }
 
 /// The scene, and the document that it was read from with the overrides in it.

@@ -88,6 +88,8 @@ impl<'a> TableReader<'a> {
 
     /// Reports unknown keys; if there are none, missing ones. A key that is misspelt is both, and said once.
     pub(crate) fn finish(self) {
+        #[cfg(test)]
+        crate::schema::seen(&self.node.path, &self.known);
         let unknown: Vec<&Entry> = self.table.0.iter().filter(|entry| !self.known.contains(&entry.name.as_str())).collect();
         for entry in &unknown {
             let expected = one_of(self.known.iter().copied(), &entry.name);

@@ -73,6 +73,22 @@ impl Quantity {
         if self.unit.is_empty() { range.to_owned() } else { format!("{range} [{}]", self.unit) }
     }
 
+    /// The unit, as in messages; empty for a plain number.
+    pub(crate) const fn unit(self) -> &'static str {
+        self.unit
+    }
+
+    /// The range as JSON Schema says it: keywords and bounds.
+    pub(crate) const fn bounds(self) -> &'static [(&'static str, i8)] {
+        match self.range {
+            Range::Any => &[],
+            Range::NotNegative => &[("minimum", 0)],
+            Range::Positive => &[("exclusiveMinimum", 0)],
+            Range::Fraction => &[("minimum", 0), ("maximum", 1)],
+            Range::Correlation => &[("minimum", -1), ("exclusiveMaximum", 1)],
+        }
+    }
+
     /// Reads a number in that range.
     pub(crate) fn read(self, node: &Node, context: Context<'_>) -> Option<f64> {
         let value = number(node, context, &self.expected())?;

@@ -12,6 +12,7 @@ use cohaptic_accuracy::{About, AccuracyError, Options, Row, Subject, Watch, meas
 use serde::Serialize;
 
 use crate::arguments::AccuracyArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
 use crate::{interrupt, output};
@@ -79,16 +80,14 @@ pub(crate) fn accuracy(arguments: &AccuracyArguments) -> Result<ExitCode, Failur
     // What was measured is printed even if the disk is full.
     let written = arguments.out.as_ref().map_or(Ok(()), |folder| files::write(folder, &rows, &about));
     if arguments.json {
-        output::json(&Document { rows: rows.iter().map(document).collect(), interrupted, wall_s })?;
+        output::json(DocumentSchema::Accuracy, &Document { rows: rows.iter().map(document).collect(), interrupted, wall_s })?;
     } else {
         let mut shown = text(&rows);
         if interrupted {
             let _ = writeln!(shown, "INTERRUPTED after {wall_s:.1} s: these are the {} rows measured until then", rows.len());
         }
-        if let (Some(folder), Ok(())) = (&arguments.out, &written) {
-            let _ = writeln!(shown, "{}", folder.join("index.html").display());
-        }
         output::text(&shown)?;
+        output::wrote(arguments.out.as_ref().filter(|_| written.is_ok()).map(|folder| folder.join("index.html")));
     }
     written?;
     if let Some(fault) = fault {

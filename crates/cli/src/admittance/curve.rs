@@ -7,6 +7,7 @@ use cohaptic_stability::{
 
 use crate::arguments::AdmittanceArguments;
 use crate::failure::{self, Failure, not_analysed};
+use crate::input;
 use crate::variants::Variant;
 
 /// A scene of which the admittance is asked for.
@@ -42,7 +43,8 @@ impl Subject {
     fn new(arguments: &AdmittanceArguments, variant: Variant) -> Result<Self, Failure> {
         let file = &arguments.scene.scene;
         let overrides = variant.on_top_of(&arguments.scene.overrides.set);
-        let scene = Scene::read(file, &overrides).map_err(|error| failure::of_variant(error, variant.option, &variant.overrides))?;
+        let scene = input::with(file, |text, file| Scene::parse(text, file, &overrides));
+        let scene = scene.map_err(|error| failure::of_variant(error, variant.option, &variant.overrides))?;
         let peer = place_of(&arguments.peer, &scene, &variant)?;
         let admittance = Admittance::of(&scene, peer).map_err(|error| not_analysed(file, &error))?;
         let chance = has_chance(&scene).then(|| mean_square_within(&scene, QUICK_UNKNOWNS));

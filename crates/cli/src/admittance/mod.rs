@@ -14,6 +14,7 @@ use curve::Curve;
 use document::Document;
 
 use crate::arguments::AdmittanceArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::output;
 
@@ -30,9 +31,10 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
         None => Vec::new(),
     };
     if arguments.scene.json {
-        output::json(&Document::new(&arguments.peer, &curves, &files))?;
+        output::json(DocumentSchema::Admittance, &Document::new(&arguments.peer, &curves, &files))?;
     } else {
-        output::text(&words::describe(&arguments.peer, &curves, &files))?;
+        output::text(&words::describe(&arguments.peer, &curves))?;
+        output::wrote(&files);
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -7,7 +7,7 @@ use cohaptic_stability::{Estimate, Verdict};
 use super::curve::Curve;
 
 /// All curves in words, each with its table.
-pub(super) fn describe(peer: &str, curves: &[Curve], files: &[String]) -> String {
+pub(super) fn describe(peer: &str, curves: &[Curve]) -> String {
     let mut text = String::new();
     for (number, curve) in curves.iter().enumerate() {
         // Writing to a string does not fail.
@@ -27,9 +27,6 @@ pub(super) fn describe(peer: &str, curves: &[Curve], files: &[String]) -> String
         for note in curve.notes() {
             let _ = writeln!(text, "  note: {note}");
         }
-    }
-    if !files.is_empty() {
-        let _ = writeln!(text, "\nwritten: {}", files.join(", "));
     }
     text
 }

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use cohaptic_accuracy::Subject;
 
-use super::EXIT_STATUS;
+use super::examples::{self, after};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::ACCURACY))]
 pub(crate) struct AccuracyArguments {
     /// Write index.html, the plots (SVG) and rows.csv into this folder
     #[arg(long, value_name = "DIR")]

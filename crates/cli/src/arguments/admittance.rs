@@ -5,11 +5,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::SceneArguments;
+use super::examples::{self, after};
 use super::numbers::{real, some};
-use super::{EXIT_STATUS, SceneArguments};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::ADMITTANCE))]
 pub(crate) struct AdmittanceArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::SceneArguments;
+use super::examples::{self, after};
 use super::numbers::{any_integer, integer, threads};
-use super::{EXIT_STATUS, SceneArguments};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::CAMPAIGN))]
 pub(crate) struct CampaignArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,

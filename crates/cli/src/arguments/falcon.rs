@@ -6,11 +6,11 @@ use std::time::Duration;
 use clap::{Args, Subcommand, ValueEnum};
 use cohaptic_units::parse;
 
-use super::EXIT_STATUS;
+use super::examples::{self, after};
 use super::numbers::{any_integer, probability};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::FALCON))]
 pub(crate) struct FalconArguments {
     #[command(subcommand)]
     pub(crate) command: FalconCommand,
@@ -49,7 +49,7 @@ pub(crate) struct WhichFalcon {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::FALCON_PROBE))]
 pub(crate) struct ProbeArguments {
     #[command(flatten)]
     pub(crate) which: WhichFalcon,
@@ -59,7 +59,7 @@ pub(crate) struct ProbeArguments {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::FALCON_HOME))]
 pub(crate) struct HomeArguments {
     #[command(flatten)]
     pub(crate) which: WhichFalcon,
@@ -69,23 +69,23 @@ pub(crate) struct HomeArguments {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::FALCON_WATCH))]
 pub(crate) struct WatchArguments {
     #[command(flatten)]
     pub(crate) which: WhichFalcon,
     /// How long [default: until Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = some_time)]
     pub(crate) length: Option<Duration>,
-    /// Push with this force \[N\], once the device is homed and its grip was pulled out
+    #[arg(help = "Push with this force [N], once the device is homed and its grip was pulled out")]
     #[arg(long, value_name = "X,Y,Z", value_parser = force, allow_hyphen_values = true, conflicts_with = "spring")]
     pub(crate) force: Option<Force>,
-    /// Pull to the origin as a spring of this stiffness \[N/m\], up to 3000, likewise
+    #[arg(help = "Pull to the origin as a spring of this stiffness [N/m], up to 3000, likewise")]
     #[arg(long, value_name = "STIFFNESS", value_parser = stiffness)]
     pub(crate) spring: Option<f64>,
-    /// What the spring damps \[N·s/m\], up to 20
+    #[arg(help = "What the spring damps [N·s/m], up to 20")]
     #[arg(long, value_name = "DAMPING", value_parser = damping, requires = "spring", default_value_t = 0.0)]
     pub(crate) damping: f64,
-    /// No greater force \[N\], above 0 and up to 4. A device may push several times as hard as it is asked to (docs/falcon.md)
+    #[arg(help = "No greater force [N], above 0 and up to 4. A device may push several times as hard as it is asked to (docs/falcon.md)")]
     #[arg(long, value_name = "NEWTONS", value_parser = gentle, default_value_t = 0.5)]
     pub(crate) limit: f64,
     /// Write every exchange into this file
@@ -94,15 +94,15 @@ pub(crate) struct WatchArguments {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::FALCON_SIMULATE))]
 pub(crate) struct SimulateArguments {
     /// Who holds the grip
     #[arg(long, value_enum, default_value_t = HandName::Swaying)]
     pub(crate) hand: HandName,
-    /// Ask the driver for this force \[N\] all the time
+    #[arg(help = "Ask the driver for this force [N] all the time")]
     #[arg(long, value_name = "X,Y,Z", value_parser = force, allow_hyphen_values = true)]
     pub(crate) force: Option<Force>,
-    /// No greater force \[N\], above 0 and up to 20
+    #[arg(help = "No greater force [N], above 0 and up to 20")]
     #[arg(long, value_name = "NEWTONS", value_parser = strong, default_value_t = 4.0)]
     pub(crate) limit: f64,
     /// A byte to the host is changed, and one that nobody sent comes before it, each with this probability

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::EXIT_STATUS;
+use super::examples::{self, after};
 use super::numbers::{any_integer, integer};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::LINK))]
 pub(crate) struct LinkArguments {
     /// What the link does: words of tc-netem (delay 20ms 5ms 25% loss 1%), or keys of the link table of a scene (delay=24ms loss=1%)
     #[arg(required_unless_present = "from", conflicts_with = "from", value_name = "SPEC", allow_negative_numbers = true)]
@@ -53,7 +53,7 @@ pub(crate) enum Profile {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::FIT))]
 pub(crate) struct FitArguments {
     /// A CSV of one-way measurements (t,delay or sent,arrived), a file of fates, or the capture of the sender (which takes that of the receiver too)
     pub(crate) file: PathBuf,

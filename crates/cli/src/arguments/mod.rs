@@ -4,19 +4,25 @@ mod accuracy;
 mod address;
 mod admittance;
 mod campaign;
+mod examples;
 mod falcon;
 mod links;
 mod numbers;
+mod pages;
 mod paper;
 mod realtime;
 mod relay;
 mod router;
 mod scenes;
 mod stability;
+#[cfg(test)]
+mod tests;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+
+use examples::after;
 
 pub(crate) use accuracy::AccuracyArguments;
 pub(crate) use admittance::AdmittanceArguments;
@@ -25,6 +31,7 @@ pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
 };
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
+pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArguments, SchemaArguments};
 pub(crate) use paper::PaperArguments;
 pub(crate) use realtime::{LiveArguments, RealTimeArguments};
 pub(crate) use relay::RelayArguments;
@@ -36,19 +43,17 @@ pub(crate) use stability::{BoundaryArguments, GridSize, LinksName, MapArguments,
 ///
 /// A scene is one TOML file: the object, the peers, the links between them, and what is expected. docs/scenes.md lists every key.
 #[derive(Debug, Parser)]
-#[command(name = "cohaptic", version, after_help = EXIT_STATUS)]
+#[command(name = "cohaptic", version, after_help = after(examples::PROGRAM))]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
 }
 
-const EXIT_STATUS: &str = "Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted.";
-
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Simulates a scene in virtual time and says what happened
     Run(RunArguments),
-    /// Runs scenes as tests: each against its own \[expect\]
+    #[command(about = "Runs scenes as tests: each against its own [expect]")]
     Check(CheckArguments),
     /// Says what a scene makes the program model, what it leaves out and why, and what it costs
     Explain(ExplainArguments),
@@ -74,12 +79,20 @@ pub(crate) enum Command {
     Paper(PaperArguments),
     /// Measures what every method costs and how wrong it is, on the same work
     Accuracy(AccuracyArguments),
+    /// Writes a scene to begin with, in which every key is explained
+    Init(InitArguments),
+    /// Prints a JSON Schema of scenes, relay files or router files: names, meanings, units and defaults of all keys, for editors
+    Schema(SchemaArguments),
+    /// Prints completions for a shell
+    Completions(CompletionsArguments),
+    /// Prints a manual page, or writes all
+    Man(ManArguments),
 }
 
 /// What all commands on one scene take.
 #[derive(Debug, Args)]
 pub(crate) struct SceneArguments {
-    /// The scene, a TOML file
+    /// The scene, a TOML file; - reads it from standard input
     pub(crate) scene: PathBuf,
     #[command(flatten)]
     pub(crate) overrides: Overrides,

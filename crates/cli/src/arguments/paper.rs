@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::EXIT_STATUS;
+use super::examples::{self, after};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::PAPER))]
 pub(crate) struct PaperArguments {
     /// Write index.html, the figures (SVG), the data behind them (CSV) and claims.json into this folder
     #[arg(long, value_name = "DIR")]

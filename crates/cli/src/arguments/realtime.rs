@@ -7,8 +7,9 @@ use std::time::Duration;
 use clap::Args;
 use cohaptic_units::parse;
 
+use super::Overrides;
 use super::address::looked_up;
-use super::{EXIT_STATUS, Overrides};
+use super::examples::{self, after};
 
 /// How to be on time, and who may look.
 #[derive(Debug, Args)]
@@ -34,9 +35,9 @@ pub(crate) struct RealTimeArguments {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::LIVE))]
 pub(crate) struct LiveArguments {
-    /// The scene, a TOML file
+    /// The scene, a TOML file; - reads it from standard input
     #[arg(required_unless_present = "new_key")]
     pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
@@ -61,7 +62,7 @@ pub(crate) struct LiveArguments {
     /// The firmware for Falcons that have none yet (docs/falcon.md)
     #[arg(long, value_name = "FILE")]
     pub(crate) firmware: Option<PathBuf>,
-    /// Write the files of `run --out` into this folder, and inputs.csv (all that came from outside: `run --inputs` replays it), releases.csv and
+    /// Write the files of run --out into this folder, and inputs.csv (all that came from outside: run --inputs replays it), releases.csv and
     /// lateness.csv
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,

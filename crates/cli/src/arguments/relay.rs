@@ -7,19 +7,22 @@ use std::time::Duration;
 use clap::Args;
 use cohaptic_units::{Bytes, parse};
 
+use super::RealTimeArguments;
 use super::address::looked_up;
+use super::examples::{self, after};
 use super::numbers::integer;
-use super::{EXIT_STATUS, Overrides, RealTimeArguments};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS, override_usage = USAGE)]
+#[command(after_help = after(examples::RELAY), override_usage = USAGE)]
 pub(crate) struct RelayArguments {
-    /// A relay file: who speaks to whom over which links. With --listen in its place what the link does, as for `cohaptic link`: words of tc-netem
+    /// A relay file: who speaks to whom over which links; - reads it from standard input. With --listen in its place what the link does, as for cohaptic link: words of tc-netem
     /// (delay 20ms 5ms 25% loss 1%), or keys of the link table of a scene (delay=24ms loss=1%)
     #[arg(required_unless_present = "listen", value_name = "FILE | SPEC", allow_negative_numbers = true)]
     pub(crate) words: Vec<OsString>,
-    #[command(flatten)]
-    pub(crate) overrides: Overrides,
+    /// Override a key of the relay file by its dotted path, again and again: --set relay.forget-after=10s --set link.delay=8ms
+    /// --set links.left.right.loss=5% --set programs.left.port=127.0.0.1:7101
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,

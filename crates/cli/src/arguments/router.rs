@@ -6,15 +6,19 @@ use std::time::Duration;
 use clap::Args;
 use cohaptic_units::parse;
 
-use super::{EXIT_STATUS, Overrides, RealTimeArguments};
+use super::RealTimeArguments;
+use super::examples::{self, after};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::ROUTER))]
 pub(crate) struct RouterArguments {
-    /// A router file: two devices, the links between them, and rules that say which packets take which link
+    /// A router file: two devices, the links between them, and rules that say which packets take which link; - reads it from
+    /// standard input
     pub(crate) file: PathBuf,
-    #[command(flatten)]
-    pub(crate) overrides: Overrides,
+    /// Override a key of the router file by its dotted path, again and again: --set links.wan.delay=8ms --set router.default=drop
+    /// --set router.memory.packets=1000
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,

@@ -4,19 +4,23 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::numbers::threads;
-use super::{EXIT_STATUS, Overrides, SceneArguments};
+use super::examples::{self, after};
+use super::numbers::{integer, threads};
+use super::{Overrides, SceneArguments};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::RUN))]
 pub(crate) struct RunArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
+    /// The seed of all random numbers, in place of the key scene.seed [default: that of the scene]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(0, i64::MAX.unsigned_abs()))]
+    pub(crate) seed: Option<u64>,
     /// Run the scene a second time with these keys overridden too, with the same random numbers, and show both:
     /// --against coordination.strategy=proportional-derivative
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) against: Vec<String>,
-    /// Write trajectory.csv, packets.csv, links.csv and plots (SVG) into this folder; the second run goes into its folder `against`
+    /// Write trajectory.csv, packets.csv, links.csv and plots (SVG) into this folder; the second run goes into its folder against
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Replay a live session: its inputs.csv, with the scene and the --set of that session. Fates and motion are the same to the last bit
@@ -34,9 +38,9 @@ pub(crate) struct RunArguments {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::CHECK))]
 pub(crate) struct CheckArguments {
-    /// Scenes, or folders of scenes
+    /// Scenes, or folders of scenes; - reads a scene from standard input
     #[arg(required = true, value_name = "SCENE")]
     pub(crate) scenes: Vec<PathBuf>,
     #[command(flatten)]
@@ -45,15 +49,15 @@ pub(crate) struct CheckArguments {
     #[arg(long)]
     pub(crate) json: bool,
     /// How many scenes run at the same time [default: one a core]. Results do not depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
-    pub(crate) jobs: Option<u16>,
+    #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
+    pub(crate) threads: Option<u16>,
     /// Simulate everything the program has, needed or not: slower, and the same answer to the last bit
     #[arg(long)]
     pub(crate) general: bool,
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::EXPLAIN))]
 pub(crate) struct ExplainArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,

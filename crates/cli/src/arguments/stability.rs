@@ -6,11 +6,12 @@ use std::time::Duration;
 use clap::{Args, Subcommand, ValueEnum};
 use cohaptic_stability::Method;
 
+use super::SceneArguments;
+use super::examples::{self, after};
 use super::numbers::{any_integer, integer, real, threads};
-use super::{EXIT_STATUS, SceneArguments};
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::STABILITY))]
 pub(crate) struct StabilityArguments {
     #[command(subcommand)]
     pub(crate) command: StabilityCommand,
@@ -27,7 +28,7 @@ pub(crate) enum StabilityCommand {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::POINT))]
 pub(crate) struct PointArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
@@ -90,7 +91,7 @@ impl From<MethodName> for Method {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::MAP))]
 pub(crate) struct MapArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
@@ -114,12 +115,12 @@ pub(crate) struct MapArguments {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// How many cells are computed at the same time [default: one a core]. Results do not depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
-    pub(crate) jobs: Option<u16>,
+    #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
+    pub(crate) threads: Option<u16>,
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_STATUS)]
+#[command(after_help = after(examples::BOUNDARY))]
 pub(crate) struct BoundaryArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,

@@ -12,8 +12,9 @@ use std::time::Instant as Clock;
 use cohaptic_campaign::{Asked, Campaign, CampaignError, Format, Outcome, Plan, Report, Variation};
 
 use crate::arguments::{CampaignArguments, TableFormat};
+use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::output;
+use crate::{input, output};
 use document::Document;
 use watch::Shown;
 
@@ -39,12 +40,13 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
         Err(error) => return Err(Failure::System(format!("--threads {threads}: {error}"))),
     };
     let wall_s = start.elapsed().as_secs_f64();
-    let title = plan.scene(0).map_or_else(|_| output::path(&arguments.scene.scene), |scene| scene.title);
+    let title = plan.scene(0).map_or_else(|_| output::path(input::named(&arguments.scene.scene)), |scene| scene.title);
     let finished = Finished { plan, title, report, wall_s };
     if arguments.scene.json {
-        output::json(&Document::new(&finished, &arguments.out))?;
+        output::json(DocumentSchema::Campaign, &Document::new(&finished, &arguments.out))?;
     } else {
         output::text(&words::describe(&finished))?;
+        output::wrote([&finished.report.file]);
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -54,7 +56,7 @@ fn plan(arguments: &CampaignArguments) -> Result<Plan, Failure> {
     let variations =
         arguments.vary.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<Variation>, _>>().map_err(|error| refused(error.into()))?;
     let (file, set) = (&arguments.scene.scene, &arguments.scene.overrides.set);
-    let text = crate::stability::source::read(file, set)?;
+    let (text, file) = (input::text(file)?, input::named(file));
     let format = match arguments.format {
         TableFormat::Parquet => Format::Parquet,
         TableFormat::Csv => Format::Csv,

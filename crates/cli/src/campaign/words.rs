@@ -39,9 +39,7 @@ pub(super) fn describe(finished: &Finished) -> String {
         if report.combinations.len() > MOST_COMBINATIONS {
             line(&format!("  ... and {} more combinations", report.combinations.len() - MOST_COMBINATIONS));
         }
-        line("");
     }
-    line(&format!("  {}", report.file.display()));
     text
 }
 

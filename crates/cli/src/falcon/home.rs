@@ -16,6 +16,7 @@ use super::probe::WITHOUT_FORCE;
 use super::reach::{self, FirmwareState};
 use super::words;
 use crate::arguments::HomeArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
 
@@ -56,7 +57,7 @@ pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
         seen: Seen::of(&homing.last),
     };
     if which.json {
-        output::json(&document)?;
+        output::json(DocumentSchema::FalconHome, &document)?;
     } else {
         output::text(&document.describe(&target.name(), state))?;
     }

@@ -14,6 +14,7 @@ use super::document::{Identity, Seen, Traffic};
 use super::reach::{self, FirmwareState, Target};
 use super::words;
 use crate::arguments::ProbeArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INPUT_OUTPUT, INTERRUPTED};
 use crate::{interrupt, output};
 
@@ -60,7 +61,7 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<ExitCode, Failure> {
     }
     let document = Document { falcons };
     if arguments.which.json {
-        output::json(&document)?;
+        output::json(DocumentSchema::FalconProbe, &document)?;
     } else {
         output::text(&document.falcons.iter().map(Entry::describe).collect::<String>())?;
     }

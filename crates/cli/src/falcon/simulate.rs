@@ -18,6 +18,7 @@ use super::truth::{DeviceDocument, Truth};
 use super::way::Way;
 use super::words;
 use crate::arguments::{Force, HandName, SimulateArguments};
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
 
@@ -80,7 +81,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failur
     let end = bench.run(Some(arguments.length), &mut simulating)?;
     let document = simulating.document(&bench, arguments, end);
     if arguments.json {
-        output::json(&document)?;
+        output::json(DocumentSchema::FalconSimulate, &document)?;
     } else {
         output::text(&document.describe())?;
     }

@@ -17,6 +17,7 @@ use super::reach;
 use super::samples::{self, SamplesFile};
 use super::words;
 use crate::arguments::{Force, WatchArguments};
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
 
@@ -72,9 +73,12 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
         files,
     };
     if which.json {
-        output::json(&document)?;
+        output::json(DocumentSchema::FalconWatch, &document)?;
     } else if !watching.prints_rows {
         output::text(&document.describe(&target.name()))?;
+    }
+    if !which.json {
+        output::wrote(&document.files);
     }
     match end {
         End::Enough | End::Over => Ok(ExitCode::SUCCESS),
@@ -93,7 +97,6 @@ impl Document {
         }
         lines.extend(words::seen(&self.seen));
         lines.push(words::forces(&self.forces));
-        lines.extend(self.files.iter().map(|file| format!("wrote {file}")));
         words::block(name, &lines)
     }
 }

@@ -18,6 +18,7 @@ use cohaptic_wan::{Link, LinkName, PacketInfo, PacketRecord};
 use serde::Serialize;
 
 use crate::arguments::LinkArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output_file::OutputFile;
 use crate::progress::Progress;
@@ -63,17 +64,21 @@ pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     let spec = Spec::read(arguments)?;
     let measured = drive(arguments, &spec)?;
     if arguments.json {
-        output::json(&Document {
-            asked: AskedDocument { spec: &spec.said, figures: &spec.asked },
-            achieved: &measured.achieved,
-            compared: &measured.figures,
-            fates: &measured.achieved.fates,
-            packets_per_s: measured.packets_per_s,
-            interrupted: measured.interrupted,
-            files: &measured.files,
-        })?;
+        output::json(
+            DocumentSchema::Link,
+            &Document {
+                asked: AskedDocument { spec: &spec.said, figures: &spec.asked },
+                achieved: &measured.achieved,
+                compared: &measured.figures,
+                fates: &measured.achieved.fates,
+                packets_per_s: measured.packets_per_s,
+                interrupted: measured.interrupted,
+                files: &measured.files,
+            },
+        )?;
     } else {
         output::text(&words::describe(&spec, &measured))?;
+        output::wrote(&measured.files);
     }
     Ok(if measured.interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }

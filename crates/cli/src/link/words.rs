@@ -39,9 +39,6 @@ pub(super) fn describe(spec: &Spec, measured: &Measured) -> String {
     parts.extend(fates.dropped.iter().filter(|(_, count)| **count > 0).map(|(cause, count)| format!("{count} dropped ({cause})")));
     line(format!("  {}", parts.join(", ")));
     line(format!("  {:.0} packets a second", measured.packets_per_s));
-    for file in &measured.files {
-        line(format!("  wrote {file}"));
-    }
     text
 }
 

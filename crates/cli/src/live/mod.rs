@@ -15,15 +15,16 @@ use std::thread;
 use std::time::Duration;
 
 use cohaptic_live::{Report, Session, SessionConfig, SessionError, SessionKey, SystemEntropy};
-use cohaptic_scene::{KeysOfLinks, Scene, SceneContent, link_key_changes, link_keys, scene_content};
+use cohaptic_scene::{KeysOfLinks, Scene, SceneContent, link_key_changes_of_text, link_keys_of_text, scene_content_of_text};
 use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 
 use crate::arguments::LiveArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
 use crate::realtime::{KeyedLinks, LiveControl};
-use crate::{failure, interrupt, output};
+use crate::{failure, input, interrupt, output};
 use conductor::Host;
 use document::Document;
 use prepare::ready_falcons;
@@ -41,7 +42,8 @@ pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {
 
 fn make_key(file: &Path) -> Result<ExitCode, Failure> {
     SessionKey::generate_to(file, &mut SystemEntropy).map_err(|error| Failure::System(error.to_string()))?;
-    output::text(&format!("{}: a new session key; only its owner can read it. Whoever has it can take part\n", output::path(file)))?;
+    output::text("a new session key; only its owner can read it. Whoever has it can take part\n")?;
+    output::wrote([file]);
     Ok(ExitCode::SUCCESS)
 }
 
@@ -52,20 +54,23 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
         overrides.extend([format!("scene.duration={}", Span(length)), "expect={}".to_owned()]);
     }
     let overrides = overrides.as_slice();
-    let scene = Scene::read_live(path, overrides)?;
+    let scene = input::with(path, |text, file| Scene::parse_live(text, file, overrides))?;
     if let Some(error) = failure::too_large(&scene, overrides) {
         return Err(error.into());
     }
     let pairs = status::pairs(&scene);
     let number = |pair| pairs.iter().position(|known| *known == pair).expect("a pair of peers is a link");
     let numbered = |links: KeysOfLinks| links.into_iter().map(|(pair, keys)| (number(pair), keys)).collect();
-    let planned: Planned = link_key_changes(path, overrides)?.into_iter().map(|(at, links)| (at, numbered(links))).collect();
-    let keys = link_keys(path, overrides)?.into_values().collect();
+    let planned: Planned = input::with(path, |text, file| link_key_changes_of_text(text, file, overrides))?
+        .into_iter()
+        .map(|(at, links)| (at, numbered(links)))
+        .collect();
+    let keys = input::with(path, |text, file| link_keys_of_text(text, file, overrides))?.into_values().collect();
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let (changes, wanted) = channel();
     let elapsed = Elapsed::default();
     let editor = TimedLinks { links: KeyedLinks { keys, folder, changes }, planned, elapsed: elapsed.clone() };
-    let content = scene_content(path, overrides)?;
+    let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
     let session = open(arguments, &scene, content)?;
     let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
     prepare::announce(&scene, session.address(), arguments.key_file.is_some());
@@ -73,7 +78,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let host = Host::new(control.look(), wanted, pairs, elapsed, scene.axes.count());
     let report = conduct(&scene, session, host, &control)?;
     if arguments.json {
-        output::json(&Document::new(&scene, &report))?;
+        output::json(DocumentSchema::Live, &Document::new(&scene, &report))?;
     } else {
         let mut text = words::describe(&scene, &report);
         if let Some(folder) = &arguments.out {
@@ -81,6 +86,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
             let _ = writeln!(text, "  replay: cohaptic run {}{set} --inputs {}", path.display(), folder.join("inputs.csv").display());
         }
         output::text(&text)?;
+        output::wrote(&report.files);
     }
     Ok(if interrupt::asked() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }

@@ -49,9 +49,6 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
             line(format!("lost at the socket: {}", Counted(lost, "datagram")));
         }
     }
-    for file in report.files.iter().filter(|file| file.extension().is_some_and(|extension| extension == "svg")) {
-        line(format!("plot: {}", file.display()));
-    }
     text.push_str(&notes(&report.prepared));
     text
 }

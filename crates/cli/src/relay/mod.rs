@@ -13,6 +13,7 @@ use cohaptic_realtime::udp::DoorConfig;
 use cohaptic_relay::{Relay, RelayError, RunOptions};
 
 use crate::arguments::RelayArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::realtime::{KeyedLinks, LiveControl, say, some_length};
 use crate::{interrupt, output};
@@ -39,7 +40,7 @@ pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     let asked = setup.asked(&edits, report.elapsed);
     let is_interrupted = interrupt::asked();
     if arguments.json {
-        output::json(&Document::new(&setup, &report, &asked, is_interrupted))?;
+        output::json(DocumentSchema::Relay, &Document::new(&setup, &report, &asked, is_interrupted))?;
     } else {
         output::text(&words::describe(&setup, &report, &asked))?;
     }

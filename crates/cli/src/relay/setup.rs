@@ -7,12 +7,13 @@ use std::time::Duration;
 
 use cohaptic_realtime::Tolerance;
 use cohaptic_relay::{Form, Limits, Proxy, RelayConfig};
-use cohaptic_scene::{LinkKeys, RelayFile, relay_link_keys};
+use cohaptic_scene::{LinkKeys, RelayFile, relay_link_keys_of_text};
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 
 use crate::arguments::RelayArguments;
 use crate::failure::Failure;
+use crate::input;
 use crate::link::link_and_keys;
 use crate::realtime::AskedDelay;
 
@@ -44,14 +45,14 @@ impl Setup {
     }
 
     fn of_file(arguments: &RelayArguments, path: &Path) -> Result<Self, Failure> {
-        let mut overrides = arguments.overrides.set.clone();
+        let mut overrides = arguments.set.clone();
         let mut lay = |key: &str, value: Option<String>| overrides.extend(value.map(|value| format!("relay.{key}={value}")));
         lay("seed", arguments.seed.map(|seed| seed.to_string()));
         lay("most-packets", arguments.packets.map(|packets| packets.to_string()));
         lay("most-bytes", arguments.bytes.map(|bytes| format!("\"{}B\"", bytes.get())));
         lay("allow-remote", arguments.real_time.allow_remote.then(|| "true".to_owned()));
-        let file = RelayFile::read(path, &overrides)?;
-        let keys = relay_link_keys(path, &overrides)?;
+        let file = input::with(path, |text, file| RelayFile::parse(text, file, &overrides))?;
+        let keys = input::with(path, |text, file| relay_link_keys_of_text(text, file, &overrides))?;
         let tolerance = arguments.real_time.tolerance.unwrap_or(file.limits.tolerance);
         Ok(Self {
             title: file.title.clone(),

@@ -47,7 +47,7 @@ pub(super) fn conduct(
 ) -> Result<Ran, Failure> {
     const GLANCE: Duration = Duration::from_millis(50);
     let stop = AtomicBool::new(false);
-    let progress = Progress::of_traffic(&arguments.file.display().to_string());
+    let progress = Progress::of_traffic(&crate::input::named(&arguments.file).display().to_string());
     let publisher = Publisher::new(control.look(), Duration::from_millis(100));
     let ran = thread::scope(|scope| {
         let running = thread::Builder::new()

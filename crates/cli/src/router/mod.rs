@@ -14,16 +14,17 @@ use cohaptic_scene::router_file::{RouterFile, Side};
 use cohaptic_units::Instant;
 
 use crate::arguments::RouterArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::realtime::{KeyedLinks, LiveControl, say, some_length};
-use crate::{interrupt, output};
+use crate::{input, interrupt, output};
 use conduct::{Ending, Ran};
 use document::Document;
 
 /// Puts the emulator between two devices, and says what it did.
 pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     let until = some_length(arguments.length)?.map(|length| Instant::ZERO.saturating_add(length));
-    let file = RouterFile::read(&arguments.file, &arguments.overrides.set)?;
+    let file = input::with(&arguments.file, |text, file| RouterFile::parse(text, file, &arguments.set))?;
     let real_time = &arguments.real_time;
     let router = Router::open(&file, real_time.pacing()).map_err(|error| Failure::System(error.to_string()))?;
     say(&format!("between {} and {}", attached(&file, Side::Left), attached(&file, Side::Right)));
@@ -34,7 +35,7 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     let control = LiveControl::open(real_time, status::description(&file), Box::new(KeyedLinks { keys, folder, changes }))?;
     let ran = conduct::conduct(router, &file, arguments, until, &control, wanted)?;
     if arguments.json {
-        output::json(&Document::new(&file, &ran))?;
+        output::json(DocumentSchema::Router, &Document::new(&file, &ran))?;
     } else {
         output::text(&words::describe(&file, &ran))?;
     }

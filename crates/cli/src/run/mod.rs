@@ -16,19 +16,21 @@ use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use crate::arguments::RunArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::{failure, interrupt, output};
+use crate::{failure, input, interrupt, output};
 use document::Document;
 use words::describe;
 
 /// Runs a scene, or a scene and a variant of it, and says what happened.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
-    let overrides = &arguments.scene.overrides.set;
+    let path = &arguments.scene.scene;
+    let overrides = &overrides(arguments);
     let scene = match &arguments.inputs {
-        None => Scene::read(&arguments.scene.scene, overrides)?,
+        None => input::with(path, |text, file| Scene::parse(text, file, overrides))?,
         // As the session read it.
-        Some(_) => Scene::read_live(&arguments.scene.scene, overrides)?,
+        Some(_) => input::with(path, |text, file| Scene::parse_live(text, file, overrides))?,
     };
     if let Some(error) = failure::too_large(&scene, overrides) {
         return Err(error.into());
@@ -38,14 +40,15 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         None
     } else {
         let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
-        let mut variant = Scene::read(&arguments.scene.scene, &both).map_err(|error| failure::of_variant(error, "--against", &arguments.against))?;
+        let variant = input::with(path, |text, file| Scene::parse(text, file, &both));
+        let mut variant = variant.map_err(|error| failure::of_variant(error, "--against", &arguments.against))?;
         if let Some(error) = failure::too_large(&variant, &both) {
             return Err(error.into());
         }
         variant.title = format!("{}, with {}", variant.title, arguments.against.join(", "));
         Some(variant)
     };
-    let inputs = arguments.inputs.as_deref().map(|file| replayed::read(file, &scene, arguments)).transpose()?;
+    let inputs = arguments.inputs.as_deref().map(|file| replayed::read(file, &scene, arguments, overrides)).transpose()?;
     let (inputs, replayed_otherwise) = inputs.unzip();
     let what = inputs.as_ref().map_or(What::Simulated, What::Replayed);
     let first = run_one(arguments, &scene, what, arguments.out.clone())?;
@@ -59,15 +62,22 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         let mut document = Document::new(&scene, &first);
         document.replayed_otherwise = replayed_otherwise.unwrap_or_default();
         document.against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| Box::new(Document::new(variant, run)));
-        output::json(&document)?;
+        output::json(DocumentSchema::Run, &document)?;
     } else {
         let mut text = format!("{}\n{}", scene.title, describe(&scene, &first));
         if let Some((variant, run)) = variant.as_ref().zip(second.as_ref()) {
             let _ = write!(text, "\nAgainst {}:\n{}", arguments.against.join(", "), describe(variant, run));
         }
         output::text(&text)?;
+        output::wrote([Some(&first), second.as_ref()].into_iter().flatten().flat_map(|run| &run.files));
     }
     Ok(if interrupt::asked() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// What is put into the scene: all `--set`, and then the seed.
+fn overrides(arguments: &RunArguments) -> Vec<String> {
+    let seed = arguments.seed.map(|seed| format!("scene.seed={seed}"));
+    arguments.scene.overrides.set.iter().cloned().chain(seed).collect()
 }
 
 /// A run and what it left behind.

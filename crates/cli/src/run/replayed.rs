@@ -4,32 +4,32 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use cohaptic_harness::live::{Inputs, InputsError, RecordedScene};
-use cohaptic_scene::{Scene, link_keys, scene_content};
+use cohaptic_scene::{Scene, link_keys_of_text, scene_content_of_text};
 use cohaptic_units::visible_lines;
 
 use crate::arguments::RunArguments;
 use crate::failure::Failure;
-use crate::{output, text_file};
+use crate::{input, output, text_file};
 
 /// So many differences are listed.
 const MOST: usize = 20;
 
 /// Reads `inputs.csv` of a session, and says in what the scene differs from that of the session; if it does, it is refused without `--force`.
-pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments) -> Result<(Inputs, Vec<String>), Failure> {
-    let (path, overrides) = (&arguments.scene.scene, &arguments.scene.overrides.set);
+pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments, overrides: &[String]) -> Result<(Inputs, Vec<String>), Failure> {
+    let path = &arguments.scene.scene;
     let text = text_file::read(file)?;
     let unreadable = |error: InputsError| Failure::Input(format!("{}: {error}", output::path(file)));
     let of_the_session = RecordedScene::read(&text).map_err(unreadable)?;
     let differences: Vec<String> = match of_the_session {
         Some(recorded) => {
-            let now = RecordedScene::of(scene, scene_content(path, overrides)?);
+            let now = RecordedScene::of(scene, input::with(path, |text, file| scene_content_of_text(text, file, overrides))?);
             recorded.differences(&now).iter().map(ToString::to_string).collect()
         }
         None => vec!["not known: the record is of a version that did not say with which scene it was made".to_owned()],
     };
     if !differences.is_empty() {
         let said = listed(&differences);
-        let (record, scene) = (output::path(file), output::path(path));
+        let (record, scene) = (output::path(file), output::path(input::named(path)));
         let message = format!("{record} is the record of a session with another scene than {scene} with these overrides. What differs:\n{said}");
         if !arguments.force {
             let way_out = "expected the scene and every --set of the session, which its summary ends with; --force replays it all the same";
@@ -39,7 +39,7 @@ pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments) -> Resu
         let _ = write!(io::stderr(), "warning: {}", visible_lines(&message));
     }
     // Any link will do: all have the modulators of the scene.
-    let keys = link_keys(path, overrides)?.into_values().next().unwrap_or_default();
+    let keys = input::with(path, |text, file| link_keys_of_text(text, file, overrides))?.into_values().next().unwrap_or_default();
     let inputs = Inputs::read(&text, scene, &keys).map_err(unreadable)?;
     Ok((inputs, differences))
 }

@@ -41,9 +41,6 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
         line(format!("  ... and {}", Counted(summary.peers.len() - MOST_PEERS, "more peer")));
     }
     line(format!("  {}", packets(summary)));
-    for file in run.files.iter().filter(|file| file.extension().is_some_and(|extension| extension == "svg")) {
-        line(format!("  plot: {}", file.display()));
-    }
     text
 }
 

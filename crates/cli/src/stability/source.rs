@@ -2,22 +2,12 @@
 
 use std::path::Path;
 
-use cohaptic_scene::{Scene, SceneError};
+use cohaptic_scene::Scene;
 use cohaptic_stability::{Criterion, Family, FamilyError, KeyRange};
 
 use super::rows_file::fingerprint;
 use crate::failure::{Failure, not_analysed};
-use crate::output;
-
-/// The text of a scene.
-pub(crate) fn read(path: &Path, set: &[String]) -> Result<String, Failure> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
-    String::from_utf8(bytes).map_err(|_| match Scene::read(path, set) {
-        Err(error) => Failure::Scene(error),
-        // It has been written anew in between.
-        Ok(_) => Failure::Input(format!("{}: not UTF-8: expected a text file in TOML", output::path(path))),
-    })
-}
+use crate::{input, output};
 
 /// The range that an option gives to a key.
 pub(super) fn range(option: &str, text: &str) -> Result<KeyRange, Failure> {
@@ -55,7 +45,7 @@ impl Said<'_> {
                     |(option, range): &&(&'static str, KeyRange)| error.to_string().starts_with(&format!("{} ", range.key)).then_some(*option);
                 match self.ranges.iter().find_map(|range| about(&range)) {
                     Some(option) => Failure::Input(format!("{option}: {error}")),
-                    None => Failure::Input(format!("{}: {error}", output::path(self.file))),
+                    None => Failure::Input(format!("{}: {error}", output::path(input::named(self.file)))),
                 }
             }
         }

@@ -84,7 +84,6 @@ fn people_are_told_what_came_out() {
         "  coordination.stiffness  link.loss  diverged  mean discrepancy",
         "\n                     500         0%         0",
         "  ... and 2 more combinations\n",
-        "  out/runs.parquet\n",
     ] {
         assert!(text.contains(part), "no {part:?} in {text}");
     }

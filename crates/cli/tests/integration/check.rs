@@ -125,7 +125,7 @@ fn what_is_not_there_cannot_be_checked() {
     desk.write("empty/notes.txt", "not a scene");
     desk.cohaptic("check empty").assert_refused(2, &["empty: no scene here"]);
     desk.cohaptic("check").assert_refused(2, &["SCENE"]);
-    desk.cohaptic("check scenes --jobs 0").assert_refused(2, &["--jobs"]);
+    desk.cohaptic("check scenes --jobs 0").assert_refused(2, &["--threads"]);
 }
 
 #[test]

@@ -20,6 +20,10 @@ fn help_names_the_commands() {
             "fit",
             "paper",
             "accuracy",
+            "init",
+            "schema",
+            "completions",
+            "man",
             "Exit status: 0 done",
             "130 interrupted"
         ]
@@ -34,7 +38,7 @@ fn help_names_the_commands() {
 fn help_of_a_command_names_its_options_and_the_exit_status() {
     for (command, options) in [
         ("run", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--against <KEY=VALUE>", "--out <DIR>", "--no-plot", "--general"][..]),
-        ("check", &["<SCENE>...", "--set <KEY=VALUE>", "--json", "--jobs <N>", "--general"]),
+        ("check", &["<SCENE>...", "--set <KEY=VALUE>", "--json", "--threads <N>", "--jobs", "--general"]),
         ("explain", &["<SCENE>", "--set <KEY=VALUE>", "--json"]),
         (
             "campaign",

@@ -12,9 +12,10 @@ use cohaptic_stability::{Boundary, BoundaryError, BoundaryOptions, Cell, Criteri
 use super::rows_file::{Row, RowsFile, fingerprint};
 use super::source::{self, Said};
 use crate::arguments::BoundaryArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::{interrupt, output};
+use crate::{input, interrupt, output};
 use document::Document;
 
 /// The file in which values looked at are kept.
@@ -59,9 +60,10 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
         rows.map_or(Ok(()), RowsFile::remove)?;
     }
     if arguments.scene.json {
-        output::json(&Document::new(&order, &found, &written))?;
+        output::json(DocumentSchema::StabilityBoundary, &Document::new(&order, &found, &written))?;
     } else {
-        output::text(&words::describe(&order, &found, &written))?;
+        output::text(&words::describe(&order, &found))?;
+        output::wrote(&written);
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -79,7 +81,7 @@ impl Order {
             return Err(Failure::Input(format!("--samples {}: expected from 2 to {}", options.samples, options.most)));
         }
         let (file, set) = (&arguments.scene.scene, &arguments.scene.overrides.set);
-        let text = source::read(file, set)?;
+        let text = input::text(file)?;
         let refused = |error| failure(arguments, &range, BoundaryError::Radius(error));
         let family = Family::new(&text, file, set, vec![range.clone()]).map_err(refused)?;
         if let (Criterion::MeanSquare, None) = (family.criterion(), arguments.tolerance) {

@@ -6,7 +6,7 @@ use cohaptic_stability::{Boundary, Criterion, Crossing, KeyRange};
 
 use super::Order;
 
-pub(super) fn describe(order: &Order, found: &Boundary, files: &[String]) -> String {
+pub(super) fn describe(order: &Order, found: &Boundary) -> String {
     let range = &order.range;
     let mut text = format!("{}\n\n", order.title);
     // Writing to a string does not fail.
@@ -37,7 +37,6 @@ pub(super) fn describe(order: &Order, found: &Boundary, files: &[String]) -> Str
         line("NOT SETTLED: it ended after the most values that it may look at; a larger tolerance or a shorter range decides".to_owned());
     }
     super::notes(found).iter().for_each(|note| line(format!("note: {note}")));
-    files.iter().for_each(|file| line(file.clone()));
     text
 }
 

@@ -34,9 +34,9 @@ pub(super) fn fill(order: &Order, arguments: &MapArguments) -> Result<Filled, Fa
     };
     let begun_before = !known.is_empty();
     let keeper = Keeper { file: Mutex::new((file, None)), broken: AtomicBool::new(false) };
-    let jobs = usize::from(arguments.jobs.unwrap_or(0));
+    let threads = usize::from(arguments.threads.unwrap_or(0));
     let work = || in_turn(order, sorted(known, order), &keeper);
-    let filled = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
+    let filled = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(work),
         // Without threads of its own it uses those that there are.
         Err(_) => work(),

@@ -15,9 +15,10 @@ use cohaptic_stability::{Criterion, Family, Grid, KeyRange, Map, MapError, Verdi
 
 use super::source::{self, Said};
 use crate::arguments::MapArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::output;
 use crate::variants::Variant;
+use crate::{input, output};
 use document::Document;
 use filling::Filled;
 
@@ -64,9 +65,10 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     }
     let document = Document::new(&order, &maps, wall_s, cells, &files);
     if arguments.scene.json {
-        output::json(&document)?;
+        output::json(DocumentSchema::StabilityMap, &document)?;
     } else {
         output::text(&words::describe(&order, &maps, &document, arguments.out.is_none()))?;
+        output::wrote(&files);
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -82,7 +84,7 @@ impl Order {
         }
         let grid = Grid::new(size.width, size.height).map_err(|error| Failure::Input(format!("--grid {size}: {error}")))?;
         let (file, set) = (&arguments.scene.scene, &arguments.scene.overrides.set);
-        let text = source::read(file, set)?;
+        let text = input::text(file)?;
         let keys = || ranges.iter().map(|(_, range)| range.clone()).collect::<Vec<_>>();
         let mut families = Vec::new();
         for variant in &variants {
@@ -91,7 +93,7 @@ impl Order {
         }
         let title = match families.first().map(source::at_low) {
             Some(Ok(scene)) => scene.title,
-            Some(Err(_)) | None => output::path(file),
+            Some(Err(_)) | None => output::path(input::named(file)),
         };
         Ok(Self { text, title, ranges, grid, variants, families })
     }

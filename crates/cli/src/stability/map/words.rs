@@ -38,9 +38,6 @@ pub(super) fn describe(order: &Order, maps: &[VariantMap], document: &Document<'
     for note in notes(maps) {
         let _ = writeln!(text, "note: {note}");
     }
-    for file in document.files {
-        let _ = writeln!(text, "  {file}");
-    }
     text
 }
 

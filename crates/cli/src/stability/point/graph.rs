@@ -13,7 +13,7 @@ const NOMINAL: &str = "the verdict is nominal, with every delay its mean and not
 
 /// The verdict if each peer hears only its neighbours. Links that leave something to chance count as if they did not, and a note says so.
 pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failure> {
-    let refused = |message: String| Failure::Input(format!("{}: --graph {graph}: {message}", path.display()));
+    let refused = |message: String| Failure::Input(format!("{}: --graph {graph}: {message}", crate::input::named(path).display()));
     let graph = match graph {
         "complete" => Graph::Complete,
         "ring" => Graph::Ring,

@@ -11,21 +11,22 @@ use cohaptic_scene::Scene;
 use cohaptic_stability::{Analysis, judge};
 
 use crate::arguments::PointArguments;
+use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, not_analysed};
-use crate::output;
+use crate::{input, output};
 use document::Document;
 
 /// Says whether the scene is stable.
 pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let path = &arguments.scene.scene;
-    let scene = Scene::read(path, &arguments.scene.overrides.set)?;
+    let scene = input::with(path, |text, file| Scene::parse(text, file, &arguments.scene.overrides.set))?;
     let judgement = match &arguments.graph {
         Some(graph) => graph::on(&scene, graph, path)?,
         None => judge(&scene, arguments.method.into(), usize::MAX).map_err(|error| not_analysed(path, &error))?,
     };
     let worst = worst::of(&scene, arguments, path)?;
     if arguments.scene.json {
-        output::json(&Document::new(&scene, &judgement, worst.as_ref()))?;
+        output::json(DocumentSchema::StabilityPoint, &Document::new(&scene, &judgement, worst.as_ref()))?;
     } else {
         output::text(&words::describe(&scene, &judgement, worst.as_ref()))?;
     }

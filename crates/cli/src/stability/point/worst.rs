@@ -23,7 +23,7 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
     };
     let patterns = Patterns { losses_in_a_row: arguments.losses_in_a_row.unwrap_or(0), delay: arguments.delay_within, links };
     let effort = Effort { accuracy: arguments.accuracy, products: arguments.products };
-    worst_case(scene, &patterns, &effort).map(Some).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
+    worst_case(scene, &patterns, &effort).map(Some).map_err(|error| Failure::Input(format!("{}: {error}", crate::input::named(path).display())))
 }
 
 #[derive(Serialize)]

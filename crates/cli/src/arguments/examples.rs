@@ -1,0 +1,113 @@
+//! What stands below the help of every command: lines that can be typed as they stand, and the exit status.
+
+const EXIT_STATUS: &str = "Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, \
+    141 standard output was closed.";
+
+/// The examples of a command, and the exit status.
+pub(super) fn after(examples: &[&str]) -> String {
+    let mut text = "Examples:\n".to_owned();
+    for example in examples {
+        text.push_str("  ");
+        text.push_str(example);
+        text.push('\n');
+    }
+    text.push('\n');
+    text.push_str(EXIT_STATUS);
+    text
+}
+
+pub(super) const PROGRAM: &[&str] =
+    &["cohaptic init", "cohaptic run scene.toml", "cohaptic run scenarios/paper/5-1-ap-2100.toml --set link.delay=40ms", "cohaptic check scenarios"];
+
+pub(super) const RUN: &[&str] = &[
+    "cohaptic run scenarios/paper/5-1-ap-2100.toml",
+    "cohaptic run scene.toml --seed 7 --set link.loss=5% --out out",
+    "cohaptic run scene.toml --against coordination.strategy=proportional-derivative",
+    "cohaptic init - | cohaptic run - --json",
+];
+
+pub(super) const CHECK: &[&str] =
+    &["cohaptic check scenarios", "cohaptic check scenarios/paper --threads 2 --json", "cohaptic check scene.toml --set link.delay=40ms"];
+
+pub(super) const EXPLAIN: &[&str] = &["cohaptic explain scenarios/network/rate-and-queue.toml", "cohaptic explain scene.toml --set scene.axes=3"];
+
+pub(super) const CAMPAIGN: &[&str] = &[
+    "cohaptic campaign scene.toml --vary link.delay=8ms..48ms/6 --runs 100 --out delays",
+    "cohaptic campaign scene.toml --vary coordination.stiffness=10..1000/5:log --out gains",
+];
+
+pub(super) const STABILITY: &[&str] =
+    &["cohaptic stability point scenarios/paper/5-1-ap-2100.toml", "cohaptic stability boundary scene.toml --along coordination.stiffness=100..6000"];
+
+pub(super) const POINT: &[&str] = &[
+    "cohaptic stability point scenarios/paper/5-1-ap-2100.toml",
+    "cohaptic stability point scenarios/paper/5-1-pd-1000.toml --losses-in-a-row 2",
+    "cohaptic stability point scenarios/coordination/n5.toml --graph ring",
+];
+
+pub(super) const MAP: &[&str] = &[
+    "cohaptic stability map scene.toml --x object.mass=0.1..2 --y link.delay=0ms..40ms --grid 40x40",
+    "cohaptic stability map - --x link.delay=0ms..40ms --y object.mass=0.1..2 --grid 9x9 --out map",
+];
+
+pub(super) const BOUNDARY: &[&str] = &[
+    "cohaptic stability boundary scene.toml --along coordination.stiffness=100..6000",
+    "cohaptic stability boundary scene.toml --along link.delay=0ms..60ms --tolerance 0.1 --out boundary",
+];
+
+pub(super) const ADMITTANCE: &[&str] = &[
+    "cohaptic admittance scenarios/coordination/n3.toml --peer left --at 0.01,0.1,1,10,100",
+    "cohaptic admittance scene.toml --peer left --to 60 --curve link.delay=40ms --out bode",
+];
+
+pub(super) const LIVE: &[&str] = &[
+    "cohaptic live scenarios/live/two-and-a-program.toml --control",
+    "cohaptic live scene.toml --for 30s --listen 127.0.0.1:7400 --out session",
+    "cohaptic live --new-key session.key",
+];
+
+pub(super) const RELAY: &[&str] = &[
+    "cohaptic relay --listen 127.0.0.1:7000 --to 127.0.0.1:9000 delay 24ms 2ms loss 1%",
+    "cohaptic relay --listen 127.0.0.1:7000 --to 127.0.0.1:9000 delay=24ms --back delay=40ms loss=1%",
+    "cohaptic relay relay.toml --set link.delay=8ms --set programs.left.port=127.0.0.1:7101 --for 1min",
+];
+
+pub(super) const ROUTER: &[&str] =
+    &["cohaptic router router.toml --control", "cohaptic router router.toml --set links.wan.delay=8ms --set router.seed=7 --for 1min"];
+
+pub(super) const FALCON: &[&str] = &["cohaptic falcon probe", "cohaptic falcon watch --simulated --for 2s"];
+
+pub(super) const FALCON_PROBE: &[&str] = &["cohaptic falcon probe", "cohaptic falcon probe --serial FALCON01 --for 5s --json"];
+
+pub(super) const FALCON_HOME: &[&str] = &["cohaptic falcon home --firmware firmware.bin", "cohaptic falcon home --simulated --virtual-time"];
+
+pub(super) const FALCON_WATCH: &[&str] = &[
+    "cohaptic falcon watch --for 10s --csv grip.csv",
+    "cohaptic falcon watch --spring 200 --damping 2 --limit 1",
+    "cohaptic falcon watch --force 0,0,0.3 --for 5s",
+];
+
+pub(super) const FALCON_SIMULATE: &[&str] =
+    &["cohaptic falcon simulate", "cohaptic falcon simulate --hand swaying --drop 0.1% --garbage 0.1% --for 10s"];
+
+pub(super) const LINK: &[&str] = &[
+    "cohaptic link delay 20ms 5ms 25% loss 1%",
+    "cohaptic link delay=24ms loss=1% --packets 1000000 --fates fates.csv",
+    "cohaptic link --from fates.csv --json",
+];
+
+pub(super) const FIT: &[&str] = &["cohaptic fit fates.csv --out link.toml", "cohaptic fit sender.pcapng receiver.pcapng --port 5000 --skew"];
+
+pub(super) const PAPER: &[&str] = &["cohaptic paper --quick", "cohaptic paper --out paper"];
+
+pub(super) const ACCURACY: &[&str] = &["cohaptic accuracy --quick", "cohaptic accuracy --only motion,time --out accuracy"];
+
+pub(super) const INIT: &[&str] =
+    &["cohaptic init", "cohaptic init four.toml --from paper/5-1 --peers 4", "cohaptic init - --from network/jitter-normal", "cohaptic init --list"];
+
+pub(super) const SCHEMA: &[&str] = &["cohaptic schema > scene.schema.json", "cohaptic schema relay", "cohaptic schema router"];
+
+pub(super) const COMPLETIONS: &[&str] =
+    &["cohaptic completions bash > ~/.local/share/bash-completion/completions/cohaptic", "cohaptic completions zsh > _cohaptic"];
+
+pub(super) const MAN: &[&str] = &["cohaptic man > cohaptic.1", "cohaptic man stability map", "cohaptic man --out man1"];

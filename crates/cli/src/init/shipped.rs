@@ -1,0 +1,125 @@
+//! The scenes that ship with the program, within it: those that need no file beside them.
+
+/// Other names of some of them.
+const OTHER_NAMES: [(&str, &str); 2] = [("paper/5-1", "paper/5-1-ap-2100"), ("paper/5-2", "paper/5-2-ap")];
+
+/// A scene by its name, or by another name of it: its own name and its text.
+pub(super) fn find(name: &str) -> Option<(&'static str, &'static str)> {
+    let name = OTHER_NAMES.iter().find(|(other, _)| *other == name).map_or(name, |(_, own)| own);
+    SCENES.iter().copied().find(|(own, _)| *own == name)
+}
+
+/// All names, the other ones first.
+pub(super) fn names() -> impl Iterator<Item = &'static str> {
+    OTHER_NAMES.iter().map(|(other, _)| *other).chain(SCENES.iter().map(|(own, _)| *own))
+}
+
+macro_rules! shipped {
+    ($($name:literal),* $(,)?) => {
+        /// Each with its name: its path within `scenarios/`, without the ending.
+        const SCENES: &[(&str, &str)] = &[$(($name, include_str!(concat!("../../../../scenarios/", $name, ".toml")))),*];
+    };
+}
+
+shipped![
+    "paper/5-1-ap-1000-no-arm",
+    "paper/5-1-ap-1000",
+    "paper/5-1-ap-2100-no-arm",
+    "paper/5-1-ap-2100",
+    "paper/5-1-pd-1000-no-arm",
+    "paper/5-1-pd-1000",
+    "paper/5-1-pd-2100-no-arm",
+    "paper/5-1-pd-2100",
+    "paper/5-2-ap",
+    "paper/5-2-enclosure",
+    "paper/5-2-pd",
+    "coordination/difference-mode-pd",
+    "coordination/difference-mode",
+    "coordination/momentum",
+    "coordination/n2-pd",
+    "coordination/n2",
+    "coordination/n3-pd",
+    "coordination/n3",
+    "coordination/n5-pd",
+    "coordination/n5",
+    "coordination/n50",
+    "coordination/n8",
+    "network/cells",
+    "network/clock-offset-and-drift",
+    "network/compute-delay",
+    "network/constant-delay",
+    "network/corrupt",
+    "network/duplicate",
+    "network/ideal",
+    "network/in-order",
+    "network/jitter-correlated",
+    "network/jitter-normal",
+    "network/jitter-uniform",
+    "network/limit-and-mtu",
+    "network/loss-correlated",
+    "network/loss-four-state",
+    "network/loss-gilbert-elliott",
+    "network/loss-in-time",
+    "network/loss-independent",
+    "network/loss-pattern",
+    "network/mark-instead-of-loss",
+    "network/modulated",
+    "network/netem-kernel",
+    "network/netem",
+    "network/outage-idle",
+    "network/outage-random",
+    "network/outage",
+    "network/per-pair-links",
+    "network/phases",
+    "network/push-contact",
+    "network/queue-codel",
+    "network/queue-disciplines",
+    "network/queue-red",
+    "network/rate-and-queue",
+    "network/reorder",
+    "network/shared-access-line",
+    "network/slots",
+    "network/three-axes",
+    "network/timeline",
+    "network/token-bucket",
+    "network/two-axes",
+    "live/three-falcons",
+    "live/two-and-a-program",
+    "counterexamples/ap-unaffected",
+    "counterexamples/below-the-bound",
+    "counterexamples/both-stable",
+    "counterexamples/damage-passes",
+    "counterexamples/healing-jump",
+    "counterexamples/heals-and-diverges",
+    "counterexamples/held-velocity",
+    "counterexamples/pd-decreases",
+    "counterexamples/region-contains",
+    "counterexamples/region-larger",
+    "counterexamples/stability-tests",
+    "counterexamples/tick-counts",
+];
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// Whatever ships is here, unless it names a file of `scenarios/network/data`.
+    #[test]
+    fn every_scene_that_stands_alone_is_here() {
+        let mut expected = Vec::new();
+        let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+        for file in cohaptic_scene::scene_files(&scenarios).unwrap() {
+            if !std::fs::read_to_string(&file).unwrap().contains("data/") {
+                let name = file.strip_prefix(&scenarios).unwrap().with_extension("");
+                expected.push(name.to_str().unwrap().replace('\\', "/"));
+            }
+        }
+        let mut here: Vec<String> = SCENES.iter().map(|(name, _)| (*name).to_owned()).collect();
+        here.sort();
+        expected.sort();
+        assert_eq!(here, expected);
+        assert!(OTHER_NAMES.iter().all(|(other, own)| find(other) == find(own) && find(own).is_some()));
+    }
+}

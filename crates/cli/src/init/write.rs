@@ -1,0 +1,126 @@
+//! A scene as text, in which every key is explained: the keys that it has, and behind a `#` those that it could have.
+
+use std::fmt::Write as _;
+
+use cohaptic_scene::schema::{FileSchema, Form, Key, Need, Table};
+use toml::Value;
+
+/// Where comments begin, if the line before them is not longer.
+const COLUMN: usize = 30;
+
+/// Values of keys that have no default, as proposals.
+const EXAMPLES: [(&str, &str); 6] = [
+    ("enclosure", "{ min = -0.1, max = 0.1, stiffness = 1000.0, damping = 5.0 }"),
+    ("clock", "{ offset = \"300us\", drift = \"20ppm\" }"),
+    ("uplink", "{ rate = \"10Mbit\" }"),
+    ("downlink", "{ rate = \"10Mbit\" }"),
+    ("jitter", "\"2ms\""),
+    ("queue", "{ limit = \"100 packets\" }"),
+];
+
+/// Keys that are not proposed: they mean something only beside others.
+const NOT_PROPOSED: [&str; 4] = ["count", "substeps", "netem-profile", "name"];
+
+/// A scene as text. `other_number`: how many peers the shipped scene has, if this one has another number.
+pub(super) fn scene(scene: &toml::Table, name: &str, other_number: Option<usize>) -> String {
+    let mut text = format!(
+        "# A scene to begin with, written by cohaptic init --from {name}.\n\
+         # Keys behind a # are not in force: they show what else can be said, most of them with the value that holds without them.\n\
+         # All keys: docs/scenes.md. To run it: cohaptic run FILE. To vary it: --set link.delay=40ms.\n\
+         # An editor for TOML explains and completes keys with the file that cohaptic schema prints.\n"
+    );
+    for key in FileSchema::Scene.root().keys() {
+        part(&mut text, key, scene.get(key.name));
+    }
+    // Writing to a string does not fail.
+    let _ = match other_number {
+        Some(number) => writeln!(text, "\n# What scenarios/{name}.toml expects holds for its {number} peers, and is left out."),
+        None => writeln!(text, "\n# Where the numbers of this scene come from stands in scenarios/{name}.toml."),
+    };
+    text
+}
+
+/// A table at the top, or the entries of a list.
+fn part(text: &mut String, key: &Key, value: Option<&Value>) {
+    // Tables whose keys people change are written even if the scene has none.
+    let is_proposed = matches!(key.name, "simulation" | "peer" | "link");
+    if let Form::Table(table) = &key.form
+        && (value.is_some() || is_proposed)
+    {
+        let _ = writeln!(text, "\n# {}.\n[{}]", key.about, key.name);
+        let nothing = toml::Table::new();
+        fields(text, table, value.and_then(Value::as_table).unwrap_or(&nothing), key.name != "expect");
+    }
+    if let (Form::List(Form::Table(table)), Some(entries)) = (&key.form, value.and_then(Value::as_array)) {
+        for (number, entry) in entries.iter().enumerate() {
+            let about = if number == 0 { format!("# {}.\n", key.about) } else { String::new() };
+            let _ = writeln!(text, "\n{about}[[{}]]", key.name);
+            if let Some(entry) = entry.as_table() {
+                fields(text, table, entry, false);
+            }
+        }
+    }
+}
+
+/// The keys of a table, those that it has and, if it is to propose some, the others.
+fn fields(text: &mut String, table: &Table, values: &toml::Table, propose: bool) {
+    for key in table.keys() {
+        match values.get(key.name) {
+            Some(value) => field(text, key, value),
+            None if propose => proposal(text, key),
+            None => {}
+        }
+    }
+}
+
+fn field(text: &mut String, key: &Key, value: &Value) {
+    if let Some(within) = value.as_table() {
+        let _ = writeln!(text, "# {}: {}", key.name, about(key));
+        explain(text, key.name, &key.form, within);
+        let _ = writeln!(text, "{} = {value}", key.name);
+    } else if let Some(list) = value.as_array().filter(|list| list.iter().any(Value::is_table)) {
+        let _ = writeln!(text, "# {}: {}", key.name, about(key));
+        let _ = writeln!(text, "{} = [", key.name);
+        for element in list {
+            let _ = writeln!(text, "    {element},");
+        }
+        text.push_str("]\n");
+    } else {
+        line(text, &format!("{} = {value}", key.name), &about(key));
+    }
+}
+
+fn proposal(text: &mut String, key: &Key) {
+    let example = EXAMPLES.iter().find(|(name, _)| *name == key.name).map(|(_, example)| *example);
+    let value = match (example, key.need) {
+        (Some(example), _) => example,
+        (None, Need::Default(default)) => default,
+        (None, Need::Required | Need::RequiredSomewhere | Need::Optional) => return,
+    };
+    if !NOT_PROPOSED.contains(&key.name) {
+        line(text, &format!("# {} = {value}", key.name), &about(key));
+    }
+}
+
+fn line(text: &mut String, said: &str, about: &str) {
+    let _ = writeln!(text, "{said:<COLUMN$}  # {about}");
+}
+
+/// What the keys of a table within a line mean, each on a line of its own.
+fn explain(text: &mut String, path: &str, form: &Form, values: &toml::Table) {
+    let Some(table) = form.table() else { return };
+    for key in table.keys() {
+        let Some(value) = values.get(key.name) else { continue };
+        let path = format!("{path}.{}", key.name);
+        let _ = writeln!(text, "#   {path}: {}", about(key));
+        if let Some(within) = value.as_table() {
+            explain(text, &path, &key.form, within);
+        }
+    }
+}
+
+/// The meaning of a key with its unit.
+fn about(key: &Key) -> String {
+    let unit = key.form.unit();
+    if unit.is_empty() { key.about.to_owned() } else { format!("{} [{unit}]", key.about) }
+}

@@ -1,0 +1,59 @@
+//! Scenes, relay files and router files as the user names them: by a path, or `-` for standard input.
+
+use std::io::{self, Read as _};
+use std::path::Path;
+use std::sync::Mutex;
+
+use cohaptic_scene::{SceneError, file_text, text_of};
+
+/// What is read from standard input at most \[bytes\]: far beyond any scene, far below what would fill a machine.
+const MOST: u64 = 64 << 20;
+
+const STANDARD_INPUT: &str = "<standard input>";
+
+/// What came from standard input, which can be read only once.
+static READ: Mutex<Option<Vec<u8>>> = Mutex::new(None);
+
+/// Whether standard input is meant.
+pub(crate) fn is_standard_input(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// What messages call the file. Its folder is where files that it names are looked for: of standard input the working directory.
+pub(crate) fn named(path: &Path) -> &Path {
+    if is_standard_input(path) { Path::new(STANDARD_INPUT) } else { path }
+}
+
+/// The text of a file and what it is called, read by `read`.
+///
+/// # Errors
+///
+/// [`SceneError`] if the file cannot be read or is no text, and those of `read`.
+pub(crate) fn with<T>(path: &Path, read: impl FnOnce(&str, &Path) -> Result<T, SceneError>) -> Result<T, SceneError> {
+    read(&text(path)?, named(path))
+}
+
+/// The text of a file.
+///
+/// # Errors
+///
+/// [`SceneError`] if the file cannot be read or is no text.
+pub(crate) fn text(path: &Path) -> Result<String, SceneError> {
+    if !is_standard_input(path) {
+        return file_text(path);
+    }
+    let unreadable = |source| SceneError::Read { path: STANDARD_INPUT.into(), source, place: None };
+    let mut read = READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let bytes = match &mut *read {
+        Some(bytes) => bytes,
+        nothing => {
+            let mut bytes = Vec::new();
+            io::stdin().lock().take(MOST + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+            if bytes.len() as u64 > MOST {
+                return Err(unreadable(io::Error::other(format!("longer than {} MiB: expected a scene", MOST >> 20))));
+            }
+            nothing.insert(bytes)
+        }
+    };
+    text_of(named(path), bytes).map(str::to_owned)
+}

@@ -1,0 +1,220 @@
+//! The keys of a scene.
+
+use cohaptic_peer::Coordination;
+use cohaptic_wan::DropCause;
+
+use super::form::{Amount, Form, Key, Table, Words, number, optional, required, somewhere, usual, vector};
+use super::link::{LINK, LINK_KIND, LINK_TABLE, MODULATOR};
+use crate::values::{
+    ADDED_MASS, ANGLE, DAMPING, DISTANCE, FORCE, FREQUENCY, MASS, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS, VELOCITY, WALL_STIFFNESS,
+};
+
+const MOST: u64 = i64::MAX.unsigned_abs();
+
+/// The top of a scene.
+pub(super) static ROOT: Table = Table::of(&[&[
+    required("scene", Form::Table(&SCENE), "How long the scene lasts, its seed and its axes"),
+    required("object", Form::Table(&OBJECT), "The shared virtual object, of which every peer has a copy"),
+    required("coordination", Form::Table(&COORDINATION), "How the copies are kept together"),
+    optional("simulation", Form::Table(&SIMULATION), "How motion between ticks is computed"),
+    optional("peer", Form::Table(&PEER_TABLE), "Holds for every peer that does not say otherwise"),
+    optional("peers", Form::List(&Form::Table(&PEERS)), "One peer each: its own keys are laid over those of [peer]"),
+    optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
+    optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
+    optional("links", Form::List(&Form::Table(&LINKS)), "One direction of one pair each: its own keys are laid over those of [link]"),
+    optional("timeline", Form::List(&Form::Table(&TIMELINE)), "What changes while the scene runs"),
+    optional("expect", Form::Table(&EXPECT), "What must come out: makes the scene a test for cohaptic check"),
+]]);
+
+static SCENE: Table = Table::of(&[&[
+    optional("title", Form::Text, "A line for people; without it the name of the file"),
+    required("duration", Form::Duration, "How long the scene lasts, above zero"),
+    usual("seed", Form::Integer(0, MOST), "0", "Seed of all random numbers"),
+    usual("axes", Form::Integer(1, 3), "1", "How many translational axes: x, then y, then z"),
+    optional(
+        "count",
+        Form::Integer(2, 1_000_000),
+        "Makes so many equal peers, named peer1, peer2 and so on; entries [[peers]] may change some of them",
+    ),
+]]);
+
+static OBJECT: Table = Table::of(&[&[
+    required("mass", number(MASS), "Mass of the whole object"),
+    usual("damping", number(DAMPING), "0", "Viscous damping of each copy"),
+    usual("split-mass", Form::Boolean, "true", "Whether each of N copies has the mass divided by N, or all of it"),
+    usual("position", vector(POSITION), "0", "Where copies and devices begin"),
+    usual("velocity", vector(VELOCITY), "0", "With which velocity copies and devices begin"),
+    optional("enclosure", Form::Table(&ENCLOSURE), "Walls that limit the travel of every copy"),
+]]);
+static ENCLOSURE: Table = Table::of(&[&[
+    required("min", vector(POSITION), "The lower end on each axis"),
+    required("max", vector(POSITION), "The upper end on each axis"),
+    required("stiffness", number(WALL_STIFFNESS), "Stiffness of the walls"),
+    required("damping", number(DAMPING), "Damping of the walls"),
+]]);
+
+static COORDINATION: Table = Table::of(&[&[
+    required("strategy", Form::Words(&STRATEGIES), "Where each copy is drawn to"),
+    required("stiffness", number(STIFFNESS), "Gain on the difference of positions, K_T"),
+    usual("damping", number(DAMPING), "0", "Gain on the difference of velocities, B_T"),
+    required("update", Form::Duration, "How often each peer sends a sample; a whole multiple of every peer's tick"),
+    usual("scaling", Form::Words(&SCALINGS), "\"none\"", "How both gains follow the number of peers"),
+]]);
+const STRATEGIES: [(&str, &str); 2] =
+    [(Coordination::AveragePosition.name(), "to the mean of the others"), (Coordination::ProportionalDerivative.name(), "to each of the others")];
+const SCALINGS: [(&str, &str); 2] = [("none", "as they are written"), ("inverse-n", "times 4(N-1)/N^2 among N peers; of a coupling times 2/N")];
+
+static SIMULATION: Table = Table::of(&[&[
+    usual("integrator", Form::Words(&INTEGRATORS), "\"exact\"", "How motion between ticks is computed"),
+    usual("substeps", Form::Integer(1, u32::MAX as u64), "1", "Steps a tick; not with exact"),
+]]);
+const INTEGRATORS: [(&str, &str); 3] =
+    [("exact", "the exact solution"), ("semi-implicit-euler", "the velocity first, then the position"), ("rk4", "Runge and Kutta's fourth order")];
+
+const PEER: [Key; 15] = [
+    somewhere("device", Form::Table(&DEVICE), "The haptic device"),
+    somewhere("coupling", Form::Table(&COUPLING), "Spring and damper between device and copy; not needed where contact is none"),
+    usual("contact", Form::AnyOf(const { &[Form::Words(&CONTACTS), Form::Table(&PUSH)] }), "\"grasp\"", "How the device touches the object"),
+    usual("hand", HAND, "\"none\"", "What the user does: a constant force, a sine, a recorded file, or an arm that follows a motion"),
+    usual("tick", Form::Duration, "\"1ms\"", "Period of the control loop"),
+    usual("compute-delay", Form::Integer(0, 1), "0", "Ticks from computing a force to applying it"),
+    usual("phase", Form::Integer(0, MOST), "0", "At which tick the first sample is sent, below coordination.update / tick"),
+    optional("clock", Form::Table(&CLOCK), "How the peer's clock differs"),
+    optional("position", vector(POSITION), "Where its copy and device begin; without it where the object does"),
+    optional("velocity", vector(VELOCITY), "With which velocity they begin; without it that of the object"),
+    optional("uplink", Form::Table(&LINK_TABLE), "A line that all it sends passes before the links"),
+    optional("downlink", Form::Table(&LINK_TABLE), "A line that all it receives passes after the links"),
+    usual("kind", Form::Words(&KINDS), "\"simulated\"", "Where the peer lives in a live session"),
+    optional("silence", Form::Table(&SILENCE), "When the pull of a peer that lives elsewhere fades"),
+    optional("falcon", Form::Table(&FALCON), "Which device a peer of kind falcon has, and how its numbers are meant"),
+];
+static PEER_TABLE: Table = Table::of(&[&PEER]);
+static PEERS: Table =
+    Table::over(&[&[required("name", Form::Text, "Its name: unique, not all, without space and without . > / , and quotes")], &PEER]);
+const KINDS: [(&str, &str); 3] = [
+    ("simulated", "simulated here"),
+    ("udp", "another program, which sends and receives samples"),
+    ("falcon", "simulated here, with a Novint Falcon"),
+];
+const CONTACTS: [(&str, &str); 2] = [("grasp", "held both ways"), ("none", "not touched")];
+
+static DEVICE: Table =
+    Table::of(&[&[somewhere("mass", number(MASS), "Mass of the device"), usual("damping", number(DAMPING), "0", "Viscous damping of the device")]]);
+static COUPLING: Table = Table::of(&[&[
+    somewhere("stiffness", number(STIFFNESS), "Stiffness between device and copy, K_C"),
+    usual("damping", number(DAMPING), "0", "Damping between device and copy, B_C"),
+    usual("scaling", Form::Words(&SCALINGS), "\"none\"", "How both follow the number of peers"),
+]]);
+static PUSH: Table = Table::of(&[&[required("push", Form::Words(&DIRECTIONS), "A finger that can push in that direction and cannot pull")]]);
+const DIRECTIONS: [(&str, &str); 6] =
+    [("+x", "to larger x"), ("-x", "to smaller x"), ("+y", "to larger y"), ("-y", "to smaller y"), ("+z", "to larger z"), ("-z", "to smaller z")];
+static CLOCK: Table = Table::of(&[&[
+    usual("offset", Form::Duration, "\"0s\"", "By how much its first tick is late"),
+    usual("drift", DRIFT, "0", "How fast it runs: parts per million as text, or seconds gained in a second"),
+]]);
+const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number(Amount(ANY))]);
+const ANY: crate::values::Quantity = ANGLE;
+static SILENCE: Table = Table::of(&[&[
+    usual("after", Form::Duration, "\"100ms\"", "After how long a silence the pull fades"),
+    usual("fade", Form::Duration, "\"250ms\"", "How long that takes"),
+]]);
+static FALCON: Table = Table::of(&[&[
+    usual("device", Form::Like(&["first", "simulated"]), "\"first\"", "The first that no other peer has, one that is simulated, or a serial number"),
+    usual("counts-per-newton-metre", number(POSITIVE_COUNTS), "10000", "Motor counts for a torque at the joint of an arm"),
+    usual("force-limit", number(POSITIVE_FORCE), "4", "No greater force is sent to the motors"),
+    usual("origin", Form::Triple(Amount(POSITION)), "[0, 0, 0.125]", "The place in the device's coordinates that is the origin of the scene"),
+]]);
+
+const HAND: Form = Form::AnyOf(&[Form::Words(&[("none", "nothing; takes away what [peer] says")]), Form::Table(&HAND_TABLE)]);
+static HAND_TABLE: Table = Table::of(&[&[
+    optional("force", vector(FORCE), "A constant force"),
+    optional("sine", Form::Table(&FORCE_SINE), "A force that sways"),
+    optional("file", Form::File, "A recorded force: a CSV with the header t,fx (and fy, fz), in seconds and newtons"),
+    optional("arm", Form::Table(&ARM), "An arm that adds its mass to the device and holds it with a damper and a spring"),
+    optional("follows", Form::Table(&FOLLOWS), "Beside arm: the motion that it wants; without it to rest at 0"),
+]]);
+static FORCE_SINE: Table = Table::of(&[&[required("amplitude", vector(FORCE), "Amplitude")], &SINE]);
+static MOTION_SINE: Table = Table::of(&[&[required("amplitude", vector(POSITION), "Amplitude")], &SINE]);
+const SINE: [Key; 2] =
+    [required("frequency", number(FREQUENCY), "Frequency"), usual("phase", number(ANGLE), "0", "Phase at the beginning of the scene")];
+static ARM: Table = Table::of(&[&[
+    required("mass", number(ADDED_MASS), "Mass that the arm adds to the device"),
+    required("damping", number(DAMPING), "Damping of the arm"),
+    required("stiffness", number(STIFFNESS), "Stiffness of the arm"),
+]]);
+static FOLLOWS: Table = Table::of(&[&[
+    optional("position", vector(POSITION), "A constant position"),
+    optional("sine", Form::Table(&MOTION_SINE), "A position that sways"),
+    optional("file", Form::File, "A recorded motion: a CSV with the header t,x (and y, z), in seconds and metres"),
+]]);
+
+static LINKS: Table = Table::over(&[&ENDS, &LINK, &LINK_KIND]);
+/// The two ends of a link.
+pub(super) const ENDS: [Key; 2] =
+    [required("from", Form::Text, "The name of the one that sends"), required("to", Form::Text, "The name of the one that receives")];
+/// Entries `[\[links\]]`.
+pub(super) static LINK_ENTRY: &Table = &LINKS;
+
+const ALL: Words = &[("all", "every link")];
+static ENDS_TABLE: Table = Table::of(&[&ENDS]);
+/// Which links a change is of.
+pub(super) const LINKS_BETWEEN: Form = Form::AnyOf(&[Form::Words(ALL), Form::Table(&ENDS_TABLE)]);
+
+static TIMELINE: Table = Table::of(&[&[
+    required("at", Form::Duration, "When, from the beginning of the scene"),
+    optional("link", LINKS_BETWEEN, "Which links change: all, or one by its ends"),
+    optional("peer", Form::Text, "The name of the peer that changes"),
+    optional("set", Form::Table(&SET), "The keys that change: of the link, or contact and hand of the peer"),
+    optional("coordination", Form::Table(&GAINS), "In place of link or peer, and without set: new gains at every peer"),
+]]);
+/// What is set of a link or of a peer: which of the two is another key's business.
+static SET: Table = Table::over(&[&LINK, &LINK_KIND, &SET_OF_PEER]);
+const SET_OF_PEER: [Key; 2] = [
+    optional("contact", Form::AnyOf(const { &[Form::Words(&CONTACTS), Form::Table(&PUSH)] }), "Of a peer: how the device touches the object"),
+    optional("hand", HAND, "Of a peer: what the user does"),
+];
+static GAINS: Table = Table::of(&[&[
+    optional("stiffness", number(STIFFNESS), "Gain on the difference of positions; without it as it was"),
+    optional("damping", number(DAMPING), "Gain on the difference of velocities; without it as it was"),
+]]);
+
+static EXPECT: Table = Table::of(&[&[
+    optional("stable", Form::Boolean, "Whether a small disturbance dies out"),
+    optional("discrepancy", Form::Table(&METRES), "The largest distance along an axis between two copies"),
+    optional("position", Form::List(&Form::Table(&EXPECT_POSITION)), "Where copies are at some time"),
+    optional("travel", Form::List(&Form::Table(&EXPECT_TRAVEL)), "When copies have first moved so far"),
+    optional("loss", Form::List(&Form::Table(&EXPECT_LOSS)), "Which fraction of what was offered was dropped"),
+    optional("delay", Form::List(&Form::Table(&EXPECT_DELAY)), "The mean delay of what was delivered"),
+]]);
+static METRES: Table = Table::of(&[&METRE_BOUNDS]);
+const METRE_BOUNDS: [Key; 2] = [optional("min", number(POSITION), "At least"), optional("max", number(POSITION), "At most")];
+const TIME_BOUNDS: [Key; 2] = [optional("min", Form::Duration, "At least"), optional("max", Form::Duration, "At most")];
+const FRACTION_BOUNDS: [Key; 2] = [optional("min", Form::Probability, "At least"), optional("max", Form::Probability, "At most")];
+const OF_PEER: [Key; 2] = [required("peer", Form::Text, "The name of a peer"), usual("axis", Form::Words(&AXES), "\"x\"", "Along which axis")];
+const AXES: [(&str, &str); 3] = [("x", "the first"), ("y", "the second"), ("z", "the third")];
+static EXPECT_POSITION: Table = Table::of(&[&OF_PEER, &[required("at", Form::Duration, "When, from the beginning of the scene")], &METRE_BOUNDS]);
+static EXPECT_TRAVEL: Table = Table::of(&[&OF_PEER, &[required("distance", number(DISTANCE), "How far from where it began")], &TIME_BOUNDS]);
+const LINK_OR_LINE: [Key; 1] = [usual(
+    "link",
+    Form::AnyOf(const { &[Form::Words(ALL), Form::Table(&SELECTOR)] }),
+    "\"all\"",
+    "Which link: all, one by its ends, or an access line",
+)];
+static SELECTOR: Table = Table::of(&[&[
+    optional("from", Form::Text, "The name of the peer that sends"),
+    optional("to", Form::Text, "The name of the peer that receives"),
+    optional("uplink", Form::Text, "In place of both: the uplink of this peer"),
+    optional("downlink", Form::Text, "In place of both: the downlink of this peer"),
+]]);
+static EXPECT_LOSS: Table =
+    Table::of(&[&LINK_OR_LINE, &[optional("cause", Form::Words(&CAUSES), "Dropped for this cause; without it for any")], &FRACTION_BOUNDS]);
+static EXPECT_DELAY: Table = Table::of(&[&LINK_OR_LINE, &TIME_BOUNDS]);
+const CAUSES: [(&str, &str); DropCause::ALL.len()] = {
+    let mut causes = [("", "dropped for this cause"); DropCause::ALL.len()];
+    let mut place = 0;
+    while place < causes.len() {
+        causes[place].0 = DropCause::ALL[place].name();
+        place += 1;
+    }
+    causes
+};

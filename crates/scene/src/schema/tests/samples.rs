@@ -1,0 +1,131 @@
+//! Files in which every table of the catalogue occurs.
+
+use std::path::{Path, PathBuf};
+
+use crate::router_file::RouterFile;
+use crate::schema::FileSchema;
+use crate::{RelayFile, Scene, SceneError, scene_files};
+
+/// Every table and every key that the shipped scenes leave out, in three scenes.
+pub(super) const SCENES: [&str; 3] = [
+    r#"
+    scene = { duration = "4s" }
+    object = { mass = 1, enclosure = { min = -1, max = 1, stiffness = 100, damping = 1 } }
+    coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
+    simulation = { integrator = "rk4" }
+    peer = { kind = "falcon", falcon = {}, silence = {}, coupling = { stiffness = 1 }, device = { mass = 1 } }
+    peers = [
+        { name = "a", hand = { sine = { amplitude = 1, frequency = 1 } }, clock = { offset = "1ms" }, contact = { push = "+x" } },
+        { name = "b", hand = { arm = { mass = 0, damping = 1, stiffness = 1 }, follows = { sine = { amplitude = 1, frequency = 1 } } }, clock = { drift = "1ppm" } },
+        { name = "c", hand = { arm = { mass = 0, damping = 1, stiffness = 1 }, follows = { position = 1 } }, uplink = { delay = "1ms" }, downlink = { loss = 0.1 } },
+    ]
+    modulators = [{ name = "cell", states = [
+        { name = "good", sojourn = { fixed = "1s" }, next = { bad = 1 } },
+        { name = "bad", sojourn = { erlang = { mean = "1s", stages = 2 } }, next = "good" },
+    ] }]
+    link = { modulated = { by = "cell", good = { delay = "1ms" }, bad = { loss = "5%" } } }
+    timeline = [
+        { at = "1s", link = { from = "a", to = "b" }, set = { delay = "2ms" } },
+        { at = "2s", peer = "a", set = { contact = "grasp" } },
+        { at = "3s", coordination = { stiffness = 2 } },
+    ]
+    [expect]
+    discrepancy = { max = 1 }
+    position = [{ peer = "a", at = "1s", min = 0 }]
+    travel = [{ peer = "a", distance = 0.1, max = "1s" }]
+    loss = [{ link = { uplink = "c" }, max = 1 }, { link = { from = "a", to = "b" }, max = 1 }]
+    delay = [{ link = { downlink = "c" }, max = "1s" }]
+    "#,
+    r#"
+    scene = { duration = "4s", count = 8 }
+    object = { mass = 1 }
+    coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
+    peer = { device = { mass = 1 }, contact = "none" }
+    link = { rate = "1Mbit", queue = { limit = "64kB", discipline = { codel = {} } }, cells = { payload = "48B" } }
+    links = [
+        { from = "peer1", to = "peer2", queue = { limit = "64kB", discipline = { red = { min = "5kB", max = "15kB" } } } },
+        { from = "peer1", to = "peer3", token-bucket = { rate = "1Mbit", burst = "9kB", peak = { rate = "2Mbit", burst = "1500B" } } },
+        { from = "peer1", to = "peer4", slots = { min = "10ms" }, jitter = { sd = "1ms" }, delay = "20ms" },
+        { from = "peer1", to = "peer5", outage = { random = { up = "3s", down = { uniform = ["1s", "2s"] } }, idle = { after = "1s", down = "1s" } } },
+        { from = "peer1", to = "peer6", outage = [{ from = "1s", to = "2s" }], loss = { times = [{ from = "1s", to = "2s" }], every = "3s" } },
+        { from = "peer1", to = "peer7", duplicate = { probability = 0.1, correlation = 0.1 }, corrupt = { probability = 0.1 } },
+        { from = "peer1", to = "peer8", reorder = { probability = 0.1, behind = 1, at-most = "9ms" }, loss = { correlated = { probability = 0.1 } } },
+        { from = "peer2", to = "peer1", loss = { gilbert-elliott = { p = 0.1 } } },
+        { from = "peer2", to = "peer3", loss = { gilbert-elliott = { mean-good = "1s", mean-bad = "1s" } } },
+        { from = "peer2", to = "peer4", loss = { states = { p13 = 0.1 } } },
+        { from = "peer2", to = "peer5", loss = { bursts = { loss = 0.1, length = 5 } } },
+        { from = "peer2", to = "peer6", loss = { packets = [3, "10-19"], every = 100 } },
+        { from = "peer2", to = "peer7", corrupt = { bit-error-rate = 1e-6 } },
+        { from = "peer2", to = "peer8", delay = "20ms", slots = { delay = "10ms", jitter = "1ms" } },
+        { from = "peer3", to = "peer2", reorder = { probability = 0.1 } },
+        { from = "peer3", to = "peer1", netem = "delay 1ms", netem-profile = "exact" },
+    ]
+    "#,
+    r#"
+    scene = { duration = "4s", count = 2 }
+    object = { mass = 1 }
+    coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
+    peer = { device = { mass = 1 }, contact = "none" }
+    link = { delay = "20ms", jitter = { sd = "2ms", distribution = { table = "data/two-sided.dist" } } }
+    links = [{ from = "peer1", to = "peer2", trace = { file = "data/path.csv" } }, { from = "peer2", to = "peer1", trace = { file = "data/line.trace" } }]
+    simulation = {}
+    "#,
+];
+
+const RELAY: &str = r#"
+    relay = {}
+    programs = [{ name = "left", port = "127.0.0.1:7001" }, { name = "right", port = "127.0.0.1:7002", address = "127.0.0.1:9002" }]
+    modulators = [{ name = "cell", states = [{ name = "good", sojourn = "1s" }, { name = "bad", sojourn = "1s" }] }]
+    link = { delay = "20ms" }
+    links = [{ from = "left", to = "right", loss = "1%" }]
+    timeline = [{ at = "1s", link = { from = "left", to = "right" }, set = { delay = "8ms" } }, { at = "2s", link = "all", set = { loss = 0.1 } }]
+"#;
+
+const ROUTER: [&str; 2] = [
+    r#"
+    router = { default = { left-to-right = "wan", right-to-left = "pass" }, memory = { packets = 10 } }
+    left = { tun = "left0" }
+    right = { tun = "right0", namespace = "lab" }
+    links = { wan = { delay = "24ms" } }
+    modulators = [{ name = "cell", states = [{ name = "good", sojourn = "1s" }, { name = "bad", sojourn = "1s" }] }]
+    rules = [{ from = "left", protocol = "tcp", port = "5000-5999", link = "pass" }, { source = "10.0.0.0/8", destination = "10.1.0.1", link = "drop" }]
+    "#,
+    "router.default = \"pass\"\nrouter.memory = {}\nleft.interface = \"eth1\"\nright.interface = \"eth2\"\n",
+];
+
+/// A text of some kind, and where it is said to stand.
+pub(super) struct Sample {
+    pub(super) kind: FileSchema,
+    pub(super) path: PathBuf,
+    pub(super) text: String,
+}
+
+pub(super) fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The texts above, what the tests of this crate read, and every shipped scene.
+pub(super) fn samples() -> Vec<Sample> {
+    let of = |kind, text: &str| Sample { kind, path: root().join("scenarios/network/sample.toml"), text: text.to_owned() };
+    let mut samples: Vec<Sample> = SCENES.iter().map(|text| of(FileSchema::Scene, text)).collect();
+    samples.push(of(FileSchema::Relay, RELAY));
+    samples.extend(ROUTER.iter().map(|text| of(FileSchema::Router, text)));
+    let mut files = scene_files(&root().join("scenarios")).unwrap();
+    files.push(root().join("crates/scene/tests/integration/data/every-key.toml"));
+    samples.extend(files.into_iter().map(|path| Sample { kind: FileSchema::Scene, text: std::fs::read_to_string(&path).unwrap(), path }));
+    samples
+}
+
+/// Reads a text, and says what it is: two texts that say the same answer the same.
+pub(super) fn read(sample: &Sample, overrides: &[String]) -> Result<String, SceneError> {
+    let (text, path) = (&sample.text, &sample.path);
+    match sample.kind {
+        FileSchema::Scene => Scene::parse(text, path, overrides).map(|scene| format!("{scene:?}")),
+        FileSchema::Relay => RelayFile::parse(text, path, overrides).map(|relay| format!("{relay:?}")),
+        FileSchema::Router => RouterFile::parse(text, path, overrides).map(|router| {
+            // Keys of a link as they are written are shown by live control; what they make is what counts.
+            let links: Vec<_> = router.links.iter().map(|link| (&link.name, &link.model)).collect();
+            format!("{:?} {:?} {:?} {:?} {links:?} {:?} {:?}", router.seed, router.memory, router.left, router.right, router.rules, router.default)
+        }),
+    }
+}
