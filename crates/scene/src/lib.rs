@@ -31,6 +31,7 @@ mod assembly;
 mod context;
 mod error;
 mod excerpt;
+mod limited;
 mod link_keys;
 mod link_table;
 mod model;
@@ -52,6 +53,7 @@ mod tree;
 mod values;
 
 pub use error::{Diagnostic, SceneError};
+pub use limited::{LimitedFile, MOST_BYTES, MOST_CAPTURE_BYTES, read_bytes, read_text};
 pub use link_keys::{
     KeysOfLinks, LinkKeys, link_from_keys, link_key_changes, link_key_changes_of_text, link_keys, link_keys_of_text, relay_link_keys,
     relay_link_keys_of_text,

@@ -65,7 +65,7 @@ impl Scene {
 
 /// What `read` makes of the text of a file.
 pub(crate) fn with_text<T>(path: &Path, read: impl FnOnce(&str) -> Result<T, SceneError>) -> Result<T, SceneError> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
+    let bytes = crate::read_bytes(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
     match core::str::from_utf8(&bytes) {
         Ok(text) => read(text),
         Err(error) => {

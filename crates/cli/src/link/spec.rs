@@ -1,12 +1,11 @@
 //! What the link is told to do: from words, keys or a file.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
 use cohaptic_measure::asked::Asked;
 use cohaptic_measure::fates::{self, ReadError};
-use cohaptic_scene::{LinkKeys, link_from_keys};
+use cohaptic_scene::{LimitedFile, LinkKeys, MOST_BYTES, link_from_keys};
 use cohaptic_wan::law::DistTable;
 use cohaptic_wan::netem::kernel::Table;
 use cohaptic_wan::netem::{ExactError, Netem, TableName};
@@ -117,7 +116,7 @@ fn slot_distribution(netem: &Netem) -> Option<cohaptic_wan::netem::Distribution>
 /// The text of `NAME.dist` in the current folder; `None` if there is no such file.
 fn table(name: &TableName, fault: &mut Option<Failure>) -> Option<String> {
     let path = Path::new(name.as_str()).with_extension("dist");
-    match std::fs::read_to_string(&path) {
+    match cohaptic_scene::read_text(&path) {
         Ok(text) => Some(text),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
         Err(error) => {
@@ -145,7 +144,7 @@ fn below(said: &str, option: &str) -> String {
 
 fn replay(path: &Path) -> Result<Spec, Failure> {
     let unreadable = |error| Failure::File { verb: "read", path: path.to_path_buf(), error };
-    let file = File::open(path).map_err(unreadable)?;
+    let file = LimitedFile::open(path, MOST_BYTES).map_err(unreadable)?;
     let log = fates::read(file).map_err(|error| match error {
         ReadError::Io(error) => unreadable(error),
         other @ (ReadError::Log(_) | _) => Failure::Input(format!("{}: {other}", output::path(path))),

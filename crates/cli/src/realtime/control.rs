@@ -22,7 +22,7 @@ impl LiveControl {
         let token = match &arguments.token_file {
             None => None,
             Some(path) => {
-                let text = std::fs::read_to_string(path).map_err(|error| Failure::File { verb: "read", path: path.clone(), error })?;
+                let text = cohaptic_scene::read_text(path).map_err(|error| Failure::File { verb: "read", path: path.clone(), error })?;
                 Some(text.trim().parse().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?)
             }
         };

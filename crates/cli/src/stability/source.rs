@@ -11,7 +11,7 @@ use crate::output;
 
 /// The text of a scene.
 pub(crate) fn read(path: &Path, set: &[String]) -> Result<String, Failure> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
+    let bytes = cohaptic_scene::read_bytes(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
     String::from_utf8(bytes).map_err(|_| match Scene::read(path, set) {
         Err(error) => Failure::Scene(error),
         // It has been written anew in between.

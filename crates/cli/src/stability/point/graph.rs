@@ -22,7 +22,7 @@ pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, F
 
 /// A file of weights: one line a peer, numbers between commas.
 fn weights(file: &Path) -> Result<Graph, Failure> {
-    let text = std::fs::read_to_string(file).map_err(|error| Failure::File { verb: "read", path: file.to_path_buf(), error })?;
+    let text = cohaptic_scene::read_text(file).map_err(|error| Failure::File { verb: "read", path: file.to_path_buf(), error })?;
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let entry = |entry: &str| {
