@@ -6,6 +6,7 @@
 
 mod accuracy;
 mod admittance;
+mod analysis_watch;
 mod arguments;
 mod campaign;
 mod check;
@@ -56,6 +57,8 @@ fn main() -> ExitCode {
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
     };
     match done {
+        // What was asked to end has ended, whatever came of it.
+        Ok(_) if interrupt::asked() => ExitCode::from(failure::INTERRUPTED),
         Ok(code) => code,
         Err(failure) => failure.report(),
     }

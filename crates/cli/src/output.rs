@@ -17,9 +17,11 @@ pub(crate) fn text(text: &str) -> Result<(), Failure> {
 
 /// Prints one JSON document. Numbers that are not finite become `null`.
 pub(crate) fn json(document: &impl Serialize) -> Result<(), Failure> {
+    // At once: standard output is written line by line otherwise, and who has asked for the end waits for no million lines.
+    let mut text = serde_json::to_vec_pretty(document).map_err(io::Error::from).map_err(Failure::StandardOutput)?;
+    text.push(b'\n');
     let mut out = io::stdout().lock();
-    serde_json::to_writer_pretty(&mut out, document).map_err(io::Error::from).map_err(Failure::StandardOutput)?;
-    out.write_all(b"\n").and_then(|()| out.flush()).map_err(Failure::StandardOutput)
+    out.write_all(&text).and_then(|()| out.flush()).map_err(Failure::StandardOutput)
 }
 
 /// A path as text. What is not Unicode in it is replaced: JSON cannot hold it.

@@ -9,7 +9,7 @@ use cohaptic_paper::{Options, PaperError, Reproduction, Watch, page, reproduce, 
 use serde::Serialize;
 
 use crate::arguments::PaperArguments;
-use crate::failure::{Failure, INTERRUPTED};
+use crate::failure::Failure;
 use crate::output_file::write_file;
 use crate::progress::Progress;
 use crate::{interrupt, output};
@@ -66,7 +66,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
         Ok(reproduction) => reproduction,
         Err(PaperError::Stopped) => {
             bar.0.clear();
-            return Ok(ExitCode::from(INTERRUPTED));
+            return Err(Failure::Interrupted("the paper is not reproduced: figures and claims are computed together, and none are kept".to_owned()));
         }
         Err(error) => return Err(Failure::Input(error.to_string())),
     };

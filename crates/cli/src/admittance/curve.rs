@@ -1,7 +1,7 @@
 //! One curve: the scene as it stands, or with what `--curve` changes.
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Admittance, FrequencyResponse, LowFrequencyFit, Verdict, ideal};
+use cohaptic_stability::{Admittance, FrequencyResponse, LowFrequencyFit, Verdict, Watch, ideal};
 
 use crate::arguments::AdmittanceArguments;
 use crate::failure::{self, Failure, not_analysed};
@@ -58,8 +58,9 @@ fn place_of(wanted: &str, scene: &Scene, variant: &Variant) -> Result<usize, Fai
 }
 
 impl Curve {
-    pub(super) fn of(Subject { variant, scene, admittance }: Subject, frequencies: &[f64]) -> Result<Self, Failure> {
-        let response = admittance.response(frequencies).map_err(|error| Failure::Input(error.to_string()))?;
+    /// At as many of the frequencies as there is time for.
+    pub(super) fn of(Subject { variant, scene, admittance }: Subject, frequencies: &[f64], watch: &dyn Watch) -> Result<Self, Failure> {
+        let response = admittance.response_watched(frequencies, watch).map_err(|error| Failure::Input(error.to_string()))?;
         let fit = admittance.fit_low_frequency();
         Ok(Self { name: variant.name, overrides: variant.overrides, title: scene.title, admittance, response, fit, mass: scene.object.mass })
     }
@@ -73,7 +74,7 @@ impl Curve {
     pub(super) fn warning(&self) -> Option<&'static str> {
         match self.admittance.verdict() {
             Verdict::Stable => None,
-            Verdict::Marginal => {
+            Verdict::Marginal | Verdict::Overflow => {
                 Some("the scene cannot be told from an unstable one: whether it has a steady state is open, and only that could be measured")
             }
             Verdict::Unstable => {

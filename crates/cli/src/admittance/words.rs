@@ -69,6 +69,7 @@ fn verdict(curve: &Curve) -> String {
     let word = match radius.verdict() {
         Verdict::Stable => "stable",
         Verdict::Marginal => "MARGINAL",
+        Verdict::Overflow => "OVERFLOW",
         Verdict::Unstable => "UNSTABLE",
     };
     format!("the scene is {word}: spectral radius {:.12} +- {:.1e}", radius.value, radius.error)

@@ -38,4 +38,6 @@ mod scenes;
 mod stability_boundary;
 mod stability_map;
 mod stability_point;
+#[cfg(target_os = "linux")]
+mod stop;
 mod svg;
