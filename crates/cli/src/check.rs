@@ -1,15 +1,18 @@
 //! `cohaptic check`.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use cohaptic_harness::check::Judged;
 use cohaptic_harness::{Model, check as harness};
 use cohaptic_scene::{Scene, SceneError, scene_files};
-use cohaptic_stability::{Method, QUICK_UNKNOWNS, Verdict, has_chance, judge};
+use cohaptic_stability::{AnalysisError, Limits, Method, NOMINAL, QUICK_UNKNOWNS, Verdict, Watch, has_chance, judge_watched};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::analysis_watch::OPERATIONS_A_SECOND;
 use crate::arguments::CheckArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{self, EXPECTATION, Failure, INTERRUPTED, scene_status};
@@ -21,11 +24,13 @@ struct Document {
     scenes: Vec<Checked>,
 }
 
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 struct Checked {
     file: String,
     passed: bool,
     failures: Vec<String>,
+    /// What was told in another way than it could be with more time.
+    notes: Vec<String>,
     /// Whether the scene has an `[expect]` at all.
     expects: bool,
     #[serde(skip)]
@@ -50,25 +55,40 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     }
     let progress = Progress::through_scenes(files.len());
     let model = if arguments.general { Model::General } else { Model::Least };
-    let check = |file: Result<PathBuf, Checked>| {
+    // A scene that is not finished in time was interrupted.
+    let begun = files.iter().map(|file| file.as_ref().map_or_else(Clone::clone, |file| Checked::interrupted(file))).collect();
+    let known: Arc<Mutex<Vec<Checked>>> = Arc::new(Mutex::new(begun));
+    let (keeper, json) = (Arc::clone(&known), arguments.json);
+    interrupt::keep(move || {
+        let scenes = keeper.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let finished = scenes.iter().filter(|scene| !scene.is_interrupted()).count();
+        let said = format!("{finished} of {} scenes were checked", scenes.len());
+        // The exit status is all that is left to say that it could not be printed.
+        if print(scenes, json).is_ok() { said } else { format!("{said}, and cannot be printed") }
+    });
+    let check = |(place, file): (usize, Result<PathBuf, Checked>)| {
         let checked = file.map_or_else(|unreadable| unreadable, |file| check_one(&file, &arguments.overrides.set, model));
+        if let Some(slot) = known.lock().unwrap_or_else(PoisonError::into_inner).get_mut(place) {
+            *slot = checked.clone();
+        }
         progress.one_more();
         checked
     };
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let scenes: Vec<Checked> = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(|| files.into_par_iter().map(check).collect()),
+        Ok(pool) => pool.install(|| files.into_par_iter().enumerate().map(check).collect()),
         // Without threads it takes longer.
-        Err(_) => files.into_iter().map(check).collect(),
+        Err(_) => files.into_iter().enumerate().map(check).collect(),
     };
+    interrupt::kept();
     progress.clear();
     let status = scenes.iter().map(|scene| scene.status).max().unwrap_or(0);
-    if arguments.json {
-        output::json(DocumentSchema::Check, &Document { scenes })?;
-    } else {
-        output::text(&describe(&scenes))?;
-    }
+    print(scenes, arguments.json)?;
     Ok(ExitCode::from(if interrupt::asked() { INTERRUPTED } else { status }))
+}
+
+fn print(scenes: Vec<Checked>, json: bool) -> Result<(), Failure> {
+    if json { output::json(DocumentSchema::Check, &Document { scenes }) } else { output::text(&describe(&scenes)) }
 }
 
 /// The scenes that a path means; standard input means itself.
@@ -77,28 +97,53 @@ fn files_of(path: &Path) -> Result<Vec<PathBuf>, SceneError> {
 }
 
 fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
+    if interrupt::asked() {
+        return Checked::interrupted(file);
+    }
     match input::with(file, |text, file| Scene::parse(text, file, overrides)) {
         Err(error) => Checked::unreadable(file, &error),
         Ok(scene) => {
             if let Some(error) = failure::too_large(&scene, overrides) {
                 return Checked { expects: scene.expect.is_some(), ..Checked::unreadable(file, &error) };
             }
+            let notes = RefCell::new(Vec::new());
+            let judged = |scene: &Scene, stable: bool| judged(scene, stable, |note| notes.borrow_mut().push(note));
             let failures = harness::check_with(&scene, model, judged, || !interrupt::asked());
             let status = if failures.is_empty() { 0 } else { EXPECTATION };
-            Checked { file: output::path(input::named(file)), passed: failures.is_empty(), failures, expects: scene.expect.is_some(), status }
+            let (file, expects) = (output::path(input::named(file)), scene.expect.is_some());
+            Checked { file, passed: failures.is_empty(), failures, notes: notes.into_inner(), expects, status }
         }
     }
 }
 
+/// How long the second moment of a scene may take, by the estimate \[s\]; what takes longer is left to a simulation.
+const QUICK: f64 = 10.0;
+
+/// Ends an analysis when the user asks for it.
+struct Interruptible;
+
+impl Watch for Interruptible {
+    fn stops(&self) -> bool {
+        interrupt::asked()
+    }
+}
+
 /// Whether a scene is as stable as it is expected to be, by analysis. One that is not linear, that changes on its way, or whose chance has no second
-/// moment that can be followed, is left to a simulation.
-fn judged(scene: &Scene, stable: bool) -> Judged {
+/// moment that can be followed in seconds, is left to a simulation; of the last it is noted.
+fn judged(scene: &Scene, stable: bool, note: impl FnOnce(String)) -> Judged {
     if !scene.timeline.is_empty() {
         return Judged::Unknown;
     }
-    let Ok(judgement) = judge(scene, Method::Reduced, QUICK_UNKNOWNS) else {
-        return Judged::Unknown;
+    let limits = Limits { unknowns: QUICK_UNKNOWNS, operations: QUICK * OPERATIONS_A_SECOND, watch: &Interruptible };
+    let judgement = match judge_watched(scene, Method::Reduced, &limits) {
+        Ok(judgement) => judgement,
+        Err(AnalysisError::Stopped) => return Judged::Otherwise("interrupted before its stability was known".to_owned()),
+        Err(_) => return Judged::Unknown,
     };
+    let refused = judgement.analysis.notes.iter().find_map(|note| note.strip_prefix(NOMINAL));
+    if let Some(refused) = refused {
+        note(format!("stable: told by a simulation with the seed of the scene, not in the mean square: {refused}"));
+    }
     // Without a second moment, whatever was replaced by something nominal is better simulated as it is.
     let nominal = judgement.mean_square.is_none() && (has_chance(scene) || !judgement.analysis.notes.is_empty());
     if judgement.analysis.modes.len() > 1 || nominal {
@@ -118,7 +163,18 @@ fn judged(scene: &Scene, stable: bool) -> Judged {
 
 impl Checked {
     fn unreadable(path: &Path, error: &SceneError) -> Self {
-        Self { file: output::path(input::named(path)), passed: false, failures: vec![error.to_string()], expects: false, status: scene_status(error) }
+        let failures = vec![error.to_string()];
+        Self { file: output::path(input::named(path)), passed: false, failures, notes: Vec::new(), expects: false, status: scene_status(error) }
+    }
+
+    /// What nothing is known of, because the user asked for the end first.
+    fn interrupted(path: &Path) -> Self {
+        let failures = vec!["interrupted before it was checked".to_owned()];
+        Self { file: output::path(input::named(path)), passed: false, failures, notes: Vec::new(), expects: false, status: INTERRUPTED }
+    }
+
+    const fn is_interrupted(&self) -> bool {
+        self.status == INTERRUPTED
     }
 }
 
@@ -136,6 +192,7 @@ fn describe(scenes: &[Checked]) -> String {
                 text.push_str(&format!("      {line}\n"));
             }
         }
+        scene.notes.iter().for_each(|note| text.push_str(&format!("      note: {note}\n")));
     }
     let failed = scenes.iter().filter(|scene| !scene.passed).count();
     text.push_str(&format!("{} passed, {failed} failed\n", scenes.len() - failed));

@@ -1,12 +1,12 @@
 //! `cohaptic fit`.
 
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
 use cohaptic_measure::fit::{self, Fitted, LossFit, LossModel, Measurements, Skew, captures};
+use cohaptic_scene::{LimitedFile, MOST_CAPTURE_BYTES};
 use cohaptic_wan::{FateLog, FateRow};
 use serde::Serialize;
 
@@ -71,7 +71,7 @@ fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Fai
         let left = Matched { unmatched_sent: matched.unmatched_sent, unmatched_arrived: matched.unmatched_arrived, ambiguous: matched.ambiguous };
         return Ok((matched.measurements, Some(left)));
     }
-    let bytes = std::fs::read(path).map_err(|error| unreadable(path, error))?;
+    let bytes = cohaptic_scene::read_bytes(path).map_err(|error| unreadable(path, error))?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", output::path(path)));
     if captures::is_capture(&bytes) {
         return Err(named(
@@ -86,8 +86,8 @@ fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Fai
     Ok((Measurements::from_csv(text.as_bytes()).map_err(|error| named(&error))?, None))
 }
 
-fn open(path: &Path) -> Result<File, Failure> {
-    File::open(path).map_err(|error| unreadable(path, error))
+fn open(path: &Path) -> Result<LimitedFile, Failure> {
+    LimitedFile::open(path, MOST_CAPTURE_BYTES).map_err(|error| unreadable(path, error))
 }
 
 fn unreadable(path: &Path, error: std::io::Error) -> Failure {

@@ -7,6 +7,7 @@
 
 mod accuracy;
 mod admittance;
+mod analysis_watch;
 mod arguments;
 mod campaign;
 mod check;
@@ -74,6 +75,8 @@ fn main() -> ExitCode {
         Command::Man(arguments) => man::man(&arguments),
     };
     match done {
+        // What was asked to end has ended, whatever came of it.
+        Ok(_) if interrupt::asked() => ExitCode::from(failure::INTERRUPTED),
         Ok(code) => code,
         Err(failure) => failure.report(),
     }

@@ -34,10 +34,10 @@ pub(crate) fn text(text: &str) -> Result<(), Failure> {
 
 /// Prints one JSON document, which says of which kind and version it is. Numbers that are not finite become `null`.
 pub(crate) fn json(schema: DocumentSchema, document: &impl Serialize) -> Result<(), Failure> {
-    ANSWERED.store(true, Ordering::Relaxed);
-    let mut out = io::stdout().lock();
-    serde_json::to_writer_pretty(&mut out, &schema.of(document)).map_err(io::Error::from).map_err(Failure::StandardOutput)?;
-    out.write_all(b"\n").and_then(|()| out.flush()).map_err(Failure::StandardOutput)
+    // At once: standard output is written line by line otherwise, and who has asked for the end waits for no million lines.
+    let mut text = serde_json::to_vec_pretty(&schema.of(document)).map_err(io::Error::from).map_err(Failure::StandardOutput)?;
+    text.push(b'\n');
+    raw(&text)
 }
 
 /// Prints a file as it is: a scene, a schema, a page for another program.
@@ -52,7 +52,7 @@ pub(crate) fn wrote(files: impl IntoIterator<Item = impl AsRef<Path>>) {
     let mut to = io::stderr().lock();
     for file in files {
         // What cannot be said was written all the same.
-        let _ = writeln!(to, "wrote {}", escape(&path(file.as_ref())));
+        let _ = writeln!(to, "wrote {}", visible_lines(&path(file.as_ref())));
     }
 }
 

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::arguments::PaperArguments;
 use crate::document_schema::DocumentSchema;
-use crate::failure::{Failure, INTERRUPTED};
+use crate::failure::Failure;
 use crate::output_file::write_file;
 use crate::progress::Progress;
 use crate::{interrupt, output};
@@ -67,7 +67,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
         Ok(reproduction) => reproduction,
         Err(PaperError::Stopped) => {
             bar.0.clear();
-            return Ok(ExitCode::from(INTERRUPTED));
+            return Err(Failure::Interrupted("the paper is not reproduced: figures and claims are computed together, and none are kept".to_owned()));
         }
         Err(error) => return Err(Failure::Input(error.to_string())),
     };

@@ -74,6 +74,18 @@ impl Progress {
         Self(bar)
     }
 
+    /// Progress through operations of a computation whose estimate comes on the way; nothing is shown of one that takes seconds.
+    pub(crate) fn through_operations() -> Self {
+        let bar = bar(0);
+        bar.set_style(style("{bar:30} {percent:>3} %  {elapsed} passed, about {eta} left"));
+        Self(bar)
+    }
+
+    /// So many steps more are to be done.
+    pub(crate) fn expect(&self, number: u64) {
+        self.0.inc_length(number);
+    }
+
     /// One line about a run that goes on until it is stopped.
     pub(crate) fn of_traffic(title: &str) -> Self {
         let bar = bar(0);

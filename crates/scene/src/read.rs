@@ -91,7 +91,7 @@ pub fn at_peer(text: &str, file: &Path, overrides: &[String], peer: usize, messa
 
 /// What `read` makes of the text of a file.
 pub(crate) fn with_text<T>(path: &Path, read: impl FnOnce(&str) -> Result<T, SceneError>) -> Result<T, SceneError> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
+    let bytes = crate::read_bytes(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source, place: None })?;
     text_of(path, &bytes).and_then(read)
 }
 

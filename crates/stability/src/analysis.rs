@@ -5,12 +5,13 @@ use std::time::Duration;
 use cohaptic_peer::Contact;
 use cohaptic_scene::{FromScene, Scene, Strategies};
 
+use crate::cost::eigenvalue_operations;
 use crate::full::{Trust, full};
 use crate::network::NominalNetwork;
 use crate::parts::{Part, radius_of, reduced};
 use crate::spectrum::bounded_radius;
 use crate::structure::{Contacts, Structure, average_position};
-use crate::{AnalysisError, Radius, Verdict};
+use crate::{AnalysisError, Radius, Unwatched, Verdict, Watch};
 
 /// How a verdict is reached.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -85,15 +86,27 @@ pub struct ContactMode {
 ///
 /// [`AnalysisError`] if the scene has no frame that repeats, or cannot be taken apart into linear scenes.
 pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError> {
+    analyse_watched(scene, method, &Unwatched)
+}
+
+/// [`analyse`], watched: it is asked between modes of contact, and between the vectors of [`Method::Full`].
+///
+/// # Errors
+///
+/// As for [`analyse`], and [`AnalysisError::Stopped`] if whoever watches ends it.
+pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let equivalent = average_position(scene).is_some();
     match method {
         // A strategy that cannot be taken apart goes the way of a user's own.
-        _ if !equivalent => push_through(scene, &combinations(scene)?, Trust::Nothing, &FromScene),
-        Method::Full => push_through(scene, &combinations(scene)?, Trust::Linear, &FromScene),
+        _ if !equivalent => push_through(scene, &combinations(scene)?, Trust::Nothing, &FromScene, watch),
+        Method::Full => push_through(scene, &combinations(scene)?, Trust::Linear, &FromScene, watch),
         Method::Reduced | Method::Determinant => {
             let network = NominalNetwork::of(scene)?;
             let combinations = combinations(scene)?;
             let modes = combinations.iter().map(|combination| {
+                if watch.stops() {
+                    return Err(AnalysisError::Stopped);
+                }
                 let structure = Structure::of(&[scene], &network, &combination.contacts)?;
                 Ok(of_parts(combination, reduced(&structure, scene, combination.axes, method)))
             });
@@ -112,21 +125,28 @@ pub fn analyse_with(scene: &Scene, strategies: &impl Strategies) -> Result<Analy
     if combinations.iter().any(|combination| combination.axes != scene.axes.count()) {
         return Err(AnalysisError::MixedAxes);
     }
-    push_through(scene, &combinations, Trust::Nothing, strategies)
+    push_through(scene, &combinations, Trust::Nothing, strategies, &Unwatched)
 }
 
-fn push_through(scene: &Scene, combinations: &[Combination], trust: Trust, strategies: &impl Strategies) -> Result<Analysis, AnalysisError> {
+fn push_through(
+    scene: &Scene,
+    combinations: &[Combination],
+    trust: Trust,
+    strategies: &impl Strategies,
+    watch: &dyn Watch,
+) -> Result<Analysis, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
     // The walls of the simulator push and do not pull, so there is nothing linear to push through them.
     let modes = combinations.iter().filter(|combination| !combination.contacts.at_wall).map(|combination| {
         let contacts = &combination.contacts;
         // With one-sided contacts every axis has combinations of its own.
         let map = match combination.axes {
-            1 => full::<1, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
-            2 => full::<2, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
-            _ => full::<3, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
+            1 => full::<1, _>(scene, &network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
+            2 => full::<2, _>(scene, &network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
+            _ => full::<3, _>(scene, &network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
         }?;
         let radius = bounded_radius(&map.monodromy, map.error);
+        watch.done(eigenvalue_operations(map.monodromy.rows()));
         let part = Part::whole(radius, map.monodromy.rows());
         Ok(ContactMode {
             contacts: combination.words.clone(),

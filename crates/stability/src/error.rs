@@ -84,6 +84,20 @@ pub enum AnalysisError {
         /// What it does.
         why: &'static str,
     },
+    /// The second moment takes too long.
+    #[error(
+        "the second moment of this scene takes about {operations:.0e} operations: at most {most:.0e} are allowed; set the drift of the clocks to 0, or simulate \
+         the scene with several seeds instead"
+    )]
+    TooManyOperations {
+        /// By the estimate ([`FrameCost`](crate::FrameCost)).
+        operations: f64,
+        /// How many are allowed.
+        most: f64,
+    },
+    /// Whoever watched ended it.
+    #[error("the analysis was stopped before its end")]
+    Stopped,
     /// The second moment takes too many numbers.
     #[error(
         "the second moment of this scene needs {} numbers, {} joint states of its links: expected at most {most}; simulate the scene with several seeds instead",

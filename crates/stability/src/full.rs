@@ -9,10 +9,11 @@ use cohaptic_peer::{Acting, Contact, Device as _, Hand, Held, ObjectCopy, Peer, 
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
+use crate::cost::{full_operations, pushed_operations};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::structure::{Contacts, arm, average_position, common_time, count};
 use crate::timetable::{Event, NodeClock, Timetable};
-use crate::{AnalysisError, Matrix, StateKind, StateName};
+use crate::{AnalysisError, Matrix, StateKind, StateName, Watch};
 
 /// What the general path finds: the matrix of one frame in relative coordinates.
 #[derive(Clone, PartialEq, Debug)]
@@ -45,13 +46,14 @@ pub(crate) fn full<const A: usize, S: Strategy<A>>(
     network: &NominalNetwork,
     contacts: &Contacts,
     trust: Trust,
+    watch: &dyn Watch,
     strategy: impl Fn(usize) -> S,
 ) -> Result<FullMap, AnalysisError> {
     let mut pusher = Pusher::<A, S>::new(scene, network, contacts, strategy)?;
     if trust == Trust::Nothing {
         pusher.check()?;
     }
-    Ok(pusher.map())
+    pusher.map(watch).ok_or(AnalysisError::Stopped)
 }
 
 type Member<const A: usize, S> = Peer<A, SimulatedDevice<A>, S>;
@@ -115,8 +117,11 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         Ok(Self { samples: vec![Vec::new(); peers], members, names, timetable, layout, time, compliance, growth: 1.0 })
     }
 
-    fn map(mut self) -> FullMap {
+    /// The matrix, vector by vector; `None` if whoever watches ends it.
+    fn map(mut self, watch: &dyn Watch) -> Option<FullMap> {
         let size = self.layout.size;
+        let events = self.timetable.events.len();
+        watch.expects(full_operations(size, events, A));
         let rest = self.pushed(&vec![0.0; size], Instant::ZERO);
         let free: Vec<usize> = (0..A).filter(|axis| self.is_free(*axis, &rest)).collect();
         // Relative to the first peer's copy, and without what nothing depends on.
@@ -127,6 +132,9 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         self.growth = 1.0;
         let (mut unit, mut reached) = (vec![0.0; size], vec![0.0; size]);
         for (column, state) in kept.iter().enumerate() {
+            if watch.stops() {
+                return None;
+            }
             unit[*state] = 1.0;
             self.push(&unit, Instant::ZERO, &mut reached);
             unit[*state] = 0.0;
@@ -137,12 +145,13 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 let moved: f64 = reference.iter().zip(&translations).map(|(reference, translation)| reached[*reference] * translation[*target]).sum();
                 monodromy[(row, column)] = reached[*target] - moved;
             }
+            watch.done(pushed_operations(events, A));
         }
         let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
         // As for the lifted system: each tick rounds, and what is left of the frame magnifies that by at most about the growth.
         let error = 10.0 * f64::EPSILON * count(ticks) * self.growth * self.growth * count(kept.len()).sqrt();
         let names = self.layout.names::<A>(&self.timetable.depth);
-        FullMap {
+        Some(FullMap {
             monodromy,
             error,
             rigid_modes: free.len() + self.layout.loose.len(),
@@ -150,7 +159,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             states: kept.iter().map(|state| names[*state]).collect(),
             time: self.time,
             relative: (0..A).map(|axis| free.contains(&axis)).collect(),
-        }
+        })
     }
 
     /// Refuses a strategy that is not linear, or that depends on more than the state it shows.

@@ -3,7 +3,7 @@
 use cohaptic_scene::Scene;
 use cohaptic_wan::LinkModel;
 
-use crate::{Analysis, AnalysisError, MeanSquare, Method, Verdict, analyse, mean_square_within};
+use crate::{Analysis, AnalysisError, Limits, MeanSquare, Method, Verdict, analyse_watched, mean_square_watched};
 
 /// A verdict, and what it rests on.
 #[derive(Clone, PartialEq, Debug)]
@@ -16,6 +16,9 @@ pub struct Judgement {
     pub mean_square: Option<MeanSquare>,
 }
 
+/// How the note begins that says why a second moment is not followed.
+pub const NOMINAL: &str = "the verdict is nominal: ";
+
 /// Whether a scene is stable: with links that leave something to chance, in the mean square, as long as that takes no more than `most` unknowns (see
 /// [`crate::mean_square_within`]).
 ///
@@ -23,14 +26,24 @@ pub struct Judgement {
 ///
 /// As for [`analyse`].
 pub fn judge(scene: &Scene, method: Method, most: usize) -> Result<Judgement, AnalysisError> {
-    let mut analysis = analyse(scene, method)?;
+    judge_watched(scene, method, &Limits::of_unknowns(most))
+}
+
+/// [`judge`] within limits, watched.
+///
+/// # Errors
+///
+/// As for [`judge`], and [`AnalysisError::Stopped`] if whoever watches ends it.
+pub fn judge_watched(scene: &Scene, method: Method, limits: &Limits<'_>) -> Result<Judgement, AnalysisError> {
+    let mut analysis = analyse_watched(scene, method, limits.watch)?;
     if !has_chance(scene) {
         return Ok(Judgement { verdict: analysis.verdict(), analysis, mean_square: None });
     }
-    match mean_square_within(scene, most) {
+    match mean_square_watched(scene, limits) {
+        Err(AnalysisError::Stopped) => Err(AnalysisError::Stopped),
         Ok(mean_square) => Ok(Judgement { verdict: mean_square.verdict(), analysis, mean_square: Some(mean_square) }),
         Err(error) => {
-            analysis.notes.push(format!("the verdict is nominal: {error}"));
+            analysis.notes.push(format!("{NOMINAL}{error}"));
             Ok(Judgement { verdict: analysis.verdict(), analysis, mean_square: None })
         }
     }

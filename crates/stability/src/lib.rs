@@ -8,6 +8,7 @@
 mod admittance;
 mod analysis;
 mod boundary;
+mod cost;
 mod determinant;
 mod error;
 mod family;
@@ -27,23 +28,26 @@ mod small;
 mod spectrum;
 mod structure;
 mod timetable;
+mod watch;
 mod worst_case;
 
 pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, admittance, ideal};
-pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_with};
+pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_watched, analyse_with};
 pub use boundary::{Boundary, BoundaryError, BoundaryOptions, Crossing, Stretch};
+pub use cost::{FrameCost, eigenvalue_operations, full_operations};
 pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
 pub use error::AnalysisError;
 pub use family::{Cell, Criterion, Family, FamilyError, FamilyScratch, KeyRange, KeyRangeError};
 pub use graph::{Graph, GraphError, analyse_on};
-pub use judgement::{Judgement, has_chance, judge};
+pub use judgement::{Judgement, NOMINAL, has_chance, judge, judge_watched};
 pub use map::{Grid, Map, MapError, MapRow, Polyline};
 pub use matrix::Matrix;
-pub use mean_square::{MeanSquare, MeanSquareMethod, QUICK_UNKNOWNS, mean_square, mean_square_within};
+pub use mean_square::{MeanSquare, MeanSquareMethod, QUICK_UNKNOWNS, mean_square, mean_square_watched, mean_square_within};
 pub use monodromy::{Monodromy, StateKind, StateName, monodromy, monodromy_with};
 pub use parts::{Part, PartKind};
 pub use radius::{Radius, Verdict};
 pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, radius, radius_small};
+pub use watch::{Limits, Unwatched, Watch};
 pub use worst_case::{
     Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Links, Pattern, PatternError, Patterns, SceneWorstCase,
     SceneWorstCaseError, WorstCase, WorstPart, WorstVerdict, worst_case,

@@ -8,7 +8,7 @@ use cohaptic_scene::{FromScene, Scene, Strategies};
 use crate::analysis::combinations;
 use crate::full::{FullMap, Trust, full};
 use crate::network::NominalNetwork;
-use crate::{AnalysisError, Matrix};
+use crate::{AnalysisError, Matrix, Unwatched};
 
 /// What one frame multiplies the relative state of a linear scene by.
 #[derive(Clone, PartialEq, Debug)]
@@ -119,9 +119,9 @@ fn pushed(scene: &Scene, trust: Trust, strategies: &impl Strategies) -> Result<M
     };
     let contacts = &combination.contacts;
     let FullMap { monodromy, error, rigid_modes, frame, states, time, relative } = match combination.axes {
-        1 => full::<1, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
-        2 => full::<2, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
-        _ => full::<3, _>(scene, &network, contacts, trust, |peer| strategies.strategy(scene, peer)),
+        1 => full::<1, _>(scene, &network, contacts, trust, &Unwatched, |peer| strategies.strategy(scene, peer)),
+        2 => full::<2, _>(scene, &network, contacts, trust, &Unwatched, |peer| strategies.strategy(scene, peer)),
+        _ => full::<3, _>(scene, &network, contacts, trust, &Unwatched, |peer| strategies.strategy(scene, peer)),
     }?;
     Ok(Monodromy { matrix: monodromy, states, frame, time, rigid_modes, error, relative })
 }

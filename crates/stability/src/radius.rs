@@ -5,7 +5,8 @@
 pub struct Radius {
     /// The largest modulus of an eigenvalue, as computed; infinite where the numbers overflowed.
     pub value: f64,
-    /// How far the true radius may be from it; zero or more, possibly infinite.
+    /// How far the true radius may be from it; zero or more. Infinite where nothing is known of the radius; of an infinite value a finite error says that
+    /// the radius is above 1, however large it is.
     pub error: f64,
 }
 
@@ -16,22 +17,48 @@ pub enum Verdict {
     Stable,
     /// The radius cannot be told from 1 within its error.
     Marginal,
+    /// Nothing is known of the radius: numbers overflowed, or their errors grew so large that 1 is lost beside them.
+    Overflow,
     /// The radius is above 1: some disturbance grows.
     Unstable,
 }
 
 impl Radius {
-    /// The verdict: [`Verdict::Marginal`] where the error reaches 1.
+    /// Nothing is known of it.
+    pub(crate) const UNKNOWN: Self = Self { value: f64::INFINITY, error: f64::INFINITY };
+
+    /// A radius that is at least `low` and has no bound from above.
+    pub(crate) fn at_least(low: f64) -> Self {
+        if low > 1.0 { Self { value: f64::INFINITY, error: 0.0 } } else { Self::UNKNOWN }
+    }
+
+    /// The verdict: [`Verdict::Marginal`] where the error reaches 1, [`Verdict::Overflow`] where it reaches farther than 2^52, beside which 1 is rounding.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
-        if self.value + self.error < 1.0 {
+        let (low, high) = self.bounds();
+        if high < 1.0 {
             Verdict::Stable
-        } else if self.value - self.error > 1.0 {
+        } else if low > 1.0 {
             Verdict::Unstable
-        } else {
-            // Also where a number is NaN.
+        } else if high < 1.0 / f64::EPSILON {
             Verdict::Marginal
+        } else {
+            Verdict::Overflow
         }
+    }
+
+    /// Between which numbers the radius is: from 0 to infinity where nothing is known of it.
+    #[must_use]
+    pub fn bounds(&self) -> (f64, f64) {
+        let (low, high) = (self.value - self.error, self.value + self.error);
+        // A comparison with NaN is false.
+        (if low > 0.0 { low } else { 0.0 }, if high >= 0.0 { high } else { f64::INFINITY })
+    }
+
+    /// The radius of that many times the matrix, for a power of two above 1.
+    pub(crate) fn scaled(self, factor: f64) -> Self {
+        let (low, high) = self.bounds();
+        if (factor * high).is_finite() { Self { value: factor * self.value, error: factor * self.error } } else { Self::at_least(factor * low) }
     }
 
     /// The radius over that many frames: the power, with the error that follows.
@@ -41,28 +68,38 @@ impl Radius {
             return self;
         }
         let power = |base: f64| libm::pow(base, f64::from(frames));
-        let value = power(self.value);
-        let rounding = f64::EPSILON * f64::from(frames) * value;
-        Self { value, error: (power(self.value + self.error) - value).max(value - power((self.value - self.error).max(0.0))) + rounding }
+        let (low, high) = self.bounds();
+        let (value, low, high) = (power(self.value), power(low), power(high));
+        let rounding = f64::EPSILON * f64::from(frames);
+        if high.is_finite() {
+            Self { value, error: (high - value).max(value - low) + rounding * value }
+        } else {
+            Self::at_least(low * (1.0 - rounding))
+        }
     }
 
     /// The radius of two systems side by side: the larger, with an error that covers both.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
-        let low = (self.value - self.error).max(other.value - other.error);
-        let high = (self.value + self.error).max(other.value + other.error);
-        let value = self.value.max(other.value);
-        Self { value, error: (high - value).max(value - low) }
+        let ((one_low, one_high), (other_low, other_high)) = (self.bounds(), other.bounds());
+        let (low, high) = (one_low.max(other_low), one_high.max(other_high));
+        if high.is_finite() {
+            let value = self.value.max(other.value);
+            Self { value, error: (high - value).max(value - low) }
+        } else {
+            Self::at_least(low)
+        }
     }
 }
 
 impl Verdict {
-    /// The word in JSON and CSV: `stable`, `marginal` or `unstable`.
+    /// The word in JSON and CSV: `stable`, `marginal`, `overflow` or `unstable`.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
             Self::Stable => "stable",
             Self::Marginal => "marginal",
+            Self::Overflow => "overflow",
             Self::Unstable => "unstable",
         }
     }
@@ -80,7 +117,29 @@ mod tests {
         assert_eq!(verdict(1.1, 0.05), Verdict::Unstable);
         assert_eq!(verdict(1.0, 0.0), Verdict::Marginal);
         assert_eq!(verdict(f64::INFINITY, 1.0), Verdict::Unstable);
-        assert_eq!(verdict(f64::NAN, 0.0), Verdict::Marginal);
+    }
+
+    #[test]
+    fn what_has_no_bound_is_not_marginal() {
+        let verdict = |value, error| Radius { value, error }.verdict();
+        for (value, error) in [(f64::INFINITY, f64::INFINITY), (f64::NAN, 0.0), (0.5, f64::NAN), (0.5, f64::INFINITY), (1e100, 1e103)] {
+            assert_eq!(verdict(value, error), Verdict::Overflow, "{value} {error}");
+        }
+    }
+
+    /// 2 to the power of 2000 is no number, and above 1 all the same; 0.5 within 0.9 may be 1.4, of which nothing follows.
+    #[test]
+    fn a_power_that_overflows_is_unstable_where_the_radius_is() {
+        assert_eq!(Radius { value: 2.0, error: 0.5 }.over(2000).verdict(), Verdict::Unstable);
+        assert_eq!(Radius { value: 0.5, error: 0.9 }.over(4_000_000).verdict(), Verdict::Overflow);
+    }
+
+    #[test]
+    fn beside_an_unstable_system_one_that_overflowed_changes_nothing() {
+        let unstable = Radius { value: 2.0, error: 0.5 };
+        assert_eq!(unstable.or(Radius::UNKNOWN).verdict(), Verdict::Unstable);
+        assert_eq!(Radius::UNKNOWN.or(unstable).or(unstable.over(2000)).verdict(), Verdict::Unstable);
+        assert_eq!(Radius { value: 0.5, error: 0.0 }.or(Radius::UNKNOWN).verdict(), Verdict::Overflow);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use std::time::Duration;
 use cohaptic_peer::Gains;
 
 use crate::Matrix;
-use crate::lifted::{Body, Node};
+use crate::lifted::{Body, Node, Rounding};
 use crate::timetable::{Event, Timetable};
 
 /// More samples of earlier frames than this, or more sent in one frame, are left to the general path.
@@ -26,7 +26,6 @@ pub(crate) struct SmallFrame {
     held: Option<usize>,
     sent: usize,
     depth: usize,
-    ticks: u32,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -76,8 +75,7 @@ impl SmallFrame {
         });
         let steps: Vec<Step> = steps.collect::<Option<_>>()?;
         let held = timetable.held.first().and_then(|(_, _, sample)| place(*sample));
-        let ticks = steps.iter().filter(|step| matches!(step, Step::Tick(_))).count();
-        Some(Self { held, sent: *sent, depth: *depth, ticks: u32::try_from(ticks).ok()?, steps, used })
+        Some(Self { held, sent: *sent, depth: *depth, steps, used })
     }
 
     /// Whether this path is for such a node: without a delay of the forces, and with something to hear.
@@ -124,7 +122,9 @@ impl SmallFrame {
         let aim_at = |sample: &[f64; C]| sample.map(|entry| 0.0 + gain * entry);
         let mut aim = self.held.map_or([0.0; C], |held| aim_at(&store[held]));
         let mut next_sent = self.used.len();
-        let mut growth = 1.0_f64;
+        let scale = crate::lifted::node::Scale { time, compliance: node.compliance(time) };
+        let mut rounding = Rounding::new(if BOUND { node.step_norm(coordination, scale).max(1.0) } else { 1.0 });
+        let mut error = 0.0;
         let mut maps: Option<(Duration, Map, Map)> = None;
         for step in &self.steps {
             match *step {
@@ -133,6 +133,9 @@ impl SmallFrame {
                         store[next_sent][column] = position_share * z[object][column] + velocity_share * z[object + 1][column];
                     }
                     next_sent += 1;
+                    if BOUND {
+                        rounding.sample(error);
+                    }
                 }
                 Step::Deliver(sample) => aim = aim_at(&store[sample]),
                 Step::Tick(span) => {
@@ -163,20 +166,14 @@ impl SmallFrame {
                     }
                     if BOUND {
                         let norm = |row: &[f64; C]| row.iter().map(|entry| entry.abs()).sum::<f64>();
-                        growth = z.iter().take(count).map(norm).fold(growth, f64::max);
+                        rounding.tick(z.iter().take(count).map(norm).fold(0.0, f64::max), &mut error);
                     }
                 }
             }
         }
         let moved = |row: usize| if row == 0 || row == object { 1.0 } else { 0.0 };
         self.assemble(&z, &store, reference.map(|row| (row, stiffness / unit)), (count, states), moved, matrix);
-        if !BOUND {
-            return 0.0;
-        }
-        let scale = crate::lifted::node::Scale { time, compliance: node.compliance(time) };
-        let step = node.step_norm(coordination, scale).max(1.0);
-        // The same bound as that of the general path, which says why.
-        10.0 * f64::EPSILON * f64::from(self.ticks) * step * growth * growth
+        if BOUND { rounding.bound(error) } else { 0.0 }
     }
 
     /// The matrix of the relative state from the rows of states and samples. `reference`: its row, and how far a translation moves a sample.

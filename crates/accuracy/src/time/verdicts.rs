@@ -45,7 +45,7 @@ impl Times {
         Ok(match analyse(&self.scene(stiffness)?, method)?.verdict() {
             Verdict::Stable => Some(true),
             Verdict::Unstable => Some(false),
-            Verdict::Marginal => None,
+            Verdict::Marginal | Verdict::Overflow => None,
         })
     }
 }

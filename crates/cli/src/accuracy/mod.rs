@@ -3,9 +3,10 @@
 mod files;
 mod machine;
 
-use std::cell::RefCell;
 use std::fmt::Write as _;
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant as Clock;
 
 use cohaptic_accuracy::{About, AccuracyError, Options, Row, Subject, Watch, measure, text};
@@ -42,14 +43,14 @@ struct RowDocument<'a> {
 /// Shows how far the work is, and keeps every row, so that none is lost if the work is ended early.
 struct Keeper {
     bar: Progress,
-    rows: RefCell<Vec<Row>>,
+    rows: Arc<Mutex<Vec<Row>>>,
 }
 
 impl Watch for Keeper {
     fn row(&self, row: &Row) {
         self.bar.one_more();
         self.bar.note(format!("{}, {}", row.subject.name(), row.case));
-        self.rows.borrow_mut().push(row.clone());
+        self.rows.lock().unwrap_or_else(PoisonError::into_inner).push(row.clone());
     }
 
     fn stops(&self) -> bool {
@@ -64,9 +65,18 @@ pub(crate) fn accuracy(arguments: &AccuracyArguments) -> Result<ExitCode, Failur
         std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
     }
     let subjects: &[Subject] = if arguments.only.is_empty() { &Subject::ALL } else { &arguments.only };
-    let keeper = Keeper { bar: Progress::through_measurements(), rows: RefCell::default() };
+    let keeper = Keeper { bar: Progress::through_measurements(), rows: Arc::default() };
     let start = Clock::now();
+    let (rows, out, json, line) = (Arc::clone(&keeper.rows), arguments.out.clone(), arguments.json, machine::line(arguments));
+    // A row may take longer than there is time.
+    interrupt::keep(move || {
+        let rows = rows.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let said = format!("the {} rows measured until then are kept", rows.len());
+        let concluded = Conclusion { rows, about: About { line, partial: true }, out, json, wall_s: start.elapsed().as_secs_f64() }.tell();
+        concluded.map_or_else(|_| "the rows measured until then cannot be written".to_owned(), |()| said)
+    });
     let measured = measure(subjects, Options { quick: arguments.quick }, &keeper);
+    interrupt::kept();
     let wall_s = start.elapsed().as_secs_f64();
     keeper.bar.clear();
     // A fault of a scene of the program's own, which loses what was measured before it as little as Ctrl-C does.
@@ -75,25 +85,44 @@ pub(crate) fn accuracy(arguments: &AccuracyArguments) -> Result<ExitCode, Failur
         Err(AccuracyError::Stopped) => (true, None),
         Err(error) => (true, Some(Failure::System(format!("the measurement ended early: {error}")))),
     };
-    let rows = keeper.rows.into_inner();
+    let rows = std::mem::take(&mut *keeper.rows.lock().unwrap_or_else(PoisonError::into_inner));
     let about = About { line: machine::line(arguments), partial: interrupted };
-    // What was measured is printed even if the disk is full.
-    let written = arguments.out.as_ref().map_or(Ok(()), |folder| files::write(folder, &rows, &about));
-    if arguments.json {
-        output::json(DocumentSchema::Accuracy, &Document { rows: rows.iter().map(document).collect(), interrupted, wall_s })?;
-    } else {
-        let mut shown = text(&rows);
-        if interrupted {
-            let _ = writeln!(shown, "INTERRUPTED after {wall_s:.1} s: these are the {} rows measured until then", rows.len());
-        }
-        output::text(&shown)?;
-        output::wrote(arguments.out.as_ref().filter(|_| written.is_ok()).map(|folder| folder.join("index.html")));
-    }
-    written?;
+    Conclusion { rows, about, out: arguments.out.clone(), json: arguments.json, wall_s }.tell()?;
     if let Some(fault) = fault {
         return Err(fault);
     }
     Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// What was measured, and where it goes.
+struct Conclusion {
+    rows: Vec<Row>,
+    about: About,
+    out: Option<PathBuf>,
+    json: bool,
+    wall_s: f64,
+}
+
+impl Conclusion {
+    /// Writes the files and prints the rows; what was measured is printed even if the disk is full.
+    fn tell(&self) -> Result<(), Failure> {
+        let Self { rows, about, out, json, wall_s } = self;
+        let written = out.as_ref().map_or(Ok(()), |folder| files::write(folder, rows, about));
+        if *json {
+            output::json(
+                DocumentSchema::Accuracy,
+                &Document { rows: rows.iter().map(document).collect(), interrupted: about.partial, wall_s: *wall_s },
+            )?;
+        } else {
+            let mut shown = text(rows);
+            if about.partial {
+                let _ = writeln!(shown, "INTERRUPTED after {wall_s:.1} s: these are the {} rows measured until then", rows.len());
+            }
+            output::text(&shown)?;
+            output::wrote(out.as_ref().filter(|_| written.is_ok()).map(|folder| folder.join("index.html")));
+        }
+        written
+    }
 }
 
 fn document(row: &Row) -> RowDocument<'_> {

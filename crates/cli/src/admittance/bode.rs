@@ -68,7 +68,7 @@ fn responded(number: usize, curve: &Curve) -> Result<Line, Failure> {
 fn named(curve: &Curve) -> String {
     match curve.admittance.verdict() {
         Verdict::Stable => curve.name.clone(),
-        verdict @ (Verdict::Marginal | Verdict::Unstable) => format!("{} ({})", curve.name, verdict.word().to_uppercase()),
+        verdict @ (Verdict::Marginal | Verdict::Overflow | Verdict::Unstable) => format!("{} ({})", curve.name, verdict.word().to_uppercase()),
     }
 }
 

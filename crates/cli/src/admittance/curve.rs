@@ -2,7 +2,7 @@
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{
-    Admittance, AnalysisError, FrequencyResponse, LowFrequencyFit, MeanSquare, QUICK_UNKNOWNS, Verdict, has_chance, ideal, mean_square_within,
+    Admittance, AnalysisError, FrequencyResponse, LowFrequencyFit, MeanSquare, QUICK_UNKNOWNS, Verdict, Watch, has_chance, ideal, mean_square_within,
 };
 
 use crate::arguments::AdmittanceArguments;
@@ -66,8 +66,9 @@ fn place_of(wanted: &str, scene: &Scene, variant: &Variant) -> Result<usize, Fai
 }
 
 impl Curve {
-    pub(super) fn of(Subject { variant, scene, admittance, chance }: Subject, frequencies: &[f64]) -> Result<Self, Failure> {
-        let response = admittance.response(frequencies).map_err(|error| Failure::Input(error.to_string()))?;
+    /// At as many of the frequencies as there is time for.
+    pub(super) fn of(Subject { variant, scene, admittance, chance }: Subject, frequencies: &[f64], watch: &dyn Watch) -> Result<Self, Failure> {
+        let response = admittance.response_watched(frequencies, watch).map_err(|error| Failure::Input(error.to_string()))?;
         let fit = admittance.fit_low_frequency();
         let (name, overrides, mass) = (variant.name, variant.overrides, scene.object.mass);
         Ok(Self { name, overrides, title: scene.title, admittance, response, fit, chance, mass })
@@ -99,7 +100,7 @@ impl Curve {
                 ),
                 _ => None,
             },
-            Verdict::Marginal => {
+            Verdict::Marginal | Verdict::Overflow => {
                 Some("the scene cannot be told from an unstable one: whether it has a steady state is open, and only that could be measured")
             }
             Verdict::Unstable => {

@@ -15,6 +15,8 @@ pub(super) struct Document<'a> {
     /// Those of `--curve`.
     curves: Vec<Named<'a>>,
     files: &'a [String],
+    /// Whether points at the end of the frequencies are missing because the user asked for the end.
+    interrupted: bool,
 }
 
 #[derive(Serialize)]
@@ -66,7 +68,7 @@ struct Point {
 }
 
 impl<'a> Document<'a> {
-    pub(super) fn new(peer: &'a str, curves: &'a [Curve], files: &'a [String]) -> Self {
+    pub(super) fn new(peer: &'a str, curves: &'a [Curve], files: &'a [String], interrupted: bool) -> Self {
         let named = |curve: &'a Curve| Named { name: &curve.name, overrides: &curve.overrides, curve: CurveDocument::of(curve) };
         Self {
             title: curves.first().map_or("", |curve| &curve.title),
@@ -74,6 +76,7 @@ impl<'a> Document<'a> {
             scene: curves.first().map(CurveDocument::of),
             curves: curves.iter().skip(1).map(named).collect(),
             files,
+            interrupted,
         }
     }
 }

@@ -9,14 +9,20 @@ use crate::output;
 use crate::output_file::{field, write_file};
 
 /// Writes `admittance.csv` and `admittance.svg` into a folder, which is made if it is not there, and gives their paths.
-pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve]) -> Result<Vec<String>, Failure> {
-    let contents = [("admittance.csv", table(curves)), ("admittance.svg", bode::svg(peer, curves)?)];
+///
+/// Of points that are not all that were asked for there is only the table: a picture takes longer than a user waits who has asked for the end.
+pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve], is_whole: bool) -> Result<Vec<String>, Failure> {
     std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "write", path: folder.to_path_buf(), error })?;
     let mut written = Vec::new();
-    for (name, content) in contents {
+    let mut add = |name: &str, content: String| {
         let path = folder.join(name);
         write_file(&path, &content)?;
         written.push(output::path(&path));
+        Ok::<(), Failure>(())
+    };
+    add("admittance.csv", table(curves))?;
+    if is_whole {
+        add("admittance.svg", bode::svg(peer, curves)?)?;
     }
     Ok(written)
 }

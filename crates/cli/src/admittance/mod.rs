@@ -13,6 +13,7 @@ use std::process::ExitCode;
 use curve::Curve;
 use document::Document;
 
+use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::AdmittanceArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
@@ -23,18 +24,30 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     let subjects = curve::subjects(arguments)?;
     let highest = subjects.iter().map(|subject| subject.admittance.highest_frequency()).fold(f64::INFINITY, f64::min);
     let frequencies = frequencies::of(arguments, highest)?;
-    let curves = subjects.into_iter().map(|subject| Curve::of(subject, &frequencies));
-    let curves = curves.collect::<Result<Vec<Curve>, Failure>>()?;
+    let watch = AnalysisWatch::new();
+    let curves = subjects.into_iter().map(|subject| Curve::of(subject, &frequencies, &watch));
+    let curves = curves.collect::<Result<Vec<Curve>, Failure>>();
+    watch.clear();
+    let curves: Vec<Curve> = curves?.into_iter().filter(|curve| !curve.response.points.is_empty()).collect();
+    let finished = curves.iter().map(|curve| curve.response.points.len()).sum::<usize>();
+    let wanted = frequencies.len() * (1 + arguments.curve.len());
+    let is_interrupted = finished < wanted;
+    if curves.is_empty() {
+        return Err(Failure::Interrupted(format!("none of {wanted} points was finished")));
+    }
     // Nothing is written before everything is known to be right.
     let files = match &arguments.out {
-        Some(folder) => files::write(folder, &arguments.peer, &curves)?,
+        Some(folder) => files::write(folder, &arguments.peer, &curves, !is_interrupted)?,
         None => Vec::new(),
     };
     if arguments.scene.json {
-        output::json(DocumentSchema::Admittance, &Document::new(&arguments.peer, &curves, &files))?;
+        output::json(DocumentSchema::Admittance, &Document::new(&arguments.peer, &curves, &files, is_interrupted))?;
     } else {
         output::text(&words::describe(&arguments.peer, &curves))?;
         output::wrote(&files);
+    }
+    if is_interrupted {
+        return Err(Failure::Interrupted(format!("these are the first {finished} of {wanted} points")));
     }
     Ok(ExitCode::SUCCESS)
 }

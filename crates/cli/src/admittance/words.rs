@@ -70,6 +70,7 @@ fn shown(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Stable => "stable",
         Verdict::Marginal => "MARGINAL",
+        Verdict::Overflow => "OVERFLOW",
         Verdict::Unstable => "UNSTABLE",
     }
 }

@@ -145,3 +145,19 @@ fn a_scene_whose_hand_is_missing_is_an_input_error() {
     assert_eq!(outcome.status, Some(3));
     assert!(outcome.stdout.contains("gone.csv") && outcome.stdout.ends_with("3 passed, 1 failed\n"), "{}", outcome.stdout);
 }
+
+/// The frame of clocks that drift is half an hour, with samples in the hundreds of thousands: its second moment would take days. It took ten minutes to
+/// say nothing.
+#[test]
+fn a_second_moment_that_takes_long_is_told_by_a_simulation_and_that_is_said() {
+    let desk = Desk::new();
+    let scene = crate::desk::shipped("network/clock-offset-and-drift.toml");
+    let line = format!("check {} --set link.loss=5%", scene.display());
+    let outcome = desk.cohaptic_within(std::time::Duration::from_secs(240), &format!("{line} --json"));
+    assert!(matches!(outcome.status, Some(0 | 1)), "{outcome:?}");
+    let checked = parse(&outcome.stdout)["scenes"][0].clone();
+    let note = checked["notes"][0].as_str().unwrap();
+    assert!(note.starts_with("stable: told by a simulation") && note.contains("operations"), "{note}");
+    // A scene without chance has nothing to note.
+    assert_eq!(folder().json("check scenes/a.toml --json")["scenes"][0]["notes"], Value::Array(Vec::new()));
+}

@@ -151,3 +151,37 @@ fn too_many_peers_to_simulate_are_refused_before_anything_is_written() {
     assert!(checked.stdout.contains(words), "{}", checked.stdout);
     assert!(desk.text("explain many.toml").contains("9999900000 links"));
 }
+
+/// Devices without an end, and a pipe that somebody fills: each is read up to the limit of its kind, 256 MiB.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_has_no_end_is_read_up_to_a_limit() {
+    let desk = Desk::with("two.toml", TWO);
+    let limit = "it is longer than 256 MiB";
+    for line in [
+        "run two.toml --set link.trace=/dev/zero",
+        "run two.toml --set link.replay=/dev/zero",
+        "run two.toml --set 'link.jitter={ sd = \"1ms\", distribution = { empirical = \"/dev/zero\" } }'",
+        "run two.toml --inputs /dev/zero",
+        "run /dev/zero",
+        "check /dev/zero",
+        "stability point two.toml --graph /dev/zero",
+        "link --from /dev/zero",
+        "fit /dev/zero",
+    ] {
+        let outcome = desk.cohaptic(line);
+        assert!(matches!(outcome.status, Some(2 | 3)) && (outcome.stderr + &outcome.stdout).contains(limit), "{line}");
+    }
+    let pipe = desk.path("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let mut fill = std::process::Command::new("dd")
+        .args(["if=/dev/zero", "bs=1M"])
+        .arg(format!("of={}", pipe.display()))
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let outcome = desk.cohaptic("run two.toml --set link.trace=pipe");
+    // Nobody reads any more, so that it has ended.
+    let _ = fill.wait();
+    assert!(outcome.status == Some(3) && outcome.stderr.contains(limit) && outcome.stderr.contains("link.trace"), "{outcome:?}");
+}

@@ -45,5 +45,7 @@ mod stability_chance;
 mod stability_map;
 mod stability_point;
 mod standard_input;
+#[cfg(target_os = "linux")]
+mod stop;
 mod svg;
 mod sweep;

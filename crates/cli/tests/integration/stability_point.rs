@@ -195,3 +195,47 @@ fn what_is_not_followed_in_the_mean_square_says_so() {
         assert!(text.contains("with every delay its mean and nothing lost"), "{text}");
     }
 }
+
+/// A spring of 10^12 N/m on copies of 0.15 kg and a tick of 1 ms: K·h²/m = 6.7·10^6 a tick, eight ticks a frame, so that the radius is some 10^52 and the
+/// square of what a frame makes of rounding far more. The bound is what counts the ticks, and the verdict what it says.
+#[test]
+fn a_frame_of_large_numbers_is_unstable_and_not_marginal() {
+    let desk = Desk::with("two.toml", TWO);
+    for stiffness in ["1e8", "1e12"] {
+        let document = desk.json(&format!("stability point two.toml --json --set coordination.stiffness={stiffness}"));
+        assert_eq!(document["verdict"], "unstable", "{stiffness}: {document:#}");
+        let text = desk.text(&format!("stability point two.toml --set coordination.stiffness={stiffness}"));
+        assert!(text.contains("\nUNSTABLE: ") && text.contains("the fastest disturbance grows") && !text.contains("inf"), "{text}");
+    }
+}
+
+/// 10^30 N/m make errors beyond all proportion, and 10^300 N/m numbers beyond the range: neither can be told from 1, and neither is near it.
+#[test]
+fn a_frame_that_overflows_has_a_verdict_of_its_own() {
+    let desk = Desk::with("two.toml", TWO);
+    for stiffness in ["1e30", "1e300"] {
+        let set = format!("--set coordination.stiffness={stiffness}");
+        let document = desk.json(&format!("stability point two.toml --json {set}"));
+        assert_eq!((&document["verdict"], &document["time_constant_s"]), (&"overflow".into(), &Value::Null), "{document:#}");
+        let text = desk.text(&format!("stability point two.toml {set}"));
+        assert!(text.contains("\nOVERFLOW: nothing is known of the spectral radius") && !text.contains("time constant"), "{text}");
+    }
+}
+
+/// The verdict is in the mean square: that loss is left out is about the other radius.
+#[test]
+fn a_note_says_which_radius_it_is_about() {
+    let desk = Desk::with("two.toml", TWO);
+    let document = desk.json("stability point two.toml --json --set link.loss=5%");
+    assert!(document["mean_square_radius"].is_number(), "{document:#}");
+    let notes: Vec<&str> = document["notes"].as_array().unwrap().iter().map(|note| note.as_str().unwrap()).collect();
+    let named = |note: &&str| {
+        ["the spectral radius, with nothing left to chance: ", "the mean-square radius: ", "both radii: "].iter().any(|which| note.starts_with(which))
+    };
+    assert!(!notes.is_empty() && notes.iter().all(named), "{notes:?}");
+    assert!(notes[0].starts_with("the spectral radius, with nothing left to chance: ") && notes[0].contains("random loss is left out"), "{notes:?}");
+    assert!(desk.text("stability point two.toml --set link.loss=5%").contains(&format!("note: {}\n", notes[0])));
+    // With one radius there is nothing to tell apart.
+    let one = desk.json("stability point two.toml --json --set 'timeline=[{ at = \"100ms\", link = \"all\", set = { delay = \"8ms\" } }]'");
+    assert!(one["notes"][0].as_str().unwrap().starts_with("the timeline is left out"), "{one:#}");
+}

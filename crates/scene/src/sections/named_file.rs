@@ -96,7 +96,7 @@ pub(crate) fn read_file<T: Clone + 'static>(
 }
 
 fn load(node: &Node, context: Context<'_>, path: &Path) -> Option<String> {
-    let bytes = std::fs::read(path).map_err(|error| context.unreadable(node, path.to_path_buf(), error)).ok()?;
+    let bytes = crate::read_bytes(path).map_err(|error| context.unreadable(node, path.to_path_buf(), error)).ok()?;
     context.files.held.borrow_mut().insert(path.to_path_buf(), Fingerprint::of_bytes(&bytes));
     match String::from_utf8(bytes) {
         Ok(text) => Some(text),

@@ -20,13 +20,16 @@ use crate::network::NominalNetwork;
 use crate::parts::{radius_of, reduced};
 use crate::structure::{Contacts, Structure, arm, count, device_plant};
 use crate::timetable::{Event, NodeClock, Timetable};
-use crate::{AnalysisError, Matrix, Method, Radius, Verdict};
+use crate::{AnalysisError, Matrix, Method, Radius, Unwatched, Verdict, Watch};
 
 pub use error::AdmittanceError;
 pub use low_frequency::{Estimate, LowFrequencyFit};
 pub use response::{AdmittancePoint, FrequencyResponse, ideal};
 
 use harmonic::Harmonic;
+
+/// How many points the threads share at a time.
+const TOGETHER: usize = 256;
 
 /// The admittance of one peer's device, with the hands of all others at rest: ready to be evaluated at any frequency.
 ///
@@ -108,8 +111,43 @@ impl Admittance {
     ///
     /// As [`Admittance::at`], for the first frequency that is not one.
     pub fn response(&self, frequencies: &[f64]) -> Result<FrequencyResponse, AdmittanceError> {
-        let points: Vec<Result<AdmittancePoint, AdmittanceError>> = frequencies.par_iter().map(|hz| self.at(*hz)).collect();
-        Ok(FrequencyResponse { points: points.into_iter().collect::<Result<_, _>>()? })
+        self.response_watched(frequencies, &Unwatched)
+    }
+
+    /// [`Admittance::response`] at as many of those frequencies as there is time for: up to the first that was not looked at when whoever watches ended it.
+    /// A point is [`Admittance::operations`].
+    ///
+    /// # Errors
+    ///
+    /// As [`Admittance::at`], for the first frequency that is not one.
+    pub fn response_watched(&self, frequencies: &[f64], watch: &dyn Watch) -> Result<FrequencyResponse, AdmittanceError> {
+        watch.expects(self.operations() * count(frequencies.len()));
+        let at = |hz: &f64| {
+            (!watch.stops()).then(|| {
+                let point = self.at(*hz);
+                watch.done(self.operations());
+                point
+            })
+        };
+        let mut points = Vec::with_capacity(frequencies.len());
+        // Threads share a few at a time, so that what is done when they are stopped is done from the first on.
+        for some in frequencies.chunks(TOGETHER) {
+            let found: Vec<Option<Result<AdmittancePoint, AdmittanceError>>> = some.par_iter().map(at).collect();
+            for point in found {
+                match point {
+                    Some(point) => points.push(point?),
+                    None => return Ok(FrequencyResponse { points }),
+                }
+            }
+        }
+        Ok(FrequencyResponse { points })
+    }
+
+    /// About how many operations a point takes: each event of a frame works on all columns of its rows.
+    #[must_use]
+    pub fn operations(&self) -> f64 {
+        let columns = 6 * self.nodes.len() + self.timetable.depth.iter().sum::<usize>();
+        20.0 * count(self.timetable.events.len()) * count(columns) + count(columns).powi(3)
     }
 
     /// What the device feels like when it is moved slowly: see [`LowFrequencyFit`].

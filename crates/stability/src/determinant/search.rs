@@ -30,7 +30,7 @@ impl DelayedLoop {
             return self.explicit_radius(longest as usize, perturbation);
         }
         let Some(mut high) = self.outer(perturbation) else {
-            return Radius { value: 1.0, error: f64::INFINITY };
+            return Radius::UNKNOWN;
         };
         let longest = longest.max(1);
         // z^−j stays below 1e60; and below a radius at which nothing could be told, nothing is tried again.

@@ -3,6 +3,7 @@
 use cohaptic_peer::Gains;
 
 use super::node::{Node, Rows, Scale, Scratch};
+use super::rounding::Rounding;
 use crate::Matrix;
 use crate::timetable::{Event, Timetable};
 
@@ -122,7 +123,8 @@ impl Lifted<'_> {
         let mut scratch = Scratch::default();
         scratch.resize(columns);
         let mut push = vec![0.0; columns];
-        let (mut growth, mut ticks) = (1.0_f64, 0_u32);
+        let step = self.nodes.iter().map(|node| node.step_norm(self.coordination, scale)).fold(1.0, f64::max);
+        let (mut rounding, mut errors) = (Rounding::new(step), vec![0.0; nodes]);
         for event in &self.timetable.events {
             match *event {
                 Event::Sample { node } => {
@@ -134,6 +136,7 @@ impl Lifted<'_> {
                         }
                     }
                     next_sent[node] += 1;
+                    rounding.sample(errors[node]);
                 }
                 Event::Deliver { from, to, sample } => {
                     held[to * nodes + from] = row_of(from, sample);
@@ -161,12 +164,10 @@ impl Lifted<'_> {
                     };
                     let hand = pushed.then_some(push.as_slice());
                     self.nodes[node].tick(&mut z, rows[node], self.coordination, targets.row(node), hand, span, scale, &mut scratch);
-                    ticks += 1;
-                    growth = growth.max(norm(&z, rows[node], self.nodes[node].states()));
+                    rounding.tick(norm(&z, rows[node], self.nodes[node].states()), &mut errors[node]);
                 }
             }
         }
-        let step = self.nodes.iter().map(|node| node.step_norm(self.coordination, scale)).fold(1.0, f64::max);
         let mut positions = vec![false; count];
         for row in &rows {
             positions[row.object] = true;
@@ -183,9 +184,7 @@ impl Lifted<'_> {
             used,
             depth: if unit > 0.0 { self.timetable.depth.clone() } else { vec![0; nodes] },
             translation: if unit > 0.0 { stiffness / unit } else { 0.0 },
-            // Each tick of a node rounds some ten operations on numbers of at most step·growth, and what is left of the frame magnifies that by at
-            // most about the growth.
-            error: 10.0 * f64::EPSILON * f64::from(ticks) * step * growth * growth,
+            error: rounding.bound(errors.into_iter().fold(0.0, f64::max)),
         }
     }
 

@@ -6,6 +6,8 @@
 mod delayed;
 pub(crate) mod frame;
 pub(crate) mod node;
+mod rounding;
 
 pub(crate) use frame::{Autonomous, FrameMap, Instrument, Lifted};
 pub(crate) use node::{Body, Node};
+pub(crate) use rounding::Rounding;

@@ -8,10 +8,10 @@ use super::held::staying;
 use super::law::LossChain;
 use super::nanoseconds;
 use super::tracked::Tracked;
-use crate::Radius;
 use crate::lifted::Lifted;
 use crate::lifted::node::Scale;
 use crate::timetable::{Event, Timetable};
+use crate::{Radius, Unwatched, Watch};
 
 /// A link of the scene.
 #[derive(Clone, Debug)]
@@ -52,6 +52,14 @@ impl Instants {
 
 /// The frame of nodes over lines; those that are not there hold nothing.
 pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -> Events {
+    events_watched(lifted, lines, instants, &Unwatched).unwrap_or_default()
+}
+
+/// How many events are worked out before it is asked whether to go on.
+const LOOK: usize = 1024;
+
+/// [`events`]; `None` if whoever watches ends it.
+pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants, watch: &dyn Watch) -> Option<Events> {
     let nodes = lifted.nodes.len();
     let unit = lifted.coordination.stiffness + lifted.coordination.damping / lifted.time;
     let scale = Scale { time: lifted.time, compliance: lifted.nodes[0].compliance(lifted.time) };
@@ -114,7 +122,10 @@ pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -
             made.steps.push(Step::Move { first: first[node], sizes: map.sizes(), map: map.value, held: held_of(node) });
         }
     };
-    for event in &lifted.timetable.events {
+    for (number, event) in lifted.timetable.events.iter().enumerate() {
+        if number.is_multiple_of(LOOK) && watch.stops() {
+            return None;
+        }
         match *event {
             Event::Sample { node } => {
                 flush(&mut pending, &mut made, node);
@@ -149,7 +160,7 @@ pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -
     for node in 0..nodes {
         flush(&mut pending, &mut made, node);
     }
-    made
+    Some(made)
 }
 
 impl Line {

@@ -33,10 +33,10 @@ use std::time::Duration;
 use cohaptic_scene::Scene;
 
 use self::arrivals::Hazards;
-use self::build::{Instants, Line, events};
+use self::build::{Instants, Line, events, events_watched};
 pub(crate) use self::equal::{Equal, EqualScratch};
 use self::law::{LinkLaw, is_random};
-use self::positive::{Positive, radius_of_positive};
+use self::positive::{Positive, radius_of_positive, radius_watched};
 use self::symmetric::Symmetric;
 use crate::analysis::{Combination, combinations};
 use crate::lifted::{Lifted, Node};
@@ -44,12 +44,14 @@ use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
 use crate::structure::{Contacts, Structure, count};
 use crate::timetable::{NodeClock, Timetable};
-use crate::{AnalysisError, Matrix, Method, Radius, Verdict};
+use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, Radius, Verdict};
 
 /// More unknowns of the second moment than this are refused, whatever the caller allows: they take minutes.
 const MOST_UNKNOWNS: usize = 1 << 20;
 /// Unknowns that take some seconds at most.
 pub const QUICK_UNKNOWNS: usize = 1 << 17;
+/// More numbers than this at once are refused: a gibibyte, of which a step makes a second one.
+const MOST_NUMBERS: usize = 1 << 27;
 /// More peers than this are not looked at one by one.
 const MOST_PEERS: usize = 64;
 
@@ -122,12 +124,22 @@ pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
 ///
 /// As for [`mean_square`].
 pub fn mean_square_within(scene: &Scene, most: usize) -> Result<MeanSquare, AnalysisError> {
+    mean_square_watched(scene, &Limits::of_unknowns(most))
+}
+
+/// [`mean_square`] within limits, watched.
+///
+/// # Errors
+///
+/// As for [`mean_square`]; [`AnalysisError::TooManyOperations`] beyond the limit, [`AnalysisError::Stopped`] if whoever watches ends it.
+pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSquare, AnalysisError> {
+    let limits = &Limits { unknowns: limits.unknowns.min(MOST_UNKNOWNS), ..*limits };
     let network = NominalNetwork::of(scene)?;
     let combinations = combinations(scene)?;
     let mut notes = Vec::new();
     let mut found: Option<MeanSquare> = None;
     for combination in &combinations {
-        let one = of_contacts(scene, &network, combination, most.min(MOST_UNKNOWNS), &mut notes)?;
+        let one = of_contacts(scene, &network, combination, limits, &mut notes)?;
         found = Some(match found {
             None => one,
             Some(before) => {
@@ -172,7 +184,7 @@ fn of_contacts(
     scene: &Scene,
     network: &NominalNetwork,
     combination: &Combination,
-    most: usize,
+    limits: &Limits<'_>,
     notes: &mut Vec<String>,
 ) -> Result<MeanSquare, AnalysisError> {
     let structure = Structure::of(&[scene], network, &combination.contacts)?;
@@ -188,7 +200,7 @@ fn of_contacts(
     } else {
         match alike(scene, &structure).then(|| symmetric(scene, network, &structure, notes)).transpose()?.flatten() {
             Some(found) => found,
-            None => one_by_one(scene, network, &structure, &combination.contacts, &random, most, notes)?,
+            None => one_by_one(scene, network, &structure, &combination.contacts, &random, limits, notes)?,
         }
     };
     if gains.stiffness + gains.damping <= 0.0 {
@@ -380,7 +392,7 @@ fn one_by_one(
     structure: &Structure,
     contacts: &Contacts,
     random: &[(usize, usize)],
-    most: usize,
+    limits: &Limits<'_>,
     notes: &mut Vec<String>,
 ) -> Result<Found, AnalysisError> {
     let peers = scene.peers.len();
@@ -393,10 +405,16 @@ fn one_by_one(
     let certain = pairs.iter().filter(|pair| !all_random && !random.contains(pair));
     let certain: Vec<(usize, usize, LinkTiming)> = certain.map(|(from, to)| (*from, *to, network.timing(*from, *to).clone())).collect();
     let timetable = Timetable::new(&clocks, &certain)?;
+    let cost = frame_cost(scene, &timetable, pairs.len());
+    // Joint states make it more, never less.
+    within(cost, limits)?;
     let instants = Instants::of(&timetable, peers);
     let (mut lines, mut held) = (Vec::new(), NOTHING);
     let mut tied = structure.tied;
     for (from, to) in pairs {
+        if limits.watch.stops() {
+            return Err(AnalysisError::Stopped);
+        }
         if let Some((_, _, timing)) = certain.iter().find(|(one, other, _)| (*one, *other) == (from, to)) {
             // What never changes is a constant force.
             if !matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)) {
@@ -423,13 +441,40 @@ fn one_by_one(
     let weights = Matrix::from_fn(peers, peers, |row, column| if row == column { 0.0 } else { share });
     let quotient = structure.quotient(scene, &nodes);
     let lifted = Lifted { nodes: &nodes, weights: &weights, timetable: &timetable, tied, ..quotient };
-    let operator = events(&lifted, &lines, &instants);
+    let operator = events_watched(&lifted, &lines, &instants, limits.watch).ok_or(AnalysisError::Stopped)?;
+    let most = limits.unknowns;
     let joint = operator.joint().filter(|joint| *joint <= most);
     let unknowns = joint.map(|_| operator.unknowns());
-    if unknowns.is_none_or(|unknowns| unknowns > most) {
+    let Some((joint, unknowns)) = joint.zip(unknowns).filter(|(_, unknowns)| *unknowns <= most) else {
         return Err(AnalysisError::TooManyMoments { joint: operator.joint(), unknowns, most });
+    };
+    let cost = FrameCost { joint, ..cost };
+    within(cost, limits)?;
+    limits.watch.expects(cost.operations());
+    let radius = radius_watched(&operator, cost.of_a_pass(), limits.watch).ok_or(AnalysisError::Stopped)?;
+    Ok(Found { radius, held, method: MeanSquareMethod::Events, frame: timetable.frame, unknowns })
+}
+
+/// The sizes of a frame with so many random links, each of which brings every sample that is sent; without the joint states of their chains.
+fn frame_cost(scene: &Scene, timetable: &Timetable, links: usize) -> FrameCost {
+    let peers = scene.peers.len().max(1);
+    let sent: usize = timetable.sent.iter().sum();
+    // Position and velocity of a device and of a copy.
+    let rows = 4 * peers + sent + timetable.depth.iter().sum::<usize>() + links;
+    FrameCost { events: timetable.events.len() + sent / peers * links, rows, joint: 1 }
+}
+
+/// Refuses what takes longer than it may, or more memory than there is.
+fn within(cost: FrameCost, limits: &Limits<'_>) -> Result<(), AnalysisError> {
+    let operations = cost.operations();
+    if operations > limits.operations {
+        return Err(AnalysisError::TooManyOperations { operations, most: limits.operations });
     }
-    Ok(Found::of(&operator, held, MeanSquareMethod::Events, timetable.frame))
+    if cost.numbers() > count(MOST_NUMBERS) {
+        let unknowns = cost.rows.checked_mul(cost.rows).and_then(|square| square.checked_mul(cost.joint));
+        return Err(AnalysisError::TooManyMoments { joint: Some(cost.joint), unknowns, most: MOST_NUMBERS });
+    }
+    Ok(())
 }
 
 fn nanoseconds(span: Duration) -> u64 {

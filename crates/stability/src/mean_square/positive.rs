@@ -19,7 +19,7 @@
 
 use crate::worst_case::rounding::{gamma, outward};
 use crate::worst_case::verified::is_positive;
-use crate::{Matrix, Radius};
+use crate::{Matrix, Radius, Unwatched, Watch};
 
 /// An operator on symmetric matrices, or tuples of them, that maps positive ones to positive ones. Elements are vectors of coordinates.
 pub(crate) trait Positive: Sync {
@@ -52,11 +52,87 @@ const MOST_STEPS: usize = 400;
 /// A direction that is left with less than this is nothing but rounding.
 const BREAKDOWN: f64 = 1e-14;
 
-/// The spectral radius. The error is infinite where the numbers overflow, and covers the whole interval from zero where no lower bound is found.
+/// The spectral radius. The error covers the whole interval from zero where no lower bound is found. Where numbers overflow, the operator is divided by a
+/// power of two, which is exact; where that does not help either, nothing is known.
 pub(crate) fn radius_of_positive(operator: &impl Positive) -> Radius {
+    radius_watched(operator, 0.0, &Unwatched).unwrap_or(Radius::UNKNOWN)
+}
+
+/// [`radius_of_positive`], one image of which is so many operations; `None` if whoever watches ends it.
+pub(crate) fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Watch) -> Option<Radius> {
+    let watched = Images { operator, factor: 1.0, operations, watch };
+    match within_range(&watched, watch) {
+        Ok(radius) => Some(radius),
+        Err(Ended::Stopped) => None,
+        Err(Ended::Overflow) => {
+            let largest = operator.apply(&operator.base()).into_iter().fold(1.0_f64, |largest, entry| largest.max(entry.abs()));
+            // The sizes may be larger than the entries; and no number is larger than 2^1024.
+            let exponent = (libm::log2(largest).ceil() + 64.0).min(1000.0);
+            match within_range(&Images { factor: libm::exp2(-exponent), ..watched }, watch) {
+                Ok(radius) => Some(radius.scaled(libm::exp2(exponent))),
+                Err(Ended::Stopped) => None,
+                Err(Ended::Overflow) => Some(Radius::UNKNOWN),
+            }
+        }
+    }
+}
+
+/// Why there is no radius.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Ended {
+    /// Numbers overflowed.
+    Overflow,
+    /// Whoever watches ended it.
+    Stopped,
+}
+
+/// An operator times a power of two, each image of which is seen by whoever watches.
+struct Images<'a, O> {
+    operator: &'a O,
+    factor: f64,
+    operations: f64,
+    watch: &'a dyn Watch,
+}
+
+impl<O> Images<'_, O> {
+    fn seen(&self, image: Vec<f64>) -> Vec<f64> {
+        self.watch.done(self.operations);
+        // A product with 1 changes nothing.
+        image.into_iter().map(|entry| self.factor * entry).collect()
+    }
+}
+
+impl<O: Positive> Positive for Images<'_, O> {
+    fn unknowns(&self) -> usize {
+        self.operator.unknowns()
+    }
+
+    fn base(&self) -> Vec<f64> {
+        self.operator.base()
+    }
+
+    fn apply(&self, element: &[f64]) -> Vec<f64> {
+        self.seen(self.operator.apply(element))
+    }
+
+    fn sizes(&self, element: &[f64]) -> Vec<f64> {
+        self.seen(self.operator.sizes(element))
+    }
+
+    fn roundings(&self) -> usize {
+        self.operator.roundings()
+    }
+
+    fn matrices(&self, element: &[f64]) -> Vec<Matrix> {
+        self.operator.matrices(element)
+    }
+}
+
+/// The spectral radius, as far as numbers go.
+fn within_range(operator: &impl Positive, watch: &dyn Watch) -> Result<Radius, Ended> {
     let unknowns = operator.unknowns();
     if unknowns == 0 {
-        return Radius { value: 0.0, error: 0.0 };
+        return Ok(Radius { value: 0.0, error: 0.0 });
     }
     let most = (MOST_NUMBERS / unknowns).clamp(2, MOST_STEPS).min(unknowns);
     let mut krylov = Krylov::new(operator.base());
@@ -64,6 +140,9 @@ pub(crate) fn radius_of_positive(operator: &impl Positive) -> Radius {
     let mut next = 8;
     let mut before = f64::NAN;
     while krylov.steps() < most {
+        if watch.stops() {
+            return Err(Ended::Stopped);
+        }
         let going = krylov.step(operator);
         let steps = krylov.steps();
         let last = !going || steps == most;
@@ -71,16 +150,14 @@ pub(crate) fn radius_of_positive(operator: &impl Positive) -> Radius {
             continue;
         }
         next = steps + steps / 4 + 2;
-        let Some(guess) = krylov.largest_real() else {
-            return Radius { value: f64::INFINITY, error: f64::INFINITY };
-        };
+        let guess = krylov.largest_real().ok_or(Ended::Overflow)?;
         let settled = (guess - before).abs() <= SETTLED * guess;
         before = guess;
         if !(settled || last) {
             continue;
         }
         let width = high - low;
-        let (below, above) = krylov.bounds(operator, guess);
+        let (below, above) = krylov.bounds(operator, guess, watch).ok_or(Ended::Stopped)?;
         (low, high) = (low.max(below), high.min(above));
         // Where rounding sets the limit a larger space does not help.
         let no_better = width.is_finite() && high - low > 0.5 * width;
@@ -88,9 +165,12 @@ pub(crate) fn radius_of_positive(operator: &impl Positive) -> Radius {
             break;
         }
     }
-    let value = if high.is_finite() { 0.5 * (low + high) } else { low };
+    if !high.is_finite() {
+        return Ok(Radius::at_least(low));
+    }
+    let value = 0.5 * (low + high);
     // The middle of the two rounds.
-    Radius { value, error: outward((high - value).max(value - low)) + f64::EPSILON * value }
+    Ok(Radius { value, error: outward((high - value).max(value - low)) + f64::EPSILON * value })
 }
 
 /// An orthonormal basis of the space of E, L(E), L²(E), …, in which L is an upper Hessenberg matrix.
@@ -153,11 +233,14 @@ impl Krylov {
         Some(if real > 0.0 { real } else { scale })
     }
 
-    /// The tightest bounds around a guess that can be checked in this space.
-    fn bounds(&self, operator: &impl Positive, guess: f64) -> (f64, f64) {
+    /// The tightest bounds around a guess that can be checked in this space; `None` if whoever watches ends it.
+    fn bounds(&self, operator: &impl Positive, guess: f64, watch: &dyn Watch) -> Option<(f64, f64)> {
         let mut low = 0.0;
         let mut apart = NEAREST;
         while apart < 1.0 && low == 0.0 {
+            if watch.stops() {
+                return None;
+            }
             let candidate = guess * (1.0 - apart);
             if self.check(operator, candidate, &is_indefinite) {
                 low = candidate;
@@ -167,6 +250,9 @@ impl Krylov {
         let mut high = f64::INFINITY;
         apart = NEAREST;
         while apart < 1e3 && high == f64::INFINITY {
+            if watch.stops() {
+                return None;
+            }
             // Where everything dies out within some frames, the guess is zero or rounding.
             let candidate = (guess * (1.0 + apart)).max(apart * 1e-3);
             if self.check(operator, candidate, &is_definite) {
@@ -174,7 +260,7 @@ impl Krylov {
             }
             apart *= FARTHER;
         }
-        (low, high)
+        Some((low, high))
     }
 
     /// Whether this space has a Y of that kind for which γY − L(Y) is positive definite whatever was rounded.

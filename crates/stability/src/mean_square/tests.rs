@@ -36,7 +36,7 @@ fn both_ways(overrides: &[&str]) -> (Radius, Radius) {
     let contacts = combinations(&scene).unwrap().remove(0).contacts;
     let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
     let one = symmetric(&scene, &network, &structure, &mut Vec::new()).unwrap().unwrap();
-    let other = one_by_one(&scene, &network, &structure, &contacts, &[], MOST_UNKNOWNS, &mut Vec::new()).unwrap();
+    let other = one_by_one(&scene, &network, &structure, &contacts, &[], &Limits::of_unknowns(MOST_UNKNOWNS), &mut Vec::new()).unwrap();
     assert!((one.held.value - other.held.value).abs() <= one.held.error + other.held.error);
     (one.radius, other.radius)
 }

@@ -95,7 +95,8 @@ pub fn radius(matrix: &Matrix) -> f64 {
 /// (Stewart & Sun 1990, Section IV.1; Trefethen & Embree 2005, Theorem 2.1), taken from the Schur form by blocks (Golub & Van Loan 2013, Section 7.6.3).
 /// A defective eigenvalue gets the error of size |E|^(1/m) that it has.
 ///
-/// The error is infinite if an entry is infinite or NaN, or if `perturbation` is.
+/// Matrices whose entries are too large for products of them are scaled by a power of two, which is exact. The error is infinite if an entry is infinite
+/// or NaN, or if `perturbation` is.
 ///
 /// # Panics
 ///
@@ -176,11 +177,20 @@ impl Workspace {
         if size == 0 {
             return Radius { value: 0.0, error: 0.0 };
         }
-        let norm = matrix.frobenius_norm();
-        // Also not for NaN; and beyond these sizes products leave the range of numbers.
-        if !((0.0..1e100).contains(&perturbation) && norm < 1e100) {
+        let largest = matrix.largest().max(perturbation);
+        // Also not for NaN.
+        if !(matrix.is_finite() && (0.0..f64::INFINITY).contains(&perturbation)) {
             return Radius { value: self.radius(matrix), error: f64::INFINITY };
         }
+        // Beyond these sizes products leave the range of numbers.
+        if largest > 1e60 {
+            let exponent = exponent_of(largest).min(1000);
+            let down = power_of_two(-exponent);
+            // What underflows is lost: less than the least normal number of each entry.
+            let lost = precise(size) * f64::MIN_POSITIVE;
+            return self.bounded_radius(&matrix.scaled(down), perturbation * down + lost).scaled(power_of_two(exponent));
+        }
+        let norm = matrix.frobenius_norm();
         if norm < 1e-100 {
             return Radius { value: 0.0, error: norm + perturbation };
         }

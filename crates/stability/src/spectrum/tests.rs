@@ -86,6 +86,7 @@ fn matrices_without_a_radius_say_so() {
     assert!(radius(&matrix(2, &[1.0, f64::NAN, 0.0, 1.0])).is_nan() && radius(&matrix(1, &[f64::INFINITY])).is_infinite());
     assert!(eigenvalues(&matrix(1, &[f64::NAN])).is_empty() && eigenvalues(&Matrix::default()).is_empty());
     assert!(bounded_radius(&matrix(1, &[f64::INFINITY]), 0.0).error.is_infinite());
+    assert_eq!(bounded_radius(&matrix(1, &[f64::INFINITY]), 0.0).verdict(), Verdict::Overflow);
     assert!(bounded_radius(&matrix(1, &[0.5]), f64::NAN).error.is_infinite());
     assert_eq!(bounded_radius(&Matrix::default(), 0.0), Radius { value: 0.0, error: 0.0 });
     let mut large = Matrix::identity(70);
@@ -255,4 +256,16 @@ proptest! {
             prop_assert!(distance(&ours, theirs) < 1e-6);
         }
     }
+}
+
+/// 10^200·[[2, 1], [1, 2]] has the eigenvalues 10^200 and 3·10^200, and diag(10^300, 10^300) twice 10^300: squares of these are no numbers.
+#[test]
+fn matrices_whose_squares_overflow_have_their_radius() {
+    let found = bounded_radius(&matrix(2, &[2e200, 1e200, 1e200, 2e200]), 1e180);
+    assert!((found.value / 3e200 - 1.0).abs() < 1e-14 && found.error < 1e187, "{found:?}");
+    assert_eq!(found.verdict(), Verdict::Unstable);
+    let found = bounded_radius(&matrix(2, &[1e300, 0.0, 0.0, -1e300]), 0.0);
+    assert!((found.value / 1e300 - 1.0).abs() < 1e-14 && found.verdict() == Verdict::Unstable, "{found:?}");
+    // The norm is no number, the radius is above 1 all the same.
+    assert_eq!(bounded_radius(&Matrix::from_fn(100, 100, |_, _| 1e307), 0.0).verdict(), Verdict::Unstable);
 }

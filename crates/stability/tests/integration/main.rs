@@ -10,3 +10,4 @@ mod mean_square;
 mod reduction;
 mod reference;
 mod strategies;
+mod watch;

@@ -4,8 +4,8 @@ use cohaptic_scene::Scene;
 use cohaptic_stability::{Analysis, ContactMode, Judgement, Part, PartKind, SceneWorstCase};
 use serde::Serialize;
 
+use super::speed::{Bounded, per_second, time_constant};
 use super::worst::WorstDocument;
-use super::{per_second, time_constant};
 
 /// What `cohaptic stability point --json` prints.
 #[derive(Serialize)]
@@ -23,14 +23,17 @@ pub(super) struct Document<'a> {
     dimension: usize,
     method: &'static str,
     frame_s: f64,
-    per_second: f64,
+    /// Both `null` where the bounds of the radius leave more than a percent of them open.
+    per_second: Option<f64>,
     time_constant_s: Option<f64>,
+    /// The least and the most that the bounds of the radius allow.
+    time_constant_bounds_s: Option<[f64; 2]>,
     /// Of the mode of contact with the largest radius.
     parts: Vec<PartDocument<'a>>,
     modes: Vec<ModeDocument<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     worst_case: Option<WorstDocument<'a>>,
-    notes: Vec<&'a str>,
+    notes: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -58,6 +61,7 @@ impl<'a> Document<'a> {
     pub(super) fn new(scene: &'a Scene, judgement: &'a Judgement, worst: Option<&'a SceneWorstCase>) -> Self {
         let Judgement { verdict, analysis, mean_square } = judgement;
         let radius = mean_square.as_ref().map(|mean_square| mean_square.radius);
+        let constant = time_constant(analysis);
         Self {
             title: &scene.title,
             verdict: verdict.word(),
@@ -69,8 +73,9 @@ impl<'a> Document<'a> {
             dimension: analysis.dimension,
             method: analysis.method.word(),
             frame_s: analysis.frame.as_secs_f64(),
-            per_second: per_second(analysis),
-            time_constant_s: time_constant(analysis),
+            per_second: per_second(analysis).known(),
+            time_constant_s: constant.and_then(|constant| constant.known()).filter(|seconds| *seconds != 0.0),
+            time_constant_bounds_s: constant.map(|Bounded { low, high, .. }| [low, high]),
             parts: worst_mode(analysis).map(|mode| parts(scene, mode)).unwrap_or_default(),
             modes: analysis.modes.iter().map(|mode| ModeDocument::new(scene, mode)).collect(),
             worst_case: worst.map(WorstDocument::new),
@@ -115,16 +120,18 @@ impl<'a> PartDocument<'a> {
     }
 }
 
-/// What is left out, by the analysis and by the mean square, each once.
-pub(super) fn notes(judgement: &Judgement) -> Vec<&str> {
-    let mean_square = judgement.mean_square.iter().flat_map(|mean_square| &mean_square.notes);
-    let mut notes: Vec<&str> = Vec::new();
-    for note in judgement.analysis.notes.iter().chain(mean_square) {
-        if !notes.contains(&note.as_str()) {
-            notes.push(note);
-        }
-    }
-    notes
+/// What is left out, by the analysis and by the mean square, each once. Where there are both figures, a note says which of them it is about.
+pub(super) fn notes(judgement: &Judgement) -> Vec<String> {
+    let Some(mean_square) = &judgement.mean_square else {
+        return judgement.analysis.notes.clone();
+    };
+    let nominal = &judgement.analysis.notes;
+    let of_nominal = nominal.iter().map(|note| match mean_square.notes.contains(note) {
+        true => format!("both radii: {note}"),
+        false => format!("the spectral radius, with nothing left to chance: {note}"),
+    });
+    let of_mean_square = mean_square.notes.iter().filter(|note| !nominal.contains(note)).map(|note| format!("the mean-square radius: {note}"));
+    of_nominal.chain(of_mean_square).collect()
 }
 
 /// The mode of contact with the largest radius.

@@ -7,7 +7,7 @@ use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKin
 use cohaptic_units::print::Span;
 
 use super::document::{notes, worst_mode};
-use super::{per_second, time_constant};
+use super::speed;
 
 /// The modes of contact that are listed at most; the worst is always among them.
 const MOST_MODES: usize = 16;
@@ -24,7 +24,7 @@ pub(super) fn describe(scene: &Scene, judgement: &Judgement, worst: Option<&Scen
         line(format!("with nothing left to chance: {}", analysis.verdict().word()));
     }
     line(format!("spectral radius {} over a frame of {}", number(analysis.radius), Span(analysis.frame)));
-    line(speed(analysis));
+    line(speed::words(analysis));
     let rigid = match analysis.rigid_modes {
         0 => "no rigid-body mode to remove".to_owned(),
         1 => "1 rigid-body mode removed".to_owned(),
@@ -58,15 +58,21 @@ fn sentence(verdict: Verdict, mean_square: bool) -> &'static str {
     match (verdict, mean_square) {
         (Verdict::Stable, false) => "STABLE: every disturbance of the relative motion dies out",
         (Verdict::Marginal, false) => "MARGINAL: the spectral radius cannot be told from 1 within its error",
+        (Verdict::Overflow, false) => {
+            "OVERFLOW: nothing is known of the spectral radius, because the numbers, or their errors, left the range of the computation"
+        }
         (Verdict::Unstable, false) => "UNSTABLE: some disturbance of the relative motion grows without end",
         (Verdict::Stable, true) => "STABLE in the mean square: the variance of every disturbance of the relative motion dies out",
         (Verdict::Marginal, true) => "MARGINAL: the mean-square radius cannot be told from 1 within its error",
+        (Verdict::Overflow, true) => {
+            "OVERFLOW: nothing is known of the mean-square radius, because the numbers, or their errors, left the range of the computation"
+        }
         (Verdict::Unstable, true) => "UNSTABLE in the mean square: the variance of some disturbance of the relative motion grows without end",
     }
 }
 
 /// The worst case, with the pattern that makes it.
-fn worst_case(worst: &SceneWorstCase, said: &[&str], line: &mut impl FnMut(String)) {
+fn worst_case(worst: &SceneWorstCase, said: &[String], line: &mut impl FnMut(String)) {
     let verdict = match worst.verdict() {
         WorstVerdict::Stable => "stable whatever the network does within these bounds",
         WorstVerdict::Undecided => "not decided: 1 is between the bounds; --products and --accuracy may tell",
@@ -82,19 +88,7 @@ fn worst_case(worst: &SceneWorstCase, said: &[&str], line: &mut impl FnMut(Strin
     if !part.sequence.is_empty() {
         line(format!("  the pattern that grows as the lower bound: {}", part.sequence));
     }
-    worst.notes.iter().filter(|note| !said.contains(&note.as_str())).for_each(|note| line(format!("  note: {note}")));
-}
-
-/// How fast the slowest disturbance changes.
-fn speed(analysis: &Analysis) -> String {
-    let factors = format!("by a factor of {:.6} a frame and {:.4e} a second", analysis.radius.value, per_second(analysis));
-    match (analysis.verdict(), time_constant(analysis)) {
-        (Verdict::Stable, Some(seconds)) => format!("the slowest disturbance changes {factors}: time constant {}", time(seconds)),
-        (Verdict::Stable, None) => "every disturbance is gone within a frame".to_owned(),
-        (Verdict::Unstable, Some(seconds)) => format!("the fastest disturbance grows {factors}: e times as large in {}", time(-seconds)),
-        (Verdict::Unstable, None) => "the fastest disturbance grows beyond every number within a frame".to_owned(),
-        (Verdict::Marginal, _) => format!("the slowest disturbance changes {factors}"),
-    }
+    worst.notes.iter().filter(|note| !said.contains(note)).for_each(|note| line(format!("  note: {note}")));
 }
 
 fn modes(analysis: &Analysis, line: &mut impl FnMut(String)) {
@@ -131,9 +125,7 @@ fn method(method: Method) -> &'static str {
 }
 
 fn number(radius: Radius) -> String {
-    format!("{:.12} +- {:.1e}", radius.value, radius.error)
-}
-
-fn time(seconds: f64) -> String {
-    if seconds < 1.0 { format!("{:.3} ms", seconds * 1e3) } else { format!("{seconds:.3} s") }
+    let Radius { value, error } = radius;
+    // Beyond a few digits before the point, decimals say nothing.
+    if value.is_finite() && value >= 1e9 { format!("{value:.12e} +- {error:.1e}") } else { format!("{value:.12} +- {error:.1e}") }
 }

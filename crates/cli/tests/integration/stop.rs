@@ -1,0 +1,137 @@
+//! SIGINT and SIGTERM while a command computes: it ends within a second, with status 130, a word on standard error, and what was whole by then.
+//!
+//! The guarantee is one second. A machine that does other things besides may need longer to get to it, so that a test allows some; without the guarantee
+//! each of these commands goes on for minutes.
+
+use std::process::{Child, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use crate::desk::{Desk, Outcome, parse};
+use crate::scenes::TWO;
+
+/// How long a command may take to end.
+const SOON: Duration = Duration::from_secs(10);
+
+/// Sends a signal to a command once it is at work, and gives what it left when it has ended.
+fn stopped(desk: &Desk, line: &str, signal: &str) -> Outcome {
+    stopped_after(HALF_A_SECOND, desk, line, signal)
+}
+
+/// Far more than reading a scene takes, and than starting up \[1/100 s\].
+const HALF_A_SECOND: u64 = 50;
+
+/// The same once it has computed that long \[1/100 s\].
+fn stopped_after(worked: u64, desk: &Desk, line: &str, signal: &str) -> Outcome {
+    // Files, for nobody reads a pipe meanwhile.
+    let file = |name: &str| Stdio::from(std::fs::File::create(desk.path(name)).unwrap());
+    let mut child = desk.command(line).stdout(file("stdout")).stderr(file("stderr")).spawn().unwrap();
+    while !has_worked(worked, child.id()) {
+        assert_eq!(child.try_wait().unwrap(), None, "it ended by itself: {} {}", desk.read("stdout"), desk.read("stderr"));
+        sleep(Duration::from_millis(5));
+    }
+    assert!(std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+    let status = end_soon(&mut child);
+    Outcome { status, stdout: desk.read("stdout"), stderr: desk.read("stderr") }
+}
+
+/// Whether a process listens to signals, and has computed that long \[1/100 s\].
+fn has_worked(worked: u64, id: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
+    // The fields behind the name, which is in brackets: the 12th and 13th of them are the time in user mode and in the system [1/100 s].
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
+    let ticks = |place: usize| fields.get(place).and_then(|field| field.parse::<u64>().ok()).unwrap_or(0);
+    crate::interrupt::listens(id) && ticks(11) + ticks(12) >= worked
+}
+
+fn end_soon(child: &mut Child) -> Option<i32> {
+    let asked = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        if asked.elapsed() > SOON {
+            child.kill().unwrap();
+            panic!("it did not end");
+        }
+        sleep(Duration::from_millis(5));
+    }
+}
+
+fn assert_interrupted(outcome: &Outcome) {
+    assert_eq!(outcome.status, Some(130), "{outcome:?}");
+    assert!(outcome.stderr.starts_with("interrupted: ") && outcome.stderr.lines().count() == 1, "{outcome:?}");
+}
+
+/// 400 users, no two of them alike: a matrix of 400·(4 + 2·4) rows, whose eigenvalues take minutes and cannot ask.
+fn many() -> String {
+    let peers: String = (0..400).map(|peer| format!("[[peers]]\nname = \"p{peer}\"\ndevice = {{ mass = 0.1{peer:03}, damping = 5.0 }}\n")).collect();
+    let (head, _) = TWO.split_once("[[peers]]").unwrap();
+    format!("{head}{peers}[link]\ndelay = \"24ms\"\n")
+}
+
+#[test]
+fn an_analysis_ends_while_it_works_out_the_eigenvalues_of_a_large_matrix() {
+    let desk = Desk::with("many.toml", &many());
+    for signal in ["-INT", "-TERM"] {
+        let outcome = stopped(&desk, "stability point many.toml --json", signal);
+        assert_interrupted(&outcome);
+        assert_eq!(outcome.stdout, "");
+    }
+}
+
+#[test]
+fn an_analysis_of_the_whole_state_ends() {
+    let desk = Desk::with("two.toml", TWO);
+    assert_interrupted(&stopped(&desk, "stability point two.toml --method full --set peers=[] --set scene.count=300", "-TERM"));
+}
+
+/// Samples that overtake each other on six links, followed by which of them is held.
+#[test]
+fn a_mean_square_ends() {
+    let desk = Desk::with("two.toml", TWO);
+    assert_interrupted(&stopped(&desk, "stability point two.toml --set peers=[] --set scene.count=3 --set link.jitter=2ms", "-INT"));
+}
+
+#[test]
+fn a_search_for_the_worst_case_ends() {
+    let desk = Desk::with("two.toml", TWO);
+    let line = "stability point two.toml --losses-in-a-row 4 --links each --accuracy 1e-9 --products 1000000000";
+    assert_interrupted(&stopped(&desk, line, "-TERM"));
+}
+
+#[test]
+fn the_paper_says_that_it_was_ended() {
+    assert_interrupted(&stopped(&Desk::new(), "paper --out out", "-INT"));
+}
+
+/// The points that are finished are the first of those that were asked for, in a whole document and a whole table.
+#[test]
+fn an_admittance_keeps_the_points_that_it_has() {
+    let desk = Desk::with("two.toml", TWO);
+    // The first points are there after milliseconds; there shall not be so many that a busy machine prints them for a second.
+    let outcome = stopped_after(8, &desk, "admittance two.toml --peer left --points 1000000 --json --out out", "-INT");
+    assert_interrupted(&outcome);
+    let document = parse(&outcome.stdout);
+    let points = document["points"].as_array().unwrap();
+    assert_eq!(desk.files("out"), ["admittance.csv"]);
+    assert_eq!(desk.read("out/admittance.csv").lines().count(), 1 + points.len());
+    assert!(!points.is_empty() && points.len() < 1_000_000 && document["interrupted"] == true);
+    // The first of a million from 0.01 Hz to 100 Hz; each is 10^(4/999999) times the one before.
+    let hz = |place: usize| points[place]["hz"].as_f64().unwrap();
+    assert!((hz(0) - 0.01).abs() < 1e-15 && (hz(points.len() - 1) / hz(points.len() - 2) / 10_f64.powf(4.0 / 999_999.0) - 1.0).abs() < 1e-9);
+}
+
+/// Of two scenes the first is told, whatever becomes of the second.
+#[test]
+fn a_check_keeps_the_scenes_that_were_checked() {
+    let desk = Desk::with("scenes/b.toml", &format!("{}\n[expect]\nstable = true\n", many().replace("200ms", "10ms")));
+    desk.write("scenes/a.toml", format!("{TWO}\n[expect]\nstable = true\n"));
+    let outcome = stopped(&desk, "check scenes --json", "-TERM");
+    assert_interrupted(&outcome);
+    let scenes = parse(&outcome.stdout)["scenes"].clone();
+    assert_eq!((&scenes[0]["file"], &scenes[0]["passed"]), (&"scenes/a.toml".into(), &true.into()));
+    assert_eq!((&scenes[1]["file"], &scenes[1]["passed"]), (&"scenes/b.toml".into(), &false.into()));
+    assert!(scenes[1]["failures"][0].as_str().unwrap().starts_with("interrupted"), "{scenes:#}");
+    assert!(outcome.stderr.contains("1 of 2 scenes"), "{}", outcome.stderr);
+}

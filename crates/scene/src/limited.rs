@@ -1,0 +1,104 @@
+//! Files that are read: up to a limit, whatever they are.
+//!
+//! A regular file that is longer is refused before it is read. What is none, a pipe or a device, has no length and is read up to the limit.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// The most bytes of a file that is read as a whole, 256 MiB: a scene, a trace, a replay, recorded motion, a table of a distribution, inputs,
+/// measurements, weights.
+pub const MOST_BYTES: u64 = 256 << 20;
+
+/// The most bytes of a capture, which is read packet by packet, 4 GiB.
+pub const MOST_CAPTURE_BYTES: u64 = 4 << 30;
+
+/// The bytes of a file.
+///
+/// # Errors
+///
+/// What the system says; and [`io::ErrorKind::FileTooLarge`] beyond [`MOST_BYTES`].
+pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let mut from = LimitedFile::open(path, MOST_BYTES)?;
+    let mut bytes = Vec::new();
+    from.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// A file that is read up to a limit, beyond which there is an error.
+#[derive(Debug)]
+pub struct LimitedFile {
+    file: File,
+    most: u64,
+    left: u64,
+}
+
+impl LimitedFile {
+    /// Opens a file of at most so many bytes.
+    ///
+    /// # Errors
+    ///
+    /// What the system says; and [`io::ErrorKind::FileTooLarge`] for a regular file that is longer.
+    pub fn open(path: &Path, most: u64) -> io::Result<Self> {
+        let file = File::open(path)?;
+        let about = file.metadata()?;
+        if about.is_file() && about.len() > most {
+            return Err(too_large(most));
+        }
+        Ok(Self { file, most, left: most })
+    }
+}
+
+impl Read for LimitedFile {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        // One byte more, to tell the end of the file from that of the limit.
+        let room = usize::try_from(self.left.saturating_add(1)).unwrap_or(usize::MAX).min(buffer.len());
+        let count = self.file.read(&mut buffer[..room])?;
+        match self.left.checked_sub(count as u64) {
+            Some(left) => {
+                self.left = left;
+                Ok(count)
+            }
+            None => Err(too_large(self.most)),
+        }
+    }
+}
+
+fn too_large(most: u64) -> io::Error {
+    let mebibytes = most >> 20;
+    io::Error::new(io::ErrorKind::FileTooLarge, format!("it is longer than {mebibytes} MiB: expected a file of at most that"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(length: usize) -> tempfile::NamedTempFile {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), vec![b'a'; length]).unwrap();
+        file
+    }
+
+    fn read(path: &Path, most: u64) -> io::Result<usize> {
+        let mut bytes = Vec::new();
+        LimitedFile::open(path, most)?.read_to_end(&mut bytes)
+    }
+
+    #[test]
+    fn a_file_of_the_limit_is_read_and_one_byte_more_is_refused() {
+        assert_eq!(read(file(100).path(), 100).unwrap(), 100);
+        assert_eq!(read(file(101).path(), 100).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+        assert_eq!(read(file(0).path(), 0).unwrap(), 0);
+    }
+
+    /// It has no length, and no end.
+    #[test]
+    #[cfg(unix)]
+    fn a_device_is_read_up_to_the_limit() {
+        let error = read(Path::new("/dev/zero"), 1 << 20).unwrap_err();
+        assert_eq!(
+            (error.kind(), error.to_string().as_str()),
+            (io::ErrorKind::FileTooLarge, "it is longer than 1 MiB: expected a file of at most that")
+        );
+    }
+}

@@ -1,0 +1,47 @@
+//! Who watches a computation, and how much it may take.
+
+/// Sees how far a computation is, and may end it.
+pub trait Watch: Sync {
+    /// So many more operations are to be done, by the estimate (see [`FrameCost`](crate::FrameCost)); called before they are begun.
+    fn expects(&self, _operations: f64) {}
+
+    /// So many of them are done.
+    fn done(&self, _operations: f64) {}
+
+    /// Whether the computation is to be given up; asked every few milliseconds where the computation is a loop.
+    fn stops(&self) -> bool {
+        false
+    }
+}
+
+/// Nobody watches.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Unwatched;
+
+impl Watch for Unwatched {}
+
+/// What an analysis may take, and who watches it.
+#[derive(Clone, Copy)]
+pub struct Limits<'a> {
+    /// More numbers of the second moment than this are refused ([`crate::mean_square_within`]).
+    pub unknowns: usize,
+    /// A second moment that takes more operations than this, by the estimate, is refused.
+    pub operations: f64,
+    /// Sees the progress, and may end it.
+    pub watch: &'a dyn Watch,
+}
+
+impl Limits<'static> {
+    /// Whatever it takes, but for the unknowns; nobody watches.
+    #[must_use]
+    pub const fn of_unknowns(unknowns: usize) -> Self {
+        Self { unknowns, operations: f64::INFINITY, watch: &Unwatched }
+    }
+}
+
+impl std::fmt::Debug for Limits<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { unknowns, operations, .. } = self;
+        formatter.debug_struct("Limits").field("unknowns", unknowns).field("operations", operations).finish_non_exhaustive()
+    }
+}
