@@ -32,7 +32,11 @@ fn all_same(shown: &[&str], printed: &[&str], vary: &Vary) -> bool {
 /// Of one line.
 pub(crate) fn same_line(shown: &str, printed: &str, vary: &Vary) -> bool {
     let (shown, printed) = (shown.trim_end(), printed.trim_end());
-    shown == printed || within_errors(shown, printed) || has_parts(shown, printed) || (vary.holds(shown) && words(shown) == words(printed))
+    shown == printed
+        || vary.leaves_alone(shown, printed)
+        || within_errors(shown, printed)
+        || has_parts(shown, printed)
+        || (vary.figures_of(shown) && words(shown) == words(printed))
 }
 
 /// Whether the printed line has all parts of the other one, between which something is left out, in their order.
@@ -101,7 +105,7 @@ fn address(word: &str) -> String {
 #[test]
 fn lines_left_out_are_any_lines_and_the_others_are_those() {
     let printed = ["title", "", "a 1", "b 2", "c 3"];
-    let same = |shown: &[&str]| same(shown, &printed, &Vary::Nowhere);
+    let same = |shown: &[&str]| same(shown, &printed, &Vary::default());
     assert!(same(&printed) && same(&["…"]) && same(&["title", "…", "c 3"]) && same(&["  …", "b 2", "…"]) && same(&["…", "a 1", "…", "c 3", "…"]));
     for other in
         [&["title"][..], &[], &["…", "a 1"], &["…", "b 2", "…", "a 1", "…"], &["title", "", "a 1", "b 2", "c 4"], &["…", "b 2", "…", "b 2", "c 3"]]
@@ -112,7 +116,7 @@ fn lines_left_out_are_any_lines_and_the_others_are_those() {
 
 #[test]
 fn a_part_of_a_line_may_be_left_out() {
-    let same = |shown: &str| same(&[shown], &["expected one of delay, jitter, loss; see --help"], &Vary::Nowhere);
+    let same = |shown: &str| same(&[shown], &["expected one of delay, jitter, loss; see --help"], &Vary::default());
     assert!(same("expected one of delay, …; see --help") && same("expected … loss; … --help") && same("expected…"));
     assert!(!same("expected one of loss, …; see --help") && !same("expected … loss; … jitter …") && !same("one of …"));
 }
@@ -120,7 +124,7 @@ fn a_part_of_a_line_may_be_left_out() {
 #[test]
 fn figures_with_an_error_of_rounding_are_the_same_within_it() {
     let line = "  stable  0.992453875813 +- 8.6e-13";
-    let same = |printed: &str| same(&[line], &[printed], &Vary::Nowhere);
+    let same = |printed: &str| same(&[line], &[printed], &Vary::default());
     assert!(same("  stable  0.992453875813 +- 3.7e-13") && same("  stable  0.992453875814 +- 1.2e-12"));
     // Off by more than is said, an error of another order, and other words.
     for other in [
@@ -131,13 +135,14 @@ fn figures_with_an_error_of_rounding_are_the_same_within_it() {
     ] {
         assert!(!same(other), "{other}");
     }
-    assert!(!super::compare::same(&["mean 39.9 ms +- 0.1 ms"], &["mean 39.8 ms +- 0.1 ms"], &Vary::Nowhere));
+    assert!(!super::compare::same(&["mean 39.9 ms +- 0.1 ms"], &["mean 39.8 ms +- 0.1 ms"], &Vary::default()));
 }
 
 #[test]
-fn only_figures_of_lines_that_vary_are_passed_over() {
-    let vary = Vary::Where(vec!["a second".to_owned()]);
+fn only_what_is_said_to_vary_is_passed_over() {
+    let vary = Vary { figures: vec!["a second".to_owned()], lines: vec!["the run is".to_owned()] };
     assert!(same(&["radius 1", "in 0.7 s: 90 a second"], &["radius 1", "in 12 ms:  7 a second"], &vary));
+    assert!(same(&["the run is valid"], &["the run is not valid: 2 of 3"], &vary));
     assert!(!same(&["radius 1"], &["radius 2"], &vary) && !same(&["in 0.7 s: 90 a second"], &["within 0.7 s: 90 a second"], &vary));
     assert_eq!(words("p50 35.5 µs, worst (-1.2e-3 ms)"), ["p50", "#,", "worst", "(#)"]);
     assert_eq!(words("at http://127.0.0.1:80/?token=09b1d4"), ["at", "http://#.#.#.#:#/?token=#"]);

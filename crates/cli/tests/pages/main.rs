@@ -23,12 +23,13 @@
 //! | `exit status: N N …` | of each `cohaptic` of the block in turn |
 //! | `figures vary` | of what is shown, numbers and units of time are not compared |
 //! | `figures vary: TEXT; TEXT` | the same, in lines that have one of these texts alone |
+//! | `lines vary: TEXT; TEXT` | of a line that has one of these texts nothing else is compared |
 //! | `run`, and lines `$ COMMAND` with what they print | commands that readers do not see: where the figures of a sentence or a table come from |
 //! | `figures printed above` | of the paragraph or table that follows: each number with a decimal point is one that the session before it printed, rounded |
 //!
 //! `COHAPTIC_UPDATE_PAGES=1 cargo test -p cohaptic-cli --test pages` writes into the pages what the commands print now; read the difference before it is
 //! kept. What was left out stays left out, as long as the lines around it can be found again.
-#![cfg(unix)]
+#![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run here says so")]
 

@@ -15,24 +15,29 @@ pub(crate) struct Notes {
     pub(crate) printed: bool,
 }
 
-/// In which lines figures are not compared.
-#[derive(Debug, Default, Clone, PartialEq, Eq)]
-pub(crate) enum Vary {
-    #[default]
-    Nowhere,
-    Everywhere,
-    /// In lines that have one of these texts.
-    Where(Vec<String>),
+/// What is not compared.
+#[derive(Debug, Default, Clone)]
+pub(crate) struct Vary {
+    /// The figures of lines that have one of these texts; an empty text is in every line.
+    pub(crate) figures: Vec<String>,
+    /// All of a line that has one of these texts, but for that text.
+    pub(crate) lines: Vec<String>,
 }
 
 impl Vary {
-    pub(crate) fn holds(&self, line: &str) -> bool {
-        match self {
-            Self::Nowhere => false,
-            Self::Everywhere => true,
-            Self::Where(texts) => texts.iter().any(|text| line.contains(text)),
-        }
+    /// Whether figures of this line are not compared.
+    pub(crate) fn figures_of(&self, line: &str) -> bool {
+        self.figures.iter().any(|text| line.contains(text))
     }
+
+    /// Whether both lines have the same text of those that are all that is compared.
+    pub(crate) fn leaves_alone(&self, one: &str, other: &str) -> bool {
+        self.lines.iter().any(|text| one.contains(text) && other.contains(text))
+    }
+}
+
+fn list(texts: &str) -> Vec<String> {
+    texts.split(';').map(|text| text.trim().to_owned()).collect()
 }
 
 impl Notes {
@@ -55,8 +60,9 @@ impl Notes {
                 self.statuses = Some(read.map_err(|error| format!("exit status: {error}"))?);
             }
             ("figures printed above", None) => self.printed = true,
-            ("figures vary", None) => self.vary = Vary::Everywhere,
-            ("figures vary", Some(texts)) => self.vary = Vary::Where(texts.split(';').map(|text| text.trim().to_owned()).collect()),
+            ("figures vary", None) => self.vary.figures = vec![String::new()],
+            ("figures vary", Some(texts)) => self.vary.figures = list(&texts),
+            ("lines vary", Some(texts)) => self.vary.lines = list(&texts),
             ("not run" | "needs" | "exit status", _) => return Err("a reason, a program or numbers are missing".to_owned()),
             _ => return Ok(false),
         }
@@ -70,9 +76,11 @@ fn comments_of_one_line_say_how_a_block_is_run() {
     for comment in ["not run: needs a Falcon", "exit status: 0 1", "figures vary: a second; real time", "run: --runs 3; for: --runs 1000"] {
         assert_eq!(notes.read(comment), Ok(true), "{comment}");
     }
-    assert_eq!((notes.not_run.as_deref(), notes.statuses), (Some("needs a Falcon"), Some(vec![0, 1])));
-    assert!(notes.vary.holds("1493 a second") && !notes.vary.holds("radius 0.5"));
+    assert_eq!((notes.not_run.as_deref(), notes.statuses.as_deref()), (Some("needs a Falcon"), Some(&[0, 1][..])));
+    assert!(notes.vary.figures_of("1493 a second") && !notes.vary.figures_of("radius 0.5"));
     assert_eq!(notes.instead, [("--runs 3".to_owned(), "--runs 1000".to_owned())]);
+    notes.read("lines vary: the run is").unwrap();
+    assert!(notes.vary.leaves_alone("the run is valid", "the run is not") && !notes.vary.leaves_alone("the run is valid", "granted"));
     assert_eq!(Notes::default().read("a remark"), Ok(false));
     assert!(Notes::default().read("not run:").is_err() && Notes::default().read("run: --quick").is_err());
 }

@@ -57,12 +57,12 @@ pub(crate) fn replaced(text: &str, changes: &[(Range<usize>, Vec<String>)]) -> S
 #[test]
 fn what_was_left_out_stays_left_out() {
     let printed = ["title", "", "rate 7", "b", "c", "d"];
-    assert_eq!(shown_anew(&["…", "rate 3", "…"], &printed, &Vary::Nowhere), ["…", "rate 7", "…"]);
-    assert_eq!(shown_anew(&["heading", "  …", "b", "x"], &printed, &Vary::Nowhere), ["title", "  …", "b", "c", "  …"]);
-    assert_eq!(shown_anew(&["…", "c", "x"], &printed, &Vary::Nowhere), ["…", "c", "d"]);
-    assert_eq!(shown_anew(&["…", "gone", "…"], &printed, &Vary::Nowhere), printed);
-    assert_eq!(shown_anew(&["x", "rate 3"], &["y", "rate 7"], &Vary::Everywhere), ["y", "rate 3"]);
-    assert_eq!(shown_anew(&["title"], &printed, &Vary::Nowhere), printed);
+    assert_eq!(shown_anew(&["…", "rate 3", "…"], &printed, &Vary::default()), ["…", "rate 7", "…"]);
+    assert_eq!(shown_anew(&["heading", "  …", "b", "x"], &printed, &Vary::default()), ["title", "  …", "b", "c", "  …"]);
+    assert_eq!(shown_anew(&["…", "c", "x"], &printed, &Vary::default()), ["…", "c", "d"]);
+    assert_eq!(shown_anew(&["…", "gone", "…"], &printed, &Vary::default()), printed);
+    assert_eq!(shown_anew(&["x", "rate 3"], &["y", "rate 7"], &Vary { figures: vec![String::new()], lines: Vec::new() }), ["y", "rate 3"]);
+    assert_eq!(shown_anew(&["title"], &printed, &Vary::default()), printed);
 }
 
 #[test]
