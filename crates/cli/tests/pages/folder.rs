@@ -75,9 +75,10 @@ impl Folder {
         Outcome { printed: String::from_utf8(output.stdout).unwrap(), statuses, status: output.status.code() }
     }
 
-    /// Whether a program is installed.
-    pub(crate) fn has(&self, program: &str) -> bool {
-        self.run(&format!("command -v {program}"), "").status == Some(0)
+    /// Whether a program is installed, or a line with more words than that succeeds.
+    pub(crate) fn has(&self, needs: &str) -> bool {
+        let line = if needs.contains(' ') { needs.to_owned() } else { format!("command -v {needs}") };
+        self.run(&line, "").status == Some(0)
     }
 }
 
@@ -88,6 +89,6 @@ fn a_script_sees_the_scenes_and_its_statuses_are_noted() {
     let outcome = folder.run("cohaptic check a.toml\ncohaptic explain scenarios/network/ideal.toml > said\ngrep -q lockstep said", "");
     assert_eq!((outcome.statuses, outcome.status), (vec![2, 0], Some(0)), "{}", outcome.printed);
     assert!(outcome.printed.contains("a.toml:1:4: "), "{}", outcome.printed);
-    assert!(folder.has("sh") && !folder.has("no-such-program"));
+    assert!(folder.has("sh") && !folder.has("no-such-program") && folder.has("test -d docs") && !folder.has("sh -c false"));
     assert_eq!(folder.run("cohaptic", "--version").statuses, [0]);
 }

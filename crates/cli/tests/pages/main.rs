@@ -19,7 +19,7 @@
 //! | `not run: REASON` | the commands of the block are not run; their options are looked up |
 //! | `run with: OPTIONS` | every `cohaptic` of the block gets these besides, so that it takes less time |
 //! | `run: TEXT; for: TEXT` | the first in place of the second, for the same reason |
-//! | `needs: PROGRAM` | where that program is not installed, the block is not run |
+//! | `needs: PROGRAM`, `needs: LINE` | where that program is not installed, or that line for `sh` fails, the block is not run |
 //! | `exit status: N N …` | of each `cohaptic` of the block in turn |
 //! | `figures vary` | of what is shown, numbers and units of time are not compared |
 //! | `figures vary: TEXT; TEXT` | the same, in lines that have one of these texts alone |

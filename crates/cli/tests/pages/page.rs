@@ -35,17 +35,18 @@ struct Page<'a> {
 pub(crate) fn check(name: &str) {
     let path = root().join(name);
     let text = fs::read_to_string(&path).unwrap();
-    let updates = std::env::var_os(UPDATE).is_some();
-    let mut page = Page {
-        name,
-        lines: text.lines().collect(),
-        folder: Folder::new(),
-        updates,
-        changes: Vec::new(),
-        problems: Vec::new(),
-        printed: String::new(),
-    };
-    let blocks = Block::all(name, &text);
+    let page = run(name, &text, std::env::var_os(UPDATE).is_some());
+    if !page.changes.is_empty() {
+        fs::write(&path, replaced(&text, &page.changes)).unwrap();
+        eprintln!("{name}: {} outputs were written anew", page.changes.len());
+    }
+    assert!(page.problems.is_empty(), "{} (if the page is to show it: {UPDATE}=1)", page.problems.join("\n"));
+}
+
+fn run<'a>(name: &'a str, text: &'a str, updates: bool) -> Page<'a> {
+    let lines = text.lines().collect();
+    let mut page = Page { name, lines, folder: Folder::new(), updates, changes: Vec::new(), problems: Vec::new(), printed: String::new() };
+    let blocks = Block::all(name, text);
     // A file that is shown only behind the commands that take it is there for them; of two with one name that is the first.
     for block in blocks.iter().rev().filter(|block| matches!(block.kind, Kind::File(_))) {
         page.block(block);
@@ -53,11 +54,7 @@ pub(crate) fn check(name: &str) {
     for block in &blocks {
         page.block(block);
     }
-    if !page.changes.is_empty() {
-        fs::write(&path, replaced(&text, &page.changes)).unwrap();
-        eprintln!("{name}: {} outputs were written anew", page.changes.len());
-    }
-    assert!(page.problems.is_empty(), "{} (if the page is to show it: {UPDATE}=1)", page.problems.join("\n"));
+    page
 }
 
 impl Page<'_> {
@@ -152,7 +149,7 @@ impl Page<'_> {
             return false;
         }
         if let Some(program) = notes.needs.as_deref().filter(|program| !self.folder.has(program)) {
-            eprintln!("{}:{}: not run, since there is no {program}", self.name, line + 1);
+            eprintln!("{}:{}: not run here, for want of `{program}`", self.name, line + 1);
             return false;
         }
         true
@@ -175,4 +172,53 @@ impl Page<'_> {
 /// The script with what the page says is run in place of something.
 fn with_less_work(script: &str, notes: &Notes) -> String {
     notes.instead.iter().fold(script.to_owned(), |script, (run, of)| script.replace(of, run))
+}
+
+/// A page with an output, each kind of fault beside what is right.
+const PAGE: &str = "<!-- run: scenarios; for: SCENES -->
+```text
+$ cohaptic check SCENES/network/ideal.toml
+ok    scenarios/network/ideal.toml
+1 passed, 0 failed
+$ cohaptic check scenarios/network/ideal.toml
+ok    scenarios/network/real.toml
+…
+```
+
+```sh
+cohaptic check scenarios/network/ideal.toml --set expect.stable=false
+```
+
+<!-- not run: a test -->
+```sh
+cohaptic check scenarios/network/ideal.toml --faster
+```
+
+<!-- run
+$ echo 0.8309
+0.8309
+-->
+<!-- figures printed above -->
+Here 0.83, there 0.84: `cohaptic check --json`.
+";
+
+#[test]
+fn each_difference_is_a_problem_and_nothing_else_is() {
+    let page = run("a page", PAGE, false);
+    let begins: Vec<&str> = page.problems.iter().map(|problem| problem.lines().next().unwrap()).collect();
+    let wanted = [
+        "a page:6: `cohaptic check scenarios/network/ideal.toml` prints",
+        "a page:12: expected exit status [0], got [1], of all Some(1):",
+        "a page:17: `cohaptic check` has no option `--faster`: cohaptic check scenarios/network/ideal.toml --faster",
+        "a page:25: the commands above do not print 0.84",
+    ];
+    assert_eq!(begins, wanted, "{}", page.problems.join("\n"));
+    assert!(page.changes.is_empty());
+}
+
+#[test]
+fn an_update_writes_what_is_printed_and_nothing_else() {
+    let page = run("a page", PAGE, true);
+    assert_eq!(page.problems.len(), 3, "{:#?}", page.problems);
+    assert_eq!(replaced(PAGE, &page.changes), PAGE.replace("network/real.toml", "network/ideal.toml"));
 }
