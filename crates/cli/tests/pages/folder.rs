@@ -33,7 +33,7 @@ const WRAPPER: &str =
 impl Folder {
     pub(crate) fn new() -> Self {
         let folder = Self(tempfile::tempdir().unwrap());
-        for name in ["bin", "desk"] {
+        for name in ["bin", "desk", "home"] {
             fs::create_dir(folder.path(name)).unwrap();
         }
         let wrapper = folder.path("bin/cohaptic");
@@ -64,6 +64,7 @@ impl Folder {
             .args(["-c", &format!("exec 2>&1\n{script}")])
             .current_dir(self.path("desk"))
             .env("PATH", format!("{}:{path}", self.path("bin").display()))
+            .env("HOME", self.path("home"))
             .env("COHAPTIC_PAGES_PROGRAM", env!("CARGO_BIN_EXE_cohaptic"))
             .env("COHAPTIC_PAGES_RUN_WITH", run_with)
             .env("COHAPTIC_PAGES_STATUSES", &log)

@@ -1,6 +1,7 @@
 //! Every command line on the pages of this project runs here, and prints what the page shows.
 //!
-//! A page is read from its first line to its last, in a folder of its own in which `scenarios` and `docs` are those of the project. What counts:
+//! A page is read from its first line to its last, in a folder of its own in which `scenarios` and `docs` are those of the project,
+//! and with an empty home. What counts:
 //!
 //! | on the page | is |
 //! | --- | --- |
@@ -15,7 +16,7 @@
 //!
 //! | comment | says |
 //! | --- | --- |
-//! | `file: NAME` | the block is a file of that name, there for all commands below; the lines of the comment itself are, if it has more than one |
+//! | `file: NAME` | the block is a file of that name, there for all commands of the page; the lines of the comment itself are, if it has more than one |
 //! | `not run: REASON` | the commands of the block are not run; their options are looked up |
 //! | `run with: OPTIONS` | every `cohaptic` of the block gets these besides, so that it takes less time |
 //! | `run: TEXT; for: TEXT` | the first in place of the second, for the same reason |
