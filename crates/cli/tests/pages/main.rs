@@ -1,0 +1,128 @@
+//! Every command line on the pages of this project runs here, and prints what the page shows.
+//!
+//! A page is read from its first line to its last, in a folder of its own in which `scenarios` and `docs` are those of the project,
+//! and with an empty home. What counts:
+//!
+//! | on the page | is |
+//! | --- | --- |
+//! | a fenced block `sh`, and an indented one that begins with a program's name | a script for `sh`. It runs whole; every `cohaptic` in it ends with status 0 |
+//! | a fenced block with lines `$ COMMAND` | commands, each with all that it prints (standard error too) in the lines below it. Nothing below: it prints nothing |
+//! | a line `…` there, or `…` within a line | any lines, or any text, left out on the page |
+//! | a figure with its error, `X +- 1.2e-13` | the same within that error, which may be another one up to ten times: rounding depends on the processor |
+//! | `` `cohaptic …` `` within a sentence or a table, and a usage line `cohaptic …` | not run; its options must be in `--help` |
+//! | `cargo …` | not run; the packages and programs it names must be there. `cargo run --release -- …` is `cohaptic …` |
+//!
+//! Comments (`<!-- … -->`), on lines of their own before a block, say what differs:
+//!
+//! | comment | says |
+//! | --- | --- |
+//! | `file: NAME` | the block is a file of that name, there for all commands of the page; the lines of the comment itself are, if it has more than one |
+//! | `not run: REASON` | the commands of the block are not run; their options are looked up |
+//! | `run with: OPTIONS` | every `cohaptic` of the block gets these besides, so that it takes less time |
+//! | `run: TEXT; for: TEXT` | the first in place of the second, for the same reason |
+//! | `needs: PROGRAM`, `needs: LINE` | where that program is not installed, or that line for `sh` fails, the block is not run |
+//! | `exit status: N N …` | of each `cohaptic` of the block in turn |
+//! | `figures vary` | of what is shown, numbers and units of time are not compared |
+//! | `figures vary: TEXT; TEXT` | the same, in lines that have one of these texts alone |
+//! | `lines vary: TEXT; TEXT` | of a line that has one of these texts nothing else is compared |
+//! | `run`, and lines `$ COMMAND` with what they print | commands that readers do not see: where the figures of a sentence or a table come from |
+//! | `figures printed above` | of the paragraph or table that follows: each number with a decimal point is one that the session before it printed, rounded |
+//!
+//! `COHAPTIC_UPDATE_PAGES=1 cargo test -p cohaptic-cli --test pages` writes into the pages what the commands print now; read the difference before it is
+//! kept. What was left out stays left out, as long as the lines around it can be found again.
+#![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
+#![expect(clippy::print_stderr, reason = "a test that cannot run here says so")]
+
+mod blocks;
+mod compare;
+mod figures;
+mod folder;
+mod notes;
+mod page;
+mod script;
+mod update;
+mod usage;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::blocks::Block;
+use crate::page::check;
+
+/// One test a page, so that they run at the same time.
+macro_rules! pages {
+    ($($name:ident: $path:literal),* $(,)?) => {
+        const PAGES: &[&str] = &[$($path),*];
+        $(
+            #[test]
+            fn $name() {
+                check($path);
+            }
+        )*
+    };
+}
+
+pages! {
+    readme: "README.md",
+    accuracy: "docs/accuracy.md",
+    architecture: "docs/architecture.md",
+    campaign: "docs/campaign.md",
+    claims: "docs/claims.md",
+    commands: "docs/commands.md",
+    the_book: "docs/README.md",
+    falcon: "docs/falcon.md",
+    hard_cases: "docs/hard-cases.md",
+    live: "docs/live.md",
+    live_control: "docs/live-control.md",
+    model: "docs/model.md",
+    netem: "docs/netem.md",
+    relay: "docs/relay.md",
+    results: "docs/results.md",
+    router: "docs/router.md",
+    scenes: "docs/scenes.md",
+    stability: "docs/stability.md",
+    scenarios: "scenarios/README.md",
+    testing: "docs/testing.md",
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+}
+
+/// All Markdown of the project, but for what is built or fetched.
+fn markdown(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let (path, name) = (entry.path(), entry.file_name());
+        let hidden = name.to_string_lossy().starts_with('.');
+        if path.is_dir() && !hidden && name != "target" {
+            markdown(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "md") {
+            found.push(path);
+        }
+    }
+}
+
+/// Pages that programs of `benches` write have their commands run there: `benches/tests/integration/commands.rs`; for the lines `cohaptic …` of
+/// `docs/measured.md` that is `measured.rs`, beside this folder.
+fn written_by_a_benchmark(text: &str) -> bool {
+    text.contains("written by\n\n    cargo run --release")
+        || text.contains("written by\n\n    cd benches/")
+        || text.contains("\n\n    benches/measure\n")
+}
+
+#[test]
+fn every_page_with_a_command_has_a_test() {
+    let root = root();
+    let mut found = Vec::new();
+    markdown(&root, &mut found);
+    let mut missing = Vec::new();
+    for path in found {
+        let (name, text) = (path.strip_prefix(&root).unwrap().to_str().unwrap().to_owned(), fs::read_to_string(&path).unwrap());
+        let has_commands = Block::all(&name, &text).iter().any(Block::has_commands);
+        if has_commands && name != "CHANGELOG.md" && !written_by_a_benchmark(&text) && !PAGES.contains(&name.as_str()) {
+            missing.push(name);
+        }
+    }
+    assert!(missing.is_empty(), "pages with commands and without a test in crates/cli/tests/pages/main.rs: {missing:?}");
+}
