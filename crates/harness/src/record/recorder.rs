@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use cohaptic_picture::Axis;
 use cohaptic_scene::Scene;
 use cohaptic_wan::Fate;
 
@@ -9,7 +10,7 @@ use super::band::Bands;
 use super::file::{RecordError, create_folder};
 use super::links;
 use super::packets::Packets;
-use super::plot::{self, Panel};
+use super::plot::{self, Panel, Plot};
 use super::trajectory::Trajectory;
 use crate::{Observer, PacketRow, Summary, TickRow};
 
@@ -73,23 +74,38 @@ impl Recorder {
     pub fn finish(self, summary: &Summary) -> Result<Vec<PathBuf>, RecordError> {
         let Self { folder, title, names, trajectory, packets, plotted } = self;
         let mut files = vec![trajectory.finish()?, packets.finish()?, links::write(&folder, summary)?];
-        for (file, bands, what, unit, scale, sane) in [
-            ("positions.svg", &plotted.positions, "position of each copy", "position [cm]", 100.0, SANE_POSITION),
-            ("forces.svg", &plotted.forces, "coordination force on each copy", "FT [N]", 1.0, SANE_FORCE),
+        for (file, bands, what, axis, scale, sane) in [
+            ("positions.svg", &plotted.positions, "position of each copy", Axis::new("Position").symbol("x_O").unit("cm"), 100.0, SANE_POSITION),
+            (
+                "forces.svg",
+                &plotted.forces,
+                "coordination force on each copy",
+                Axis::new("Coordination force").symbol("F_T").unit("N"),
+                1.0,
+                SANE_FORCE,
+            ),
         ] {
             let by_axis = bands.split(bands.curves() / names.len());
-            let heading = |axis: usize| if by_axis.len() == 1 { format!("{title}: {what}") } else { format!("{title}: {what} along {}", AXES[axis]) };
-            let panel = |(axis, bands)| Panel { title: heading(axis), unit, names: &names, bands, scale, sane, not_negative: false };
+            let heading = |along: usize| if by_axis.len() == 1 { String::new() } else { format!("along {}", AXES[along]) };
+            let panel = |(along, bands)| Panel { title: heading(along), axis: axis.clone(), names: &names, bands, scale, sane, not_negative: false };
             let panels: Vec<Panel<'_>> = by_axis.iter().enumerate().map(panel).collect();
-            files.push(plot::write(folder.join(file), &panels)?);
+            files.push(plot::write(folder.join(file), &Plot { title: format!("{title}: {what}"), panels })?);
         }
         let shares = plotted.drop_shares();
-        let of_links = |title: String, unit, bands, scale| Panel { title, unit, names: &[], bands, scale, sane: f64::INFINITY, not_negative: true };
-        let network = [
-            of_links(format!("{title}: delay of the packets that arrived, all links"), "delay [ms]", &plotted.delays, 1e3),
-            of_links("share of the packets sent that were dropped".into(), "dropped [%]", &shares, 100.0),
+        let of_links = |title: &str, axis, bands, scale| Panel {
+            title: title.to_owned(),
+            axis,
+            names: &[],
+            bands,
+            scale,
+            sane: f64::INFINITY,
+            not_negative: true,
+        };
+        let panels = vec![
+            of_links("delay of the packets that arrived", Axis::new("Delay").unit("ms"), &plotted.delays, 1e3),
+            of_links("share of the packets sent that were dropped", Axis::new("Dropped").unit("%"), &shares, 100.0),
         ];
-        files.push(plot::write(folder.join("network.svg"), &network)?);
+        files.push(plot::write(folder.join("network.svg"), &Plot { title: format!("{title}: all links"), panels })?);
         Ok(files)
     }
 }

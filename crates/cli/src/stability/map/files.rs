@@ -7,7 +7,7 @@ use super::{Order, VariantMap};
 use crate::failure::Failure;
 use crate::output;
 use crate::output_file::{field, write_file};
-use crate::stability::quantity::label;
+use crate::stability::quantity::axis_of;
 
 /// Writes `map.csv`, `map-2.csv` ... and `map.svg`, and gives their paths.
 pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap]) -> Result<Vec<String>, Failure> {
@@ -41,8 +41,8 @@ fn picture(order: &Order, maps: &[VariantMap]) -> String {
     let title = format!("{}: spectral radius 1", order.title);
     Picture {
         title: &title,
-        x: Axis { label: label(order.x()), values: &first.map.x },
-        y: Axis { label: label(order.y()), values: &first.map.y },
+        x: Axis { shown: axis_of(order.x()), values: &first.map.x },
+        y: Axis { shown: axis_of(order.y()), values: &first.map.y },
         outlines: maps.iter().map(outline).collect(),
         regions: first.map.regions(),
     }
