@@ -58,7 +58,6 @@ where
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Sample {
     Line(Look),
-    Area(RGBColor),
 }
 
 /// The height of an entry of the legend \[pixels\].
@@ -80,7 +79,6 @@ pub(crate) fn draw_legend<'a>(area: &Drawing<'a>, entries: &[(Sample, String)]) 
             Sample::Line(Look { style, dash: Some((dash, gap)) }) => {
                 area.draw(&DashedPathElement::new([(LEFT, y), (RIGHT, y)], dash, gap, style))?;
             }
-            Sample::Area(colour) => area.draw(&Rectangle::new([(LEFT, y - 6), (RIGHT, y + 6)], colour.filled()))?,
         }
         area.draw(&Text::new(name.clone(), (RIGHT + 12, y - 7), ("sans-serif", 14)))?;
         y += ENTRY;

@@ -53,6 +53,15 @@ fn unit(key: &str) -> Option<&'static str> {
 mod tests {
     use super::*;
 
+    /// Symbols are those of the table in docs/model.md, which takes them from the paper.
+    #[test]
+    fn an_axis_has_the_name_symbol_and_unit_of_the_paper() {
+        let of = |range: &str| axis_of(&KeyRange::parse(range).unwrap());
+        assert_eq!(of("coordination.stiffness=0..1"), Axis::new("Coordination stiffness").symbol("K_T").unit("N/m"));
+        assert_eq!(of("link.delay=0ms..1ms"), Axis::new("Delay of links").symbol("T_d").unit("ms"));
+        assert_eq!(of("peers.left.device.mass=0..1"), Axis::new("peers.left.device.mass").unit("kg"));
+    }
+
     #[test]
     fn a_key_is_shown_with_its_unit() {
         for (range, shown) in [

@@ -265,8 +265,10 @@ fn plots_are_well_formed_and_name_the_peers() {
         let desk = Desk::with("scene.toml", scene);
         desk.text("run scene.toml --out out");
         for plot in ["positions.svg", "forces.svg", "network.svg"] {
-            let words = svg::words(&desk.read(&format!("out/{plot}")));
-            let names: &[&str] = if plot == "network.svg" { &["t [s]", "delay [ms]"] } else { &names };
+            let document = desk.read(&format!("out/{plot}"));
+            assert_eq!(cohaptic_picture::testing::faults(&document), [""; 0], "{plot}");
+            let words = svg::words(&document);
+            let names: &[&str] = if plot == "network.svg" { &["Time", "Delay [ms]"] } else { &names };
             assert!(names.iter().all(|name| words.iter().any(|word| word == name)), "{plot}: {words:?}");
         }
     }
