@@ -255,9 +255,12 @@ macro_rules! content_from {
 }
 content_from!(Line, Band, Region, HeatMap, Rug);
 
+/// Lowest and highest x, and y; `None` where there is no value.
+pub(crate) type Reach = (Option<(f64, f64)>, Option<(f64, f64)>);
+
 impl Content {
     /// Lowest and highest x, and y, of what is neither an endless line nor without a place on the axes.
-    pub(crate) fn extents(&self) -> (Option<(f64, f64)>, Option<(f64, f64)>) {
+    pub(crate) fn extents(&self) -> Reach {
         let endless = |value: &f64| value.abs() < f64::MAX;
         let of = |points: &mut dyn Iterator<Item = (f64, f64)>| {
             let points: Vec<(f64, f64)> = points.collect();

@@ -1,7 +1,7 @@
 //! A panel: two axes and what lies between them.
 
 use crate::axis::{Axis, Extent};
-use crate::content::Content;
+use crate::content::{Content, Reach};
 use crate::text::Text;
 
 /// One plot of a picture.
@@ -56,7 +56,7 @@ impl Panel {
     }
 
     /// What both axes reach over: of this panel alone.
-    pub(crate) fn content_extents(&self) -> (Option<(f64, f64)>, Option<(f64, f64)>) {
+    pub(crate) fn content_extents(&self) -> Reach {
         let join = |one: Option<(f64, f64)>, other: Option<(f64, f64)>| match (one, other) {
             (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
             (one, other) => one.or(other),

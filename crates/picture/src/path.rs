@@ -14,6 +14,8 @@ pub(crate) struct Frame {
 }
 
 type Point = (f64, f64);
+/// Which coordinate a side limits, where it is, and whether what is greater (1) or less (-1) is inside.
+type Side = (fn(Point) -> f64, f64, f64);
 
 impl Frame {
     pub(crate) fn width(&self) -> f64 {
@@ -65,8 +67,7 @@ impl Frame {
 
     /// The part of a closed outline that lies inside (Sutherland & Hodgman 1974).
     pub(crate) fn cut_outline(&self, outline: &[Point]) -> Vec<Point> {
-        let sides: [(fn(Point) -> f64, f64, f64); 4] =
-            [(|p| p.0, self.left, 1.0), (|p| p.0, self.right, -1.0), (|p| p.1, self.top, 1.0), (|p| p.1, self.bottom, -1.0)];
+        let sides: [Side; 4] = [(|p| p.0, self.left, 1.0), (|p| p.0, self.right, -1.0), (|p| p.1, self.top, 1.0), (|p| p.1, self.bottom, -1.0)];
         let mut points = outline.to_vec();
         for (of, edge, sign) in sides {
             let room = |point: Point| sign * (of(point) - edge);

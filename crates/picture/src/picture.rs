@@ -1,6 +1,7 @@
 //! A whole picture: title, panels in a grid, legend; and the document it becomes.
 
 use crate::axis::Scale;
+use crate::content::Reach;
 use crate::draw;
 use crate::layout::{Layout, whole};
 use crate::legend::LegendPlace;
@@ -145,7 +146,7 @@ impl Picture {
         let own: Vec<_> = self.panels.iter().map(Panel::content_extents).collect();
         let all = own.iter().fold((None, None), |(x, y), (other_x, other_y)| (join(x, *other_x), join(y, *other_y)));
         let first = self.panels.first();
-        let of = |(panel, (x, y)): (&Panel, &(Option<(f64, f64)>, Option<(f64, f64)>))| Extents {
+        let of = |(panel, (x, y)): (&Panel, &Reach)| Extents {
             x: if self.shared_x { first.unwrap_or(panel).x.shown(all.0) } else { panel.x.shown(*x) },
             y: if self.shared_y { first.unwrap_or(panel).y.shown(all.1) } else { panel.y.shown(*y) },
         };
