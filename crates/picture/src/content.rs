@@ -1,5 +1,6 @@
 //! What a panel shows: lines, bands, regions, heat maps, marks.
 
+use crate::axis::Scale;
 use crate::look::{Fill, Look, Marker};
 use crate::text::Text;
 
@@ -201,7 +202,8 @@ impl HeatMap {
 
     /// The lowest and highest value.
     pub(crate) fn extent(&self) -> crate::axis::Extent {
-        let finite = self.values.iter().flatten().copied().filter(|value| value.is_finite());
+        let logarithmic = self.axis.scale == Scale::Logarithmic;
+        let finite = self.values.iter().flatten().copied().filter(|value| value.is_finite() && (!logarithmic || *value > 0.0));
         self.axis.clone().tight().shown(span(finite))
     }
 }
@@ -259,19 +261,19 @@ content_from!(Line, Band, Region, HeatMap, Rug);
 pub(crate) type Reach = (Option<(f64, f64)>, Option<(f64, f64)>);
 
 impl Content {
-    /// Lowest and highest x, and y, of what is neither an endless line nor without a place on the axes.
-    pub(crate) fn extents(&self) -> Reach {
-        let endless = |value: &f64| value.abs() < f64::MAX;
+    /// Lowest and highest x, and y, of what is neither an endless line nor without a place on axes of these scales.
+    pub(crate) fn extents(&self, x: Scale, y: Scale) -> Reach {
+        let placed = |scale: Scale| move |value: &f64| value.abs() < f64::MAX && (scale == Scale::Linear || *value > 0.0);
         let of = |points: &mut dyn Iterator<Item = (f64, f64)>| {
             let points: Vec<(f64, f64)> = points.collect();
-            (span(points.iter().map(|(x, _)| *x).filter(endless)), span(points.iter().map(|(_, y)| *y).filter(endless)))
+            (span(points.iter().map(|(x, _)| *x).filter(placed(x))), span(points.iter().map(|(_, y)| *y).filter(placed(y))))
         };
         match self {
             Self::Line(line) => of(&mut line.runs.iter().flatten().copied()),
             Self::Band(band) => of(&mut band.runs.iter().flatten().flat_map(|(x, low, high)| [(*x, *low), (*x, *high)])),
             Self::Region(region) => of(&mut region.outlines.iter().flatten().copied()),
-            Self::HeatMap(map) => (span(map.xs.iter().copied()), span(map.ys.iter().copied())),
-            Self::Rug(rug) => (span(rug.xs.iter().copied()), None),
+            Self::HeatMap(map) => (span(map.xs.iter().copied().filter(placed(x))), span(map.ys.iter().copied().filter(placed(y)))),
+            Self::Rug(rug) => (span(rug.xs.iter().copied().filter(placed(x))), None),
         }
     }
 }

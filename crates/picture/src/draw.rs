@@ -1,11 +1,11 @@
 //! The layout as a document.
 
-use crate::axis::Extent;
+use crate::axis::{Extent, Scale};
 use crate::content::{Band, Content, HeatMap, Line, Region, Rug, edges};
 use crate::layout::{AFTER_TICK, AxisLayout, BAR, Layout, PanelLayout, TICK, TITLE};
 use crate::legend::{draw_marker, stroke};
 use crate::look::{PATTERNS, STYLE};
-use crate::panel::Panel;
+use crate::panel::{Extents, Panel};
 use crate::path::{Frame, data, reduced};
 use crate::picture::Picture;
 use crate::size::MILLIMETRE;
@@ -69,6 +69,13 @@ impl Sheet<'_> {
     fn y(&self, value: f64) -> f64 {
         let frame = self.frame();
         frame.bottom - frame.height() * self.placed.extents.y.place(value).clamp(-1e6, 1e6)
+    }
+
+    /// Where a corner of an area is. One at zero or below on a logarithmic axis lies beyond its low end: there the area has no border that could be seen.
+    fn corner(&self, x: f64, y: f64) -> (f64, f64) {
+        let reaching = |extent: Extent, value: f64| if extent.scale == Scale::Logarithmic { value.max(f64::MIN_POSITIVE) } else { value };
+        let Extents { x: along, y: up } = self.placed.extents;
+        (self.x(reaching(along, x)), self.y(reaching(up, y)))
     }
 
     fn draw(&mut self, panel: &Panel) {
@@ -204,14 +211,14 @@ impl Sheet<'_> {
 
     fn band(&mut self, band: &Band) {
         for run in &band.runs {
-            let high = reduced(&run.iter().map(|(x, _, high)| (self.x(*x), self.y(*high))).collect::<Vec<_>>());
-            let low = reduced(&run.iter().map(|(x, low, _)| (self.x(*x), self.y(*low))).collect::<Vec<_>>());
+            let high = reduced(&run.iter().map(|(x, _, high)| self.corner(*x, *high)).collect::<Vec<_>>());
+            let low = reduced(&run.iter().map(|(x, low, _)| self.corner(*x, *low)).collect::<Vec<_>>());
             self.area(&[high.into_iter().chain(low.into_iter().rev()).collect()], &band.fill.class());
         }
     }
 
     fn region(&mut self, region: &Region) {
-        let outline = |outline: &Vec<(f64, f64)>| outline.iter().map(|(x, y)| (self.x(*x), self.y(*y))).collect();
+        let outline = |outline: &Vec<(f64, f64)>| outline.iter().map(|(x, y)| self.corner(*x, *y)).collect();
         let outlines: Vec<Vec<(f64, f64)>> = region.outlines.iter().map(outline).collect();
         self.area(&outlines, &region.fill.class());
     }
@@ -234,7 +241,7 @@ impl Sheet<'_> {
     fn heat_map(&mut self, map: &HeatMap) {
         let extent = map.extent();
         let (xs, ys): (Vec<f64>, Vec<f64>) =
-            (edges(&map.xs).iter().map(|x| self.x(*x)).collect(), edges(&map.ys).iter().map(|y| self.y(*y)).collect());
+            (edges(&map.xs).iter().map(|x| self.corner(*x, 1.0).0).collect(), edges(&map.ys).iter().map(|y| self.corner(1.0, *y).1).collect());
         // Cells of one colour beside each other are one rectangle; all rectangles of one colour are one path.
         let mut by_colour: Vec<Vec<Vec<(f64, f64)>>> = vec![Vec::new(); SHADES];
         for (row, values) in map.values.iter().enumerate() {

@@ -3,7 +3,6 @@
 //! Ticks, wrapped titles and labels depend on the size of the plots, and that on them; so a height is assumed, all is measured, and where a given height of the
 //! picture leaves less, this is done again with less.
 
-use crate::axis::Ticks;
 use crate::content::{Content, HeatMap, count};
 use crate::ends::EndLabel;
 use crate::legend::{Legend, LegendPlace, Sample, entry};
@@ -11,6 +10,7 @@ use crate::panel::{Extents, Panel};
 use crate::path::Frame;
 use crate::picture::Picture;
 use crate::text::{LEADING, Text};
+use crate::ticks::Ticks;
 
 /// The larger letters of the title \[sizes of the font\].
 pub(crate) const TITLE: f64 = 1.15;

@@ -20,10 +20,10 @@
 //!
 //! # Why no plotting crate
 //!
-//! `plotters`, which drew the pictures before, was tried as far as it goes: it works in whole pixels, cuts off a title that is too long, puts its legend over the
-//! data, has no subscripts, no style sheet, no hatching and no colour bar, and its logarithmic axes were replaced in two places. What is left of it, mapping a
-//! number to a pixel, is a line here. Nearly all of this crate is about room for text, which it does not know. What others do well is theirs: the colours of heat
-//! maps come from `colorous`.
+//! `plotters` drew the pictures before. It was judged by those pictures and by its documentation; no second implementation was made with it. Its SVG backend works in
+//! whole pixels, a title that is too long is cut off, the legend lies over the data, and there are no subscripts, no style sheet for a dark page, no hatching and no
+//! colour bar; its logarithmic axis had been replaced in two places. What is left of it, mapping a number to a pixel, is a line here. Nearly all of this crate is
+//! about room for text, which it does not know. The colours of heat maps come from `colorous`.
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact values"))]
 
 mod advance;
@@ -41,6 +41,7 @@ mod size;
 #[cfg(feature = "testing")]
 pub mod testing;
 mod text;
+mod ticks;
 mod xml;
 
 pub use axis::Axis;

@@ -61,7 +61,10 @@ impl Panel {
             (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
             (one, other) => one.or(other),
         };
-        self.contents.iter().map(Content::extents).fold((None, None), |(x, y), (other_x, other_y)| (join(x, other_x), join(y, other_y)))
+        self.contents
+            .iter()
+            .map(|content| content.extents(self.x.scale, self.y.scale))
+            .fold((None, None), |(x, y), (other_x, other_y)| (join(x, other_x), join(y, other_y)))
     }
 }
 

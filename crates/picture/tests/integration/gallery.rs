@@ -18,6 +18,28 @@ pub(crate) fn gallery() -> Vec<(String, Picture)> {
     kinds.into_iter().flat_map(named).collect()
 }
 
+/// Cells at 0, 1 and 10 on axes from 1 to 10: the first ends at 0.5, which is below the axes, the second at 5.5, which is 74 % up them (the decimal logarithm of 5.5).
+#[test]
+fn cells_and_bands_that_begin_at_zero_reach_the_foot_of_a_logarithmic_axis() {
+    let places = [0.0, 1.0, 10.0];
+    let axis = || Axis::new("x").logarithmic().range(1.0, 10.0);
+    let map = HeatMap::new(&places, &places, vec![vec![1.0, 2.0, 3.0]; 3], Axis::new("value"));
+    let cells = Region::cells(&places, &places, Fill::Hatch, |column, row| column == 1 && row < 2);
+    let band = Band::new([(1.0, 0.0, 5.0), (10.0, 0.0, 5.0)], Fill::Grey);
+    let svg = Picture::new("").panel(Panel::new(axis(), axis()).with(map).with(cells).with(band)).svg();
+    assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0]);
+    let ys = |class: &str| {
+        let path = svg.lines().find(|line| line.starts_with(&format!("<path class=\"{class}"))).unwrap_or_else(|| panic!("{class}: {svg}"));
+        let data = path.split_once(" d=\"").unwrap().1.split_once('"').unwrap().0;
+        let ys = data.split(['M', 'L', 'Z']).filter_map(|point| Some(point.split_once(',')?.1.parse::<f64>().unwrap()));
+        ys.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)))
+    };
+    let (top, foot) = ys("cells");
+    let (end, low) = ys("hatch");
+    assert!((low - foot).abs() < 0.02 && ((foot - end) / (foot - top) - 0.7404).abs() < 1e-3, "{top} {foot} {end} {low}");
+    assert!((ys("tint").1 - foot).abs() < 0.02, "{svg}");
+}
+
 fn samples(count: u32, end: f64) -> impl Iterator<Item = f64> {
     (0..count).map(move |n| f64::from(n) / f64::from(count - 1) * end)
 }
