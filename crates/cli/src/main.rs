@@ -15,7 +15,6 @@ mod failure;
 mod falcon;
 mod fit;
 mod interrupt;
-mod lines;
 mod link;
 mod live;
 mod output;

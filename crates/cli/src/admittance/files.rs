@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use cohaptic_picture::Size;
+
 use super::bode;
 use super::curve::Curve;
 use crate::failure::Failure;
@@ -9,8 +11,8 @@ use crate::output;
 use crate::output_file::{field, write_file};
 
 /// Writes `admittance.csv` and `admittance.svg` into a folder, which is made if it is not there, and gives their paths.
-pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve]) -> Result<Vec<String>, Failure> {
-    let contents = [("admittance.csv", table(curves)), ("admittance.svg", bode::svg(peer, curves)?)];
+pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve], size: Size) -> Result<Vec<String>, Failure> {
+    let contents = [("admittance.csv", table(curves)), ("admittance.svg", bode::picture(peer, curves)?.size(size).svg())];
     std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "write", path: folder.to_path_buf(), error })?;
     let mut written = Vec::new();
     for (name, content) in contents {

@@ -1,6 +1,5 @@
 //! `cohaptic admittance`.
 
-mod axes;
 mod bode;
 mod curve;
 mod document;
@@ -26,7 +25,7 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     let curves = curves.collect::<Result<Vec<Curve>, Failure>>()?;
     // Nothing is written before everything is known to be right.
     let files = match &arguments.out {
-        Some(folder) => files::write(folder, &arguments.peer, &curves)?,
+        Some(folder) => files::write(folder, &arguments.peer, &curves, arguments.pictures.size())?,
         None => Vec::new(),
     };
     if arguments.scene.json {

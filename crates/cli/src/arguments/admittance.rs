@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{EXIT_STATUS, SceneArguments};
+use super::{EXIT_STATUS, PictureArguments, SceneArguments};
 
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_STATUS)]
@@ -34,4 +34,6 @@ pub(crate) struct AdmittanceArguments {
     /// Write admittance.csv and a Bode plot, admittance.svg, into this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
 }

@@ -6,6 +6,7 @@ mod campaign;
 mod falcon;
 mod links;
 mod paper;
+mod pictures;
 mod realtime;
 mod relay;
 mod router;
@@ -25,6 +26,7 @@ pub(crate) use falcon::{
 };
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use paper::PaperArguments;
+pub(crate) use pictures::PictureArguments;
 pub(crate) use realtime::{LiveArguments, RealTimeArguments};
 pub(crate) use relay::RelayArguments;
 pub(crate) use router::RouterArguments;

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use cohaptic_stability::Method;
 
 use super::threads::threads;
-use super::{EXIT_STATUS, SceneArguments};
+use super::{EXIT_STATUS, PictureArguments, SceneArguments};
 
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_STATUS)]
@@ -113,6 +113,8 @@ pub(crate) struct MapArguments {
     /// Write map.csv, map-2.csv ... and map.svg into this folder, and keep there what is done if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
     /// How many cells are computed at the same time [default: one a core]. Results do not depend on it
     #[arg(long, value_name = "N", value_parser = threads())]
     pub(crate) jobs: Option<u16>,
@@ -135,6 +137,8 @@ pub(crate) struct BoundaryArguments {
     /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep there what is done if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
 }
 
 /// How many cells a map has along each axis.

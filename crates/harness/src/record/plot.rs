@@ -25,30 +25,31 @@ pub(crate) struct Panel<'a> {
     pub(crate) scale: f64,
     /// What curves do not exceed in a scene that does not diverge: see [`Bands::range`].
     pub(crate) sane: f64,
-    /// Whether values below zero have no meaning, so that the axis begins there.
-    pub(crate) not_negative: bool,
 }
 
 /// More curves than this are drawn in one look and not named.
 const MOST_NAMED: usize = 10;
 
-/// Writes a plot.
-pub(crate) fn write(path: PathBuf, plot: &Plot<'_>) -> Result<PathBuf, RecordError> {
+/// Writes a picture.
+pub(crate) fn write(path: PathBuf, picture: &Picture) -> Result<PathBuf, RecordError> {
     let mut file = PartialFile::create(path)?;
-    file.write(picture(plot).svg().as_bytes())?;
+    file.write(picture.svg().as_bytes())?;
     file.finish()
 }
 
-fn picture(plot: &Plot<'_>) -> Picture {
-    let mut picture = Picture::new(plot.title.as_str()).shared_x().aspect(0.38);
-    for panel in &plot.panels {
-        let (panel, cut) = drawn(panel);
-        picture = picture.panel(panel);
-        if cut && !picture.has_note(CUT) {
-            picture = picture.note(CUT);
+impl Plot<'_> {
+    /// The picture.
+    pub(crate) fn picture(&self) -> Picture {
+        let mut picture = Picture::new(self.title.as_str()).shared_x().aspect(0.38);
+        for panel in &self.panels {
+            let (panel, cut) = drawn(panel);
+            picture = picture.panel(panel);
+            if cut && !picture.has_note(CUT) {
+                picture = picture.note(CUT);
+            }
         }
+        picture
     }
-    picture
 }
 
 const CUT: &str = "What goes far beyond is cut off.";
@@ -56,8 +57,7 @@ const CUT: &str = "What goes far beyond is cut off.";
 /// The panel, and whether something is cut off.
 fn drawn(panel: &Panel<'_>) -> (cohaptic_picture::Panel, bool) {
     let (range, cut) = panel.bands.range(panel.sane);
-    let lowest = if panel.not_negative { 0.0 } else { f64::NEG_INFINITY };
-    let range = (range.start * panel.scale).max(lowest)..range.end * panel.scale;
+    let range = range.start * panel.scale..range.end * panel.scale;
     let time = Axis::new("Time").symbol("t").unit("s").range(0.0, panel.bands.seconds());
     let mut drawn = cohaptic_picture::Panel::new(time, panel.axis.clone().range(range.start, range.end)).titled(panel.title.as_str());
     let few = panel.bands.curves() <= MOST_NAMED;
@@ -113,8 +113,8 @@ mod tests {
         let title =
             "Section 5.1: two of three users, AP at 2100 N/m, with arms, with coordination.strategy=proportional-derivative: position of each copy";
         let axis = Axis::new("Position").symbol("x_O").unit("cm");
-        let panel = Panel { title: String::new(), axis, names: &names, bands: &bands, scale: 100.0, sane: 1.0, not_negative: false };
-        let svg = picture(&Plot { title: title.to_owned(), panels: vec![panel] }).svg();
+        let panel = Panel { title: String::new(), axis, names: &names, bands: &bands, scale: 100.0, sane: 1.0 };
+        let svg = Plot { title: title.to_owned(), panels: vec![panel] }.picture().svg();
         assert_eq!(faults(&svg), [""; 0]);
         let drawn = svg.split_once("</desc>").expect("there is a description").1;
         assert!(title.split(' ').all(|word| drawn.contains(word)) && drawn.contains(CUT), "the title and the warning are whole");

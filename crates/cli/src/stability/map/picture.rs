@@ -27,8 +27,8 @@ pub(super) struct Outline {
 }
 
 impl Picture<'_> {
-    /// The document.
-    pub(super) fn svg(&self) -> String {
+    /// The picture, of no size yet.
+    pub(super) fn drawn(&self) -> cohaptic_picture::Picture {
         let first = self.outlines.first().map_or("", |outline| &outline.name);
         let regions = self.regions.iter().map(|region| region.points.clone());
         let lines = self
@@ -39,7 +39,7 @@ impl Picture<'_> {
         let panel = Panel::new(self.x.between_values(), self.y.between_values())
             .with(Region::new(regions, Fill::Tint(0)).named(format!("stable: {first}")))
             .with_all(lines);
-        cohaptic_picture::Picture::new(self.title).panel(panel).svg()
+        cohaptic_picture::Picture::new(self.title).panel(panel)
     }
 }
 
@@ -66,7 +66,7 @@ mod tests {
         let square = |half: f64| Polyline { points: vec![(-half, -half), (half, -half), (half, half), (-half, half)], closed: true };
         let values = [-4.0, 4.0];
         let axis = || Axis { shown: Shown::new("x"), values: &values };
-        let svg = Picture { title: "", x: axis(), y: axis(), outlines: Vec::new(), regions: [1.0, 3.0, 2.0].map(square).into() }.svg();
+        let svg = Picture { title: "", x: axis(), y: axis(), outlines: Vec::new(), regions: [1.0, 3.0, 2.0].map(square).into() }.drawn().svg();
         let area = svg.lines().find(|line| line.starts_with("<path class=\"tint")).unwrap();
         assert!(area.contains("fill-rule=\"evenodd\"") && area.matches('M').count() == 3, "{area}");
     }
@@ -78,7 +78,7 @@ mod tests {
         let outlines = (0..12)
             .map(|n| Outline { name: format!("</svg>{n}\u{1}"), lines: vec![Polyline { points: vec![(0.0, 0.0), (1.0, 1.0)], closed: false }] })
             .collect();
-        let svg = Picture { title: "<script>", x: axis(), y: axis(), outlines, regions: Vec::new() }.svg();
+        let svg = Picture { title: "<script>", x: axis(), y: axis(), outlines, regions: Vec::new() }.drawn().svg();
         assert_eq!(svg.matches("</svg>").count(), 1);
         assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;") && !svg.contains('\u{1}'));
         assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0]);
