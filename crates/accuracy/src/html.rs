@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_harness::record::svg::escape;
+use cohaptic_picture::escape;
 
 use crate::groups::{Group, groups};
 use crate::numbers::short;

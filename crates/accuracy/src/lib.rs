@@ -23,7 +23,6 @@ mod plots;
 pub mod real_time;
 mod rounds;
 mod row;
-mod scale;
 mod subject;
 mod text;
 pub mod time;

@@ -21,7 +21,6 @@ mod fit;
 mod init;
 mod input;
 mod interrupt;
-mod lines;
 mod link;
 mod live;
 mod man;

@@ -106,7 +106,7 @@ fn document(reproduction: &Reproduction, has_files: bool) -> Document<'_> {
 
 fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure> {
     for figure in &reproduction.figures {
-        write_file(&folder.join(format!("{}.svg", figure.id)), figure.on_white().as_bytes())?;
+        write_file(&folder.join(format!("{}.svg", figure.id)), figure.svg.as_bytes())?;
         write_file(&folder.join(format!("{}.csv", figure.id)), figure.csv.as_bytes())?;
     }
     for claim in &reproduction.claims {

@@ -1,8 +1,8 @@
 //! Work–precision plots.
 
 use cohaptic_accuracy::{Subject, plots};
+use cohaptic_picture::testing::faults;
 
-use crate::documents::assert_balanced;
 use crate::row;
 
 #[test]
@@ -11,13 +11,12 @@ fn every_group_has_one_picture_with_a_line_for_each_method() {
     let plots = plots(&rows);
     let [plot] = plots.as_slice() else { panic!("{}", plots.len()) };
     assert_eq!((plot.id.as_str(), plot.caption.as_str()), ("motion-a-case-position-m", ""));
-    assert!(plot.svg.starts_with("<svg") && plot.on_white().starts_with("<svg style=\"background:#fff"));
-    assert_balanced(&plot.svg);
-    for text in ["one", "other", "ns a tick", "position [m]"] {
+    assert_eq!(faults(&plot.svg), [""; 0]);
+    for text in [">one</text>", ">other</text>", "Cost [ns a tick]", "Error: position [m]"] {
         assert!(plot.svg.contains(text), "{text}");
     }
-    // Three points, and one for each entry of the legend.
-    assert_eq!(plot.svg.matches("<circle").count(), 3 + 2);
+    // A disc for each of the two points of the first method and one in the legend, a square for the one point of the second and one in the legend.
+    assert_eq!((plot.svg.matches("<circle").count(), plot.svg.matches("<path class=\"f1\"").count()), (2 + 1, 1 + 1));
 }
 
 /// Zero has no logarithm: it is a triangle at the foot, and the legend and the caption say so.
@@ -26,16 +25,14 @@ fn an_error_of_zero_is_at_the_foot_and_said() {
     let with = plots(&[row("one", Some(1.0), Some(1e-3)), row("exact", Some(2.0), Some(0.0))]);
     let plot = &with[0];
     assert!(plot.svg.contains("error exactly 0") && plot.caption.contains("exactly 0"));
-    assert_eq!(plot.svg.matches("<polygon").count(), 1 + 1);
-    let lowest = |tag: &str, attribute: &str| {
-        let start = plot.svg.find(tag).unwrap();
-        plot.svg[start..].split_once(attribute).unwrap().1.split_once('"').unwrap().0.to_owned()
-    };
-    let circle: f64 = lowest("<circle", "cy=\"").parse().unwrap();
-    let polygon = lowest("<polygon", "points=\"");
-    for corner in polygon.split_whitespace() {
+    assert_eq!(faults(&plot.svg), [""; 0]);
+    let (_, circle) = plot.svg.split_once("cy=\"").unwrap();
+    let circle: f64 = circle.split_once('"').unwrap().0.parse().unwrap();
+    let triangle = plot.svg.lines().find(|line| line.starts_with("<path class=\"f1\"")).unwrap();
+    let corners = triangle.split_once(" d=\"M").unwrap().1.split_once(['Z', '"']).unwrap().0;
+    for corner in corners.split('L') {
         let y: f64 = corner.split_once(',').unwrap().1.parse().unwrap();
-        assert!(y > circle, "the triangle is below every error: {polygon} {circle}");
+        assert!(y > circle, "the triangle is below every error: {triangle} {circle}");
     }
     let without = plots(&[row("one", Some(1.0), Some(1e-3))]);
     assert!(!without[0].svg.contains("exactly 0"));
@@ -51,8 +48,7 @@ fn zeros_alone_one_point_alone_and_extreme_numbers_can_be_drawn() {
     ] {
         let plots = plots(&rows);
         assert_eq!(plots.len(), 1);
-        assert_balanced(&plots[0].svg);
-        assert!(!plots[0].svg.contains("NaN") && !plots[0].svg.contains("inf"), "{}", plots[0].svg);
+        assert_eq!(faults(&plots[0].svg), [""; 0]);
     }
 }
 

@@ -23,7 +23,7 @@ pub(super) fn write(folder: &Path, rows: &[Row], about: &About) -> Result<(), Fa
         Ok(()) | Err(_) => {}
     }
     for plot in plots(rows) {
-        write_file(&folder.join(format!("{}.svg", plot.id)), plot.on_white())?;
+        write_file(&folder.join(format!("{}.svg", plot.id)), &plot.svg)?;
     }
     write_file(&folder.join("index.html"), html(rows, about))
 }

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use cohaptic_picture::Size;
+
 use super::bode;
 use super::curve::Curve;
 use crate::failure::Failure;
@@ -11,7 +13,7 @@ use crate::output_file::{field, write_file};
 /// Writes `admittance.csv` and `admittance.svg` into a folder, which is made if it is not there, and gives their paths.
 ///
 /// Of points that are not all that were asked for there is only the table: a picture takes longer than a user waits who has asked for the end.
-pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve], is_whole: bool) -> Result<Vec<String>, Failure> {
+pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve], is_whole: bool, size: Size) -> Result<Vec<String>, Failure> {
     std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "write", path: folder.to_path_buf(), error })?;
     let mut written = Vec::new();
     let mut add = |name: &str, content: String| {
@@ -22,7 +24,7 @@ pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve], is_whole: bool)
     };
     add("admittance.csv", table(curves))?;
     if is_whole {
-        add("admittance.svg", bode::svg(peer, curves)?)?;
+        add("admittance.svg", bode::picture(peer, curves)?.size(size).svg())?;
     }
     Ok(written)
 }

@@ -1,6 +1,5 @@
 //! `cohaptic admittance`.
 
-mod axes;
 mod bode;
 mod curve;
 mod document;
@@ -37,7 +36,7 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     }
     // Nothing is written before everything is known to be right.
     let files = match &arguments.out {
-        Some(folder) => files::write(folder, &arguments.peer, &curves, !is_interrupted)?,
+        Some(folder) => files::write(folder, &arguments.peer, &curves, !is_interrupted, arguments.pictures.size())?,
         None => Vec::new(),
     };
     if arguments.scene.json {

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::SceneArguments;
 use super::examples::{self, after};
 use super::numbers::{real, some};
+use super::{PictureArguments, SceneArguments};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::ADMITTANCE))]
@@ -36,4 +36,6 @@ pub(crate) struct AdmittanceArguments {
     /// Write admittance.csv and a Bode plot, admittance.svg, into this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
 }

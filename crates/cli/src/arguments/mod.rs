@@ -10,6 +10,7 @@ mod links;
 mod numbers;
 mod pages;
 mod paper;
+mod pictures;
 mod realtime;
 mod relay;
 mod router;
@@ -33,6 +34,7 @@ pub(crate) use falcon::{
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArguments, SchemaArguments};
 pub(crate) use paper::PaperArguments;
+pub(crate) use pictures::PictureArguments;
 pub(crate) use realtime::{LiveArguments, RealTimeArguments};
 pub(crate) use relay::RelayArguments;
 pub(crate) use router::RouterArguments;

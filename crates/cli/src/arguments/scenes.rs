@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::examples::{self, after};
 use super::numbers::{integer, threads};
-use super::{Overrides, SceneArguments};
+use super::{Overrides, PictureArguments, SceneArguments};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::RUN))]
@@ -23,6 +23,8 @@ pub(crate) struct RunArguments {
     /// Write trajectory.csv, packets.csv, links.csv and plots (SVG) into this folder; the second run goes into its folder against
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
     /// Replay a live session: its inputs.csv, with the scene and the --set of that session. Fates and motion are the same to the last bit
     #[arg(long, value_name = "FILE", conflicts_with_all = ["against", "general"])]
     pub(crate) inputs: Option<PathBuf>,

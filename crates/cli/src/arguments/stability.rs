@@ -6,9 +6,9 @@ use std::time::Duration;
 use clap::{Args, Subcommand, ValueEnum};
 use cohaptic_stability::Method;
 
-use super::SceneArguments;
 use super::examples::{self, after};
 use super::numbers::{any_integer, integer, real, threads};
+use super::{PictureArguments, SceneArguments};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::STABILITY))]
@@ -114,6 +114,8 @@ pub(crate) struct MapArguments {
     /// Write map.csv, map-2.csv ... and map.svg into this folder, and keep there what is done if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
     /// How many cells are computed at the same time [default: one a core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
@@ -136,6 +138,8 @@ pub(crate) struct BoundaryArguments {
     /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep there what is done if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
 }
 
 /// How many cells a map has along each axis.

@@ -106,7 +106,7 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
     let (summary, files) = match out.as_deref() {
         None => (execute(arguments, scene, what, &mut &mut watch)?, Vec::new()),
         Some(folder) => {
-            let mut observer = (Recorder::create(folder, scene)?, &mut watch);
+            let mut observer = (Recorder::create(folder, scene)?.sized(arguments.pictures.size()), &mut watch);
             let summary = execute(arguments, scene, what, &mut observer)?;
             let files = observer.0.finish(&summary)?;
             (summary, files)

@@ -1,14 +1,39 @@
-//! The unit of a key, for axes.
+//! What an axis says of a key: its name and symbol as in the paper, and its unit.
 
+use cohaptic_picture::Axis;
 use cohaptic_stability::KeyRange;
 
 /// The key with the unit that its range has, or else that of the key itself: `coordination.stiffness [N/m]`, `link.delay [ms]`.
 pub(crate) fn label(range: &KeyRange) -> String {
-    let written = Some(range.unit.as_str()).filter(|unit| !unit.is_empty());
-    match written.or_else(|| unit(&range.key)) {
+    match shown_unit(range) {
         Some(unit) => format!("{} [{unit}]", range.key),
         None => range.key.clone(),
     }
+}
+
+/// The axis of a picture over a key: `Coordination stiffness K_T [N/m]`. A key that has no symbol in the paper keeps its own name.
+pub(crate) fn axis_of(range: &KeyRange) -> Axis {
+    let named = NAMES.iter().find(|(key, _, _)| *key == range.key.trim());
+    let axis = named.map_or_else(|| Axis::new(range.key.as_str()), |(_, name, symbol)| Axis::new(*name).symbol(symbol));
+    axis.unit(shown_unit(range).unwrap_or_default())
+}
+
+/// Keys, their names, and their symbols in Rakhsha & Constantinescu 2015; N is how many users there are, T_d the delay one way.
+const NAMES: [(&str, &str, &str); 10] = [
+    ("coordination.stiffness", "Coordination stiffness", "K_T"),
+    ("coordination.damping", "Coordination damping", "B_T"),
+    ("coupling.stiffness", "Coupling stiffness", "K_C"),
+    ("coupling.damping", "Coupling damping", "B_C"),
+    ("object.mass", "Mass of the object", "m_O"),
+    ("device.mass", "Mass of the device", "m_H"),
+    ("scene.count", "Number of users", "N"),
+    ("link.delay", "Delay of links", "T_d"),
+    ("link.loss", "Loss on links", ""),
+    ("link.jitter", "Jitter of links", ""),
+];
+
+fn shown_unit(range: &KeyRange) -> Option<&str> {
+    Some(range.unit.as_str()).filter(|unit| !unit.is_empty()).or_else(|| unit(&range.key))
 }
 
 /// The unit of the plain numbers of a key; `None` where they have none.
@@ -27,6 +52,15 @@ fn unit(key: &str) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Symbols are those of the table in docs/model.md, which takes them from the paper.
+    #[test]
+    fn an_axis_has_the_name_symbol_and_unit_of_the_paper() {
+        let of = |range: &str| axis_of(&KeyRange::parse(range).unwrap());
+        assert_eq!(of("coordination.stiffness=0..1"), Axis::new("Coordination stiffness").symbol("K_T").unit("N/m"));
+        assert_eq!(of("link.delay=0ms..1ms"), Axis::new("Delay of links").symbol("T_d").unit("ms"));
+        assert_eq!(of("peers.left.device.mass=0..1"), Axis::new("peers.left.device.mass").unit("kg"));
+    }
 
     #[test]
     fn a_key_is_shown_with_its_unit() {

@@ -27,7 +27,7 @@ fn the_page_the_figures_and_the_data_lie_in_the_folder() {
     }
     for figure in document["figures"].as_array().unwrap() {
         let file = figure["file"].as_str().unwrap();
-        assert!(desk.read(&format!("again/{file}")).starts_with("<svg"));
+        assert_eq!(cohaptic_picture::testing::faults(&desk.read(&format!("again/{file}"))), [""; 0], "{file}");
         assert!(desk.read(&format!("again/{}", file.replace(".svg", ".csv"))).lines().count() > 100);
     }
     assert!(desk.read("again/index.html").starts_with("<!DOCTYPE html>"));

@@ -267,11 +267,37 @@ fn plots_are_well_formed_and_name_the_peers() {
         let desk = Desk::with("scene.toml", scene);
         desk.text("run scene.toml --out out");
         for plot in ["positions.svg", "forces.svg", "network.svg"] {
-            let words = svg::words(&desk.read(&format!("out/{plot}")));
-            let names: &[&str] = if plot == "network.svg" { &["t [s]", "delay [ms]"] } else { &names };
+            let document = desk.read(&format!("out/{plot}"));
+            assert_eq!(cohaptic_picture::testing::faults(&document), [""; 0], "{plot}");
+            let words = svg::words(&document);
+            let row = [format!("{} → {}: none of ", names[0], names[1]), format!("{} → {}: none of ", names[1], names[0])];
+            let links = row.iter().all(|link| words.iter().any(|word| word.starts_with(link.as_str())));
+            assert!(links || plot != "network.svg", "a row for each link: {words:?}");
+            let names: &[&str] = if plot == "network.svg" { &["Delay [ms]", "Share of packets"] } else { &names };
             assert!(names.iter().all(|name| words.iter().any(|word| word == name)), "{plot}: {words:?}");
         }
     }
+}
+
+/// A column of a paper is 85 mm wide: 321.26 px of a 96th of an inch.
+#[test]
+fn pictures_have_the_size_that_was_asked_for() {
+    let desk = Desk::with("two.toml", TWO);
+    for (command, picture) in [
+        ("run two.toml --no-plot", "network.svg"),
+        ("admittance two.toml --peer left --points 5", "admittance.svg"),
+        ("stability boundary two.toml --along coordination.stiffness=0..5000 --samples 20", "boundary.svg"),
+        ("stability map two.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --grid 4x4", "map.svg"),
+    ] {
+        for (size, root) in [("one-column", "width=\"85mm\" "), ("700x900", "width=\"700\" height=\"900\" ")] {
+            desk.text(&format!("{command} --out out --size {size}"));
+            let svg = desk.read(&format!("out/{picture}"));
+            assert!(svg.lines().next().is_some_and(|line| line.contains(root)), "{command}: {}", svg.lines().next().unwrap_or_default());
+            assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0], "{command} {size}");
+        }
+    }
+    desk.cohaptic("run two.toml --out out --size 20x20mm").assert_refused(2, &["a picture is 160 px (42 mm) to"]);
+    desk.cohaptic("run two.toml --size page").assert_refused(2, &["--out"]);
 }
 
 #[test]

@@ -68,8 +68,10 @@ fn files_hold_what_was_found() {
     let samples = desk.read("out/samples.csv");
     assert!(samples.starts_with("coordination.stiffness,spectral_radius,error_bound,verdict\n100.0,"));
     assert_eq!(samples.lines().count() as u64 - 1, document["samples"].as_u64().unwrap());
-    let words = words(&desk.read("out/boundary.svg"));
-    for part in ["coordination.stiffness [N/m]", "spectral radius"] {
+    let svg = desk.read("out/boundary.svg");
+    assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0]);
+    let words = words(&svg);
+    for part in ["Coordination stiffness", "Spectral radius", "spectral radius"] {
         assert!(words.iter().any(|word| word == part), "no {part:?} in {words:?}");
     }
     assert!(words.iter().any(|word| word.starts_with("unstable from coordination.stiffness=")), "{words:?}");

@@ -87,11 +87,15 @@ fn every_curve_has_a_table_and_an_entry_in_the_legend() {
     let desk = Desk::with("paper.toml", &format!("{PAPER}\n").replace("duration = ", "title = \"<A> & B\", duration = "));
     let text = desk.text(&format!("{MAP} --grid 20x16 --out a/b --curve scene.count=2 --curve scene.count=5,link.delay=24ms"));
     assert_eq!(desk.files("a/b"), ["map-2.csv", "map-3.csv", "map.csv", "map.svg"]);
-    let words = words(&desk.read("a/b/map.svg"));
+    let svg = desk.read("a/b/map.svg");
+    assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0]);
+    let words = words(&svg);
     for part in [
         "<A> & B: spectral radius 1",
-        "coordination.stiffness [N/m]",
-        "coordination.damping [N·s/m]",
+        "Coordination stiffness",
+        "[N/m]",
+        "Coordination damping",
+        "[N·s/m]",
         "as it stands",
         "scene.count=2",
         "scene.count=5, link.delay=24ms",
@@ -138,7 +142,7 @@ fn a_key_with_a_unit_keeps_it() {
     let desk = Desk::with("two.toml", TWO);
     let document = desk.json("stability map two.toml --x link.delay=8ms..24ms --y coordination.stiffness=100..900 --grid 3x2 --json --out out");
     assert_eq!((numbers(&document["x"]), &document["x_unit"], &document["y_unit"]), (vec![8.0, 16.0, 24.0], &"ms".into(), &"".into()));
-    assert!(words(&desk.read("out/map.svg")).iter().any(|word| word == "link.delay [ms]"));
+    assert!(words(&desk.read("out/map.svg")).iter().any(|word| word == "Delay of links"));
     let point = desk.json("stability point two.toml --json --set link.delay=16ms --set coordination.stiffness=900");
     assert!((cells(&document)[4] - point["spectral_radius"].as_f64().unwrap()).abs() < 1e-9);
 }

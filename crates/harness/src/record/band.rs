@@ -46,26 +46,11 @@ impl Bands {
         usize::try_from(at.as_nanos() / self.width).ok().filter(|span| *span < self.spans)
     }
 
-    /// When a span ends \[s\].
+    /// The middle of a span \[s\].
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of spans is small")]
-    pub fn end_of(&self, span: usize) -> f64 {
-        (span + 1) as f64 * (self.width as f64 / 1e9)
-    }
-
-    /// The same scene and spans without any value.
-    #[must_use]
-    pub fn emptied(&self) -> Self {
-        Self::new(self.duration, self.spans, self.curves())
-    }
-
-    /// Sets a span of a curve to one value.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such curve or span.
-    pub fn set(&mut self, curve: usize, span: usize, value: f64) {
-        self.extremes[curve][span] = Some((value, value));
+    pub fn middle_of(&self, span: usize) -> f64 {
+        (span as f64 + 0.5) * (self.width as f64 / 1e9)
     }
 
     /// The curves in `parts` equal parts, in order.
@@ -99,13 +84,8 @@ impl Bands {
     /// # Panics
     ///
     /// If there is no such curve.
-    #[expect(clippy::cast_precision_loss, reason = "the number of spans is small")]
     pub fn curve(&self, curve: usize) -> impl Iterator<Item = (f64, f64, f64)> {
-        let width = self.width as f64 / 1e9;
-        self.extremes[curve]
-            .iter()
-            .enumerate()
-            .filter_map(move |(span, extremes)| extremes.map(|(low, high)| ((span as f64 + 0.5) * width, low, high)))
+        self.extremes[curve].iter().enumerate().filter_map(|(span, extremes)| extremes.map(|(low, high)| (self.middle_of(span), low, high)))
     }
 
     /// The range of values worth showing, with a margin, and whether values beyond it are left out.

@@ -6,7 +6,8 @@
 //! | `packets.csv` | one row a packet, in the order of arrival or drop |
 //! | `links.csv` | one row a link or access line: its counters at the end |
 //! | `inputs.csv` | of a live session: one row a thing that came in from outside |
-//! | `positions.svg`, `forces.svg`, `network.svg` | plots over time |
+//! | `positions.svg`, `forces.svg` | plots over time |
+//! | `network.svg` | delays, losses and the distribution of the delay of up to six links |
 //!
 //! A file is written under the name `….partial` and takes its own name when it is whole. Numbers are written with the fewest digits that read back
 //! as the same `f64`.
@@ -15,10 +16,10 @@ mod band;
 mod file;
 mod inputs;
 mod links;
+mod network;
 mod packets;
 mod plot;
 mod recorder;
-pub mod svg;
 mod trajectory;
 
 pub use band::Bands;

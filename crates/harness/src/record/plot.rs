@@ -2,79 +2,71 @@
 
 use std::path::PathBuf;
 
-use plotters::prelude::*;
+use cohaptic_picture::{Axis, Line, Look, Picture};
 
 use super::band::Bands;
 use super::file::PartialFile;
-use super::svg::{self, COLOURS, Drawing, DrawingResult};
 use crate::record::RecordError;
+
+/// A plot: panels over one axis of time, below one another.
+pub(crate) struct Plot<'a> {
+    pub(crate) title: String,
+    pub(crate) panels: Vec<Panel<'a>>,
+}
 
 /// One panel of a plot: curves over time with their names, or without.
 pub(crate) struct Panel<'a> {
     pub(crate) title: String,
-    pub(crate) unit: &'a str,
+    /// The vertical axis, in the unit of the values times `scale`.
+    pub(crate) axis: Axis,
     pub(crate) names: &'a [String],
     pub(crate) bands: &'a Bands,
     /// What values are multiplied by before they are shown: 100 to show metres in centimetres.
     pub(crate) scale: f64,
     /// What curves do not exceed in a scene that does not diverge: see [`Bands::range`].
     pub(crate) sane: f64,
-    /// Whether values below zero have no meaning, so that the axis begins there.
-    pub(crate) not_negative: bool,
 }
 
-/// More curves than this are drawn in one colour and not named.
-const MOST_NAMED: usize = COLOURS.len();
+/// More curves than this are drawn in one look and not named.
+const MOST_NAMED: usize = 10;
 
-/// Writes the panels below one another.
-pub(crate) fn write(path: PathBuf, panels: &[Panel<'_>]) -> Result<PathBuf, RecordError> {
-    let height = 60 + 300 * u32::try_from(panels.len()).unwrap_or(1);
-    let svg = svg::document((960, height), |root| draw(root, panels));
+/// Writes a picture.
+pub(crate) fn write(path: PathBuf, picture: &Picture) -> Result<PathBuf, RecordError> {
     let mut file = PartialFile::create(path)?;
-    file.write(svg.as_bytes())?;
+    file.write(picture.svg().as_bytes())?;
     file.finish()
 }
 
-fn draw<'a>(root: &Drawing<'a>, panels: &[Panel<'_>]) -> DrawingResult<'a> {
-    for (area, panel) in root.split_evenly((panels.len(), 1)).iter().zip(panels) {
-        draw_panel(area, panel)?;
+impl Plot<'_> {
+    /// The picture.
+    pub(crate) fn picture(&self) -> Picture {
+        let mut picture = Picture::new(self.title.as_str()).shared_x().aspect(0.38);
+        for panel in &self.panels {
+            let (panel, cut) = drawn(panel);
+            picture = picture.panel(panel);
+            if cut && !picture.has_note(CUT) {
+                picture = picture.note(CUT);
+            }
+        }
+        picture
     }
-    Ok(())
 }
 
-fn draw_panel<'a>(area: &Drawing<'a>, panel: &Panel<'_>) -> DrawingResult<'a> {
+const CUT: &str = "What goes far beyond is cut off.";
+
+/// The panel, and whether something is cut off.
+fn drawn(panel: &Panel<'_>) -> (cohaptic_picture::Panel, bool) {
     let (range, cut) = panel.bands.range(panel.sane);
-    let lowest = if panel.not_negative { 0.0 } else { f64::NEG_INFINITY };
-    let range = (range.start * panel.scale).max(lowest)..range.end * panel.scale;
-    let title = if cut { format!("{} (what goes far beyond is cut off)", panel.title) } else { panel.title.clone() };
-    let mut chart = ChartBuilder::on(area)
-        .caption(title, ("sans-serif", 16))
-        .margin(12)
-        .x_label_area_size(36)
-        .y_label_area_size(64)
-        .build_cartesian_2d(0.0..panel.bands.seconds(), range.clone())?;
-    chart.configure_mesh().x_desc("t [s]").y_desc(panel.unit).light_line_style(WHITE).draw()?;
+    let range = range.start * panel.scale..range.end * panel.scale;
+    let time = Axis::new("Time").symbol("t").unit("s").range(0.0, panel.bands.seconds());
+    let mut drawn = cohaptic_picture::Panel::new(time, panel.axis.clone().range(range.start, range.end)).titled(panel.title.as_str());
     let few = panel.bands.curves() <= MOST_NAMED;
     for curve in 0..panel.bands.curves() {
-        let colour = COLOURS.get(curve).copied().filter(|_| few).unwrap_or(COLOURS[0]);
-        let style = colour.mix(if few { 0.9 } else { 0.35 }).stroke_width(1);
-        for run in visible_runs(panel, curve, &range) {
-            chart.draw_series(LineSeries::new(run, style))?;
-        }
-        if let Some(name) = panel.names.get(curve).filter(|_| few) {
-            let empty = LineSeries::new(std::iter::empty::<(f64, f64)>(), style);
-            chart.draw_series(empty)?.label(name).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
-        }
+        let look = if few { Look::of(curve) } else { Look::of(0).thin() };
+        let name = panel.names.get(curve).filter(|_| few).map_or("", String::as_str);
+        drawn = drawn.with(Line::runs(visible_runs(panel, curve, &range), look).named(name));
     }
-    if few && !panel.names.is_empty() {
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
-            .background_style(WHITE.mix(0.8))
-            .border_style(BLACK.mix(0.3))
-            .draw()?;
-    }
-    Ok(())
+    (drawn, cut)
 }
 
 /// The parts of a curve that lie in the range shown: lowest and highest value of each span, in the order that continues the line.
@@ -98,4 +90,39 @@ fn visible_runs(panel: &Panel<'_>, curve: usize, range: &std::ops::Range<f64>) -
     }
     runs.retain(|run| !run.is_empty());
     runs
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use cohaptic_picture::testing::faults;
+    use cohaptic_units::Instant;
+
+    use super::*;
+
+    /// The faults of the pictures on the first page of the README: a title cut off at both ends, and two curves that were one.
+    #[test]
+    fn no_title_is_cut_off_and_curves_that_coincide_are_told_apart() {
+        let mut bands = Bands::new(Duration::from_secs(10), 1000, 2);
+        for millis in (0..10_000_u32).step_by(5) {
+            let (at, t) = (Instant::from_nanos(u64::from(millis) * 1_000_000), f64::from(millis) / 1000.0);
+            (0..2).for_each(|curve| bands.add(curve, at, 1e-3 * (2.0 * t).exp()));
+        }
+        let names = ["left".to_owned(), "right".to_owned()];
+        let title =
+            "Section 5.1: two of three users, AP at 2100 N/m, with arms, with coordination.strategy=proportional-derivative: position of each copy";
+        let axis = Axis::new("Position").symbol("x_O").unit("cm");
+        let panel = Panel { title: String::new(), axis, names: &names, bands: &bands, scale: 100.0, sane: 1.0 };
+        let svg = Plot { title: title.to_owned(), panels: vec![panel] }.picture().svg();
+        assert_eq!(faults(&svg), [""; 0]);
+        let drawn = svg.split_once("</desc>").expect("there is a description").1;
+        assert!(title.split(' ').all(|word| drawn.contains(word)) && drawn.contains(CUT), "the title and the warning are whole");
+        let curves: Vec<&str> = drawn.lines().filter(|line| line.starts_with("<path class=\"line s")).collect();
+        let data = |path: &str| path.split_once(" d=").map(|(_, data)| data.to_owned());
+        assert_eq!(data(curves[0]), data(curves[1]), "they coincide");
+        assert!(!curves[0].contains("dasharray") && curves[1].contains("dasharray"), "{:?}", &curves[..2]);
+        let fractions = data(curves[0]).is_some_and(|data| data.split(['M', 'L', ',']).any(|number| number.contains('.')));
+        assert!(fractions, "coordinates are finer than a pixel");
+    }
 }

@@ -2,14 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use cohaptic_picture::{Axis, Size};
 use cohaptic_scene::Scene;
-use cohaptic_wan::Fate;
 
 use super::band::Bands;
 use super::file::{RecordError, create_folder};
 use super::links;
+use super::network::Network;
 use super::packets::Packets;
-use super::plot::{self, Panel};
+use super::plot::{self, Panel, Plot};
 use super::trajectory::Trajectory;
 use crate::{Observer, PacketRow, Summary, TickRow};
 
@@ -22,6 +23,7 @@ pub struct Recorder {
     trajectory: Trajectory,
     packets: Packets,
     plotted: Plotted,
+    size: Size,
 }
 
 /// What the plots show. Curves are ordered by axis, then peer.
@@ -29,9 +31,7 @@ pub struct Recorder {
 struct Plotted {
     positions: Bands,
     forces: Bands,
-    delays: Bands,
-    /// In each span: packets dropped, and all whose fate is known, by when they were sent.
-    drops: Vec<(u32, u32)>,
+    network: Network,
 }
 
 /// The spans of time of a plot, and the most numbers that all curves of a plot may hold together.
@@ -60,9 +60,16 @@ impl Recorder {
             title: scene.title.clone(),
             trajectory: Trajectory::create(folder, names.clone(), scene.axes)?,
             packets: Packets::create(folder, names.clone())?,
-            plotted: Plotted { positions: bands(curves), forces: bands(curves), delays: bands(1), drops: vec![(0, 0); spans] },
+            plotted: Plotted { positions: bands(curves), forces: bands(curves), network: Network::new(scene, spans) },
+            size: Size::default(),
             names,
         })
+    }
+
+    /// With pictures of this size. Without it, a page on a screen.
+    #[must_use]
+    pub fn sized(self, size: Size) -> Self {
+        Self { size, ..self }
     }
 
     /// Writes what is left and gives every file its name; gives the files.
@@ -71,57 +78,32 @@ impl Recorder {
     ///
     /// [`RecordError`] if a file cannot be written.
     pub fn finish(self, summary: &Summary) -> Result<Vec<PathBuf>, RecordError> {
-        let Self { folder, title, names, trajectory, packets, plotted } = self;
+        let Self { folder, title, names, trajectory, packets, plotted, size } = self;
         let mut files = vec![trajectory.finish()?, packets.finish()?, links::write(&folder, summary)?];
-        for (file, bands, what, unit, scale, sane) in [
-            ("positions.svg", &plotted.positions, "position of each copy", "position [cm]", 100.0, SANE_POSITION),
-            ("forces.svg", &plotted.forces, "coordination force on each copy", "FT [N]", 1.0, SANE_FORCE),
+        for (file, bands, what, axis, scale, sane) in [
+            ("positions.svg", &plotted.positions, "position of each copy", Axis::new("Position").symbol("x_O").unit("cm"), 100.0, SANE_POSITION),
+            (
+                "forces.svg",
+                &plotted.forces,
+                "coordination force on each copy",
+                Axis::new("Coordination force").symbol("F_T").unit("N"),
+                1.0,
+                SANE_FORCE,
+            ),
         ] {
             let by_axis = bands.split(bands.curves() / names.len());
-            let heading = |axis: usize| if by_axis.len() == 1 { format!("{title}: {what}") } else { format!("{title}: {what} along {}", AXES[axis]) };
-            let panel = |(axis, bands)| Panel { title: heading(axis), unit, names: &names, bands, scale, sane, not_negative: false };
+            let heading = |along: usize| if by_axis.len() == 1 { String::new() } else { format!("along {}", AXES[along]) };
+            let panel = |(along, bands)| Panel { title: heading(along), axis: axis.clone(), names: &names, bands, scale, sane };
             let panels: Vec<Panel<'_>> = by_axis.iter().enumerate().map(panel).collect();
-            files.push(plot::write(folder.join(file), &panels)?);
+            let plot = Plot { title: format!("{title}: {what}"), panels };
+            files.push(plot::write(folder.join(file), &plot.picture().size(size))?);
         }
-        let shares = plotted.drop_shares();
-        let of_links = |title: String, unit, bands, scale| Panel { title, unit, names: &[], bands, scale, sane: f64::INFINITY, not_negative: true };
-        let network = [
-            of_links(format!("{title}: delay of the packets that arrived, all links"), "delay [ms]", &plotted.delays, 1e3),
-            of_links("share of the packets sent that were dropped".into(), "dropped [%]", &shares, 100.0),
-        ];
-        files.push(plot::write(folder.join("network.svg"), &network)?);
+        files.push(plot::write(folder.join("network.svg"), &plotted.network.picture(&title, &names).size(size))?);
         Ok(files)
     }
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-
-impl Plotted {
-    fn on_packet(&mut self, row: &PacketRow) {
-        let arrived = matches!(row.fate, Fate::Delivered(_));
-        if arrived {
-            self.delays.add(0, row.sent, (row.at - row.sent).as_secs_f64());
-        }
-        if let Some(span) = self.delays.span(row.sent) {
-            let (dropped, all) = &mut self.drops[span];
-            *dropped = dropped.saturating_add(u32::from(!arrived));
-            *all = all.saturating_add(1);
-        }
-    }
-
-    /// The share of the packets sent in each span that was dropped. What was sent so late that it may still be on the way at the end is left out:
-    /// there only the drops are known.
-    fn drop_shares(&self) -> Bands {
-        let mut shares = self.delays.emptied();
-        let longest = self.delays.curve(0).map(|(_, _, high)| high).fold(0.0, f64::max);
-        let known = self.delays.seconds() - longest;
-        let spans = self.drops.iter().enumerate().filter(|(span, (_, all))| *all > 0 && self.delays.end_of(*span) <= known);
-        for (span, (dropped, all)) in spans {
-            shares.set(0, span, f64::from(*dropped) / f64::from(*all));
-        }
-        shares
-    }
-}
 
 impl Observer for Recorder {
     type Error = RecordError;
@@ -144,35 +126,7 @@ impl Observer for Recorder {
     }
 
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), RecordError> {
-        self.plotted.on_packet(row);
+        self.plotted.network.on_packet(row);
         self.packets.on_packet(row)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::time::Duration;
-
-    use cohaptic_units::{Bytes, Instant};
-    use cohaptic_wan::DropCause;
-
-    use super::*;
-
-    /// Packets at 0, 100, … 900 ms of a second, every second one lost, the others 150 ms on the way: those sent from 850 ms on are unknown.
-    #[test]
-    fn the_share_dropped_is_shown_only_where_all_fates_are_known() {
-        let bands = Bands::new(Duration::from_secs(1), 5, 1);
-        let mut plotted = Plotted { positions: bands.clone(), forces: bands.clone(), delays: bands, drops: vec![(0, 0); 5] };
-        let at = |millis: u64| Instant::from_nanos(millis * 1_000_000);
-        for (sequence, sent) in (0..1000).step_by(100).enumerate() {
-            let lost = sequence % 2 == 1;
-            let fate = if lost { Fate::Dropped(DropCause::Loss) } else { Fate::Delivered(at(sent + 150)) };
-            if lost || sent + 150 <= 1000 {
-                let arrival = if lost { at(sent) } else { at(sent + 150) };
-                plotted.on_packet(&PacketRow { from: 0, to: 1, sequence: sequence as u64, sent: at(sent), at: arrival, size: Bytes::new(64), fate });
-            }
-        }
-        let shown: Vec<f64> = plotted.drop_shares().curve(0).map(|(_, low, _)| low).collect();
-        assert_eq!(shown, [0.5; 4]);
     }
 }

@@ -2,8 +2,9 @@
 
 use std::fmt::Write as _;
 
+use cohaptic_picture::{Axis, Line, Look, Panel, Picture};
+
 use super::admittance::{Curve, MASS, Responses};
-use super::chart::{Line, Panel, draw};
 use super::{Figure, Table};
 use crate::case::{Case, Strategy};
 
@@ -15,7 +16,14 @@ pub(super) fn figure(responses: &Responses) -> Figure {
          low frequencies where the ideal is a mass, more of it with more peers, and with PD more than with AP. The paper does not say whether the others touch the object; both are \
          shown. At high frequencies the device's own mass and coupling show, which the paper's ordinate does not tell from the object's. The paper prints no numbers."
     );
-    Figure { id: "fig-5".to_owned(), svg: draw(&panels, 2, &title), title, caption, table: table(responses), csv: csv(responses) }
+    Figure {
+        id: "fig-5".to_owned(),
+        svg: Picture::new(title.as_str()).columns(2).panels(panels).svg(),
+        title,
+        caption,
+        table: table(responses),
+        csv: csv(responses),
+    }
 }
 
 fn is_one(case: &Case) -> bool {
@@ -26,32 +34,31 @@ fn name(case: &Case) -> String {
     if case.peers == 2 { "N = 2".to_owned() } else { format!("{} N = {}", case.strategy.word(), case.peers) }
 }
 
+/// One colour for each number of peers; PD has dashes.
+fn look(case: &Case) -> Look {
+    const COLOURS: usize = 7;
+    let number = case.peers - 2;
+    if case.strategy == Strategy::Pd { Look::of(number + COLOURS) } else { Look::of(number).solid() }
+}
+
 fn panel(responses: &Responses, one: bool, magnitude: bool) -> Panel {
-    let y = if magnitude { (-60.0, 60.0) } else { (-270.0, 60.0) };
     let points = |values: &[f64]| responses.frequencies.iter().copied().zip(values.iter().copied()).collect::<Vec<_>>();
-    let mut lines: Vec<Line> = Vec::new();
-    for curve in responses.curves.iter().filter(|curve| is_one(&curve.case) == one) {
+    let curves = responses.curves.iter().filter(|curve| is_one(&curve.case) == one).map(|curve| {
         let values = if magnitude { &curve.decibels } else { &curve.phases };
-        let line = Line::within(name(&curve.case), curve.case.peers - 2, points(values), y);
-        lines.push(if curve.case.strategy == Strategy::Pd { line.dashed() } else { line });
-    }
+        Line::new(points(values), look(&curve.case)).named(name(&curve.case))
+    });
     let ideal = if magnitude { responses.ideal() } else { vec![-90.0; responses.frequencies.len()] };
-    lines.push(Line::within("ideal mass".to_owned(), 6, points(&ideal), y));
-    if !magnitude {
-        for line in &mut lines {
-            line.name.clear();
-        }
-    }
+    let frequency = Axis::new("Frequency").symbol("f").unit("Hz").logarithmic().range(0.01, 40.0);
+    let up = if magnitude {
+        Axis::new("Magnitude").unit("dB re 1 m/(N·s)").multiples_of(20).range(-60.0, 60.0)
+    } else {
+        Axis::new("Phase").unit("degrees").multiples_of(45).range(-270.0, 60.0)
+    };
     let (word, quantity) = (if one { "one touches" } else { "all touch" }, if magnitude { "magnitude" } else { "phase" });
-    Panel {
-        title: format!("{quantity}, {word}"),
-        x_label: "f [Hz]",
-        y_label: if magnitude { "dB re 1 m/(N·s)" } else { "degrees" },
-        x: (0.01, 40.0),
-        y,
-        decades: true,
-        lines,
-    }
+    Panel::new(frequency, up)
+        .titled(format!("{quantity}, {word}"))
+        .with_all(curves)
+        .with(Line::new(points(&ideal), Look::reference()).named("ideal mass"))
 }
 
 fn table(responses: &Responses) -> Table {

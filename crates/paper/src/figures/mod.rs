@@ -2,7 +2,6 @@
 
 pub(crate) mod admittance;
 mod bode;
-mod chart;
 mod regions;
 mod stability_test;
 mod travel;
@@ -22,18 +21,10 @@ pub struct Figure {
     pub caption: String,
     /// The paper's numbers beside ours.
     pub table: Table,
-    /// The drawing, an SVG document.
+    /// The drawing, an SVG document with a ground of its own, light or dark as its reader prefers.
     pub svg: String,
     /// The numbers behind it, as CSV.
     pub csv: String,
-}
-
-impl Figure {
-    /// The picture on a white ground, for a file of its own: on the page it takes the colours of the text around it.
-    #[must_use]
-    pub fn on_white(&self) -> String {
-        self.svg.replacen("<svg ", "<svg style=\"background:#fff;color:#000\" ", 1)
-    }
 }
 
 /// A small table.

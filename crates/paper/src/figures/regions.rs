@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::chart::{Line, Panel, draw};
+use cohaptic_picture::{Axis, Line, Look, Panel, Picture};
+
 use super::{Figure, Table};
 use crate::case::Strategy;
 use crate::region::{Atlas, HIGHEST, PEERS, Setting};
@@ -15,7 +16,7 @@ pub(super) fn figures(atlas: &Atlas) -> Vec<Figure> {
         let panels: Vec<Panel> = settings.iter().flat_map(|setting| Strategy::BOTH.map(|strategy| panel(atlas, *setting, strategy))).collect();
         Figure {
             id: id.to_owned(),
-            svg: draw(&panels, 2, &title),
+            svg: Picture::new(title.as_str()).columns(2).aspect(1.0).panels(panels).svg(),
             title,
             caption: caption(atlas, &settings),
             table: table(atlas, &settings),
@@ -26,26 +27,20 @@ pub(super) fn figures(atlas: &Atlas) -> Vec<Figure> {
 }
 
 fn panel(atlas: &Atlas, setting: Setting, strategy: Strategy) -> Panel {
-    let kilo = |points: Vec<(f64, f64)>| points.into_iter().map(|(x, y)| (x / 1000.0, y / 1000.0)).collect::<Vec<_>>();
-    let lines = PEERS.iter().enumerate().filter_map(|(colour, peers)| {
+    let kilo = |(x, y): (f64, f64)| (x / 1000.0, y / 1000.0);
+    let lines = PEERS.iter().enumerate().filter_map(|(number, peers)| {
         let region = atlas.region(setting, strategy, *peers)?;
-        let close = |line: cohaptic_stability::Polyline| {
+        let closed = |line: cohaptic_stability::Polyline| {
             let first = line.points.first().copied().filter(|_| line.closed);
-            kilo(line.points.into_iter().chain(first).collect())
+            line.points.into_iter().chain(first).map(kilo).collect::<Vec<_>>()
         };
-        let runs = region.map.contour().into_iter().map(close).collect();
-        Some(Line { name: format!("N = {peers}"), colour, dashed: false, runs })
+        Some(Line::runs(region.map.contour().into_iter().map(closed), Look::of(number)).named(format!("N = {peers}")))
     });
     let mass = setting.mass.words();
-    Panel {
-        title: format!("{}, {mass}, {} ms one way", strategy.word(), setting.delay_us / 1000),
-        x_label: "KT [kN/m]",
-        y_label: "KC [kN/m]",
-        x: (0.0, HIGHEST / 1000.0),
-        y: (0.0, HIGHEST / 1000.0),
-        decades: false,
-        lines: lines.collect(),
-    }
+    let axis = |name: &str, symbol: &str| Axis::new(name).symbol(symbol).unit("kN/m").range(0.0, HIGHEST / 1000.0);
+    Panel::new(axis("Coordination stiffness", "K_T"), axis("Coupling stiffness", "K_C"))
+        .titled(format!("{}, {mass}, {} ms one way", strategy.word(), setting.delay_us / 1000))
+        .with_all(lines)
 }
 
 fn caption(atlas: &Atlas, settings: &[Setting]) -> String {

@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::chart::{Line, Panel, draw};
+use cohaptic_picture::{Axis, Line, Look, Panel, Picture};
+
 use super::{Figure, Table};
 use crate::case::Strategy;
 use crate::experiment::{PeerTrace, StabilityTest};
@@ -40,27 +41,40 @@ pub(super) fn figure(tests: &[StabilityTest], delay_ms: u32) -> Figure {
         "Two users move the object at 1 Hz; the third copy is touched by nobody. The force is that of the coordination on the local copy. What leaves the paper's ordinates is cut off. {differ} The \
          paper's motion is that of people; ours are arms of 0.3 kg, 10 N·s/m and 100 N/m that follow a sine, or forces of 2 N without arms."
     );
-    Figure { id: format!("fig-7-{delay_ms}ms"), svg: draw(&panels, 2, &title), title, caption, table, csv: csv(&shown) }
+    Figure {
+        id: format!("fig-7-{delay_ms}ms"),
+        svg: Picture::new(title.as_str()).columns(2).panels(panels).svg(),
+        title,
+        caption,
+        table,
+        csv: csv(&shown),
+    }
 }
 
 fn name(test: &StabilityTest) -> String {
     format!("{} {} arms", test.strategy.word(), if test.arms { "with" } else { "without" })
 }
 
+fn time() -> Axis {
+    Axis::new("Time").symbol("t").unit("s").range(0.0, 7.0)
+}
+
 fn positions(test: &StabilityTest) -> Panel {
     let names = ["left", "right", "untouched"];
     let line = |(place, peer): (usize, &PeerTrace)| {
         let points = test.trace.times.iter().copied().zip(peer.position.iter().map(|x| 100.0 * x));
-        Line::within(names.get(place).copied().unwrap_or_default().to_owned(), place, points, POSITION_CM)
+        Line::new(points, Look::of(place)).named(names.get(place).copied().unwrap_or_default())
     };
-    let lines = test.trace.peers.iter().enumerate().map(line).collect();
-    Panel { title: name(test), x_label: "t [s]", y_label: "position [cm]", x: (0.0, 7.0), y: POSITION_CM, decades: false, lines }
+    Panel::new(time(), Axis::new("Position").symbol("x_O").unit("cm").range(POSITION_CM.0, POSITION_CM.1))
+        .titled(name(test))
+        .with_all(test.trace.peers.iter().enumerate().map(line))
 }
 
 fn forces(test: &StabilityTest) -> Panel {
     let points = test.trace.times.iter().copied().zip(test.trace.peers[0].force.iter().copied());
-    let lines = vec![Line::within(String::new(), 0, points, FORCE_N)];
-    Panel { title: name(test), x_label: "t [s]", y_label: "coordination force [N]", x: (0.0, 7.0), y: FORCE_N, decades: false, lines }
+    Panel::new(time(), Axis::new("Coordination force").symbol("F_T").unit("N").range(FORCE_N.0, FORCE_N.1))
+        .titled(name(test))
+        .with(Line::new(points, Look::of(0)).named("left"))
 }
 
 fn csv(tests: &[&StabilityTest]) -> String {

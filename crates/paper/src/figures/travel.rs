@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::chart::{Line, Panel, draw};
+use cohaptic_picture::{Axis, Line, Look, Panel, Picture};
+
 use super::{Figure, Table};
 use crate::case::Strategy;
 use crate::experiment::{DISTANCE, PeerTrace, Travel};
@@ -16,7 +17,7 @@ pub(super) fn figure(travels: &[Travel], delay_ms: u32) -> Figure {
     let find = |strategy| travels.iter().find(|travel| travel.strategy == strategy && travel.delay_ms == delay_ms);
     let shown: Vec<(&Travel, &str)> = PAPER.iter().filter_map(|(strategy, paper)| Some((find(*strategy)?, *paper))).collect();
     let mut panels = Vec::new();
-    for quantity in QUANTITIES {
+    for quantity in &QUANTITIES {
         panels.extend(shown.iter().map(|(travel, _)| panel(travel, quantity)));
     }
     let mut table = Table::new(&["", "the paper: 20 mm", "ours: 20 mm", "ours: ρ over 8 ms", "ours: viscosity"]);
@@ -37,35 +38,54 @@ pub(super) fn figure(travels: &[Travel], delay_ms: u32) -> Figure {
         "The grey line is where the object has gone 20 mm. Agrees where the loop is stable: the velocity saturates, sooner with PD, and AP is the less viscous.{text} The printed \
          parameters do not give both of the paper's times. A symmetric push does not excite how the two untouched copies swing against each other, which is what may be unstable."
     );
-    Figure { id: format!("fig-8-{delay_ms}ms"), svg: draw(&panels, 2, &title), title, caption, table, csv: csv(&shown) }
+    Figure {
+        id: format!("fig-8-{delay_ms}ms"),
+        svg: Picture::new(title.as_str()).columns(2).panels(panels).svg(),
+        title,
+        caption,
+        table,
+        csv: csv(&shown),
+    }
 }
 
 /// How much of the scene is shown, a little more than in the paper [s].
 const SHOWN: f64 = 3.0;
 
-/// A quantity with its unit, its range, and how it is had from a trace.
-type Quantity = (&'static str, (f64, f64), fn(&PeerTrace) -> &[f64], f64);
+/// A quantity over time: its axis (name, symbol, unit), its range, how it is had from a trace, and what that is multiplied by.
+struct Quantity {
+    axis: (&'static str, &'static str, &'static str),
+    range: (f64, f64),
+    values: fn(&PeerTrace) -> &[f64],
+    scale: f64,
+    /// Whether it is the one that the distance is marked in.
+    is_position: bool,
+}
 
 const QUANTITIES: [Quantity; 3] = [
-    ("position [cm]", (0.0, 5.0), |peer| &peer.position, 100.0),
-    ("velocity [cm/s]", (-4.0, 2.0), |peer| &peer.velocity, 100.0),
-    ("coordination force [N]", (-4.0, 4.0), |peer| &peer.force, 1.0),
+    Quantity { axis: ("Position", "x_O", "cm"), range: (0.0, 5.0), values: |peer| &peer.position, scale: 100.0, is_position: true },
+    Quantity { axis: ("Velocity", "v_O", "cm/s"), range: (-4.0, 2.0), values: |peer| &peer.velocity, scale: 100.0, is_position: false },
+    Quantity { axis: ("Coordination force", "F_T", "N"), range: (-4.0, 4.0), values: |peer| &peer.force, scale: 1.0, is_position: false },
 ];
 
-fn panel(travel: &Travel, (label, y, values, scale): Quantity) -> Panel {
+fn panel(travel: &Travel, quantity: &Quantity) -> Panel {
     let line = |(place, peer): (usize, &PeerTrace)| {
-        let points = travel.trace.times.iter().copied().zip(values(peer).iter().map(|value| scale * value)).take_while(|(t, _)| *t <= SHOWN);
-        Line::within(format!("copy {}", place + 1), place, points, y)
+        let values = (quantity.values)(peer).iter().map(|value| quantity.scale * value);
+        let points = travel.trace.times.iter().copied().zip(values).take_while(|(t, _)| *t <= SHOWN);
+        Line::new(points, Look::of(place)).named(format!("copy {}", place + 1))
     };
-    let mut lines: Vec<Line> = travel.trace.peers.iter().enumerate().map(line).collect();
-    if label.starts_with("position") {
+    let ((name, symbol, unit), (low, high)) = (quantity.axis, quantity.range);
+    let time = Axis::new("Time").symbol("t").unit("s").range(0.0, SHOWN);
+    let mut panel = Panel::new(time, Axis::new(name).symbol(symbol).unit(unit).range(low, high))
+        .titled(travel.strategy.word())
+        .with_all(travel.trace.peers.iter().enumerate().map(line));
+    if quantity.is_position {
         let goal = 100.0 * (travel.trace.peers[0].position.first().copied().unwrap_or(0.0) - DISTANCE);
-        lines.push(Line { name: "20 mm".to_owned(), colour: 6, dashed: true, runs: vec![vec![(0.0, goal), (SHOWN, goal)]] });
+        panel = panel.with(Line::level(goal).named("20 mm"));
         if let Some(time) = travel.time {
-            lines.push(Line { name: String::new(), colour: 6, dashed: true, runs: vec![vec![(time, y.0), (time, goal)]] });
+            panel = panel.with(Line::new([(time, low), (time, goal)], Look::reference()));
         }
     }
-    Panel { title: travel.strategy.word().to_owned(), x_label: "t [s]", y_label: label, x: (0.0, SHOWN), y, decades: false, lines }
+    panel
 }
 
 fn csv(travels: &[(&Travel, &str)]) -> String {

@@ -4,7 +4,7 @@ mod style;
 
 use std::fmt::Write as _;
 
-use cohaptic_harness::record::svg::escape;
+use cohaptic_picture::escape;
 
 use crate::{Claim, Figure, Reproduction, Table, Verdict};
 

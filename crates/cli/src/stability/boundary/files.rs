@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use cohaptic_picture::Size;
 use cohaptic_stability::{Boundary, Cell, Criterion};
 
 use super::Order;
@@ -10,12 +11,13 @@ use super::words::crossing_in_words;
 use crate::failure::Failure;
 use crate::output;
 use crate::output_file::{field, write_file};
-use crate::stability::quantity::label;
+use crate::stability::quantity::axis_of;
 use crate::stability::source;
 
 /// Writes `boundary.csv`, `samples.csv` and `boundary.svg`, and gives their paths.
-pub(super) fn write(folder: &Path, order: &Order, found: &Boundary) -> Result<Vec<String>, Failure> {
-    let files = [("boundary.csv", crossings(order, found)), ("samples.csv", samples(order, found)), ("boundary.svg", picture(order, found))];
+pub(super) fn write(folder: &Path, order: &Order, found: &Boundary, size: Size) -> Result<Vec<String>, Failure> {
+    let files =
+        [("boundary.csv", crossings(order, found)), ("samples.csv", samples(order, found)), ("boundary.svg", picture(order, found).size(size).svg())];
     let mut written = Vec::new();
     for (name, content) in files {
         let path = folder.join(name);
@@ -47,16 +49,16 @@ fn samples(order: &Order, found: &Boundary) -> String {
     text
 }
 
-fn picture(order: &Order, found: &Boundary) -> String {
+fn picture(order: &Order, found: &Boundary) -> cohaptic_picture::Picture {
     let samples: Vec<(f64, f64)> = found.known.iter().map(|(value, cell)| (*value, cell.radius.value)).collect();
     let crossings: Vec<(f64, String)> = found.crossings.iter().map(|crossing| (crossing.value, crossing_in_words(&order.range, crossing))).collect();
     let picture = Picture {
         title: &order.title,
+        axis: axis_of(&order.range),
         radius: source::name(order.family.criterion()),
-        label: &label(&order.range),
         range: (order.range.low, order.range.high),
         samples: &samples,
         crossings: &crossings,
     };
-    picture.svg()
+    picture.drawn()
 }

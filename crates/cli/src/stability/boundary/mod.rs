@@ -56,7 +56,7 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
     }
     let mut written = Vec::new();
     if let Some(folder) = &arguments.out {
-        written = files::write(folder, &order, &found)?;
+        written = files::write(folder, &order, &found, arguments.pictures.size())?;
         rows.map_or(Ok(()), RowsFile::remove)?;
     }
     if arguments.scene.json {

@@ -1,86 +1,87 @@
 //! The spectral radius along a key as SVG, with the crossings marked.
 
-use cohaptic_harness::record::svg;
-use plotters::prelude::*;
-
-use crate::lines::{Look, Sample, draw_legend, draw_line, legend_height};
+use cohaptic_picture::{Axis, Line, Look, Panel};
 
 /// What is shown.
 pub(super) struct Picture<'a> {
     pub(super) title: &'a str,
-    /// What the radius is called.
+    /// The axis of the key.
+    pub(super) axis: Axis,
+    /// The name of the radius: spectral radius, or mean-square radius.
     pub(super) radius: &'a str,
-    /// The key and its unit.
-    pub(super) label: &'a str,
     /// From where to where the key was searched.
     pub(super) range: (f64, f64),
-    /// Values of the key, rising, and the spectral radius at each.
+    /// Values of the key, rising, and the radius at each.
     pub(super) samples: &'a [(f64, f64)],
     /// Where the verdict changes, and in words to what.
     pub(super) crossings: &'a [(f64, String)],
 }
 
-const SIZE: (u32, u32) = (960, 500);
-
 /// A radius above this is cut off: how far beyond 1 it is says nothing about where it crosses.
 const HIGHEST: f64 = 2.0;
 
+/// The legend names this many crossings at most.
+const MOST_NAMED: usize = 20;
+
 impl Picture<'_> {
-    /// The document.
-    pub(super) fn svg(&self) -> String {
+    /// The picture, of no size yet.
+    pub(super) fn drawn(&self) -> cohaptic_picture::Picture {
         let finite = || self.samples.iter().map(|(_, radius)| *radius).filter(|radius| radius.is_finite());
         let cut = self.samples.iter().any(|(_, radius)| radius.is_nan() || *radius > HIGHEST);
         let (low, high) = finite().fold((1.0_f64, 1.0_f64), |(low, high), radius| (low.min(radius), high.max(radius)));
         let high = high.min(HIGHEST);
         let margin = (0.05 * (high - low)).max(1e-3);
-        let range = (low - margin).max(0.0)..high + margin;
-        let title = if cut { format!("{} (what goes far beyond is cut off)", self.title) } else { self.title.to_owned() };
-        let mut entries = vec![(Sample::Line(RADIUS), self.radius.to_owned()), (Sample::Line(Look::grey()), "1".to_owned())];
-        entries.extend(self.crossings.iter().map(|(_, words)| (Sample::Line(crossing()), words.clone())));
-        let entries = &entries[..entries.len().min(MOST_ENTRIES)];
-        svg::document((SIZE.0, SIZE.1 + legend_height(entries.len())), |root| {
-            let (area, legend) = root.split_vertically(SIZE.1);
-            let mut chart = ChartBuilder::on(&area)
-                .caption(title, ("sans-serif", 16))
-                .margin(12)
-                .x_label_area_size(40)
-                .y_label_area_size(68)
-                .build_cartesian_2d(self.range.0..self.range.1, range.clone())?;
-            chart.configure_mesh().x_desc(self.label).y_desc(self.radius).light_line_style(TRANSPARENT).draw()?;
-            draw_line(&mut chart, &[(self.range.0, 1.0), (self.range.1, 1.0)], Look::grey())?;
-            for (value, _) in self.crossings {
-                draw_line(&mut chart, &[(*value, range.start), (*value, range.end)], crossing())?;
-            }
-            for run in visible_runs(self.samples, range.end) {
-                draw_line(&mut chart, &run, RADIUS)?;
-            }
-            draw_legend(&legend, entries)
-        })
+        let up = Axis::new(begun_large(self.radius)).range((low - margin).max(0.0), high + margin);
+        let crossings = self.crossings.iter().enumerate().map(|(number, (value, words))| {
+            let line = Line::upright(*value).look(Look::of(1 + number).thin());
+            if number < MOST_NAMED { line.named(words) } else { line }
+        });
+        let panel = Panel::new(self.axis.clone().range(self.range.0, self.range.1), up)
+            .with(Line::level(1.0).named("1"))
+            .with_all(crossings)
+            .with(Line::new(self.samples.iter().copied(), Look::of(0)).named(self.radius));
+        let mut picture = cohaptic_picture::Picture::new(self.title).aspect(0.45).panel(panel);
+        if cut {
+            picture = picture.note("What goes far beyond 1 is cut off.");
+        }
+        if let Some(more @ 1..) = self.crossings.len().checked_sub(MOST_NAMED) {
+            picture = picture.note(format!("Crossings are named up to the {MOST_NAMED}th, {more} more are shown without a name."));
+        }
+        picture
     }
 }
 
-/// The legend names this many lines at most.
-const MOST_ENTRIES: usize = 22;
-
-const RADIUS: Look = Look::solid();
-
-fn crossing() -> Look {
-    Look::of(1)
-}
-
-/// The parts of the curve that lie in the picture.
-fn visible_runs(samples: &[(f64, f64)], top: f64) -> Vec<Vec<(f64, f64)>> {
-    let visible = |sample: &(f64, f64)| sample.1 <= top;
-    samples.chunk_by(|one, other| visible(one) && visible(other)).filter(|run| run.iter().all(visible)).map(<[_]>::to_vec).collect()
+fn begun_large(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::visible_runs;
+    use cohaptic_picture::testing::faults;
+
+    use super::*;
+
+    fn picture(samples: &[(f64, f64)], crossings: &[(f64, String)]) -> String {
+        let axis = Axis::new("Delay of links").symbol("T_d").unit("ms");
+        Picture { title: "Two users", axis, radius: "mean-square radius", range: (0.0, 5.0), samples, crossings }.drawn().svg()
+    }
 
     #[test]
-    fn what_lies_above_the_picture_parts_the_curve() {
-        let samples = [(0.0, 0.5), (1.0, 0.9), (2.0, 3.0), (3.0, f64::NAN), (4.0, f64::INFINITY), (5.0, 0.8)];
-        assert_eq!(visible_runs(&samples, 1.5), [vec![(0.0, 0.5), (1.0, 0.9)], vec![(5.0, 0.8)]]);
+    fn what_lies_above_the_picture_is_cut_off_and_parts_the_curve() {
+        let svg = picture(&[(0.0, 0.5), (1.0, 0.9), (2.0, 3.0), (3.0, f64::NAN), (4.0, f64::INFINITY), (4.5, 0.8), (5.0, 0.9)], &[]);
+        assert_eq!(faults(&svg), [""; 0]);
+        assert!(svg.contains("<desc>What goes far beyond 1 is cut off. Mean-square radius over Delay of links\u{a0}Td [ms].</desc>"), "{svg}");
+        let curve = svg.lines().find(|line| line.starts_with("<path class=\"line s0\"") && line.matches('M').count() > 1);
+        assert!(curve.is_some_and(|curve| curve.matches('M').count() == 2), "{svg}");
+    }
+
+    #[test]
+    fn a_picture_with_many_crossings_says_how_many_have_no_name() {
+        let crossings: Vec<(f64, String)> = (0..25).map(|n| (0.2 * f64::from(n), format!("stable from link.delay={n}ms"))).collect();
+        let svg = picture(&[(0.0, 0.9), (5.0, 1.1)], &crossings);
+        assert_eq!(faults(&svg), [""; 0]);
+        assert!(svg.contains("5 more are shown without a name") && !svg.contains("cut off"), "{svg}");
+        assert!(svg.contains("delay=19ms") && !svg.contains("delay=20ms"));
     }
 }

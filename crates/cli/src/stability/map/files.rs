@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use cohaptic_picture::Size;
 use cohaptic_stability::Criterion;
 
 use super::picture::{Axis, Outline, Picture};
@@ -9,11 +10,11 @@ use super::{Order, VariantMap};
 use crate::failure::Failure;
 use crate::output;
 use crate::output_file::{field, write_file};
-use crate::stability::quantity::label;
+use crate::stability::quantity::axis_of;
 use crate::stability::source;
 
 /// Writes `map.csv`, `map-2.csv` ... and `map.svg`, and gives their paths.
-pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap]) -> Result<Vec<String>, Failure> {
+pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap], size: Size) -> Result<Vec<String>, Failure> {
     let mut files = Vec::new();
     for (number, map) in maps.iter_mut().enumerate() {
         let path = folder.join(if number == 0 { "map.csv".to_owned() } else { format!("map-{}.csv", number + 1) });
@@ -22,7 +23,7 @@ pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap]) -> Re
         files.push(output::path(&path));
     }
     let path = folder.join("map.svg");
-    write_file(&path, picture(order, maps))?;
+    write_file(&path, picture(order, maps).map(|picture| picture.size(size).svg()).unwrap_or_default())?;
     files.push(output::path(&path));
     Ok(files)
 }
@@ -48,17 +49,18 @@ fn table(order: &Order, VariantMap { map, criterion, verdicts, .. }: &VariantMap
     text
 }
 
-fn picture(order: &Order, maps: &[VariantMap]) -> String {
-    let Some(first) = maps.first() else { return String::new() };
+fn picture(order: &Order, maps: &[VariantMap]) -> Option<cohaptic_picture::Picture> {
+    let first = maps.first()?;
     let outline = |map: &VariantMap| Outline { name: map.name.clone(), lines: map.map.contour() };
     let radius = source::name(first.criterion);
     let title = format!("{}: {radius} 1", order.title);
-    Picture {
+    let picture = Picture {
         title: &title,
-        x: Axis { label: label(order.x()), values: &first.map.x },
-        y: Axis { label: label(order.y()), values: &first.map.y },
+        x: Axis { shown: axis_of(order.x()), values: &first.map.x },
+        y: Axis { shown: axis_of(order.y()), values: &first.map.y },
         outlines: maps.iter().map(outline).collect(),
         regions: first.map.regions(),
-    }
-    .svg()
+        nominal: &first.map.nominal,
+    };
+    Some(picture.drawn())
 }

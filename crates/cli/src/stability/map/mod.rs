@@ -60,7 +60,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let wall_s = start.elapsed().as_secs_f64();
     let mut files = Vec::new();
     if let Some(folder) = &arguments.out {
-        files = files::write(folder, &order, &mut maps)?;
+        files = files::write(folder, &order, &mut maps, arguments.pictures.size())?;
         rows.map_or(Ok(()), super::rows_file::RowsFile::remove)?;
     }
     let document = Document::new(&order, &maps, wall_s, cells, &files);

@@ -1,0 +1,201 @@
+//! `network.svg`: what each link did, as a row of two panels: delays over time with the losses below them, and the distribution of the delay.
+//!
+//! Memory is bounded: over time the least and greatest delay of each span are kept, and of the distribution how many delays lie in each ten microseconds.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Rug};
+use cohaptic_scene::Scene;
+use cohaptic_wan::Fate;
+
+use super::band::Bands;
+use crate::PacketRow;
+
+/// The links of a scene that are shown, and what their packets did.
+#[derive(Debug)]
+pub(super) struct Network {
+    /// How many peers there are; a link leads from each to each other.
+    peers: usize,
+    /// Delays by link shown \[s\], over when packets were sent.
+    delays: Bands,
+    shown: Vec<Shown>,
+}
+
+/// One link.
+#[derive(Debug, Default)]
+struct Shown {
+    from: usize,
+    to: usize,
+    /// How many packets took how long, in steps of [`STEP`].
+    delays: BTreeMap<u64, u64>,
+    /// In which spans packets were sent that never arrived.
+    losses: BTreeSet<usize>,
+    /// All packets whose fate is known, and those of them that were dropped.
+    known: u64,
+    dropped: u64,
+}
+
+/// A picture shows this many links at most, the first ones by sender, then receiver: all links of three users.
+pub(super) const MOST_LINKS: usize = 6;
+
+/// A note names this many links that are not shown at most.
+const MOST_NAMED: usize = 20;
+
+/// Delays nearer to each other than this are one \[ns\]: a hundredth of what a picture could show.
+const STEP: u64 = 10_000;
+
+impl Network {
+    /// For a scene, in that many spans of time.
+    pub(super) fn new(scene: &Scene, spans: usize) -> Self {
+        let peers = scene.peers.len();
+        let shown: Vec<Shown> = pairs(peers).take(MOST_LINKS).map(|(from, to)| Shown { from, to, ..Shown::default() }).collect();
+        Self { peers, delays: Bands::new(scene.duration, spans, shown.len()), shown }
+    }
+
+    pub(super) fn on_packet(&mut self, row: &PacketRow) {
+        let Some(place) = self.shown.iter().position(|link| (link.from, link.to) == (row.from, row.to)) else { return };
+        let link = &mut self.shown[place];
+        link.known += 1;
+        if matches!(row.fate, Fate::Delivered(_)) {
+            let delay = row.at - row.sent;
+            self.delays.add(place, row.sent, delay.as_secs_f64());
+            let steps = u64::try_from(delay.as_nanos()).unwrap_or(u64::MAX).saturating_add(STEP / 2) / STEP;
+            *link.delays.entry(steps).or_default() += 1;
+        } else {
+            link.dropped += 1;
+            link.losses.extend(self.delays.span(row.sent));
+        }
+    }
+
+    /// The picture.
+    pub(super) fn picture(&self, title: &str, names: &[String]) -> Picture {
+        let name = |from: usize, to: usize| format!("{} → {}", names[from], names[to]);
+        let longest = self.shown.iter().filter_map(|link| link.delays.last_key_value()).map(|(steps, _)| milliseconds(*steps)).fold(0.0, f64::max);
+        let delay = || Axis::new("Delay").unit("ms").range(0.0, if longest > 0.0 { 1.05 * longest } else { 1.0 });
+        let mut picture = Picture::new(format!("{title}: delays and losses of links")).columns(2).aspect(0.42);
+        for (place, link) in self.shown.iter().enumerate() {
+            let band: Vec<(f64, f64, f64)> = self.delays.curve(place).collect();
+            // From the least to the greatest delay of each span, and on to the next.
+            let extremes = band.iter().flat_map(|(t, low, high)| [(*t, 1e3 * low), (*t, 1e3 * high)]);
+            let lost = Rug::new(link.losses.iter().map(|span| self.delays.middle_of(*span)), Look::of(1)).named("packets lost");
+            let over_time = Panel::new(Axis::new("Time").symbol("t").unit("s").range(0.0, self.delays.seconds()), delay())
+                .titled(format!("{}: {}", name(link.from, link.to), link.losses_in_words()))
+                .with(Line::new(extremes, Look::of(0).thin()).named("delay of packets"))
+                .with(lost);
+            let shares = Panel::new(delay(), Axis::new("Share of packets").range(0.0, 1.0))
+                .titled(link.median_in_words())
+                .with(Line::steps(link.distribution(), Look::of(0)).named("no longer than this"));
+            picture = picture.panel(over_time).panel(shares);
+        }
+        let rest: Vec<String> = pairs(self.peers).skip(self.shown.len()).map(|(from, to)| name(from, to)).collect();
+        if !rest.is_empty() {
+            let unnamed = rest.len().saturating_sub(MOST_NAMED);
+            let end = if unnamed > 0 { format!(" and {unnamed} more") } else { String::new() };
+            let (named, shown, all) = (rest[..rest.len() - unnamed].join(", "), self.shown.len(), self.shown.len() + rest.len());
+            picture = picture.note(format!("{shown} of {all} links are shown; links.csv has all. Not shown: {named}{end}."));
+        }
+        picture
+    }
+}
+
+/// Every peer with every other, by sender, then receiver.
+fn pairs(peers: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..peers).flat_map(move |from| (0..peers).filter(move |to| *to != from).map(move |to| (from, to)))
+}
+
+impl Shown {
+    /// The share of the delivered packets that took no longer than each delay \[ms\].
+    fn distribution(&self) -> Vec<(f64, f64)> {
+        let all = count(self.delays.values().sum());
+        let first = self.delays.first_key_value().map(|(steps, _)| (milliseconds(*steps), 0.0));
+        let mut until = 0;
+        let rising = self.delays.iter().map(|(steps, packets)| {
+            until += packets;
+            (milliseconds(*steps), count(until) / all)
+        });
+        first.into_iter().chain(rising).collect()
+    }
+
+    fn losses_in_words(&self) -> String {
+        match (self.dropped, self.known) {
+            (_, 0) => "no packets".to_owned(),
+            (0, known) => format!("none of {known} packets lost"),
+            (dropped, known) => format!("{dropped} of {known} packets lost ({:.2} %)", 100.0 * count(dropped) / count(known)),
+        }
+    }
+
+    /// The least delay that half of the packets do not exceed.
+    fn median_in_words(&self) -> String {
+        let median = self.distribution().into_iter().find(|(_, share)| *share >= 0.5);
+        median.map_or_else(|| "nothing arrived".to_owned(), |(delay, _)| format!("median {delay:.2} ms"))
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "delays of more than a month and counts beyond 2^53 do not occur")]
+fn milliseconds(steps: u64) -> f64 {
+    steps as f64 * (STEP as f64 / 1e6)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts beyond 2^53 do not occur")]
+fn count(number: u64) -> f64 {
+    number as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_picture::testing::faults;
+    use cohaptic_units::{Bytes, Instant};
+    use cohaptic_wan::DropCause;
+
+    use super::*;
+
+    const SCENE: &str = r#"
+        scene = { duration = "1s", count = COUNT }
+        object = { mass = 0.45 }
+        coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+        peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+        link = { delay = "24ms" }
+    "#;
+
+    /// What ten spans of a second hold of these packets from the first peer: (to, sent \[ms\], delay \[ms\], none if it was lost).
+    fn network(peers: usize, packets: &[(usize, u64, Option<u64>)]) -> (Network, String) {
+        let scene = Scene::parse(&SCENE.replace("COUNT", &peers.to_string()), "scene.toml".as_ref(), &[]).unwrap();
+        let mut network = Network::new(&scene, 10);
+        let at = |millis: u64| Instant::from_nanos(millis * 1_000_000);
+        for (sequence, (to, sent, delay)) in (0..).zip(packets) {
+            let arrival = at(sent + delay.unwrap_or(0));
+            let fate = if delay.is_some() { Fate::Delivered(arrival) } else { Fate::Dropped(DropCause::Loss) };
+            network.on_packet(&PacketRow { from: 0, to: *to, sequence, sent: at(*sent), at: arrival, size: Bytes::new(64), fate });
+        }
+        let names: Vec<String> = (1..=peers).map(|peer| format!("p{peer}")).collect();
+        let svg = network.picture("A test", &names).svg();
+        assert_eq!(faults(&svg), [""; 0]);
+        (network, svg)
+    }
+
+    /// Delays of 10, 20, 20 and 40 ms: a quarter takes no longer than 10, three quarters no longer than 20.
+    #[test]
+    fn each_link_has_its_own_delays_losses_and_distribution() {
+        let packets = [(1, 0, Some(10)), (1, 120, Some(20)), (1, 130, None), (1, 240, Some(20)), (1, 900, Some(40)), (2, 0, Some(5))];
+        let (network, svg) = network(3, &packets);
+        assert_eq!(network.shown[0].distribution(), [(10.0, 0.0), (10.0, 0.25), (20.0, 0.75), (40.0, 1.0)]);
+        assert_eq!(network.shown[1].distribution(), [(5.0, 0.0), (5.0, 1.0)]);
+        assert_eq!(network.shown[0].losses.iter().copied().collect::<Vec<_>>(), [1]);
+        for text in
+            ["p1 → p2: 1 of 5 packets lost (20.00 %)", "median 20.00 ms", "p1 → p3: none of 1 packets lost", "p3 → p2: no packets", "nothing arrived"]
+        {
+            assert!(svg.contains(&format!(">{text}</text>")), "{text}");
+        }
+        assert!(!svg.contains("Not shown"));
+    }
+
+    #[test]
+    fn links_beyond_the_sixth_are_named_in_a_note_and_not_drawn() {
+        let (_, svg) = network(4, &[]);
+        let note = "6 of 12 links are shown; links.csv has all. Not shown: p3 → p1, p3 → p2, p3 → p4, p4 → p1, p4 → p2, p4 → p3.";
+        assert!(svg.contains(note) && !svg.contains(">p3 → p1: no packets</text>"), "{svg}");
+        assert_eq!(svg.matches(": no packets</text>").count(), MOST_LINKS);
+        let (_, svg) = network(20, &[]);
+        assert!(svg.contains("6 of 380 links are shown") && svg.contains("and 354 more."), "{svg}");
+    }
+}

@@ -1,0 +1,232 @@
+//! An axis: its name, symbol and unit, its scale and range.
+
+use crate::text::Text;
+use crate::ticks::{Step, Ticks};
+
+/// How values lie along an axis.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Scale {
+    Linear,
+    /// Values of zero and below have no place.
+    Logarithmic,
+}
+
+/// One axis of a panel.
+///
+/// ```
+/// use cohaptic_picture::Axis;
+///
+/// let along = Axis::new("Coordination stiffness").symbol("K_T").unit("N/m").range(0.0, 10_000.0);
+/// let decibels = Axis::new("Admittance").unit("dB").multiples_of(20).ends_at_ticks();
+/// let frequency = Axis::new("Frequency").symbol("f").unit("Hz").logarithmic();
+/// ```
+#[derive(Clone, PartialEq, Debug)]
+pub struct Axis {
+    name: Text,
+    symbol: Text,
+    unit: String,
+    pub(crate) scale: Scale,
+    range: Option<(f64, f64)>,
+    includes: Vec<f64>,
+    multiples: Option<u32>,
+    ends_at_ticks: bool,
+    tight: bool,
+}
+
+impl Axis {
+    /// A linear axis over all of the content, with a margin.
+    #[must_use]
+    pub fn new(name: impl Into<Text>) -> Self {
+        Self {
+            name: name.into(),
+            symbol: Text::default(),
+            unit: String::new(),
+            scale: Scale::Linear,
+            range: None,
+            includes: Vec::new(),
+            multiples: None,
+            ends_at_ticks: false,
+            tight: false,
+        }
+    }
+
+    /// With a symbol, as [`Text::math`]: `K_T`.
+    #[must_use]
+    pub fn symbol(self, symbol: &str) -> Self {
+        Self { symbol: Text::math(symbol), ..self }
+    }
+
+    /// With a unit, which is shown in brackets.
+    #[must_use]
+    pub fn unit(self, unit: impl Into<String>) -> Self {
+        Self { unit: unit.into(), ..self }
+    }
+
+    /// With a logarithmic scale.
+    #[must_use]
+    pub fn logarithmic(self) -> Self {
+        Self { scale: Scale::Logarithmic, ..self }
+    }
+
+    /// From one value to another, whatever the content; lines are cut at the ends. Ends that are equal or not finite are made different.
+    #[must_use]
+    pub fn range(self, low: f64, high: f64) -> Self {
+        Self { range: Some((low.min(high), low.max(high))), ..self }
+    }
+
+    /// Reaches this value at least: 0 for quantities that are compared by length.
+    #[must_use]
+    pub fn include(mut self, value: f64) -> Self {
+        self.includes.push(value);
+        self
+    }
+
+    /// Ends where the content ends, without a margin.
+    #[must_use]
+    pub fn tight(self) -> Self {
+        Self { tight: true, ..self }
+    }
+
+    /// Has ticks at multiples of this number only: 20 for decibels, 45 for degrees, 1 for counts.
+    #[must_use]
+    pub fn multiples_of(self, step: u32) -> Self {
+        Self { multiples: Some(step.max(1)), ..self }
+    }
+
+    /// Ends at ticks.
+    #[must_use]
+    pub fn ends_at_ticks(self) -> Self {
+        Self { ends_at_ticks: true, ..self }
+    }
+
+    /// Name, symbol and unit, the unit with a power of ten that the numbers at the ticks are to be multiplied by.
+    pub(crate) fn title(&self, exponent: i32) -> Text {
+        let mut title = self.name.clone();
+        if !self.symbol.is_empty() {
+            title = if title.is_empty() { self.symbol.clone() } else { title.then("\u{a0}").then(self.symbol.clone()) };
+        }
+        if exponent == 0 && self.unit.is_empty() {
+            return title;
+        }
+        title = title.then(" [");
+        if exponent != 0 {
+            title = title.then(Text::power_of_ten("1", exponent));
+            if !self.unit.is_empty() {
+                title = title.then("\u{a0}");
+            }
+        }
+        title.then(self.unit.as_str()).then("]")
+    }
+
+    /// From where to where it shows, if the content reaches over these values.
+    pub(crate) fn shown(&self, content: Option<(f64, f64)>) -> Extent {
+        let usable = |value: &f64| value.is_finite() && (self.scale == Scale::Linear || *value > 0.0);
+        let limit = |value: f64| value.clamp(-1e300, 1e300);
+        let (low, high) = match self.range {
+            Some((low, high)) if usable(&low) && usable(&high) => (limit(low), limit(high)),
+            _ => {
+                let known = content.into_iter().flat_map(|(low, high)| [low, high]).chain(self.includes.iter().copied()).filter(usable);
+                let (low, high) = known.map(limit).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+                if low > high {
+                    (if self.scale == Scale::Linear { 0.0 } else { 1.0 }, if self.scale == Scale::Linear { 1.0 } else { 10.0 })
+                } else {
+                    (low, high)
+                }
+            }
+        };
+        let margin = if self.tight || self.range.is_some() { 0.0 } else { 0.05 };
+        let held = |end: f64| self.includes.iter().any(|value| value.to_bits() == end.to_bits());
+        let margins = (if held(low) { 0.0 } else { margin }, if held(high) { 0.0 } else { margin });
+        let extent = Extent::new(self.scale, low, high, margins);
+        if self.ends_at_ticks { extent.widened_to_ticks(self.multiples) } else { extent }
+    }
+
+    /// Ticks of which there are about that many at most.
+    pub(crate) fn ticks(&self, extent: Extent, most: usize) -> Ticks {
+        Ticks::of(extent, most, self.multiples)
+    }
+}
+
+/// The range of an axis, and how values lie in it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Extent {
+    pub(crate) scale: Scale,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+}
+
+impl Extent {
+    fn new(scale: Scale, low: f64, high: f64, margins: (f64, f64)) -> Self {
+        match scale {
+            Scale::Linear => {
+                let least = 1e-9 * low.abs().max(high.abs()).max(1e-290);
+                let (low, high) = if high - low < least { (low - 0.05 * low.abs() - 1e-12, high + 0.05 * high.abs() + 1e-12) } else { (low, high) };
+                let span = high - low;
+                Self { scale, low: low - margins.0 * span, high: high + margins.1 * span }
+            }
+            Scale::Logarithmic => {
+                let (low, high) = (low.max(1e-300), high.max(1e-300));
+                let (low, high) = if high / low < 1.000_001 { (low / 2.0, high * 2.0) } else { (low, high) };
+                let ratio = libm::log10(high) - libm::log10(low);
+                let (below, above) = (libm::pow(10.0, -margins.0 * ratio), libm::pow(10.0, margins.1 * ratio));
+                Self { scale, low: (low * below).max(1e-306), high: (high * above).min(1e306) }
+            }
+        }
+    }
+
+    fn widened_to_ticks(self, multiples: Option<u32>) -> Self {
+        const ABOUT: usize = 7;
+        match self.scale {
+            Scale::Linear => {
+                let (first, last, unit) = Step::of(self, ABOUT, multiples).around(self);
+                Self { low: first * unit, high: last.max(first + 1.0) * unit, ..self }
+            }
+            Scale::Logarithmic => {
+                // What is a power of ten but for rounding is one.
+                let (first, last) = ((libm::log10(self.low) + 1e-9).floor(), (libm::log10(self.high) - 1e-9).ceil());
+                Self { low: libm::pow(10.0, first), high: libm::pow(10.0, last.max(first + 1.0)), ..self }
+            }
+        }
+    }
+
+    /// Where a value lies: 0 at the low end, 1 at the high one. Not finite if it has no place.
+    pub(crate) fn place(self, value: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Logarithmic if value > 0.0 => (libm::log10(value) - libm::log10(self.low)) / (libm::log10(self.high) - libm::log10(self.low)),
+            Scale::Logarithmic => f64::NAN,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_range_is_empty() {
+        for (low, high) in [(0.0, 0.0), (5.0, 5.0), (1e300, 1e300), (-1e308, 1e308), (f64::NAN, 1.0), (1e9, 1e9 + 1e-7), (1e-320, 1e305)] {
+            for axis in [Axis::new(""), Axis::new("").logarithmic(), Axis::new("").ends_at_ticks(), Axis::new("").multiples_of(20).ends_at_ticks()] {
+                let extent = axis.range(low, high).shown(None);
+                assert!(extent.high > extent.low && (extent.high - extent.low).is_finite(), "{low} {high}: {extent:?}");
+            }
+        }
+    }
+
+    /// Decimal logarithms lie between −300 and 300; half way between them is 1.
+    #[test]
+    fn hundreds_of_decades_are_an_axis_too() {
+        let extent = Axis::new("").logarithmic().range(1e-300, 1e300).shown(None);
+        assert_eq!([1e-300, 1.0, 1e300].map(|value| (1e9 * extent.place(value)).round()), [0.0, 5e8, 1e9]);
+    }
+
+    #[test]
+    fn an_axis_that_ends_at_ticks_ends_at_the_decades_that_hold_its_values() {
+        let ends = |low, high| {
+            let extent = Axis::new("").logarithmic().tight().ends_at_ticks().shown(Some((low, high)));
+            [extent.low, extent.high].map(|end| libm::log10(end).round())
+        };
+        assert_eq!(ends(2e-17, 1e-9), [-17.0, -9.0]);
+        assert_eq!(ends(1e-7, 1e-3), [-7.0, -3.0]);
+    }
+}

@@ -1,0 +1,278 @@
+//! Where everything is: texts first, since their room is what cannot be changed, then the plots in what is left.
+//!
+//! Ticks, wrapped titles and labels depend on the size of the plots, and that on them; so a height is assumed, all is measured, and where a given height of the
+//! picture leaves less, this is done again with less.
+
+use crate::content::{Content, HeatMap, count};
+use crate::ends::EndLabel;
+use crate::legend::{Legend, LegendPlace, Sample, entry};
+use crate::panel::{Extents, Panel};
+use crate::path::Frame;
+use crate::picture::Picture;
+use crate::text::{LEADING, Text};
+use crate::ticks::Ticks;
+
+/// The larger letters of the title \[sizes of the font\].
+pub(crate) const TITLE: f64 = 1.15;
+/// The length of a tick, and the distance of its label \[sizes of the font\].
+pub(crate) const TICK: f64 = 0.35;
+pub(crate) const AFTER_TICK: f64 = 0.25;
+/// The room around the picture, and between panels \[sizes of the font\].
+const MARGIN: f64 = 0.8;
+/// The width of a colour bar \[sizes of the font\].
+pub(crate) const BAR: f64 = 0.9;
+/// No plot is smaller than this, whatever size is asked for \[sizes of the font\].
+const LEAST_WIDTH: f64 = 7.0;
+const LEAST_HEIGHT: f64 = 5.0;
+
+/// The picture with all places \[px\].
+#[derive(Debug)]
+pub(crate) struct Layout {
+    pub(crate) width: f64,
+    pub(crate) height: f64,
+    pub(crate) margin: f64,
+    pub(crate) title: Vec<Text>,
+    pub(crate) notes: Vec<Text>,
+    pub(crate) panels: Vec<PanelLayout>,
+    pub(crate) legend: Legend,
+    pub(crate) legend_at: (f64, f64),
+}
+
+/// A panel with all places.
+#[derive(Debug)]
+pub(crate) struct PanelLayout {
+    pub(crate) frame: Frame,
+    pub(crate) extents: Extents,
+    pub(crate) title: Vec<Text>,
+    pub(crate) x: AxisLayout,
+    pub(crate) y: AxisLayout,
+    /// From the left edge of the frame to the middle of its rotated title is this plus half a line.
+    pub(crate) y_title_at: f64,
+    pub(crate) ends: Vec<EndLabel>,
+    pub(crate) bar: Option<AxisLayout>,
+}
+
+/// An axis with its labels: none where another panel shows them.
+#[derive(Debug, Default)]
+pub(crate) struct AxisLayout {
+    pub(crate) ticks: Option<Ticks>,
+    pub(crate) title: Vec<Text>,
+    pub(crate) labelled: bool,
+}
+
+impl AxisLayout {
+    /// How wide the labels of the ticks are.
+    pub(crate) fn widest(&self, font: f64) -> f64 {
+        let labels = self.ticks.iter().flat_map(|ticks| &ticks.marks).filter(|_| self.labelled);
+        labels.map(|(_, label)| label.width(font)).fold(0.0, f64::max)
+    }
+}
+
+/// The room at both sides of a frame.
+#[derive(Clone, Copy, Debug)]
+struct Room {
+    left: f64,
+    right: f64,
+}
+
+impl Layout {
+    pub(crate) fn of(picture: &Picture) -> Self {
+        let font = picture.size.font;
+        let columns = picture.columns_shown();
+        let assumed = picture.aspect * 0.8 * (picture.size.width / count(columns));
+        let least = LEAST_HEIGHT * font;
+        let mut height = assumed.clamp(least, 60.0 * font);
+        if let Some(whole) = picture.size.height {
+            height = (whole / count(picture.rows())).max(least);
+        }
+        let mut attempt = Attempt::new(picture, height);
+        if let Some(whole) = picture.size.height {
+            for _ in 0..12 {
+                let over = attempt.layout.height - whole;
+                if over <= 0.01 || height <= least {
+                    break;
+                }
+                height = (height - over / count(picture.rows())).max(least);
+                attempt = Attempt::new(picture, height);
+            }
+            attempt.layout.height = attempt.layout.height.max(whole);
+        }
+        attempt.layout
+    }
+}
+
+struct Attempt {
+    layout: Layout,
+}
+
+impl Attempt {
+    fn new(picture: &Picture, plot_height: f64) -> Self {
+        let (font, width, columns, rows) = (picture.size.font, picture.size.width, picture.columns_shown(), picture.rows());
+        let margin = MARGIN * font;
+        let title = picture.title.wrapped(TITLE * font, width - 2.0 * margin, 8);
+        let notes: Vec<Text> = picture.notes.iter().flat_map(|note| note.wrapped(font, width - 2.0 * margin, 8)).collect();
+        let header = margin
+            + LEADING * font * (TITLE * count(title.len()) + count(notes.len()))
+            + if title.is_empty() && notes.is_empty() { 0.0 } else { 0.3 * font };
+
+        let extents = picture.extents();
+        let at_ends: Vec<bool> = picture.panels.iter().map(|panel| panel.labels_at_ends && EndLabel::fit(panel, font, plot_height)).collect();
+        let entries = entries(&picture.panels, &at_ends);
+        let narrow = picture.legend == LegendPlace::Right;
+        let legend_width = if narrow { 0.35 * width } else { width - 2.0 * margin };
+        let legend = if picture.legend == LegendPlace::Nowhere { Legend::default() } else { Legend::new(&entries, font, legend_width, narrow) };
+        let beside = if narrow && legend.width > 0.0 { legend.width + margin } else { 0.0 };
+        let for_panels = width - 2.0 * margin - beside;
+
+        // Upright sizes are known now: y ticks, labels at ends, colour bars.
+        let cell = for_panels / count(columns);
+        let mut panels: Vec<PanelLayout> = Vec::new();
+        let mut rooms: Vec<Room> = Vec::new();
+        for (place, panel) in picture.panels.iter().enumerate() {
+            let y_labelled = !(picture.shared_y && place % columns != 0);
+            let y = upright(&panel.y, extents[place].y, font, plot_height, y_labelled);
+            let ends = if at_ends[place] { EndLabel::of(panel, extents[place], font, 0.32 * cell, plot_height) } else { Vec::new() };
+            let bar = panel.heat_map().map(|map| upright(&map.axis, map.extent(), font, plot_height, true));
+            let labels = y.widest(font);
+            let y_title_at = TICK * font + AFTER_TICK * font + labels + 0.35 * font;
+            let left = if y_labelled { y_title_at + LEADING * font * count(y.title.len()) } else { 0.9 * font };
+            let after = ends.iter().map(EndLabel::width).fold(0.0, f64::max);
+            let right = match &bar {
+                Some(bar) => (0.8 + BAR + TICK + AFTER_TICK + 0.35) * font + bar.widest(font) + LEADING * font * count(bar.title.len()),
+                None if after > 0.0 => after + 1.6 * font,
+                None => 0.0,
+            };
+            rooms.push(Room { left, right });
+            let frame = Frame { left: 0.0, top: 0.0, right: 0.0, bottom: 0.0 };
+            panels.push(PanelLayout { frame, extents: extents[place], title: Vec::new(), x: AxisLayout::default(), y, y_title_at, ends, bar });
+        }
+
+        // Ticks along x need the width, which their labels reach over at both ends: found with what it is at most.
+        let along = |plot_width: f64| -> Vec<AxisLayout> {
+            let axis = |(place, panel): (usize, &Panel)| {
+                let labelled = !(picture.shared_x && place + columns < picture.panels.len());
+                level(&panel.x, extents[place].x, font, plot_width, labelled)
+            };
+            picture.panels.iter().enumerate().map(axis).collect()
+        };
+        let least = LEAST_WIDTH * font;
+        let column_rooms = |rooms: &[Room], column: usize| {
+            let of = |side: fn(&Room) -> f64| rooms.iter().skip(column).step_by(columns).map(side).fold(0.0, f64::max);
+            (of(|room| room.left), of(|room| room.right))
+        };
+        let plot_width_of = |rooms: &[Room]| {
+            let used: f64 = (0..columns).map(|column| column_rooms(rooms, column)).map(|(left, right)| left + right).sum();
+            ((for_panels - used - 0.9 * font * count(columns - 1)) / count(columns)).max(least)
+        };
+        let mut axes = along(plot_width_of(&rooms));
+        for _ in 0..2 {
+            for (room, axis) in rooms.iter_mut().zip(&axes) {
+                let half = 0.5 * axis.widest(font) + 0.1 * font;
+                *room = Room { left: room.left.max(half), right: room.right.max(half) };
+            }
+            axes = along(plot_width_of(&rooms));
+        }
+        let plot_width = plot_width_of(&rooms);
+
+        let mut tops = vec![0.0_f64; rows];
+        let mut bottoms = vec![0.0_f64; rows];
+        for (place, (panel, axis)) in panels.iter_mut().zip(axes).enumerate() {
+            let (_, right) = column_rooms(&rooms, place % columns);
+            panel.title = picture.panels[place].title.wrapped(font, plot_width + right, 4);
+            tops[place / columns] = tops[place / columns].max(LEADING * font * count(panel.title.len()) + 0.75 * font);
+            panel.x = axis;
+            let labels = if panel.x.labelled { (0.6 + LEADING) * font } else { 0.75 * font };
+            let below = labels + LEADING * font * count(panel.x.title.len());
+            bottoms[place / columns] = bottoms[place / columns].max(below);
+        }
+        let mut y = header;
+        let mut body_width = 0.0_f64;
+        for row in 0..rows {
+            y += tops[row];
+            let mut x = margin;
+            for column in 0..columns {
+                let (left, right) = column_rooms(&rooms, column);
+                x += left;
+                if let Some(panel) = panels.get_mut(row * columns + column) {
+                    panel.frame = Frame { left: x, top: y, right: x + plot_width, bottom: y + plot_height };
+                }
+                x += plot_width + right + 0.9 * font;
+            }
+            body_width = body_width.max(x - 0.9 * font - margin);
+            y += plot_height + bottoms[row] + if row + 1 < rows { 0.3 * font } else { 0.0 };
+        }
+        let legend_at = if narrow { (margin + body_width + margin, header + 0.75 * font) } else { (margin, y + 0.5 * font) };
+        let mut height = y;
+        if legend.height > 0.0 {
+            height = if narrow { height.max(legend_at.1 + legend.height) } else { legend_at.1 + legend.height };
+        }
+        let width = width.max(margin + body_width + beside + margin);
+        Self { layout: Layout { width, height: height + 0.5 * margin, margin, title, notes, panels, legend, legend_at } }
+    }
+}
+
+/// The names of all contents, each once; those of lines that have their names at their ends are left out.
+fn entries(panels: &[Panel], at_ends: &[bool]) -> Vec<(Sample, Text)> {
+    let mut entries: Vec<(Sample, Text)> = Vec::new();
+    for (panel, at_ends) in panels.iter().zip(at_ends) {
+        for content in &panel.contents {
+            let Some((sample, name)) = entry(content) else { continue };
+            let labelled = *at_ends && EndLabel::is_labelled(content);
+            if !labelled && !entries.iter().any(|(known, text)| *known == sample && text == name) {
+                entries.push((sample, name.clone()));
+            }
+        }
+    }
+    entries
+}
+
+/// An axis that runs upwards, with as many ticks as labels do not touch.
+fn upright(axis: &crate::Axis, extent: crate::axis::Extent, font: f64, height: f64, labelled: bool) -> AxisLayout {
+    let mut most = whole(height / (2.0 * font)).clamp(2, 7);
+    let crowded = |ticks: &Ticks| {
+        let places: Vec<f64> = ticks.marks.iter().map(|(value, _)| height * extent.place(*value)).collect();
+        places.windows(2).any(|pair| (pair[1] - pair[0]).abs() < LEADING * font)
+    };
+    let mut ticks = axis.ticks(extent, most);
+    while most > 1 && crowded(&ticks) {
+        most -= 1;
+        ticks = axis.ticks(extent, most);
+    }
+    if crowded(&ticks) {
+        ticks.marks.truncate(1);
+    }
+    // The title may be a little longer than the plot, but never wider than what a page can show.
+    let title = if labelled { axis.title(ticks.exponent).wrapped(font, height + 0.7 * font, 3) } else { Vec::new() };
+    AxisLayout { ticks: Some(ticks), title, labelled }
+}
+
+/// An axis that runs to the right.
+fn level(axis: &crate::Axis, extent: crate::axis::Extent, font: f64, width: f64, labelled: bool) -> AxisLayout {
+    let mut most = whole(width / (3.0 * font)).clamp(2, 9);
+    let crowded = |ticks: &Ticks| {
+        let spans: Vec<(f64, f64)> = ticks.marks.iter().map(|(value, label)| (width * extent.place(*value), 0.5 * label.width(font))).collect();
+        spans.windows(2).any(|pair| pair[1].0 - pair[1].1 < pair[0].0 + pair[0].1 + 0.6 * font)
+    };
+    let mut ticks = axis.ticks(extent, most);
+    while most > 1 && crowded(&ticks) {
+        most -= 1;
+        ticks = axis.ticks(extent, most);
+    }
+    if crowded(&ticks) {
+        ticks.marks.truncate(1);
+    }
+    let title = if labelled { axis.title(ticks.exponent).wrapped(font, width, 3) } else { Vec::new() };
+    AxisLayout { ticks: Some(ticks), title, labelled }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lengths on a page are small and not below zero")]
+pub(crate) fn whole(value: f64) -> usize {
+    value.max(0.0) as usize
+}
+
+impl Panel {
+    /// The heat map with the colour bar: the first.
+    pub(crate) fn heat_map(&self) -> Option<&HeatMap> {
+        self.contents.iter().find_map(|content| if let Content::HeatMap(map) = content { Some(map) } else { None })
+    }
+}

@@ -1,0 +1,76 @@
+//! A panel: two axes and what lies between them.
+
+use crate::axis::{Axis, Extent};
+use crate::content::{Content, Reach};
+use crate::text::Text;
+
+/// One plot of a picture.
+///
+/// ```
+/// use cohaptic_picture::{Axis, Line, Look, Panel};
+///
+/// let panel = Panel::new(Axis::new("Time").symbol("t").unit("s"), Axis::new("Position").unit("cm"))
+///     .titled("along x")
+///     .with(Line::new([(0.0, 1.0), (1.0, 2.0)], Look::of(0)).named("left"));
+/// ```
+#[derive(Clone, PartialEq, Debug)]
+pub struct Panel {
+    pub(crate) title: Text,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
+    pub(crate) contents: Vec<Content>,
+    pub(crate) labels_at_ends: bool,
+}
+
+impl Panel {
+    /// An empty panel.
+    #[must_use]
+    pub const fn new(x: Axis, y: Axis) -> Self {
+        Self { title: Text { spans: Vec::new() }, x, y, contents: Vec::new(), labels_at_ends: false }
+    }
+
+    /// With a title above it.
+    #[must_use]
+    pub fn titled(self, title: impl Into<Text>) -> Self {
+        Self { title: title.into(), ..self }
+    }
+
+    /// With one more content, drawn over those before it; but areas are drawn before all lines.
+    #[must_use]
+    pub fn with(mut self, content: impl Into<Content>) -> Self {
+        self.contents.push(content.into());
+        self
+    }
+
+    /// With more contents.
+    #[must_use]
+    pub fn with_all<C: Into<Content>>(mut self, contents: impl IntoIterator<Item = C>) -> Self {
+        self.contents.extend(contents.into_iter().map(Into::into));
+        self
+    }
+
+    /// With the names of lines where they end at the right, not in the legend. Where there is not enough room, all are in the legend.
+    #[must_use]
+    pub fn labels_at_ends(self) -> Self {
+        Self { labels_at_ends: true, ..self }
+    }
+
+    /// What both axes reach over: of this panel alone.
+    pub(crate) fn content_extents(&self) -> Reach {
+        let join = |one: Option<(f64, f64)>, other: Option<(f64, f64)>| match (one, other) {
+            (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
+            (one, other) => one.or(other),
+        };
+        self.contents
+            .iter()
+            .map(|content| content.extents(self.x.scale, self.y.scale))
+            .fold((None, None), |(x, y), (other_x, other_y)| (join(x, other_x), join(y, other_y)))
+    }
+}
+
+/// Both axes of a panel as they are shown.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Extents {
+    pub(crate) x: Extent,
+    pub(crate) y: Extent,
+}

@@ -1,0 +1,168 @@
+//! A whole picture: title, panels in a grid, legend; and the document it becomes.
+
+use crate::axis::Scale;
+use crate::content::Reach;
+use crate::draw;
+use crate::layout::{Layout, whole};
+use crate::legend::LegendPlace;
+use crate::panel::{Extents, Panel};
+use crate::size::Size;
+use crate::text::Text;
+
+/// A picture that becomes one SVG document. Equal pictures become equal bytes.
+///
+/// See the [crate] for examples.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Picture {
+    pub(crate) title: Text,
+    pub(crate) notes: Vec<Text>,
+    pub(crate) description: String,
+    pub(crate) size: Size,
+    pub(crate) panels: Vec<Panel>,
+    columns: usize,
+    pub(crate) shared_x: bool,
+    pub(crate) shared_y: bool,
+    pub(crate) legend: LegendPlace,
+    pub(crate) aspect: f64,
+    pub(crate) ground: bool,
+}
+
+impl Picture {
+    /// A picture without panels. The title is wrapped, after eight lines it ends in an ellipsis; what must not be lost is a [`note`](Self::note).
+    #[must_use]
+    pub fn new(title: impl Into<Text>) -> Self {
+        Self {
+            title: title.into(),
+            notes: Vec::new(),
+            description: String::new(),
+            size: Size::default(),
+            panels: Vec::new(),
+            columns: 1,
+            shared_x: false,
+            shared_y: false,
+            legend: LegendPlace::default(),
+            aspect: 0.6,
+            ground: true,
+        }
+    }
+
+    /// With one more paragraph below the title: a subtitle, or a warning.
+    #[must_use]
+    pub fn note(mut self, note: impl Into<Text>) -> Self {
+        self.notes.push(note.into());
+        self
+    }
+
+    /// Whether this note is there already.
+    #[must_use]
+    pub fn has_note(&self, note: &str) -> bool {
+        self.notes.iter().any(|known| known.plain() == note)
+    }
+
+    /// With a description for people who do not see the picture, beside the titles.
+    #[must_use]
+    pub fn description(self, description: impl Into<String>) -> Self {
+        Self { description: description.into(), ..self }
+    }
+
+    /// Of this size. Where texts leave no room for the plots, the picture becomes larger.
+    #[must_use]
+    pub fn size(self, size: Size) -> Self {
+        Self { size, ..self }
+    }
+
+    /// With one more panel: to the right of the one before, or in the next row.
+    #[must_use]
+    pub fn panel(mut self, panel: Panel) -> Self {
+        self.panels.push(panel);
+        self
+    }
+
+    /// With more panels.
+    #[must_use]
+    pub fn panels(mut self, panels: impl IntoIterator<Item = Panel>) -> Self {
+        self.panels.extend(panels);
+        self
+    }
+
+    /// With that many panels beside each other, or fewer where the picture is too narrow. Without it panels are below each other.
+    #[must_use]
+    pub fn columns(self, columns: usize) -> Self {
+        Self { columns: columns.max(1), ..self }
+    }
+
+    /// With one range of x for all panels, labelled in the last row only.
+    #[must_use]
+    pub fn shared_x(self) -> Self {
+        Self { shared_x: true, ..self }
+    }
+
+    /// With one range of y for all panels, labelled in the first column only.
+    #[must_use]
+    pub fn shared_y(self) -> Self {
+        Self { shared_y: true, ..self }
+    }
+
+    /// With the legend at this place.
+    #[must_use]
+    pub fn legend(self, legend: LegendPlace) -> Self {
+        Self { legend, ..self }
+    }
+
+    /// With plots about this much as high as wide where the size leaves the height open. Without it, 0.6.
+    #[must_use]
+    pub fn aspect(self, aspect: f64) -> Self {
+        Self { aspect: if aspect.is_finite() { aspect.clamp(0.1, 3.0) } else { self.aspect }, ..self }
+    }
+
+    /// Without a ground of its own, for a page that has one.
+    #[must_use]
+    pub fn without_ground(self) -> Self {
+        Self { ground: false, ..self }
+    }
+
+    /// The document: valid as a file and as a part of a page of HTML.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        draw::document(self, &Layout::of(self))
+    }
+
+    /// Columns that have room for a plot with its labels.
+    pub(crate) fn columns_shown(&self) -> usize {
+        const LEAST: f64 = 13.0;
+        self.columns.min(whole(self.size.width / (LEAST * self.size.font))).clamp(1, self.panels.len().max(1))
+    }
+
+    pub(crate) fn rows(&self) -> usize {
+        self.panels.len().div_ceil(self.columns_shown()).max(1)
+    }
+
+    /// The axes of each panel as shown.
+    pub(crate) fn extents(&self) -> Vec<Extents> {
+        let join = |one: Option<(f64, f64)>, other: Option<(f64, f64)>| match (one, other) {
+            (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
+            (one, other) => one.or(other),
+        };
+        let own: Vec<_> = self.panels.iter().map(Panel::content_extents).collect();
+        let all = own.iter().fold((None, None), |(x, y), (other_x, other_y)| (join(x, *other_x), join(y, *other_y)));
+        let first = self.panels.first();
+        let of = |(panel, (x, y)): (&Panel, &Reach)| Extents {
+            x: if self.shared_x { first.unwrap_or(panel).x.shown(all.0) } else { panel.x.shown(*x) },
+            y: if self.shared_y { first.unwrap_or(panel).y.shown(all.1) } else { panel.y.shown(*y) },
+        };
+        self.panels.iter().zip(&own).map(of).collect()
+    }
+
+    /// What a screen reader says: all titles and axes.
+    pub(crate) fn spoken(&self) -> String {
+        let mut sentences: Vec<String> = self.notes.iter().map(Text::plain).collect();
+        sentences.extend((!self.description.is_empty()).then(|| self.description.clone()));
+        for panel in &self.panels {
+            let scale = |axis: &crate::Axis| if axis.scale == Scale::Logarithmic { " (logarithmic)" } else { "" };
+            let (x, y) = (panel.x.title(0).plain(), panel.y.title(0).plain());
+            let before = if panel.title.is_empty() { String::new() } else { format!("{}: ", panel.title.plain()) };
+            sentences.push(format!("{before}{y}{} over {x}{}.", scale(&panel.y), scale(&panel.x)));
+        }
+        sentences.join(" ")
+    }
+}

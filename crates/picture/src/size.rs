@@ -1,0 +1,124 @@
+//! How large a picture is, and its letters.
+
+use std::str::FromStr;
+
+use thiserror::Error;
+
+/// The size of a picture. Its letters are 8 points high where it is meant for print, 13 px else.
+///
+/// A command line names it as a word: `one-column`, `two-columns`, `page`, `960x400` \[CSS px\], `85x60mm`.
+///
+/// ```
+/// use cohaptic_picture::Size;
+///
+/// assert_eq!("one-column".parse(), Ok(Size::ONE_COLUMN));
+/// assert_eq!("85x60mm".parse(), Size::millimetres(85.0, 60.0));
+/// assert!("85x0mm".parse::<Size>().is_err());
+/// ```
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Size {
+    /// \[px\], of which 96 are an inch.
+    pub(crate) width: f64,
+    /// `None`: as high as its content asks for \[px\].
+    pub(crate) height: Option<f64>,
+    /// The size of letters \[px\].
+    pub(crate) font: f64,
+    /// Whether the document gives its size in millimetres.
+    pub(crate) print: bool,
+}
+
+/// A millimetre \[px\].
+pub(crate) const MILLIMETRE: f64 = 96.0 / 25.4;
+/// Eight points \[px\].
+const PRINTED: f64 = 8.0 * 96.0 / 72.0;
+/// Letters on a screen \[px\].
+const ON_SCREEN: f64 = 13.0;
+
+/// Why a size is none.
+#[derive(Clone, PartialEq, Eq, Debug, Error)]
+pub enum SizeError {
+    /// The word is not known.
+    #[error("`{0}` is no size of a picture: one-column, two-columns, page, WIDTHxHEIGHT in pixels (960x400), or WIDTHxHEIGHTmm (85x60mm)")]
+    Unknown(String),
+    /// Too small to hold text, or too large for any page.
+    #[error("a picture is 160 px (42 mm) to 10000 px (2645 mm) wide, and 100 px (26 mm) to 10000 px high")]
+    OutOfRange,
+}
+
+impl Size {
+    /// One column of a paper: 85 mm wide, as high as the content asks for.
+    pub const ONE_COLUMN: Self = Self { width: 85.0 * MILLIMETRE, height: None, font: PRINTED, print: true };
+    /// Two columns of a paper: 175 mm wide, as high as the content asks for.
+    pub const TWO_COLUMNS: Self = Self { width: 175.0 * MILLIMETRE, height: None, font: PRINTED, print: true };
+    /// A page on a screen: 800 px wide, as high as the content asks for.
+    pub const PAGE: Self = Self { width: 800.0, height: None, font: ON_SCREEN, print: false };
+
+    /// Width and height on a screen \[CSS px\].
+    ///
+    /// # Errors
+    ///
+    /// [`SizeError::OutOfRange`].
+    pub fn pixels(width: f64, height: f64) -> Result<Self, SizeError> {
+        Self { width, height: Some(height), font: ON_SCREEN, print: false }.checked()
+    }
+
+    /// Width and height in print \[mm\].
+    ///
+    /// # Errors
+    ///
+    /// [`SizeError::OutOfRange`].
+    pub fn millimetres(width: f64, height: f64) -> Result<Self, SizeError> {
+        Self { width: width * MILLIMETRE, height: Some(height * MILLIMETRE), font: PRINTED, print: true }.checked()
+    }
+
+    fn checked(self) -> Result<Self, SizeError> {
+        let fits = (160.0..=10_000.0).contains(&self.width) && self.height.is_none_or(|height| (100.0..=10_000.0).contains(&height));
+        if fits { Ok(self) } else { Err(SizeError::OutOfRange) }
+    }
+}
+
+impl Default for Size {
+    /// [`Size::PAGE`].
+    fn default() -> Self {
+        Self::PAGE
+    }
+}
+
+impl FromStr for Size {
+    type Err = SizeError;
+
+    fn from_str(word: &str) -> Result<Self, SizeError> {
+        match word {
+            "one-column" => return Ok(Self::ONE_COLUMN),
+            "two-columns" => return Ok(Self::TWO_COLUMNS),
+            "page" => return Ok(Self::PAGE),
+            _ => {}
+        }
+        let unknown = || SizeError::Unknown(word.chars().take(40).flat_map(char::escape_debug).collect());
+        let (numbers, print) = word.strip_suffix("mm").map_or_else(|| (word.strip_suffix("px").unwrap_or(word), false), |numbers| (numbers, true));
+        let (width, height) = numbers.split_once('x').ok_or_else(unknown)?;
+        let width = width.strip_suffix("mm").filter(|_| print).unwrap_or(width);
+        let number = |text: &str| text.parse::<f64>().ok().filter(|number| number.is_finite()).ok_or_else(unknown);
+        let (width, height) = (number(width)?, number(height)?);
+        if print { Self::millimetres(width, height) } else { Self::pixels(width, height) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_size_is_a_word_or_two_numbers() {
+        assert_eq!("two-columns".parse(), Ok(Size::TWO_COLUMNS));
+        assert_eq!("960x400".parse(), Size::pixels(960.0, 400.0));
+        assert_eq!("960x400px".parse(), Size::pixels(960.0, 400.0));
+        assert_eq!("85mmx60mm".parse(), Size::millimetres(85.0, 60.0));
+        for word in ["", "x", "960", "960x", "large", "NaNxNaN", "infx1", "1e9x\u{202e}"] {
+            assert!(matches!(word.parse::<Size>(), Err(SizeError::Unknown(_))), "{word:?}");
+        }
+        for word in ["0x0", "-5x100", "1e9x100", "20x20mm"] {
+            assert_eq!(word.parse::<Size>(), Err(SizeError::OutOfRange), "{word:?}");
+        }
+    }
+}

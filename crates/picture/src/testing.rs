@@ -1,0 +1,161 @@
+//! Checks for tests of pictures: of any command, drawn by this crate.
+//!
+//! [`faults`] reads a document and computes where each text is with the widest of the common fonts. [`in_browser`] asks Chromium, where there is one.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use crate::advance::advance;
+use crate::text::SMALL;
+
+/// The box around a text.
+#[derive(Clone, PartialEq, Debug)]
+pub struct TextBox {
+    /// What it says.
+    pub text: String,
+    /// Left, top, right and bottom \[px\].
+    pub sides: [f64; 4],
+}
+
+/// What is wrong with a picture, in sentences; empty if nothing is: it is no well-formed XML, a number has more than two decimals, a text is outside of the picture
+/// or on another.
+#[must_use]
+pub fn faults(svg: &str) -> Vec<String> {
+    let document = match roxmltree::Document::parse(svg) {
+        Ok(document) => document,
+        Err(error) => return vec![format!("no well-formed XML: {error}")],
+    };
+    let view: Vec<f64> = numbers(document.root_element().attribute("viewBox").unwrap_or_default());
+    let [_, _, width, height] = view[..] else { return vec!["no viewBox".to_owned()] };
+    let mut faults = Vec::new();
+    for node in document.descendants() {
+        for attribute in node.attributes() {
+            let drawn = !matches!(attribute.name(), "class" | "fill" | "role" | "id");
+            for word in attribute.value().split(|letter: char| !(letter.is_ascii_digit() || letter == '.')).filter(|_| drawn) {
+                if word.split_once('.').is_some_and(|(_, decimals)| decimals.len() > 2) {
+                    faults.push(format!("{}=\"…{word}…\" of <{}> has more than two decimals", attribute.name(), node.tag_name().name()));
+                }
+            }
+            if ["NaN", "inf"].iter().any(|word| attribute.value().contains(word)) {
+                faults.push(format!("{} of <{}> is no number: {}", attribute.name(), node.tag_name().name(), attribute.value()));
+            }
+        }
+    }
+    let texts: Vec<TextBox> =
+        document.descendants().filter(|node| node.has_tag_name("text") || node.tag_name().name() == "text").map(estimated).collect();
+    faults.extend(misplaced(&texts, (width, height)));
+    faults
+}
+
+/// Which texts are outside of a picture of that width and height, and which are on each other, in sentences.
+#[must_use]
+pub fn misplaced(texts: &[TextBox], (width, height): (f64, f64)) -> Vec<String> {
+    // Coordinates are rounded to a hundredth.
+    const ROUNDING: f64 = 0.05;
+    let mut faults = Vec::new();
+    for (place, TextBox { text, sides: [left, top, right, bottom] }) in texts.iter().enumerate() {
+        if *left < -ROUNDING || *top < -ROUNDING || *right > width + ROUNDING || *bottom > height + ROUNDING {
+            faults.push(format!("{text:?} at {left:.2}..{right:.2}, {top:.2}..{bottom:.2} is outside of {width} by {height}"));
+        }
+        for other in &texts[..place] {
+            let [a, b, c, d] = other.sides;
+            if *left + ROUNDING < c && a + ROUNDING < *right && *top + ROUNDING < d && b + ROUNDING < *bottom {
+                faults.push(format!("{text:?} is on {:?}: {:.2?} and {:.2?}", other.text, [left, top, right, bottom], other.sides));
+            }
+        }
+    }
+    faults
+}
+
+fn numbers(text: &str) -> Vec<f64> {
+    text.split([' ', '(', ')', ',']).filter_map(|word| word.parse().ok()).collect()
+}
+
+/// How far plain letters reach above and below their line in DejaVu Sans, the tallest of the common fonts \[sizes of the font\].
+const ABOVE: f64 = 0.93;
+const BELOW: f64 = 0.24;
+
+/// The box of a text with the widest and tallest of the common fonts.
+fn estimated(node: roxmltree::Node<'_, '_>) -> TextBox {
+    let number = |node: roxmltree::Node<'_, '_>, name: &str| node.attribute(name).and_then(|text| text.parse::<f64>().ok());
+    let size = number(node, "font-size").unwrap_or(16.0);
+    let (x, y) = (number(node, "x").unwrap_or(0.0), number(node, "y").unwrap_or(0.0));
+    let (mut width, mut shift, mut above, mut below, mut text) = (0.0, 0.0, ABOVE * size, BELOW * size, String::new());
+    for part in node.children() {
+        let span = part.is_element();
+        let words = if span { part.text() } else { part.text().filter(|_| part.is_text()) }.unwrap_or_default();
+        let own = if span { number(part, "font-size").unwrap_or(size) } else { size };
+        shift += if span { number(part, "dy").unwrap_or(0.0) } else { 0.0 };
+        width += words.chars().map(advance).sum::<f64>() * own;
+        above = above.max(ABOVE * own - shift);
+        below = below.max(BELOW * own + shift);
+        text.push_str(words);
+        debug_assert!(!span || own >= 0.99 * SMALL * size, "no smaller letters are drawn");
+    }
+    let left = match node.attribute("text-anchor") {
+        Some("middle") => -0.5 * width,
+        Some("end") => -width,
+        _ => 0.0,
+    };
+    let sides = if node.attribute("transform").is_some_and(|turn| turn.starts_with("rotate(-90")) {
+        [x - above, y - left - width, x + below, y - left]
+    } else {
+        [x + left, y - above, x + left + width, y + below]
+    };
+    TextBox { text, sides }
+}
+
+/// What a browser says of these pictures, each under its name: [`misplaced`] with the boxes that it gives. `None` where there is no `chromium` on the path.
+///
+/// A folder for the page and for what the browser keeps is needed, which is the caller's to remove.
+///
+/// # Panics
+///
+/// If the browser does not start or gives no answer.
+#[must_use]
+pub fn in_browser(folder: &Path, pictures: &[(String, String)]) -> Option<Vec<String>> {
+    let found = Command::new("chromium").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success());
+    if !found {
+        return None;
+    }
+    let mut page = "<!doctype html><meta charset=\"utf-8\"><body>".to_owned();
+    for (name, svg) in pictures {
+        let _ = write!(page, "<div data-name=\"{}\">{svg}</div>", crate::escape(name));
+    }
+    // Boxes in the units of the picture, as lines of numbers and a text.
+    page.push_str(
+        "<pre id=answer></pre><script>let lines=[];for(const [n,div] of [...document.querySelectorAll('div[data-name]')].entries()){const svg=div.firstElementChild,\
+         o=svg.getBoundingClientRect(),v=svg.viewBox.baseVal,k=v.width/o.width;for(const t of svg.querySelectorAll('text')){const b=t.getBoundingClientRect();\
+         lines.push([n,(b.left-o.left)*k,(b.top-o.top)*k,(b.right-o.left)*k,(b.bottom-o.top)*k,v.width,v.height].map(x=>x.toFixed(3)).join(' ')+' '+\
+         encodeURIComponent(t.textContent))}}document.getElementById('answer').textContent='BEGIN\\n'+lines.join('\\n')+'\\nEND'</script>",
+    );
+    let file = folder.join("pictures.html");
+    std::fs::write(&file, page).expect("the page can be written");
+    let output = Command::new("chromium")
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-component-update"])
+        .args(["--disable-sync", "--dump-dom"])
+        .arg(format!("--user-data-dir={}", folder.join("browser").display()))
+        .arg(format!("file://{}", file.display()))
+        .stderr(Stdio::null())
+        .output()
+        .expect("the browser starts");
+    let text = String::from_utf8_lossy(&output.stdout);
+    let answer = text.split_once("BEGIN\n").and_then(|(_, rest)| rest.split_once("\nEND")).expect("the browser has run the script").0;
+    let rows: Vec<(Vec<f64>, &str)> =
+        answer.lines().map(|line| (line.split(' ').take(7).filter_map(|word| word.parse().ok()).collect(), line)).collect();
+    let mut faults = Vec::new();
+    for (number, (name, svg)) in pictures.iter().enumerate() {
+        let own: Vec<_> = rows.iter().filter(|(row, _)| row.len() == 7 && (row[0] - crate::content::count(number)).abs() < 0.5).collect();
+        if own.len() != svg.matches("<text ").count() {
+            faults.push(format!("{name}: the browser shows {} of {} texts", own.len(), svg.matches("<text ").count()));
+        }
+        let texts: Vec<TextBox> = own
+            .iter()
+            .map(|(row, line)| TextBox { text: line.rsplit(' ').next().unwrap_or_default().to_owned(), sides: [row[1], row[2], row[3], row[4]] })
+            .collect();
+        let size = own.first().map_or((0.0, 0.0), |(row, _)| (row[5], row[6]));
+        faults.extend(misplaced(&texts, size).into_iter().map(|fault| format!("{name}: {fault}")));
+    }
+    Some(faults)
+}

@@ -1,0 +1,286 @@
+//! Text with symbols: subscripts, superscripts and italics within a line, its width, and its lines when it wraps.
+//!
+//! What comes in as `&str` or `String` is plain: an underscore in the name of a scene is an underscore. Only [`Text::math`] reads `K_T` as a symbol.
+
+use crate::advance::advance;
+
+/// How a part of a text stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Stand {
+    Plain,
+    /// A symbol of a formula: italic.
+    Symbol,
+    Subscript,
+    Superscript,
+}
+
+/// Subscripts and superscripts are this much smaller.
+pub(crate) const SMALL: f64 = 0.7;
+/// How far subscripts are lowered and superscripts are raised \[sizes of the font\].
+pub(crate) const LOWERED: f64 = 0.16;
+pub(crate) const RAISED: f64 = 0.33;
+/// How far letters reach above the line they stand on, raised ones among them, at most \[sizes of the font\]; 0.33 are below it.
+pub(crate) const ASCENT: f64 = 0.98;
+/// From one line to the next \[sizes of the font\].
+pub(crate) const LEADING: f64 = 1.34;
+
+/// A part of a text.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Span {
+    pub(crate) text: String,
+    pub(crate) stand: Stand,
+}
+
+/// A line or paragraph of text. Control characters, and characters that turn the direction of writing, become a visible U+FFFD.
+///
+/// ```
+/// use cohaptic_picture::Text;
+///
+/// let axis = Text::from("Coordination stiffness ").then(Text::math("K_T")).then(" [N/m]");
+/// assert_eq!(axis.plain(), "Coordination stiffness KT [N/m]");
+/// ```
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Text {
+    pub(crate) spans: Vec<Span>,
+}
+
+impl From<&str> for Text {
+    fn from(text: &str) -> Self {
+        Self::standing(text, Stand::Plain)
+    }
+}
+
+impl From<String> for Text {
+    fn from(text: String) -> Self {
+        Self::from(text.as_str())
+    }
+}
+
+impl From<&String> for Text {
+    fn from(text: &String) -> Self {
+        Self::from(text.as_str())
+    }
+}
+
+impl Text {
+    /// A formula: letters are italic, `_x` and `_{text}` are lowered, `^x` and `^{text}` are raised.
+    #[must_use]
+    pub fn math(formula: &str) -> Self {
+        let mut text = Self::default();
+        let mut letters = formula.chars().peekable();
+        while let Some(letter) = letters.next() {
+            let stand = match letter {
+                '_' => Stand::Subscript,
+                '^' => Stand::Superscript,
+                _ => {
+                    let stand = if letter.is_alphabetic() { Stand::Symbol } else { Stand::Plain };
+                    text.push(&letter.to_string(), stand);
+                    continue;
+                }
+            };
+            let part: String = match letters.next() {
+                Some('{') => letters.by_ref().take_while(|letter| *letter != '}').collect(),
+                Some(one) => one.to_string(),
+                None => String::new(),
+            };
+            text.push(&part, stand);
+        }
+        text
+    }
+
+    /// A power of ten, or a multiple of one: 10⁻³.
+    #[must_use]
+    pub(crate) fn power_of_ten(factor: &str, exponent: i32) -> Self {
+        let mut text = Self::from(if factor == "1" { "10".to_owned() } else { format!("{factor}·10") });
+        text.push(&exponent.to_string().replace('-', "\u{2212}"), Stand::Superscript);
+        text
+    }
+
+    /// This text with another after it.
+    #[must_use]
+    pub fn then(mut self, other: impl Into<Self>) -> Self {
+        for span in other.into().spans {
+            self.push(&span.text, span.stand);
+        }
+        self
+    }
+
+    /// The letters alone.
+    #[must_use]
+    pub fn plain(&self) -> String {
+        self.spans.iter().map(|span| span.text.as_str()).collect()
+    }
+
+    /// Whether there is nothing to see.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.spans.iter().all(|span| span.text.trim().is_empty())
+    }
+
+    fn standing(text: &str, stand: Stand) -> Self {
+        let mut new = Self::default();
+        new.push(text, stand);
+        new
+    }
+
+    fn push(&mut self, text: &str, stand: Stand) {
+        let clean = text.chars().map(shown);
+        match self.spans.last_mut().filter(|span| span.stand == stand) {
+            Some(span) => span.text.extend(clean),
+            None => self.spans.push(Span { text: clean.collect(), stand }),
+        }
+    }
+
+    /// The width with a font of that size, at most.
+    pub(crate) fn width(&self, size: f64) -> f64 {
+        self.spans.iter().flat_map(|span| span.text.chars().map(|letter| width_of(letter, span.stand))).sum::<f64>() * size
+    }
+
+    /// The text in lines that are no wider than that, of which there are at most `most`; more end in an ellipsis. A word that is wider is broken.
+    pub(crate) fn wrapped(&self, size: f64, width: f64, most: usize) -> Vec<Self> {
+        let mut lines = vec![Self::default()];
+        for word in self.words() {
+            let mut word = word;
+            let line = lines.last_mut().expect("there is always a line");
+            // White space at the end of a line takes no room.
+            if line.width(size) + word.trimmed().width(size) <= width {
+                line.append(word);
+                continue;
+            }
+            if !line.spans.is_empty() {
+                lines.push(Self::default());
+            }
+            while word.trimmed().width(size) > width {
+                let (head, tail) = word.broken(size, width);
+                lines.last_mut().expect("there is always a line").append(head);
+                lines.push(Self::default());
+                word = tail;
+            }
+            lines.last_mut().expect("there is always a line").append(word);
+        }
+        let mut lines: Vec<Self> = lines.iter().map(Self::trimmed).filter(|line| !line.is_empty()).collect();
+        if lines.len() > most {
+            lines.truncate(most);
+            if let Some(last) = lines.last_mut() {
+                *last = last.broken(size, width - size * advance('…')).0.then("…");
+            }
+        }
+        lines
+    }
+
+    fn append(&mut self, other: Self) {
+        for span in other.spans {
+            self.push(&span.text, span.stand);
+        }
+    }
+
+    /// The words, each with the white space after it.
+    fn words(&self) -> Vec<Self> {
+        let mut words = vec![Self::default()];
+        let mut after_space = false;
+        for span in &self.spans {
+            for letter in span.text.chars() {
+                // U+00A0 keeps words together.
+                let space = letter == ' ';
+                if after_space && !space {
+                    words.push(Self::default());
+                }
+                words.last_mut().expect("there is always a word").push(letter.encode_utf8(&mut [0; 4]), span.stand);
+                after_space = space;
+            }
+        }
+        words
+    }
+
+    /// Without white space at both ends.
+    fn trimmed(&self) -> Self {
+        let mut spans = self.spans.clone();
+        while let Some(first) = spans.first_mut() {
+            first.text = first.text.trim_start_matches(' ').to_owned();
+            if !first.text.is_empty() {
+                break;
+            }
+            spans.remove(0);
+        }
+        while let Some(last) = spans.last_mut() {
+            last.text = last.text.trim_end_matches(' ').to_owned();
+            if !last.text.is_empty() {
+                break;
+            }
+            spans.pop();
+        }
+        Self { spans }
+    }
+
+    /// As many letters as fit, at least one, and the others.
+    fn broken(&self, size: f64, width: f64) -> (Self, Self) {
+        let (mut head, mut tail, mut so_far) = (Self::default(), Self::default(), 0.0);
+        for span in &self.spans {
+            for letter in span.text.chars() {
+                so_far += size * width_of(letter, span.stand);
+                let fits = tail.spans.is_empty() && (so_far <= width || head.spans.is_empty());
+                if fits { &mut head } else { &mut tail }.push(letter.encode_utf8(&mut [0; 4]), span.stand);
+            }
+        }
+        (head, tail)
+    }
+}
+
+fn width_of(letter: char, stand: Stand) -> f64 {
+    match stand {
+        // Italic letters lean over their right edge.
+        Stand::Symbol => advance(letter) + 0.05,
+        Stand::Plain => advance(letter),
+        Stand::Subscript | Stand::Superscript => SMALL * advance(letter),
+    }
+}
+
+/// A letter as it is shown: what XML cannot hold, what is invisible, and what turns the direction of writing is replaced.
+pub(crate) fn shown(letter: char) -> char {
+    match letter {
+        '\t' | '\n' | '\r' => ' ',
+        // Marks, overrides and isolates of direction; line and paragraph separators; zero width; byte order mark.
+        '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{61c}' | '\u{feff}' => char::REPLACEMENT_CHARACTER,
+        '\u{fffe}' | '\u{ffff}' => char::REPLACEMENT_CHARACTER,
+        control if control.is_control() => char::REPLACEMENT_CHARACTER,
+        letter => letter,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(text: &str, width: f64) -> Vec<String> {
+        Text::from(text).wrapped(10.0, width, 9).iter().map(Text::plain).collect()
+    }
+
+    #[test]
+    fn a_line_breaks_between_words_and_a_long_word_anywhere() {
+        // With the widths stored, "aaa" at 10 px is 18.39 px wide, a space 3.18 px.
+        assert_eq!(lines("aaa aaa aaa", 40.0), ["aaa aaa", "aaa"]);
+        assert_eq!(lines("aaa aaa", 39.9), ["aaa", "aaa"]);
+        assert_eq!(lines("aaaaaaa", 20.0), ["aaa", "aaa", "a"]);
+        assert!(lines("   ", 20.0).is_empty());
+    }
+
+    #[test]
+    fn what_is_left_out_shows_as_an_ellipsis() {
+        let cut = Text::from("aaa aaa aaa aaa").wrapped(10.0, 20.0, 2);
+        assert_eq!(cut.iter().map(Text::plain).collect::<Vec<_>>(), ["aaa", "a…"]);
+        assert!(cut.iter().all(|line| line.width(10.0) <= 20.0));
+    }
+
+    #[test]
+    fn a_formula_has_subscripts_and_a_plain_text_underscores() {
+        let stands = |text: Text| text.spans.into_iter().map(|span| (span.text, span.stand)).collect::<Vec<_>>();
+        assert_eq!(stands(Text::math("K_T")), [("K".into(), Stand::Symbol), ("T".into(), Stand::Subscript)]);
+        assert_eq!(stands(Text::math("10^{-3}")), [("10".into(), Stand::Plain), ("-3".into(), Stand::Superscript)]);
+        assert_eq!(stands(Text::from("K_T")), [("K_T".into(), Stand::Plain)]);
+    }
+
+    #[test]
+    fn nothing_turns_the_direction_of_writing() {
+        assert_eq!(Text::from("a\u{202e}b\u{0}c\nd").plain(), "a\u{fffd}b\u{fffd}c d");
+    }
+}
