@@ -29,6 +29,22 @@ fn verdicts(criterion: &mut Criterion) {
     group.finish();
 }
 
+fn mean_square(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("stability/mean-square");
+    group.throughput(Throughput::Elements(1)).sample_size(20);
+    for peers in [2, 8, 1000] {
+        let family = family(peers, &["link.loss=5%".into()]);
+        let (mut number, mut scratch) = (0_u32, FamilyScratch::default());
+        group.bench_function(BenchmarkId::new("radius", peers), |bencher| {
+            bencher.iter(|| {
+                number += 1;
+                family.radius(&[f64::from(number * 7 % 6000), f64::from(number * 11 % 5900) + 100.0], &mut scratch).ok()
+            });
+        });
+    }
+    group.finish();
+}
+
 fn maps(criterion: &mut Criterion) {
     let family = family(3, &[]);
     let mut group = criterion.benchmark_group("stability/map");
@@ -72,5 +88,5 @@ fn ways(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, verdicts, maps, different_peers, ways);
+criterion_group!(benches, verdicts, mean_square, maps, different_peers, ways);
 criterion_main!(benches);

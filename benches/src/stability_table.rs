@@ -85,6 +85,7 @@ fn main() -> Result<(), String> {
     println!("Each figure is the median of {} rounds in which all rows or columns of a table alternate.\n", work.rounds);
     equal_peers(work);
     figure(work);
+    mean_square_cells(work);
     different_peers(work);
     long_delays(work);
     speed_against_error(work);
@@ -141,8 +142,15 @@ impl Walk {
 }
 
 fn figure(work: Work) {
+    println!("\n## The paper's Figure 3\n");
+    filled(work, 0, "5 s");
+}
+
+/// The maps of Figure 3 over links that lose that share of the samples.
+fn filled(work: Work, loss: u32, asked: &str) {
     let Work { rounds: count, cells: side, .. } = work;
-    let families = figure_3();
+    let count = if loss == 0 { count } else { count.min(3) };
+    let families = figure_3(loss);
     let grid = Grid::new(side, side).expect("a grid");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
     let mut rounds = (Vec::new(), Vec::new());
@@ -155,7 +163,6 @@ fn figure(work: Work) {
         rounds.1.push(process_time() - processor);
     }
     let cells = families.len() * side * side;
-    println!("\n## The paper's Figure 3\n");
     println!(
         "{} curves, a map of {side} × {side} cells each: {cells} radii without bounds, on two threads of two cores that others use too.\n",
         families.len()
@@ -163,7 +170,31 @@ fn figure(work: Work) {
     println!("| wall | asked for | processor | processor a cell |");
     println!("| ---: | ---: | ---: | ---: |");
     let (wall, processor) = (median(rounds.0).as_secs_f64(), median(rounds.1).as_secs_f64());
-    println!("| {wall:.2} s | 5 s | {processor:.2} s | {:.2} µs |", processor / cells as f64 * 1e6);
+    println!("| {wall:.2} s | {asked} | {processor:.2} s | {:.2} µs |", processor / cells as f64 * 1e6);
+}
+
+fn mean_square_cells(work: Work) {
+    println!("\n## The mean square\n");
+    println!("Radii a second along the map KT × KC of N equal peers, over links of Tn that lose 5 % of the samples, or also have a jitter that is spread over");
+    println!("five ticks: the radii of a map, and those with proven bounds, which `point`, `boundary` and cells next to 1 take.\n");
+    println!("| peers | links | radius | asked for | with bounds |");
+    println!("| ---: | --- | ---: | ---: | ---: |");
+    let spread = "link.jitter={ sd = \"1ms\", distribution = \"uniform\" }".to_owned();
+    for (peers, jitter) in [(2, false), (3, false), (8, false), (1000, false), (3, true)] {
+        let changes = ["link.loss=5%".to_owned()].into_iter().chain(jitter.then(|| spread.clone()));
+        let family = family(peers, &changes.collect::<Vec<_>>());
+        let (mut first, mut second) = (Walk::default(), Walk::default());
+        let (mut one, mut other) = (FamilyScratch::default(), FamilyScratch::default());
+        let times = work.measured(vec![
+            Box::new(|| drop(black_box(family.radius(&first.next(), &mut one)))),
+            Box::new(|| drop(black_box(family.bounded_radius(&second.next(), &mut other)))),
+        ]);
+        let [radius, bounded] = [0, 1].map(|place: usize| 1.0 / times[place].as_secs_f64());
+        let (links, asked) = if jitter { ("loss and jitter", "—") } else { ("loss", "2000") };
+        println!("| {peers} | {links} | {radius:.0} | {asked} | {bounded:.0} |");
+    }
+    println!("\nFigure 3 with a loss of 5 %:\n");
+    filled(work, 5, "20 s");
 }
 
 fn different_peers(work: Work) {

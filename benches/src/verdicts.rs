@@ -35,11 +35,14 @@ pub fn family(peers: usize, changes: &[String]) -> Family {
     Family::new(PAPER, "paper.toml".as_ref(), &overrides, keys.to_vec()).expect("a family")
 }
 
-/// The curves of the paper's Figure 3, BT = BC = 0: proportional-derivative for 2 to 5 peers, average-position for 2 to 8.
+/// The curves of the paper's Figure 3, BT = BC = 0: proportional-derivative for 2 to 5 peers, average-position for 2 to 8; over links that lose that share
+/// of the samples \[%\].
 #[must_use]
-pub fn figure_3() -> Vec<Family> {
+pub fn figure_3(loss: u32) -> Vec<Family> {
     let curve = |strategy: &str, peers: usize| {
-        family(peers, &[format!("coordination.strategy={strategy}"), "coordination.damping=0".into(), "peer.coupling.damping=0".into()])
+        let undamped = ["coordination.damping=0".to_owned(), "peer.coupling.damping=0".to_owned()];
+        let changes = [format!("coordination.strategy={strategy}"), format!("link.loss={loss}%")];
+        family(peers, &[changes, undamped].concat())
     };
     (2..=5).map(|peers| curve("proportional-derivative", peers)).chain((2..=8).map(|peers| curve("average-position", peers))).collect()
 }
@@ -77,6 +80,6 @@ mod tests {
         assert!((full.radius.value - reduced.radius.value).abs() < 1e-12);
         // Four states of a body each and two of a sample, less the common position; the reduced path needs one number of a sample.
         assert_eq!(full.dimension, 8 * 6 - 1);
-        assert_eq!(figure_3().len(), 11);
+        assert_eq!(figure_3(0).len(), 11);
     }
 }
