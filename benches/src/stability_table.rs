@@ -175,7 +175,9 @@ fn filled(work: Work, loss: u32, asked: &str) {
 
 fn mean_square_cells(work: Work) {
     println!("\n## The mean square\n");
-    println!("Radii a second along the map KT × KC of N equal peers, over links of Tn that lose 5 % of the samples, or also have a jitter that is spread over");
+    println!(
+        "Radii a second along the map KT × KC of N equal peers, over links of Tn that lose 5 % of the samples, or also have a jitter that is spread over"
+    );
     println!("five ticks: the radii of a map, and those with proven bounds, which `point`, `boundary` and cells next to 1 take.\n");
     println!("| peers | links | radius | asked for | with bounds |");
     println!("| ---: | --- | ---: | ---: | ---: |");

@@ -3,6 +3,8 @@
 //! An operation is a multiplication with an addition on one number. Estimates count what the innermost loops do and leave out the rest; they are good to a
 //! factor of about three, which is enough to tell seconds from hours. What an operation takes in time is the machine's affair, not this crate's.
 
+use crate::structure::count;
+
 /// The sizes of a frame in which a second moment is followed event by event.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FrameCost {
@@ -27,41 +29,36 @@ impl FrameCost {
     /// How many operations the spectral radius takes.
     #[must_use]
     pub fn operations(&self) -> f64 {
-        TO_PREPARE * real(self.events) + PASSES * self.of_a_pass()
+        TO_PREPARE * count(self.events) + PASSES * self.of_a_pass()
     }
 
     /// One way through the frame, and what is done to all numbers at its end.
     pub(crate) fn of_a_pass(&self) -> f64 {
-        OF_AN_EVENT * real(self.joint) * real(self.rows) * real(self.events) + BETWEEN * self.numbers()
+        OF_AN_EVENT * count(self.joint) * count(self.rows) * count(self.events) + BETWEEN * self.numbers()
     }
 
     /// How many numbers are kept at once within the frame.
     #[must_use]
     pub fn numbers(&self) -> f64 {
-        real(self.joint) * real(self.rows) * real(self.rows)
+        count(self.joint) * count(self.rows) * count(self.rows)
     }
 }
 
 /// How many operations it takes to push that many unit vectors through a frame of that many events along so many axes, and then to find the eigenvalues.
 #[must_use]
 pub fn full_operations(states: usize, events: usize, axes: usize) -> f64 {
-    pushed_operations(events, axes) * real(states) + eigenvalue_operations(states)
+    pushed_operations(events, axes) * count(states) + eigenvalue_operations(states)
 }
 
 /// Those of one of the vectors: a tick of a peer is some sixty operations an axis.
 pub(crate) fn pushed_operations(events: usize, axes: usize) -> f64 {
-    60.0 * real(events) * real(axes)
+    60.0 * count(events) * count(axes)
 }
 
 /// How many operations the eigenvalues of a matrix of that size take: 10·n³ (Golub & Van Loan 2013, Section 7.5.6).
 #[must_use]
 pub fn eigenvalue_operations(size: usize) -> f64 {
-    10.0 * real(size).powi(3)
-}
-
-#[expect(clippy::cast_precision_loss, reason = "an estimate")]
-fn real(number: usize) -> f64 {
-    number as f64
+    10.0 * count(size).powi(3)
 }
 
 #[cfg(test)]
@@ -74,7 +71,7 @@ mod tests {
     fn the_cost_follows_events_rows_and_joint_states() {
         let frame = FrameCost { events: 10_000_000, rows: 100, joint: 1 };
         let ratio = |other: FrameCost| other.operations() / frame.operations();
-        assert!((ratio(FrameCost { events: 200_000, ..frame }) - 2.0).abs() < 0.01);
+        assert!((ratio(FrameCost { events: 20_000_000, ..frame }) - 2.0).abs() < 0.01);
         assert!((ratio(FrameCost { joint: 2, ..frame }) - 2.0).abs() < 0.1);
         assert!((ratio(FrameCost { rows: 1000, ..frame }) - 10.0).abs() < 0.5);
         // 8 bytes each: a gibibyte is 2^27 numbers.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cohaptic_measure::asked::Asked;
 use cohaptic_measure::fates::{self, ReadError};
-use cohaptic_scene::{LimitedFile, LinkKeys, MOST_BYTES, link_from_keys};
+use cohaptic_scene::{LinkKeys, link_from_keys};
 use cohaptic_wan::law::DistTable;
 use cohaptic_wan::netem::kernel::Table;
 use cohaptic_wan::netem::{ExactError, Netem, TableName};
@@ -158,8 +158,8 @@ fn below(said: &str, option: &str) -> String {
 
 fn replay(path: &Path) -> Result<Spec, Failure> {
     let unreadable = |error| Failure::File { verb: "read", path: path.to_path_buf(), error };
-    let file = LimitedFile::open(path, MOST_BYTES).map_err(unreadable)?;
-    let log = fates::read(file).map_err(|error| match error {
+    let text = text_file::read(path)?;
+    let log = fates::read(text.as_bytes()).map_err(|error| match error {
         ReadError::Io(error) => unreadable(error),
         other @ (ReadError::Log(_) | _) => Failure::Input(format!("{}: {other}", output::path(path))),
     })?;

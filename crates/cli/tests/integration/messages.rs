@@ -19,9 +19,9 @@ const fn bad(line: &'static str, message: &'static str) -> Bad {
 
 /// Refusals of arguments, without [`HELP`].
 const ARGUMENTS: &[Bad] = &[
-    bad("check two.toml --jobs abc", "invalid value 'abc' for '--jobs <N>': expected an integer from 1 to 1024"),
-    bad("check two.toml --jobs 0", "invalid value '0' for '--jobs <N>': expected an integer from 1 to 1024"),
-    bad("check two.toml --jobs -1", "invalid value '-1' for '--jobs <N>': expected an integer from 1 to 1024"),
+    bad("check two.toml --jobs abc", "invalid value 'abc' for '--threads <N>': expected an integer from 1 to 1024"),
+    bad("check two.toml --jobs 0", "invalid value '0' for '--threads <N>': expected an integer from 1 to 1024"),
+    bad("check two.toml --jobs -1", "invalid value '-1' for '--threads <N>': expected an integer from 1 to 1024"),
     bad(
         "campaign two.toml --vary object.mass=1,2 --out c --part 0",
         "invalid value '0' for '--part <N>': expected an integer of at least 1, below 2^64",
@@ -51,7 +51,7 @@ const ARGUMENTS: &[Bad] = &[
         "invalid value '127.0.0.1:65536' for '--to <ADDRESS>': is no address with a port: expected an address with a port, such as 127.0.0.1:7000, [::1]:7000 \
          or localhost:7000",
     ),
-    bad("check two.toml --jobs 1\u{202e}0", "invalid value '1\\u{202e}0' for '--jobs <N>': expected an integer from 1 to 1024"),
+    bad("check two.toml --jobs 1\u{202e}0", "invalid value '1\\u{202e}0' for '--threads <N>': expected an integer from 1 to 1024"),
     bad(
         "link delay 1ms --every 8\u{202e}ms",
         "invalid value '8\\u{202e}ms' for '--every <TIME>': unknown unit \"\\u{202e}ms\" in \"8\\u{202e}ms\": expected a duration such as \"8ms\", \"1.5s\" or \
