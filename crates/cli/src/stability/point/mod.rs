@@ -28,9 +28,12 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
             let watch = AnalysisWatch::new();
             let judged = judge_watched(&scene, arguments.method.into(), &Limits { watch: &watch, ..Limits::of_unknowns(usize::MAX) });
             watch.clear();
-            judged.map_err(|error| match error {
-                AnalysisError::Stopped => Failure::Interrupted("the analysis was ended before its verdict".to_owned()),
-                error => not_analysed(path, &error),
+            judged.map_err(|error| {
+                if error == AnalysisError::Stopped {
+                    Failure::Interrupted("the analysis was ended before its verdict".to_owned())
+                } else {
+                    not_analysed(path, &error)
+                }
             })?
         }
     };
