@@ -24,7 +24,7 @@ pub const NOMINAL: &str = "the verdict is nominal: ";
 ///
 /// # Errors
 ///
-/// As for [`analyse`].
+/// As for [`analyse`](crate::analyse).
 pub fn judge(scene: &Scene, method: Method, most: usize) -> Result<Judgement, AnalysisError> {
     judge_watched(scene, method, &Limits::of_unknowns(most))
 }

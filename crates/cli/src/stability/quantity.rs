@@ -22,10 +22,10 @@ pub(crate) fn axis_of(range: &KeyRange) -> Axis {
 const NAMES: [(&str, &str, &str); 10] = [
     ("coordination.stiffness", "Coordination stiffness", "K_T"),
     ("coordination.damping", "Coordination damping", "B_T"),
-    ("coupling.stiffness", "Coupling stiffness", "K_C"),
-    ("coupling.damping", "Coupling damping", "B_C"),
+    ("peer.coupling.stiffness", "Coupling stiffness", "K_C"),
+    ("peer.coupling.damping", "Coupling damping", "B_C"),
     ("object.mass", "Mass of the object", "m_O"),
-    ("device.mass", "Mass of the device", "m_H"),
+    ("peer.device.mass", "Mass of the device", "m_H"),
     ("scene.count", "Number of users", "N"),
     ("link.delay", "Delay of links", "T_d"),
     ("link.loss", "Loss on links", ""),
@@ -60,6 +60,24 @@ mod tests {
         assert_eq!(of("coordination.stiffness=0..1"), Axis::new("Coordination stiffness").symbol("K_T").unit("N/m"));
         assert_eq!(of("link.delay=0ms..1ms"), Axis::new("Delay of links").symbol("T_d").unit("ms"));
         assert_eq!(of("peers.left.device.mass=0..1"), Axis::new("peers.left.device.mass").unit("kg"));
+    }
+
+    #[test]
+    fn every_key_with_a_name_is_one_of_a_scene() {
+        let text = "scene = { duration = '1s', count = 2 }\nobject.mass = 1.0\n\
+            coordination = { strategy = 'average-position', stiffness = 1.0, damping = 1.0, update = '8ms' }\n\
+            peer = { device = { mass = 1.0, damping = 1.0 }, coupling = { stiffness = 1.0, damping = 1.0 } }\nlink.delay = '8ms'\n";
+        for (key, ..) in NAMES {
+            let value = if ["link.delay", "link.jitter"].contains(&key) {
+                "3ms"
+            } else if key == "link.loss" {
+                "3%"
+            } else {
+                "3"
+            };
+            let scene = cohaptic_scene::Scene::parse(text, "scene.toml".as_ref(), &[format!("{key}={value}")]);
+            assert!(scene.is_ok(), "{key}: {scene:?}");
+        }
     }
 
     #[test]

@@ -50,7 +50,8 @@ fn a_map_has_the_mean_square_radii_of_its_cells() {
     let mut lines = table.lines();
     assert_eq!(lines.next(), Some("coordination.stiffness,link.loss,mean_square_radius,verdict,judged"));
     assert!(lines.all(|line| line.ends_with(",mean-square")));
-    assert!(desk.read("out/map.svg").contains("mean-square radius"));
+    let picture = desk.read("out/map.svg");
+    assert!(picture.contains("mean-square radius") && picture.contains("stable in the mean square"), "{picture}");
 }
 
 #[test]

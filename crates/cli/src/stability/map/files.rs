@@ -56,6 +56,7 @@ fn picture(order: &Order, maps: &[VariantMap]) -> Option<cohaptic_picture::Pictu
     let title = format!("{}: {radius} 1", order.title);
     let picture = Picture {
         title: &title,
+        stable: if first.criterion == Criterion::MeanSquare { "stable in the mean square" } else { "stable" },
         x: Axis { shown: axis_of(order.x()), values: &first.map.x },
         y: Axis { shown: axis_of(order.y()), values: &first.map.y },
         outlines: maps.iter().map(outline).collect(),

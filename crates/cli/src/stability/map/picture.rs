@@ -6,6 +6,8 @@ use cohaptic_stability::Polyline;
 /// What a map shows.
 pub(super) struct Picture<'a> {
     pub(super) title: &'a str,
+    /// What the region of the first variant is: stable, by which criterion.
+    pub(super) stable: &'a str,
     pub(super) x: Axis<'a>,
     pub(super) y: Axis<'a>,
     pub(super) outlines: Vec<Outline>,
@@ -39,7 +41,7 @@ impl Picture<'_> {
             .enumerate()
             .map(|(number, outline)| Line::runs(outline.lines.iter().map(closed), Look::of(number)).named(outline.name.as_str()));
         let panel = Panel::new(self.x.between_values(), self.y.between_values())
-            .with(Region::new(regions, Fill::Tint(0)).named(format!("stable: {first}")))
+            .with(Region::new(regions, Fill::Tint(0)).named(format!("{}: {first}", self.stable)))
             .with_all(lines);
         let is_nominal = |column: usize, row: usize| self.nominal.get(row).and_then(|row| row.get(column)).copied().unwrap_or(false);
         let panel = if self.nominal.iter().flatten().any(|nominal| *nominal) {
@@ -74,9 +76,17 @@ mod tests {
         let square = |half: f64| Polyline { points: vec![(-half, -half), (half, -half), (half, half), (-half, half)], closed: true };
         let values = [-4.0, 4.0];
         let axis = || Axis { shown: Shown::new("x"), values: &values };
-        let svg = Picture { title: "", x: axis(), y: axis(), outlines: Vec::new(), regions: [1.0, 3.0, 2.0].map(square).into(), nominal: &[] }
-            .drawn()
-            .svg();
+        let svg = Picture {
+            title: "",
+            stable: "stable",
+            x: axis(),
+            y: axis(),
+            outlines: Vec::new(),
+            regions: [1.0, 3.0, 2.0].map(square).into(),
+            nominal: &[],
+        }
+        .drawn()
+        .svg();
         let area = svg.lines().find(|line| line.starts_with("<path class=\"tint")).unwrap();
         assert!(area.contains("fill-rule=\"evenodd\"") && area.matches('M').count() == 3, "{area}");
     }
@@ -88,9 +98,17 @@ mod tests {
         let outlines = (0..12)
             .map(|n| Outline { name: format!("</svg>{n}\u{1}"), lines: vec![Polyline { points: vec![(0.0, 0.0), (1.0, 1.0)], closed: false }] })
             .collect();
-        let svg = Picture { title: "<script>", x: axis(), y: axis(), outlines, regions: Vec::new(), nominal: &[vec![true, false], vec![true, true]] }
-            .drawn()
-            .svg();
+        let svg = Picture {
+            title: "<script>",
+            stable: "stable",
+            x: axis(),
+            y: axis(),
+            outlines,
+            regions: Vec::new(),
+            nominal: &[vec![true, false], vec![true, true]],
+        }
+        .drawn()
+        .svg();
         assert!(svg.contains("nominal: nothing is left to chance"));
         assert_eq!(svg.matches("</svg>").count(), 1);
         assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;") && !svg.contains('\u{1}'));
