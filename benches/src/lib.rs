@@ -9,7 +9,9 @@
 
 pub mod bare;
 pub mod bare_pair;
+pub mod by_hand;
 pub mod effort;
+pub mod kernel;
 pub mod machine;
 pub mod one_link;
 pub mod pages;

@@ -1,6 +1,7 @@
 //! A scene in virtual time.
 
-use cohaptic_peer::{Gains, Strategy};
+use cohaptic_peer::Strategy;
+use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_scene::{Axes, FromScene, Scene, Strategies};
 
 use crate::arrays::{Arrays, Shape};
@@ -69,12 +70,12 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     pub fn run<O: Observer>(&self, observer: &mut O) -> Result<Summary, O::Error> {
         assert!(too_large(self.scene).is_none(), "a scene with more peers than a simulation takes is not run");
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
-        if let Some((shape, gains)) = self.arrays(&plan, Watch::of(observer)) {
+        if let Some((shape, law)) = self.arrays(&plan, Watch::of(observer)) {
             let keep_going = |now| observer.keep_going(now);
             let [summary] = match plan.axes {
-                Axes::One => Arrays::<1, 1>::new([self.scene], shape, [gains]).run(keep_going),
-                Axes::Two => Arrays::<2, 1>::new([self.scene], shape, [gains]).run(keep_going),
-                Axes::Three => Arrays::<3, 1>::new([self.scene], shape, [gains]).run(keep_going),
+                Axes::One => Arrays::<1, 1>::new([self.scene], shape, [law]).run(keep_going),
+                Axes::Two => Arrays::<2, 1>::new([self.scene], shape, [law]).run(keep_going),
+                Axes::Three => Arrays::<3, 1>::new([self.scene], shape, [law]).run(keep_going),
             };
             return Ok(summary);
         }
@@ -86,7 +87,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     }
 
     /// The shape of the scene, if it needs no events and nobody watches.
-    fn arrays(&self, plan: &Plan, watch: Watch) -> Option<(Shape, Gains)> {
+    fn arrays(&self, plan: &Plan, watch: Watch) -> Option<(Shape, BuiltIn)> {
         let is_unseen = watch == Watch { ticks: false, packets: false } && self.disturbance.is_none() && self.model == Model::Least;
         if is_unseen { Shape::of(self.scene, plan, &self.strategies) } else { None }
     }

@@ -1,6 +1,7 @@
 //! The parameters of a peer. Each is finite and not negative, a mass above zero: whoever makes one has checked that.
 
-use crate::Signal;
+use crate::tick::grasp;
+use crate::{Motion, Number, Signal};
 
 /// A haptic device: a mass with viscous damping.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -13,11 +14,29 @@ pub struct DeviceConfig {
 
 /// A spring and a damper side by side: the virtual coupling (KC, BC) or the coordination (KT, BT).
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Gains {
+pub struct Gains<C = f64> {
     /// Stiffness [N/m].
-    pub stiffness: f64,
+    pub stiffness: C,
     /// Damping [N·s/m].
-    pub damping: f64,
+    pub damping: C,
+}
+
+impl<C: Copy> Gains<C> {
+    /// Each gain replaced by what `gain` makes of it, the stiffness first.
+    #[must_use]
+    #[inline(always)]
+    pub fn map<D>(&self, mut gain: impl FnMut(&C) -> D) -> Gains<D> {
+        Gains { stiffness: gain(&self.stiffness), damping: gain(&self.damping) }
+    }
+}
+
+impl<N: Number> Gains<N> {
+    /// The force of the spring and the damper \[N\], where `apart` is the motion of one end relative to the other.
+    #[must_use]
+    #[inline(always)]
+    pub fn force(&self, apart: Motion<N>) -> N {
+        self.stiffness * apart.position + self.damping * apart.velocity
+    }
 }
 
 impl Gains {
@@ -78,23 +97,20 @@ pub enum Contact {
 }
 
 impl Contact {
-    /// FC along an axis \[N\], through a coupling KC and BC, of a device that is `gap` \[m\] from the copy and moves away from it with `speed` [m/s]: xH − xO
-    /// and vH − vO.
+    /// FC along an axis \[N\], through a coupling KC and BC, of a device with the motion `apart` relative to the copy: xH − xO and vH − vO.
     #[must_use]
     #[inline(always)]
-    pub fn force_along(self, axis: usize, coupling: Gains, gap: f64, speed: f64) -> f64 {
-        let Gains { stiffness: k_c, damping: b_c } = coupling;
+    pub fn force_along(self, axis: usize, coupling: &Gains, apart: Motion) -> f64 {
         match self {
             Self::None => 0.0,
-            //= Rakhsha & Constantinescu 2015, eq. (9): FC = KC·(xH − xO) + BC·(vH − vO)
-            Self::Grasp => k_c * gap + b_c * speed,
+            Self::Grasp => grasp(coupling, apart),
             Self::Push(direction) => {
                 let sign = if direction.positive { 1.0 } else { -1.0 };
-                let depth = sign * gap;
-                if axis != direction.axis || depth <= 0.0 {
+                let inwards = Motion { position: sign * apart.position, velocity: sign * apart.velocity };
+                if axis != direction.axis || inwards.position <= 0.0 {
                     return 0.0;
                 }
-                sign * (k_c * depth + b_c * (sign * speed)).max(0.0)
+                sign * grasp(coupling, inwards).max(0.0)
             }
         }
     }

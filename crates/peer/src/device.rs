@@ -6,6 +6,7 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 
 use crate::stepper::Stepper;
+use crate::tick::on_device;
 use crate::{ArmConfig, Clock, DeviceConfig, Hand, Integrator, Plant, Signal, State};
 
 /// What a peer needs of a haptic device, simulated or real.
@@ -146,8 +147,7 @@ impl<const A: usize> Device<A> for SimulatedDevice<A> {
     #[inline(always)]
     fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
         let hand = self.hand.at(now);
-        //= Rakhsha & Constantinescu 2015, eq. (7): mH·aH = Fh − FC − bH·vH
-        let force = core::array::from_fn(|axis| hand[axis] - coupling_force[axis]);
+        let force = core::array::from_fn(|axis| on_device(hand[axis], coupling_force[axis]));
         self.stepper.advance(&mut self.state, span, force);
     }
 }

@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
+use crate::tick::on_object;
 use crate::wire::{DecodeError, MAX_LEN, Sample};
 use crate::{Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
 
@@ -156,8 +157,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         let own = self.object.state();
         let coupling = self.coupling_force(own);
         let command = self.strategy.command(&Context { now, own, held: &self.held });
-        //= Rakhsha & Constantinescu 2015, eq. (8): mO·aO = FC − FT − bO·vO
-        let mut on_object: [f64; A] = core::array::from_fn(|axis| coupling[axis] - command.force[axis]);
+        let mut on_object: [f64; A] = core::array::from_fn(|axis| on_object(coupling[axis], command.force[axis]));
         if let Some(enclosure) = &self.config.enclosure {
             let walls = enclosure.force(own);
             for axis in 0..A {
@@ -271,8 +271,6 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             return [0.0; A];
         }
         let device = self.device.state();
-        core::array::from_fn(|axis| {
-            contact.force_along(axis, coupling, device.position[axis] - object.position[axis], device.velocity[axis] - object.velocity[axis])
-        })
+        core::array::from_fn(|axis| contact.force_along(axis, &coupling, device.along(axis).relative_to(object.along(axis))))
     }
 }

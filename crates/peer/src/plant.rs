@@ -13,6 +13,8 @@
 
 use core::time::Duration;
 
+use crate::{Motion, Number};
+
 /// How motion between ticks is computed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Integrator {
@@ -44,11 +46,11 @@ pub struct Plant {
 
 /// The linear map of one step.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct StepMap {
+pub struct StepMap<C = f64> {
     /// Increment by the state: row 0 for the position, row 1 for the velocity.
-    state: [[f64; 2]; 2],
+    state: [[C; 2]; 2],
     /// Increment by the held force.
-    force: [f64; 2],
+    force: [C; 2],
 }
 
 impl Plant {
@@ -77,34 +79,55 @@ impl Plant {
     }
 }
 
-impl StepMap {
-    /// Moves (x, v) by one step under the held force `f`.
-    #[inline]
-    pub fn advance(&self, position: &mut f64, velocity: &mut f64, force: f64) {
-        let (x, v) = (*position, *velocity);
-        *position = x + (self.state[0][0] * x + self.state[0][1] * v + self.force[0] * force);
-        *velocity = v + (self.state[1][0] * x + self.state[1][1] * v + self.force[1] * force);
+impl<C> StepMap<C> {
+    /// The map with these coefficients: increments by (x, v) row by row, then by the force.
+    #[must_use]
+    pub const fn new(state: [[C; 2]; 2], force: [C; 2]) -> Self {
+        Self { state, force }
     }
 
-    /// Whether the increment does not depend on the position: a body that nothing ties to ground.
+    /// Each coefficient replaced by what `coefficient` makes of it: increments by (x, v) row by row, then by the force.
     #[must_use]
-    pub fn is_free(&self) -> bool {
-        self.state[0][0] == 0.0 && self.state[1][0] == 0.0
+    #[inline(always)]
+    pub fn map<D>(&self, mut coefficient: impl FnMut(&C) -> D) -> StepMap<D> {
+        let mut row = |[by_first, by_second]: &[C; 2]| [coefficient(by_first), coefficient(by_second)];
+        StepMap { state: [row(&self.state[0]), row(&self.state[1])], force: row(&self.force) }
+    }
+}
+
+impl<C: Copy> StepMap<C> {
+    /// The coefficients: increments by (x, v) row by row, then by the force.
+    #[must_use]
+    #[inline(always)]
+    pub const fn coefficients(&self) -> ([[C; 2]; 2], [C; 2]) {
+        (self.state, self.force)
+    }
+}
+
+impl<N: Number> StepMap<N> {
+    /// Moves a body by one step under the held force `f`.
+    #[inline(always)]
+    pub fn advance(&self, body: &mut Motion<N>, force: N) {
+        let Motion { position: x, velocity: v } = *body;
+        body.position = x + (self.state[0][0] * x + self.state[0][1] * v + self.force[0] * force);
+        body.velocity = v + (self.state[1][0] * x + self.state[1][1] * v + self.force[1] * force);
     }
 
     /// [`StepMap::advance`] for a free body, with the terms that are zero left out. The result is the same to the bit, unless the position is
     /// infinite or NaN.
-    #[inline]
-    pub fn advance_free(&self, position: &mut f64, velocity: &mut f64, force: f64) {
-        let v = *velocity;
-        *position += self.state[0][1] * v + self.force[0] * force;
-        *velocity = v + (self.state[1][1] * v + self.force[1] * force);
+    #[inline(always)]
+    pub fn advance_free(&self, body: &mut Motion<N>, force: N) {
+        let Motion { position: x, velocity: v } = *body;
+        body.position = x + (self.state[0][1] * v + self.force[0] * force);
+        body.velocity = v + (self.state[1][1] * v + self.force[1] * force);
     }
+}
 
-    /// The coefficients: increments by (x, v) row by row, then by the force.
+impl StepMap {
+    /// Whether the increment does not depend on the position: a body that nothing ties to ground.
     #[must_use]
-    pub const fn coefficients(&self) -> ([[f64; 2]; 2], [f64; 2]) {
-        (self.state, self.force)
+    pub fn is_free(&self) -> bool {
+        self.state[0][0] == 0.0 && self.state[1][0] == 0.0
     }
 }
 
@@ -201,10 +224,10 @@ mod tests {
     #[test]
     fn an_undamped_free_body_moves_as_newton_says() {
         let map = Plant { mass: 0.15, damping: 0.0, stiffness: 0.0 }.step(TICK, Integrator::Exact);
-        let (mut x, mut v) = (1.0, 2.0);
-        map.advance(&mut x, &mut v, 3.0);
-        close(x, 1.0 + 2.0e-3 + 3.0 / 0.15 * 0.5e-6, 1e-15);
-        close(v, 2.0 + 3.0 / 0.15 * 1e-3, 1e-15);
+        let mut body = Motion { position: 1.0, velocity: 2.0 };
+        map.advance(&mut body, 3.0);
+        close(body.position, 1.0 + 2.0e-3 + 3.0 / 0.15 * 0.5e-6, 1e-15);
+        close(body.velocity, 2.0 + 3.0 / 0.15 * 1e-3, 1e-15);
     }
 
     /// An undamped spring: x(h) = cos(ωh), v(h) = −ω·sin(ωh) from (1, 0), up to thirty turns in one step.
@@ -213,8 +236,9 @@ mod tests {
         for stiffness in [1.0, 100.0, 1e6, 4e9] {
             let map = Plant { mass: 0.1, damping: 0.0, stiffness }.step(TICK, Integrator::Exact);
             let angle = libm::sqrt(stiffness / 0.1) * 1e-3;
-            let (mut x, mut v) = (1.0, 0.0);
-            map.advance(&mut x, &mut v, 0.0);
+            let mut body = Motion { position: 1.0, velocity: 0.0 };
+            map.advance(&mut body, 0.0);
+            let Motion { position: x, velocity: v } = body;
             assert!((x - libm::cos(angle)).abs() < 1e-9, "ωh = {angle}: {x} is not {}", libm::cos(angle));
             assert!((v * 1e-3 / angle + libm::sin(angle)).abs() < 1e-9);
         }
@@ -223,11 +247,13 @@ mod tests {
     #[test]
     fn the_short_form_for_a_free_body_gives_the_same_bits() {
         let map = Plant { mass: 0.1, damping: 5.0, stiffness: 0.0 }.step(TICK, Integrator::Exact);
-        for (x, v, f) in [(0.3, -0.2, 1.5), (0.0, 0.0, -1.5), (-1e6, 1e-3, 0.0), (-0.0, -0.0, 0.0)] {
-            let (mut full, mut short) = ((x, v), (x, v));
-            map.advance(&mut full.0, &mut full.1, f);
-            map.advance_free(&mut short.0, &mut short.1, f);
-            assert_eq!((full.0.to_bits(), full.1.to_bits()), (short.0.to_bits(), short.1.to_bits()));
+        for (position, velocity, f) in [(0.3, -0.2, 1.5), (0.0, 0.0, -1.5), (-1e6, 1e-3, 0.0), (-0.0, -0.0, 0.0)] {
+            let mut full = Motion { position, velocity };
+            let mut short = full;
+            map.advance(&mut full, f);
+            map.advance_free(&mut short, f);
+            let bits = |body: Motion<f64>| (body.position.to_bits(), body.velocity.to_bits());
+            assert_eq!(bits(full), bits(short));
         }
     }
 

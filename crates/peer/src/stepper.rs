@@ -35,12 +35,14 @@ impl Stepper {
             other = self.plant.step(span, self.integrator);
             &other
         };
-        for ((position, velocity), force) in state.position.iter_mut().zip(&mut state.velocity).zip(force) {
+        for (axis, force) in force.into_iter().enumerate() {
+            let mut body = state.along(axis);
             if self.free {
-                map.advance_free(position, velocity, force);
+                map.advance_free(&mut body, force);
             } else {
-                map.advance(position, velocity, force);
+                map.advance(&mut body, force);
             }
+            state.set_along(axis, body);
         }
     }
 }

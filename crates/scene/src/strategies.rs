@@ -1,7 +1,7 @@
 //! Which strategy each peer runs: the scene's, or one of the caller's own.
 
-use cohaptic_peer::coordination::BuiltIn;
-use cohaptic_peer::{Gains, Strategy};
+use cohaptic_peer::Strategy;
+use cohaptic_peer::coordination::{BuiltIn, LawParameters, LawStrategy};
 
 use crate::Scene;
 
@@ -15,9 +15,8 @@ pub trait Strategies {
     /// Makes the strategy of the peer in that place of [`Scene::peers`].
     fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> Self::Strategy<A>;
 
-    /// The gains KT and BT towards the mean of the samples held with which average-position coordination gives the same forces at every peer, to the bit;
-    /// `None` if these strategies are not known to be that. A run that knows can do without them.
-    fn towards_mean(&self, _scene: &Scene) -> Option<Gains> {
+    /// The law of every peer, if these strategies are one of the registry: it gives their forces to the bit, so a run can do without the strategies.
+    fn law(&self, _scene: &Scene) -> Option<BuiltIn> {
         None
     }
 }
@@ -27,17 +26,27 @@ pub trait Strategies {
 pub struct FromScene;
 
 impl Strategies for FromScene {
-    type Strategy<const A: usize> = BuiltIn;
+    type Strategy<const A: usize> = LawStrategy<A>;
 
-    fn strategy<const A: usize>(&self, scene: &Scene, _peer: usize) -> BuiltIn {
-        let peers = scene.peers.len();
-        let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(peers));
-        scene.coordination.strategy.strategy(gains, peers)
+    fn strategy<const A: usize>(&self, scene: &Scene, _peer: usize) -> LawStrategy<A> {
+        LawStrategy::new(scene.coordination.strategy, scene.law_parameters())
     }
 
-    fn towards_mean(&self, scene: &Scene) -> Option<Gains> {
-        let peers = scene.peers.len();
-        let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(peers));
-        scene.coordination.strategy.as_average_position(gains, peers)
+    fn law(&self, scene: &Scene) -> Option<BuiltIn> {
+        Some(scene.law())
+    }
+}
+
+impl Scene {
+    /// The coordination law of every peer.
+    #[must_use]
+    pub fn law(&self) -> BuiltIn {
+        self.coordination.strategy.law(&self.law_parameters())
+    }
+
+    /// What the law is made from: the gains scaled by the number of peers.
+    fn law_parameters(&self) -> LawParameters {
+        let peers = self.peers.len();
+        LawParameters { gains: self.coordination.gains.scaled(self.coordination.scaling.coordination_factor(peers)), peers }
     }
 }

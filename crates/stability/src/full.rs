@@ -11,7 +11,7 @@ use cohaptic_units::Instant;
 
 use crate::cost::{full_operations, pushed_operations};
 use crate::network::{LinkTiming, NominalNetwork};
-use crate::structure::{Contacts, arm, average_position, common_time, count};
+use crate::structure::{Contacts, arm, common_time, count, pull};
 use crate::timetable::{Event, NodeClock, Timetable};
 use crate::{AnalysisError, Matrix, StateKind, StateName, Watch};
 
@@ -111,7 +111,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let tied = silent || (0..peers).any(|place| contacts.touching[place] && arm(&scene.peers[place]).stiffness > 0.0);
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);
         let touching = contacts.touching.iter().copied().enumerate();
-        let time = common_time(scene, timetable.frame, average_position(scene).unwrap_or(scene.coordination.gains), touching, false);
+        let time = common_time(scene, timetable.frame, pull(scene).unwrap_or(scene.coordination.gains), touching, false);
         let compliance = scene.peers.iter().map(|peer| time * peer.clock.tick.as_secs_f64() / scene.copy_mass()).collect();
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
         Ok(Self { samples: vec![Vec::new(); peers], members, names, timetable, layout, time, compliance, growth: 1.0 })

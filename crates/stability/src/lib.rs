@@ -16,6 +16,7 @@ mod full;
 mod graph;
 mod judgement;
 mod lifted;
+mod linear_form;
 mod map;
 mod matrix;
 mod mean_square;

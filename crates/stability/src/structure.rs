@@ -11,6 +11,7 @@ use cohaptic_peer::{ArmConfig, Gains, Hand, Plant};
 use cohaptic_scene::{PeerSpec, Scene};
 
 use crate::lifted::{Body, Lifted, Node};
+use crate::linear_form::pull_towards_mean;
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::timetable::{NodeClock, Timetable};
 use crate::{AnalysisError, Matrix};
@@ -53,7 +54,7 @@ impl Structure {
     pub(crate) fn with_alone(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, alone: Option<usize>) -> Result<Self, AnalysisError> {
         let scene = scenes[0];
         let peers = scene.peers.len();
-        if scenes.iter().any(|scene| average_position(scene).is_none()) {
+        if scenes.iter().any(|scene| pull(scene).is_none()) {
             return Err(AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() });
         }
         let mut classes: Vec<Vec<usize>> = Vec::new();
@@ -77,7 +78,7 @@ impl Structure {
 
     /// Every peer by itself, whether or not it is like another.
     pub(crate) fn of_each(scene: &Scene, network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
-        if average_position(scene).is_none() {
+        if pull(scene).is_none() {
             return Err(AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() });
         }
         Self::of_classes(scene, (0..scene.peers.len()).map(|peer| vec![peer]).collect(), network, contacts)
@@ -108,7 +109,7 @@ impl Structure {
     /// KT and BT of the average-position strategy that is the same as the scene's.
     #[expect(clippy::unused_self, reason = "only a scene that has a structure has them for certain")]
     pub(crate) fn coordination(&self, scene: &Scene) -> Gains {
-        average_position(scene).expect("a structure is made only of scenes whose strategy is one")
+        pull(scene).expect("a structure is made only of scenes whose strategy is one")
     }
 
     /// The node that stands for a class.
@@ -153,11 +154,9 @@ impl Structure {
     }
 }
 
-/// KT and BT of the average-position strategy that is the same as the scene's; `None` if there is none.
-pub(crate) fn average_position(scene: &Scene) -> Option<Gains> {
-    let peers = scene.peers.len();
-    let gains = scene.coordination.gains.scaled(scene.coordination.scaling.coordination_factor(peers));
-    scene.coordination.strategy.as_average_position(gains, peers)
+/// KT and BT of the pull towards the mean that the scene's law is; `None` if it is another law.
+pub(crate) fn pull(scene: &Scene) -> Option<Gains> {
+    pull_towards_mean(&scene.law())
 }
 
 /// What velocities are multiplied by to be lengths like positions \[s\]: the time in which the stiffest of the bodies swings by a radian, from a tick to

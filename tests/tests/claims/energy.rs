@@ -26,10 +26,17 @@ use crate::{TICK, ages, cases};
 /// Of a device's damping, what the coupling may use; the rest bounds what a hand can put in.
 const SHARE: f64 = 0.75;
 
+/// How many times KT and BT hold one copy to all others together: once to their mean, or once to each of the others.
+pub(crate) fn pulls(strategy: Coordination, peers: usize) -> f64 {
+    match strategy {
+        Coordination::AveragePosition => 1.0,
+        Coordination::ProportionalDerivative => (peers - 1) as f64,
+    }
+}
+
 /// Kᵢ: what holds one copy to all others together [N/m].
 pub(crate) fn stiffness(scene: &Scene) -> f64 {
-    let gains = scene.coordination.strategy.as_average_position(scene.coordination.gains, scene.peers.len());
-    gains.map_or(f64::NAN, |gains| gains.stiffness)
+    pulls(scene.coordination.strategy, scene.peers.len()) * scene.coordination.gains.stiffness
 }
 
 /// The bound on the damping of every copy, with `age` the largest at a tick \[s\].

@@ -11,7 +11,7 @@ use std::convert::Infallible;
 
 use cohaptic_harness::live::LiveScene;
 use cohaptic_harness::{Model, Observer, TickRow};
-use cohaptic_peer::coordination::BuiltIn;
+use cohaptic_peer::coordination::LawStrategy;
 use cohaptic_peer::wire::MAX_LEN;
 use cohaptic_peer::{ArmConfig, Contact, Coordination, Gains, Held, ObjectCopy, Peer, RestingDevice, State};
 use cohaptic_scene::Scene;
@@ -28,7 +28,7 @@ use crate::settling::{Motion, Settling, motions, spread};
 const MILLISECOND: core::time::Duration = core::time::Duration::from_millis(1);
 
 /// The program of a peer that lives elsewhere: a copy of the object and a strategy, and no memory beyond its life.
-type Process = Peer<1, RestingDevice<1>, BuiltIn>;
+type Process = Peer<1, RestingDevice<1>, LawStrategy<1>>;
 
 fn start(scene: &Scene, place: usize, x: f64) -> Process {
     let spec = &scene.peers[place];

@@ -20,7 +20,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-use crate::energy::{Ledger, damped, springs, stiffness};
+use crate::energy::{Ledger, damped, pulls, springs, stiffness};
 use crate::{TICK, ages, cases};
 
 /// For each tick and each peer, the longest time between the sendings of two samples that replace one another then \[s\].
@@ -85,7 +85,7 @@ proptest! {
     /// Stable or not, whatever the links do.
     #[test]
     fn no_force_jumps_by_more_than_what_was_missed(draft in pushed()) {
-        let gains = draft.strategy.as_average_position(draft.gains, 3).unwrap();
+        let gains = draft.gains.scaled(pulls(draft.strategy, 3));
         let log = run(&draft.scene(), Model::Least);
         prop_assume!(log.summary.ticks == 500);
         let excess = largest_excess(&log, 3, (gains.stiffness, gains.damping));

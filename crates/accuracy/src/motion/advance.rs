@@ -1,13 +1,11 @@
 //! Ways of one body from tick to tick, with its force held.
 
-use cohaptic_peer::{Plant, StepMap};
-
-use super::number::Number;
+use cohaptic_peer::{Motion, Number, Plant, StepMap};
 
 /// A way of one body on one axis over one tick.
 pub(crate) trait Advance<T> {
-    /// Moves (x, v) by one tick under the held force.
-    fn advance(&self, position: &mut T, velocity: &mut T, force: T);
+    /// Moves a body by one tick under the held force.
+    fn advance(&self, body: &mut Motion<T>, force: T);
 }
 
 /// The program's own map, with the short form for what nothing ties to ground: what its peers do at every tick, whichever integrator made the map.
@@ -25,11 +23,11 @@ impl Program {
 
 impl Advance<f64> for Program {
     #[inline(always)]
-    fn advance(&self, position: &mut f64, velocity: &mut f64, force: f64) {
+    fn advance(&self, body: &mut Motion, force: f64) {
         if self.free {
-            self.map.advance_free(position, velocity, force);
+            self.map.advance_free(body, force);
         } else {
-            self.map.advance(position, velocity, force);
+            self.map.advance(body, force);
         }
     }
 }
@@ -62,10 +60,10 @@ pub(crate) struct Euler(pub(crate) Stepped);
 
 impl Advance<f64> for Euler {
     #[inline(always)]
-    fn advance(&self, position: &mut f64, velocity: &mut f64, force: f64) {
+    fn advance(&self, body: &mut Motion, force: f64) {
         for _ in 0..self.0.steps {
-            *velocity += self.0.h * self.0.acceleration(*position, *velocity, force);
-            *position += self.0.h * *velocity;
+            body.velocity += self.0.h * self.0.acceleration(body.position, body.velocity, force);
+            body.position += self.0.h * body.velocity;
         }
     }
 }
@@ -76,11 +74,11 @@ pub(crate) struct RungeKutta(pub(crate) Stepped);
 
 impl Advance<f64> for RungeKutta {
     #[inline(always)]
-    fn advance(&self, position: &mut f64, velocity: &mut f64, force: f64) {
+    fn advance(&self, body: &mut Motion, force: f64) {
         let h = self.0.h;
         let half = 0.5 * h;
         for _ in 0..self.0.steps {
-            let (x, v) = (*position, *velocity);
+            let Motion { position: x, velocity: v } = *body;
             let a1 = self.0.acceleration(x, v, force);
             let v2 = v + half * a1;
             let a2 = self.0.acceleration(x + half * v, v2, force);
@@ -88,31 +86,15 @@ impl Advance<f64> for RungeKutta {
             let a3 = self.0.acceleration(x + half * v2, v3, force);
             let v4 = v + h * a3;
             let a4 = self.0.acceleration(x + h * v3, v4, force);
-            *position = x + h / 6.0 * (v + 2.0 * (v2 + v3) + v4);
-            *velocity = v + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4);
+            body.position = x + h / 6.0 * (v + 2.0 * (v2 + v3) + v4);
+            body.velocity = v + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4);
         }
     }
 }
 
-/// A linear map in any numbers: increments by (x, v), row by row, and by the force.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Map<T> {
-    pub(crate) state: [[T; 2]; 2],
-    pub(crate) force: [T; 2],
-}
-
-impl<T: Number> Map<T> {
-    /// The coefficients of a map of the program, each exactly.
-    pub(crate) fn of(map: &StepMap) -> Self {
-        let (state, force) = map.coefficients();
-        Self { state: state.map(|row| row.map(T::of)), force: force.map(T::of) }
-    }
-}
-
-impl<T: Number> Advance<T> for Map<T> {
-    fn advance(&self, position: &mut T, velocity: &mut T, force: T) {
-        let (x, v) = (*position, *velocity);
-        *position = x + (self.state[0][0] * x + self.state[0][1] * v + self.force[0] * force);
-        *velocity = v + (self.state[1][0] * x + self.state[1][1] * v + self.force[1] * force);
+/// A map in any numbers, with all its terms.
+impl<T: Number> Advance<T> for StepMap<T> {
+    fn advance(&self, body: &mut Motion<T>, force: T) {
+        Self::advance(self, body, force);
     }
 }

@@ -11,14 +11,14 @@
 //! in the two unknowns K and t = tan(θ/2), by Newton's method with 100 bits, so that what is left of an error is the integrator's and not the solver's.
 //! Where it is a real one that reaches the circle, λ is 1 or −1, and K the only unknown.
 
-use cohaptic_peer::StepMap;
+use cohaptic_peer::{Motion, Number as _, StepMap};
 use cohaptic_stability::{Matrix, eigenvalues};
 use qd::Quad;
 
-use super::advance::{Advance, Map};
+use super::advance::Advance;
 use super::number::{Complex, Number, absolute};
 use super::scenes::Along;
-use super::world::{Body, Loop, Pair, World};
+use super::world::{Loop, Pair, World};
 
 /// The matrix of a frame, row by row.
 fn frame<T: Number>(gains: &Loop<T>, movers: &[impl Advance<T>; 4]) -> Vec<Vec<T>> {
@@ -44,16 +44,16 @@ fn frame<T: Number>(gains: &Loop<T>, movers: &[impl Advance<T>; 4]) -> Vec<Vec<T
 fn entry<T>(world: &mut World<T>, number: usize, first: usize) -> &mut T {
     let (whose, which) = (number / 2, number % 2);
     let places = world.sent.len();
-    let body: &mut Body<T> = match whose {
+    let body: &mut Motion<T> = match whose {
         0..4 => &mut world.bodies[whose],
         4..6 => &mut world.held[whose - 4],
         _ => &mut world.sent[(first + (whose - 6) / 2) % places][(whose - 6) % 2],
     };
-    if which == 0 { &mut body.x } else { &mut body.v }
+    if which == 0 { &mut body.position } else { &mut body.velocity }
 }
 
 /// The eigenvalue farthest out.
-fn outermost(gains: &Loop<f64>, movers: &[Map<f64>; 4]) -> Option<Complex<f64>> {
+fn outermost(gains: &Loop<f64>, movers: &[StepMap<f64>; 4]) -> Option<Complex<f64>> {
     let rows = frame(gains, movers);
     let matrix = Matrix::from_fn(rows.len(), rows.len(), |row, column| rows[row][column]);
     eigenvalues(&matrix).first().map(|value| Complex { re: value.re, im: value.im })
@@ -96,8 +96,8 @@ fn determinant(rows: &[Vec<Quad>], eigenvalue: Complex<Quad>) -> Complex<Quad> {
 
 /// The first stiffness within the range at which the loop turns unstable \[N/m\]. `None` if it is unstable at the beginning of the range or nowhere within
 /// it.
-pub(crate) fn critical(pair: &Pair, (along, low, high): (Along, f64, f64), maps: &[Map<Quad>; 4]) -> Option<Quad> {
-    let (stiffness, eigenvalue) = rough(pair, (along, low, high), &maps.map(|map| rounded(&map)))?;
+pub(crate) fn critical(pair: &Pair, (along, low, high): (Along, f64, f64), maps: &[StepMap<Quad>; 4]) -> Option<Quad> {
+    let (stiffness, eigenvalue) = rough(pair, (along, low, high), &maps.map(|map| map.map(|coefficient| coefficient.rounded())))?;
     let residue = |stiffness: Quad, eigenvalue: Complex<Quad>| determinant(&frame(&pair.with(along, stiffness), maps), eigenvalue);
     let start = Quad::of(stiffness);
     let root = if eigenvalue.im.abs() < REAL {
@@ -155,12 +155,8 @@ fn pair_root(start: Quad, tangent: Quad, residue: impl Fn(Quad, Complex<Quad>) -
     None
 }
 
-fn rounded(map: &Map<Quad>) -> Map<f64> {
-    Map { state: map.state.map(|row| row.map(Number::rounded)), force: map.force.map(Number::rounded) }
-}
-
 /// The first stiffness and the eigenvalue, with the program's numbers.
-fn rough(pair: &Pair, (along, low, high): (Along, f64, f64), maps: &[Map<f64>; 4]) -> Option<(f64, Complex<f64>)> {
+fn rough(pair: &Pair, (along, low, high): (Along, f64, f64), maps: &[StepMap<f64>; 4]) -> Option<(f64, Complex<f64>)> {
     let outermost = |stiffness: f64| outermost(&pair.with(along, stiffness), maps);
     let unstable = |stiffness: f64| outermost(stiffness).is_none_or(|value| value.norm_squared() > 1.0);
     /// Values looked at before any are halved, each this much above the one before.
@@ -188,6 +184,6 @@ fn rough(pair: &Pair, (along, low, high): (Along, f64, f64), maps: &[Map<f64>; 4
 }
 
 /// The maps of the program in more digits, each coefficient exactly.
-pub(crate) fn quadruple(maps: &[StepMap; 4]) -> [Map<Quad>; 4] {
-    maps.map(|map| Map::of(&map))
+pub(crate) fn quadruple(maps: &[StepMap; 4]) -> [StepMap<Quad>; 4] {
+    maps.map(|map| map.map(|coefficient| Quad::of(*coefficient)))
 }

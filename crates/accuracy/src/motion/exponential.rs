@@ -1,8 +1,7 @@
 //! The exact map of a tick with twice the digits.
 
-use cohaptic_peer::Plant;
+use cohaptic_peer::{Plant, StepMap};
 
-use super::advance::Map;
 use super::number::{Number, absolute};
 
 /// Terms of the series: the first one left out is below 0.5³⁰/31! = 1.1e-43 of the first.
@@ -13,7 +12,7 @@ const TERMS: u32 = 30;
 ///
 /// The columns of exp(X) − I, X = h·[0 1 0; −k/m −b/m 1/m; 0 0 0], are summed by themselves: each term is X times the one before over its number. A
 /// step in which a row of X has a norm above ½ is halved first, and two halves are one after the other.
-pub(crate) fn exact_map<T: Number>(plant: &Plant, nanos: f64) -> Map<T> {
+pub(crate) fn exact_map<T: Number>(plant: &Plant, nanos: f64) -> StepMap<T> {
     let mut h = T::of(nanos) / T::of(1e9);
     let (k, b, inverse) = (T::of(plant.stiffness), T::of(plant.damping), T::of(1.0) / T::of(plant.mass));
     let norm = |h: T| {
@@ -36,7 +35,7 @@ pub(crate) fn exact_map<T: Number>(plant: &Plant, nanos: f64) -> Map<T> {
     };
     let (one, zero) = (T::of(1.0), T::of(0.0));
     let (by_x, by_v, by_f) = (column([one, zero, zero]), column([zero, one, zero]), column([zero, zero, one]));
-    let mut map = Map { state: [[by_x[0], by_v[0]], [by_x[1], by_v[1]]], force: by_f };
+    let mut map = StepMap::new([[by_x[0], by_v[0]], [by_x[1], by_v[1]]], by_f);
     for _ in 0..halvings {
         map = twice(&map);
     }
@@ -44,10 +43,10 @@ pub(crate) fn exact_map<T: Number>(plant: &Plant, nanos: f64) -> Map<T> {
 }
 
 /// A map after itself: E ← 2E + E·E, the force held over both.
-fn twice<T: Number>(map: &Map<T>) -> Map<T> {
-    let Map { state: e, force: g } = map;
+fn twice<T: Number>(map: &StepMap<T>) -> StepMap<T> {
+    let (e, g) = map.coefficients();
     let product = |i: usize, j: usize| e[i][0] * e[0][j] + e[i][1] * e[1][j];
     let state = [0, 1].map(|i| [0, 1].map(|j| e[i][j] + e[i][j] + product(i, j)));
     let force = [0, 1].map(|i| g[i] + g[i] + (e[i][0] * g[0] + e[i][1] * g[1]));
-    Map { state, force }
+    StepMap::new(state, force)
 }

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::{Integrator, StepMap};
+use cohaptic_peer::{Integrator, Motion, StepMap};
 
 use super::advance::{Euler, Program, RungeKutta, Stepped};
 use super::scenes::TICK;
-use super::world::{Body, Pair, World, run};
+use super::world::{Pair, World, run};
 use crate::Options;
 
 /// A way from tick to tick.
@@ -68,7 +68,7 @@ impl Method {
     }
 
     /// Runs the loop this way.
-    pub(crate) fn run(self, pair: &Pair, show: impl FnMut(usize, &[Body<f64>; 4])) -> World<f64> {
+    pub(crate) fn run(self, pair: &Pair, show: impl FnMut(usize, &[Motion; 4])) -> World<f64> {
         let stepped = |steps| pair.plants.map(|plant| Stepped::new(&plant, TICK, steps));
         match self {
             Self::Exact | Self::EulerMap(_) | Self::RungeKuttaMap(_) => run(pair, &self.maps(pair).map(Program::new), show),

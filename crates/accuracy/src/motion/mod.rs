@@ -16,16 +16,16 @@ mod world;
 use std::path::Path;
 use std::time::Duration;
 
+use cohaptic_peer::{Motion, Number as _, StepMap};
 use cohaptic_stability::{Boundary, BoundaryOptions, Family, KeyRange};
 use qd::Quad;
 
 use crate::cost::median_time;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
-use advance::Map;
 use method::Method;
-use number::{Number, absolute};
+use number::{Number as _, absolute};
 use scenes::{MotionScene, SCENES, TICK_NANOS};
-use world::{Body, Pair, energy, run};
+use world::{Pair, energy, run};
 
 const COST: &str = "ns a tick";
 const POSITION: &str = "position [m]";
@@ -64,7 +64,7 @@ pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyErr
 pub(crate) struct Work {
     pub(crate) pair: Pair,
     /// The bodies after every tick.
-    pub(crate) reference: Vec<[Body<Quad>; 4]>,
+    pub(crate) reference: Vec<[Motion<Quad>; 4]>,
     pub(crate) critical: Option<Quad>,
     rounds: usize,
 }
@@ -73,7 +73,7 @@ impl Work {
     pub(crate) fn prepare(motion: &MotionScene, options: Options) -> Result<Self, AccuracyError> {
         let (ticks, rounds) = if options.quick { (1000, 7) } else { (4000, 31) };
         let pair = Pair::of(motion, &motion.scene()?, ticks);
-        let maps: [Map<Quad>; 4] = pair.plants.map(|plant| exponential::exact_map(&plant, TICK_NANOS));
+        let maps: [StepMap<Quad>; 4] = pair.plants.map(|plant| exponential::exact_map(&plant, TICK_NANOS));
         let mut reference = Vec::with_capacity(ticks);
         run(&pair, &maps, |_, bodies| reference.push(*bodies));
         let critical = motion.boundary.and_then(|range| boundary::critical(&pair, range, &maps));
@@ -112,10 +112,10 @@ impl Work {
     pub(crate) fn errors(&self, method: Method) -> (Option<f64>, Option<f64>) {
         let (mut position, mut stored) = (0.0, 0.0);
         method.run(&self.pair, |tick, bodies| {
-            let exactly = bodies.map(|body| Body { x: Quad::of(body.x), v: Quad::of(body.v) });
+            let exactly = bodies.map(|body| Motion { position: Quad::of(body.position), velocity: Quad::of(body.velocity) });
             let right = &self.reference[tick];
             for (body, right) in exactly.iter().zip(right) {
-                position = worse(position, absolute(body.x - right.x).rounded());
+                position = worse(position, absolute(body.position - right.position).rounded());
             }
             stored = worse(stored, absolute(energy(&self.pair, &exactly) - energy(&self.pair, right)).rounded());
         });

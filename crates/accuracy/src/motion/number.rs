@@ -1,26 +1,16 @@
 //! Numbers that the loop can be run in: those of the program, and those with twice the digits that it is set against.
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Div, Mul, Sub};
 
 use qd::Quad;
 
-/// What the loop needs of a number.
-pub(crate) trait Number:
-    Copy + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
-{
-    /// That number exactly.
-    fn of(value: f64) -> Self;
-
+/// A number of the loop that is compared, divided and rounded.
+pub(crate) trait Number: cohaptic_peer::Number + PartialOrd + Div<Output = Self> {
     /// The nearest number of the program.
     fn rounded(self) -> f64;
 }
 
 impl Number for f64 {
-    #[inline(always)]
-    fn of(value: f64) -> Self {
-        value
-    }
-
     #[inline(always)]
     fn rounded(self) -> f64 {
         self
@@ -29,10 +19,6 @@ impl Number for f64 {
 
 /// The unevaluated sum of two numbers of the program: at least 100 bits.
 impl Number for Quad {
-    fn of(value: f64) -> Self {
-        Self::from_f64(value)
-    }
-
     fn rounded(self) -> f64 {
         self.0
     }

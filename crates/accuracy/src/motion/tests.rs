@@ -80,8 +80,8 @@ fn the_reference_is_the_closed_form_of_a_free_device() {
         let reached = Quad::ONE - (-(b * t / m)).exp();
         let x = (t - m / b * reached) / b;
         // A thousand additions of numbers below 0.2, each rounded at 2⁻¹⁰⁴ or better.
-        assert!(absolute(bodies[0].x - x).rounded() < 1000.0 * 0.2 * 5e-32, "tick {tick}");
-        assert!(absolute(bodies[0].v - reached / b).rounded() < 1000.0 * 0.2 * 5e-32, "tick {tick}");
+        assert!(absolute(bodies[0].position - x).rounded() < 1000.0 * 0.2 * 5e-32, "tick {tick}");
+        assert!(absolute(bodies[0].velocity - reached / b).rounded() < 1000.0 * 0.2 * 5e-32, "tick {tick}");
     }
 }
 
@@ -115,8 +115,8 @@ fn the_reference_is_that_of_another_program() {
         let found = work(&motion).reference[499];
         for (found, [x, v]) in found.iter().zip(bodies) {
             // 500 ticks of some ten roundings of numbers below 0.02, 2⁻¹⁰⁴ each, and what a coupling of 15 kN/m makes of them over a tick.
-            assert!(absolute(found.x - Quad(x.0, x.1)).rounded() < 1e-28, "{}: {found:?}", motion.name);
-            assert!(absolute(found.v - Quad(v.0, v.1)).rounded() < 1e-27, "{}: {found:?}", motion.name);
+            assert!(absolute(found.position - Quad(x.0, x.1)).rounded() < 1e-28, "{}: {found:?}", motion.name);
+            assert!(absolute(found.velocity - Quad(v.0, v.1)).rounded() < 1e-27, "{}: {found:?}", motion.name);
         }
     }
 }
@@ -125,7 +125,7 @@ fn the_reference_is_that_of_another_program() {
 #[test]
 fn a_long_exact_step_is_as_good_as_many_short_ones() {
     let plant = Plant { mass: 0.1, damping: 5.0, stiffness: 300.0 };
-    let (long, short): (Map<Quad>, Map<Quad>) = (exponential::exact_map(&plant, 1e8), exponential::exact_map(&plant, 1e6));
+    let (long, short): (StepMap<Quad>, StepMap<Quad>) = (exponential::exact_map(&plant, 1e8), exponential::exact_map(&plant, 1e6));
     let (mut at_once, mut in_steps) = ((Quad::of(0.3), Quad::of(-1.0)), (Quad::of(0.3), Quad::of(-1.0)));
     advance::Advance::advance(&long, &mut at_once.0, &mut at_once.1, Quad::of(2.0));
     for _ in 0..100 {
@@ -140,7 +140,7 @@ fn a_long_exact_step_is_as_good_as_many_short_ones() {
 #[test]
 fn the_exact_propagator_errs_by_no_more_than_roundings_explain() {
     let work = Work::prepare(&FREE, Options { quick: false }).unwrap();
-    let (ticks, last) = (f64_of(work.reference.len()), work.reference.last().unwrap()[0].x.rounded());
+    let (ticks, last) = (f64_of(work.reference.len()), work.reference.last().unwrap()[0].position.rounded());
     let u = 0.5 * f64::EPSILON;
     assert!(position_error(&work, Method::Exact) <= u * ((ticks + 11.0) * last + 8.7 * ticks * 1e-3));
     for motion in [COUPLED, STIFF, PUSH] {
@@ -158,7 +158,7 @@ fn one_map_is_many_steps() {
             let (stepped, mapped) = (stepped.run(&work.pair, |_, _| {}), mapped.run(&work.pair, |_, _| {}));
             for (one, other) in stepped.bodies.iter().zip(&mapped.bodies) {
                 // 1000 ticks of four steps of some ten roundings of numbers below 0.3.
-                assert!((one.x - other.x).abs() < 4e4 * 0.3 * f64::EPSILON, "{}", motion.name);
+                assert!((one.position - other.position).abs() < 4e4 * 0.3 * f64::EPSILON, "{}", motion.name);
             }
         }
     }
@@ -166,7 +166,7 @@ fn one_map_is_many_steps() {
 
 /// Compares every number that a simulation shows with the loop of this crate.
 struct Compare {
-    bodies: Vec<[Body<f64>; 4]>,
+    bodies: Vec<[Motion; 4]>,
     compared: usize,
 }
 
@@ -180,8 +180,12 @@ impl Observer for Compare {
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
         let tick = usize::try_from(row.at.as_nanos() / 1_000_000).unwrap();
         for (shown, place) in [(row.device, row.peer), (row.object, 2 + row.peer)] {
-            let body = tick.checked_sub(1).map_or(Body { x: 0.0, v: 0.0 }, |before| self.bodies[before][place]);
-            assert_eq!((shown.position[0].to_bits(), shown.velocity[0].to_bits()), (body.x.to_bits(), body.v.to_bits()), "tick {tick}, body {place}");
+            let body = tick.checked_sub(1).map_or(Motion { position: 0.0, velocity: 0.0 }, |before| self.bodies[before][place]);
+            assert_eq!(
+                (shown.position[0].to_bits(), shown.velocity[0].to_bits()),
+                (body.position.to_bits(), body.velocity.to_bits()),
+                "tick {tick}, body {place}"
+            );
             self.compared += 1;
         }
         Ok(())
@@ -209,7 +213,7 @@ fn the_scenes_are_as_hard_as_they_say() {
     let mut changes = 0;
     let mut touched = [false; 2];
     for bodies in Work::prepare(&PUSH, Options { quick: false }).unwrap().reference {
-        let touches = [bodies[0].x > bodies[2].x, bodies[1].x < bodies[3].x];
+        let touches = [bodies[0].position > bodies[2].position, bodies[1].position < bodies[3].position];
         changes += u32::from(touches[0] != touched[0]) + u32::from(touches[1] != touched[1]);
         touched = touches;
     }

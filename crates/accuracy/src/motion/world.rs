@@ -1,19 +1,14 @@
 //! The loop that all methods share: what two peers do at a tick, in any numbers. Forces are computed at ticks and held, as docs/model.md says.
 
-use cohaptic_peer::{ArmConfig, Contact, Hand, Plant, Signal};
+use cohaptic_peer::coordination::{AveragePosition, Observation};
+use cohaptic_peer::tick::{forces, grasp, on_device};
+use cohaptic_peer::{Contact, Gains, Hand, Motion, Plant, Signal};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use super::advance::Advance;
 use super::number::Number;
 use super::scenes::{Along, MotionScene, TICK_NANOS};
-
-/// Position and velocity of a body on one axis.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Body<T> {
-    pub(crate) x: T,
-    pub(crate) v: T,
-}
 
 /// How a device touches its copy, on one axis.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -27,8 +22,8 @@ pub(crate) enum Touch {
 /// What the two peers are.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Pair {
-    pub(crate) coupling: (f64, f64),
-    pub(crate) coordination: (f64, f64),
+    pub(crate) coupling: Gains,
+    pub(crate) coordination: Gains,
     pub(crate) touch: [Touch; 2],
     /// Devices with their arms, then copies.
     pub(crate) plants: [Plant; 4],
@@ -41,15 +36,8 @@ pub(crate) struct Pair {
 impl Pair {
     /// What the scene says, for that many ticks.
     pub(crate) fn of(motion: &MotionScene, scene: &Scene, ticks: usize) -> Self {
-        let arm = |peer: usize| match &scene.peers[peer].hand {
-            Some(Hand::Arm { arm, .. }) => *arm,
-            Some(Hand::Force(_)) | None => ArmConfig { mass: 0.0, damping: 0.0, stiffness: 0.0 },
-        };
-        let device = |peer: usize| {
-            let (device, arm) = (scene.peers[peer].device, arm(peer));
-            Plant { mass: device.mass + arm.mass, damping: device.damping + arm.damping, stiffness: arm.stiffness }
-        };
-        let copy = Plant { mass: scene.object.mass / 2.0, damping: scene.object.damping, stiffness: 0.0 };
+        let device = |peer: usize| scene.peers[peer].device.plant(scene.peers[peer].hand.as_ref());
+        let copy = scene.copy_config().plant();
         // Arms of these scenes want to stay where they are, which is no held force.
         let force = |peer: usize, at: Instant| match &scene.peers[peer].hand {
             Some(Hand::Force(signal)) => Signal::value::<1>(signal, at)[0],
@@ -60,10 +48,9 @@ impl Pair {
             Contact::Grasp => Touch::Grasp,
             Contact::Push(direction) => Touch::Push(if direction.positive { 1.0 } else { -1.0 }),
         };
-        let gains = scene.peers[0].coupling;
         Self {
-            coupling: (gains.stiffness, gains.damping),
-            coordination: (scene.coordination.gains.stiffness, scene.coordination.gains.damping),
+            coupling: scene.peers[0].coupling,
+            coordination: scene.coordination.gains,
             touch: [touch(0), touch(1)],
             plants: [device(0), device(1), copy, copy],
             hands: (0..ticks).map(instant).map(|at| [force(0, at), force(1, at)]).collect(),
@@ -76,16 +63,16 @@ impl Pair {
     pub(crate) fn with<T: Number>(&self, along: Along, stiffness: T) -> Loop<T> {
         let mut gains = self.gains();
         match along {
-            Along::Coupling => gains.coupling.0 = stiffness,
-            Along::Coordination => gains.coordination.0 = stiffness,
+            Along::Coupling => gains.coupling.stiffness = stiffness,
+            Along::Coordination => gains.coordination.stiffness = stiffness,
         }
         gains
     }
 
     /// What the loop of forces is made of.
     pub(crate) fn gains<T: Number>(&self) -> Loop<T> {
-        let both = |(stiffness, damping): (f64, f64)| (T::of(stiffness), T::of(damping));
-        Loop { coupling: both(self.coupling), coordination: both(self.coordination), touch: self.touch, update: self.update, delay: self.delay }
+        let exactly = |gains: Gains| gains.map(|gain| T::of(*gain));
+        Loop { coupling: exactly(self.coupling), coordination: exactly(self.coordination), touch: self.touch, update: self.update, delay: self.delay }
     }
 }
 
@@ -97,8 +84,8 @@ fn instant(tick: usize) -> Instant {
 /// What the forces of a tick depend on besides the motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Loop<T> {
-    pub(crate) coupling: (T, T),
-    pub(crate) coordination: (T, T),
+    pub(crate) coupling: Gains<T>,
+    pub(crate) coordination: Gains<T>,
     pub(crate) touch: [Touch; 2],
     pub(crate) update: usize,
     pub(crate) delay: usize,
@@ -108,17 +95,17 @@ pub(crate) struct Loop<T> {
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct World<T> {
     /// Two devices, then two copies.
-    pub(crate) bodies: [Body<T>; 4],
+    pub(crate) bodies: [Motion<T>; 4],
     /// What each peer holds of the other.
-    pub(crate) held: [Body<T>; 2],
+    pub(crate) held: [Motion<T>; 2],
     /// The copies as they were at the latest sendings: sample s in place s modulo the length.
-    pub(crate) sent: Vec<[Body<T>; 2]>,
+    pub(crate) sent: Vec<[Motion<T>; 2]>,
 }
 
 impl<T: Number> World<T> {
     /// At rest at the origin.
     pub(crate) fn rest(gains: &Loop<T>) -> Self {
-        let rest = Body { x: T::of(0.0), v: T::of(0.0) };
+        let rest = Motion { position: T::of(0.0), velocity: T::of(0.0) };
         Self { bodies: [rest; 4], held: [rest; 2], sent: vec![[rest; 2]; gains.delay / gains.update + 1] }
     }
 
@@ -135,33 +122,30 @@ impl<T: Number> World<T> {
             let [left, right] = self.sent[sending / gains.update % places];
             self.held = [right, left];
         }
+        let law = AveragePosition { gains: gains.coordination };
         for peer in 0..2 {
-            let (device, copy, held) = (self.bodies[peer], self.bodies[2 + peer], self.held[peer]);
-            let coupling = coupling_force(gains.touch[peer], gains.coupling, device, copy);
-            let (stiffness, damping) = gains.coordination;
-            let coordination = stiffness * (copy.x - held.x) + damping * (copy.v - held.v);
-            let Body { x, v } = &mut self.bodies[peer];
-            movers[peer].advance(x, v, hands[peer] - coupling);
-            let Body { x, v } = &mut self.bodies[2 + peer];
-            movers[2 + peer].advance(x, v, coupling - coordination);
+            let seen = Observation { own: self.bodies[2 + peer], mean: self.held[peer] };
+            let touch = |apart: Motion<T>| coupling_force(gains.touch[peer], &gains.coupling, apart);
+            let (coupling, on_object) = forces(self.bodies[peer], touch, &seen, &law, &mut []);
+            movers[peer].advance(&mut self.bodies[peer], on_device(hands[peer], coupling));
+            movers[2 + peer].advance(&mut self.bodies[2 + peer], on_object);
         }
     }
 }
 
 #[inline(always)]
-fn coupling_force<T: Number>(touch: Touch, (stiffness, damping): (T, T), device: Body<T>, copy: Body<T>) -> T {
-    let (depth, closing) = (device.x - copy.x, device.v - copy.v);
+fn coupling_force<T: Number>(touch: Touch, coupling: &Gains<T>, apart: Motion<T>) -> T {
     let nothing = T::of(0.0);
     match touch {
         Touch::Nothing => nothing,
-        Touch::Grasp => stiffness * depth + damping * closing,
+        Touch::Grasp => grasp(coupling, apart),
         Touch::Push(sign) => {
             let sign = T::of(sign);
-            let (depth, closing) = (sign * depth, sign * closing);
-            if depth <= nothing {
+            let inwards = Motion { position: sign * apart.position, velocity: sign * apart.velocity };
+            if inwards.position <= nothing {
                 return nothing;
             }
-            let force = stiffness * depth + damping * closing;
+            let force = grasp(coupling, inwards);
             if force > nothing { sign * force } else { nothing }
         }
     }
@@ -169,7 +153,7 @@ fn coupling_force<T: Number>(touch: Touch, (stiffness, damping): (T, T), device:
 
 /// Runs from rest and shows the bodies after every tick.
 #[inline(always)]
-pub(crate) fn run<T: Number>(pair: &Pair, movers: &[impl Advance<T>; 4], mut show: impl FnMut(usize, &[Body<T>; 4])) -> World<T> {
+pub(crate) fn run<T: Number>(pair: &Pair, movers: &[impl Advance<T>; 4], mut show: impl FnMut(usize, &[Motion<T>; 4])) -> World<T> {
     let gains = pair.gains();
     let mut world = World::rest(&gains);
     for (tick, hands) in pair.hands.iter().enumerate() {
@@ -181,22 +165,22 @@ pub(crate) fn run<T: Number>(pair: &Pair, movers: &[impl Advance<T>; 4], mut sho
 
 /// The mechanical energy \[J\]: the motion of devices, arms and copies; the springs of arms, of couplings that touch, and of the coordination as it would
 /// be without delay, ½·KT·(xO1 − xO2)².
-pub(crate) fn energy<T: Number>(pair: &Pair, bodies: &[Body<T>; 4]) -> T {
+pub(crate) fn energy<T: Number>(pair: &Pair, bodies: &[Motion<T>; 4]) -> T {
     let mut twice = T::of(0.0);
     for (plant, body) in pair.plants.iter().zip(bodies) {
-        twice = twice + T::of(plant.mass) * body.v * body.v + T::of(plant.stiffness) * body.x * body.x;
+        twice = twice + T::of(plant.mass) * body.velocity * body.velocity + T::of(plant.stiffness) * body.position * body.position;
     }
     for peer in 0..2 {
-        let depth = bodies[peer].x - bodies[2 + peer].x;
+        let depth = bodies[peer].position - bodies[2 + peer].position;
         let touches = match pair.touch[peer] {
             Touch::Nothing => false,
             Touch::Grasp => true,
             Touch::Push(sign) => T::of(sign) * depth > T::of(0.0),
         };
         if touches {
-            twice = twice + T::of(pair.coupling.0) * depth * depth;
+            twice = twice + T::of(pair.coupling.stiffness) * depth * depth;
         }
     }
-    let apart = bodies[2].x - bodies[3].x;
-    T::of(0.5) * (twice + T::of(pair.coordination.0) * apart * apart)
+    let apart = bodies[2].position - bodies[3].position;
+    T::of(0.5) * (twice + T::of(pair.coordination.stiffness) * apart * apart)
 }

@@ -1,8 +1,13 @@
-//! The bodies of all peers and how they move: eight numbers have the same done to them at once.
+//! The bodies of all peers and how they move, eight lanes at a time.
 //!
-//! The formulas are those of [`cohaptic_peer::Peer`], in its order of operations, so that every bit is the same.
+//! What a lane computes is [`cohaptic_peer::tick`] and the scene's law, as [`cohaptic_peer::Peer`] does, so every bit is the same. Each tick is a loop over
+//! lanes without branches, which the compiler turns into vector instructions.
 
-use cohaptic_peer::{Contact, Enclosure, Gains, HandForce, Plant, State, StepMap};
+use std::mem::discriminant;
+
+use cohaptic_peer::coordination::{BuiltIn, Law, Observation};
+use cohaptic_peer::tick::{grasp, on_device, on_object};
+use cohaptic_peer::{Contact, Enclosure, Gains, HandForce, Motion, Plant, State, StepMap};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -25,22 +30,21 @@ pub(super) struct Blocks<const A: usize> {
     goes_on: Mask,
 }
 
+/// Position and velocity of eight bodies along one axis.
+type Motions = Motion<Eight>;
+
 /// Eight devices with their copies of the object, along one axis.
 #[derive(Clone, Debug)]
 struct Block {
-    device_x: Eight,
-    device_v: Eight,
-    object_x: Eight,
-    object_v: Eight,
+    device: Motions,
+    object: Motions,
     /// The mean of the samples held.
-    target_x: Eight,
-    target_v: Eight,
+    mean: Motions,
     hand: Eight,
     /// KC and BC.
-    stiffness: Eight,
-    damping: Eight,
+    coupling: Gains<Eight>,
     grasps: Mask,
-    device: Map,
+    device_map: StepMap<Eight>,
     /// The contacts of all eight, if any of them is one-sided.
     contacts: Option<Box<[Contact; WIDTH]>>,
     axis: usize,
@@ -48,27 +52,26 @@ struct Block {
     is_tied: bool,
 }
 
-/// What is the same for all peers of a run.
+/// What all peers of a run have in common.
 #[derive(Clone, Debug)]
 struct Common {
-    /// KT and BT towards the mean.
-    stiffness: Eight,
-    damping: Eight,
-    object: Map,
+    law: BuiltIn<Eight>,
+    object_map: StepMap<Eight>,
 }
 
-/// Eight step maps: the increments of (x, v) by (x, v), row by row, and by the held force.
-#[derive(Clone, Debug)]
-struct Map {
-    state: [[Eight; 2]; 2],
-    force: [Eight; 2],
+/// The forces of a tick on eight peers.
+#[derive(Clone, Copy, Debug)]
+struct Forces {
+    /// FC.
+    coupling: Eight,
+    /// FC − FT, and the walls.
+    on_object: Eight,
 }
 
 /// Forces that are applied a tick late.
 #[derive(Clone, Debug)]
 struct Late {
-    coupling: Eight,
-    on_object: Eight,
+    computed: Forces,
     is_late: Mask,
 }
 
@@ -81,46 +84,59 @@ pub(super) struct Moved<const L: usize> {
     pub(super) finite: [bool; L],
 }
 
-impl Map {
-    const ZERO: Self = Self { state: [[Eight::ZERO; 2]; 2], force: [Eight::ZERO; 2] };
+const ZERO_MAP: StepMap<Eight> = StepMap::new([[Eight::ZERO; 2]; 2], [Eight::ZERO; 2]);
 
-    fn set(&mut self, lane: usize, map: &StepMap) {
-        let (state, force) = map.coefficients();
-        for (eight, number) in self.state.iter_mut().flatten().zip(state.iter().flatten()) {
-            eight.0[lane] = *number;
-        }
-        for (eight, number) in self.force.iter_mut().zip(force) {
-            eight.0[lane] = number;
-        }
-    }
+impl Forces {
+    const NONE: Self = Self { coupling: Eight::ZERO, on_object: Eight::ZERO };
+}
 
-    /// [`StepMap::advance_free`].
-    #[inline(always)]
-    fn advance_free(&self, x: &mut Eight, v: &mut Eight, force: Eight) {
-        let before = *v;
-        *x = *x + (self.state[0][1] * before + self.force[0] * force);
-        *v = before + (self.state[1][1] * before + self.force[1] * force);
-    }
+/// Replaces the step map of one lane.
+fn set_map(maps: &mut StepMap<Eight>, lane: usize, map: &StepMap) {
+    let (state, force) = map.coefficients();
+    let mut numbers = state.into_iter().flatten().chain(force);
+    *maps = maps.map(|eight| {
+        let mut eight = *eight;
+        eight.0[lane] = numbers.next().unwrap_or_default();
+        eight
+    });
+}
 
-    /// [`StepMap::advance`].
-    #[inline(always)]
-    fn advance(&self, x: &mut Eight, v: &mut Eight, force: Eight) {
-        let (x0, v0) = (*x, *v);
-        *x = x0 + (self.state[0][0] * x0 + self.state[0][1] * v0 + self.force[0] * force);
-        *v = v0 + (self.state[1][0] * x0 + self.state[1][1] * v0 + self.force[1] * force);
-    }
+/// The laws of runs that are made of one law, as one of eight lanes; lane l is of run l modulo their number.
+fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Eight> {
+    let coefficients = |law: &BuiltIn| {
+        let mut all = Vec::new();
+        let _ = law.map(|coefficient| all.push(*coefficient));
+        all
+    };
+    debug_assert!(laws.iter().all(|law| discriminant(law) == discriminant(&laws[0])), "runs side by side have one law");
+    let each: Vec<Vec<f64>> = laws.iter().map(coefficients).collect();
+    let mut place = 0..;
+    laws[0].map(|_| {
+        let place = place.next().unwrap_or_default();
+        Eight(std::array::from_fn(|lane| each[lane % laws.len()][place]))
+    })
+}
+
+/// The motion of one lane.
+#[inline(always)]
+fn lane_of(motions: &Motions, lane: usize) -> Motion {
+    Motion { position: motions.position.0[lane], velocity: motions.velocity.0[lane] }
+}
+
+/// Replaces the motion of one lane.
+#[inline(always)]
+fn set_lane(motions: &mut Motions, lane: usize, motion: Motion) {
+    (motions.position.0[lane], motions.velocity.0[lane]) = (motion.position, motion.velocity);
 }
 
 impl<const A: usize> Blocks<A> {
-    /// The bodies of runs of these scenes, with the gains towards the mean of each.
-    pub(super) fn new(places: Places, scenes: &[&Scene], gains: &[Gains]) -> Self {
+    /// The bodies of runs of these scenes, with the law of each.
+    pub(super) fn new(places: Places, scenes: &[&Scene], laws: &[BuiltIn]) -> Self {
         let tick = scenes[0].peers[0].clock.tick;
-        let mut common = Common { stiffness: Eight::ZERO, damping: Eight::ZERO, object: Map::ZERO };
+        let mut common = Common { law: law_of_lanes(laws), object_map: ZERO_MAP };
         for lane in 0..WIDTH {
             let run = lane % places.runs;
-            common.stiffness.0[lane] = gains[run].stiffness;
-            common.damping.0[lane] = gains[run].damping;
-            common.object.set(lane, &scenes[run].copy_config().plant().step(tick, scenes[run].integrator));
+            set_map(&mut common.object_map, lane, &scenes[run].copy_config().plant().step(tick, scenes[run].integrator));
         }
         let step = |plant: Plant, run: usize| plant.step(tick, scenes[run].integrator);
         let hands: Vec<(usize, usize, HandForce<A>)> = (0..places.peers)
@@ -131,14 +147,13 @@ impl<const A: usize> Blocks<A> {
         let mut late = Vec::with_capacity(A * places.blocks());
         for axis in 0..A {
             blocks.extend((0..places.blocks()).map(|_| Block::empty(axis)));
-            late.extend((0..places.blocks()).map(|_| Late { coupling: Eight::ZERO, on_object: Eight::ZERO, is_late: Mask::NONE }));
+            late.extend((0..places.blocks()).map(|_| Late { computed: Forces::NONE, is_late: Mask::NONE }));
             for (spot, peer, run) in places.all(axis) {
                 let (spec, config) = (&scenes[run].peers[peer], scenes[run].peer_config(peer));
                 let initial: State<A> = scenes[run].initial_state(peer);
                 let block: &mut Block = &mut blocks[spot.block];
-                block.device_x.0[spot.lane] = initial.position[axis];
-                block.object_x.0[spot.lane] = initial.position[axis];
-                block.object_v.0[spot.lane] = initial.velocity[axis];
+                block.device.position.0[spot.lane] = initial.position[axis];
+                set_lane(&mut block.object, spot.lane, initial.along(axis));
                 late[spot.block].is_late.set(spot.lane, config.compute_delay);
                 block.touch(axis, spot.lane, config.contact);
                 if config.contact == Contact::None {
@@ -147,10 +162,10 @@ impl<const A: usize> Blocks<A> {
                 }
                 let map = step(spec.device.plant(spec.hand.as_ref()), run);
                 block.is_tied |= !map.is_free();
-                block.device.set(spot.lane, &map);
-                block.device_v.0[spot.lane] = initial.velocity[axis];
-                block.stiffness.0[spot.lane] = config.coupling.stiffness;
-                block.damping.0[spot.lane] = config.coupling.damping;
+                set_map(&mut block.device_map, spot.lane, &map);
+                block.device.velocity.0[spot.lane] = initial.velocity[axis];
+                block.coupling.stiffness.0[spot.lane] = config.coupling.stiffness;
+                block.coupling.damping.0[spot.lane] = config.coupling.damping;
                 let hand = &hands[peer * places.runs + run].2;
                 block.hand.0[spot.lane] = hand.constant().map_or(0.0, |force| force[axis]);
             }
@@ -174,8 +189,8 @@ impl<const A: usize> Blocks<A> {
     #[inline(always)]
     pub(super) fn object(&self, axis: usize, peer: usize, run: usize) -> (f64, f64) {
         let Spot { block, lane } = self.places.spot(axis, peer, run);
-        let block = &self.blocks[block];
-        (block.object_x.0[lane], block.object_v.0[lane])
+        let Motion { position, velocity } = lane_of(&self.blocks[block].object, lane);
+        (position, velocity)
     }
 
     /// Replaces the mean of the samples that a peer holds, in all runs.
@@ -183,15 +198,13 @@ impl<const A: usize> Blocks<A> {
     pub(super) fn set_target<const L: usize>(&mut self, axis: usize, peer: usize, x: [f64; L], v: [f64; L]) {
         for run in 0..L {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
-            let block = &mut self.blocks[block];
-            block.target_x.0[lane] = x[run];
-            block.target_v.0[lane] = v[run];
+            set_lane(&mut self.blocks[block].mean, lane, Motion { position: x[run], velocity: v[run] });
         }
         if L < WIDTH && peer + 1 == self.places.peers {
             let Spot { block, lane } = self.places.spot(axis, peer, L - 1);
-            let block = &mut self.blocks[block];
-            block.target_x.0[lane..].fill(x[L - 1]);
-            block.target_v.0[lane..].fill(v[L - 1]);
+            let mean = &mut self.blocks[block].mean;
+            mean.position.0[lane..].fill(x[L - 1]);
+            mean.velocity.0[lane..].fill(v[L - 1]);
         }
     }
 
@@ -226,16 +239,16 @@ impl<const A: usize> Blocks<A> {
             let (mut low, mut high) = (Eight::splat(f64::INFINITY), Eight::splat(f64::NEG_INFINITY));
             for place in axis * per_axis..(axis + 1) * per_axis {
                 let block = &mut self.blocks[place];
-                low = block.object_x.smaller(low);
-                high = block.object_x.larger(high);
-                let (mut coupling, mut on_object) = block.forces(&self.common);
+                low = block.object.position.smaller(low);
+                high = block.object.position.larger(high);
+                let mut forces = block.forces(&self.common.law);
                 if let Some(walls) = &self.walls {
-                    block.add_walls(walls, &mut on_object);
+                    block.add_walls(walls, &mut forces.on_object);
                 }
                 if let Some(late) = &mut self.late {
-                    (coupling, on_object) = late[place].exchange(coupling, on_object);
+                    forces = late[place].exchange(forces);
                 }
-                block.advance(&self.common, coupling, on_object);
+                block.advance(&self.common.object_map, &forces);
                 size = size + block.size();
             }
             let distances = distances::<L>(low, high);
@@ -260,8 +273,8 @@ impl<const A: usize> Blocks<A> {
         for axis in 0..A {
             for (Spot { block, lane }, _, run) in self.places.all(axis) {
                 let block = &self.blocks[block];
-                let numbers = [block.device_x, block.device_v, block.object_x, block.object_v];
-                finite[run] &= numbers.iter().all(|numbers| numbers.0[lane].is_finite());
+                let motions = [&block.device, &block.object].map(|motions| lane_of(motions, lane));
+                finite[run] &= motions.iter().all(|motion| motion.position.is_finite() && motion.velocity.is_finite());
             }
         }
         finite
@@ -284,18 +297,15 @@ fn distances<const L: usize>(mut low: Eight, mut high: Eight) -> [f64; L] {
 impl Block {
     fn empty(axis: usize) -> Self {
         let zero = Eight::ZERO;
+        let rest = Motion { position: zero, velocity: zero };
         Self {
-            device_x: zero,
-            device_v: zero,
-            object_x: zero,
-            object_v: zero,
-            target_x: zero,
-            target_v: zero,
+            device: rest,
+            object: rest,
+            mean: rest,
             hand: zero,
-            stiffness: zero,
-            damping: zero,
+            coupling: Gains { stiffness: zero, damping: zero },
             grasps: Mask::NONE,
-            device: Map::ZERO,
+            device_map: ZERO_MAP,
             contacts: None,
             axis,
             is_tied: false,
@@ -318,56 +328,79 @@ impl Block {
         }
     }
 
-    /// FC, and FC − FT.
+    /// The forces of a tick without walls.
     #[inline(always)]
-    fn forces(&self, common: &Common) -> (Eight, Eight) {
-        let (gap, speed) = (self.device_x - self.object_x, self.device_v - self.object_v);
-        //= Rakhsha & Constantinescu 2015, eq. (9): FC = KC·(xH − xO) + BC·(vH − vO)
-        let mut coupling = (self.stiffness * gap + self.damping * speed) & self.grasps;
+    fn forces(&self, law: &BuiltIn<Eight>) -> Forces {
+        let mut coupling = Eight::ZERO;
+        for lane in 0..WIDTH {
+            coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), self.apart(lane));
+        }
+        coupling = coupling & self.grasps;
         if let Some(contacts) = &self.contacts {
             for lane in 0..WIDTH {
-                let gains = Gains { stiffness: self.stiffness.0[lane], damping: self.damping.0[lane] };
-                coupling.0[lane] = contacts[lane].force_along(self.axis, gains, gap.0[lane], speed.0[lane]);
+                let gains = self.coupling.map(|gain| gain.0[lane]);
+                coupling.0[lane] = contacts[lane].force_along(self.axis, &gains, self.apart(lane));
             }
         }
-        //= Rakhsha & Constantinescu 2015, eq. (10): FT = KT·(xO − xd) + BT·(vO − vd)
-        let coordination = common.stiffness * (self.object_x - self.target_x) + common.damping * (self.object_v - self.target_v);
-        (coupling, coupling - coordination)
+        let mut on_copy = Eight::ZERO;
+        for lane in 0..WIDTH {
+            let seen = Observation { own: lane_of(&self.object, lane), mean: lane_of(&self.mean, lane) };
+            let coordination = law.map(|coefficient| coefficient.0[lane]).force(&seen, &mut []);
+            on_copy.0[lane] = on_object(coupling.0[lane], coordination);
+        }
+        Forces { coupling, on_object: on_copy }
+    }
+
+    /// The motion of a device relative to its copy.
+    #[inline(always)]
+    fn apart(&self, lane: usize) -> Motion {
+        lane_of(&self.device, lane).relative_to(lane_of(&self.object, lane))
     }
 
     #[inline(never)]
     fn add_walls(&self, walls: &[Option<Enclosure>], on_object: &mut Eight) {
         for lane in 0..WIDTH {
             if let Some(walls) = &walls[lane % walls.len()] {
-                on_object.0[lane] += walls.force_along(self.axis, self.object_x.0[lane], self.object_v.0[lane]);
+                on_object.0[lane] += walls.force_along(self.axis, self.object.position.0[lane], self.object.velocity.0[lane]);
             }
         }
     }
 
+    /// Moves devices and copies to the next tick.
     #[inline(always)]
-    fn advance(&mut self, common: &Common, coupling: Eight, on_object: Eight) {
-        //= Rakhsha & Constantinescu 2015, eq. (7): mH·aH = Fh − FC − bH·vH
-        let on_device = self.hand - coupling;
-        if self.is_tied {
-            self.device.advance(&mut self.device_x, &mut self.device_v, on_device);
-        } else {
-            self.device.advance_free(&mut self.device_x, &mut self.device_v, on_device);
+    fn advance(&mut self, object_map: &StepMap<Eight>, forces: &Forces) {
+        for lane in 0..WIDTH {
+            let map = self.device_map.map(|coefficient| coefficient.0[lane]);
+            let mut device = lane_of(&self.device, lane);
+            let force = on_device(self.hand.0[lane], forces.coupling.0[lane]);
+            if self.is_tied {
+                map.advance(&mut device, force);
+            } else {
+                map.advance_free(&mut device, force);
+            }
+            set_lane(&mut self.device, lane, device);
+            let mut object = lane_of(&self.object, lane);
+            object_map.map(|coefficient| coefficient.0[lane]).advance_free(&mut object, forces.on_object.0[lane]);
+            set_lane(&mut self.object, lane, object);
         }
-        common.object.advance_free(&mut self.object_x, &mut self.object_v, on_object);
     }
 
     #[inline(always)]
     fn size(&self) -> Eight {
-        (self.device_x.abs() + self.device_v.abs()) + (self.object_x.abs() + self.object_v.abs())
+        let size = |motions: &Motions| motions.position.abs() + motions.velocity.abs();
+        size(&self.device) + size(&self.object)
     }
 }
 
 impl Late {
     /// Remembers the forces computed now, and gives those that are applied.
     #[inline(always)]
-    fn exchange(&mut self, coupling: Eight, on_object: Eight) -> (Eight, Eight) {
-        let applied = (self.is_late.choose(self.coupling, coupling), self.is_late.choose(self.on_object, on_object));
-        (self.coupling, self.on_object) = (coupling, on_object);
+    fn exchange(&mut self, forces: Forces) -> Forces {
+        let applied = Forces {
+            coupling: self.is_late.choose(self.computed.coupling, forces.coupling),
+            on_object: self.is_late.choose(self.computed.on_object, forces.on_object),
+        };
+        self.computed = forces;
         applied
     }
 }

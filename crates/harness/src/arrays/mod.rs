@@ -14,7 +14,7 @@ mod samples;
 mod shape;
 mod side_by_side;
 
-use cohaptic_peer::Gains;
+use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkStats;
@@ -54,7 +54,7 @@ enum Samples<const A: usize, const L: usize> {
 
 impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     /// The scenes at their beginning, all of that shape.
-    pub(crate) fn new(scenes: [&'a Scene; L], shape: Shape, gains: [Gains; L]) -> Self {
+    pub(crate) fn new(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L]) -> Self {
         let places = Places { peers: shape.peers, runs: L };
         let tick_nanos = nanos(shape.tick);
         let samples = match shape.delay {
@@ -62,7 +62,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             None => Samples::Single(Single::new(&scenes, shape.end, tick_nanos)),
         };
         Self {
-            blocks: Blocks::new(places, &scenes, &gains),
+            blocks: Blocks::new(places, &scenes, &laws),
             scenes,
             samples,
             earliest_send: shape.phases.iter().copied().min().unwrap_or(u64::MAX),

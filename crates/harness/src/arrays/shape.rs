@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::Gains;
+use cohaptic_peer::Coordination;
+use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_scene::{Scene, Strategies};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
@@ -12,6 +13,7 @@ use crate::plan::{Plan, Ticking};
 /// What two scenes must have in common to be run side by side.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Shape {
+    pub(super) law: Coordination,
     pub(super) peers: usize,
     pub(super) axes: usize,
     pub(super) tick: Duration,
@@ -29,9 +31,9 @@ const LONGEST: Duration = Duration::from_secs(365 * 86_400);
 
 impl Shape {
     /// The shape of a scene that can be run in arrays: everybody ticks together, nothing changes on the way, and over the links nothing waits. `None` for
-    /// any other, and for strategies that are not average-position coordination.
-    pub(crate) fn of(scene: &Scene, plan: &Plan, strategies: &impl Strategies) -> Option<(Self, Gains)> {
-        let gains = strategies.towards_mean(scene)?;
+    /// any other, and for strategies that are no law of the registry without memory.
+    pub(crate) fn of(scene: &Scene, plan: &Plan, strategies: &impl Strategies) -> Option<(Self, BuiltIn)> {
+        let law = strategies.law(scene).filter(|law| Law::<f64>::memory(law) == 0)?;
         let clock = scene.peers.first()?.clock;
         let fits = plan.ticking == Ticking::Lockstep
             && !plan.general_links
@@ -43,6 +45,7 @@ impl Shape {
             && scene.links.used().all(|(link, _)| link.is_direct());
         fits.then(|| {
             let shape = Self {
+                law: scene.coordination.strategy,
                 peers: scene.peers.len(),
                 axes: plan.axes.count(),
                 tick: clock.tick,
@@ -51,7 +54,7 @@ impl Shape {
                 phases: scene.peers.iter().map(|peer| peer.phase).collect(),
                 delay: one_delay(scene),
             };
-            (shape, gains)
+            (shape, law)
         })
     }
 }

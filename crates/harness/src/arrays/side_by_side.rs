@@ -1,6 +1,6 @@
 //! Many runs, those of one shape at the same time.
 
-use cohaptic_scene::{Axes, FromScene, Scene, Strategies};
+use cohaptic_scene::{Axes, FromScene, Scene};
 
 use super::eight::WIDTH;
 use super::{Arrays, Shape};
@@ -57,11 +57,11 @@ fn shape(scene: &Scene) -> Option<Shape> {
 /// Runs up to eight scenes of one shape; the last one fills the lanes that are left.
 fn run_eight(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
     let lanes: [&Scene; WIDTH] = std::array::from_fn(|lane| &scenes[lane.min(scenes.len() - 1)]);
-    let gains = lanes.map(|scene| FromScene.towards_mean(scene).expect("scenes that are alike have a shape"));
+    let laws = lanes.map(Scene::law);
     let summaries = match lanes[0].axes {
-        Axes::One => Arrays::<1, WIDTH>::new(lanes, shape, gains).run(|_| true),
-        Axes::Two => Arrays::<2, WIDTH>::new(lanes, shape, gains).run(|_| true),
-        Axes::Three => Arrays::<3, WIDTH>::new(lanes, shape, gains).run(|_| true),
+        Axes::One => Arrays::<1, WIDTH>::new(lanes, shape, laws).run(|_| true),
+        Axes::Two => Arrays::<2, WIDTH>::new(lanes, shape, laws).run(|_| true),
+        Axes::Three => Arrays::<3, WIDTH>::new(lanes, shape, laws).run(|_| true),
     };
     summaries.into_iter().take(scenes.len()).collect()
 }

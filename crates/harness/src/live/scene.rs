@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use cohaptic_peer::State;
-use cohaptic_peer::coordination::BuiltIn;
+use cohaptic_peer::coordination::LawStrategy;
 use cohaptic_scene::{Axes, LinkKeys, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, LinkStats};
@@ -40,9 +40,9 @@ pub struct LiveScene {
 
 /// A world with as many axes as the scene has.
 enum AnyWorld {
-    One(Box<World<1, BuiltIn, Attendance<1>>>),
-    Two(Box<World<2, BuiltIn, Attendance<2>>>),
-    Three(Box<World<3, BuiltIn, Attendance<3>>>),
+    One(Box<World<1, LawStrategy<1>, Attendance<1>>>),
+    Two(Box<World<2, LawStrategy<2>, Attendance<2>>>),
+    Three(Box<World<3, LawStrategy<3>, Attendance<3>>>),
 }
 
 macro_rules! each {

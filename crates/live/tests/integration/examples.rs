@@ -8,9 +8,9 @@ mod served;
 
 use std::net::UdpSocket;
 
-use cohaptic_peer::coordination::AveragePosition;
 use cohaptic_peer::{
-    Clock, Contact, CopyConfig, DeviceConfig, Gains, Hand, Held, Integrator, ObjectCopy, Peer, PeerConfig, Signal, SimulatedDevice, State,
+    Clock, Contact, Coordination, CopyConfig, DeviceConfig, Gains, Hand, Held, Integrator, ObjectCopy, Peer, PeerConfig, Signal, SimulatedDevice,
+    State,
 };
 use cohaptic_units::Instant;
 use std::time::Duration;
@@ -65,7 +65,8 @@ impl Mechanics {
             enclosure: None,
         };
         let others = Held::new((1..self.peers).map(|_| State::REST));
-        let mut peer: Peer<3, _, _> = Peer::new(config, device, object, AveragePosition::new(self.coordination), others);
+        let mut peer: Peer<3, _, _> =
+            Peer::new(config, device, object, Coordination::AveragePosition.strategy(self.coordination, self.peers), others);
         for k in 0..ticks {
             let now = Instant::from_nanos(k * 1_000_000);
             peer.compute(now);

@@ -2,35 +2,33 @@
 //!
 //! Over an ideal network the difference modes of N copies have the stiffness N/(N−1)·KT (Rakhsha & Constantinescu 2015, equation 6): bounded in N.
 
-use super::{Command, Context, Strategy};
-use crate::Gains;
+use super::{Law, LawParameters, Observation};
+use crate::{Gains, Number};
 
-/// The strategy of Rakhsha & Constantinescu (2015).
+/// The law of Rakhsha & Constantinescu (2015).
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct AveragePosition {
-    gains: Gains,
+pub struct AveragePosition<C = f64> {
+    /// KT and BT.
+    pub gains: Gains<C>,
 }
 
 impl AveragePosition {
-    /// The strategy with gains KT and BT.
-    #[must_use]
-    pub const fn new(gains: Gains) -> Self {
-        Self { gains }
+    pub(super) const fn new(parameters: &LawParameters) -> Self {
+        Self { gains: parameters.gains }
     }
 }
 
-impl<const A: usize> Strategy<A> for AveragePosition {
-    #[inline]
-    fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
-        let Gains { stiffness: k_t, damping: b_t } = self.gains;
-        let (own, target) = (context.own, *context.held.mean());
-        //= Rakhsha & Constantinescu 2015, eq. (10): FT = KT·(xO − xd) + BT·(vO − vd)
-        let force =
-            core::array::from_fn(|axis| k_t * (own.position[axis] - target.position[axis]) + b_t * (own.velocity[axis] - target.velocity[axis]));
-        Command { force, target }
+impl<C: Copy> AveragePosition<C> {
+    #[inline(always)]
+    pub(super) fn map<D>(&self, coefficient: impl FnMut(&C) -> D) -> AveragePosition<D> {
+        AveragePosition { gains: self.gains.map(coefficient) }
     }
+}
 
-    fn set_gains(&mut self, gains: Gains) {
-        self.gains = gains;
+impl<N: Number> Law<N> for AveragePosition<N> {
+    #[inline(always)]
+    fn force(&self, seen: &Observation<N>, _memory: &mut [N]) -> N {
+        //= Rakhsha & Constantinescu 2015, eq. (10): FT = KT·(xO − xd) + BT·(vO − vd)
+        self.gains.force(seen.own.relative_to(seen.mean))
     }
 }

@@ -2,36 +2,37 @@
 //!
 //! Over an ideal network the difference modes of N copies have the stiffness N·KT (Rakhsha & Constantinescu 2015, equation 3): it grows with N.
 
-use super::{AveragePosition, Command, Context, Strategy};
-use crate::Gains;
+use super::{Law, LawParameters, Observation};
+use crate::{Gains, Number};
 
-/// The conventional strategy.
+/// The conventional law.
 ///
-/// Σⱼ [KT·(x − xⱼ) + BT·(v − vⱼ)] over the N−1 others is (N−1)·[KT·(x − x̄) + BT·(v − v̄)]: average-position coordination with gains (N−1)·KT and
-/// (N−1)·BT. It is computed so, in one product instead of N−1, and then the identity between the two strategies holds to the bit.
+/// FT = Σⱼ [KT·(x − xⱼ) + BT·(v − vⱼ)] over the N−1 others. Every term is linear, so the sum is the pull of their mean with N−1 times the gains: two products
+/// made once in place of N−1 terms a tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct ProportionalDerivative {
-    others: f64,
-    equivalent: AveragePosition,
+pub struct ProportionalDerivative<C = f64> {
+    /// (N−1)·KT and (N−1)·BT.
+    summed: Gains<C>,
 }
 
 impl ProportionalDerivative {
-    /// The strategy with gains KT and BT towards each of the other peers; `peers` counts all of them.
-    #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-    pub fn new(gains: Gains, peers: usize) -> Self {
-        let others = peers.saturating_sub(1) as f64;
-        Self { others, equivalent: AveragePosition::new(gains.scaled(others)) }
+    pub(super) fn new(parameters: &LawParameters) -> Self {
+        Self { summed: parameters.gains.scaled(parameters.peers.saturating_sub(1) as f64) }
     }
 }
 
-impl<const A: usize> Strategy<A> for ProportionalDerivative {
-    #[inline]
-    fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
-        self.equivalent.command(context)
+impl<C: Copy> ProportionalDerivative<C> {
+    #[inline(always)]
+    pub(super) fn map<D>(&self, coefficient: impl FnMut(&C) -> D) -> ProportionalDerivative<D> {
+        ProportionalDerivative { summed: self.summed.map(coefficient) }
     }
+}
 
-    fn set_gains(&mut self, gains: Gains) {
-        Strategy::<A>::set_gains(&mut self.equivalent, gains.scaled(self.others));
+impl<N: Number> Law<N> for ProportionalDerivative<N> {
+    #[inline(always)]
+    fn force(&self, seen: &Observation<N>, _memory: &mut [N]) -> N {
+        //= Rakhsha & Constantinescu 2015, eq. (2): FT = Σⱼ [KT·(xO − xOⱼ) + BT·(vO − vOⱼ)]
+        self.summed.force(seen.own.relative_to(seen.mean))
     }
 }

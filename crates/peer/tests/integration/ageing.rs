@@ -5,7 +5,7 @@ use std::time::Duration;
 use cohaptic_peer::wire::Sample;
 use cohaptic_peer::{
     Age, Ages, Clock, Contact, Coordination, CopyConfig, Forces, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, RestingDevice, State,
-    coordination::BuiltIn,
+    coordination::LawStrategy,
 };
 use cohaptic_units::Instant;
 use proptest::collection::vec;
@@ -15,7 +15,7 @@ const GAINS: Gains = Gains { stiffness: 2000.0, damping: 7.0 };
 
 /// A peer and the ages that it gives to others.
 struct Receiver {
-    peer: Peer<1, RestingDevice<1>, BuiltIn>,
+    peer: Peer<1, RestingDevice<1>, LawStrategy<1>>,
     ages: Ages<1>,
 }
 

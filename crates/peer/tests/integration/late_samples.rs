@@ -5,13 +5,13 @@ use std::time::Duration;
 use cohaptic_peer::wire::MAX_LEN;
 use cohaptic_peer::{
     Clock, Contact, Coordination, CopyConfig, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, ReceiveError, Reception, RestingDevice, State,
-    coordination::BuiltIn, wire::Sample,
+    coordination::LawStrategy, wire::Sample,
 };
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-type Receiver = Peer<1, RestingDevice<1>, BuiltIn>;
+type Receiver = Peer<1, RestingDevice<1>, LawStrategy<1>>;
 
 const SESSION: u64 = 7;
 const PLACE: u32 = 1;

@@ -4,6 +4,7 @@
 
 mod ageing;
 mod late_samples;
+mod laws;
 mod own_parts;
 mod step_map;
 mod wire;

@@ -50,8 +50,8 @@ fn read_axes(node: &Node, context: Context<'_>) -> Option<Axes> {
 /// `[coordination]`.
 pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<CoordinationSpec> {
     let mut table = TableReader::new(node, context, "a table such as [coordination]")?;
-    let strategies = Coordination::ALL.map(|strategy| (strategy.name(), strategy));
-    let names = strategies.map(|(name, _)| name).join(", ");
+    let strategies: Vec<_> = Coordination::ALL.iter().map(|strategy| (strategy.name(), *strategy)).collect();
+    let names = strategies.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let strategy = table.required("strategy", &format!("one of {names}"), |node, context| values::choice(node, context, &strategies));
     let scaling = table.optional("scaling", Scaling::None, read_scaling);
     let stiffness = table.required("stiffness", &STIFFNESS.expected(), |node, context| STIFFNESS.read(node, context));

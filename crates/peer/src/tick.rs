@@ -1,0 +1,43 @@
+//! The tick of a peer along one axis: equations (7) to (9) of Rakhsha & Constantinescu (2015), in any [`Number`]. Equation (10) is the law,
+//! [`AveragePosition`](crate::coordination::AveragePosition).
+
+use crate::coordination::{Law, Observation};
+use crate::{Gains, Motion, Number};
+
+/// FC \[N\] of a device that grasps its copy, where `apart` is the motion of the device relative to the copy: xH − xO and vH − vO.
+#[must_use]
+#[inline(always)]
+pub fn grasp<N: Number>(coupling: &Gains<N>, apart: Motion<N>) -> N {
+    //= Rakhsha & Constantinescu 2015, eq. (9): FC = KC·(xH − xO) + BC·(vH − vO)
+    coupling.force(apart)
+}
+
+/// The force on a copy \[N\], apart from its damping and the walls.
+#[must_use]
+#[inline(always)]
+pub fn on_object<N: Number>(coupling: N, coordination: N) -> N {
+    //= Rakhsha & Constantinescu 2015, eq. (8): mO·aO = FC − FT − bO·vO
+    coupling - coordination
+}
+
+/// The force on a device \[N\], apart from its damping and the arm that holds it.
+#[must_use]
+#[inline(always)]
+pub fn on_device<N: Number>(hand: N, coupling: N) -> N {
+    //= Rakhsha & Constantinescu 2015, eq. (7): mH·aH = Fh − FC − bH·vH
+    hand - coupling
+}
+
+/// FC and FC − FT, where `coupling` gives FC from the motion of the device relative to the copy.
+#[must_use]
+#[inline(always)]
+pub fn forces<N: Number>(
+    device: Motion<N>,
+    coupling: impl FnOnce(Motion<N>) -> N,
+    seen: &Observation<N>,
+    law: &impl Law<N>,
+    memory: &mut [N],
+) -> (N, N) {
+    let coupling = coupling(device.relative_to(seen.own));
+    (coupling, on_object(coupling, law.force(seen, memory)))
+}
