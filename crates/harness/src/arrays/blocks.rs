@@ -6,7 +6,7 @@
 use std::mem::discriminant;
 
 use cohaptic_peer::coordination::{BuiltIn, Law, Observation};
-use cohaptic_peer::tick::{grasp, on_device, on_object};
+use cohaptic_peer::tick::{forces, grasp, on_device, on_object};
 use cohaptic_peer::{Contact, Enclosure, Gains, HandForce, Motion, Plant, State, StepMap};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
@@ -241,14 +241,18 @@ impl<const A: usize> Blocks<A> {
                 let block = &mut self.blocks[place];
                 low = block.object.position.smaller(low);
                 high = block.object.position.larger(high);
-                let mut forces = block.forces(&self.common.law);
-                if let Some(walls) = &self.walls {
-                    block.add_walls(walls, &mut forces.on_object);
+                if self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
+                    block.tick(&self.common);
+                } else {
+                    let mut forces = block.forces(&self.common.law);
+                    if let Some(walls) = &self.walls {
+                        block.add_walls(walls, &mut forces.on_object);
+                    }
+                    if let Some(late) = &mut self.late {
+                        forces = late[place].exchange(forces);
+                    }
+                    block.advance(&self.common.object_map, &forces);
                 }
-                if let Some(late) = &mut self.late {
-                    forces = late[place].exchange(forces);
-                }
-                block.advance(&self.common.object_map, &forces);
                 size = size + block.size();
             }
             let distances = distances::<L>(low, high);
@@ -294,6 +298,36 @@ fn distances<const L: usize>(mut low: Eight, mut high: Eight) -> [f64; L] {
     std::array::from_fn(|run| high.0[run] - low.0[run])
 }
 
+/// [`Block::tick`]. By references of their own the compiler knows that nothing that is written is read in another lane.
+#[inline(always)]
+fn tick_of_lanes<const TIED: bool>(
+    devices: &mut Motions,
+    objects: &mut Motions,
+    means: &Motions,
+    hands: &Eight,
+    (coupling, grasps): (&Gains<Eight>, &Mask),
+    device_map: &StepMap<Eight>,
+    common: &Common,
+) {
+    for lane in 0..WIDTH {
+        let (mut device, mut object) = (lane_of(devices, lane), lane_of(objects, lane));
+        let gains = coupling.map(|gain| gain.0[lane]);
+        let touch = |apart| grasps.keep(lane, grasp(&gains, apart));
+        let seen = Observation { own: object, mean: lane_of(means, lane) };
+        let law = common.law.map(|coefficient| coefficient.0[lane]);
+        let (coupling, on_object) = forces(device, touch, &seen, &law, &mut []);
+        let map = device_map.map(|coefficient| coefficient.0[lane]);
+        if TIED {
+            map.advance(&mut device, on_device(hands.0[lane], coupling));
+        } else {
+            map.advance_free(&mut device, on_device(hands.0[lane], coupling));
+        }
+        common.object_map.map(|coefficient| coefficient.0[lane]).advance_free(&mut object, on_object);
+        set_lane(devices, lane, device);
+        set_lane(objects, lane, object);
+    }
+}
+
 impl Block {
     fn empty(axis: usize) -> Self {
         let zero = Eight::ZERO;
@@ -325,6 +359,17 @@ impl Block {
         }
         if let Some(contacts) = &mut self.contacts {
             contacts[lane] = contact;
+        }
+    }
+
+    /// Forces and motion of a tick in one pass, where nothing but grasps and the law acts.
+    #[inline(always)]
+    fn tick(&mut self, common: &Common) {
+        let Self { device, object, mean, hand, coupling, grasps, device_map, .. } = self;
+        if self.is_tied {
+            tick_of_lanes::<true>(device, object, mean, hand, (coupling, grasps), device_map, common);
+        } else {
+            tick_of_lanes::<false>(device, object, mean, hand, (coupling, grasps), device_map, common);
         }
     }
 

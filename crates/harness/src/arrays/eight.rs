@@ -65,6 +65,12 @@ impl Mask {
         self.0[place] != 0
     }
 
+    /// The number where the mask holds in that lane, +0 elsewhere.
+    #[inline(always)]
+    pub(super) fn keep(&self, lane: usize, number: f64) -> f64 {
+        f64::from_bits(number.to_bits() & self.0[lane])
+    }
+
     /// `yes` where it holds, `no` elsewhere.
     #[inline(always)]
     pub(super) fn choose(self, yes: Eight, no: Eight) -> Eight {
