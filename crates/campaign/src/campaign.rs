@@ -212,7 +212,8 @@ impl Campaign {
             return Err(CampaignError::Damaged { path, message: format!("{found} rows: expected {runs}"), way_out: WAY_OUT });
         }
         let (combinations, quantiles) = tally.finish();
-        Ok(Report { file: path, runs, computed, combinations, quantiles, judgements: self.judgements.clone() })
+        let verdicts = self.plan.has_verdicts().then(|| self.folder.verdicts());
+        Ok(Report { file: path, verdicts, runs, computed, combinations, quantiles, judgements: self.judgements.clone() })
     }
 }
 

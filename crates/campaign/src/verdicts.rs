@@ -67,7 +67,8 @@ impl Words {
     fn all(&mut self, judgement: Judgement) -> Judgement {
         match judgement {
             Judgement::Known(verdict) => Judgement::Known(Verdict { word: self.one(&verdict.word), judged: self.one(&verdict.judged), ..verdict }),
-            Judgement::Refused(reason) => Judgement::Refused(self.one(&reason)),
+            // A line of the journal is one line.
+            Judgement::Refused(reason) => Judgement::Refused(self.one(&reason.replace(['\n', '\r'], " "))),
         }
     }
 }

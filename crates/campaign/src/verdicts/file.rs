@@ -85,8 +85,7 @@ fn cells(judgement: &Judgement) -> [String; 5] {
         Judgement::Known(Verdict { word, judged, radius, error }) => {
             [word.to_string(), judged.to_string(), number_text(*radius), number_text(*error), String::new()]
         }
-        // A line of the journal is one line.
-        Judgement::Refused(reason) => [String::new(), String::new(), String::new(), String::new(), reason.replace(['\n', '\r'], " ")],
+        Judgement::Refused(reason) => [String::new(), String::new(), String::new(), String::new(), reason.to_string()],
     }
 }
 

@@ -36,7 +36,10 @@ pub(crate) fn judge(
             let mut shared = lock();
             let Shared { journal, judgements, words, failed } = &mut *shared;
             let kept = match judged {
-                Ok(Some(judgement)) => journal.add(*combination, &judgement).map(|()| Some(words.all(judgement))),
+                Ok(Some(judgement)) => {
+                    let judgement = words.all(judgement);
+                    journal.add(*combination, &judgement).map(|()| Some(judgement))
+                }
                 Ok(None) => Ok(None),
                 Err(error) => Err(error),
             };

@@ -18,6 +18,8 @@ pub(super) struct Document<'a> {
     runs_per_s: f64,
     out: String,
     file: String,
+    /// The table, verdicts, pictures.
+    files: Vec<String>,
     diverged: u64,
     combinations: Vec<Combination<'a>>,
     notes: &'a [String],
@@ -78,6 +80,7 @@ impl<'a> Document<'a> {
             runs_per_s: finished.runs_per_s(),
             out: output::path(out),
             file: output::path(&report.file),
+            files: finished.files.iter().map(|file| output::path(file)).collect(),
             diverged: report.diverged(),
             combinations: report.combinations.iter().enumerate().map(combination).collect(),
             notes: &finished.notes,

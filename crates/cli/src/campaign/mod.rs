@@ -2,11 +2,13 @@
 
 mod document;
 mod judge;
+mod picture;
 mod refusal;
 mod watch;
 mod words;
 
 use std::num::NonZeroU64;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
@@ -18,6 +20,7 @@ use crate::failure::Failure;
 use crate::{input, output};
 use document::Document;
 use judge::ByAnalysis;
+use picture::Drawn;
 use watch::Shown;
 
 /// The program, as a campaign remembers it.
@@ -32,6 +35,8 @@ struct Finished {
     wall_s: f64,
     /// What verdicts leave out, and what is not drawn.
     notes: Vec<String>,
+    /// All that are there: the table, verdicts, pictures.
+    files: Vec<PathBuf>,
 }
 
 /// Does the runs that are missing, and says what came out.
@@ -46,12 +51,18 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     let wall_s = start.elapsed().as_secs_f64();
     let title = plan.scene(0).map_or_else(|_| output::path(input::named(&arguments.scene.scene)), |scene| scene.title);
     let notes = judge::notes(&report);
-    let finished = Finished { plan, title, report, wall_s, notes };
+    let files = std::iter::once(report.file.clone()).chain(report.verdicts.clone()).collect();
+    let mut finished = Finished { plan, title, report, wall_s, notes, files };
+    if !arguments.no_plot {
+        let Drawn { files, notes } = picture::write(&finished, &arguments.out, arguments.pictures.size())?;
+        finished.files.extend(files);
+        finished.notes.extend(notes);
+    }
     if arguments.scene.json {
         output::json(DocumentSchema::Campaign, &Document::new(&finished, &arguments.out))?;
     } else {
         output::text(&words::describe(&finished))?;
-        output::wrote([&finished.report.file]);
+        output::wrote(&finished.files);
     }
     Ok(ExitCode::SUCCESS)
 }

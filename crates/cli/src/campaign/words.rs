@@ -11,7 +11,7 @@ use crate::run::words::length;
 const MOST_COMBINATIONS: usize = 20;
 
 pub(super) fn describe(finished: &Finished) -> String {
-    let Finished { plan, title, report, wall_s, notes } = finished;
+    let Finished { plan, title, report, wall_s, notes, .. } = finished;
     let (combinations, each) = (plan.combinations(), plan.runs_of_each());
     let mut text = format!("{title}\n");
     // Writing to a string does not fail.

@@ -8,6 +8,7 @@ mod accuracy;
 mod admittance;
 mod against;
 mod campaign;
+mod campaign_pictures;
 mod campaign_verdicts;
 mod check;
 mod desk;
