@@ -31,6 +31,7 @@ struct Sheet<'a> {
     plan: &'a Plan,
     report: &'a Report,
     arranged: Arranged,
+    size: Size,
 }
 
 /// Writes `discrepancy.svg`, and `verdicts.svg` where there are verdicts; nothing if no key has several values.
@@ -41,7 +42,7 @@ pub(super) fn write(finished: &Finished, folder: &Path, size: Size) -> Result<Dr
         Ok(None) => return Ok(Drawn::default()),
         Err(why) => return Ok(Drawn { files: Vec::new(), notes: vec![format!("no picture is drawn: {why}")] }),
     };
-    let sheet = Sheet { title, plan, report, arranged };
+    let sheet = Sheet { title, plan, report, arranged, size };
     let mut drawn = Drawn::default();
     if report.quantiles.is_empty() {
         drawn.notes.push(format!(
@@ -49,10 +50,10 @@ pub(super) fn write(finished: &Finished, folder: &Path, size: Size) -> Result<Dr
              of {MOST_COMBINATIONS_OF_QUANTILES} combinations"
         ));
     } else {
-        put(&mut drawn, folder, "discrepancy.svg", &sheet.discrepancy().size(size))?;
+        put(&mut drawn, folder, "discrepancy.svg", &sheet.discrepancy())?;
     }
     if !report.judgements.is_empty() {
-        put(&mut drawn, folder, "verdicts.svg", &verdicts::picture(&sheet).size(size))?;
+        put(&mut drawn, folder, "verdicts.svg", &verdicts::picture(&sheet))?;
     }
     Ok(drawn)
 }
@@ -84,12 +85,16 @@ impl Sheet<'_> {
 
     /// The picture without panels.
     fn picture(&self) -> Picture {
+        let is_grid = matches!(self.arranged.keys, Keys::Grid(..));
         let columns = match self.arranged.facets() {
             1 => 1,
+            // Colour bars take room.
+            _ if is_grid && self.size.is_narrow() => 1,
             2..=4 => 2,
+            _ if is_grid => 2,
             _ => 3,
         };
-        let picture = Picture::new(self.title).columns(columns);
+        let picture = Picture::new(self.title).size(self.size).columns(columns);
         match &self.arranged.keys {
             Keys::Names(along) => {
                 // A few rows are not far from each other, and the names of many have room.
