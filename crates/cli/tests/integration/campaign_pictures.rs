@@ -19,7 +19,7 @@ fn desk() -> Desk {
 /// Every kind of picture: a command, and words that its pictures must have: of the discrepancy, and of the verdicts.
 fn kinds() -> Vec<(String, Vec<&'static str>, Vec<&'static str>)> {
     let random = |rest: &str| format!("campaign random.toml --runs 20 --verdicts {rest}");
-    let bands = vec!["90 % of the runs", "50 % of the runs", "median", "Largest discrepancy [mm]"];
+    let bands = ["90 % of the runs", "50 % of the runs", "median", "Largest discrepancy [mm]"];
     let with = |more: &[&'static str]| bands.iter().chain(more).copied().collect();
     vec![
         (random("--vary link.loss=0%..40%/5"), with(&["Loss on links [%]"]), vec!["Loss on links [%]", "Mean-square radius", "1"]),

@@ -28,7 +28,7 @@ pub(super) enum Keys {
     /// One of numbers.
     Line(Along),
     /// Two of numbers: along x and y.
-    Grid(Along, Along),
+    Grid(Box<(Along, Along)>),
 }
 
 /// A key along an axis.
@@ -53,7 +53,7 @@ impl Arranged {
             varied.iter().filter_map(|(key, vary)| Along::of_numbers(*key, vary).map(|along| (*key, along))).take(2).collect();
         let mut numbers = numbers.into_iter();
         let keys = match (numbers.next(), numbers.next(), varied.first()) {
-            (Some((_, x)), Some((_, y)), _) => Keys::Grid(x, y),
+            (Some((_, x)), Some((_, y)), _) => Keys::Grid(Box::new((x, y))),
             (Some((_, x)), None, _) => Keys::Line(x),
             (None, _, Some((key, vary))) => Keys::Names(Along::of_names(*key, vary)?),
             (None, _, None) => return Ok(None),
@@ -113,7 +113,7 @@ impl Keys {
     fn along(&self) -> Vec<&Along> {
         match self {
             Self::Names(along) | Self::Line(along) => vec![along],
-            Self::Grid(x, y) => vec![x, y],
+            Self::Grid(both) => vec![&both.0, &both.1],
         }
     }
 }

@@ -110,7 +110,7 @@ impl Sheet<'_> {
         match &self.arranged.keys {
             Keys::Names(along) => names::quantiles(self, along, facet, scale),
             Keys::Line(along) => bands::quantiles(self, along, facet, scale),
-            Keys::Grid(x, y) => cells::medians(self, (x, y), facet, scale),
+            Keys::Grid(both) => cells::medians(self, (&both.0, &both.1), facet, scale),
         }
     }
 
@@ -119,7 +119,7 @@ impl Sheet<'_> {
         match &self.arranged.keys {
             Keys::Names(along) => names::shares(self, along, facet),
             Keys::Line(along) => bands::shares(self, along, facet),
-            Keys::Grid(x, y) => cells::shares(self, (x, y), facet),
+            Keys::Grid(both) => cells::shares(self, (&both.0, &both.1), facet),
         }
     }
 

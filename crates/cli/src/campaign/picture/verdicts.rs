@@ -31,7 +31,7 @@ pub(super) fn picture(sheet: &Sheet<'_>) -> Picture {
         let panel = match &sheet.arranged.keys {
             Keys::Names(along) => radii.by_name(sheet, along, facet),
             Keys::Line(along) => radii.line(sheet, along, facet),
-            Keys::Grid(x, y) => regions(sheet, (x, y), facet, radii.criterion),
+            Keys::Grid(both) => regions(sheet, (&both.0, &both.1), facet, radii.criterion),
         };
         panel.titled(sheet.arranged.title(sheet.plan, facet, ""))
     };
