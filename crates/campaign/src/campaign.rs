@@ -2,12 +2,14 @@
 
 use std::fs::File;
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::error::CampaignError;
 use crate::folder::{Folder, Manifest, write_whole};
 use crate::plan::{Parts, Plan};
 use crate::report::{Report, Tally};
 use crate::table::{Column, Head, Row, TableError, columns};
+use crate::verdicts::{Journal, Judge, Judgement, judge, read_whole, write_all};
 use crate::watch::Watch;
 use crate::work::Work;
 
@@ -19,6 +21,8 @@ pub struct Campaign {
     parts: Parts,
     columns: Vec<Column>,
     folder: Folder,
+    /// One for each combination; none while they are not known, or not asked for.
+    judgements: Arc<[Judgement]>,
 }
 
 /// How [`Campaign::run`] ended.
@@ -58,13 +62,13 @@ impl Campaign {
         };
         folder.sweep()?;
         let parts = manifest.parts(plan.runs());
-        let columns = columns(plan.variations(), &manifest.roster);
-        Ok(Self { plan, manifest, parts, columns, folder })
+        let columns = columns(plan.variations(), plan.has_verdicts(), &manifest.roster);
+        Ok(Self { plan, manifest, parts, columns, folder, judgements: Arc::from([]) })
     }
 
     fn new_manifest(plan: &Plan, watch: &dyn Watch) -> Result<Manifest, CampaignError> {
         let checked = plan.check(watch)?;
-        let parts = Parts::of(plan, &checked, columns(plan.variations(), &checked.roster).len())?;
+        let parts = Parts::of(plan, &checked, columns(plan.variations(), plan.has_verdicts(), &checked.roster).len())?;
         Ok(Manifest::new(plan, plan.fingerprint_of(&checked.numbers), checked.roster, parts))
     }
 
@@ -105,19 +109,57 @@ impl Campaign {
         (0..self.parts.count()).filter(|part| self.has(*part)).map(|part| self.parts.len(part)).sum()
     }
 
+    /// Judges the combinations that are not judged yet, on all threads of the pool that it is called in. Each judgement is kept as soon as it is known.
+    /// Gives how many combinations have none: above 0 if the watch or the judge ended it. Of a plan without verdicts none is missing.
+    ///
+    /// # Errors
+    ///
+    /// [`CampaignError::File`] if a judgement cannot be kept, [`CampaignError::Damaged`] if the judgements are not as they were written.
+    pub fn judge(&mut self, by: &dyn Judge, watch: &dyn Watch) -> Result<u64, CampaignError> {
+        if !self.plan.has_verdicts() || !self.judgements.is_empty() {
+            return Ok(0);
+        }
+        let path = self.folder.verdicts();
+        if let Some(judgements) = read_whole(&path, &self.plan)? {
+            self.folder.remove_journal()?;
+            self.judgements = judgements.into();
+            return Ok(0);
+        }
+        let combinations = self.plan.combinations();
+        let (mut journal, known) = Journal::open(self.folder.journal(), combinations)?;
+        let mut judgements = vec![None; usize::try_from(combinations).unwrap_or_default()];
+        watch.judged(known.len() as u64);
+        for (combination, judgement) in known {
+            judgements[usize::try_from(combination).unwrap_or_default()] = Some(judgement);
+        }
+        let judgements = judge(&self.plan, by, watch, &mut journal, judgements)?;
+        let missing = judgements.iter().filter(|judgement| judgement.is_none()).count() as u64;
+        if missing == 0 {
+            let judgements: Vec<Judgement> = judgements.into_iter().flatten().collect();
+            write_all(&path, &self.plan, &judgements)?;
+            drop(journal);
+            self.folder.remove_journal()?;
+            self.judgements = judgements.into();
+        }
+        Ok(missing)
+    }
+
     /// Does the runs that are missing, on all threads of the pool that it is called in, and puts the table together. A campaign that is finished is left as
     /// it is.
     ///
     /// # Errors
     ///
     /// [`CampaignError::File`] if a file cannot be written: whole parts are kept, of others nothing is left, and once there is room the campaign goes on.
-    /// [`CampaignError::Damaged`] if a part or the table is not as it was written.
+    /// [`CampaignError::Damaged`] if a part or the table is not as it was written. [`CampaignError::NotJudged`] if verdicts are asked for and not known.
     pub fn run(&mut self, watch: &dyn Watch) -> Result<Outcome, CampaignError> {
+        if self.plan.has_verdicts() && self.judgements.is_empty() {
+            return Err(CampaignError::NotJudged);
+        }
         let mut computed = 0;
         if !self.is_finished() {
             let missing: Vec<u64> = (0..self.parts.count()).filter(|part| !self.has(*part)).collect();
             let keep = |part: u64, rows: &[Row]| self.keep(part, rows);
-            let work = Work { plan: &self.plan, roster: &self.manifest.roster, parts: self.parts, watch, keep: &keep };
+            let work = Work { plan: &self.plan, roster: &self.manifest.roster, judgements: &self.judgements, parts: self.parts, watch, keep: &keep };
             computed = work.run(&missing)?;
             let kept = self.kept();
             if kept < self.plan.runs() {
@@ -162,14 +204,16 @@ impl Campaign {
         const WAY_OUT: &str = "remove the folder, or choose another one";
         let path = self.folder.table(self.plan.format());
         let file = File::open(&path).map_err(|error| CampaignError::File { verb: "read", path: path.clone(), error })?;
-        let mut tally = Tally::new(self.plan.runs_of_each());
+        let mut tally = Tally::new(self.plan.runs_of_each(), self.plan.combinations());
         let read = self.plan.format().read_gists(file, &mut |gist| tally.add(gist));
         read.map_err(|error| unread(&path, error, WAY_OUT))?;
         let (found, runs) = (tally.runs(), self.plan.runs());
         if found != runs {
             return Err(CampaignError::Damaged { path, message: format!("{found} rows: expected {runs}"), way_out: WAY_OUT });
         }
-        Ok(Report { file: path, runs, computed, combinations: tally.combinations() })
+        let (combinations, quantiles) = tally.finish();
+        let verdicts = self.plan.has_verdicts().then(|| self.folder.verdicts());
+        Ok(Report { file: path, verdicts, runs, computed, combinations, quantiles, judgements: self.judgements.clone() })
     }
 }
 

@@ -95,6 +95,9 @@ pub enum CampaignError {
         /// Why.
         error: io::Error,
     },
+    /// Verdicts are asked for and not known.
+    #[error("the combinations of this campaign are not judged yet: expected Campaign::judge before Campaign::run")]
+    NotJudged,
     /// It was ended while the combinations were checked: nothing is written yet.
     #[error("ended while the combinations were checked: nothing is written")]
     Stopped,
@@ -115,6 +118,7 @@ impl CampaignError {
             | Self::NoFolder { .. }
             | Self::Foreign { .. }
             | Self::Other { .. }
+            | Self::NotJudged
             | Self::Stopped => false,
         }
     }

@@ -3,6 +3,8 @@
 //! ```text
 //! campaign.lock            as long as somebody works on it
 //! campaign.json            what the campaign is; the first file with its own name
+//! verdicts.part.csv        judgements, as long as not all are known
+//! verdicts.csv             all judgements
 //! part-00000.parquet …     whole parts
 //! runs.parquet             the table; the parts go when it is there
 //! ```
@@ -102,6 +104,16 @@ impl Folder {
         self.path.join(format!("runs.{}", format.name()))
     }
 
+    /// All judgements.
+    pub(crate) fn verdicts(&self) -> PathBuf {
+        self.path.join("verdicts.csv")
+    }
+
+    /// Judgements as they are made.
+    pub(crate) fn journal(&self) -> PathBuf {
+        self.path.join("verdicts.part.csv")
+    }
+
     pub(crate) fn part(&self, part: u64, format: Format) -> PathBuf {
         self.path.join(format!("part-{part:05}.{}", format.name()))
     }
@@ -118,16 +130,25 @@ impl Folder {
         Ok(())
     }
 
+    /// Removes the judgements as they were made, which are all in their table.
+    pub(crate) fn remove_journal(&self) -> Result<(), CampaignError> {
+        remove(self.journal())
+    }
+
     /// Removes the parts, which are all in the table.
     pub(crate) fn remove_parts(&self, parts: u64, format: Format) -> Result<(), CampaignError> {
         for part in 0..parts {
-            let path = self.part(part, format);
-            match std::fs::remove_file(&path) {
-                Ok(()) => {}
-                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-                Err(error) => return Err(CampaignError::File { verb: "remove", path, error }),
-            }
+            remove(self.part(part, format))?;
         }
         Ok(())
+    }
+}
+
+/// Removes a file if it is there.
+fn remove(path: PathBuf) -> Result<(), CampaignError> {
+    match std::fs::remove_file(&path) {
+        Ok(()) => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(CampaignError::File { verb: "remove", path, error }),
     }
 }

@@ -7,6 +7,8 @@
 //!
 //! Every run is the run that [`cohaptic_harness::Simulation`] makes of the same scene with the same seed, to the last bit.
 //!
+//! A plan [with verdicts](Plan::with_verdicts) has each combination judged once, by a [`Judge`] that its caller brings, before anything runs.
+//!
 //! Nothing here is printed and no clock is read.
 //!
 //! ```
@@ -32,16 +34,20 @@ mod campaign;
 mod error;
 mod folder;
 mod plan;
+mod quantiles;
 mod report;
 mod table;
 mod vary;
+mod verdicts;
 mod watch;
 mod work;
 
 pub use campaign::{Campaign, Outcome};
 pub use error::CampaignError;
 pub use plan::{Asked, MOST_COMBINATIONS, MOST_RUNS, Plan};
+pub use quantiles::{MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Quantiles};
 pub use report::{CombinationReport, Report};
 pub use table::{Column, Format, Kind, Value};
 pub use vary::{MOST_VALUES, Variation, VaryError, split_at_commas};
+pub use verdicts::{Judge, Judgement, Verdict};
 pub use watch::{NoWatch, Watch};

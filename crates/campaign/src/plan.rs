@@ -55,6 +55,7 @@ pub struct Plan {
     format: Format,
     part: Option<u64>,
     program: String,
+    verdicts: bool,
 }
 
 impl Plan {
@@ -91,7 +92,19 @@ impl Plan {
             )));
         }
         let (text, file, set, program) = (text.to_owned(), file.to_path_buf(), set.to_vec(), program.to_owned());
-        Ok(Self { text, file, set, variations, runs, combinations, format, part, program })
+        Ok(Self { text, file, set, variations, runs, combinations, format, part, program, verdicts: false })
+    }
+
+    /// The same campaign with a verdict on each combination, which stands in the rows of its runs.
+    #[must_use]
+    pub fn with_verdicts(self) -> Self {
+        Self { verdicts: true, ..self }
+    }
+
+    /// Whether each combination is judged.
+    #[must_use]
+    pub const fn has_verdicts(&self) -> bool {
+        self.verdicts
     }
 
     /// How many combinations of values there are; 1 if nothing is varied.
@@ -130,7 +143,8 @@ impl Plan {
     }
 
     /// Which value of each key a combination has.
-    fn places(&self, combination: u64) -> Vec<usize> {
+    #[must_use]
+    pub fn places(&self, combination: u64) -> Vec<usize> {
         let mut left = combination;
         let mut places: Vec<usize> = self
             .variations
@@ -148,7 +162,8 @@ impl Plan {
     }
 
     /// The combination with these places.
-    fn combination(&self, places: &[usize]) -> u64 {
+    #[must_use]
+    pub fn combination(&self, places: &[usize]) -> u64 {
         places.iter().zip(&self.variations).fold(0, |combination, (place, vary)| combination * vary.count() as u64 + *place as u64)
     }
 

@@ -1,20 +1,30 @@
 //! What a campaign comes to.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
+use crate::quantiles::{MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Quantiles};
 use crate::table::Gist;
+use crate::verdicts::Judgement;
 
 /// What a campaign comes to, taken from its table.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Report {
     /// The table.
     pub file: PathBuf,
+    /// The table of verdicts, if they are asked for.
+    pub verdicts: Option<PathBuf>,
     /// How many runs it has.
     pub runs: u64,
     /// How many of them were done this time; the others were there already.
     pub computed: u64,
     /// The combinations, in order.
     pub combinations: Vec<CombinationReport>,
+    /// The quantiles of each combination, `None` where all of its runs diverged. Empty if they would take too much memory: beyond
+    /// [`MOST_RUNS_OF_QUANTILES`] or [`MOST_COMBINATIONS_OF_QUANTILES`].
+    pub quantiles: Vec<Option<Quantiles>>,
+    /// What is said of each combination; empty if that is not asked for.
+    pub judgements: Arc<[Judgement]>,
 }
 
 /// What the runs of one combination come to.
@@ -54,15 +64,20 @@ pub(crate) struct Tally {
     of_each: u64,
     runs: u64,
     combinations: Vec<CombinationReport>,
+    /// Of the runs of the combination at hand that did not diverge; `None` if no quantiles are kept.
+    discrepancies: Option<Vec<f64>>,
+    quantiles: Vec<Option<Quantiles>>,
 }
 
 impl Tally {
-    pub(crate) const fn new(of_each: u64) -> Self {
-        Self { of_each, runs: 0, combinations: Vec::new() }
+    pub(crate) fn new(of_each: u64, combinations: u64) -> Self {
+        let kept = of_each <= MOST_RUNS_OF_QUANTILES && combinations <= MOST_COMBINATIONS_OF_QUANTILES;
+        Self { of_each, runs: 0, combinations: Vec::new(), discrepancies: kept.then(Vec::new), quantiles: Vec::new() }
     }
 
     pub(crate) fn add(&mut self, gist: Gist) {
         if self.runs.is_multiple_of(self.of_each) {
+            self.end_combination();
             self.combinations.push(CombinationReport::default());
         }
         let run = self.runs;
@@ -72,6 +87,9 @@ impl Tally {
         if gist.diverged {
             combination.diverged += 1;
             return;
+        }
+        if let Some(discrepancies) = &mut self.discrepancies {
+            discrepancies.push(gist.max_discrepancy);
         }
         // The sum for now.
         combination.mean_discrepancy = Some(combination.mean_discrepancy.unwrap_or(0.0) + gist.max_discrepancy);
@@ -86,13 +104,23 @@ impl Tally {
         self.runs
     }
 
-    pub(crate) fn combinations(mut self) -> Vec<CombinationReport> {
+    /// Puts away what the combination that is over has.
+    fn end_combination(&mut self) {
+        if let Some(discrepancies) = self.discrepancies.as_mut().filter(|_| !self.combinations.is_empty()) {
+            self.quantiles.push(Quantiles::of(discrepancies));
+            discrepancies.clear();
+        }
+    }
+
+    /// What the combinations come to, and their quantiles.
+    pub(crate) fn finish(mut self) -> (Vec<CombinationReport>, Vec<Option<Quantiles>>) {
+        self.end_combination();
         for combination in &mut self.combinations {
             #[expect(clippy::cast_precision_loss, reason = "fewer runs than 2^52")]
             let counted = (combination.runs - combination.diverged) as f64;
             combination.mean_discrepancy = combination.mean_discrepancy.map(|sum| sum / counted);
         }
-        self.combinations
+        (self.combinations, self.quantiles)
     }
 }
 
@@ -102,20 +130,22 @@ mod tests {
 
     #[test]
     fn runs_are_summed_up_by_combination_without_those_that_diverged() {
-        let mut tally = Tally::new(3);
+        let mut tally = Tally::new(3, 3);
         for (diverged, max_discrepancy) in
             [(false, 1.0), (true, f64::INFINITY), (false, 4.0), (true, 5.0), (true, 6.0), (true, f64::NAN), (false, 4.0)]
         {
             tally.add(Gist { diverged, max_discrepancy });
         }
         assert_eq!(tally.runs(), 7);
-        let combinations = tally.combinations();
+        let (combinations, quantiles) = tally.finish();
+        let median = |place: usize| quantiles[place].map(|quantiles| (quantiles.p5, quantiles.median, quantiles.p95));
+        assert_eq!((median(0), median(1), median(2)), (Some((1.0, 1.0, 4.0)), None, Some((4.0, 4.0, 4.0))));
         let [first, second, third] = combinations.as_slice() else { panic!("three of three, three and one") };
         let expected = CombinationReport { runs: 3, diverged: 1, mean_discrepancy: Some(2.5), largest_discrepancy: Some(4.0), worst_run: Some(2) };
         assert_eq!(*first, expected);
         assert_eq!(*second, CombinationReport { runs: 3, diverged: 3, ..CombinationReport::default() });
         assert_eq!((third.worst_run, third.mean_discrepancy), (Some(6), Some(4.0)));
-        let report = Report { file: PathBuf::new(), runs: 7, computed: 7, combinations };
+        let report = Report { file: PathBuf::new(), verdicts: None, runs: 7, computed: 7, combinations, quantiles, judgements: Arc::from([]) };
         assert_eq!((report.diverged(), report.worst().and_then(|worst| worst.worst_run)), (4, Some(2)), "of equal ones the first");
     }
 }

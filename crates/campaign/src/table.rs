@@ -10,6 +10,7 @@ mod row;
 use std::sync::Arc;
 
 pub(crate) use columns::columns;
+pub(crate) use comma_separated::{number_text, text as value_text};
 pub use format::Format;
 pub(crate) use format::{Gist, Gists, Head, TableError};
 pub(crate) use roster::Roster;

@@ -21,6 +21,7 @@ pub struct Variation {
     key: String,
     unit: String,
     kind: Kind,
+    logarithmic: bool,
     values: Vec<Varied>,
 }
 
@@ -134,14 +135,14 @@ impl Variation {
         if key.is_empty() {
             return Err(no_key());
         }
-        let (unit, kind, values) = match Grid::parse(text, values)? {
-            Some(grid) => (grid.unit.clone(), Kind::Number, grid.values()),
+        let (unit, kind, logarithmic, values) = match Grid::parse(text, values)? {
+            Some(grid) => (grid.unit.clone(), Kind::Number, grid.logarithmic, grid.values()),
             None => {
                 let list = List::parse(text, values)?;
-                (list.unit, list.kind, list.values)
+                (list.unit, list.kind, false, list.values)
             }
         };
-        Ok(Self { text: text.trim().to_owned(), key: key.to_owned(), unit, kind, values })
+        Ok(Self { text: text.trim().to_owned(), key: key.to_owned(), unit, kind, logarithmic, values })
     }
 
     /// The text that it was read from.
@@ -180,6 +181,35 @@ impl Variation {
             "%" => format!("{}_percent", self.key),
             unit => format!("{}_{unit}", self.key),
         }
+    }
+
+    /// The unit that all its values have; empty if they have none, or not the same.
+    #[must_use]
+    pub fn unit(&self) -> &str {
+        &self.unit
+    }
+
+    /// Whether its values are a range of equal ratios.
+    #[must_use]
+    pub const fn is_logarithmic(&self) -> bool {
+        self.logarithmic
+    }
+
+    /// A value by its place, as a number in the unit of all; `None` if it is text, or if there are not so many.
+    #[must_use]
+    pub fn number(&self, place: usize) -> Option<f64> {
+        match &self.values.get(place)?.value {
+            #[expect(clippy::cast_precision_loss, reason = "a number to be drawn")]
+            Value::Integer(integer) => Some(*integer as f64),
+            Value::Number(number) => Some(*number),
+            Value::Text(_) | Value::Absent => None,
+        }
+    }
+
+    /// A value by its place, as it is written; empty if there are not so many.
+    #[must_use]
+    pub fn value_text(&self, place: usize) -> &str {
+        self.values.get(place).map_or("", |varied| &varied.text)
     }
 
     pub(crate) const fn kind(&self) -> Kind {

@@ -2,13 +2,16 @@
 
 /// Is told how far a campaign has come, and can end it. Called from many threads.
 pub trait Watch: Sync {
-    /// Whether to go on. Asked before every few combinations that are checked and before every few runs.
+    /// Whether to go on. Asked before every few combinations that are checked, before each that is judged, and before every few runs.
     fn keep_going(&self) -> bool {
         true
     }
 
     /// So many more combinations have been checked.
     fn checked(&self, _combinations: u64) {}
+
+    /// So many more combinations have been judged.
+    fn judged(&self, _combinations: u64) {}
 
     /// So many more runs have been done.
     fn ran(&self, _runs: u64) {}

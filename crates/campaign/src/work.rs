@@ -13,6 +13,7 @@ use cohaptic_scene::Scene;
 use crate::error::CampaignError;
 use crate::plan::{CHUNK, Parts, Plan};
 use crate::table::{Place, Roster, Row, row};
+use crate::verdicts::Judgement;
 use crate::watch::Watch;
 
 /// Keeps the rows of the part of that number.
@@ -22,6 +23,8 @@ pub(crate) type Keep<'a> = dyn Fn(u64, &[Row]) -> Result<(), CampaignError> + Sy
 pub(crate) struct Work<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) roster: &'a Roster,
+    /// One for each combination; none if none are asked for.
+    pub(crate) judgements: &'a [Judgement],
     pub(crate) parts: Parts,
     pub(crate) watch: &'a dyn Watch,
     /// Puts a whole part away.
@@ -95,7 +98,8 @@ impl Work<'_> {
         let rows = runs.zip(scenes.iter().zip(&summaries)).map(|(run, (scene, summary))| {
             let combination = run / self.plan.runs_of_each();
             let place = Place { run, combination, seed: scene.seed };
-            row(place, self.plan.values(combination), summary, self.roster)
+            let judgement = usize::try_from(combination).ok().and_then(|place| self.judgements.get(place));
+            row(place, self.plan.values(combination), judgement, summary, self.roster)
         });
         let rows = rows.collect();
         self.watch.ran(chunk.end - chunk.start);

@@ -16,6 +16,15 @@ const SHORT: f64 = 1.0;
 /// The steps of the bar: millions of operations.
 const STEP: f64 = 1e6;
 
+/// Ends an analysis when the user asks for it, and shows nothing.
+pub(crate) struct Interruptible;
+
+impl Watch for Interruptible {
+    fn stops(&self) -> bool {
+        interrupt::asked()
+    }
+}
+
 /// Shows how far an analysis is, if it takes long, and ends it when the user asks for it.
 pub(crate) struct AnalysisWatch(std::sync::Mutex<Shown>);
 

@@ -8,11 +8,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use cohaptic_harness::check::Judged;
 use cohaptic_harness::{Model, check as harness};
 use cohaptic_scene::{Scene, SceneError, scene_files};
-use cohaptic_stability::{AnalysisError, Limits, Method, NOMINAL, QUICK_UNKNOWNS, Verdict, Watch, has_chance, judge_watched};
+use cohaptic_stability::{AnalysisError, Limits, Method, NOMINAL, QUICK_UNKNOWNS, Verdict, has_chance, judge_watched};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::analysis_watch::OPERATIONS_A_SECOND;
+use crate::analysis_watch::{Interruptible, OPERATIONS_A_SECOND};
 use crate::arguments::CheckArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{self, EXPECTATION, Failure, INTERRUPTED, scene_status};
@@ -118,15 +118,6 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
 
 /// How long the second moment of a scene may take, by the estimate \[s\]; what takes longer is left to a simulation.
 const QUICK: f64 = 10.0;
-
-/// Ends an analysis when the user asks for it.
-struct Interruptible;
-
-impl Watch for Interruptible {
-    fn stops(&self) -> bool {
-        interrupt::asked()
-    }
-}
 
 /// Whether a scene is as stable as it is expected to be, by analysis. One that is not linear, that changes on its way, or whose chance has no second
 /// moment that can be followed in seconds, is left to a simulation; of the last it is noted.

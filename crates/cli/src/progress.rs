@@ -45,6 +45,13 @@ impl Progress {
         Self(bar)
     }
 
+    /// Progress through the combinations of a campaign that are judged.
+    pub(crate) fn through_verdicts(count: u64) -> Self {
+        let bar = bar(count);
+        bar.set_style(style("judging combinations {bar:30} {pos}/{len}, {eta} left"));
+        Self(bar)
+    }
+
     /// Progress through the runs of a campaign, some of which are done already.
     pub(crate) fn through_runs(count: u64, done: u64) -> Self {
         let bar = bar(count).with_position(done);

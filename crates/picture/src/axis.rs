@@ -31,6 +31,7 @@ pub struct Axis {
     multiples: Option<u32>,
     ends_at_ticks: bool,
     tight: bool,
+    categories: Vec<Text>,
 }
 
 impl Axis {
@@ -47,6 +48,7 @@ impl Axis {
             multiples: None,
             ends_at_ticks: false,
             tight: false,
+            categories: Vec::new(),
         }
     }
 
@@ -72,6 +74,15 @@ impl Axis {
     #[must_use]
     pub fn range(self, low: f64, high: f64) -> Self {
         Self { range: Some((low.min(high), low.max(high))), ..self }
+    }
+
+    /// Of names: the first at 0, the next at 1, and so on, from half a step before the first to half a step behind the last. Made for axes that run upwards, where
+    /// names are beneath each other.
+    #[must_use]
+    pub fn categories<T: Into<Text>>(self, names: impl IntoIterator<Item = T>) -> Self {
+        let categories: Vec<Text> = names.into_iter().map(Into::into).collect();
+        let axis = self.range(-0.5, crate::content::count(categories.len().max(1)) - 0.5);
+        Self { categories, ..axis }
     }
 
     /// Reaches this value at least: 0 for quantities that are compared by length.
@@ -143,7 +154,7 @@ impl Axis {
 
     /// Ticks of which there are about that many at most.
     pub(crate) fn ticks(&self, extent: Extent, most: usize) -> Ticks {
-        Ticks::of(extent, most, self.multiples)
+        if self.categories.is_empty() { Ticks::of(extent, most, self.multiples) } else { Ticks::named(&self.categories) }
     }
 }
 

@@ -150,13 +150,19 @@ impl Region {
     /// next, and the outermost end at their values.
     #[must_use]
     pub fn cells(xs: &[f64], ys: &[f64], fill: Fill, shown: impl Fn(usize, usize) -> bool) -> Self {
-        let (columns, rows) = (edges(xs), edges(ys));
+        Self::between(&edges(xs), &edges(ys), fill, shown)
+    }
+
+    /// The cells (column, row) of a grid for which `shown` holds, between those edges, rising: one more than there are columns, and rows.
+    #[must_use]
+    pub fn between(columns: &[f64], rows: &[f64], fill: Fill, shown: impl Fn(usize, usize) -> bool) -> Self {
+        let (across, up) = (columns.len().saturating_sub(1), rows.len().saturating_sub(1));
         let mut outlines = Vec::new();
-        for row in 0..ys.len() {
+        for row in 0..up {
             let mut column = 0;
-            while column < xs.len() {
+            while column < across {
                 let begin = column;
-                while column < xs.len() && shown(column, row) {
+                while column < across && shown(column, row) {
                     column += 1;
                 }
                 if column > begin {
@@ -181,8 +187,9 @@ impl Region {
 /// seen alike with and without colour blindness (Nuñez, Anderton & Renslow 2018).
 #[derive(Clone, PartialEq, Debug)]
 pub struct HeatMap {
-    pub(crate) xs: Vec<f64>,
-    pub(crate) ys: Vec<f64>,
+    /// Where columns and rows begin and end: one more than there are of them.
+    pub(crate) columns: Vec<f64>,
+    pub(crate) rows: Vec<f64>,
     /// By row, then column.
     pub(crate) values: Vec<Vec<f64>>,
     pub(crate) axis: crate::Axis,
@@ -197,7 +204,18 @@ impl HeatMap {
     #[must_use]
     pub fn new(xs: &[f64], ys: &[f64], values: Vec<Vec<f64>>, axis: crate::Axis) -> Self {
         assert!(values.len() == ys.len() && values.iter().all(|row| row.len() == xs.len()), "a value for each cell");
-        Self { xs: xs.to_vec(), ys: ys.to_vec(), values, axis }
+        Self { columns: edges(xs), rows: edges(ys), values, axis }
+    }
+
+    /// Values by row (y), then column (x), of cells between those edges, rising: one more than there are columns, and rows.
+    ///
+    /// # Panics
+    ///
+    /// If there are not as many rows and columns of values as the edges hold.
+    #[must_use]
+    pub fn between(columns: Vec<f64>, rows: Vec<f64>, values: Vec<Vec<f64>>, axis: crate::Axis) -> Self {
+        assert!(values.len() + 1 == rows.len() && values.iter().all(|row| row.len() + 1 == columns.len()), "a value for each cell");
+        Self { columns, rows, values, axis }
     }
 
     /// The lowest and highest value.
@@ -272,7 +290,7 @@ impl Content {
             Self::Line(line) => of(&mut line.runs.iter().flatten().copied()),
             Self::Band(band) => of(&mut band.runs.iter().flatten().flat_map(|(x, low, high)| [(*x, *low), (*x, *high)])),
             Self::Region(region) => of(&mut region.outlines.iter().flatten().copied()),
-            Self::HeatMap(map) => (span(map.xs.iter().copied().filter(placed(x))), span(map.ys.iter().copied().filter(placed(y)))),
+            Self::HeatMap(map) => (span(map.columns.iter().copied().filter(placed(x))), span(map.rows.iter().copied().filter(placed(y)))),
             Self::Rug(rug) => (span(rug.xs.iter().copied().filter(placed(x))), None),
         }
     }
@@ -290,6 +308,20 @@ pub(crate) fn edges(values: &[f64]) -> Vec<f64> {
     }
     let between = values.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
     std::iter::once(*first).chain(between).chain([*last]).collect()
+}
+
+/// The edges of cells whose values, rising, are at their middles, for [`HeatMap::between`] and [`Region::between`]: half way to the next along a linear or a
+/// logarithmic axis; the outermost end at their values, so that no axis reaches where no value is.
+#[must_use]
+pub fn cell_edges(values: &[f64], logarithmic: bool) -> Vec<f64> {
+    match values {
+        [first, .., last] if logarithmic => {
+            let between = values.windows(2).map(|pair| libm::sqrt(pair[0]) * libm::sqrt(pair[1]));
+            std::iter::once(*first).chain(between).chain([*last]).collect()
+        }
+        [only] if logarithmic => vec![only / 2.0, only * 2.0],
+        _ => edges(values),
+    }
 }
 
 /// How many, as a number to compute with.
@@ -312,6 +344,13 @@ mod tests {
     fn what_is_not_finite_parts_a_line() {
         let line = Line::new([(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0), (f64::INFINITY, 1.0)], Look::of(0));
         assert_eq!(line.runs, [vec![(0.0, 1.0)], vec![(2.0, 3.0)]]);
+    }
+
+    #[test]
+    fn cells_end_in_the_middle_of_their_axis() {
+        assert_eq!(cell_edges(&[0.0, 2.0, 6.0], false), [0.0, 1.0, 4.0, 6.0]);
+        assert_eq!(cell_edges(&[1.0, 4.0, 16.0], true), [1.0, 2.0, 8.0, 16.0]);
+        assert_eq!((cell_edges(&[8.0], true), cell_edges(&[8.0], false)), (vec![4.0, 16.0], vec![7.5, 8.5]));
     }
 
     #[test]

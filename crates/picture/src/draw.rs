@@ -1,7 +1,7 @@
 //! The layout as a document.
 
 use crate::axis::{Extent, Scale};
-use crate::content::{Band, Content, HeatMap, Line, Region, Rug, edges};
+use crate::content::{Band, Content, HeatMap, Line, Region, Rug};
 use crate::layout::{AFTER_TICK, AxisLayout, BAR, Layout, PanelLayout, TICK, TITLE};
 use crate::legend::{draw_marker, stroke};
 use crate::look::{PATTERNS, STYLE};
@@ -241,7 +241,7 @@ impl Sheet<'_> {
     fn heat_map(&mut self, map: &HeatMap) {
         let extent = map.extent();
         let (xs, ys): (Vec<f64>, Vec<f64>) =
-            (edges(&map.xs).iter().map(|x| self.corner(*x, 1.0).0).collect(), edges(&map.ys).iter().map(|y| self.corner(1.0, *y).1).collect());
+            (map.columns.iter().map(|x| self.corner(*x, 1.0).0).collect(), map.rows.iter().map(|y| self.corner(1.0, *y).1).collect());
         // Cells of one colour beside each other are one rectangle; all rectangles of one colour are one path.
         let mut by_colour: Vec<Vec<Vec<(f64, f64)>>> = vec![Vec::new(); SHADES];
         for (row, values) in map.values.iter().enumerate() {

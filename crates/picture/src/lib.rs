@@ -45,7 +45,7 @@ mod ticks;
 mod xml;
 
 pub use axis::Axis;
-pub use content::{Band, Content, HeatMap, Line, Region, Rug};
+pub use content::{Band, Content, HeatMap, Line, Region, Rug, cell_edges};
 pub use legend::LegendPlace;
 pub use look::{Fill, Look, Marker};
 pub use panel::Panel;

@@ -71,6 +71,12 @@ impl Size {
         Self { width: width * MILLIMETRE, height: Some(height * MILLIMETRE), font: PRINTED, print: true }.checked()
     }
 
+    /// Whether it is too narrow for two plots with colour bars beside each other: as one column of a paper is.
+    #[must_use]
+    pub const fn is_narrow(self) -> bool {
+        self.width < 45.0 * self.font
+    }
+
     fn checked(self) -> Result<Self, SizeError> {
         let fits = (160.0..=10_000.0).contains(&self.width) && self.height.is_none_or(|height| (100.0..=10_000.0).contains(&height));
         if fits { Ok(self) } else { Err(SizeError::OutOfRange) }
@@ -107,6 +113,11 @@ impl FromStr for Size {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_column_is_narrow_and_a_page_is_not() {
+        assert_eq!([Size::ONE_COLUMN, Size::TWO_COLUMNS, Size::PAGE].map(Size::is_narrow), [true, false, false]);
+    }
 
     #[test]
     fn a_size_is_a_word_or_two_numbers() {

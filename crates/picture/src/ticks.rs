@@ -64,6 +64,12 @@ impl Ticks {
         }
     }
 
+    /// Each name at its number.
+    pub(crate) fn named(names: &[Text]) -> Self {
+        let marks = names.iter().enumerate().map(|(place, name)| (crate::content::count(place), name.clone())).collect();
+        Self { marks, between: Vec::new(), exponent: 0 }
+    }
+
     fn linear(extent: Extent, most: usize, multiples: Option<u32>) -> Self {
         let step = Step::of(extent, most, multiples);
         let size = step.size();
@@ -142,6 +148,15 @@ mod tests {
         assert_eq!(labels(&axis, 0.0, 3e6, 4), (["0", "1", "2", "3"].map(String::from).to_vec(), 6));
         assert_eq!(labels(&axis, 0.0, 4e-5, 5), (["0", "10", "20", "30", "40"].map(String::from).to_vec(), -6));
         assert_eq!(labels(&Axis::new("phase").multiples_of(45), -200.0, 0.0, 6).0, ["\u{2212}180", "\u{2212}135", "\u{2212}90", "\u{2212}45", "0"]);
+    }
+
+    #[test]
+    fn names_stand_at_their_numbers() {
+        let axis = Axis::new("strategy").categories(["ap", "pd", "other"]);
+        let extent = axis.shown(Some((0.0, 9.0)));
+        assert_eq!((extent.low, extent.high), (-0.5, 2.5));
+        let marks: Vec<(f64, String)> = axis.ticks(extent, 2).marks.iter().map(|(place, name)| (*place, name.plain())).collect();
+        assert_eq!(marks, [(0.0, "ap".to_owned()), (1.0, "pd".to_owned()), (2.0, "other".to_owned())]);
     }
 
     #[test]

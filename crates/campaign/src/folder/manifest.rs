@@ -32,6 +32,9 @@ pub(crate) struct Manifest {
     part: Option<u64>,
     /// How many runs a part has.
     part_runs: u64,
+    /// Whether combinations are judged.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    verdicts: bool,
     pub(crate) roster: Roster,
 }
 
@@ -49,6 +52,7 @@ impl Manifest {
             format: plan.format().name().to_owned(),
             part: plan.part(),
             part_runs: parts.size,
+            verdicts: plan.has_verdicts(),
             roster,
         }
     }
@@ -103,6 +107,8 @@ impl Manifest {
         compare("--format", self.format.clone(), plan.format().name().to_owned());
         let part = |part: Option<u64>| part.map_or_else(|| "not given".to_owned(), |part| part.to_string());
         compare("--part", part(self.part), part(plan.part()));
+        let given = |verdicts: bool| if verdicts { "given" } else { "not given" }.to_owned();
+        compare("--verdicts", given(self.verdicts), given(plan.has_verdicts()));
         if self.scene != plan.text() {
             differences.push(different_line(&self.scene, plan.text()));
         }

@@ -39,10 +39,10 @@ pub(super) fn partial_name(path: &Path) -> OsString {
     name
 }
 
-/// Whether a file of a campaign was being written: `campaign.json.partial`, `part-….partial`, `runs.….partial`.
+/// Whether a file of a campaign was being written: `campaign.json.partial`, `part-….partial`, `runs.….partial`, `verdicts.csv.partial`.
 pub(super) fn is_partial(path: &Path) -> bool {
     let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-    name.ends_with(PARTIAL) && ["campaign.", "part-", "runs."].iter().any(|begin| name.starts_with(begin))
+    name.ends_with(PARTIAL) && ["campaign.", "part-", "runs.", "verdicts."].iter().any(|begin| name.starts_with(begin))
 }
 
 #[cfg(test)]

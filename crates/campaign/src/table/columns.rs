@@ -9,11 +9,16 @@ use crate::vary::Variation;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The columns, in the order in which [`row`](super::row()) fills them.
-pub(crate) fn columns(variations: &[Variation], roster: &Roster) -> Vec<Column> {
+pub(crate) fn columns(variations: &[Variation], verdicts: bool, roster: &Roster) -> Vec<Column> {
     let column = |name: String, kind: Kind, optional: bool| Column { name, kind, optional };
     let always = |name: &str, kind: Kind| column(name.to_owned(), kind, false);
     let mut columns = vec![always("run", Kind::Integer), always("combination", Kind::Integer), always("seed", Kind::Integer)];
     columns.extend(variations.iter().map(|vary| column(vary.column(), vary.kind(), false)));
+    if verdicts {
+        let optional = |name: &str, kind: Kind| column(name.to_owned(), kind, true);
+        columns.extend([optional("verdict", Kind::Text), optional("judged", Kind::Text)]);
+        columns.extend([optional("radius", Kind::Number), optional("error_bound", Kind::Number)]);
+    }
     columns.push(always("ending", Kind::Text));
     columns.push(always("ended_at_s", Kind::Number));
     columns.push(always("ticks", Kind::Integer));

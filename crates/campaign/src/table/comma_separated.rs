@@ -16,14 +16,19 @@ pub(super) fn write(file: &File, columns: &[Column], rows: &[Row]) -> io::Result
     to.into_inner().map_err(|error| io::Error::other(error.to_string()))?.flush()
 }
 
-/// A number with the fewest digits that read back the same.
-fn text(value: &Value) -> String {
+/// A value as it stands in a table of text.
+pub(crate) fn text(value: &Value) -> String {
     match value {
         Value::Absent => String::new(),
         Value::Integer(integer) => integer.to_string(),
-        Value::Number(number) => format!("{number:?}"),
+        Value::Number(number) => number_text(*number),
         Value::Text(text) => text.to_string(),
     }
+}
+
+/// A number with the fewest digits that read back the same.
+pub(crate) fn number_text(number: f64) -> String {
+    format!("{number:?}")
 }
 
 fn unwritten(error: csv::Error) -> io::Error {

@@ -8,6 +8,7 @@ use cohaptic_wan::{DropCause, LinkStats};
 
 use super::{Roster, Row, Value};
 use crate::vary::Varied;
+use crate::verdicts::Judgement;
 
 /// Which run it is.
 #[derive(Clone, Copy, Debug)]
@@ -18,9 +19,21 @@ pub(crate) struct Place {
 }
 
 /// A value for each of [`columns`](super::columns()).
-pub(crate) fn row<'a>(place: Place, varied: impl Iterator<Item = &'a Varied>, summary: &Summary, roster: &Roster) -> Row {
+pub(crate) fn row<'a>(
+    place: Place,
+    varied: impl Iterator<Item = &'a Varied>,
+    judgement: Option<&Judgement>,
+    summary: &Summary,
+    roster: &Roster,
+) -> Row {
     let mut row = vec![integer(place.run), integer(place.combination), integer(place.seed)];
     row.extend(varied.map(|varied| varied.value.clone()));
+    row.extend(judgement.into_iter().flat_map(|judgement| match judgement.verdict() {
+        Some(verdict) => {
+            [Value::Text(verdict.word.clone()), Value::Text(verdict.judged.clone()), Value::Number(verdict.radius), Value::Number(verdict.error)]
+        }
+        None => [const { Value::Absent }; 4],
+    }));
     let (ending, ended) = match summary.ending {
         Ending::Complete => ("complete", summary.duration.as_secs_f64()),
         Ending::Diverged(at) => ("diverged", seconds(at)),

@@ -13,7 +13,7 @@ pub(super) struct Grid {
     pub(super) unit: String,
     count: usize,
     /// Whether the ratio of neighbours is the same everywhere, and not their difference.
-    logarithmic: bool,
+    pub(super) logarithmic: bool,
 }
 
 impl Grid {

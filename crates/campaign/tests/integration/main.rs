@@ -6,3 +6,4 @@ mod bench;
 mod folders;
 mod resume;
 mod tables;
+mod verdicts;

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::SceneArguments;
 use super::examples::{self, after};
 use super::numbers::{any_integer, integer, threads};
+use super::{PictureArguments, SceneArguments};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::CAMPAIGN))]
@@ -24,6 +24,9 @@ pub(crate) struct CampaignArguments {
     /// The folder of the campaign: the table, and until that is there the parts. The same command goes on with what is there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+    /// Judge each combination as stability point does, and write the verdict into the rows of its runs
+    #[arg(long)]
+    pub(crate) verdicts: bool,
     /// As what the table is written
     #[arg(long, value_enum, default_value_t = TableFormat::Parquet)]
     pub(crate) format: TableFormat,
@@ -33,6 +36,11 @@ pub(crate) struct CampaignArguments {
     /// How many runs are kept together, the most that a kill can cost on each thread [default: some seconds' worth]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<NonZeroU64>(1, u64::MAX))]
     pub(crate) part: Option<NonZeroU64>,
+    /// Do not draw pictures
+    #[arg(long)]
+    pub(crate) no_plot: bool,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
 }
 
 /// As what a table is written.

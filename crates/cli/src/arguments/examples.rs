@@ -34,6 +34,7 @@ pub(super) const EXPLAIN: &[&str] = &["cohaptic explain scenarios/network/rate-a
 pub(super) const CAMPAIGN: &[&str] = &[
     "cohaptic campaign scene.toml --vary link.delay=8ms..48ms/6 --runs 100 --out delays",
     "cohaptic campaign scene.toml --vary coordination.stiffness=10..1000/5:log --out gains",
+    "cohaptic campaign scene.toml --vary link.loss=0%..30%/7 --verdicts --size one-column --out losses",
 ];
 
 pub(super) const STABILITY: &[&str] =

@@ -1,11 +1,14 @@
 //! `cohaptic campaign`.
 
 mod document;
+mod judge;
+mod picture;
 mod refusal;
 mod watch;
 mod words;
 
 use std::num::NonZeroU64;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
@@ -16,6 +19,8 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::{input, output};
 use document::Document;
+use judge::ByAnalysis;
+use picture::Drawn;
 use watch::Shown;
 
 /// The program, as a campaign remembers it.
@@ -28,6 +33,10 @@ struct Finished {
     report: Report,
     /// Of this time.
     wall_s: f64,
+    /// What verdicts leave out, and what is not drawn.
+    notes: Vec<String>,
+    /// All that are there: the table, verdicts, pictures.
+    files: Vec<PathBuf>,
 }
 
 /// Does the runs that are missing, and says what came out.
@@ -41,12 +50,19 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     };
     let wall_s = start.elapsed().as_secs_f64();
     let title = plan.scene(0).map_or_else(|_| output::path(input::named(&arguments.scene.scene)), |scene| scene.title);
-    let finished = Finished { plan, title, report, wall_s };
+    let notes = judge::notes(&report);
+    let files = std::iter::once(report.file.clone()).chain(report.verdicts.clone()).collect();
+    let mut finished = Finished { plan, title, report, wall_s, notes, files };
+    if !arguments.no_plot {
+        let Drawn { files, notes } = picture::write(&finished, &arguments.out, arguments.pictures.size())?;
+        finished.files.extend(files);
+        finished.notes.extend(notes);
+    }
     if arguments.scene.json {
         output::json(DocumentSchema::Campaign, &Document::new(&finished, &arguments.out))?;
     } else {
         output::text(&words::describe(&finished))?;
-        output::wrote([&finished.report.file]);
+        output::wrote(&finished.files);
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -62,7 +78,8 @@ fn plan(arguments: &CampaignArguments) -> Result<Plan, Failure> {
         TableFormat::Csv => Format::Csv,
     };
     let part = arguments.part.map(NonZeroU64::get);
-    Plan::new(Asked { text: &text, file, set, variations, runs: arguments.runs, format, part, program: PROGRAM }).map_err(refused)
+    let plan = Plan::new(Asked { text: &text, file, set, variations, runs: arguments.runs, format, part, program: PROGRAM }).map_err(refused)?;
+    Ok(if arguments.verdicts { plan.with_verdicts() } else { plan })
 }
 
 fn execute(arguments: &CampaignArguments, plan: Plan) -> Result<Report, Failure> {
@@ -72,6 +89,15 @@ fn execute(arguments: &CampaignArguments, plan: Plan) -> Result<Report, Failure>
     let opened = Campaign::open(plan, &arguments.out, &checking);
     checking.clear();
     let mut campaign = opened.map_err(refused)?;
+    let judging = Shown::judging(combinations);
+    let missing = campaign.judge(&ByAnalysis, &judging);
+    judging.clear();
+    let missing = missing.map_err(refused)?;
+    if missing > 0 {
+        let out = output::path(&arguments.out);
+        let judged = combinations - missing;
+        return Err(Failure::Interrupted(format!("{judged} of {combinations} verdicts are kept in {out}; the same command goes on from there")));
+    }
     let running = Shown::running(runs, campaign.kept());
     let outcome = campaign.run(&running);
     running.clear();

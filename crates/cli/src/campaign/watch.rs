@@ -13,6 +13,10 @@ impl Shown {
         Self(Progress::through_combinations(combinations))
     }
 
+    pub(super) fn judging(combinations: u64) -> Self {
+        Self(Progress::through_verdicts(combinations))
+    }
+
     pub(super) fn running(runs: u64, kept: u64) -> Self {
         Self(Progress::through_runs(runs, kept))
     }
@@ -28,6 +32,10 @@ impl Watch for Shown {
     }
 
     fn checked(&self, combinations: u64) {
+        self.0.more(combinations);
+    }
+
+    fn judged(&self, combinations: u64) {
         self.0.more(combinations);
     }
 

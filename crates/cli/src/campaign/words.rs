@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_campaign::CombinationReport;
+use cohaptic_campaign::{CombinationReport, Judgement};
 
 use super::Finished;
 use crate::run::words::length;
@@ -11,7 +11,7 @@ use crate::run::words::length;
 const MOST_COMBINATIONS: usize = 20;
 
 pub(super) fn describe(finished: &Finished) -> String {
-    let Finished { plan, title, report, wall_s } = finished;
+    let Finished { plan, title, report, wall_s, notes, .. } = finished;
     let (combinations, each) = (plan.combinations(), plan.runs_of_each());
     let mut text = format!("{title}\n");
     // Writing to a string does not fail.
@@ -33,31 +33,42 @@ pub(super) fn describe(finished: &Finished) -> String {
         }
         Some(_) | None => line(&format!("  all {} diverged", report.runs)),
     }
-    if !plan.variations().is_empty() {
+    if !plan.variations().is_empty() || !report.judgements.is_empty() {
         line("");
         table(finished).iter().for_each(|row| line(row));
         if report.combinations.len() > MOST_COMBINATIONS {
             line(&format!("  ... and {} more combinations", report.combinations.len() - MOST_COMBINATIONS));
         }
     }
+    notes.iter().for_each(|note| line(&format!("note: {note}")));
     text
 }
 
 /// A row for each combination, with its values and what became of its runs.
 fn table(finished: &Finished) -> Vec<String> {
     let keys: Vec<String> = finished.plan.variations().iter().map(|vary| vary.key().to_owned()).collect();
-    let heads = ["diverged", "mean discrepancy", "largest"].map(str::to_owned);
+    let judgements = &finished.report.judgements;
+    let heads: &[&str] = if judgements.is_empty() { &[] } else { &["verdict", "judged", "radius"] };
+    let heads = heads.iter().chain(&["diverged", "mean discrepancy", "largest"]).map(|head| (*head).to_owned());
     let mut rows: Vec<Vec<String>> = vec![keys.iter().cloned().chain(heads).collect()];
     for (number, combination) in finished.report.combinations.iter().enumerate().take(MOST_COMBINATIONS) {
         let varied = finished.plan.varied(number as u64);
         let values = varied.iter().map(|text| text.split_once('=').map_or_else(String::new, |(_, value)| value.to_owned()));
         let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), length);
         let figures = [combination.diverged.to_string(), metres(combination.mean_discrepancy), metres(combination.largest_discrepancy)];
-        rows.push(values.chain(figures).collect());
+        rows.push(values.chain(judgements.get(number).into_iter().flat_map(judged)).chain(figures).collect());
     }
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..keys.len() + 3).map(width).collect();
+    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
     rows.iter().map(|row| row.iter().zip(&widths).map(|(cell, width)| format!("  {cell:>width$}")).collect()).collect()
+}
+
+/// The cells of a verdict.
+fn judged(judgement: &Judgement) -> [String; 3] {
+    match judgement.verdict() {
+        Some(verdict) => [verdict.word.to_string(), verdict.judged.to_string(), format!("{:.6}", verdict.radius)],
+        None => [const { "-" }; 3].map(str::to_owned),
+    }
 }
 
 fn counted(number: u64, what: &str) -> String {

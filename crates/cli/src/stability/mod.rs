@@ -3,7 +3,7 @@
 mod boundary;
 mod map;
 mod point;
-mod quantity;
+pub(crate) mod quantity;
 mod rows_file;
 pub(crate) mod source;
 

@@ -5,7 +5,7 @@ use cohaptic_stability::KeyRange;
 
 /// The key with the unit that its range has, or else that of the key itself: `coordination.stiffness [N/m]`, `link.delay [ms]`.
 pub(crate) fn label(range: &KeyRange) -> String {
-    match shown_unit(range) {
+    match shown_unit(&range.key, &range.unit) {
         Some(unit) => format!("{} [{unit}]", range.key),
         None => range.key.clone(),
     }
@@ -13,9 +13,14 @@ pub(crate) fn label(range: &KeyRange) -> String {
 
 /// The axis of a picture over a key: `Coordination stiffness K_T [N/m]`. A key that has no symbol in the paper keeps its own name.
 pub(crate) fn axis_of(range: &KeyRange) -> Axis {
-    let named = NAMES.iter().find(|(key, _, _)| *key == range.key.trim());
-    let axis = named.map_or_else(|| Axis::new(range.key.as_str()), |(_, name, symbol)| Axis::new(*name).symbol(symbol));
-    axis.unit(shown_unit(range).unwrap_or_default())
+    axis_of_key(&range.key, &range.unit)
+}
+
+/// The same of a key whose values have that unit, which may be empty.
+pub(crate) fn axis_of_key(key: &str, unit: &str) -> Axis {
+    let named = NAMES.iter().find(|(known, _, _)| *known == key.trim());
+    let axis = named.map_or_else(|| Axis::new(key), |(_, name, symbol)| Axis::new(*name).symbol(symbol));
+    axis.unit(shown_unit(key, unit).unwrap_or_default())
 }
 
 /// Keys, their names, and their symbols in Rakhsha & Constantinescu 2015; N is how many users there are, T_d the delay one way.
@@ -32,8 +37,8 @@ const NAMES: [(&str, &str, &str); 10] = [
     ("link.jitter", "Jitter of links", ""),
 ];
 
-fn shown_unit(range: &KeyRange) -> Option<&str> {
-    Some(range.unit.as_str()).filter(|unit| !unit.is_empty()).or_else(|| unit(&range.key))
+fn shown_unit<'a>(key: &str, given: &'a str) -> Option<&'a str> {
+    Some(given).filter(|unit| !unit.is_empty()).or_else(|| unit(key))
 }
 
 /// The unit of the plain numbers of a key; `None` where they have none.

@@ -68,19 +68,26 @@ pub(super) fn fingerprint_of(family: &Family) -> Result<u64, FamilyError> {
 }
 
 /// What a radius of that criterion is called.
-pub(super) const fn name(criterion: Criterion) -> &'static str {
+pub(crate) const fn name(criterion: Criterion) -> &'static str {
     match criterion {
         Criterion::SpectralRadius => "spectral radius",
         Criterion::MeanSquare => "mean-square radius",
     }
 }
 
-/// What that many radii leave out, because the second moment cannot be followed there; `None` if there are none.
-pub(super) fn nominal(count: usize, what: &str) -> Option<String> {
+/// The word in tables for what a verdict rests on: the criterion, or `nominal`.
+pub(crate) const fn judged(criterion: Criterion, is_nominal: bool) -> &'static str {
+    if is_nominal { "nominal" } else { criterion.word() }
+}
+
+/// What that many radii leave out, because the second moment cannot be followed there; `None` if there are none. Of one and of several it is said in other
+/// words: "cell is", "cells are".
+pub(crate) fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
     (count > 0).then(|| {
         format!(
-            "{count} {what} are nominal: the second moment cannot be followed there, and their radius is the square of the spectral radius with every delay its \
-             mean and nothing lost; stability point says why"
+            "{count} {} nominal: the second moment cannot be followed there, and the radius is the square of the spectral radius with every delay its mean and \
+             nothing lost; stability point says why",
+            if count == 1 { one } else { several }
         )
     })
 }

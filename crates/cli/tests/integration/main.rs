@@ -8,6 +8,8 @@ mod accuracy;
 mod admittance;
 mod against;
 mod campaign;
+mod campaign_pictures;
+mod campaign_verdicts;
 mod check;
 mod desk;
 mod documents;

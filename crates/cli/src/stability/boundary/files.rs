@@ -42,7 +42,7 @@ fn samples(order: &Order, found: &Boundary) -> String {
     for (value, Cell { radius, is_nominal }) in &found.known {
         text.push_str(&format!("{value:?},{:?},{:?},{}", radius.value, radius.error, radius.verdict().word()));
         if is_mean_square {
-            text.push_str(if *is_nominal { ",nominal" } else { ",mean-square" });
+            text.push_str(&format!(",{}", source::judged(Criterion::MeanSquare, *is_nominal)));
         }
         text.push('\n');
     }

@@ -101,7 +101,7 @@ impl Order {
 
 /// What the radii leave out.
 fn notes(found: &Boundary) -> Vec<String> {
-    source::nominal(found.nominal(), "of the values looked at").into_iter().collect()
+    source::nominal(found.nominal(), ["of the values looked at is", "of the values looked at are"]).into_iter().collect()
 }
 
 fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic_stability::FamilyError>> {

@@ -70,7 +70,7 @@ impl<'a> Radii<'a> {
 /// What the radii of the maps leave out.
 pub(super) fn notes(maps: &[VariantMap]) -> Vec<String> {
     let cells: usize = maps.iter().map(VariantMap::nominal_cells).sum();
-    source::nominal(cells, "cells").into_iter().collect()
+    source::nominal(cells, ["cell is", "cells are"]).into_iter().collect()
 }
 
 impl<'a> Document<'a> {

@@ -38,10 +38,8 @@ fn table(order: &Order, VariantMap { map, criterion, verdicts, .. }: &VariantMap
     for (((y, row), verdicts), nominal) in map.y.iter().zip(&map.radius).zip(verdicts).zip(&map.nominal) {
         for (((x, radius), verdict), nominal) in map.x.iter().zip(row).zip(verdicts).zip(nominal) {
             text.push_str(&format!("{x:?},{y:?},{radius:?},{}", verdict.word()));
-            match (criterion, nominal) {
-                (Criterion::SpectralRadius, _) => {}
-                (Criterion::MeanSquare, false) => text.push_str(",mean-square"),
-                (Criterion::MeanSquare, true) => text.push_str(",nominal"),
+            if *criterion == Criterion::MeanSquare {
+                text.push_str(&format!(",{}", source::judged(*criterion, *nominal)));
             }
             text.push('\n');
         }

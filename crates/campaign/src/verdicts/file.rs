@@ -1,0 +1,176 @@
+//! Judgements as files: a journal that grows by a line for each combination that is judged, and one table of all of them.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+
+use super::{Judgement, Verdict, Words};
+use crate::error::CampaignError;
+use crate::folder::write_whole;
+use crate::plan::Plan;
+use crate::table::{TableError, number_text, value_text};
+
+/// What helps where the table of judgements is not as it was written.
+const WAY_OUT: &str = "remove it and repeat the command, which judges again";
+
+/// What a judgement says, in the order of its columns.
+const COLUMNS: [&str; 5] = ["verdict", "judged", "radius", "error_bound", "reason"];
+
+/// Judgements as they are made, in any order. A last line that is not whole, as a machine leaves it that loses its power, is forgotten.
+#[derive(Debug)]
+pub(crate) struct Journal {
+    path: PathBuf,
+    file: File,
+}
+
+impl Journal {
+    /// Opens the journal, or begins one, and gives what it holds.
+    pub(crate) fn open(path: PathBuf, combinations: u64) -> Result<(Self, Vec<(u64, Judgement)>), CampaignError> {
+        let failed = |verb: &'static str| {
+            let path = path.clone();
+            move |error: io::Error| CampaignError::File { verb, path, error }
+        };
+        let bytes = match fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+            Err(error) => return Err(failed("read")(error)),
+        };
+        let (mut known, mut whole, mut words) = (Vec::new(), 0, Words::default());
+        for line in bytes.split_inclusive(|byte| *byte == b'\n') {
+            let Some((combination, judgement)) = record(line).filter(|(combination, _)| *combination < combinations) else { break };
+            known.push((combination, words.all(judgement)));
+            whole += line.len() as u64;
+        }
+        let open = || {
+            let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(&path)?;
+            file.set_len(whole)?;
+            file.seek(SeekFrom::End(0))?;
+            Ok(file)
+        };
+        let file = open().map_err(failed("write"))?;
+        Ok((Self { path, file }, known))
+    }
+
+    /// Adds a judgement. It is with the system when this returns.
+    pub(crate) fn add(&mut self, combination: u64, judgement: &Judgement) -> Result<(), CampaignError> {
+        let cells = std::iter::once(combination.to_string()).chain(cells(judgement));
+        let written = line(cells).and_then(|line| self.file.write_all(&line));
+        written.map_err(|error| CampaignError::File { verb: "write", path: self.path.clone(), error })
+    }
+}
+
+/// A line of the journal; `None` if it is not whole.
+fn record(line: &[u8]) -> Option<(u64, Judgement)> {
+    line.strip_suffix(b"\n")?;
+    let mut record = csv::StringRecord::new();
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(line);
+    let cells = reader.read_record(&mut record).ok().filter(|read| *read).map(|_| &record)?;
+    if cells.len() != 1 + COLUMNS.len() {
+        return None;
+    }
+    Some((cells.get(0)?.parse().ok()?, judgement(cells, 1)?))
+}
+
+/// The judgement whose columns begin at that place.
+fn judgement(cells: &csv::StringRecord, from: usize) -> Option<Judgement> {
+    let [word, judged, radius, error, reason] = std::array::from_fn(|place| cells.get(from + place).unwrap_or_default());
+    if word.is_empty() {
+        return (!reason.is_empty()).then(|| Judgement::Refused(reason.into()));
+    }
+    Some(Judgement::Known(Verdict { word: word.into(), judged: judged.into(), radius: radius.parse().ok()?, error: error.parse().ok()? }))
+}
+
+fn cells(judgement: &Judgement) -> [String; 5] {
+    match judgement {
+        Judgement::Known(Verdict { word, judged, radius, error }) => {
+            [word.to_string(), judged.to_string(), number_text(*radius), number_text(*error), String::new()]
+        }
+        Judgement::Refused(reason) => [String::new(), String::new(), String::new(), String::new(), reason.to_string()],
+    }
+}
+
+fn line(cells: impl Iterator<Item = String>) -> io::Result<Vec<u8>> {
+    let mut line = csv::Writer::from_writer(Vec::new());
+    line.write_record(cells).map_err(io::Error::other)?;
+    line.into_inner().map_err(|error| io::Error::other(error.to_string()))
+}
+
+/// Writes the table of all judgements: a row for each combination, with the values of its keys.
+pub(crate) fn write_all(path: &Path, plan: &Plan, judgements: &[Judgement]) -> Result<(), CampaignError> {
+    let written = write_whole(path, |file| -> io::Result<()> {
+        let mut to = BufWriter::new(file);
+        let keys = plan.variations().iter().map(|vary| vary.column());
+        to.write_all(&line(std::iter::once("combination".to_owned()).chain(keys).chain(COLUMNS.map(str::to_owned)))?)?;
+        for (combination, judgement) in (0..).zip(judgements) {
+            let values = plan.values(combination).map(|varied| value_text(&varied.value));
+            to.write_all(&line(std::iter::once(combination.to_string()).chain(values).chain(cells(judgement)))?)?;
+        }
+        to.flush()
+    });
+    written.map_err(|error| CampaignError::File { verb: "write", path: path.to_path_buf(), error })
+}
+
+/// The judgements of a table; `None` if there is no table.
+pub(crate) fn read_whole(path: &Path, plan: &Plan) -> Result<Option<Vec<Judgement>>, CampaignError> {
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(CampaignError::File { verb: "read", path: path.to_path_buf(), error }),
+    };
+    let read = read(file, plan).map_err(|error| match error {
+        TableError::Io(error) => CampaignError::File { verb: "read", path: path.to_path_buf(), error },
+        error @ (TableError::Content(_) | TableError::Part { .. }) => {
+            CampaignError::Damaged { path: path.to_path_buf(), message: error.to_string(), way_out: WAY_OUT }
+        }
+    });
+    read.map(Some)
+}
+
+fn read(file: File, plan: &Plan) -> Result<Vec<Judgement>, TableError> {
+    let mut reader = csv::Reader::from_reader(io::BufReader::new(file));
+    let (mut judgements, mut words, mut cells) = (Vec::new(), Words::default(), csv::StringRecord::new());
+    let content =
+        |error: csv::Error| if error.is_io_error() { TableError::Io(io::Error::other(error)) } else { TableError::Content(error.to_string()) };
+    while reader.read_record(&mut cells).map_err(content)? {
+        let number = judgements.len();
+        let in_place = cells.get(0) == Some(number.to_string().as_str());
+        let found = judgement(&cells, 1 + plan.variations().len()).filter(|_| in_place);
+        judgements.push(words.all(found.ok_or_else(|| TableError::Content(format!("row {number} is no judgement")))?));
+    }
+    let (found, expected) = (judgements.len() as u64, plan.combinations());
+    if found == expected { Ok(judgements) } else { Err(TableError::Content(format!("{found} rows: expected {expected}"))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known(word: &str, radius: f64, error: f64) -> Judgement {
+        Judgement::Known(Verdict { word: word.into(), judged: "mean-square".into(), radius, error })
+    }
+
+    #[test]
+    fn a_journal_torn_anywhere_gives_back_its_whole_lines() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("journal");
+        let (mut journal, _) = Journal::open(path.clone(), 9).unwrap();
+        let judgements = [
+            (7, known("stable", 0.1 + 0.2, 5e-324)),
+            (0, Judgement::Refused("no, \"really\" none".into())),
+            (3, known("overflow", f64::INFINITY, f64::INFINITY)),
+        ];
+        judgements.iter().for_each(|(combination, judgement)| journal.add(*combination, judgement).unwrap());
+        let whole = fs::read(&path).unwrap();
+        for end in 0..=whole.len() {
+            fs::write(&path, &whole[..end]).unwrap();
+            let (mut journal, found) = Journal::open(path.clone(), 9).unwrap();
+            let lines = whole[..end].iter().filter(|byte| **byte == b'\n').count();
+            assert_eq!(found, judgements[..lines], "{end}");
+            journal.add(8, &judgements[0].1).unwrap();
+            assert_eq!(Journal::open(path.clone(), 9).unwrap().1.len(), lines + 1, "{end}");
+        }
+        // One of another campaign has combinations that this one has not.
+        fs::write(&path, &whole).unwrap();
+        assert_eq!(Journal::open(path, 7).unwrap().1, []);
+    }
+}

@@ -1,0 +1,143 @@
+//! The pictures of a campaign: quantiles of the discrepancy, which runs diverged, and verdicts, over the keys that are varied.
+
+mod arranged;
+mod bands;
+mod cells;
+mod names;
+mod scale;
+mod verdicts;
+
+use std::path::Path;
+
+use cohaptic_campaign::{MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Plan, Quantiles, Report};
+use cohaptic_picture::{Panel, Picture, Size};
+
+use super::Finished;
+use crate::failure::Failure;
+use crate::output_file::write_file;
+use arranged::{Arranged, Keys};
+use scale::Scale;
+
+/// Files that were written, and what is to be said of them.
+#[derive(Default)]
+pub(super) struct Drawn {
+    pub(super) files: Vec<std::path::PathBuf>,
+    pub(super) notes: Vec<String>,
+}
+
+/// What all pictures of a campaign have in common.
+struct Sheet<'a> {
+    title: &'a str,
+    plan: &'a Plan,
+    report: &'a Report,
+    arranged: Arranged,
+    size: Size,
+}
+
+/// Writes `discrepancy.svg`, and `verdicts.svg` where there are verdicts; nothing if no key has several values.
+pub(super) fn write(finished: &Finished, folder: &Path, size: Size) -> Result<Drawn, Failure> {
+    let Finished { title, plan, report, .. } = finished;
+    let arranged = match Arranged::new(plan) {
+        Ok(Some(arranged)) => arranged,
+        Ok(None) => return Ok(Drawn::default()),
+        Err(why) => return Ok(Drawn { files: Vec::new(), notes: vec![format!("no picture is drawn: {why}")] }),
+    };
+    let sheet = Sheet { title, plan, report, arranged, size };
+    let mut drawn = Drawn::default();
+    if report.quantiles.is_empty() {
+        drawn.notes.push(format!(
+            "no picture of the discrepancy is drawn: its quantiles would take too much memory; they are computed of at most {MOST_RUNS_OF_QUANTILES} runs of each \
+             of {MOST_COMBINATIONS_OF_QUANTILES} combinations"
+        ));
+    } else {
+        put(&mut drawn, folder, "discrepancy.svg", &sheet.discrepancy())?;
+    }
+    if !report.judgements.is_empty() {
+        put(&mut drawn, folder, "verdicts.svg", &verdicts::picture(&sheet))?;
+    }
+    Ok(drawn)
+}
+
+fn put(drawn: &mut Drawn, folder: &Path, name: &str, picture: &Picture) -> Result<(), Failure> {
+    let path = folder.join(name);
+    write_file(&path, picture.svg())?;
+    drawn.files.push(path);
+    Ok(())
+}
+
+impl Sheet<'_> {
+    /// The quantiles of the discrepancy, and below them which share of the runs diverged, if any did.
+    fn discrepancy(&self) -> Picture {
+        let (each, diverged) = (self.plan.runs_of_each(), self.report.diverged());
+        let scale = Scale::of(&self.report.quantiles);
+        let mut picture = self.picture();
+        if each > 1 {
+            let which = if diverged > 0 { " that did not diverge" } else { "" };
+            picture = picture.note(format!("Quantiles of the runs{which}, of which each combination has {each}."));
+        }
+        let panels = |title: &str, panel: &dyn Fn(usize) -> Panel| -> Vec<Panel> {
+            let titled = |facet: usize| panel(facet).titled(self.arranged.title(self.plan, facet, title));
+            (0..self.arranged.facets()).map(titled).collect()
+        };
+        let shares = if diverged > 0 { panels("diverged", &|facet| self.shares(facet)) } else { Vec::new() };
+        picture.panels(panels("", &|facet| self.quantiles(facet, &scale))).panels(shares)
+    }
+
+    /// The picture without panels.
+    fn picture(&self) -> Picture {
+        let is_grid = matches!(self.arranged.keys, Keys::Grid(..));
+        let columns = match self.arranged.facets() {
+            1 => 1,
+            // Colour bars take room.
+            _ if is_grid && self.size.is_narrow() => 1,
+            2..=4 => 2,
+            _ if is_grid => 2,
+            _ => 3,
+        };
+        let picture = Picture::new(self.title).size(self.size).columns(columns);
+        match &self.arranged.keys {
+            Keys::Names(along) => {
+                // A few rows are not far from each other, and the names of many have room.
+                let aspect = 0.06 * f64::from(u32::try_from((1 + along.values.len()) * columns).unwrap_or(u32::MAX));
+                picture.aspect(aspect).note(format!("The rows are the values of {}.", self.plan.variations()[along.key].key()))
+            }
+            Keys::Line(_) | Keys::Grid(..) if columns == 1 => picture.aspect(0.45),
+            Keys::Line(_) | Keys::Grid(..) => picture.aspect(0.7),
+        }
+    }
+
+    fn quantiles(&self, facet: usize, scale: &Scale) -> Panel {
+        match &self.arranged.keys {
+            Keys::Names(along) => names::quantiles(self, along, facet, scale),
+            Keys::Line(along) => bands::quantiles(self, along, facet, scale),
+            Keys::Grid(both) => cells::medians(self, (&both.0, &both.1), facet, scale),
+        }
+    }
+
+    /// Which share of the runs diverged.
+    fn shares(&self, facet: usize) -> Panel {
+        match &self.arranged.keys {
+            Keys::Names(along) => names::shares(self, along, facet),
+            Keys::Line(along) => bands::shares(self, along, facet),
+            Keys::Grid(both) => cells::shares(self, (&both.0, &both.1), facet),
+        }
+    }
+
+    /// The combination at these places along the axes, in a panel.
+    fn combination(&self, facet: usize, at: &[usize]) -> usize {
+        self.arranged.combination(self.plan, facet, at)
+    }
+
+    fn quantiles_of(&self, combination: usize) -> Option<Quantiles> {
+        self.report.quantiles.get(combination).copied().flatten()
+    }
+
+    /// Which share of the runs of a combination diverged.
+    fn share(&self, combination: usize) -> f64 {
+        #[expect(clippy::cast_precision_loss, reason = "fewer runs than 2^52")]
+        self.report.combinations.get(combination).map_or(f64::NAN, |combination| combination.diverged as f64 / combination.runs.max(1) as f64)
+    }
+}
+
+/// What the axis of shares says.
+const SHARE: &str = "Share of runs that diverged";

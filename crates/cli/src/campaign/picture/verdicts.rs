@@ -1,0 +1,121 @@
+//! The verdicts of a campaign: the radius over one key, regions over two.
+
+use cohaptic_campaign::Judgement;
+use cohaptic_picture::{Axis, Fill, Line, Look, Marker, Panel, Picture};
+use cohaptic_stability::{Criterion, Verdict};
+
+use super::Sheet;
+use super::arranged::{Along, Keys};
+use super::bands::marked;
+use super::cells::with_cells;
+use crate::campaign::judge::{is_nominal, is_spectral};
+use crate::stability::source;
+
+/// A radius above this is cut off: how far beyond 1 it is says nothing about where it crosses.
+const HIGHEST: f64 = 2.0;
+/// What the legend says of radii that leave out what links leave to chance.
+const NOMINAL: &str = "nominal: nothing is left to chance";
+
+/// The radii of a campaign, all by one criterion: as in a map, a scene that leaves nothing to chance has the square of its spectral radius beside mean-square radii.
+struct Radii {
+    criterion: Criterion,
+    /// From where to where the axis reaches.
+    range: (f64, f64),
+    is_cut: bool,
+}
+
+/// The picture, of no size yet.
+pub(super) fn picture(sheet: &Sheet<'_>) -> Picture {
+    let radii = Radii::of(&sheet.report.judgements);
+    let panel = |facet: usize| {
+        let panel = match &sheet.arranged.keys {
+            Keys::Names(along) => radii.by_name(sheet, along, facet),
+            Keys::Line(along) => radii.line(sheet, along, facet),
+            Keys::Grid(both) => regions(sheet, (&both.0, &both.1), facet, radii.criterion),
+        };
+        panel.titled(sheet.arranged.title(sheet.plan, facet, ""))
+    };
+    let mut picture = sheet.picture();
+    if radii.is_cut && !matches!(sheet.arranged.keys, Keys::Grid(..)) {
+        picture = picture.note("What goes far beyond 1 is cut off.");
+    }
+    picture.panels((0..sheet.arranged.facets()).map(panel))
+}
+
+impl Radii {
+    fn of(judgements: &[Judgement]) -> Self {
+        let mean_square = judgements.iter().any(|judgement| judgement.verdict().is_some() && !is_spectral(judgement));
+        let criterion = if mean_square { Criterion::MeanSquare } else { Criterion::SpectralRadius };
+        let mut radii = Self { criterion, range: (1.0, 1.0), is_cut: false };
+        for radius in judgements.iter().filter_map(|judgement| radii.radius(judgement)).collect::<Vec<f64>>() {
+            radii.is_cut |= radius.is_nan() || radius > HIGHEST;
+            if radius.is_finite() {
+                radii.range = (radii.range.0.min(radius), radii.range.1.max(radius.min(HIGHEST)));
+            }
+        }
+        let margin = (0.05 * (radii.range.1 - radii.range.0)).max(1e-3);
+        radii.range = ((radii.range.0 - margin).max(0.0), radii.range.1 + margin);
+        radii
+    }
+
+    /// The radius by the criterion of the picture; `None` where there is no verdict.
+    fn radius(&self, judgement: &Judgement) -> Option<f64> {
+        let squared = self.criterion == Criterion::MeanSquare && is_spectral(judgement);
+        judgement.verdict().map(|verdict| if squared { verdict.radius * verdict.radius } else { verdict.radius })
+    }
+
+    fn axis(&self) -> Axis {
+        let name = match self.criterion {
+            Criterion::SpectralRadius => "Spectral radius",
+            Criterion::MeanSquare => "Mean-square radius",
+        };
+        Axis::new(name).range(self.range.0, self.range.1)
+    }
+
+    /// Each value of a key, its radius, and whether that is nominal.
+    fn points(&self, sheet: &Sheet<'_>, along: &Along, facet: usize) -> Vec<(f64, f64, bool)> {
+        let point = |(at, value): (usize, &f64)| {
+            let judgement = sheet.report.judgements.get(sheet.combination(facet, &[at]));
+            let radius = judgement.and_then(|judgement| self.radius(judgement)).unwrap_or(f64::NAN);
+            (*value, radius, judgement.is_some_and(is_nominal))
+        };
+        along.values.iter().enumerate().map(point).collect()
+    }
+
+    /// The radius over a key of numbers.
+    fn line(&self, sheet: &Sheet<'_>, along: &Along, facet: usize) -> Panel {
+        let points = self.points(sheet, along, facet);
+        let radius = Line::new(points.iter().map(|(x, radius, _)| (*x, *radius)), Look::of(0));
+        let panel =
+            Panel::new(along.axis(), self.axis()).with(Line::level(1.0).named("1")).with(marked(radius, along).named(source::name(self.criterion)));
+        with_nominal(panel, points.iter().filter(|point| point.2).map(|(x, radius, _)| (*x, *radius)).collect())
+    }
+
+    /// A mark for each name.
+    fn by_name(&self, sheet: &Sheet<'_>, along: &Along, facet: usize) -> Panel {
+        let points = self.points(sheet, along, facet);
+        let of = |nominal: bool| points.iter().filter(move |point| point.2 == nominal).map(|(y, radius, _)| (*radius, *y)).collect::<Vec<_>>();
+        let panel = Panel::new(self.axis(), along.axis()).with(Line::upright(1.0).named("1"));
+        with_nominal(panel.with(Line::new(of(false), Look::of(0)).marks_only(Marker::Disc).named(source::name(self.criterion))), of(true))
+    }
+}
+
+/// With the points that are nominal marked, if there are any.
+fn with_nominal(panel: Panel, points: Vec<(f64, f64)>) -> Panel {
+    if points.is_empty() { panel } else { panel.with(Line::new(points, Look::of(1)).marks_only(Marker::Diamond).named(NOMINAL)) }
+}
+
+/// Where the combinations of two keys are stable, and where not.
+fn regions(sheet: &Sheet<'_>, along: (&Along, &Along), facet: usize, criterion: Criterion) -> Panel {
+    let judgement = |column: usize, row: usize| sheet.report.judgements.get(sheet.combination(facet, &[column, row]));
+    let word = |column: usize, row: usize| judgement(column, row).and_then(Judgement::verdict).map(|verdict| &*verdict.word);
+    let is = |verdict: Verdict| move |column: usize, row: usize| word(column, row) == Some(verdict.word());
+    let in_mean_square = |word: &str| if criterion == Criterion::MeanSquare { format!("{word} in the mean square") } else { word.to_owned() };
+    let panel = Panel::new(along.0.axis(), along.1.axis());
+    let panel = with_cells(panel, along, Fill::Tint(0), &in_mean_square(Verdict::Stable.word()), is(Verdict::Stable));
+    let panel = with_cells(panel, along, Fill::Tint(1), &in_mean_square(Verdict::Unstable.word()), is(Verdict::Unstable));
+    let unknown = |column: usize, row: usize| is(Verdict::Marginal)(column, row) || is(Verdict::Overflow)(column, row);
+    let panel = with_cells(panel, along, Fill::Grey, "cannot be told", unknown);
+    let panel = with_cells(panel, along, Fill::BackHatch, "no verdict", |column, row| word(column, row).is_none());
+    with_cells(panel, along, Fill::Hatch, NOMINAL, |column, row| judgement(column, row).is_some_and(is_nominal))
+}
