@@ -9,6 +9,7 @@ mod admittance;
 mod against;
 mod campaign;
 mod check;
+mod check_page;
 mod desk;
 mod documents;
 mod errors;
@@ -37,6 +38,7 @@ mod replays;
 #[cfg(target_os = "linux")]
 mod router;
 mod run;
+mod run_page;
 #[cfg(target_os = "linux")]
 mod running;
 mod scenes;

@@ -16,6 +16,8 @@ b.bad { color: var(--bad); }
 p.warning { color: var(--bad); font-weight: 600; }
 .wide { overflow-x: auto; }
 .wide svg { max-width: max(100%, 40rem); height: auto; }
+.wide svg.gauge { max-width: none; vertical-align: middle; }
+b { white-space: nowrap; }
 table { border-collapse: collapse; margin: 1rem 0; font-size: .9rem; }
 th, td { text-align: left; vertical-align: top; padding: .25rem .75rem .25rem 0; border-bottom: 1px solid var(--line); }
 th.number, td.number { text-align: right; font-variant-numeric: tabular-nums; }
