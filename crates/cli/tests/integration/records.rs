@@ -46,7 +46,7 @@ fn all_records_are_there_and_whole() {
     let mut files: Vec<&str> = document["files"].as_array().unwrap().iter().map(|file| file.as_str().unwrap()).collect();
     files.sort_unstable();
     assert_eq!(files, FILES.map(|file| format!("out/{file}")));
-    let said = desk.cohaptic("run two.toml --no-plot --out a/folder/within").stderr;
+    let said = desk.cohaptic("run two.toml --out a/folder/within").stderr;
     assert_eq!(desk.files("a/folder/within"), FILES);
     let mut said: Vec<&str> = said.lines().collect();
     said.sort_unstable();
