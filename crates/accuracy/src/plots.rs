@@ -3,7 +3,7 @@
 //! An error of zero has no logarithm. It is drawn at the foot of the plot, below all other errors, as a triangle that points down, and the legend says
 //! so. What has no error or no cost is not drawn; the caption counts it.
 
-use cohaptic_picture::{Axis, Line, Look, Marker, Panel, Picture};
+use cohaptic_picture::{Axis, Line, Look, Marker, Panel, Picture, Size};
 
 use crate::Row;
 use crate::groups::{Group, groups};
@@ -21,9 +21,9 @@ pub struct Plot {
     pub svg: String,
 }
 
-/// A plot for each group of rows that has anything to draw.
+/// A plot of this size for each group of rows that has anything to draw.
 #[must_use]
-pub fn plots(rows: &[Row]) -> Vec<Plot> {
+pub fn plots(rows: &[Row], size: Size) -> Vec<Plot> {
     let mut plots: Vec<Plot> = Vec::new();
     for group in groups(rows) {
         let drawn = Drawn::of(&group);
@@ -39,7 +39,7 @@ pub fn plots(rows: &[Row]) -> Vec<Plot> {
             unique = format!("{id}-{number}");
             number += 1;
         }
-        plots.push(Plot { id: unique, title: group.title(), caption: drawn.caption(), svg: draw(&group, &drawn) });
+        plots.push(Plot { id: unique, title: group.title(), caption: drawn.caption(), svg: draw(&group, &drawn).size(size).svg() });
     }
     plots
 }
@@ -112,7 +112,7 @@ impl<'a> Drawn<'a> {
     }
 }
 
-fn draw(group: &Group<'_>, drawn: &Drawn<'_>) -> String {
+fn draw(group: &Group<'_>, drawn: &Drawn<'_>) -> Picture {
     let decades = |name: &str| Axis::new(name).logarithmic().tight().ends_at_ticks();
     let (along, mut up) = (decades("Cost").unit(group.cost_unit), decades(&format!("Error: {}", group.error_unit)));
     let floor = drawn.floor();
@@ -131,5 +131,5 @@ fn draw(group: &Group<'_>, drawn: &Drawn<'_>) -> String {
     if drawn.zeros > 0 {
         panel = panel.with(Line::new([], Look::reference()).marks_only(Marker::TriangleDown).named("error exactly 0, drawn at the foot"));
     }
-    Picture::new(group.title()).panel(panel).svg()
+    Picture::new(group.title()).panel(panel)
 }

@@ -14,6 +14,7 @@ mod check;
 mod completions;
 mod document_schema;
 mod documents;
+mod expectations;
 mod explain;
 mod failure;
 mod falcon;

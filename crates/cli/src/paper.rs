@@ -56,7 +56,7 @@ impl Watch for Bar {
 
 /// Computes the paper again.
 pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
-    let options = Options { quick: arguments.quick };
+    let options = Options { quick: arguments.quick, size: arguments.pictures.size() };
     if let Some(folder) = &arguments.out {
         // A folder that cannot be had is found out before the work, not after it.
         std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;

@@ -17,16 +17,20 @@ mod region;
 mod text;
 mod watch;
 
+use cohaptic_picture::Size;
+
 pub use claims::{Claim, Verdict};
 pub use error::PaperError;
 pub use figures::{Figure, Table};
 pub use watch::{Unwatched, Watch};
 
-/// How closely everything is looked at.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+/// How closely everything is looked at, and how large it is drawn.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Options {
     /// Coarser grids, in some seconds instead of a minute.
     pub quick: bool,
+    /// The size of the drawings.
+    pub size: Size,
 }
 
 /// The paper again.
@@ -54,7 +58,7 @@ pub fn reproduce(options: Options, watch: &dyn Watch) -> Result<Reproduction, Pa
     let travels = experiment::travels(watch)?;
     let tests = experiment::stability_tests(watch)?;
     let responses = figures::admittance::Responses::compute(options, watch)?;
-    let figures = figures::all(&atlas, &responses, &tests, &travels);
+    let figures = figures::all(&atlas, &responses, &tests, &travels, options.size);
     let claims = claims::all(&atlas, &responses, &tests, &travels, options, watch)?;
     Ok(Reproduction { claims, figures })
 }

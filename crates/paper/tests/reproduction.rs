@@ -4,9 +4,10 @@
 use std::sync::OnceLock;
 
 use cohaptic_paper::{Claim, Options, Reproduction, Unwatched, Verdict, Watch, page, reproduce};
+use cohaptic_picture::Size;
 
 fn again() -> Reproduction {
-    reproduce(Options { quick: true }, &Unwatched).unwrap()
+    reproduce(Options { quick: true, ..Options::default() }, &Unwatched).unwrap()
 }
 
 fn quick() -> &'static Reproduction {
@@ -59,40 +60,30 @@ fn a_second_time_every_byte_is_the_same() {
     assert_eq!(page::html(&second), page::html(quick()));
 }
 
+/// One column is 85 mm; where two plots with their labels need more, a drawing is a little wider.
+#[test]
+fn drawings_have_the_size_that_was_asked_for_and_numbers_do_not_depend_on_it() {
+    let narrow = reproduce(Options { quick: true, size: Size::ONE_COLUMN }, &Unwatched).unwrap();
+    assert_eq!(narrow.claims, quick().claims);
+    for (one, other) in narrow.figures.iter().zip(&quick().figures) {
+        assert_eq!((&one.csv, &one.table, &one.caption), (&other.csv, &other.table, &other.caption));
+        let width: f64 = one.svg.split(" width=\"").nth(1).and_then(|rest| rest.split_once("mm\"")?.0.parse().ok()).unwrap();
+        assert!((85.0..95.0).contains(&width) && other.svg.contains(" width=\"800\""), "{}: {width}", one.id);
+        assert_eq!(cohaptic_picture::testing::faults(&one.svg), [""; 0], "{}", one.id);
+    }
+}
+
 #[test]
 fn the_page_needs_nothing_from_elsewhere() {
     let page = page::html(quick());
-    for word in ["src=", "<script", "<link", "@import", "url(", "href=\"http"] {
-        // A place within the page is not elsewhere.
-        assert!(!page.replace("url(#", "").contains(word), "{word} in the page");
-    }
-    assert!(page.matches("<title>").count() > quick().figures.len(), "every drawing has a title");
-    assert_balanced(&page);
+    assert_eq!(cohaptic_picture::testing::page_faults(&page), [""; 0]);
+    assert_eq!(page.matches("<svg ").count(), quick().figures.len());
     for figure in &quick().figures {
-        assert_balanced(&figure.svg);
         assert_eq!(cohaptic_picture::testing::faults(&figure.svg), [""; 0], "{}", figure.id);
         assert!(figure.table.rows.iter().all(|row| row.len() == figure.table.head.len()), "{}", figure.id);
         let columns = figure.csv.lines().next().unwrap().split(',').count();
         assert!(figure.csv.lines().all(|line| line.split(',').count() == columns), "{}", figure.id);
     }
-}
-
-/// Every tag that opens closes, in order. Void elements are those of HTML that the page uses.
-fn assert_balanced(text: &str) {
-    let mut open = Vec::new();
-    let mut rest = text;
-    while let Some(start) = rest.find('<') {
-        let end = start + rest[start..].find('>').expect("a tag ends");
-        let tag = &rest[start + 1..end];
-        rest = &rest[end + 1..];
-        let name = tag.trim_start_matches('/').split([' ', '\n', '/']).next().unwrap();
-        if tag.starts_with('/') {
-            assert_eq!(open.pop(), Some(name), "</{name}> closes another tag");
-        } else if !tag.ends_with('/') && !tag.starts_with(['!', '?']) && name != "meta" {
-            open.push(name);
-        }
-    }
-    assert!(open.is_empty(), "{open:?} are not closed");
 }
 
 struct Impatient;
@@ -107,6 +98,6 @@ impl Watch for Impatient {
 
 #[test]
 fn it_can_be_given_up() {
-    let given_up = reproduce(Options { quick: true }, &Impatient).unwrap_err();
+    let given_up = reproduce(Options { quick: true, ..Options::default() }, &Impatient).unwrap_err();
     assert_eq!(given_up.to_string(), "given up before the end");
 }

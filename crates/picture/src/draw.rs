@@ -4,7 +4,7 @@ use crate::axis::{Extent, Scale};
 use crate::content::{Band, Content, HeatMap, Line, Region, Rug};
 use crate::layout::{AFTER_TICK, AxisLayout, BAR, Layout, PanelLayout, TICK, TITLE};
 use crate::legend::{draw_marker, stroke};
-use crate::look::{PATTERNS, STYLE};
+use crate::look::{PATTERNS, style};
 use crate::panel::{Extents, Panel};
 use crate::path::{Frame, data, reduced};
 use crate::picture::Picture;
@@ -27,7 +27,7 @@ pub(crate) fn document(picture: &Picture, layout: &Layout) -> String {
         escape(&picture.title.plain()),
         escape(&picture.spoken())
     ));
-    xml.text.push_str(STYLE);
+    xml.text.push_str(&format!("<style>\n{}</style>\n", style()));
     xml.text.push_str(PATTERNS);
     if picture.ground {
         xml.element("rect", &[("class", "paper"), ("width", &width), ("height", &height)]);

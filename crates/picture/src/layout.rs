@@ -1,7 +1,7 @@
-//! Where everything is: texts first, since their room is what cannot be changed, then the plots in what is left.
+//! Where everything is: texts first, since the room for texts cannot be changed, then the plots in the rest.
 //!
-//! Ticks, wrapped titles and labels depend on the size of the plots, and that on them; so a height is assumed, all is measured, and where a given height of the
-//! picture leaves less, this is done again with less.
+//! Ticks, wrapped titles and labels depend on the size of the plots, and the size of the plots depends on all of these; so a height is assumed, all is measured, and
+//! where a given height of the picture leaves less, all is measured again with less.
 
 use crate::content::{Content, HeatMap, count};
 use crate::ends::EndLabel;
@@ -228,19 +228,10 @@ fn entries(panels: &[Panel], at_ends: &[bool]) -> Vec<(Sample, Text)> {
 
 /// An axis that runs upwards, with as many ticks as labels do not touch.
 fn upright(axis: &crate::Axis, extent: crate::axis::Extent, font: f64, height: f64, labelled: bool) -> AxisLayout {
-    let mut most = whole(height / (2.0 * font)).clamp(2, 7);
-    let crowded = |ticks: &Ticks| {
+    let ticks = thinned(axis, extent, whole(height / (2.0 * font)).clamp(2, 7), |ticks| {
         let places: Vec<f64> = ticks.marks.iter().map(|(value, _)| height * extent.place(*value)).collect();
         places.windows(2).any(|pair| (pair[1] - pair[0]).abs() < LEADING * font)
-    };
-    let mut ticks = axis.ticks(extent, most);
-    while most > 1 && crowded(&ticks) {
-        most -= 1;
-        ticks = axis.ticks(extent, most);
-    }
-    if crowded(&ticks) {
-        ticks.marks.truncate(1);
-    }
+    });
     // The title may be a little longer than the plot, but never wider than what a page can show.
     let title = if labelled { axis.title(ticks.exponent).wrapped(font, height + 0.7 * font, 3) } else { Vec::new() };
     AxisLayout { ticks: Some(ticks), title, labelled }
@@ -248,11 +239,16 @@ fn upright(axis: &crate::Axis, extent: crate::axis::Extent, font: f64, height: f
 
 /// An axis that runs to the right.
 fn level(axis: &crate::Axis, extent: crate::axis::Extent, font: f64, width: f64, labelled: bool) -> AxisLayout {
-    let mut most = whole(width / (3.0 * font)).clamp(2, 9);
-    let crowded = |ticks: &Ticks| {
+    let ticks = thinned(axis, extent, whole(width / (3.0 * font)).clamp(2, 9), |ticks| {
         let spans: Vec<(f64, f64)> = ticks.marks.iter().map(|(value, label)| (width * extent.place(*value), 0.5 * label.width(font))).collect();
         spans.windows(2).any(|pair| pair[1].0 - pair[1].1 < pair[0].0 + pair[0].1 + 0.6 * font)
-    };
+    });
+    let title = if labelled { axis.title(ticks.exponent).wrapped(font, width, 3) } else { Vec::new() };
+    AxisLayout { ticks: Some(ticks), title, labelled }
+}
+
+/// As many ticks as labels do not touch, `most` of them at most; one where even two labels touch.
+fn thinned(axis: &crate::Axis, extent: crate::axis::Extent, mut most: usize, crowded: impl Fn(&Ticks) -> bool) -> Ticks {
     let mut ticks = axis.ticks(extent, most);
     while most > 1 && crowded(&ticks) {
         most -= 1;
@@ -261,8 +257,7 @@ fn level(axis: &crate::Axis, extent: crate::axis::Extent, font: f64, width: f64,
     if crowded(&ticks) {
         ticks.marks.truncate(1);
     }
-    let title = if labelled { axis.title(ticks.exponent).wrapped(font, width, 3) } else { Vec::new() };
-    AxisLayout { ticks: Some(ticks), title, labelled }
+    ticks
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lengths on a page are small and not below zero")]

@@ -1,12 +1,11 @@
-//! Pictures of curves, regions and maps as SVG documents that are fit to print.
+//! Pictures of curves, regions and maps as SVG documents that are fit to print, and pages of HTML that show them.
 //!
 //! A [`Picture`] has a title, notes and [`Panel`]s in a grid; a panel has two [`Axis`] and contents: [`Line`], [`Band`], [`Region`], [`HeatMap`], [`Rug`].
 //! Texts wrap and never leave the picture or lie on each other, by widths that no common font exceeds; the legend is outside of the plots; lines differ by
 //! colour and by dashes. A picture is light or dark as its reader prefers, in a file, in an `<img>` and within a page. Text stays text. The [`Size`] is one or
 //! two columns of a paper, a page on a screen, or given.
 //!
-//! This crate reads no file and no clock, and prints nothing: equal pictures are equal bytes. It shows what it is given; what is worth showing, its callers
-//! decide.
+//! This crate reads no file and no clock, and prints nothing: equal pictures are equal bytes. Callers decide what is worth showing.
 //!
 //! ```
 //! use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
@@ -31,9 +30,11 @@ mod axis;
 mod content;
 mod draw;
 mod ends;
+mod gauge;
 mod layout;
 mod legend;
 mod look;
+pub mod page;
 mod panel;
 mod path;
 mod picture;
@@ -46,6 +47,7 @@ mod xml;
 
 pub use axis::Axis;
 pub use content::{Band, Content, HeatMap, Line, Region, Rug, cell_edges};
+pub use gauge::Gauge;
 pub use legend::LegendPlace;
 pub use look::{Fill, Look, Marker};
 pub use panel::Panel;

@@ -127,9 +127,21 @@ impl Marker {
     }
 }
 
-/// The same in every picture, so that several can stand in one page of HTML.
-pub(crate) const STYLE: &str = r##"<style>
-.cohaptic-picture{font-family:Helvetica,Arial,"Liberation Sans","DejaVu Sans",sans-serif}
+/// The colours of lines by number, then that of reference lines: on a light and on a dark ground. On white, Okabe & Ito's orange and sky blue would be too
+/// faint; they are darker here until their contrast is 3.
+const SERIES: [(&str, &str, &str); COLOURS + 1] = [
+    ("0", "#0072b2", "#4aa8e8"),
+    ("1", "#d55e00", "#ff8237"),
+    ("2", "#009e73", "#20c493"),
+    ("3", "#cc79a7", "#e59bc6"),
+    ("4", "#c58800", "#f2b53a"),
+    ("5", "#3a9ad9", "#8fd2f7"),
+    ("6", "#777", "#b0b0b0"),
+    ("r", "#6e7781", "#8b949e"),
+];
+
+/// What has neither a number nor a series.
+const LIGHT: &str = r#".cohaptic-picture{font-family:Helvetica,Arial,"Liberation Sans","DejaVu Sans",sans-serif}
 .cohaptic-picture text{white-space:pre}
 .cohaptic-picture .paper{fill:#fff}
 .cohaptic-picture .ink{fill:#1b1f24}
@@ -143,15 +155,8 @@ pub(crate) const STYLE: &str = r##"<style>
 .cohaptic-picture .hatching{fill:none;stroke:#57606a}
 .cohaptic-picture .hatch{fill:url(#cohaptic-hatch)}
 .cohaptic-picture .back-hatch{fill:url(#cohaptic-back-hatch)}
-.cohaptic-picture .s0{stroke:#0072b2}.cohaptic-picture .f0{fill:#0072b2}
-.cohaptic-picture .s1{stroke:#d55e00}.cohaptic-picture .f1{fill:#d55e00}
-.cohaptic-picture .s2{stroke:#009e73}.cohaptic-picture .f2{fill:#009e73}
-.cohaptic-picture .s3{stroke:#cc79a7}.cohaptic-picture .f3{fill:#cc79a7}
-.cohaptic-picture .s4{stroke:#e69f00}.cohaptic-picture .f4{fill:#e69f00}
-.cohaptic-picture .s5{stroke:#56b4e9}.cohaptic-picture .f5{fill:#56b4e9}
-.cohaptic-picture .s6{stroke:#777}.cohaptic-picture .f6{fill:#777}
-.cohaptic-picture .sr{stroke:#6e7781}.cohaptic-picture .fr{fill:#6e7781}
-@media (prefers-color-scheme:dark){
+"#;
+const DARK: &str = "\
 .cohaptic-picture .paper{fill:#14181d}
 .cohaptic-picture .ink{fill:#e6e9ec}
 .cohaptic-picture .quiet{fill:#a3abb4}
@@ -159,19 +164,21 @@ pub(crate) const STYLE: &str = r##"<style>
 .cohaptic-picture .grid{stroke:#2a3038}
 .cohaptic-picture .tint{fill-opacity:.3}
 .cohaptic-picture .hatching{stroke:#a3abb4}
-.cohaptic-picture .s0{stroke:#4aa8e8}.cohaptic-picture .f0{fill:#4aa8e8}
-.cohaptic-picture .s1{stroke:#ff8237}.cohaptic-picture .f1{fill:#ff8237}
-.cohaptic-picture .s2{stroke:#20c493}.cohaptic-picture .f2{fill:#20c493}
-.cohaptic-picture .s3{stroke:#e59bc6}.cohaptic-picture .f3{fill:#e59bc6}
-.cohaptic-picture .s4{stroke:#f2b53a}.cohaptic-picture .f4{fill:#f2b53a}
-.cohaptic-picture .s5{stroke:#8fd2f7}.cohaptic-picture .f5{fill:#8fd2f7}
-.cohaptic-picture .s6{stroke:#b0b0b0}.cohaptic-picture .f6{fill:#b0b0b0}
-.cohaptic-picture .sr{stroke:#8b949e}.cohaptic-picture .fr{fill:#8b949e}
-}
-</style>
-"##;
+";
 
-/// What areas are hatched with; the same in every picture as well.
+/// The style sheet: one for all pictures, so that several can stand in one page of HTML.
+pub(crate) fn style() -> String {
+    let series = |dark: bool| -> String {
+        let rule = |(name, on_white, on_black): &(&str, &str, &str)| {
+            let colour = if dark { on_black } else { on_white };
+            format!(".cohaptic-picture .s{name}{{stroke:{colour}}}.cohaptic-picture .f{name}{{fill:{colour}}}\n")
+        };
+        SERIES.iter().map(rule).collect()
+    };
+    format!("{LIGHT}{}@media (prefers-color-scheme: dark){{\n{DARK}{}}}\n", series(false), series(true))
+}
+
+/// What areas are hatched with: one set for all pictures, as the style sheet.
 pub(crate) const PATTERNS: &str = r#"<defs>
 <pattern id="cohaptic-hatch" width="6" height="6" patternUnits="userSpaceOnUse"><path class="hatching" stroke-width="0.9" d="M-1,1L1,-1M0,6L6,0M5,7L7,5"/></pattern>
 <pattern id="cohaptic-back-hatch" width="6" height="6" patternUnits="userSpaceOnUse"><path class="hatching" stroke-width="0.9" d="M-1,5L1,7M0,0L6,6M5,-1L7,1"/></pattern>

@@ -1,6 +1,7 @@
 //! Work–precision plots.
 
 use cohaptic_accuracy::{Subject, plots};
+use cohaptic_picture::Size;
 use cohaptic_picture::testing::faults;
 
 use crate::row;
@@ -8,7 +9,7 @@ use crate::row;
 #[test]
 fn every_group_has_one_picture_with_a_line_for_each_method() {
     let rows = [row("one", Some(1.0), Some(1e-3)), row("one", Some(10.0), Some(1e-6)), row("other", Some(3.0), Some(1e-4))];
-    let plots = plots(&rows);
+    let plots = plots(&rows, Size::PAGE);
     let [plot] = plots.as_slice() else { panic!("{}", plots.len()) };
     assert_eq!((plot.id.as_str(), plot.caption.as_str()), ("motion-a-case-position-m", ""));
     assert_eq!(faults(&plot.svg), [""; 0]);
@@ -22,7 +23,7 @@ fn every_group_has_one_picture_with_a_line_for_each_method() {
 /// Zero has no logarithm: it is a triangle at the foot, and the legend and the caption say so.
 #[test]
 fn an_error_of_zero_is_at_the_foot_and_said() {
-    let with = plots(&[row("one", Some(1.0), Some(1e-3)), row("exact", Some(2.0), Some(0.0))]);
+    let with = plots(&[row("one", Some(1.0), Some(1e-3)), row("exact", Some(2.0), Some(0.0))], Size::PAGE);
     let plot = &with[0];
     assert!(plot.svg.contains("error exactly 0") && plot.caption.contains("exactly 0"));
     assert_eq!(faults(&plot.svg), [""; 0]);
@@ -34,7 +35,7 @@ fn an_error_of_zero_is_at_the_foot_and_said() {
         let y: f64 = corner.split_once(',').unwrap().1.parse().unwrap();
         assert!(y > circle, "the triangle is below every error: {triangle} {circle}");
     }
-    let without = plots(&[row("one", Some(1.0), Some(1e-3))]);
+    let without = plots(&[row("one", Some(1.0), Some(1e-3))], Size::PAGE);
     assert!(!without[0].svg.contains("exactly 0"));
 }
 
@@ -46,7 +47,7 @@ fn zeros_alone_one_point_alone_and_extreme_numbers_can_be_drawn() {
         vec![row("far", Some(1e-300), Some(4.9e-324)), row("far", Some(1e300), Some(1.7e308)), row("far", Some(1.0), Some(0.0))],
         (0..40).map(|method| row(&format!("method {method}"), Some(f64::from(method + 1)), Some(1e-3))).collect(),
     ] {
-        let plots = plots(&rows);
+        let plots = plots(&rows, Size::PAGE);
         assert_eq!(plots.len(), 1);
         assert_eq!(faults(&plots[0].svg), [""; 0]);
     }
@@ -55,9 +56,9 @@ fn zeros_alone_one_point_alone_and_extreme_numbers_can_be_drawn() {
 #[test]
 fn what_cannot_be_drawn_is_counted_and_a_group_of_it_has_no_picture() {
     let nothing = [row("none", Some(1.0), None), row("none", None, Some(1.0)), row("none", Some(f64::NAN), Some(1.0))];
-    assert!(plots(&nothing).is_empty());
+    assert!(plots(&nothing, Size::PAGE).is_empty());
     let some = [row("none", Some(1.0), None), row("one", Some(1.0), Some(1.0))];
-    assert!(plots(&some)[0].caption.starts_with("One row has no error or no cost"));
+    assert!(plots(&some, Size::PAGE)[0].caption.starts_with("One row has no error or no cost"));
 }
 
 #[test]
@@ -73,7 +74,7 @@ fn names_of_files_differ() {
         (row.subject, row.case, row.cost_unit) = (subject, case.to_owned(), cost_unit);
         rows.push(row);
     }
-    let mut ids: Vec<String> = plots(&rows).into_iter().map(|plot| plot.id).collect();
+    let mut ids: Vec<String> = plots(&rows, Size::PAGE).into_iter().map(|plot| plot.id).collect();
     ids.sort();
     ids.dedup();
     assert_eq!(ids.len(), 4, "{ids:?}");

@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use cohaptic_accuracy::{About, Row, csv, html, plots};
+use cohaptic_picture::Size;
 
 use crate::failure::Failure;
 use crate::output_file::write_file;
@@ -12,8 +13,8 @@ use crate::output_file::write_file;
 const WHOLE: &str = "rows.csv";
 const PARTIAL: &str = "rows-interrupted.csv";
 
-/// Writes all files, the page last. Each has its name only when it is whole.
-pub(super) fn write(folder: &Path, rows: &[Row], about: &About) -> Result<(), Failure> {
+/// Writes all files with pictures of this size, the page last. Each has its name only when it is whole.
+pub(super) fn write(folder: &Path, rows: &[Row], about: &About, size: Size) -> Result<(), Failure> {
     let (name, other) = if about.partial { (PARTIAL, WHOLE) } else { (WHOLE, PARTIAL) };
     write_file(&folder.join(name), csv(rows))?;
     // Of the measurement before, which the pictures and the page no longer belong to.
@@ -22,8 +23,8 @@ pub(super) fn write(folder: &Path, rows: &[Row], about: &About) -> Result<(), Fa
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(Failure::File { verb: "remove", path: old, error }),
         Ok(()) | Err(_) => {}
     }
-    for plot in plots(rows) {
+    for plot in plots(rows, size) {
         write_file(&folder.join(format!("{}.svg", plot.id)), &plot.svg)?;
     }
-    write_file(&folder.join("index.html"), html(rows, about))
+    write_file(&folder.join("index.html"), html(rows, about, size))
 }

@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant as Clock;
 
 use cohaptic_accuracy::{About, AccuracyError, Options, Row, Subject, Watch, measure, text};
+use cohaptic_picture::Size;
 use serde::Serialize;
 
 use crate::arguments::AccuracyArguments;
@@ -68,11 +69,12 @@ pub(crate) fn accuracy(arguments: &AccuracyArguments) -> Result<ExitCode, Failur
     let keeper = Keeper { bar: Progress::through_measurements(), rows: Arc::default() };
     let start = Clock::now();
     let (rows, out, json, line) = (Arc::clone(&keeper.rows), arguments.out.clone(), arguments.json, machine::line(arguments));
+    let size = arguments.pictures.size();
     // A row may take longer than there is time.
     interrupt::keep(move || {
         let rows = rows.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let said = format!("the {} rows measured until then are kept", rows.len());
-        let concluded = Conclusion { rows, about: About { line, partial: true }, out, json, wall_s: start.elapsed().as_secs_f64() }.tell();
+        let concluded = Conclusion { rows, about: About { line, partial: true }, out, json, size, wall_s: start.elapsed().as_secs_f64() }.tell();
         concluded.map_or_else(|_| "the rows measured until then cannot be written".to_owned(), |()| said)
     });
     let measured = measure(subjects, Options { quick: arguments.quick }, &keeper);
@@ -87,7 +89,7 @@ pub(crate) fn accuracy(arguments: &AccuracyArguments) -> Result<ExitCode, Failur
     };
     let rows = std::mem::take(&mut *keeper.rows.lock().unwrap_or_else(PoisonError::into_inner));
     let about = About { line: machine::line(arguments), partial: interrupted };
-    Conclusion { rows, about, out: arguments.out.clone(), json: arguments.json, wall_s }.tell()?;
+    Conclusion { rows, about, out: arguments.out.clone(), json: arguments.json, size, wall_s }.tell()?;
     if let Some(fault) = fault {
         return Err(fault);
     }
@@ -100,14 +102,15 @@ struct Conclusion {
     about: About,
     out: Option<PathBuf>,
     json: bool,
+    size: Size,
     wall_s: f64,
 }
 
 impl Conclusion {
     /// Writes the files and prints the rows; what was measured is printed even if the disk is full.
     fn tell(&self) -> Result<(), Failure> {
-        let Self { rows, about, out, json, wall_s } = self;
-        let written = out.as_ref().map_or(Ok(()), |folder| files::write(folder, rows, about));
+        let Self { rows, about, out, json, size, wall_s } = self;
+        let written = out.as_ref().map_or(Ok(()), |folder| files::write(folder, rows, about, *size));
         if *json {
             output::json(
                 DocumentSchema::Accuracy,

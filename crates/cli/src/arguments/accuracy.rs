@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use cohaptic_accuracy::Subject;
 
+use super::PictureArguments;
 use super::examples::{self, after};
 
 #[derive(Debug, Args)]
@@ -13,6 +14,8 @@ pub(crate) struct AccuracyArguments {
     /// Write index.html, the plots (SVG) and rows.csv into this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
     /// Fewer settings and less work: under a minute
     #[arg(long)]
     pub(crate) quick: bool,

@@ -26,8 +26,11 @@ pub(super) const RUN: &[&str] = &[
     "cohaptic init - | cohaptic run - --json",
 ];
 
-pub(super) const CHECK: &[&str] =
-    &["cohaptic check scenarios", "cohaptic check scenarios/paper --threads 2 --json", "cohaptic check scene.toml --set link.delay=40ms"];
+pub(super) const CHECK: &[&str] = &[
+    "cohaptic check scenarios",
+    "cohaptic check scenarios/paper --threads 2 --json",
+    "cohaptic check scene.toml --set link.delay=40ms --page check.html",
+];
 
 pub(super) const EXPLAIN: &[&str] = &["cohaptic explain scenarios/network/rate-and-queue.toml", "cohaptic explain scene.toml --set scene.axes=3"];
 

@@ -20,7 +20,7 @@ pub(crate) struct RunArguments {
     /// --against coordination.strategy=proportional-derivative
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) against: Vec<String>,
-    /// Write trajectory.csv, packets.csv, links.csv and plots (SVG) into this folder; the second run goes into its folder against
+    /// Write trajectory.csv, packets.csv, links.csv, plots (SVG) and run.html, a page of it all, into this folder; the second run goes into its folder against
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
@@ -31,7 +31,7 @@ pub(crate) struct RunArguments {
     /// Replay even if the scene or its --set are not those of the session, and say what differs
     #[arg(long, requires = "inputs")]
     pub(crate) force: bool,
-    /// Do not draw positions in the terminal. Nothing is looked at then but counters, which is fastest
+    /// Do not draw positions in the terminal, and do not write run.html. Without --out nothing is looked at then but counters, which is fastest
     #[arg(long)]
     pub(crate) no_plot: bool,
     /// Simulate everything the program has, needed or not: slower, and the same answer to the last bit
@@ -50,6 +50,9 @@ pub(crate) struct CheckArguments {
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
+    /// Write one page (HTML) into this file: each expectation with what came out, as numbers and as a bar
+    #[arg(long, value_name = "FILE")]
+    pub(crate) page: Option<PathBuf>,
     /// How many scenes run at the same time [default: one a core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,

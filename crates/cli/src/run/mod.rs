@@ -1,6 +1,8 @@
 //! `cohaptic run`.
 
+mod command;
 mod document;
+mod page;
 mod replayed;
 pub(crate) mod words;
 
@@ -9,6 +11,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
+use cohaptic_harness::check::ExpectationWatch;
 use cohaptic_harness::live::{Inputs, replay};
 use cohaptic_harness::record::{Bands, RecordError, Recorder};
 use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow};
@@ -18,6 +21,7 @@ use cohaptic_units::Instant;
 use crate::arguments::RunArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
+use crate::output_file::write_file;
 use crate::progress::Progress;
 use crate::{failure, input, interrupt, output};
 use document::Document;
@@ -51,10 +55,11 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let inputs = arguments.inputs.as_deref().map(|file| replayed::read(file, &scene, arguments, overrides)).transpose()?;
     let (inputs, replayed_otherwise) = inputs.unzip();
     let what = inputs.as_ref().map_or(What::Simulated, What::Replayed);
-    let first = run_one(arguments, &scene, what, arguments.out.clone())?;
+    let first = run_one(arguments, &scene, what, arguments.out.clone(), overrides)?;
     let second = match &variant {
         Some(variant) if !interrupt::asked() => {
-            Some(run_one(arguments, variant, What::Simulated, arguments.out.as_ref().map(|out| out.join("against")))?)
+            let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
+            Some(run_one(arguments, variant, What::Simulated, arguments.out.as_ref().map(|out| out.join("against")), &both)?)
         }
         _ => None,
     };
@@ -96,11 +101,13 @@ enum What<'a> {
     Replayed(&'a Inputs),
 }
 
-fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<PathBuf>) -> Result<Run, Failure> {
+fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<PathBuf>, overrides: &[String]) -> Result<Run, Failure> {
     let shown = !arguments.scene.json && !arguments.no_plot;
+    let paged = out.is_some() && !arguments.no_plot;
     let mut watch = Watch {
         progress: Progress::through_scene(&scene.title, scene.duration),
         positions: shown.then(|| Bands::new(scene.duration, PLOT_SPANS, scene.peers.len())),
+        expectations: paged.then(|| ExpectationWatch::new(scene)),
     };
     let start = Clock::now();
     let (summary, files) = match out.as_deref() {
@@ -108,7 +115,14 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
         Some(folder) => {
             let mut observer = (Recorder::create(folder, scene)?.sized(arguments.pictures.size()), &mut watch);
             let summary = execute(arguments, scene, what, &mut observer)?;
-            let files = observer.0.finish(&summary)?;
+            let (mut files, pictures) = observer.0.finish_with_pictures(&summary)?;
+            if let Some(expectations) = &watch.expectations {
+                let outcomes = expectations.outcomes(&summary);
+                let page = page::html(arguments, scene, overrides, &summary, &outcomes, &pictures)?;
+                let file = folder.join("run.html");
+                write_file(&file, page)?;
+                files.push(file);
+            }
             (summary, files)
         }
     };
@@ -128,21 +142,26 @@ fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>,
 const PLOT_SPANS: usize = 144;
 
 /// Shows progress, collects what the terminal shows, and ends the run when the user asks for it.
-struct Watch {
+struct Watch<'a> {
     progress: Progress,
     positions: Option<Bands>,
+    /// For the page.
+    expectations: Option<ExpectationWatch<'a>>,
 }
 
-impl Observer for &mut Watch {
+impl Observer for &mut Watch<'_> {
     type Error = RecordError;
 
     fn wants_ticks(&self) -> bool {
-        self.positions.is_some()
+        self.positions.is_some() || self.expectations.as_ref().is_some_and(ExpectationWatch::wants_ticks)
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
         if let Some(positions) = &mut self.positions {
             positions.add(row.peer, row.at, row.object.position[0]);
+        }
+        if let Some(expectations) = &mut self.expectations {
+            expectations.on_tick(row);
         }
         Ok(())
     }

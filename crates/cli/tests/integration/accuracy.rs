@@ -52,6 +52,23 @@ fn the_rows_the_plots_and_the_page_lie_in_the_folder() {
     let page = desk.read("out/index.html");
     assert!(page.starts_with("<!DOCTYPE html>") && page.contains("cohaptic accuracy --quick --only motion, version "));
     assert_eq!(page.matches("<svg").count(), plots.len());
+    assert_eq!(cohaptic_picture::testing::page_faults(&page), [""; 0]);
+    assert!(plots.iter().all(|plot| desk.read(&format!("out/{plot}")).contains(" width=\"800\"")));
+}
+
+#[test]
+fn plots_have_the_size_that_was_asked_for() {
+    let desk = Desk::new();
+    desk.json("accuracy --quick --only motion --json --out out --size one-column");
+    for plot in desk.files("out").iter().filter(|file| file.ends_with(".svg")) {
+        let svg = desk.read(&format!("out/{plot}"));
+        assert!(svg.contains(" width=\"85mm\""), "{plot}");
+        assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0], "{plot}");
+    }
+    assert!(desk.read("out/index.html").contains(" width=\"85mm\""));
+    // Without a folder there is nothing that could have a size.
+    desk.cohaptic("accuracy --quick --only motion --size page").assert_refused(2, &["--out"]);
+    desk.cohaptic("accuracy --quick --only motion --out out --size huge").assert_refused(2, &["one-column"]);
 }
 
 #[test]

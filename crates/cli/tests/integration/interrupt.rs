@@ -44,7 +44,7 @@ fn has_content(desk: &Desk, file: &str) -> bool {
 
 /// The records are whole lines under their own names, and the rows agree with the ticks said.
 fn assert_whole(desk: &Desk, ticks: u64) {
-    assert_eq!(desk.files("out"), ["forces.svg", "links.csv", "network.svg", "packets.csv", "positions.svg", "trajectory.csv"]);
+    assert_eq!(desk.files("out"), ["forces.svg", "links.csv", "network.svg", "packets.csv", "positions.svg", "run.html", "trajectory.csv"]);
     let trajectory = desk.read("out/trajectory.csv");
     assert_eq!((trajectory.ends_with('\n'), trajectory.lines().count() as u64), (true, 1 + 2 * ticks));
     assert!(desk.read("out/packets.csv").ends_with("delivered\n"));

@@ -11,6 +11,7 @@ mod campaign;
 mod campaign_pictures;
 mod campaign_verdicts;
 mod check;
+mod check_page;
 mod desk;
 mod documents;
 mod errors;
@@ -39,6 +40,7 @@ mod replays;
 #[cfg(target_os = "linux")]
 mod router;
 mod run;
+mod run_page;
 #[cfg(target_os = "linux")]
 mod running;
 mod scenes;

@@ -36,6 +36,22 @@ fn a_scene_that_says_the_same_is_the_same() {
     desk.text(&format!("run same.toml {SET} --inputs out/inputs.csv --no-plot"));
 }
 
+/// The records of a session say in logical time what happened, and a replay is the same to the last bit: so are the pictures, which are drawn from them.
+#[test]
+fn pictures_of_a_session_are_those_of_its_replay() {
+    let desk = session();
+    desk.text(&format!("run two.toml {SET} --inputs out/inputs.csv --out again"));
+    for file in ["positions.svg", "forces.svg", "network.svg"] {
+        let picture = desk.read(&format!("out/{file}"));
+        assert_eq!(cohaptic_picture::testing::faults(&picture), [""; 0], "{file}");
+        assert!(picture.contains("<path class=\"line s0\""), "{file} shows something");
+        assert_eq!(picture, desk.read(&format!("again/{file}")), "{file}");
+    }
+    // Other inputs are other pictures.
+    desk.text("run two.toml --set link.delay=8ms --set scene.duration=40ms --out other");
+    assert_ne!(desk.read("out/network.svg"), desk.read("other/network.svg"));
+}
+
 #[test]
 fn another_scene_is_refused_key_by_key() {
     for (change, set, differences) in [

@@ -7,6 +7,7 @@ use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 use cohaptic_wan::{DropCause, LinkName, LinkStats};
 
+use super::Outcome;
 use crate::{Summary, TickRow};
 
 /// What was seen of the positions that expectations are about.
@@ -62,69 +63,71 @@ impl Watched {
         }
     }
 
-    /// One line for each expectation that does not hold.
-    pub(crate) fn failures(&self, scene: &Scene, expect: &Expect, summary: &Summary) -> Vec<String> {
+    /// What came out of each expectation, in the order of the file's sections.
+    pub(crate) fn outcomes(&self, scene: &Scene, expect: &Expect, summary: &Summary) -> Vec<Outcome> {
         let name = |peer: usize| &scene.peers[peer].name;
-        let mut failures = Vec::new();
-        if let Some(bounds) = expect.discrepancy.filter(|bounds| !bounds.contain(summary.max_discrepancy)) {
-            failures.push(format!("largest discrepancy between copies: {} m, expected {}", summary.max_discrepancy, range(&bounds, "m")));
+        let mut outcomes = Vec::new();
+        if let Some(bounds) = &expect.discrepancy {
+            outcomes.push(Outcome::number("discrepancy", "largest discrepancy between copies".to_owned(), "m", bounds, summary.max_discrepancy));
         }
         for (expected, watched) in expect.positions.iter().zip(&self.positions) {
             let what = format!("position of {}'s copy along {} at {}", name(expected.peer), AXES[expected.axis], expected.at);
             let at_the_end = expected.at >= Instant::ZERO.saturating_add(scene.duration);
             let seen = if at_the_end { Some(summary.peers[expected.peer].position[expected.axis]) } else { watched.seen };
-            match seen {
-                None => failures.push(format!("{what}: {} has not ticked by then", name(expected.peer))),
-                Some(seen) if !expected.bounds.contain(seen) => failures.push(format!("{what}: {seen} m, expected {}", range(&expected.bounds, "m"))),
-                Some(_) => {}
-            }
+            outcomes.push(match seen {
+                None => Outcome::nothing("position", what, "m", &expected.bounds, &format!("{} has not ticked by then", name(expected.peer))),
+                Some(seen) => Outcome::number("position", what, "m", &expected.bounds, seen),
+            });
         }
         for (expected, watched) in expect.travel.iter().zip(&self.travels) {
             let what = format!("time in which {}'s copy travels {} m along {}", name(expected.peer), expected.distance, AXES[expected.axis]);
-            let seconds = watched.reached.map(Instant::as_secs_f64);
-            match seconds {
-                None => failures.push(format!("{what}: not reached, expected {}", range(&expected.bounds, "s"))),
-                Some(seconds) if !expected.bounds.contain(seconds) => {
-                    failures.push(format!("{what}: {seconds} s, expected {}", range(&expected.bounds, "s")));
-                }
-                Some(_) => {}
-            }
+            outcomes.push(match watched.reached {
+                None => Outcome::nothing("travel", what, "s", &expected.bounds, "not reached"),
+                Some(at) => Outcome::number("travel", what, "s", &expected.bounds, at.as_secs_f64()),
+            });
         }
-        failures.extend(expect.loss.iter().filter_map(|expected| loss_failure(scene, expected, summary)));
-        failures.extend(expect.delay.iter().filter_map(|expected| delay_failure(scene, expected, summary)));
-        failures
+        outcomes.extend(expect.loss.iter().map(|expected| loss(scene, expected, summary)));
+        outcomes.extend(expect.delay.iter().map(|expected| delay(scene, expected, summary)));
+        outcomes
     }
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 #[expect(clippy::cast_precision_loss, reason = "packet counts below 2^53")]
-fn loss_failure(scene: &Scene, expected: &ExpectLoss, summary: &Summary) -> Option<String> {
+fn loss(scene: &Scene, expected: &ExpectLoss, summary: &Summary) -> Outcome {
     let stats = selected(expected.link, summary);
     let offered: u64 = stats.iter().map(LinkStats::offered).sum();
     let dropped: u64 = stats.iter().map(|stats| expected.cause.map_or_else(|| stats.dropped_in_all(), |cause| stats.dropped(cause))).sum();
     let cause = expected.cause.map_or("for any reason", DropCause::name);
     let what = format!("fraction of packets dropped on {} ({cause})", link_name(expected.link, scene));
+    let bounds = Bounds { min: expected.min.map(|min| min.get()), max: expected.max.map(|max| max.get()) };
     if offered == 0 {
-        return Some(format!("{what}: no packet was offered"));
+        return Outcome::nothing("loss", what, "", &bounds, "no packet was offered");
     }
     let fraction = dropped as f64 / offered as f64;
-    let bounds = Bounds { min: expected.min.map(|min| min.get()), max: expected.max.map(|max| max.get()) };
-    (!bounds.contain(fraction)).then(|| format!("{what}: {fraction} ({dropped} of {offered}), expected {}", range(&bounds, "")))
+    Outcome { found: format!("{fraction} ({dropped} of {offered})"), ..Outcome::number("loss", what, "", &bounds, fraction) }
 }
 
-fn delay_failure(scene: &Scene, expected: &ExpectDelay, summary: &Summary) -> Option<String> {
+fn delay(scene: &Scene, expected: &ExpectDelay, summary: &Summary) -> Outcome {
     let stats = selected(expected.link, summary);
     let delivered: u64 = stats.iter().map(LinkStats::delivered).sum();
     let what = format!("mean delay on {}", link_name(expected.link, scene));
     let total: u128 = stats.iter().filter_map(|stats| stats.mean_delay().map(|mean| mean.as_nanos() * u128::from(stats.delivered()))).sum();
+    let bounds = Bounds { min: expected.min.map(|min| min.as_secs_f64()), max: expected.max.map(|max| max.as_secs_f64()) };
+    let range = match (expected.min, expected.max) {
+        (Some(min), Some(max)) => format!("{} to {}", Span(min), Span(max)),
+        (Some(min), None) => format!("at least {}", Span(min)),
+        (None, Some(max)) => format!("at most {}", Span(max)),
+        (None, None) => "any delay".to_owned(),
+    };
     let Some(mean) = total.checked_div(u128::from(delivered)) else {
-        return Some(format!("{what}: no packet was delivered"));
+        return Outcome { expected: range, ..Outcome::nothing("delay", what, "s", &bounds, "no packet was delivered") };
     };
     let mean = Duration::from_nanos(u64::try_from(mean).unwrap_or(u64::MAX));
-    let low = expected.min.filter(|min| mean < *min).map(|min| format!("at least {}", Span(min)));
-    let high = expected.max.filter(|max| mean > *max).map(|max| format!("at most {}", Span(max)));
-    low.or(high).map(|bound| format!("{what}: {}, expected {bound}", Span(mean)))
+    // Compared in nanoseconds, which are exact.
+    let passed = expected.min.is_none_or(|min| mean >= min) && expected.max.is_none_or(|max| mean <= max);
+    Outcome { passed, expected: range, found: Span(mean).to_string(), ..Outcome::number("delay", what, "s", &bounds, mean.as_secs_f64()) }
 }
 
 fn selected(link: LinkSelector, summary: &Summary) -> Vec<LinkStats> {
@@ -146,15 +149,5 @@ fn link_name(link: LinkSelector, scene: &Scene) -> String {
         LinkSelector::Between { from, to } => LinkName::between(name(from), name(to)).as_str().into(),
         LinkSelector::Uplink(peer) => LinkName::uplink(name(peer)).as_str().into(),
         LinkSelector::Downlink(peer) => LinkName::downlink(name(peer)).as_str().into(),
-    }
-}
-
-fn range(bounds: &Bounds, unit: &str) -> String {
-    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-    match (bounds.min, bounds.max) {
-        (Some(min), Some(max)) => format!("{min} to {max}{unit}"),
-        (Some(min), None) => format!("at least {min}{unit}"),
-        (None, Some(max)) => format!("at most {max}{unit}"),
-        (None, None) => "any number".into(),
     }
 }

@@ -1,8 +1,10 @@
 //! Whether a scene does what its `[expect]` says.
 
 mod expectations;
+mod outcome;
 mod stability;
 
+pub use outcome::{Finding, Outcome};
 pub use stability::{Stability, stability};
 
 use std::convert::Infallible;
@@ -10,7 +12,7 @@ use std::convert::Infallible;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use crate::{Ending, Model, Observer, Simulation, TickRow};
+use crate::{Ending, Model, Observer, Simulation, Summary, TickRow};
 use expectations::Watched;
 
 /// Runs a scene and gives one line for each expectation that does not hold, in the order of the file's sections; empty if all hold.
@@ -21,46 +23,98 @@ use expectations::Watched;
 /// line that says so.
 #[must_use]
 pub fn check(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) -> Vec<String> {
-    check_with(scene, model, |_, _| Judged::Unknown, keep_going)
+    check_with(scene, model, |_, _| Judged::Unknown, keep_going).failures()
 }
 
 /// What a caller knows of whether a scene is as stable as it is expected to be.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub enum Judged {
-    /// It is.
-    AsExpected,
-    /// It is not, or that cannot be told: a line that says so.
-    Otherwise(String),
+    /// What was found.
+    Found(Finding),
     /// Nothing: a simulation tells.
     Unknown,
 }
 
-/// [`check`], where `judge` is asked first whether the scene is stable (`true`) or unstable (`false`), as expected.
+/// What came out of a check.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Checked {
+    /// Of each expectation, in the order of the file's sections.
+    pub outcomes: Vec<Outcome>,
+    /// Why the scene could not be checked; `None` if it was.
+    pub unchecked: Option<String>,
+}
+
+impl Checked {
+    /// One line for each expectation that does not hold, after the reason why the scene could not be checked.
+    #[must_use]
+    pub fn failures(&self) -> Vec<String> {
+        self.unchecked.iter().cloned().chain(self.outcomes.iter().filter_map(Outcome::failure)).collect()
+    }
+}
+
+/// [`check`] with what came out of each expectation, where `judge` is asked first whether the scene is stable (`true`) or unstable (`false`), as expected.
 #[must_use]
-pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) -> Judged, mut keep_going: impl FnMut() -> bool) -> Vec<String> {
+pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) -> Judged, mut keep_going: impl FnMut() -> bool) -> Checked {
     let Some(expect) = &scene.expect else {
-        return Vec::new();
+        return Checked::default();
     };
+    let unchecked = |reason: String| Checked { outcomes: Vec::new(), unchecked: Some(reason) };
     if let Some(reason) = crate::too_large(scene) {
-        return vec![reason];
+        return unchecked(reason);
     }
     let mut observer = Watching { watched: Watched::new(scene, expect), keep_going: &mut keep_going };
     let Ok(summary) = Simulation::new(scene, model).run(&mut observer);
     let watched = observer.watched;
-    let mut failures = Vec::new();
     if let Ending::Interrupted(at) = summary.ending {
-        failures.push(format!("interrupted at {at}"));
-        return failures;
+        return unchecked(format!("interrupted at {at}"));
     }
+    let mut outcomes = Vec::new();
     if let Some(expected) = expect.stable {
-        match judge(scene, expected) {
-            Judged::AsExpected => {}
-            Judged::Otherwise(failure) => failures.push(failure),
-            Judged::Unknown => failures.extend(stability(scene, model, &mut keep_going).failure(expected)),
+        let finding = match judge(scene, expected) {
+            Judged::Found(finding) => finding,
+            Judged::Unknown => stability(scene, model, &mut keep_going).finding(expected),
+        };
+        outcomes.push(Outcome::stability(expected, finding));
+    }
+    outcomes.extend(watched.outcomes(scene, expect, &summary));
+    Checked { outcomes, unchecked: None }
+}
+
+/// Watches a run for the expectations that a single run can answer: all but `stable`.
+#[derive(Debug)]
+pub struct ExpectationWatch<'a> {
+    scene: &'a Scene,
+    watched: Option<Watched>,
+}
+
+impl<'a> ExpectationWatch<'a> {
+    /// Before the run.
+    #[must_use]
+    pub fn new(scene: &'a Scene) -> Self {
+        Self { scene, watched: scene.expect.as_ref().map(|expect| Watched::new(scene, expect)) }
+    }
+
+    /// Whether the run must be watched tick by tick.
+    #[must_use]
+    pub fn wants_ticks(&self) -> bool {
+        self.watched.as_ref().is_some_and(Watched::wants_ticks)
+    }
+
+    /// What the observer of the run is shown.
+    pub fn on_tick(&mut self, row: &TickRow<'_>) {
+        if let Some(watched) = &mut self.watched {
+            watched.on_tick(row);
         }
     }
-    failures.extend(watched.failures(scene, expect, &summary));
-    failures
+
+    /// What came out; nothing of a run that was interrupted.
+    #[must_use]
+    pub fn outcomes(&self, summary: &Summary) -> Vec<Outcome> {
+        match (&self.watched, &self.scene.expect) {
+            (Some(watched), Some(expect)) if !matches!(summary.ending, Ending::Interrupted(_)) => watched.outcomes(self.scene, expect, summary),
+            _ => Vec::new(),
+        }
+    }
 }
 
 /// Watches what expectations are about.

@@ -13,6 +13,7 @@ use cohaptic_peer::coordination::LawStrategy;
 use cohaptic_scene::{Axes, Scene};
 use cohaptic_units::Instant;
 
+use super::Finding;
 use crate::disturbance::Disturbance;
 use crate::observer::NoObserver;
 use crate::plan::{Model, Plan};
@@ -37,21 +38,20 @@ pub enum Stability {
 }
 
 impl Stability {
-    /// A line that says why this is not what was expected, `None` if it is.
+    /// What was found, where the scene is expected to be `stable`, or not.
     #[must_use]
-    pub fn failure(self, stable: bool) -> Option<String> {
-        let expected = if stable { "stable" } else { "unstable" };
-        match self {
-            Self::Stable if stable => None,
-            Self::Unstable if !stable => None,
-            Self::Stable => Some(format!("expected {expected}, but a small disturbance dies out")),
-            Self::Unstable => Some(format!("expected {expected}, but a small disturbance grows")),
-            Self::Undecided { ratio } => Some(format!(
-                "expected {expected}, but that cannot be told within the scene's duration: from its second to its last quarter a small disturbance \
-                 changes by a factor of {ratio:.3}; a longer duration decides"
-            )),
-            Self::Interrupted => Some("interrupted".into()),
-        }
+    pub fn finding(self, stable: bool) -> Finding {
+        let passed = matches!((self, stable), (Self::Stable, true) | (Self::Unstable, false));
+        let found = match self {
+            Self::Stable => "a small disturbance dies out".to_owned(),
+            Self::Unstable => "a small disturbance grows".to_owned(),
+            Self::Undecided { ratio } => format!(
+                "that cannot be told within the scene's duration: from its second to its last quarter a small disturbance changes by a factor of {ratio:.3}; \
+                 a longer duration decides"
+            ),
+            Self::Interrupted => "the simulation was interrupted".to_owned(),
+        };
+        Finding { passed, found, radius: None }
     }
 }
 

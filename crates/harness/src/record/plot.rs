@@ -31,9 +31,9 @@ pub(crate) struct Panel<'a> {
 const MOST_NAMED: usize = 10;
 
 /// Writes a picture.
-pub(crate) fn write(path: PathBuf, picture: &Picture) -> Result<PathBuf, RecordError> {
+pub(crate) fn write(path: PathBuf, svg: &str) -> Result<PathBuf, RecordError> {
     let mut file = PartialFile::create(path)?;
-    file.write(picture.svg().as_bytes())?;
+    file.write(svg.as_bytes())?;
     file.finish()
 }
 

@@ -78,8 +78,18 @@ impl Recorder {
     ///
     /// [`RecordError`] if a file cannot be written.
     pub fn finish(self, summary: &Summary) -> Result<Vec<PathBuf>, RecordError> {
+        self.finish_with_pictures(summary).map(|(files, _)| files)
+    }
+
+    /// [`finish`](Self::finish), with the pictures of the files under the names of the files.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError`] if a file cannot be written.
+    pub fn finish_with_pictures(self, summary: &Summary) -> Result<(Vec<PathBuf>, Vec<(&'static str, String)>), RecordError> {
         let Self { folder, title, names, trajectory, packets, plotted, size } = self;
         let mut files = vec![trajectory.finish()?, packets.finish()?, links::write(&folder, summary)?];
+        let mut pictures = Vec::new();
         for (file, bands, what, axis, scale, sane) in [
             ("positions.svg", &plotted.positions, "position of each copy", Axis::new("Position").symbol("x_O").unit("cm"), 100.0, SANE_POSITION),
             (
@@ -96,10 +106,13 @@ impl Recorder {
             let panel = |(along, bands)| Panel { title: heading(along), axis: axis.clone(), names: &names, bands, scale, sane };
             let panels: Vec<Panel<'_>> = by_axis.iter().enumerate().map(panel).collect();
             let plot = Plot { title: format!("{title}: {what}"), panels };
-            files.push(plot::write(folder.join(file), &plot.picture().size(size))?);
+            pictures.push((file, plot.picture().size(size).svg()));
         }
-        files.push(plot::write(folder.join("network.svg"), &plotted.network.picture(&title, &names).size(size))?);
-        Ok(files)
+        pictures.push(("network.svg", plotted.network.picture(&title, &names).size(size).svg()));
+        for (file, svg) in &pictures {
+            files.push(plot::write(folder.join(file), svg)?);
+        }
+        Ok((files, pictures))
     }
 }
 

@@ -2,13 +2,13 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_picture::{Axis, Line, Look, Panel, Picture};
+use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
 
 use super::admittance::{Curve, MASS, Responses};
 use super::{Figure, Table};
 use crate::case::{Case, Strategy};
 
-pub(super) fn figure(responses: &Responses) -> Figure {
+pub(super) fn figure(responses: &Responses, size: Size) -> Figure {
     let title = "Figure 5: admittance of the object, KT = 1000 N/m, BT = 5 N·s/m, Td = Tn = 8 ms".to_owned();
     let panels = [panel(responses, true, true), panel(responses, false, true), panel(responses, true, false), panel(responses, false, false)];
     let caption = format!(
@@ -18,7 +18,7 @@ pub(super) fn figure(responses: &Responses) -> Figure {
     );
     Figure {
         id: "fig-5".to_owned(),
-        svg: Picture::new(title.as_str()).columns(2).panels(panels).svg(),
+        svg: Picture::new(title.as_str()).columns(2).panels(panels).size(size).svg(),
         title,
         caption,
         table: table(responses),

@@ -6,6 +6,8 @@ mod regions;
 mod stability_test;
 mod travel;
 
+use cohaptic_picture::Size;
+
 use crate::experiment::{StabilityTest, Travel};
 use crate::region::Atlas;
 use admittance::Responses;
@@ -42,11 +44,11 @@ impl Table {
     }
 }
 
-/// All figures, in the order of the paper.
-pub(crate) fn all(atlas: &Atlas, responses: &Responses, tests: &[StabilityTest], travels: &[Travel]) -> Vec<Figure> {
-    let mut figures = regions::figures(atlas);
-    figures.push(bode::figure(responses));
-    figures.extend(crate::experiment::DELAYS_MS.map(|delay_ms| stability_test::figure(tests, delay_ms)));
-    figures.extend(crate::experiment::DELAYS_MS.map(|delay_ms| travel::figure(travels, delay_ms)));
+/// All figures, drawn in this size, in the order of the paper.
+pub(crate) fn all(atlas: &Atlas, responses: &Responses, tests: &[StabilityTest], travels: &[Travel], size: Size) -> Vec<Figure> {
+    let mut figures = regions::figures(atlas, size);
+    figures.push(bode::figure(responses, size));
+    figures.extend(crate::experiment::DELAYS_MS.map(|delay_ms| stability_test::figure(tests, delay_ms, size)));
+    figures.extend(crate::experiment::DELAYS_MS.map(|delay_ms| travel::figure(travels, delay_ms, size)));
     figures
 }

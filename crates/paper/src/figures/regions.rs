@@ -2,21 +2,21 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_picture::{Axis, Line, Look, Panel, Picture};
+use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
 
 use super::{Figure, Table};
 use crate::case::Strategy;
 use crate::region::{Atlas, HIGHEST, PEERS, Setting};
 use crate::text::{percent, percents};
 
-pub(super) fn figures(atlas: &Atlas) -> Vec<Figure> {
+pub(super) fn figures(atlas: &Atlas, size: Size) -> Vec<Figure> {
     let of = |id: &str, number: &str, damping: f64| {
         let settings: Vec<Setting> = Setting::all().into_iter().filter(|setting| (setting.damping - damping).abs() < 0.5).collect();
         let title = format!("Figure {number}: stability regions, BT = BC = {damping} N·s/m");
         let panels: Vec<Panel> = settings.iter().flat_map(|setting| Strategy::BOTH.map(|strategy| panel(atlas, *setting, strategy))).collect();
         Figure {
             id: id.to_owned(),
-            svg: Picture::new(title.as_str()).columns(2).aspect(1.0).panels(panels).svg(),
+            svg: Picture::new(title.as_str()).columns(2).aspect(1.0).panels(panels).size(size).svg(),
             title,
             caption: caption(atlas, &settings),
             table: table(atlas, &settings),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_picture::{Axis, Line, Look, Panel, Picture};
+use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
 
 use super::{Figure, Table};
 use crate::case::Strategy;
@@ -12,7 +12,7 @@ use crate::experiment::{PeerTrace, StabilityTest};
 const POSITION_CM: (f64, f64) = (-4.0, 4.0);
 const FORCE_N: (f64, f64) = (-6.0, 6.0);
 
-pub(super) fn figure(tests: &[StabilityTest], delay_ms: u32) -> Figure {
+pub(super) fn figure(tests: &[StabilityTest], delay_ms: u32, size: Size) -> Figure {
     let title = format!("Figure 7: three users at KT = 2100 N/m, {delay_ms} ms one way");
     let shown: Vec<&StabilityTest> = [(Strategy::Pd, true), (Strategy::Ap, true), (Strategy::Pd, false), (Strategy::Ap, false)]
         .iter()
@@ -43,7 +43,7 @@ pub(super) fn figure(tests: &[StabilityTest], delay_ms: u32) -> Figure {
     );
     Figure {
         id: format!("fig-7-{delay_ms}ms"),
-        svg: Picture::new(title.as_str()).columns(2).panels(panels).svg(),
+        svg: Picture::new(title.as_str()).columns(2).panels(panels).size(size).svg(),
         title,
         caption,
         table,

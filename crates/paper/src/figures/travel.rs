@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_picture::{Axis, Line, Look, Panel, Picture};
+use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
 
 use super::{Figure, Table};
 use crate::case::Strategy;
@@ -12,7 +12,7 @@ use crate::text::seconds;
 /// What the paper measured for 20 mm [s].
 const PAPER: [(Strategy, &str); 2] = [(Strategy::Pd, "1.514 s"), (Strategy::Ap, "1.22 s")];
 
-pub(super) fn figure(travels: &[Travel], delay_ms: u32) -> Figure {
+pub(super) fn figure(travels: &[Travel], delay_ms: u32, size: Size) -> Figure {
     let title = format!("Figure 8: pushed with 1.5 N, KT = 1000 N/m, {delay_ms} ms one way");
     let find = |strategy| travels.iter().find(|travel| travel.strategy == strategy && travel.delay_ms == delay_ms);
     let shown: Vec<(&Travel, &str)> = PAPER.iter().filter_map(|(strategy, paper)| Some((find(*strategy)?, *paper))).collect();
@@ -40,7 +40,7 @@ pub(super) fn figure(travels: &[Travel], delay_ms: u32) -> Figure {
     );
     Figure {
         id: format!("fig-8-{delay_ms}ms"),
-        svg: Picture::new(title.as_str()).columns(2).panels(panels).svg(),
+        svg: Picture::new(title.as_str()).columns(2).panels(panels).size(size).svg(),
         title,
         caption,
         table,

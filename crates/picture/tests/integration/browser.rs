@@ -1,6 +1,7 @@
 //! The gallery in a browser, where there is one.
 
-use cohaptic_picture::testing::{faults, in_browser};
+use cohaptic_picture::page::{Html, Mark, Page};
+use cohaptic_picture::testing::{Scheme, computed_colours, faults, in_browser, page_in_browser};
 
 use crate::gallery::gallery;
 
@@ -19,4 +20,61 @@ fn a_browser_shows_every_text_of_every_kind_of_picture_inside_and_apart() {
         Some(found) => assert!(found.is_empty(), "in the browser:\n{}", found.join("\n")),
         None => eprintln!("skipped: there is no chromium"),
     }
+}
+
+/// A page with one picture of each kind and each mark.
+fn page() -> String {
+    let pictures = gallery().into_iter().filter(|(name, _)| name.ends_with("-page"));
+    let figures = pictures.fold(Html::default(), |before, (name, picture)| before.and(Html::figure(&name, Html::picture(&picture.svg()))));
+    let marks = [(Mark::Good, "good"), (Mark::Partly, "partly"), (Mark::Bad, "bad")].map(|(mark, word)| Html::mark(mark, word));
+    Page::new("Each kind of picture").with(Html::list(marks)).with(Html::warning("A warning")).with(figures).html()
+}
+
+/// What a reader sees, not what the style sheet says: a rule that no browser reads would change nothing.
+#[test]
+fn a_browser_draws_other_colours_for_readers_who_prefer_dark() {
+    let folder = tempfile::tempdir().unwrap();
+    let colours = |scheme| computed_colours(folder.path(), &page(), scheme);
+    let (Some(light), Some(dark)) = (colours(Scheme::Light), colours(Scheme::Dark)) else {
+        eprintln!("skipped: there is no chromium");
+        return;
+    };
+    let of = |lines: &[String], element: &str| -> Vec<String> {
+        let line = lines.iter().find(|line| line.split('|').next() == Some(element)).unwrap_or_else(|| panic!("no {element} in {lines:?}"));
+        line.split('|').skip(1).map(str::to_owned).collect()
+    };
+    // Fill, stroke, text and ground. #fff and #14181d are the grounds; #0072b2 and #4aa8e8 the first line.
+    for (element, place, on_white, on_black) in [
+        ("rect.paper", 0, "rgb(255, 255, 255)", "rgb(20, 24, 29)"),
+        ("body.", 3, "rgb(255, 255, 255)", "rgb(20, 24, 29)"),
+        ("text.ink", 0, "rgb(27, 31, 36)", "rgb(230, 233, 236)"),
+        ("path.line s0", 1, "rgb(0, 114, 178)", "rgb(74, 168, 232)"),
+        ("path.f1", 0, "rgb(213, 94, 0)", "rgb(255, 130, 55)"),
+        ("path.hatching", 1, "rgb(87, 96, 106)", "rgb(163, 171, 180)"),
+        ("b.bad", 2, "rgb(155, 28, 28)", "rgb(255, 143, 143)"),
+    ] {
+        assert_eq!((of(&light, element)[place].as_str(), of(&dark, element)[place].as_str()), (on_white, on_black), "{element}");
+    }
+    // Colours of cells mean values, and hatchings are patterns whose path is looked at above; whatever else a picture draws changes.
+    let drawn = |element: &str| ["path.", "rect.", "circle.", "text."].iter().any(|kind| element.starts_with(kind));
+    let mut seen = 0;
+    for element in light.iter().filter_map(|line| line.split('|').next()).filter(|element| drawn(element)) {
+        if !["cells", "hatch", "back-hatch"].iter().any(|class| element.ends_with(&format!(".{class}"))) {
+            assert_ne!(of(&light, element)[..2], of(&dark, element)[..2], "{element} looks alike in both");
+            seen += 1;
+        }
+    }
+    assert!(seen >= 20, "{seen}");
+}
+
+#[test]
+fn a_browser_shows_pages_without_scrolling_sideways_and_texts_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(found) = page_in_browser(folder.path(), &page()) else {
+        eprintln!("skipped: there is no chromium");
+        return;
+    };
+    assert_eq!(found, [""; 0]);
+    let wide = page().replace("<main>", "<main style=\"width:3000px;max-width:none\">");
+    assert!(page_in_browser(folder.path(), &wide).unwrap().iter().any(|fault| fault.starts_with("the page is wider")));
 }

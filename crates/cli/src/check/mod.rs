@@ -1,11 +1,13 @@
 //! `cohaptic check`.
 
+mod page;
+
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use cohaptic_harness::check::Judged;
+use cohaptic_harness::check::{Finding, Judged};
 use cohaptic_harness::{Model, check as harness};
 use cohaptic_scene::{Scene, SceneError, scene_files};
 use cohaptic_stability::{AnalysisError, Limits, Method, NOMINAL, QUICK_UNKNOWNS, Verdict, has_chance, judge_watched};
@@ -15,7 +17,9 @@ use serde::Serialize;
 use crate::analysis_watch::{Interruptible, OPERATIONS_A_SECOND};
 use crate::arguments::CheckArguments;
 use crate::document_schema::DocumentSchema;
+use crate::expectations::OutcomeDocument;
 use crate::failure::{self, EXPECTATION, Failure, INTERRUPTED, scene_status};
+use crate::output_file::write_file;
 use crate::progress::Progress;
 use crate::{input, interrupt, output};
 
@@ -29,6 +33,8 @@ struct Checked {
     file: String,
     passed: bool,
     failures: Vec<String>,
+    /// What came out of each expectation; empty if the scene could not be checked.
+    expectations: Vec<OutcomeDocument>,
     /// What was told in another way than it could be with more time.
     notes: Vec<String>,
     /// Whether the scene has an `[expect]` at all.
@@ -83,7 +89,13 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     interrupt::kept();
     progress.clear();
     let status = scenes.iter().map(|scene| scene.status).max().unwrap_or(0);
+    // What was checked is printed even if the disk is full.
+    let written = arguments.page.as_ref().map_or(Ok(()), |file| write_file(file, page::html(&scenes, &arguments.overrides.set)));
     print(scenes, arguments.json)?;
+    written?;
+    if !arguments.json {
+        output::wrote(&arguments.page);
+    }
     Ok(ExitCode::from(if interrupt::asked() { INTERRUPTED } else { status }))
 }
 
@@ -108,10 +120,12 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
             }
             let notes = RefCell::new(Vec::new());
             let judged = |scene: &Scene, stable: bool| judged(scene, stable, |note| notes.borrow_mut().push(note));
-            let failures = harness::check_with(&scene, model, judged, || !interrupt::asked());
+            let checked = harness::check_with(&scene, model, judged, || !interrupt::asked());
+            let failures = checked.failures();
+            let expectations = checked.outcomes.iter().map(OutcomeDocument::new).collect();
             let status = if failures.is_empty() { 0 } else { EXPECTATION };
             let (file, expects) = (output::path(input::named(file)), scene.expect.is_some());
-            Checked { file, passed: failures.is_empty(), failures, notes: notes.into_inner(), expects, status }
+            Checked { file, passed: failures.is_empty(), failures, expectations, notes: notes.into_inner(), expects, status }
         }
     }
 }
@@ -128,7 +142,9 @@ fn judged(scene: &Scene, stable: bool, note: impl FnOnce(String)) -> Judged {
     let limits = Limits { unknowns: QUICK_UNKNOWNS, operations: QUICK * OPERATIONS_A_SECOND, watch: &Interruptible };
     let judgement = match judge_watched(scene, Method::Reduced, &limits) {
         Ok(judgement) => judgement,
-        Err(AnalysisError::Stopped) => return Judged::Otherwise("interrupted before its stability was known".to_owned()),
+        Err(AnalysisError::Stopped) => {
+            return Judged::Found(Finding { passed: false, found: "the analysis was interrupted".to_owned(), radius: None });
+        }
         Err(_) => return Judged::Unknown,
     };
     let refused = judgement.analysis.notes.iter().find_map(|note| note.strip_prefix(NOMINAL));
@@ -145,23 +161,23 @@ fn judged(scene: &Scene, stable: bool, note: impl FnOnce(String)) -> Judged {
         None => (judgement.analysis.radius, "spectral radius"),
     };
     let expected = if stable { Verdict::Stable } else { Verdict::Unstable };
-    if judgement.verdict == expected {
-        return Judged::AsExpected;
-    }
-    let (expected, found) = (expected.word(), judgement.verdict.word());
-    Judged::Otherwise(format!("expected {expected}, but it is {found}: the {what} is {} within {:.1e}", radius.value, radius.error))
+    let found = format!("it is {}: the {what} is {} within {:.1e}", judgement.verdict.word(), radius.value, radius.error);
+    Judged::Found(Finding { passed: judgement.verdict == expected, found, radius: Some(radius.value).filter(|value| value.is_finite()) })
 }
 
 impl Checked {
     fn unreadable(path: &Path, error: &SceneError) -> Self {
-        let failures = vec![error.to_string()];
-        Self { file: output::path(input::named(path)), passed: false, failures, notes: Vec::new(), expects: false, status: scene_status(error) }
+        Self::unchecked(path, error.to_string(), scene_status(error))
     }
 
     /// What nothing is known of, because the user asked for the end first.
     fn interrupted(path: &Path) -> Self {
-        let failures = vec!["interrupted before it was checked".to_owned()];
-        Self { file: output::path(input::named(path)), passed: false, failures, notes: Vec::new(), expects: false, status: INTERRUPTED }
+        Self::unchecked(path, "interrupted before it was checked".to_owned(), INTERRUPTED)
+    }
+
+    fn unchecked(path: &Path, reason: String, status: u8) -> Self {
+        let (file, failures) = (output::path(input::named(path)), vec![reason]);
+        Self { file, passed: false, failures, expectations: Vec::new(), notes: Vec::new(), expects: false, status }
     }
 
     const fn is_interrupted(&self) -> bool {

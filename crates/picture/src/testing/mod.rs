@@ -1,10 +1,15 @@
 //! Checks for tests of pictures: of any command, drawn by this crate.
 //!
 //! [`faults`] reads a document and computes where each text is with the widest of the common fonts. [`in_browser`] asks Chromium, where there is one.
+//! [`colour_faults`] reads the colours of pictures and pages, light and dark.
 
-use std::fmt::Write as _;
-use std::path::Path;
-use std::process::{Command, Stdio};
+mod browser;
+mod colours;
+mod page;
+
+pub use browser::{Scheme, computed_colours, in_browser, page_in_browser};
+pub use colours::{colour_faults, contrast};
+pub use page::page_faults;
 
 use crate::advance::advance;
 use crate::text::SMALL;
@@ -104,58 +109,4 @@ fn estimated(node: roxmltree::Node<'_, '_>) -> TextBox {
         [x + left, y - above, x + left + width, y + below]
     };
     TextBox { text, sides }
-}
-
-/// What a browser says of these pictures, each under its name: [`misplaced`] with the boxes that it gives. `None` where there is no `chromium` on the path.
-///
-/// A folder for the page and for what the browser keeps is needed, which is the caller's to remove.
-///
-/// # Panics
-///
-/// If the browser does not start or gives no answer.
-#[must_use]
-pub fn in_browser(folder: &Path, pictures: &[(String, String)]) -> Option<Vec<String>> {
-    let found = Command::new("chromium").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success());
-    if !found {
-        return None;
-    }
-    let mut page = "<!doctype html><meta charset=\"utf-8\"><body>".to_owned();
-    for (name, svg) in pictures {
-        let _ = write!(page, "<div data-name=\"{}\">{svg}</div>", crate::escape(name));
-    }
-    // Boxes in the units of the picture, as lines of numbers and a text.
-    page.push_str(
-        "<pre id=answer></pre><script>let lines=[];for(const [n,div] of [...document.querySelectorAll('div[data-name]')].entries()){const svg=div.firstElementChild,\
-         o=svg.getBoundingClientRect(),v=svg.viewBox.baseVal,k=v.width/o.width;for(const t of svg.querySelectorAll('text')){const b=t.getBoundingClientRect();\
-         lines.push([n,(b.left-o.left)*k,(b.top-o.top)*k,(b.right-o.left)*k,(b.bottom-o.top)*k,v.width,v.height].map(x=>x.toFixed(3)).join(' ')+' '+\
-         encodeURIComponent(t.textContent))}}document.getElementById('answer').textContent='BEGIN\\n'+lines.join('\\n')+'\\nEND'</script>",
-    );
-    let file = folder.join("pictures.html");
-    std::fs::write(&file, page).expect("the page can be written");
-    let output = Command::new("chromium")
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-component-update"])
-        .args(["--disable-sync", "--dump-dom"])
-        .arg(format!("--user-data-dir={}", folder.join("browser").display()))
-        .arg(format!("file://{}", file.display()))
-        .stderr(Stdio::null())
-        .output()
-        .expect("the browser starts");
-    let text = String::from_utf8_lossy(&output.stdout);
-    let answer = text.split_once("BEGIN\n").and_then(|(_, rest)| rest.split_once("\nEND")).expect("the browser has run the script").0;
-    let rows: Vec<(Vec<f64>, &str)> =
-        answer.lines().map(|line| (line.split(' ').take(7).filter_map(|word| word.parse().ok()).collect(), line)).collect();
-    let mut faults = Vec::new();
-    for (number, (name, svg)) in pictures.iter().enumerate() {
-        let own: Vec<_> = rows.iter().filter(|(row, _)| row.len() == 7 && (row[0] - crate::content::count(number)).abs() < 0.5).collect();
-        if own.len() != svg.matches("<text ").count() {
-            faults.push(format!("{name}: the browser shows {} of {} texts", own.len(), svg.matches("<text ").count()));
-        }
-        let texts: Vec<TextBox> = own
-            .iter()
-            .map(|(row, line)| TextBox { text: line.rsplit(' ').next().unwrap_or_default().to_owned(), sides: [row[1], row[2], row[3], row[4]] })
-            .collect();
-        let size = own.first().map_or((0.0, 0.0), |(row, _)| (row[5], row[6]));
-        faults.extend(misplaced(&texts, size).into_iter().map(|fault| format!("{name}: {fault}")));
-    }
-    Some(faults)
 }

@@ -1,0 +1,53 @@
+//! Expectations of scenes and what came out: as JSON and as a table on a page.
+
+use cohaptic_harness::check::Outcome;
+use cohaptic_picture::Gauge;
+use cohaptic_picture::page::{Html, Mark, Table};
+use serde::Serialize;
+
+/// One expectation and what came out.
+#[derive(Clone, Serialize)]
+pub(crate) struct OutcomeDocument {
+    expectation: &'static str,
+    name: String,
+    unit: &'static str,
+    low: Option<f64>,
+    high: Option<f64>,
+    measured: Option<f64>,
+    passed: bool,
+    expected: String,
+    found: String,
+}
+
+impl OutcomeDocument {
+    pub(crate) fn new(outcome: &Outcome) -> Self {
+        let Outcome { key, name, unit, low, high, measured, passed, expected, found, .. } = outcome.clone();
+        Self { expectation: key, name, unit, low, high, measured, passed, expected, found }
+    }
+
+    pub(crate) const fn passed(&self) -> bool {
+        self.passed
+    }
+
+    /// The cells of a row: verdict, expectation, what was expected, what came out, and both as a bar.
+    pub(crate) fn cells(&self) -> [Html; 5] {
+        let Self { name, low, high, measured, passed, expected, found, .. } = self;
+        let gauge = Gauge { low: *low, high: *high, measured: *measured, passed: *passed };
+        let bar = if low.is_some() || high.is_some() { Html::gauge(&gauge) } else { Html::text("no number") };
+        [verdict(*passed), name.as_str().into(), expected.as_str().into(), found.as_str().into(), bar]
+    }
+}
+
+/// A verdict that is read without colours too.
+pub(crate) fn verdict(passed: bool) -> Html {
+    if passed { Html::mark(Mark::Good, "✓ passed") } else { Html::mark(Mark::Bad, "✗ FAILED") }
+}
+
+/// The columns of [`OutcomeDocument::cells`].
+pub(crate) fn columns() -> Table {
+    Table::new().column("verdict").column("expectation").column("expected").column("came out").column("limits and value")
+}
+
+/// What the bars of such a table mean.
+pub(crate) const BARS: &str = "All bars have one axis: the lower limit lies at the left mark and the upper limit at the right one, and grey is what is expected. The value that came out is a \
+    disc where it passed and a cross where it failed; beyond the axis it is a triangle at the end. Where there is one limit, zero, or twice a lower limit, lies where the other mark would be.";

@@ -1,0 +1,149 @@
+//! `run.html`: a run on one page.
+
+use std::collections::BTreeMap;
+
+use cohaptic_harness::check::Outcome;
+use cohaptic_harness::record::SANE_POSITION;
+use cohaptic_harness::{Ending, Summary};
+use cohaptic_picture::page::{Html, Page, Table};
+use cohaptic_scene::{Scene, scene_content_of_text};
+use cohaptic_units::print::{Counted, Span};
+use cohaptic_wan::{DropCause, LinkName, LinkStats};
+
+use super::command;
+use super::words::{length, packets};
+use crate::arguments::RunArguments;
+use crate::expectations::{BARS, OutcomeDocument, columns};
+use crate::failure::Failure;
+use crate::{input, output};
+
+/// More rows of a table stand in a file of the folder only.
+const MOST_ROWS: usize = 400;
+
+/// The page. It depends on the scene and what the command says of it, on nothing else.
+pub(super) fn html(
+    arguments: &RunArguments,
+    scene: &Scene,
+    overrides: &[String],
+    summary: &Summary,
+    outcomes: &[Outcome],
+    pictures: &[(&'static str, String)],
+) -> Result<String, Failure> {
+    let path = &arguments.scene.scene;
+    let text = input::text(path)?;
+    let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
+    let mut page = Page::new(scene.title.as_str()).with(ending(scene, summary)).with(Html::facts(facts(arguments, scene, overrides, summary)));
+    page = page.with(Html::heading(2, "Made by")).with(Html::preformatted(&command::line(arguments)));
+    page = page.with(expectations(scene, outcomes)).with(Html::heading(2, "Pictures"));
+    for (file, svg) in pictures {
+        page = page.with(Html::figure(file, Html::picture(svg)));
+    }
+    page = page.with(Html::heading(2, "Peers")).with(peers(scene, summary)).with(Html::heading(2, "Links")).with(links(summary));
+    let edits = edits(&content.keys);
+    if !edits.is_empty() {
+        page = page.with(Html::heading(2, "Timeline")).with(Html::table(&edits));
+    }
+    let said = "The file as it was read; overrides are not in it.";
+    page = page.with(Html::heading(2, "Scene")).with(Html::details("The text of the scene", Html::paragraph(said).and(Html::preformatted(&text))));
+    Ok(page.html())
+}
+
+/// A warning where the run did not come to its end.
+fn ending(scene: &Scene, summary: &Summary) -> Html {
+    match summary.ending {
+        Ending::Complete => Html::default(),
+        Ending::Diverged(at) => Html::warning(format!("DIVERGED: at {at} a position or a velocity is no finite number any more.")),
+        Ending::Interrupted(_) => Html::warning(format!("INTERRUPTED after {} of {}.", Span(summary.duration), Span(scene.duration))),
+    }
+}
+
+fn facts<'a>(arguments: &RunArguments, scene: &Scene, overrides: &[String], summary: &Summary) -> Vec<(&'a str, Html)> {
+    let apart = if summary.max_discrepancy > SANE_POSITION { ": they came apart" } else { "" };
+    let mut facts = vec![
+        ("Simulated", format!("{}, {}", Span(summary.duration), Counted(summary.ticks, "tick")).into()),
+        ("Largest discrepancy between two copies", format!("{}{apart}", length(summary.max_discrepancy)).into()),
+        ("Packets", packets(summary).into()),
+        ("Scene", Html::code(&output::path(input::named(&arguments.scene.scene)))),
+        ("Seed", scene.seed.to_string().into()),
+        ("Fingerprint of the scene", Html::code(&scene.clone().fingerprint().to_string())),
+    ];
+    if !overrides.is_empty() {
+        let keys = overrides.iter().map(|key| Html::code(key));
+        facts.push(("Overrides", keys.reduce(|before, key| before.and(", ").and(key)).unwrap_or_default()));
+    }
+    facts
+}
+
+fn expectations(scene: &Scene, outcomes: &[Outcome]) -> Html {
+    let Some(expect) = &scene.expect else { return Html::default() };
+    let mut content = Html::heading(2, "Expectations");
+    if !outcomes.is_empty() {
+        let table = outcomes.iter().fold(columns(), |table, outcome| table.row(OutcomeDocument::new(outcome).cells()));
+        content = content.and(Html::paragraph(BARS)).and(Html::table(&table));
+    }
+    if let Some(stable) = expect.stable {
+        let word = if stable { "stable" } else { "unstable" };
+        content = content.and(Html::paragraph(
+            Html::text(&format!("The scene is expected to be {word}, which one run cannot tell: ")).and(Html::code("cohaptic check")).and(" can."),
+        ));
+    }
+    content
+}
+
+fn peers(scene: &Scene, summary: &Summary) -> Html {
+    let axes = ["x", "y", "z"].into_iter().take(scene.axes.count());
+    let head = axes.clone().fold(Table::new().column("peer"), |table, axis| table.number(format!("{axis} at the end [mm]")));
+    let head = axes.fold(head, |table, axis| table.number(format!("velocity along {axis} [mm/s]")));
+    let head = head.number("samples too late").number("samples refused");
+    let shown = summary.peers.iter().take(MOST_ROWS).fold(head, |table, peer| {
+        let millimetres = |value: &f64| Html::text(&number(1e3 * value));
+        let motion = peer.position.iter().chain(&peer.velocity).map(millimetres);
+        let counts = [peer.stale_samples, peer.refused_samples].map(|count| Html::text(&count.to_string()));
+        table.row(std::iter::once(Html::text(&peer.name)).chain(motion).chain(counts))
+    });
+    Html::table(&shown).and(more(summary.peers.len(), "peers", "trajectory.csv"))
+}
+
+fn links(summary: &Summary) -> Html {
+    let name = |peer: usize| &summary.peers[peer].name;
+    let access = summary.access_lines.iter().map(|line| {
+        let link = if line.uplink { LinkName::uplink(name(line.peer)) } else { LinkName::downlink(name(line.peer)) };
+        (link, line.stats)
+    });
+    let between = summary.links.iter().map(|link| (LinkName::between(name(link.from), name(link.to)), link.stats));
+    let all: Vec<(LinkName, LinkStats)> = access.chain(between).collect();
+    // Causes that dropped nothing would make the table wide.
+    let causes: Vec<DropCause> = DropCause::ALL.into_iter().filter(|cause| all.iter().any(|(_, stats)| stats.dropped(*cause) > 0)).collect();
+    let head = Table::new().column("link").number("offered").number("copies").number("delivered");
+    let head = causes.iter().fold(head, |table, cause| table.number(format!("dropped: {}", cause.name())));
+    let head = head.number("on the way at the end").number("mean delay [ms]");
+    let table = all.iter().take(MOST_ROWS).fold(head, |table, (link, stats)| {
+        let counts = [stats.offered(), stats.duplicated(), stats.delivered()].into_iter().chain(causes.iter().map(|cause| stats.dropped(*cause)));
+        let delay = stats.mean_delay().map_or_else(|| "–".to_owned(), |delay| number(1e3 * delay.as_secs_f64()));
+        let cells = counts.chain([stats.in_flight()]).map(|count| count.to_string()).chain([delay]);
+        table.row(std::iter::once(link.as_str().to_owned()).chain(cells).map(|cell| Html::text(&cell)))
+    });
+    Html::table(&table).and(more(all.len(), "links", "links.csv"))
+}
+
+fn more(rows: usize, what: &str, file: &str) -> Html {
+    if rows > MOST_ROWS { Html::paragraph(format!("{MOST_ROWS} of {rows} {what} are shown; {file} has all.")) } else { Html::default() }
+}
+
+/// Three decimals, or as a power of ten where these would be none or many.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e7).contains(&value.abs()) { format!("{value:.3}") } else { format!("{value:.3e}") }
+}
+
+/// The changes on the way, by the keys of the scene such as `timeline.0.set.loss`.
+fn edits(keys: &BTreeMap<String, String>) -> Table {
+    let mut changes: BTreeMap<usize, (String, Vec<String>)> = BTreeMap::new();
+    for (key, value) in keys {
+        let Some((number, key)) = key.strip_prefix("timeline.").and_then(|rest| rest.split_once('.')) else { continue };
+        let Ok(number) = number.parse() else { continue };
+        let (at, effects) = changes.entry(number).or_default();
+        if key == "at" { at.clone_from(value) } else { effects.push(format!("{key} = {value}")) }
+    }
+    let head = Table::new().column("at").column("change");
+    changes.into_values().fold(head, |table, (at, effects)| table.row([Html::text(at.trim_matches('"')), Html::text(&effects.join(", "))]))
+}

@@ -1,0 +1,97 @@
+//! `run.html`: a run on one page.
+
+use cohaptic_picture::testing::{page_faults, page_in_browser};
+
+use crate::desk::Desk;
+use crate::scenes::{RANDOM, TWO};
+
+fn page(desk: &Desk, line: &str) -> String {
+    desk.text(&format!("{line} --out out"));
+    let page = desk.read("out/run.html");
+    assert_eq!(page_faults(&page), [""; 0], "{line}");
+    page
+}
+
+#[test]
+fn a_run_is_one_page_that_depends_on_its_inputs_alone() {
+    let desk = Desk::with("three.toml", RANDOM);
+    let first = page(&desk, "run three.toml --seed 7 --set link.loss=5%");
+    desk.text("run three.toml --seed 7 --set link.loss=5% --out elsewhere --json");
+    assert_eq!(first, desk.read("elsewhere/run.html"), "neither the folder nor --json changes it");
+    assert_ne!(first, page(&desk, "run three.toml --seed 8 --set link.loss=5%"));
+    // Each picture of the folder as it is there, and the scene as it is written.
+    assert_eq!(first.matches("<svg ").count(), 3);
+    for file in ["positions.svg", "forces.svg", "network.svg"] {
+        assert!(first.contains(&desk.read(&format!("elsewhere/{file}"))), "{file}");
+    }
+    assert!(first.contains(&cohaptic_picture::escape(RANDOM)));
+    assert!(first.contains("<pre>cohaptic run three.toml --set link.loss=5% --seed 7 --out DIR</pre>"), "{first}");
+}
+
+#[test]
+fn the_command_on_the_page_makes_the_page_again() {
+    let desk = Desk::with("it's two.toml", TWO);
+    let mut command = desk.command("run");
+    let words = ["it's two.toml", "--set", "scene.title=\"<b> & $HOME\"", "--out", "DIR", "--size", "two-columns"];
+    assert!(command.args(words).output().unwrap().status.success());
+    let first = desk.read("DIR/run.html");
+    let shown = first.split_once("<pre>").unwrap().1.split_once("</pre>").unwrap().0;
+    let line = shown.replace("&lt;", "<").replace("&gt;", ">").replace("&quot;", "\"").replace("&amp;", "&");
+    assert!(line.ends_with("--out DIR --size two-columns"), "{line}");
+    std::fs::remove_dir_all(desk.path("DIR")).unwrap();
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_cohaptic")).parent().unwrap();
+    let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
+    let again = std::process::Command::new("sh").args(["-c", &line]).env("PATH", path).current_dir(desk.path("")).output().unwrap();
+    assert!(again.status.success(), "{line}: {}", String::from_utf8_lossy(&again.stderr));
+    assert_eq!(desk.read("DIR/run.html"), first);
+}
+
+#[test]
+fn what_a_scene_says_is_text_on_the_page() {
+    let hostile = "<script>alert(1)</script>";
+    let desk = Desk::with("two.toml", &TWO.replace("Two users", hostile));
+    let page = page(&desk, "run two.toml");
+    assert!(!page.contains("<script") && page.contains("<h1>&lt;script&gt;alert(1)&lt;/script&gt;</h1>"), "{page}");
+}
+
+/// 13 of 25 packets a link are sent until 96 ms and arrive; those of 104 ms, ... 192 ms are 12, which are lost: 48 %.
+#[test]
+fn tables_have_the_figures_of_links_and_peers_the_timeline_and_the_expectations() {
+    let scene = format!(
+        "{TWO}\n[[timeline]]\nat = \"100ms\"\nlink = \"all\"\nset = {{ loss = \"100%\" }}\n\n[expect]\nstable = true\nloss = [{{ cause = \"loss\", max = \"1%\" }}]\n"
+    );
+    let page = page(&Desk::with("two.toml", &scene), "run two.toml");
+    for row in [
+        "<th scope=\"row\">left-&gt;right</th><td class=\"number\">25</td><td class=\"number\">0</td><td class=\"number\">13</td><td class=\"number\">12</td><td class=\"number\">0</td>\
+         <td class=\"number\">24.000</td>",
+        "<th scope=\"row\">100ms</th><td>link = &quot;all&quot;, set.loss = &quot;100%&quot;</td>",
+        "✗ FAILED</b></th><td>fraction of packets dropped on all links (loss)</td><td>at most 0.01</td><td>0.48 (24 of 50)</td>",
+        "expected to be stable, which one run cannot tell",
+        "<th scope=\"row\">left</th><td class=\"number\">",
+    ] {
+        assert!(page.contains(row), "no {row} in {page}");
+    }
+}
+
+#[test]
+fn no_plot_leaves_the_page_away_and_a_second_run_has_its_own() {
+    let desk = Desk::with("two.toml", TWO);
+    desk.text("run two.toml --no-plot --out plain");
+    assert!(!desk.path("plain/run.html").exists() && desk.path("plain/positions.svg").exists());
+    let document = desk.json("run two.toml --against link.delay=8ms --out both --json");
+    assert_eq!(document["files"][6], "both/run.html");
+    let (first, second) = (desk.read("both/run.html"), desk.read("both/against/run.html"));
+    assert!(first.contains("--against link.delay=8ms --out DIR") && second.contains("--against link.delay=8ms --out DIR"));
+    assert!(second.contains("<h1>Two users, with link.delay=8ms</h1>") && second.contains("8.000</td>") && !first.contains("8.000</td>"));
+}
+
+#[test]
+fn a_browser_shows_the_page_without_scrolling_and_its_texts_apart() {
+    let desk = Desk::with("three.toml", RANDOM);
+    let page = page(&desk, "run three.toml");
+    std::fs::create_dir(desk.path("browser")).unwrap();
+    match page_in_browser(&desk.path("browser"), &page) {
+        Some(found) => assert_eq!(found, [""; 0]),
+        None => eprintln!("skipped: there is no chromium"),
+    }
+}

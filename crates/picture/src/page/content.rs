@@ -1,0 +1,180 @@
+//! What pages hold: elements that are well formed by construction.
+
+use std::fmt::Write as _;
+
+use super::Table;
+use crate::{Gauge, escape};
+
+/// A part of a page. Texts that become a part are escaped.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Html {
+    text: String,
+}
+
+/// How something was judged. The words beside a mark say the judgement too, for readers who do not see colours.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Mark {
+    /// It is as it should be.
+    Good,
+    /// It is so in part.
+    Partly,
+    /// It is not.
+    Bad,
+}
+
+impl From<&str> for Html {
+    fn from(text: &str) -> Self {
+        Self::text(text)
+    }
+}
+
+impl From<String> for Html {
+    fn from(text: String) -> Self {
+        Self::text(&text)
+    }
+}
+
+impl Html {
+    /// A text.
+    #[must_use]
+    pub fn text(text: &str) -> Self {
+        Self { text: escape(text) }
+    }
+
+    /// Both, one after the other.
+    #[must_use]
+    pub fn and(mut self, more: impl Into<Self>) -> Self {
+        self.text.push_str(&more.into().text);
+        self
+    }
+
+    /// A paragraph.
+    #[must_use]
+    pub fn paragraph(content: impl Into<Self>) -> Self {
+        Self::line("p", &content.into())
+    }
+
+    /// A paragraph that is not to be overlooked.
+    #[must_use]
+    pub fn warning(content: impl Into<Self>) -> Self {
+        Self { text: format!("<p class=\"warning\">{}</p>\n", content.into().text) }
+    }
+
+    /// A heading below that of the page: of level 2 or 3.
+    #[must_use]
+    pub fn heading(level: u8, content: impl Into<Self>) -> Self {
+        Self::line(if level <= 2 { "h2" } else { "h3" }, &content.into())
+    }
+
+    /// A part with a name that links lead to.
+    #[must_use]
+    pub fn section(name: &str, content: impl Into<Self>) -> Self {
+        Self { text: format!("<section id=\"{}\">\n{}</section>\n", escape(name), content.into().text) }
+    }
+
+    /// A link to a part of the page.
+    #[must_use]
+    pub fn link(name: &str, content: impl Into<Self>) -> Self {
+        Self { text: format!("<a href=\"#{}\">{}</a>", escape(name), content.into().text) }
+    }
+
+    /// A list.
+    #[must_use]
+    pub fn list(items: impl IntoIterator<Item = Self>) -> Self {
+        let items: String = items.into_iter().map(|item| format!("<li>{}</li>\n", item.text)).collect();
+        Self { text: format!("<ul>\n{items}</ul>\n") }
+    }
+
+    /// Words with the colour of a judgement.
+    #[must_use]
+    pub fn mark(mark: Mark, words: &str) -> Self {
+        let class = match mark {
+            Mark::Good => "good",
+            Mark::Partly => "partly",
+            Mark::Bad => "bad",
+        };
+        Self { text: format!("<b class=\"{class}\">{}</b>", escape(words)) }
+    }
+
+    /// Names with what belongs to each.
+    #[must_use]
+    pub fn facts<'a>(facts: impl IntoIterator<Item = (&'a str, Self)>) -> Self {
+        let facts: String = facts.into_iter().map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), value.text)).collect();
+        Self { text: format!("<dl>\n{facts}</dl>\n") }
+    }
+
+    /// A few letters of a file or a command.
+    #[must_use]
+    pub fn code(text: &str) -> Self {
+        Self { text: format!("<code>{}</code>", escape(text)) }
+    }
+
+    /// Lines of a file or a command.
+    #[must_use]
+    pub fn preformatted(text: &str) -> Self {
+        Self { text: format!("<pre>{}</pre>\n", escape(text)) }
+    }
+
+    /// What is shown only to readers who ask for it.
+    #[must_use]
+    pub fn details(summary: &str, content: impl Into<Self>) -> Self {
+        Self { text: format!("<details>\n<summary>{}</summary>\n{}</details>\n", escape(summary), content.into().text) }
+    }
+
+    /// A picture with what belongs to it, under a name that links lead to; without one if it is empty.
+    #[must_use]
+    pub fn figure(name: &str, content: impl Into<Self>) -> Self {
+        let name = if name.is_empty() { String::new() } else { format!(" id=\"{}\"", escape(name)) };
+        Self { text: format!("<figure{name}>\n{}</figure>\n", content.into().text) }
+    }
+
+    /// What [`Picture::svg`](crate::Picture::svg) gave.
+    #[must_use]
+    pub fn picture(svg: &str) -> Self {
+        // Beyond the declaration of a document of its own, an SVG stands in a page as it is.
+        let svg = svg.find("<svg").map_or("", |start| &svg[start..]);
+        Self { text: format!("<div class=\"wide\">{svg}</div>\n") }
+    }
+
+    /// What stands below a picture.
+    #[must_use]
+    pub fn caption(content: impl Into<Self>) -> Self {
+        Self::line("figcaption", &content.into())
+    }
+
+    /// A small bar, for a cell of a table.
+    #[must_use]
+    pub fn gauge(gauge: &Gauge) -> Self {
+        Self { text: gauge.svg() }
+    }
+
+    /// A table, which can be scrolled where it is wider than the page.
+    #[must_use]
+    pub fn table(table: &Table) -> Self {
+        let mut text = "<div class=\"wide\">\n<table>\n<thead><tr>".to_owned();
+        let class = |number: bool| if number { " class=\"number\"" } else { "" };
+        for (name, number) in &table.columns {
+            let _ = write!(text, "<th scope=\"col\"{}>{}</th>", class(*number), escape(name));
+        }
+        text.push_str("</tr></thead>\n<tbody>\n");
+        for row in &table.rows {
+            text.push_str("<tr>");
+            for (place, cell) in row.iter().enumerate() {
+                let number = class(table.columns.get(place).is_some_and(|(_, number)| *number));
+                let (open, close) = if place == 0 { ("<th scope=\"row\"", "</th>") } else { ("<td", "</td>") };
+                let _ = write!(text, "{open}{number}>{}{close}", cell.text);
+            }
+            text.push_str("</tr>\n");
+        }
+        text.push_str("</tbody>\n</table>\n</div>\n");
+        Self { text }
+    }
+
+    pub(super) fn as_str(&self) -> &str {
+        &self.text
+    }
+
+    fn line(element: &str, content: &Self) -> Self {
+        Self { text: format!("<{element}>{}</{element}>\n", content.text) }
+    }
+}

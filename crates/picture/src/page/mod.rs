@@ -1,0 +1,108 @@
+//! Pages of HTML: one file each, without scripts and with nothing from elsewhere, so that it can be opened from a folder or sent by mail.
+//!
+//! A [`Page`] is a title and [`Html`], which is made of texts, tables and pictures and always well formed: texts are escaped where they enter. Pages are light or
+//! dark as their reader prefers, as the pictures within them. Equal contents are equal bytes.
+//!
+//! ```
+//! use cohaptic_picture::page::{Html, Page};
+//!
+//! let page = Page::new("A <title>").with(Html::paragraph("1 < 2")).html();
+//! assert!(page.contains("<h1>A &lt;title&gt;</h1>") && page.contains("<p>1 &lt; 2</p>"));
+//! ```
+
+mod content;
+mod style;
+mod table;
+
+use std::fmt::Write as _;
+
+use crate::escape;
+
+pub use content::{Html, Mark};
+pub(crate) use style::STYLE;
+pub use table::Table;
+
+/// A page.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Page {
+    title: String,
+    content: Html,
+}
+
+impl Page {
+    /// A page without content.
+    #[must_use]
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), content: Html::default() }
+    }
+
+    /// With more content at the end.
+    #[must_use]
+    pub fn with(self, content: impl Into<Html>) -> Self {
+        Self { title: self.title, content: self.content.and(content) }
+    }
+
+    /// The document.
+    #[must_use]
+    pub fn html(&self) -> String {
+        let title = escape(&self.title);
+        let mut page = String::new();
+        let _ = write!(
+            page,
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta name=\"color-scheme\" content=\"light dark\">\n<title>{title}</title>\n<style>\n{STYLE}{}</style>\n</head>\n<body>\n<main>\n<h1>{title}</h1>\n{}</main>\n\
+             </body>\n</html>\n",
+            crate::look::style(),
+            self.content.as_str()
+        );
+        page
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Axis, Gauge, Line, Look, Panel, Picture};
+
+    const HOSTILE: &str = "<script>alert(\"1\")</script> & 'more' \u{202e}";
+
+    fn everything() -> Page {
+        let picture = Picture::new(HOSTILE).panel(Panel::new(Axis::new("x"), Axis::new("y")).with(Line::new([(0.0, 1.0), (1.0, 2.0)], Look::of(0))));
+        let table = Table::new()
+            .column(HOSTILE)
+            .number("value")
+            .row([Html::text(HOSTILE), Html::gauge(&Gauge { low: None, high: Some(1.0), measured: Some(2.0), passed: false })]);
+        let content = Html::paragraph(HOSTILE)
+            .and(Html::warning(HOSTILE))
+            .and(Html::heading(2, HOSTILE))
+            .and(Html::list([Html::link(HOSTILE, HOSTILE), Html::mark(Mark::Bad, HOSTILE)]))
+            .and(Html::facts([(HOSTILE, Html::code(HOSTILE))]))
+            .and(Html::details(HOSTILE, Html::preformatted(HOSTILE)))
+            .and(Html::figure(HOSTILE, Html::picture(&picture.svg()).and(Html::caption(HOSTILE))));
+        Page::new(HOSTILE).with(Html::section(HOSTILE, content.and(Html::table(&table))))
+    }
+
+    #[test]
+    fn texts_are_escaped_wherever_they_stand() {
+        let page = everything().html();
+        assert!(!page.contains("<script") && !page.contains('\u{202e}'), "{page}");
+        assert_eq!(page, everything().html());
+        // Each of its places once, the title of the page twice, that of the picture in its own title too.
+        assert!(page.matches("&lt;script&gt;").count() >= 16, "{page}");
+    }
+
+    #[test]
+    fn a_page_is_one_well_formed_document_without_anything_from_elsewhere() {
+        let page = everything().html();
+        assert_eq!(crate::testing::page_faults(&page), [""; 0]);
+        for (old, new, fault) in [
+            ("<h1>", "<h1><b>", "tags"),
+            ("<main>", "<main><img src=\"x.png\">", "from elsewhere"),
+            ("<main>", "<main><a href=\"https://example.org\">there</a>", "from elsewhere"),
+            ("<main>", "<main><script>1</script>", "from elsewhere"),
+        ] {
+            let found = crate::testing::page_faults(&page.replacen(old, new, 1));
+            assert!(found.iter().any(|sentence| sentence.contains(fault)), "{new}: {found:?}");
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! How pages look: in light and in dark, on a wide screen and on a narrow one. The ground is that of pictures.
+
+pub(crate) const STYLE: &str = "\
+:root { color-scheme: light dark; --ground: #fff; --ink: #1b1f24; --line: #c3c8ce; --good: #00603f; --partly: #7a4b00; --bad: #9b1c1c; }
+@media (prefers-color-scheme: dark) { :root { --ground: #14181d; --ink: #e6e9ec; --line: #454d57; --good: #5fd3a6; --partly: #f0b84a; --bad: #ff8f8f; } }
+body { margin: 0; background: var(--ground); color: var(--ink); font: 1rem/1.5 system-ui, sans-serif; }
+main { max-width: 64rem; margin: 0 auto; padding: 1rem; }
+h1, h2, h3 { line-height: 1.25; overflow-wrap: anywhere; }
+a { color: inherit; }
+section, figure { margin: 0 0 2rem; padding: 0; border-top: 1px solid var(--line); }
+dt { font-weight: 600; }
+dd { margin: 0 0 .5rem 1rem; overflow-wrap: anywhere; }
+b.good { color: var(--good); }
+b.partly { color: var(--partly); }
+b.bad { color: var(--bad); }
+p.warning { color: var(--bad); font-weight: 600; }
+.wide { overflow-x: auto; }
+.wide svg { max-width: max(100%, 40rem); height: auto; }
+.wide svg.gauge { max-width: none; vertical-align: middle; }
+b { white-space: nowrap; }
+table { border-collapse: collapse; margin: 1rem 0; font-size: .9rem; }
+th, td { text-align: left; vertical-align: top; padding: .25rem .75rem .25rem 0; border-bottom: 1px solid var(--line); }
+th.number, td.number { text-align: right; font-variant-numeric: tabular-nums; }
+tbody th { font-weight: 400; }
+pre { overflow-x: auto; padding: .5rem; border: 1px solid var(--line); white-space: pre-wrap; overflow-wrap: anywhere; }
+";

@@ -1,0 +1,122 @@
+//! What Chromium says of pictures and pages, where there is one.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use super::{TextBox, misplaced};
+
+/// Which colours the reader of a document prefers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Scheme {
+    /// Dark letters on a light ground.
+    Light,
+    /// Light letters on a dark ground.
+    Dark,
+}
+
+/// Writes for each picture the place of each text in the units of the picture, as lines of numbers and a text.
+const PLACES: &str = "let lines=[];for(const [n,svg] of [...document.querySelectorAll('svg.cohaptic-picture')].entries()){\
+    const o=svg.getBoundingClientRect(),v=svg.viewBox.baseVal,k=v.width/o.width;for(const t of svg.querySelectorAll('text')){const b=t.getBoundingClientRect();\
+    lines.push([n,(b.left-o.left)*k,(b.top-o.top)*k,(b.right-o.left)*k,(b.bottom-o.top)*k,v.width,v.height].map(x=>x.toFixed(3)).join(' ')+' '+\
+    encodeURIComponent(t.textContent))}}";
+
+/// Writes for each class of each element the colours it is drawn with, each once.
+const COLOURS: &str = "let lines=[...new Set([...document.querySelectorAll('[class],body')].map(e=>{const s=getComputedStyle(e);\
+    return [e.tagName.toLowerCase()+'.'+(e.getAttribute('class')||''),s.fill,s.stroke,s.color,s.backgroundColor].join('|')}))];";
+
+/// Writes by how much the page is wider than the window \[px\].
+const WIDTH: &str = "lines.push('WIDER '+(document.documentElement.scrollWidth-document.documentElement.clientWidth));";
+
+/// What a browser says of these pictures, each under its name: [`misplaced`] with the boxes that it gives. `None` where there is no `chromium` on the path.
+///
+/// A folder for the page and for what the browser keeps is needed, which is the caller's to remove.
+///
+/// # Panics
+///
+/// If the browser does not start or gives no answer.
+#[must_use]
+pub fn in_browser(folder: &Path, pictures: &[(String, String)]) -> Option<Vec<String>> {
+    let svgs: Vec<&str> = pictures.iter().map(|(_, svg)| svg.as_str()).collect();
+    let lines = answer(folder, &format!("<!doctype html><meta charset=\"utf-8\"><body>{}", svgs.join("\n")), Scheme::Light, PLACES)?;
+    let expected: Vec<(&str, usize)> = pictures.iter().map(|(name, svg)| (name.as_str(), svg.matches("<text ").count())).collect();
+    Some(placed(&lines, &expected))
+}
+
+/// What a browser says of a page: texts of its pictures outside of them or on each other, and whether the page is wider than a window of a laptop. `None`
+/// where there is no `chromium` on the path; see [`in_browser`].
+///
+/// # Panics
+///
+/// As [`in_browser`].
+#[must_use]
+pub fn page_in_browser(folder: &Path, page: &str) -> Option<Vec<String>> {
+    let mut lines = answer(folder, page, Scheme::Light, &format!("{PLACES}{WIDTH}"))?;
+    let wider = lines.pop().and_then(|line| line.strip_prefix("WIDER ")?.parse::<i32>().ok());
+    let pictures: Vec<&str> = page.split("<svg ").skip(1).collect();
+    let names: Vec<String> = (1..=pictures.len()).map(|number| format!("picture {number}")).collect();
+    let expected: Vec<(&str, usize)> = names.iter().map(String::as_str).zip(pictures.iter().map(|svg| svg.matches("<text ").count())).collect();
+    let mut faults = placed(&lines, &expected);
+    faults.extend((wider != Some(0)).then(|| format!("the page is wider than its window by {wider:?} px")));
+    Some(faults)
+}
+
+/// With which colours a browser draws each kind of element (`path.line s0|fill|stroke|color|background`) of a document for a reader who prefers that scheme.
+/// `None` where there is no `chromium` on the path; see [`in_browser`].
+///
+/// # Panics
+///
+/// As [`in_browser`].
+#[must_use]
+pub fn computed_colours(folder: &Path, document: &str, scheme: Scheme) -> Option<Vec<String>> {
+    answer(folder, document, scheme, COLOURS)
+}
+
+/// The places of texts of several pictures, of which the names and numbers of texts are known, in sentences.
+fn placed(lines: &[String], expected: &[(&str, usize)]) -> Vec<String> {
+    let rows: Vec<(Vec<f64>, &str)> =
+        lines.iter().map(|line| (line.split(' ').take(7).filter_map(|word| word.parse().ok()).collect(), line.as_str())).collect();
+    let mut faults = Vec::new();
+    for (number, (name, texts)) in expected.iter().enumerate() {
+        let own: Vec<_> = rows.iter().filter(|(row, _)| row.len() == 7 && (row[0] - crate::content::count(number)).abs() < 0.5).collect();
+        if own.len() != *texts {
+            faults.push(format!("{name}: the browser shows {} of {texts} texts", own.len()));
+        }
+        let texts: Vec<TextBox> = own
+            .iter()
+            .map(|(row, line)| TextBox { text: line.rsplit(' ').next().unwrap_or_default().to_owned(), sides: [row[1], row[2], row[3], row[4]] })
+            .collect();
+        let size = own.first().map_or((0.0, 0.0), |(row, _)| (row[5], row[6]));
+        faults.extend(misplaced(&texts, size).into_iter().map(|fault| format!("{name}: {fault}")));
+    }
+    faults
+}
+
+/// The lines that a script puts into `lines` when the browser has the page.
+fn answer(folder: &Path, page: &str, scheme: Scheme, script: &str) -> Option<Vec<String>> {
+    let found = Command::new("chromium").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success());
+    if !found {
+        return None;
+    }
+    let mut page = page.to_owned();
+    let _ = write!(
+        page,
+        "<pre id=\"answer\"></pre><script>{script}document.getElementById('answer').textContent='BEGIN\\n'+lines.join('\\n')+'\\nEND'</script>"
+    );
+    let file = folder.join("page.html");
+    std::fs::write(&file, page).expect("the page can be written");
+    // In Chromium's settings 0 is dark and 1 is light.
+    let preferred = if scheme == Scheme::Dark { 0 } else { 1 };
+    let output = Command::new("chromium")
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-component-update"])
+        .args(["--disable-sync", "--window-size=1280,900", "--dump-dom"])
+        .arg(format!("--blink-settings=preferredColorScheme={preferred}"))
+        .arg(format!("--user-data-dir={}", folder.join("browser").display()))
+        .arg(format!("file://{}", file.display()))
+        .stderr(Stdio::null())
+        .output()
+        .expect("the browser starts");
+    let text = String::from_utf8_lossy(&output.stdout);
+    let answer = text.split_once("BEGIN\n").and_then(|(_, rest)| rest.split_once("\nEND")).expect("the browser has run the script").0;
+    Some(answer.lines().map(str::to_owned).collect())
+}
