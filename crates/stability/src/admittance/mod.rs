@@ -185,9 +185,11 @@ impl Admittance {
         Lifted { nodes, weights, timetable, coordination: *coordination, time: *time, tied: *tied }
     }
 
-    /// Force over velocity, at a frequency that is one.
-    fn impedance(&self, hz: f64) -> Complex64 {
-        Harmonic::new(&self.lifted(), self.pushed, hz).point().value.inv()
+    /// Force over velocity, at a frequency that is one, and how far rounding may have moved it: 1/(v + d) − 1/v is −d/(v·(v + d)).
+    fn impedance(&self, hz: f64) -> (Complex64, f64) {
+        let AdmittancePoint { value, error, .. } = Harmonic::new(&self.lifted(), self.pushed, hz).point();
+        let size = value.norm();
+        (value.inv(), if error < size { error / (size * (size - error)) } else { f64::INFINITY })
     }
 
     /// Leaves nothing but the device of the pushed peer. A node has a copy, which then rests.
@@ -280,10 +282,11 @@ mod tests {
     }
 
     /// b = bH + N·KT·(τ + δ), δ = BT·(Tc²/m)·(M² − 1)/12: see scenarios/README.md. Met far below the frequency KT/(2πb), 0.14 mHz here.
+    /// So low, a bound of what rounding does to an impedance is some 10⁻⁴ of it.
     #[test]
     fn the_viscosity_of_a_hundred_thousand_peers_follows_the_law() {
         let fit = with_peers(100_000).fit_low_frequency();
         let expected = 5.0 + 1e5 * 1000.0 * (0.0115 + 5.0 * 1e-6 / 0.45 * 63.0 / 12.0);
-        assert!((fit.viscosity.value / expected - 1.0).abs() < 0.005 && fit.viscosity.error < 1e-4 * expected, "{fit:?}, {expected}");
+        assert!((fit.viscosity.value / expected - 1.0).abs() < 0.005 && fit.viscosity.error < 1e-3 * expected, "{fit:?}, {expected}");
     }
 }

@@ -2,6 +2,7 @@
 
 use cohaptic_peer::Gains;
 
+use super::majorant;
 use super::node::{Node, Rows, Scale, Scratch};
 use super::rounding::Rounding;
 use crate::Matrix;
@@ -124,7 +125,7 @@ impl Lifted<'_> {
         scratch.resize(columns);
         let mut push = vec![0.0; columns];
         let step = self.nodes.iter().map(|node| node.step_norm(self.coordination, scale)).fold(1.0, f64::max);
-        let (mut rounding, mut errors) = (Rounding::new(step), vec![0.0; nodes]);
+        let mut rounding = Rounding::new(step);
         for event in &self.timetable.events {
             match *event {
                 Event::Sample { node } => {
@@ -136,7 +137,6 @@ impl Lifted<'_> {
                         }
                     }
                     next_sent[node] += 1;
-                    rounding.sample(errors[node]);
                 }
                 Event::Deliver { from, to, sample } => {
                     held[to * nodes + from] = row_of(from, sample);
@@ -164,7 +164,7 @@ impl Lifted<'_> {
                     };
                     let hand = pushed.then_some(push.as_slice());
                     self.nodes[node].tick(&mut z, rows[node], self.coordination, targets.row(node), hand, span, scale, &mut scratch);
-                    rounding.tick(norm(&z, rows[node], self.nodes[node].states()), &mut errors[node]);
+                    rounding.tick(norm(&z, rows[node], self.nodes[node].states()));
                 }
             }
         }
@@ -184,8 +184,19 @@ impl Lifted<'_> {
             used,
             depth: if unit > 0.0 { self.timetable.depth.clone() } else { vec![0; nodes] },
             translation: if unit > 0.0 { stiffness / unit } else { 0.0 },
-            error: rounding.bound(errors.into_iter().fold(0.0, f64::max)),
+            error: if instrument.inputs() == 0 {
+                rounding.bound(|| self.error())
+            } else {
+                // Nothing that is pushed is among the rows of the closer bound.
+                rounding.bound(|| f64::INFINITY)
+            },
         }
+    }
+
+    /// A bound of the rounding errors of a frame: see [`majorant`].
+    pub(crate) fn error(&self) -> f64 {
+        let compliance = self.nodes[0].compliance(self.time);
+        majorant::error_of(self, |_| compliance)
     }
 
     /// The samples of earlier frames that are used in this one, by node and then by age.
