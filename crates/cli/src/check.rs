@@ -9,6 +9,7 @@ use cohaptic_harness::check::Judged;
 use cohaptic_harness::{Model, check as harness};
 use cohaptic_scene::{Scene, SceneError, scene_files};
 use cohaptic_stability::{AnalysisError, Limits, Method, NOMINAL, QUICK_UNKNOWNS, Verdict, Watch, has_chance, judge_watched};
+use cohaptic_units::print::Number;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -158,7 +159,7 @@ fn judged(scene: &Scene, stable: bool, note: impl FnOnce(String)) -> Judged {
         return Judged::AsExpected;
     }
     let (expected, found) = (expected.word(), judgement.verdict.word());
-    Judged::Otherwise(format!("expected {expected}, but it is {found}: the {what} is {} within {:.1e}", radius.value, radius.error))
+    Judged::Otherwise(format!("expected {expected}, but it is {found}: the {what} is {} within {:.1e}", Number(radius.value), radius.error))
 }
 
 impl Checked {

@@ -79,8 +79,9 @@ pub(super) const fn name(criterion: Criterion) -> &'static str {
 pub(super) fn nominal(count: usize, what: &str) -> Option<String> {
     (count > 0).then(|| {
         format!(
-            "{count} {what} are nominal: the second moment cannot be followed there, and their radius is the square of the spectral radius with every delay its \
-             mean and nothing lost; stability point says why"
+            "{count} {what} {} nominal: the second moment cannot be followed there, where the radius is the square of the spectral radius with every delay its \
+             mean and nothing lost; stability point says why",
+            if count == 1 { "is" } else { "are" }
         )
     })
 }

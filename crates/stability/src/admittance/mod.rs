@@ -69,11 +69,20 @@ impl Admittance {
     ///
     /// [`AdmittanceError`] if there is no such peer, or if the scene has no frame that repeats.
     pub fn of(scene: &Scene, peer: usize) -> Result<Self, AdmittanceError> {
+        Self::of_watched(scene, peer, &Unwatched)
+    }
+
+    /// [`Admittance::of`], watched while it works out the verdict on the scene.
+    ///
+    /// # Errors
+    ///
+    /// As [`Admittance::of`], and [`AnalysisError::Stopped`] if the watch ends it.
+    pub fn of_watched(scene: &Scene, peer: usize, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
         let spec = scene.peers.get(peer).ok_or(AdmittanceError::NoSuchPeer { peer, peers: scene.peers.len() })?;
         let network = NominalNetwork::of(scene)?;
         let (contacts, notes) = closed_contacts(scene, peer);
         let structure = Structure::with_alone(&[scene], &network, &contacts, Some(peer))?;
-        let mut admittance = Self::of_classes(scene, structure, peer);
+        let mut admittance = Self::of_classes(scene, structure, peer, watch)?;
         if !contacts.touching[peer] {
             let device = Some(Body::new(device_plant(spec), scene.integrator, &spec.clock));
             admittance.leave_bare(device, NodeClock::of(scene, peer), arm(spec).stiffness > 0.0)?;
@@ -84,13 +93,13 @@ impl Admittance {
     }
 
     /// From classes of which the pushed peer is one by itself.
-    fn of_classes(scene: &Scene, structure: Structure, peer: usize) -> Self {
-        let radius = radius_of(&reduced(&structure, scene, 1, Method::Reduced).parts);
+    fn of_classes(scene: &Scene, structure: Structure, peer: usize, watch: &dyn Watch) -> Result<Self, AnalysisError> {
+        let radius = radius_of(&reduced(&structure, scene, 1, Method::Reduced, watch)?.parts);
         let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
         let (coordination, time) = (structure.coordination(scene), structure.time(scene));
         let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
         let Structure { timetable, weights, tied, .. } = structure;
-        Self { nodes, weights, timetable, coordination, time, tied, pushed, highest: 0.0, radius, notes: Vec::new() }
+        Ok(Self { nodes, weights, timetable, coordination, time, tied, pushed, highest: 0.0, radius, notes: Vec::new() })
     }
 
     /// The admittance at a frequency \[Hz\].
@@ -260,7 +269,7 @@ mod tests {
         structure.peers = count;
         let others = crate::structure::count(count - 1);
         structure.weights = Matrix::from_fn(2, 2, |row, column| [[0.0, 1.0], [1.0 / others, (others - 1.0) / others]][row][column]);
-        let mut admittance = Admittance::of_classes(&scene, structure, 0);
+        let mut admittance = Admittance::of_classes(&scene, structure, 0, &Unwatched).unwrap();
         admittance.highest = 0.5 * admittance.tick_rate();
         admittance
     }

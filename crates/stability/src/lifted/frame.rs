@@ -5,8 +5,8 @@ use cohaptic_peer::Gains;
 use super::majorant;
 use super::node::{Node, Rows, Scale, Scratch};
 use super::rounding::Rounding;
-use crate::Matrix;
 use crate::timetable::{Event, Timetable};
+use crate::{Matrix, Unwatched, Watch};
 
 /// Nodes that are coupled through samples.
 #[derive(Clone, Copy, Debug)]
@@ -69,9 +69,17 @@ pub(crate) struct FrameMap {
     pub(crate) error: f64,
 }
 
+/// After how many entries that are worked on it is asked whether to go on: some ten milliseconds.
+const LOOK: usize = 1_000_000;
+
 impl Lifted<'_> {
     /// Steps through the frame with all unknowns at once.
     pub(crate) fn frame(&self, instrument: &mut impl Instrument) -> FrameMap {
+        self.frame_watched(instrument, &Unwatched).expect("without a watch nothing ends it")
+    }
+
+    /// [`Lifted::frame`]; `None` if the watch ends it.
+    pub(crate) fn frame_watched(&self, instrument: &mut impl Instrument, watch: &dyn Watch) -> Option<FrameMap> {
         let Gains { stiffness, damping } = self.coordination;
         // What a sample is divided by [N/m].
         let unit = stiffness + damping / self.time;
@@ -126,7 +134,16 @@ impl Lifted<'_> {
         let mut push = vec![0.0; columns];
         let step = self.nodes.iter().map(|node| node.step_norm(self.coordination, scale)).fold(1.0, f64::max);
         let mut rounding = Rounding::new(step);
+        let mut since = 0;
         for event in &self.timetable.events {
+            // An event takes some operations in each column.
+            since += columns;
+            if since > LOOK {
+                since = 0;
+                if watch.stops() {
+                    return None;
+                }
+            }
             match *event {
                 Event::Sample { node } => {
                     if unit > 0.0 {
@@ -175,7 +192,7 @@ impl Lifted<'_> {
                 positions[device] = true;
             }
         }
-        FrameMap {
+        Some(FrameMap {
             states: z,
             positions,
             reference,
@@ -190,7 +207,7 @@ impl Lifted<'_> {
                 // Nothing that is pushed is among the rows of the closer bound.
                 rounding.bound(|| f64::INFINITY)
             },
-        }
+        })
     }
 
     /// A bound of the rounding errors of a frame: see [`majorant`].
