@@ -31,6 +31,8 @@ pub(crate) struct AnalysisWatch(std::sync::Mutex<Shown>);
 #[derive(Default)]
 struct Shown {
     bar: Option<Progress>,
+    /// Of all that was said of.
+    expected: f64,
     /// Of what was done, what no step was shown for yet.
     left: f64,
 }
@@ -54,8 +56,16 @@ impl AnalysisWatch {
 impl Watch for AnalysisWatch {
     fn expects(&self, operations: f64) {
         let mut shown = self.shown();
+        shown.expected += operations;
+        let all = estimate(shown.expected);
         if shown.bar.is_some() || operations / OPERATIONS_A_SECOND > SHORT {
-            shown.bar.get_or_insert_with(Progress::through_operations).expect(steps(operations));
+            let bar = shown.bar.get_or_insert_with(|| {
+                let bar = Progress::through_operations();
+                bar.tick();
+                bar
+            });
+            bar.expect(steps(operations));
+            bar.note(format!("{all} in all"));
         }
     }
 
@@ -74,7 +84,86 @@ impl Watch for AnalysisWatch {
     }
 }
 
+/// How long that number of operations takes, in words.
+pub(crate) fn estimate(operations: f64) -> String {
+    let seconds = operations / OPERATIONS_A_SECOND;
+    match seconds {
+        ..1.0 => "less than a second".to_owned(),
+        ..90.0 => format!("about {seconds:.0} s"),
+        ..5400.0 => format!("about {:.0} min", seconds / 60.0),
+        ..259_200.0 => format!("about {:.0} h", seconds / 3600.0),
+        _ => format!("about {:.0} days", seconds / 86_400.0),
+    }
+}
+
+/// Shows, behind a bar of another kind, how far the cells or values are that take long, and ends them when the user asks for it.
+pub(crate) struct CellWatch<'a> {
+    progress: &'a Progress,
+    /// What a cell is called.
+    name: &'static str,
+    stops: &'a (dyn Fn() -> bool + Sync),
+    /// How many operations the cells take that were begun, how many are done, and the largest estimate of one.
+    operations: std::sync::Mutex<[f64; 3]>,
+}
+
+impl<'a> CellWatch<'a> {
+    pub(crate) fn new(progress: &'a Progress, name: &'static str, stops: &'a (dyn Fn() -> bool + Sync)) -> Self {
+        Self { progress, name, stops, operations: std::sync::Mutex::default() }
+    }
+
+    fn count(&self, add: [f64; 2]) {
+        let mut operations = self.operations.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let [expected, done, largest] = &mut *operations;
+        (*expected, *done, *largest) = (*expected + add[0], *done + add[1], largest.max(add[0]));
+        if let Some(note) = note(self.name, *operations) {
+            self.progress.note(note);
+        }
+    }
+}
+
+/// What is said of cells that take long; nothing of others.
+fn note(name: &str, [expected, done, largest]: [f64; 3]) -> Option<String> {
+    let long = largest / OPERATIONS_A_SECOND > SHORT;
+    long.then(|| format!("; a {name} takes {}, {:.0} % of those begun", estimate(largest), 100.0 * (done / expected).min(1.0)))
+}
+
+impl Watch for CellWatch<'_> {
+    fn expects(&self, operations: f64) {
+        self.count([operations, 0.0]);
+    }
+
+    fn done(&self, operations: f64) {
+        self.count([0.0, operations]);
+    }
+
+    fn stops(&self) -> bool {
+        (self.stops)()
+    }
+}
+
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a conversion to the nearest number that there is")]
 fn steps(operations: f64) -> u64 {
     (operations / STEP) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_estimate_has_the_unit_that_fits_it() {
+        for (seconds, words) in
+            [(0.5, "less than a second"), (12.4, "about 12 s"), (90.0, "about 2 min"), (720.0, "about 12 min"), (7200.0, "about 2 h")]
+        {
+            assert_eq!(estimate(seconds * OPERATIONS_A_SECOND), words);
+        }
+        assert_eq!(estimate(1e6 * OPERATIONS_A_SECOND), "about 12 days");
+    }
+
+    #[test]
+    fn of_a_cell_that_takes_long_it_is_said_how_far_it_is() {
+        let minutes = 720.0 * OPERATIONS_A_SECOND;
+        assert_eq!(note("cell", [2.0 * minutes, 0.5 * minutes, minutes]).unwrap(), "; a cell takes about 12 min, 25 % of those begun");
+        assert_eq!(note("cell", [minutes, 0.0, 0.1 * OPERATIONS_A_SECOND]), None);
+    }
 }

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use cohaptic_measure::fit::{self, Fitted, LossFit, LossModel, Measurements, Skew, captures};
 use cohaptic_scene::{LimitedFile, MOST_CAPTURE_BYTES};
+use cohaptic_units::print::Counted;
 use cohaptic_wan::{FateLog, FateRow};
 use serde::Serialize;
 
@@ -103,8 +104,8 @@ fn describe(fitted: &Fitted, scene: &str, skew: Option<Skew>, matched: Option<Ma
     };
     let spaced = if goodness.evenly_spaced { "evenly" } else { "unevenly" };
     line(format!(
-        "{} packets, {} arrived, one every {} ({spaced}); they say as much as {:.0} independent ones",
-        goodness.packets,
+        "{}, {} arrived, one every {} ({spaced}); they say as much as {:.0} independent ones",
+        Counted(goodness.packets, "packet"),
         goodness.received,
         milliseconds(goodness.spacing_s),
         goodness.effective

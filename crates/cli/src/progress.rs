@@ -34,7 +34,7 @@ impl Progress {
     /// Progress through the rows of maps.
     pub(crate) fn through_rows(count: usize) -> Self {
         let bar = bar(count as u64);
-        bar.set_style(style("{bar:30} {percent:>3} %  {pos}/{len} rows, {eta} left"));
+        bar.set_style(style("{bar:30} {percent:>3} %  {pos}/{len} rows, {eta} left{msg}"));
         Self(bar)
     }
 
@@ -63,7 +63,7 @@ impl Progress {
     /// Progress through values of which nobody knows how many there will be.
     pub(crate) fn through_values() -> Self {
         let bar = bar(0);
-        bar.set_style(style("{spinner} {pos} values looked at, {elapsed} passed"));
+        bar.set_style(style("{spinner} {pos} values looked at, {elapsed} passed{msg}"));
         Self(bar)
     }
 
@@ -84,11 +84,16 @@ impl Progress {
     /// Progress through operations of a computation whose estimate comes on the way; nothing is shown of one that takes seconds.
     pub(crate) fn through_operations() -> Self {
         let bar = bar(0);
-        bar.set_style(style("{bar:30} {percent:>3} %  {elapsed} passed, about {eta} left"));
+        bar.set_style(style("{bar:30} {percent:>3} %  {elapsed} passed, {msg}"));
         Self(bar)
     }
 
-    /// So many steps more are to be done.
+    /// What is passed is shown anew although nothing else is: by what cannot say how far it is.
+    pub(crate) fn tick(&self) {
+        self.0.enable_steady_tick(Duration::from_millis(500));
+    }
+
+    /// That number of steps more is to be done.
     pub(crate) fn expect(&self, number: u64) {
         self.0.inc_length(number);
     }

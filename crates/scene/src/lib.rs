@@ -33,7 +33,6 @@ mod content;
 mod context;
 mod error;
 mod excerpt;
-mod limited;
 mod link_keys;
 mod link_table;
 mod model;
@@ -56,9 +55,9 @@ mod tree;
 mod values;
 
 pub use address::{AddressError, address};
+pub use cohaptic_files::{LimitedFile, MOST_BYTES, MOST_CAPTURE_BYTES, read_bytes};
 pub use content::{Fingerprint, FingerprintError, SceneContent, scene_content, scene_content_of_text};
 pub use error::{Diagnostic, SceneError};
-pub use limited::{LimitedFile, MOST_BYTES, MOST_CAPTURE_BYTES, read_bytes};
 pub use link_keys::{
     KeysOfLinks, LinkKeys, link_from_keys, link_key_changes, link_key_changes_of_text, link_keys, link_keys_of_text, relay_link_keys,
     relay_link_keys_of_text,

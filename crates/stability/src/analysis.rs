@@ -89,7 +89,7 @@ pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError>
     analyse_watched(scene, method, &Unwatched)
 }
 
-/// [`analyse`], watched: it is asked between modes of contact, and between the vectors of [`Method::Full`].
+/// [`analyse`], watched: it is asked between the parts of the scene, within frames and determinants, and between the vectors of [`Method::Full`].
 ///
 /// # Errors
 ///
@@ -108,7 +108,7 @@ pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Resu
                     return Err(AnalysisError::Stopped);
                 }
                 let structure = Structure::of(&[scene], &network, &combination.contacts)?;
-                Ok(of_parts(combination, reduced(&structure, scene, combination.axes, method)))
+                Ok(of_parts(combination, reduced(&structure, scene, combination.axes, method, watch)?))
             });
             Ok(combine(modes.collect::<Result<_, AnalysisError>>()?, method, &network, scene))
         }

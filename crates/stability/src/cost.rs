@@ -17,7 +17,7 @@ pub struct FrameCost {
 }
 
 /// How often a frame is gone through: by the iteration, and for the bounds that are tried.
-const PASSES: f64 = 60.0;
+pub(crate) const PASSES: f64 = 60.0;
 /// What is done to each number between two passes: it is made orthogonal, twice, to those of all passes before.
 const BETWEEN: f64 = 4.0 * 0.5 * PASSES;
 /// What an event does to each of the columns of its rows.

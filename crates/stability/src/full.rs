@@ -5,13 +5,15 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::{Acting, Contact, Device as _, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State, Strategy};
+use cohaptic_peer::{Acting, Contact, Device as _, Gains, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State, Strategy};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use crate::cost::{full_operations, pushed_operations};
+use crate::lifted::majorant::error_of;
+use crate::lifted::{Body, Lifted, Node, closer_of};
 use crate::network::{LinkTiming, NominalNetwork};
-use crate::structure::{Contacts, arm, common_time, count, pull};
+use crate::structure::{Contacts, Structure, arm, common_time, count, device_plant, pull};
 use crate::timetable::{Event, NodeClock, Timetable};
 use crate::{AnalysisError, Matrix, StateKind, StateName, Watch};
 
@@ -53,7 +55,34 @@ pub(crate) fn full<const A: usize, S: Strategy<A>>(
     if trust == Trust::Nothing {
         pusher.check()?;
     }
-    pusher.map(watch).ok_or(AnalysisError::Stopped)
+    let mut map = pusher.map(watch).ok_or(AnalysisError::Stopped)?;
+    if trust == Trust::Linear && pull(scene).is_some() {
+        let nodes = Structure::of_each(scene, network, contacts)?;
+        map.error = closer_of(map.error, || error_of_known(scene, &nodes, map.time));
+    }
+    Ok(map)
+}
+
+/// A bound of the errors of what real peers made of unit vectors, for a strategy whose numbers are known: each peer does what its node would.
+fn error_of_known(scene: &Scene, structure: &Structure, time: f64) -> f64 {
+    let node = |peer: usize| {
+        let mut node = structure.node(scene, peer);
+        if node.device.is_none() {
+            // A device that touches nothing moves on its own, and is pushed with the others.
+            let spec = &scene.peers[peer];
+            node.device = Some(Body::new(device_plant(spec), scene.integrator, &spec.clock));
+            node.coupling = Gains { stiffness: 0.0, damping: 0.0 };
+        }
+        node
+    };
+    let nodes: Vec<Node> = (0..scene.peers.len()).map(node).collect();
+    let lifted = Lifted { time, ..structure.quotient(scene, &nodes) };
+    error_of(&lifted, |peer| compliance(scene, peer, time))
+}
+
+/// What the forces of a peer are multiplied by to be lengths [m/N].
+fn compliance(scene: &Scene, peer: usize, time: f64) -> f64 {
+    time * scene.peers[peer].clock.tick.as_secs_f64() / scene.copy_mass()
 }
 
 type Member<const A: usize, S> = Peer<A, SimulatedDevice<A>, S>;
@@ -112,7 +141,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);
         let touching = contacts.touching.iter().copied().enumerate();
         let time = common_time(scene, timetable.frame, pull(scene).unwrap_or(scene.coordination.gains), touching, false);
-        let compliance = scene.peers.iter().map(|peer| time * peer.clock.tick.as_secs_f64() / scene.copy_mass()).collect();
+        let compliance = (0..peers).map(|peer| compliance(scene, peer, time)).collect();
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
         Ok(Self { samples: vec![Vec::new(); peers], members, names, timetable, layout, time, compliance, growth: 1.0 })
     }

@@ -13,7 +13,7 @@ use crate::lifted::Lifted;
 use crate::network::NominalNetwork;
 use crate::parts::{alone, lifted_part};
 use crate::structure::{Structure, count};
-use crate::{AnalysisError, ContactMode, Matrix, Method, PartKind};
+use crate::{AnalysisError, ContactMode, Matrix, Method, PartKind, Unwatched, Watch};
 
 /// Who hears whom.
 #[derive(Clone, PartialEq, Debug)]
@@ -75,6 +75,15 @@ pub enum GraphError {
 ///
 /// [`GraphError`] if the peers are not equal, the scene is not linear, or the weights make no sense.
 pub fn analyse_on(scene: &Scene, graph: &Graph) -> Result<Analysis, GraphError> {
+    analyse_on_watched(scene, graph, &Unwatched)
+}
+
+/// [`analyse_on`], watched.
+///
+/// # Errors
+///
+/// As for [`analyse_on`], and [`AnalysisError::Stopped`] if the watch ends it.
+pub fn analyse_on_watched(scene: &Scene, graph: &Graph, watch: &dyn Watch) -> Result<Analysis, GraphError> {
     let network = NominalNetwork::of(scene).map_err(GraphError::Analysis)?;
     let combinations = combinations(scene).map_err(GraphError::Analysis)?;
     let [combination] = combinations.as_slice() else {
@@ -106,7 +115,7 @@ pub fn analyse_on(scene: &Scene, graph: &Graph) -> Result<Analysis, GraphError> 
         }
         let kind = if together { PartKind::Together } else { PartKind::Mode { weight: eigenvalue.value() } };
         let lifted = Lifted { weights: &weight, timetable, coordination, tied, ..quotient };
-        parts.push(lifted_part(&lifted, kind, copies * combination.axes, Method::Reduced));
+        parts.push(lifted_part(&lifted, kind, copies * combination.axes, Method::Reduced, watch)?);
     }
     let mut dimension = peers * (node[0].states() + 2 * structure.timetable.depth[0]);
     if let Some((part, rigid)) = alone(&structure, scene, 0, combination.axes) {

@@ -39,7 +39,7 @@ pub use cost::{FrameCost, eigenvalue_operations, full_operations};
 pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};
 pub use error::AnalysisError;
 pub use family::{Cell, Criterion, Family, FamilyError, FamilyScratch, KeyRange, KeyRangeError};
-pub use graph::{Graph, GraphError, analyse_on};
+pub use graph::{Graph, GraphError, analyse_on, analyse_on_watched};
 pub use judgement::{Judgement, NOMINAL, has_chance, judge, judge_watched};
 pub use map::{Grid, Map, MapError, MapRow, Polyline};
 pub use matrix::Matrix;
@@ -51,5 +51,5 @@ pub use spectrum::{Workspace as SpectrumWorkspace, bounded_radius, eigenvalues, 
 pub use watch::{Limits, Unwatched, Watch};
 pub use worst_case::{
     Automaton, AutomatonError, Certificate, CertificateError, Edge, Effort, Links, Pattern, PatternError, Patterns, SceneWorstCase,
-    SceneWorstCaseError, WorstCase, WorstPart, WorstVerdict, worst_case,
+    SceneWorstCaseError, WorstCase, WorstPart, WorstVerdict, worst_case, worst_case_watched,
 };

@@ -5,10 +5,11 @@ use std::time::Duration;
 use cohaptic_peer::{Plant, StepMap};
 use cohaptic_scene::Scene;
 
+use crate::cost::eigenvalue_operations;
 use crate::lifted::{Autonomous, Lifted, Node};
 use crate::spectrum::bounded_radius;
 use crate::structure::{Structure, arm, device_plant};
-use crate::{Matrix, Method, Radius};
+use crate::{AnalysisError, Matrix, Method, Radius, Watch};
 
 /// A part of a scene that moves on its own.
 #[derive(Clone, PartialEq, Debug)]
@@ -70,14 +71,14 @@ pub(crate) fn radius_of(parts: &[Part]) -> Radius {
     parts.iter().map(|part| part.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 })
 }
 
-/// Takes a scene apart along that many equal axes.
-pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method: Method) -> Reduced {
+/// Takes a scene apart along that many equal axes; the watch is asked before each part and within it.
+pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method: Method, watch: &dyn Watch) -> Result<Reduced, AnalysisError> {
     let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
     let quotient = structure.quotient(scene, &nodes);
     let mut parts = Vec::new();
     let mut rigid_modes = usize::from(!structure.tied);
     let mut dimension = 0;
-    parts.push(lifted_part(&quotient, PartKind::Together, axes, method));
+    parts.push(lifted_part(&quotient, PartKind::Together, axes, method, watch)?);
     for (class, members) in structure.classes.iter().enumerate() {
         let node = &nodes[class];
         // Each sample is a position and a velocity.
@@ -85,7 +86,7 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method:
         if let Some(timetable) = &structure.apart[class] {
             let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
             let apart = Lifted { nodes: &nodes[class..=class], weights: &weight, timetable, tied: true, ..quotient };
-            let part = lifted_part(&apart, PartKind::Apart { peer: members[0] }, (members.len() - 1) * axes, method);
+            let part = lifted_part(&apart, PartKind::Apart { peer: members[0] }, (members.len() - 1) * axes, method, watch)?;
             // A class on its own may repeat more often than the whole scene.
             let frames = structure.timetable.frame.as_nanos() / timetable.frame.as_nanos().max(1);
             parts.push(Part { radius: part.radius.over(u32::try_from(frames).unwrap_or(u32::MAX)), ..part });
@@ -96,7 +97,7 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method:
             dimension += 2 * members.len();
         }
     }
-    Reduced { parts, rigid_modes: rigid_modes * axes, dimension: (dimension - rigid_modes) * axes, frame: structure.timetable.frame }
+    Ok(Reduced { parts, rigid_modes: rigid_modes * axes, dimension: (dimension - rigid_modes) * axes, frame: structure.timetable.frame })
 }
 
 /// From how many rows on a matrix is replaced by the determinant, whose cost grows with the number of signals and little with their delay: between
@@ -106,15 +107,23 @@ const LARGE: usize = 500;
 const FEW: usize = 32;
 
 /// The part of a scene that a lifted system is.
-pub(crate) fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: Method) -> Part {
-    let frame = lifted.frame(&mut Autonomous);
+pub(crate) fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: Method, watch: &dyn Watch) -> Result<Part, AnalysisError> {
+    let frame = lifted.frame_watched(&mut Autonomous, watch).ok_or(AnalysisError::Stopped)?;
     let size = frame.size();
     let long = method == Method::Determinant && frame.history() > 0 || size > LARGE && frame.signals() <= FEW;
     let delayed = if long { frame.delayed_loop().ok() } else { None };
-    match delayed {
-        Some(delayed) => Part { kind, size, copies, radius: delayed.bounded_radius(frame.error), method: Method::Determinant },
-        None => Part { kind, size, copies, radius: bounded_radius(&frame.monodromy(), frame.error), method: Method::Reduced },
+    if let Some(delayed) = delayed {
+        let radius = delayed.bounded_radius_watched(frame.error, watch).ok_or(AnalysisError::Stopped)?;
+        return Ok(Part { kind, size, copies, radius, method: Method::Determinant });
     }
+    // Eigenvalues cannot ask.
+    watch.expects(eigenvalue_operations(size));
+    if watch.stops() {
+        return Err(AnalysisError::Stopped);
+    }
+    let radius = bounded_radius(&frame.monodromy(), frame.error);
+    watch.done(eigenvalue_operations(size));
+    Ok(Part { kind, size, copies, radius, method: Method::Reduced })
 }
 
 /// The devices of a class if they touch nothing, and how many rigid-body modes they have along one axis.

@@ -195,7 +195,8 @@ fn part<const BOUND: bool>(small: Option<&SmallFrame>, lifted: &Lifted<'_>, matr
     let error = match (small, lifted.nodes) {
         (Some(small), [node]) if SmallFrame::fits(node, lifted.coordination) => {
             let weight = lifted.weights[(0, 0)];
-            small.monodromy::<BOUND>(SmallNode { node, weight, coordination: lifted.coordination, time: lifted.time, tied: lifted.tied }, matrix)
+            let small_node = SmallNode { node, weight, coordination: lifted.coordination, time: lifted.time, tied: lifted.tied };
+            small.monodromy::<BOUND>(small_node, matrix, || lifted.error())
         }
         _ => {
             let frame = lifted.frame(&mut Autonomous);

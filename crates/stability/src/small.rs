@@ -84,21 +84,21 @@ impl SmallFrame {
     }
 
     /// Writes the monodromy matrix into `matrix` and answers a bound of the error of its entries, in the largest sum of sizes of a row; zero without
-    /// `BOUND`.
-    pub(crate) fn monodromy<const BOUND: bool>(&self, small: SmallNode<'_>, matrix: &mut Matrix) -> f64 {
+    /// `BOUND`. `closer` is asked for another bound where the quick one says nothing.
+    pub(crate) fn monodromy<const BOUND: bool>(&self, small: SmallNode<'_>, matrix: &mut Matrix, closer: impl FnOnce() -> f64) -> f64 {
         let states = small.node.states() - usize::from(!small.tied);
         // Sizes that the compiler knows are worth a few copies of the loop.
         match states + self.used.len() {
-            0..=2 => self.run::<2, BOUND>(small, matrix),
-            3 => self.run::<3, BOUND>(small, matrix),
-            4 => self.run::<4, BOUND>(small, matrix),
-            5 => self.run::<5, BOUND>(small, matrix),
-            6 => self.run::<6, BOUND>(small, matrix),
-            _ => self.run::<{ MOST_STATES + MOST_SAMPLES }, BOUND>(small, matrix),
+            0..=2 => self.run::<2, BOUND>(small, matrix, closer),
+            3 => self.run::<3, BOUND>(small, matrix, closer),
+            4 => self.run::<4, BOUND>(small, matrix, closer),
+            5 => self.run::<5, BOUND>(small, matrix, closer),
+            6 => self.run::<6, BOUND>(small, matrix, closer),
+            _ => self.run::<{ MOST_STATES + MOST_SAMPLES }, BOUND>(small, matrix, closer),
         }
     }
 
-    fn run<const C: usize, const BOUND: bool>(&self, small: SmallNode<'_>, matrix: &mut Matrix) -> f64 {
+    fn run<const C: usize, const BOUND: bool>(&self, small: SmallNode<'_>, matrix: &mut Matrix, closer: impl FnOnce() -> f64) -> f64 {
         let SmallNode { node, weight, coordination, time, tied } = small;
         let Gains { stiffness, damping } = coordination;
         let unit = stiffness + damping / time;
@@ -124,7 +124,6 @@ impl SmallFrame {
         let mut next_sent = self.used.len();
         let scale = crate::lifted::node::Scale { time, compliance: node.compliance(time) };
         let mut rounding = Rounding::new(if BOUND { node.step_norm(coordination, scale).max(1.0) } else { 1.0 });
-        let mut error = 0.0;
         let mut maps: Option<(Duration, Map, Map)> = None;
         for step in &self.steps {
             match *step {
@@ -133,9 +132,6 @@ impl SmallFrame {
                         store[next_sent][column] = position_share * z[object][column] + velocity_share * z[object + 1][column];
                     }
                     next_sent += 1;
-                    if BOUND {
-                        rounding.sample(error);
-                    }
                 }
                 Step::Deliver(sample) => aim = aim_at(&store[sample]),
                 Step::Tick(span) => {
@@ -166,14 +162,14 @@ impl SmallFrame {
                     }
                     if BOUND {
                         let norm = |row: &[f64; C]| row.iter().map(|entry| entry.abs()).sum::<f64>();
-                        rounding.tick(z.iter().take(count).map(norm).fold(0.0, f64::max), &mut error);
+                        rounding.tick(z.iter().take(count).map(norm).fold(0.0, f64::max));
                     }
                 }
             }
         }
         let moved = |row: usize| if row == 0 || row == object { 1.0 } else { 0.0 };
         self.assemble(&z, &store, reference.map(|row| (row, stiffness / unit)), (count, states), moved, matrix);
-        if BOUND { rounding.bound(error) } else { 0.0 }
+        if BOUND { rounding.bound(closer) } else { 0.0 }
     }
 
     /// The matrix of the relative state from the rows of states and samples. `reference`: its row, and how far a translation moves a sample.

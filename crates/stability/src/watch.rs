@@ -45,3 +45,12 @@ impl std::fmt::Debug for Limits<'_> {
         formatter.debug_struct("Limits").field("unknowns", unknowns).field("operations", operations).finish_non_exhaustive()
     }
 }
+
+/// A watch that does nothing but ask.
+pub(crate) struct Asks<F>(pub(crate) F);
+
+impl<F: Fn() -> bool + Sync> Watch for Asks<F> {
+    fn stops(&self) -> bool {
+        (self.0)()
+    }
+}

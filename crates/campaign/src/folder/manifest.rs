@@ -58,7 +58,7 @@ impl Manifest {
     }
 
     pub(crate) fn read(path: &Path) -> Result<Self, CampaignError> {
-        let bytes = std::fs::read(path).map_err(|error| CampaignError::File { verb: "read", path: path.to_path_buf(), error })?;
+        let bytes = cohaptic_files::read_bytes(path).map_err(|error| CampaignError::File { verb: "read", path: path.to_path_buf(), error })?;
         let damaged =
             |message: String| CampaignError::Damaged { path: path.to_path_buf(), message, way_out: "choose another folder, or remove this one" };
         let layout = serde_json::from_slice::<Layout>(&bytes).map_err(|error| damaged(error.to_string()))?.layout;

@@ -66,7 +66,7 @@ pub(super) fn merge<'a>(file: &File, columns: &[Column], parts: impl Iterator<It
 
 /// A part that is as it was written, behind its header.
 fn open(path: &Path, header: &[u8], expected: u64) -> Result<File, TableError> {
-    let mut from = File::open(path)?;
+    let mut from = cohaptic_files::open(path, cohaptic_files::MOST_CAPTURE_BYTES)?;
     let mut found = vec![0; header.len()];
     match from.read_exact(&mut found) {
         Ok(()) if found == header => {}

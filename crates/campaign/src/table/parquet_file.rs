@@ -92,7 +92,7 @@ pub(super) fn merge<'a>(file: &File, head: Head<'_>, parts: impl Iterator<Item =
     let mut writer = begin(file, head)?;
     for (path, expected) in parts {
         let of_part = TableError::of_part(path);
-        let part = File::open(path).map_err(|error| of_part(error.into()))?;
+        let part = cohaptic_files::open(path, cohaptic_files::MOST_CAPTURE_BYTES).map_err(|error| of_part(error.into()))?;
         for group in &groups(&part, head.columns, expected).map_err(of_part)? {
             let mut to = writer.next_row_group()?;
             append(&mut to, &part, group)?;

@@ -13,6 +13,8 @@ use cohaptic_accuracy::{About, AccuracyError, Options, Row, Subject, Watch, meas
 use cohaptic_picture::Size;
 use serde::Serialize;
 
+use cohaptic_units::print::Counted;
+
 use crate::arguments::AccuracyArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
@@ -73,7 +75,7 @@ pub(crate) fn accuracy(arguments: &AccuracyArguments) -> Result<ExitCode, Failur
     // A row may take longer than there is time.
     interrupt::keep(move || {
         let rows = rows.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let said = format!("the {} rows measured until then are kept", rows.len());
+        let said = format!("{} kept that had been measured until then", output::are(rows.len(), "row"));
         let concluded = Conclusion { rows, about: About { line, partial: true }, out, json, size, wall_s: start.elapsed().as_secs_f64() }.tell();
         concluded.map_or_else(|_| "the rows measured until then cannot be written".to_owned(), |()| said)
     });
@@ -119,7 +121,7 @@ impl Conclusion {
         } else {
             let mut shown = text(rows);
             if about.partial {
-                let _ = writeln!(shown, "INTERRUPTED after {wall_s:.1} s: these are the {} rows measured until then", rows.len());
+                let _ = writeln!(shown, "INTERRUPTED after {wall_s:.1} s: this is what was measured until then, {}", Counted(rows.len(), "row"));
             }
             output::text(&shown)?;
             output::wrote(out.as_ref().filter(|_| written.is_ok()).map(|folder| folder.join("index.html")));

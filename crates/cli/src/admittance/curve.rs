@@ -2,7 +2,8 @@
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{
-    Admittance, AnalysisError, FrequencyResponse, LowFrequencyFit, MeanSquare, QUICK_UNKNOWNS, Verdict, Watch, has_chance, ideal, mean_square_within,
+    Admittance, AdmittanceError, AnalysisError, FrequencyResponse, Limits, LowFrequencyFit, MeanSquare, QUICK_UNKNOWNS, Verdict, Watch, has_chance,
+    ideal, mean_square_watched,
 };
 
 use crate::arguments::AdmittanceArguments;
@@ -35,19 +36,26 @@ pub(super) struct Curve {
 }
 
 /// The scene as it stands, then that of every `--curve`.
-pub(super) fn subjects(arguments: &AdmittanceArguments) -> Result<Vec<Subject>, Failure> {
-    Variant::all(&arguments.curve, &[])?.into_iter().map(|variant| Subject::new(arguments, variant)).collect()
+pub(super) fn subjects(arguments: &AdmittanceArguments, watch: &dyn Watch) -> Result<Vec<Subject>, Failure> {
+    Variant::all(&arguments.curve, &[])?.into_iter().map(|variant| Subject::new(arguments, variant, watch)).collect()
 }
 
 impl Subject {
-    fn new(arguments: &AdmittanceArguments, variant: Variant) -> Result<Self, Failure> {
+    fn new(arguments: &AdmittanceArguments, variant: Variant, watch: &dyn Watch) -> Result<Self, Failure> {
         let file = &arguments.scene.scene;
         let overrides = variant.on_top_of(&arguments.scene.overrides.set);
         let scene = input::with(file, |text, file| Scene::parse(text, file, &overrides));
         let scene = scene.map_err(|error| failure::of_variant(error, variant.option, &variant.overrides))?;
         let peer = place_of(&arguments.peer, &scene, &variant)?;
-        let admittance = Admittance::of(&scene, peer).map_err(|error| not_analysed(file, &error))?;
-        let chance = has_chance(&scene).then(|| mean_square_within(&scene, QUICK_UNKNOWNS));
+        let ended = || Failure::Interrupted("the analysis was ended before its first point".to_owned());
+        let admittance = Admittance::of_watched(&scene, peer, watch).map_err(|error| match error {
+            AdmittanceError::Analysis(AnalysisError::Stopped) => ended(),
+            error => not_analysed(file, &error),
+        })?;
+        let chance = has_chance(&scene).then(|| mean_square_watched(&scene, &Limits { watch, ..Limits::of_unknowns(QUICK_UNKNOWNS) }));
+        if chance == Some(Err(AnalysisError::Stopped)) {
+            return Err(ended());
+        }
         Ok(Self { variant, scene, admittance, chance })
     }
 }

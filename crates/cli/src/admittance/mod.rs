@@ -20,10 +20,14 @@ use crate::output;
 
 /// Says what the hand of one peer feels.
 pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Failure> {
-    let subjects = curve::subjects(arguments)?;
+    let watch = AnalysisWatch::new();
+    let subjects = curve::subjects(arguments, &watch);
+    if subjects.is_err() {
+        watch.clear();
+    }
+    let subjects = subjects?;
     let highest = subjects.iter().map(|subject| subject.admittance.highest_frequency()).fold(f64::INFINITY, f64::min);
     let frequencies = frequencies::of(arguments, highest)?;
-    let watch = AnalysisWatch::new();
     let curves = subjects.into_iter().map(|subject| Curve::of(subject, &frequencies, &watch));
     let curves = curves.collect::<Result<Vec<Curve>, Failure>>();
     watch.clear();

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use cohaptic_stability::{Estimate, Verdict};
 
 use super::curve::Curve;
+use crate::output::figure;
 
 /// All curves in words, each with its table.
 pub(super) fn describe(peer: &str, curves: &[Curve]) -> String {
@@ -62,7 +63,7 @@ fn felt(text: &mut String, curve: &Curve) {
 }
 
 fn limit(Estimate { value, error }: Estimate, unit: &str) -> String {
-    if value.is_finite() && error.is_finite() { format!("{value:.6} +- {error:.1e} {unit}") } else { "no definite size".to_owned() }
+    if value.is_finite() && error.is_finite() { format!("{} +- {error:.1e} {unit}", figure(value, 6)) } else { "no definite size".to_owned() }
 }
 
 /// A verdict as it is printed: one that people must not overlook in capitals.
@@ -78,14 +79,14 @@ fn shown(verdict: Verdict) -> &'static str {
 fn verdict(curve: &Curve) -> String {
     let radius = curve.admittance.radius();
     let word = shown(radius.verdict());
-    let nominal = format!("spectral radius {:.12} +- {:.1e}", radius.value, radius.error);
+    let nominal = format!("spectral radius {} +- {:.1e}", figure(radius.value, 12), radius.error);
     match &curve.chance {
         None => format!("the scene is {word}: {nominal}"),
         Some(Err(_)) => format!("with nothing left to chance the scene is {word}: {nominal}"),
         Some(Ok(moment)) => format!(
-            "in the mean square the scene is {}: mean-square radius {:.12} +- {:.1e}\n  with nothing left to chance it is {word}: {nominal}",
+            "in the mean square the scene is {}: mean-square radius {} +- {:.1e}\n  with nothing left to chance it is {word}: {nominal}",
             shown(moment.verdict()),
-            moment.radius.value,
+            figure(moment.radius.value, 12),
             moment.radius.error
         ),
     }

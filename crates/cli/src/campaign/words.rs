@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use cohaptic_campaign::{CombinationReport, Judgement};
+use cohaptic_units::print::Counted;
 
 use super::Finished;
 use crate::run::words::length;
@@ -18,12 +19,12 @@ pub(super) fn describe(finished: &Finished) -> String {
     let mut line = |line: &str| {
         let _ = writeln!(text, "{line}");
     };
-    line(&format!("  {} of {}, {each} of each", counted(report.runs, "run"), counted(combinations, "combination")));
+    line(&format!("  {} of {}, {each} of each", Counted(report.runs, "run"), Counted(combinations, "combination")));
     if report.computed == 0 {
         line("  all of them were there already: nothing was run");
     } else {
         let before = report.runs - report.computed;
-        let kept = if before > 0 { format!(", {before} were there already") } else { String::new() };
+        let kept = if before > 0 { format!(", {before} {} there already", if before == 1 { "was" } else { "were" }) } else { String::new() };
         line(&format!("  {} run in {wall_s:.3} s: {:.0} a second{kept}", report.computed, finished.runs_per_s()));
     }
     match report.worst() {
@@ -37,7 +38,7 @@ pub(super) fn describe(finished: &Finished) -> String {
         line("");
         table(finished).iter().for_each(|row| line(row));
         if report.combinations.len() > MOST_COMBINATIONS {
-            line(&format!("  ... and {} more combinations", report.combinations.len() - MOST_COMBINATIONS));
+            line(&format!("  ... and {}", Counted(report.combinations.len() - MOST_COMBINATIONS, "more combination")));
         }
     }
     notes.iter().for_each(|note| line(&format!("note: {note}")));
@@ -69,8 +70,4 @@ fn judged(judgement: &Judgement) -> [String; 3] {
         Some(verdict) => [verdict.word.to_string(), verdict.judged.to_string(), format!("{:.6}", verdict.radius)],
         None => [const { "-" }; 3].map(str::to_owned),
     }
-}
-
-fn counted(number: u64, what: &str) -> String {
-    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }

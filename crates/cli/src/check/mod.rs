@@ -11,6 +11,7 @@ use cohaptic_harness::check::{Finding, Judged};
 use cohaptic_harness::{Model, check as harness};
 use cohaptic_scene::{Scene, SceneError, scene_files};
 use cohaptic_stability::{AnalysisError, Limits, Method, NOMINAL, QUICK_UNKNOWNS, Verdict, has_chance, judge_watched};
+use cohaptic_units::print::Number;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -161,7 +162,7 @@ fn judged(scene: &Scene, stable: bool, note: impl FnOnce(String)) -> Judged {
         None => (judgement.analysis.radius, "spectral radius"),
     };
     let expected = if stable { Verdict::Stable } else { Verdict::Unstable };
-    let found = format!("it is {}: the {what} is {} within {:.1e}", judgement.verdict.word(), radius.value, radius.error);
+    let found = format!("it is {}: the {what} is {} within {:.1e}", judgement.verdict.word(), Number(radius.value), radius.error);
     Judged::Found(Finding { passed: judgement.verdict == expected, found, radius: Some(radius.value).filter(|value| value.is_finite()) })
 }
 

@@ -17,6 +17,8 @@ use super::reach::SWAY;
 use super::truth::{DeviceDocument, Truth};
 use super::way::Way;
 use super::words;
+use cohaptic_units::print::Counted;
+
 use crate::arguments::{Force, HandName, SimulateArguments};
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
@@ -93,7 +95,7 @@ impl Document {
     fn describe(&self) -> String {
         let mut lines: Vec<String> = self.changes.iter().map(|change| format!("{:7.3} s  {} ({})", change.t_s, change.phase, change.light)).collect();
         if self.more_changes > 0 {
-            lines.push(format!("and {} changes more", self.more_changes));
+            lines.push(format!("and {}", Counted(self.more_changes, "more change")));
         }
         lines.push(match &self.driver_error {
             Some(error) => format!("the driver gave up after {:.3} s: {error}", self.traffic.seconds),

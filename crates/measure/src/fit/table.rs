@@ -12,7 +12,7 @@
 //! Times are in seconds, or in the unit that the name ends in: `_s`, `_ms`, `_us`, `_ns`. Digits are kept exactly up to 10⁻¹⁸ s, so that instants may
 //! be counted from 1970. Rows stand in the order of sending.
 
-use std::io::Read;
+use std::io::{self, Read};
 
 use super::decimal::Attoseconds;
 use super::{Measurement, Measurements, MeasurementsError};
@@ -21,9 +21,15 @@ use super::{Measurement, Measurements, MeasurementsError};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableError {
-    /// The file cannot be read or is no CSV.
-    #[error("cannot be read as CSV: {0}")]
-    Csv(#[from] csv::Error),
+    /// The file cannot be read.
+    #[error("cannot be read: {0}")]
+    Io(io::Error),
+    /// What stands there is no text.
+    #[error("line {line}: found bytes that are no text, expected UTF-8")]
+    NotText {
+        /// The line.
+        line: u64,
+    },
     /// A column is missing, twice there, or excluded by another.
     #[error(
         "line 1: found the columns \"{found}\", expected `t` or `sent` and either `delay` or `arrived`, each once, perhaps `lost` (and times with _ms, _us or _ns)"
@@ -55,6 +61,14 @@ pub enum TableError {
     /// The packets as a whole are refused.
     #[error(transparent)]
     Measurements(#[from] MeasurementsError),
+}
+
+impl From<csv::Error> for TableError {
+    fn from(error: csv::Error) -> Self {
+        let line = error.position().map_or(1, csv::Position::line);
+        // Rows may be of any length, so that nothing else is refused.
+        if error.is_io_error() { Self::Io(error.into()) } else { Self::NotText { line } }
+    }
 }
 
 impl Measurements {

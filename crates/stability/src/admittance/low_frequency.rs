@@ -7,7 +7,8 @@
 //! ```
 //!
 //! both parts in ω² alone. Their first coefficients are found by extrapolation to ω² = 0 (Richardson 1911): the frequency is halved again and again, a
-//! table of differences (Neville) removes one term of the series after the other, and the entry is taken that changed least (Ridders 1982). That stops by
+//! table of differences (Neville) removes one term of the series after the other, and the entry is taken that changed least (Ridders 1982) over three
+//! frequencies. That stops by
 //! itself between frequencies that are too high for the series and those so low that rounding covers what is looked for.
 
 use std::f64::consts::TAU;
@@ -30,7 +31,8 @@ pub struct LowFrequencyFit {
 pub struct Estimate {
     /// The limit.
     pub value: f64,
-    /// How far the best extrapolations are apart, and what rounding may add: about how far it may be off. Infinite where there is no limit.
+    /// How far the limit may be off: how far the extrapolations are apart from which it comes, and what rounding of the impedances does to it at most.
+    /// Infinite where there is no limit.
     pub error: f64,
 }
 
@@ -38,52 +40,74 @@ pub struct Estimate {
 const FREQUENCIES: usize = 30;
 /// How many terms of the series are removed at most: beyond that rounding grows faster than what is left shrinks.
 const MOST_TERMS: usize = 8;
-/// What an impedance may be rounded by, relative to its size: some units in the last place.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 impl LowFrequencyFit {
-    /// From the impedance at any frequency up to `highest`, and whether anything ties the device to ground.
-    pub(super) fn of(impedance: impl Fn(f64) -> Complex64, highest: f64, tied: bool) -> Self {
+    /// From the impedance at any frequency up to `highest` with a bound of its rounding, and whether anything ties the device to ground.
+    pub(super) fn of(impedance: impl Fn(f64) -> (Complex64, f64), highest: f64, tied: bool) -> Self {
         let frequencies: Vec<f64> = std::iter::successors(Some(highest), |hz| Some(0.5 * hz)).take(FREQUENCIES).collect();
-        let points: Vec<(f64, Complex64)> = frequencies.iter().map(|hz| (TAU * hz, impedance(*hz))).collect();
+        // A unit in the last place is for what is done to each here.
+        let point = |hz: &f64| {
+            let (z, noise) = impedance(*hz);
+            (TAU * hz, z, noise + 2.0 * f64::EPSILON * z.norm())
+        };
+        let points: Vec<(f64, Complex64, f64)> = frequencies.iter().map(point).collect();
         // Each value with what rounding of the impedance makes of it.
-        let noise = |z: &Complex64| ROUNDING * z.norm();
-        let real: Vec<(f64, f64)> = points.iter().map(|(_, z)| (z.re, noise(z))).collect();
-        let spring: Vec<(f64, f64)> = points.iter().map(|(omega, z)| (-omega * z.im, omega * noise(z))).collect();
+        let real: Vec<(f64, f64)> = points.iter().map(|(_, z, noise)| (z.re, *noise)).collect();
+        let spring: Vec<(f64, f64)> = points.iter().map(|(omega, z, noise)| (-omega * z.im, omega * noise)).collect();
         let mass: Vec<(f64, f64)> = if tied {
             // (p(ω²) − p(ω²/4)) / (3/4·ω²) of p = ω·Im Z has the series m + 5/4·s·ω² + …, again in ω².
             let pairs = points.windows(2).zip(spring.windows(2));
             pairs
-                .map(|(point, spring)| (spring[1].0 - spring[0].0, spring[0].1, 0.75 * point[0].0 * point[0].0))
-                .map(|(p, noise, h)| (p / h, 2.0 * noise / h))
+                .map(|(point, spring)| (spring[1].0 - spring[0].0, spring[0].1 + spring[1].1, 0.75 * point[0].0 * point[0].0))
+                .map(|(p, noise, h)| (p / h, noise / h))
                 .collect()
         } else {
-            points.iter().map(|(omega, z)| (z.im / omega, noise(z) / omega)).collect()
+            points.iter().map(|(omega, z, noise)| (z.im / omega, noise / omega)).collect()
         };
         let stiffness = if tied { extrapolated(&spring) } else { Estimate { value: 0.0, error: 0.0 } };
         Self { stiffness, viscosity: extrapolated(&real), inertia: extrapolated(&mass) }
     }
 }
 
-/// The limit of a sequence whose terms have a series in h, at h, h/4, h/16, …; beside each term what rounding makes of it.
+/// The limit of a sequence whose terms have a series in h, at h, h/4, h/16, …; beside each term what rounding makes of it at most.
+///
+/// An entry of the table is (4ᵏ·a − b)/(4ᵏ − 1) of two entries before it, so that what rounding makes of it is at most (4ᵏ·α + β)/(4ᵏ − 1) of theirs: that
+/// is carried along beside the entries, as it grows quickly where the terms themselves are divided by h.
+///
+/// A series may seem to converge to what is felt in some range of frequencies above the lowest ones. So each frequency has its own estimate, and the best is
+/// taken of those from the lowest frequency up to the first that contradicts them.
 fn extrapolated(sequence: &[(f64, f64)]) -> Estimate {
-    let mut best = Estimate { value: f64::NAN, error: f64::INFINITY };
-    let mut before: Vec<f64> = Vec::new();
+    let none = Estimate { value: f64::NAN, error: f64::INFINITY };
+    let mut estimates = Vec::with_capacity(sequence.len());
+    let (mut before, mut earlier): (Vec<(f64, f64)>, Vec<(f64, f64)>) = (Vec::new(), Vec::new());
     for (value, noise) in sequence {
-        let mut row = vec![*value];
+        let mut best = none;
+        let mut row = vec![(*value, *noise)];
         let mut power = 1.0;
-        for (term, above) in before.iter().enumerate().take(MOST_TERMS) {
+        for (term, (above, noise_above)) in before.iter().enumerate().take(MOST_TERMS) {
             power *= 4.0;
-            let next = row[term] + (row[term] - above) / (power - 1.0);
-            let apart = (next - row[term]).abs().max((next - above).abs());
-            // Two entries of noise may agree by chance.
-            let error = apart + noise;
+            let (here, noise_here) = row[term];
+            let next = here + (here - above) / (power - 1.0);
+            let noise = (power * noise_here + noise_above) / (power - 1.0) + 2.0 * f64::EPSILON * next.abs();
+            // Above the first resonance terms follow no series, and two of them may agree by chance: those of three frequencies must.
+            let before_that = earlier.get(term).map_or(f64::INFINITY, |(entry, _)| (above - entry).abs());
+            let error = (next - here).abs().max((next - above).abs()).max(before_that) + noise;
             if error < best.error {
                 best = Estimate { value: next, error };
             }
-            row.push(next);
+            row.push((next, noise));
         }
-        before = row;
+        estimates.push(best);
+        earlier = std::mem::replace(&mut before, row);
+    }
+    let mut best = none;
+    for estimate in estimates.into_iter().rev().filter(|estimate| estimate.error.is_finite()) {
+        if (estimate.value - best.value).abs() > estimate.error + best.error {
+            break;
+        }
+        if estimate.error < best.error {
+            best = estimate;
+        }
     }
     best
 }
@@ -95,7 +119,7 @@ mod tests {
     #[track_caller]
     fn assert_found(found: Estimate, expected: f64, relative: f64) {
         let off = (found.value - expected).abs();
-        assert!(off <= relative * expected.abs() && off <= 2.0 * found.error, "{found:?} is not {expected}");
+        assert!(off <= relative * expected.abs() && off <= found.error, "{found:?} is not {expected}");
     }
 
     /// k/s + b + m·s with a delayed force g·(1 − e^{−sτ}): as s → 0 that adds g·τ·s, an inertia.
@@ -104,7 +128,9 @@ mod tests {
         for stiffness in [0.0, 300.0] {
             let impedance = |hz: f64| {
                 let s = Complex64::new(0.0, TAU * hz);
-                stiffness / s + 5.0 + 0.2 * s + 7.0 * (1.0 - (-s * 0.03).exp())
+                let z = stiffness / s + 5.0 + 0.2 * s + 7.0 * (1.0 - (-s * 0.03).exp());
+                // Of sums of numbers up to 7, and of the spring.
+                (z, 4.0 * f64::EPSILON * (14.0 + z.norm()))
             };
             let fit = LowFrequencyFit::of(impedance, 20.0, stiffness > 0.0);
             assert_found(fit.stiffness, stiffness, 1e-9);
@@ -113,9 +139,19 @@ mod tests {
         }
     }
 
+    /// 5 N·s/m at 0.1 Hz and above, and 10⁴ N·s/m below some µHz: what is felt at last counts.
+    #[test]
+    fn a_range_of_frequencies_in_which_something_else_is_felt_is_no_limit() {
+        let impedance = |hz: f64| {
+            let z = 5.0 + 1e4 / (1.0 + Complex64::new(0.0, hz / 3e-6));
+            (z, 4.0 * f64::EPSILON * (1e4 + z.norm()))
+        };
+        assert_found(LowFrequencyFit::of(impedance, 30.0, false).viscosity, 10_005.0, 1e-9);
+    }
+
     #[test]
     fn there_is_no_limit_where_there_are_no_numbers() {
-        let fit = LowFrequencyFit::of(|_| Complex64::new(f64::NAN, f64::NAN), 20.0, false);
+        let fit = LowFrequencyFit::of(|_| (Complex64::new(f64::NAN, f64::NAN), f64::NAN), 20.0, false);
         assert!(fit.viscosity.value.is_nan() && fit.viscosity.error.is_infinite());
     }
 }

@@ -69,11 +69,20 @@ impl Admittance {
     ///
     /// [`AdmittanceError`] if there is no such peer, or if the scene has no frame that repeats.
     pub fn of(scene: &Scene, peer: usize) -> Result<Self, AdmittanceError> {
+        Self::of_watched(scene, peer, &Unwatched)
+    }
+
+    /// [`Admittance::of`], watched while it works out the verdict on the scene.
+    ///
+    /// # Errors
+    ///
+    /// As [`Admittance::of`], and [`AnalysisError::Stopped`] if the watch ends it.
+    pub fn of_watched(scene: &Scene, peer: usize, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
         let spec = scene.peers.get(peer).ok_or(AdmittanceError::NoSuchPeer { peer, peers: scene.peers.len() })?;
         let network = NominalNetwork::of(scene)?;
         let (contacts, notes) = closed_contacts(scene, peer);
         let structure = Structure::with_alone(&[scene], &network, &contacts, Some(peer))?;
-        let mut admittance = Self::of_classes(scene, structure, peer);
+        let mut admittance = Self::of_classes(scene, structure, peer, watch)?;
         if !contacts.touching[peer] {
             let device = Some(Body::new(device_plant(spec), scene.integrator, &spec.clock));
             admittance.leave_bare(device, NodeClock::of(scene, peer), arm(spec).stiffness > 0.0)?;
@@ -84,13 +93,13 @@ impl Admittance {
     }
 
     /// From classes of which the pushed peer is one by itself.
-    fn of_classes(scene: &Scene, structure: Structure, peer: usize) -> Self {
-        let radius = radius_of(&reduced(&structure, scene, 1, Method::Reduced).parts);
+    fn of_classes(scene: &Scene, structure: Structure, peer: usize, watch: &dyn Watch) -> Result<Self, AnalysisError> {
+        let radius = radius_of(&reduced(&structure, scene, 1, Method::Reduced, watch)?.parts);
         let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
         let (coordination, time) = (structure.coordination(scene), structure.time(scene));
         let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
         let Structure { timetable, weights, tied, .. } = structure;
-        Self { nodes, weights, timetable, coordination, time, tied, pushed, highest: 0.0, radius, notes: Vec::new() }
+        Ok(Self { nodes, weights, timetable, coordination, time, tied, pushed, highest: 0.0, radius, notes: Vec::new() })
     }
 
     /// The admittance at a frequency \[Hz\].
@@ -185,9 +194,11 @@ impl Admittance {
         Lifted { nodes, weights, timetable, coordination: *coordination, time: *time, tied: *tied }
     }
 
-    /// Force over velocity, at a frequency that is one.
-    fn impedance(&self, hz: f64) -> Complex64 {
-        Harmonic::new(&self.lifted(), self.pushed, hz).point().value.inv()
+    /// Force over velocity, at a frequency that is one, and how far rounding may have moved it: 1/(v + d) − 1/v is −d/(v·(v + d)).
+    fn impedance(&self, hz: f64) -> (Complex64, f64) {
+        let AdmittancePoint { value, error, .. } = Harmonic::new(&self.lifted(), self.pushed, hz).point();
+        let size = value.norm();
+        (value.inv(), if error < size { error / (size * (size - error)) } else { f64::INFINITY })
     }
 
     /// Leaves nothing but the device of the pushed peer. A node has a copy, which then rests.
@@ -258,7 +269,7 @@ mod tests {
         structure.peers = count;
         let others = crate::structure::count(count - 1);
         structure.weights = Matrix::from_fn(2, 2, |row, column| [[0.0, 1.0], [1.0 / others, (others - 1.0) / others]][row][column]);
-        let mut admittance = Admittance::of_classes(&scene, structure, 0);
+        let mut admittance = Admittance::of_classes(&scene, structure, 0, &Unwatched).unwrap();
         admittance.highest = 0.5 * admittance.tick_rate();
         admittance
     }
@@ -280,10 +291,11 @@ mod tests {
     }
 
     /// b = bH + N·KT·(τ + δ), δ = BT·(Tc²/m)·(M² − 1)/12: see scenarios/README.md. Met far below the frequency KT/(2πb), 0.14 mHz here.
+    /// So low, a bound of what rounding does to an impedance is some 10⁻⁴ of it.
     #[test]
     fn the_viscosity_of_a_hundred_thousand_peers_follows_the_law() {
         let fit = with_peers(100_000).fit_low_frequency();
         let expected = 5.0 + 1e5 * 1000.0 * (0.0115 + 5.0 * 1e-6 / 0.45 * 63.0 / 12.0);
-        assert!((fit.viscosity.value / expected - 1.0).abs() < 0.005 && fit.viscosity.error < 1e-4 * expected, "{fit:?}, {expected}");
+        assert!((fit.viscosity.value / expected - 1.0).abs() < 0.005 && fit.viscosity.error < 1e-3 * expected, "{fit:?}, {expected}");
     }
 }

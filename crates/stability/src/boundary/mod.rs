@@ -16,7 +16,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use crate::map::{Scratches, nodes};
-use crate::{Cell, Family, FamilyError, KeyRange, Verdict};
+use crate::watch::Asks;
+use crate::{AnalysisError, Cell, Family, FamilyError, KeyRange, Verdict, Watch};
 use intervals::{Samples, wanted};
 
 /// How closely a boundary is looked for.
@@ -117,12 +118,30 @@ impl Boundary {
         progress: impl Fn(usize) + Sync,
         stop: impl Fn() -> bool + Sync,
     ) -> Result<Self, BoundaryError<FamilyError>> {
+        Self::find_watched(family, options, known, progress, &Asks(stop))
+    }
+
+    /// [`Boundary::find`] with a watch, which sees how far values are that take long, and ends the search within them.
+    ///
+    /// # Errors
+    ///
+    /// As [`Boundary::find`].
+    pub fn find_watched(
+        family: &Family,
+        options: BoundaryOptions,
+        known: &[(f64, Cell)],
+        progress: impl Fn(usize) + Sync,
+        watch: &dyn Watch,
+    ) -> Result<Self, BoundaryError<FamilyError>> {
         let [range] = family.keys() else {
             return Err(BoundaryError::Keys { keys: family.keys().len() });
         };
         let pool = Scratches::default();
-        let radius = |value: f64| pool.with(|scratch| family.bounded_radius(&[value], scratch));
-        Self::search(range, options, known, radius, progress, stop)
+        let radius = |value: f64| match pool.with(|scratch| family.bounded_radius_watched(&[value], scratch, watch)) {
+            Err(FamilyError::Analysis(AnalysisError::Stopped)) => Ok(None),
+            found => found.map(Some),
+        };
+        Self::searched(range, options, known, radius, progress, || watch.stops())
     }
 
     /// Finds every crossing of a radius over a range, which may be that of anything. Values are looked at on all threads of the pool it is called in;
@@ -142,6 +161,18 @@ impl Boundary {
         progress: impl Fn(usize) + Sync,
         stop: impl Fn() -> bool + Sync,
     ) -> Result<Self, BoundaryError<E>> {
+        Self::searched(range, options, known, |value| radius(value).map(Some), progress, stop)
+    }
+
+    /// [`Boundary::search`]; of a value that was ended before it was known, `radius` answers `None`.
+    fn searched<E: Send>(
+        range: &KeyRange,
+        options: BoundaryOptions,
+        known: &[(f64, Cell)],
+        radius: impl Fn(f64) -> Result<Option<Cell>, E> + Sync,
+        progress: impl Fn(usize) + Sync,
+        stop: impl Fn() -> bool + Sync,
+    ) -> Result<Self, BoundaryError<E>> {
         let BoundaryOptions { samples, tolerance, most } = options;
         if samples < 2 || samples > most || !(tolerance > 0.0 && tolerance.is_finite()) {
             return Err(BoundaryError::Options { samples, tolerance, most });
@@ -153,9 +184,10 @@ impl Boundary {
                 return Ok(None);
             }
             let found = match known.get(&value.to_bits()) {
-                Some(cell) => *cell,
+                Some(cell) => Some(*cell),
                 None => radius(value)?,
             };
+            let Some(found) = found else { return Ok(None) };
             progress(looked_at.fetch_add(1, Ordering::Relaxed) + 1);
             Ok(Some((value, found)))
         };

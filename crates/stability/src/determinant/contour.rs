@@ -11,6 +11,7 @@ use num_complex::Complex64;
 
 use super::DelayedLoop;
 use super::point::Point;
+use crate::Watch;
 
 /// The most points that one count may cost, and that many more for each step of delay. A root that asks for more counts as too near.
 const POINTS: u64 = 10_000;
@@ -43,8 +44,8 @@ struct Limits {
 
 impl DelayedLoop {
     /// How often det A turns around zero on the circle, which must not have the origin inside unless it is its centre, for all systems whose
-    /// matrices are within `perturbation` of these in the 2-norm.
-    pub(super) fn trip(&self, circle: Circle, perturbation: f64) -> Trip {
+    /// matrices are within `perturbation` of these in the 2-norm; not told if the watch ends it.
+    pub(super) fn trip(&self, circle: Circle, perturbation: f64, watch: &dyn Watch) -> Trip {
         let centred = circle.centre.norm() == 0.0;
         let inner = (if centred { circle.radius } else { circle.centre.norm() - circle.radius }) * (1.0 - 1e-15);
         let half = circle.centre.im == 0.0;
@@ -64,7 +65,7 @@ impl DelayedLoop {
         let mut reach = self.reach(&here, &limits, circle.radius);
         let steps: u64 = self.terms.iter().map(|term| u64::from(term.kernel.steps())).sum();
         for _ in 0..POINTS + POINTS_PER_STEP * steps {
-            let Some(covered) = reach else {
+            let Some(covered) = reach.filter(|_| !watch.stops()) else {
                 trip.nearest = here.z;
                 return trip;
             };

@@ -14,7 +14,7 @@ mod tests;
 
 use num_complex::Complex64;
 
-use crate::Matrix;
+use crate::{Matrix, Unwatched, Watch};
 use contour::Circle;
 pub use kernel::Kernel;
 
@@ -82,15 +82,15 @@ impl DelayedLoop {
     /// F has no poles but z = 0 and is z^n far away, so that the roots outside are n less the turns of F along the circle.
     #[must_use]
     pub fn roots_outside(&self, radius: f64) -> Option<usize> {
-        self.count(radius, 0.0)
+        self.count(radius, 0.0, &Unwatched)
     }
 
     /// [`DelayedLoop::roots_outside`] for all loops whose matrices are each within `perturbation` of these in the 2-norm.
-    fn count(&self, radius: f64, perturbation: f64) -> Option<usize> {
+    fn count(&self, radius: f64, perturbation: f64, watch: &dyn Watch) -> Option<usize> {
         if !(radius > 0.0 && radius.is_finite()) {
             return None;
         }
-        self.roots_beyond(self.trip(Circle { centre: Complex64::default(), radius }, perturbation).turns?)
+        self.roots_beyond(self.trip(Circle { centre: Complex64::default(), radius }, perturbation, watch).turns?)
     }
 
     fn roots_beyond(&self, turns: i64) -> Option<usize> {

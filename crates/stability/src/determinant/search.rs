@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use super::contour::Circle;
 use super::{DelayedLoop, Kernel};
-use crate::{Matrix, Radius};
+use crate::{Matrix, Radius, Unwatched, Watch};
 
 /// Up to this many rows the explicit matrix is as cheap, and its bound is better at multiple roots.
 const EXPLICIT: usize = 40;
@@ -25,6 +25,18 @@ impl DelayedLoop {
     /// counted. The error is infinite if nothing could be counted.
     #[must_use]
     pub fn bounded_radius(&self, perturbation: f64) -> Radius {
+        self.bounded_radius_watched(perturbation, &Unwatched).unwrap_or(Radius::UNKNOWN)
+    }
+
+    /// [`DelayedLoop::bounded_radius`], watched: it is asked at each point of each circle; `None` if the watch ends it.
+    #[must_use]
+    pub fn bounded_radius_watched(&self, perturbation: f64, watch: &dyn Watch) -> Option<Radius> {
+        let radius = self.searched(perturbation, watch);
+        // A count that was ended tells nothing, like one that is too near to a root: what came of it is no answer.
+        (!watch.stops()).then_some(radius)
+    }
+
+    fn searched(&self, perturbation: f64, watch: &dyn Watch) -> Radius {
         let longest = self.terms.iter().map(|term| term.kernel.steps()).max().unwrap_or(0);
         if self.now.rows().saturating_mul(longest as usize + 1) <= EXPLICIT {
             return self.explicit_radius(longest as usize, perturbation);
@@ -38,7 +50,10 @@ impl DelayedLoop {
         let mut low: f64 = 0.0;
         let mut trial = high;
         for _ in 0..HALVINGS {
-            let trip = self.trip(Circle { centre: Complex64::default(), radius: trial }, perturbation);
+            if watch.stops() {
+                break;
+            }
+            let trip = self.trip(Circle { centre: Complex64::default(), radius: trial }, perturbation, watch);
             match trip.turns.and_then(|turns| self.roots_beyond(turns)) {
                 Some(0) => high = high.min(trial),
                 Some(_) => low = low.max(trial),
@@ -50,8 +65,8 @@ impl DelayedLoop {
             {
                 let modulus = root.norm();
                 if modulus >= low && modulus < high {
-                    let reached = low.max(self.certified_low(root, perturbation));
-                    if let Some(sure) = self.certified_high(root, high, perturbation) {
+                    let reached = low.max(self.certified_low(root, perturbation, watch));
+                    if let Some(sure) = self.certified_high(root, high, perturbation, watch) {
                         return interval(reached, high.min(sure), modulus);
                     }
                     low = reached;
@@ -151,11 +166,11 @@ impl DelayedLoop {
     }
 
     /// A radius that at least one root reaches, from a circle around the computed one; 0 if there is none.
-    fn certified_low(&self, root: Complex64, perturbation: f64) -> f64 {
+    fn certified_low(&self, root: Complex64, perturbation: f64, watch: &dyn Watch) -> f64 {
         let mut distance = self.first_distance(root, perturbation);
-        while distance < 0.9 * root.norm() {
+        while distance < 0.9 * root.norm() && !watch.stops() {
             // A circle that comes near the real axis but is not centred there would meet the conjugate root too; that is no harm.
-            if self.trip(Circle { centre: root, radius: distance }, perturbation).turns.is_some_and(|turns| turns > 0) {
+            if self.trip(Circle { centre: root, radius: distance }, perturbation, watch).turns.is_some_and(|turns| turns > 0) {
                 return (root.norm() - distance) * (1.0 - 4.0 * f64::EPSILON);
             }
             distance *= GROWTH;
@@ -164,11 +179,11 @@ impl DelayedLoop {
     }
 
     /// A radius that no root reaches, as little above that of `root` as can be told; `None` if there is a root outside, or nothing can be told.
-    fn certified_high(&self, root: Complex64, high: f64, perturbation: f64) -> Option<f64> {
+    fn certified_high(&self, root: Complex64, high: f64, perturbation: f64, watch: &dyn Watch) -> Option<f64> {
         let modulus = root.norm();
         let mut distance = self.first_distance(root, perturbation);
-        while modulus + distance < high {
-            match self.count(modulus + distance, perturbation) {
+        while modulus + distance < high && !watch.stops() {
+            match self.count(modulus + distance, perturbation, watch) {
                 Some(0) => return Some((modulus + distance) * (1.0 + 4.0 * f64::EPSILON)),
                 Some(_) => return None,
                 None => distance *= GROWTH,

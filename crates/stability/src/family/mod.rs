@@ -23,7 +23,7 @@ pub use error::FamilyError;
 pub use range::{KeyRange, KeyRangeError};
 
 use crate::plan::PlanScratch;
-use crate::{Radius, has_chance};
+use crate::{Radius, Unwatched, Watch, has_chance};
 use leaves::Probe;
 use prepared::Prepared;
 
@@ -138,7 +138,16 @@ impl Family {
     ///
     /// As [`Family::scene`], and if the scene cannot be analysed.
     pub fn radius(&self, values: &[f64], scratch: &mut FamilyScratch) -> Result<Cell<f64>, FamilyError> {
-        self.evaluate::<false>(values, scratch).map(|cell| Cell { radius: cell.radius.value, is_nominal: cell.is_nominal })
+        self.radius_watched(values, scratch, &Unwatched)
+    }
+
+    /// [`Family::radius`], watched where a second moment is followed.
+    ///
+    /// # Errors
+    ///
+    /// As [`Family::radius`], and [`AnalysisError::Stopped`] if the watch ends it.
+    pub fn radius_watched(&self, values: &[f64], scratch: &mut FamilyScratch, watch: &dyn Watch) -> Result<Cell<f64>, FamilyError> {
+        self.evaluate::<false>(values, scratch, watch).map(|cell| Cell { radius: cell.radius.value, is_nominal: cell.is_nominal })
     }
 
     /// The radius with those values of the keys, by the family's criterion.
@@ -147,10 +156,19 @@ impl Family {
     ///
     /// As [`Family::radius`].
     pub fn bounded_radius(&self, values: &[f64], scratch: &mut FamilyScratch) -> Result<Cell<Radius>, FamilyError> {
-        self.evaluate::<true>(values, scratch)
+        self.bounded_radius_watched(values, scratch, &Unwatched)
     }
 
-    fn evaluate<const BOUND: bool>(&self, values: &[f64], scratch: &mut FamilyScratch) -> Result<Cell<Radius>, FamilyError> {
+    /// [`Family::bounded_radius`], watched where a second moment is followed.
+    ///
+    /// # Errors
+    ///
+    /// As [`Family::radius_watched`].
+    pub fn bounded_radius_watched(&self, values: &[f64], scratch: &mut FamilyScratch, watch: &dyn Watch) -> Result<Cell<Radius>, FamilyError> {
+        self.evaluate::<true>(values, scratch, watch)
+    }
+
+    fn evaluate<const BOUND: bool>(&self, values: &[f64], scratch: &mut FamilyScratch, watch: &dyn Watch) -> Result<Cell<Radius>, FamilyError> {
         self.check(values)?;
         let is_last = scratch
             .last
@@ -174,7 +192,7 @@ impl Family {
         prepared.write(learned, scene);
         let cell = match self.criterion {
             Criterion::SpectralRadius => Cell::certain(prepared.radius::<BOUND>(scene, plans)),
-            Criterion::MeanSquare => prepared.mean_square::<BOUND>(learned, scene, plans)?,
+            Criterion::MeanSquare => prepared.mean_square::<BOUND>(learned, scene, plans, watch)?,
         };
         if !prepared.is_varied() {
             // It stands for these values only.

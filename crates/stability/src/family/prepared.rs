@@ -6,7 +6,7 @@ use super::criterion::Cell;
 use super::leaves::{Leaf, Probe, learn};
 use crate::mean_square::Followed;
 use crate::plan::{Plan, PlanScratch, plans};
-use crate::{AnalysisError, Radius, has_chance, mean_square};
+use crate::{AnalysisError, Limits, Radius, Watch, has_chance, mean_square_watched};
 
 /// A scene with learned keys.
 #[derive(Debug)]
@@ -67,6 +67,7 @@ impl Prepared {
         values: &[f64],
         scene: &mut Scene,
         scratch: &mut [PlanScratch],
+        watch: &dyn Watch,
     ) -> Result<Cell, AnalysisError> {
         let is_certain = |plan: &Plan| matches!(plan.followed(), Ok(Followed::Certain));
         if self.plans.iter().all(is_certain) {
@@ -79,7 +80,7 @@ impl Prepared {
             return Ok(Cell { radius: Radius { value, error: 0.0 }, is_nominal: false });
         }
         set(&self.others, values, scene);
-        match mean_square(scene) {
+        match mean_square_watched(scene, &Limits { watch, ..Limits::of_unknowns(usize::MAX) }) {
             Ok(found) => Ok(Cell { radius: found.radius, is_nominal: false }),
             Err(AnalysisError::ChanceWithoutMoments { .. } | AnalysisError::TooManyMoments { .. }) => {
                 Ok(Cell { radius: self.radius::<BOUND>(scene, scratch).over(2), is_nominal: true })

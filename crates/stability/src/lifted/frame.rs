@@ -2,10 +2,11 @@
 
 use cohaptic_peer::Gains;
 
+use super::majorant;
 use super::node::{Node, Rows, Scale, Scratch};
 use super::rounding::Rounding;
-use crate::Matrix;
 use crate::timetable::{Event, Timetable};
+use crate::{Matrix, Unwatched, Watch};
 
 /// Nodes that are coupled through samples.
 #[derive(Clone, Copy, Debug)]
@@ -68,9 +69,17 @@ pub(crate) struct FrameMap {
     pub(crate) error: f64,
 }
 
+/// After how many entries that are worked on it is asked whether to go on: some ten milliseconds.
+const LOOK: usize = 1_000_000;
+
 impl Lifted<'_> {
     /// Steps through the frame with all unknowns at once.
     pub(crate) fn frame(&self, instrument: &mut impl Instrument) -> FrameMap {
+        self.frame_watched(instrument, &Unwatched).expect("without a watch nothing ends it")
+    }
+
+    /// [`Lifted::frame`]; `None` if the watch ends it.
+    pub(crate) fn frame_watched(&self, instrument: &mut impl Instrument, watch: &dyn Watch) -> Option<FrameMap> {
         let Gains { stiffness, damping } = self.coordination;
         // What a sample is divided by [N/m].
         let unit = stiffness + damping / self.time;
@@ -124,8 +133,17 @@ impl Lifted<'_> {
         scratch.resize(columns);
         let mut push = vec![0.0; columns];
         let step = self.nodes.iter().map(|node| node.step_norm(self.coordination, scale)).fold(1.0, f64::max);
-        let (mut rounding, mut errors) = (Rounding::new(step), vec![0.0; nodes]);
+        let mut rounding = Rounding::new(step);
+        let mut since = 0;
         for event in &self.timetable.events {
+            // An event takes some operations in each column.
+            since += columns;
+            if since > LOOK {
+                since = 0;
+                if watch.stops() {
+                    return None;
+                }
+            }
             match *event {
                 Event::Sample { node } => {
                     if unit > 0.0 {
@@ -136,7 +154,6 @@ impl Lifted<'_> {
                         }
                     }
                     next_sent[node] += 1;
-                    rounding.sample(errors[node]);
                 }
                 Event::Deliver { from, to, sample } => {
                     held[to * nodes + from] = row_of(from, sample);
@@ -164,7 +181,7 @@ impl Lifted<'_> {
                     };
                     let hand = pushed.then_some(push.as_slice());
                     self.nodes[node].tick(&mut z, rows[node], self.coordination, targets.row(node), hand, span, scale, &mut scratch);
-                    rounding.tick(norm(&z, rows[node], self.nodes[node].states()), &mut errors[node]);
+                    rounding.tick(norm(&z, rows[node], self.nodes[node].states()));
                 }
             }
         }
@@ -175,7 +192,7 @@ impl Lifted<'_> {
                 positions[device] = true;
             }
         }
-        FrameMap {
+        Some(FrameMap {
             states: z,
             positions,
             reference,
@@ -184,8 +201,19 @@ impl Lifted<'_> {
             used,
             depth: if unit > 0.0 { self.timetable.depth.clone() } else { vec![0; nodes] },
             translation: if unit > 0.0 { stiffness / unit } else { 0.0 },
-            error: rounding.bound(errors.into_iter().fold(0.0, f64::max)),
-        }
+            error: if instrument.inputs() == 0 {
+                rounding.bound(|| self.error())
+            } else {
+                // Nothing that is pushed is among the rows of the closer bound.
+                rounding.bound(|| f64::INFINITY)
+            },
+        })
+    }
+
+    /// A bound of the rounding errors of a frame: see [`majorant`].
+    pub(crate) fn error(&self) -> f64 {
+        let compliance = self.nodes[0].compliance(self.time);
+        majorant::error_of(self, |_| compliance)
     }
 
     /// The samples of earlier frames that are used in this one, by node and then by age.

@@ -5,9 +5,10 @@
 
 mod delayed;
 pub(crate) mod frame;
+pub(crate) mod majorant;
 pub(crate) mod node;
 mod rounding;
 
 pub(crate) use frame::{Autonomous, FrameMap, Instrument, Lifted};
 pub(crate) use node::{Body, Node};
-pub(crate) use rounding::Rounding;
+pub(crate) use rounding::{Rounding, closer_of};

@@ -11,7 +11,8 @@ use rayon::prelude::*;
 
 pub use contour::Polyline;
 
-use crate::{Cell, Criterion, Family, FamilyError, FamilyScratch, KeyRange};
+use crate::watch::Asks;
+use crate::{AnalysisError, Cell, Criterion, Family, FamilyError, FamilyScratch, KeyRange, Watch};
 
 /// More cells than this are refused.
 const MOST_CELLS: usize = 100_000_000;
@@ -127,9 +128,24 @@ impl Map {
     pub fn resume(
         family: &Family,
         grid: Grid,
-        mut known: Vec<MapRow>,
+        known: Vec<MapRow>,
         done: impl Fn(usize, &MapRow) + Sync,
         stop: impl Fn() -> bool + Sync,
+    ) -> Result<Self, MapError> {
+        Self::resume_watched(family, grid, known, done, &Asks(stop))
+    }
+
+    /// [`Map::resume`] with a watch, which sees how far cells are that take long, and ends the filling within them.
+    ///
+    /// # Errors
+    ///
+    /// As [`Map::resume`].
+    pub fn resume_watched(
+        family: &Family,
+        grid: Grid,
+        mut known: Vec<MapRow>,
+        done: impl Fn(usize, &MapRow) + Sync,
+        watch: &dyn Watch,
     ) -> Result<Self, MapError> {
         let [first, second] = family.keys() else {
             return Err(MapError::Keys { keys: family.keys().len() });
@@ -143,7 +159,7 @@ impl Map {
         known.resize_with(grid.rows, MapRow::default);
         let stopped = AtomicBool::new(false);
         let stop = || {
-            if stop() {
+            if watch.stops() {
                 stopped.store(true, Ordering::Relaxed);
             }
             stopped.load(Ordering::Relaxed)
@@ -153,7 +169,7 @@ impl Map {
             if stop() {
                 return Ok(());
             }
-            let cells = pool.with(|scratch| cells(family, &x, y[number], scratch, &stop));
+            let cells = pool.with(|scratch| cells(family, &x, y[number], scratch, &stop, watch));
             match cells {
                 Ok(Some(cells)) => {
                     *row = cells;
@@ -191,7 +207,14 @@ impl Map {
 }
 
 /// One row; `None` if it was stopped.
-fn cells(family: &Family, x: &[f64], y: f64, scratch: &mut FamilyScratch, stop: &impl Fn() -> bool) -> Result<Option<MapRow>, FamilyError> {
+fn cells(
+    family: &Family,
+    x: &[f64],
+    y: f64,
+    scratch: &mut FamilyScratch,
+    stop: &impl Fn() -> bool,
+    watch: &dyn Watch,
+) -> Result<Option<MapRow>, FamilyError> {
     // Cells whose second moment is followed one by one take long.
     let often = if family.criterion() == Criterion::MeanSquare { 1 } else { 256 };
     let mut row = MapRow { radius: Vec::with_capacity(x.len()), nominal: Vec::with_capacity(x.len()) };
@@ -199,7 +222,10 @@ fn cells(family: &Family, x: &[f64], y: f64, scratch: &mut FamilyScratch, stop: 
         if (column + 1) % often == 0 && stop() {
             return Ok(None);
         }
-        let Cell { radius, is_nominal } = family.radius(&[*x, y], scratch)?;
+        let Cell { radius, is_nominal } = match family.radius_watched(&[*x, y], scratch, watch) {
+            Err(FamilyError::Analysis(AnalysisError::Stopped)) => return Ok(None),
+            found => found?,
+        };
         row.radius.push(radius);
         row.nominal.push(is_nominal);
     }

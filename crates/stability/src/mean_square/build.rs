@@ -11,7 +11,7 @@ use super::tracked::Tracked;
 use crate::lifted::Lifted;
 use crate::lifted::node::Scale;
 use crate::timetable::{Event, Timetable};
-use crate::{Radius, Unwatched, Watch};
+use crate::{Radius, Watch};
 
 /// A link of the scene.
 #[derive(Clone, Debug)]
@@ -51,8 +51,9 @@ impl Instants {
 }
 
 /// The frame of nodes over lines; those that are not there hold nothing.
+#[cfg(test)]
 pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -> Events {
-    events_watched(lifted, lines, instants, &Unwatched).unwrap_or_default()
+    events_watched(lifted, lines, instants, &crate::Unwatched).unwrap_or_default()
 }
 
 /// How many events are worked out before it is asked whether to go on.

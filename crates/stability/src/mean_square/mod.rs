@@ -33,18 +33,19 @@ use std::time::Duration;
 use cohaptic_scene::Scene;
 
 use self::arrivals::Hazards;
-use self::build::{Instants, Line, events, events_watched};
+use self::build::{Instants, Line, events_watched};
 pub(crate) use self::equal::{Equal, EqualScratch};
 use self::law::{LinkLaw, is_random};
-use self::positive::{Positive, radius_of_positive, radius_watched};
+use self::positive::{Positive, radius_watched};
 use self::symmetric::Symmetric;
 use crate::analysis::{Combination, combinations};
+use crate::cost::PASSES;
 use crate::lifted::{Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
 use crate::structure::{Contacts, Structure, count};
 use crate::timetable::{NodeClock, Timetable};
-use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, Radius, Verdict};
+use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, Radius, Verdict, Watch};
 
 /// More unknowns of the second moment than this are refused, whatever the caller allows: they take minutes.
 const MOST_UNKNOWNS: usize = 1 << 20;
@@ -188,7 +189,7 @@ fn of_contacts(
     notes: &mut Vec<String>,
 ) -> Result<MeanSquare, AnalysisError> {
     let structure = Structure::of(&[scene], network, &combination.contacts)?;
-    let parts = reduced(&structure, scene, combination.axes, Method::Reduced).parts;
+    let parts = reduced(&structure, scene, combination.axes, Method::Reduced, limits.watch)?.parts;
     let nominal = radius_of(&parts);
     let frame = structure.timetable.frame;
     let nominal_squared = nominal.over(2);
@@ -198,7 +199,7 @@ fn of_contacts(
     let mut found = if random.is_empty() {
         nothing
     } else {
-        match alike(scene, &structure).then(|| symmetric(scene, network, &structure, notes)).transpose()?.flatten() {
+        match alike(scene, &structure).then(|| symmetric(scene, network, &structure, limits, notes)).transpose()?.flatten() {
             Some(found) => found,
             None => one_by_one(scene, network, &structure, &combination.contacts, &random, limits, notes)?,
         }
@@ -288,8 +289,17 @@ struct Found {
 }
 
 impl Found {
-    fn of(operator: &impl Positive, held: Radius, method: MeanSquareMethod, frame: Duration) -> Self {
-        Self { radius: radius_of_positive(operator), held, method, frame, unknowns: operator.unknowns() }
+    /// One image of the operator is that many operations.
+    fn of(
+        operator: &impl Positive,
+        operations: f64,
+        held: Radius,
+        (method, frame): (MeanSquareMethod, Duration),
+        watch: &dyn Watch,
+    ) -> Result<Self, AnalysisError> {
+        watch.expects(PASSES * operations);
+        let radius = radius_watched(operator, operations, watch).ok_or(AnalysisError::Stopped)?;
+        Ok(Self { radius, held, method, frame, unknowns: operator.unknowns() })
     }
 }
 
@@ -332,7 +342,13 @@ fn alike(scene: &Scene, structure: &Structure) -> bool {
 }
 
 /// Equal peers over equal links, if these lose independently and nothing overtakes.
-fn symmetric(scene: &Scene, network: &NominalNetwork, structure: &Structure, notes: &mut Vec<String>) -> Result<Option<Found>, AnalysisError> {
+fn symmetric(
+    scene: &Scene,
+    network: &NominalNetwork,
+    structure: &Structure,
+    limits: &Limits<'_>,
+    notes: &mut Vec<String>,
+) -> Result<Option<Found>, AnalysisError> {
     let alike = Alike::of(scene, network, notes)?;
     let (timetable, instants) = (&alike.timetable, &alike.instants);
     let frame = timetable.frame;
@@ -341,7 +357,9 @@ fn symmetric(scene: &Scene, network: &NominalNetwork, structure: &Structure, not
     if alike.hazards.is_none() {
         // Nobody hears of anybody: each peer alone, pulled to where the others were at the beginning.
         let alone = Lifted { tied: true, ..lifted };
-        return Ok(Some(Found::of(&events(&alone, &[], instants), SILENT, MeanSquareMethod::Symmetric, frame)));
+        let operator = events_watched(&alone, &[], instants, limits.watch).ok_or(AnalysisError::Stopped)?;
+        let cost = frame_cost(scene, timetable, 0);
+        return Found::of(&operator, cost.of_a_pass(), SILENT, (MeanSquareMethod::Symmetric, frame), limits.watch).map(Some);
     }
     let Some(hazards) = alike.independent(structure) else {
         return Ok(None);
@@ -350,7 +368,7 @@ fn symmetric(scene: &Scene, network: &NominalNetwork, structure: &Structure, not
     if operator.unknowns() > MOST_UNKNOWNS {
         return Err(AnalysisError::TooManyMoments { joint: Some(1), unknowns: Some(operator.unknowns()), most: MOST_UNKNOWNS });
     }
-    Ok(Some(Found::of(&operator, alike.held(hazards), MeanSquareMethod::Symmetric, frame)))
+    Found::of(&operator, operator.operations(), alike.held(hazards), (MeanSquareMethod::Symmetric, frame), limits.watch).map(Some)
 }
 
 /// How the second moment of scenes that differ in numbers only is followed again and again, in one combination of contacts.

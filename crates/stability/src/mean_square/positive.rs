@@ -19,7 +19,7 @@
 
 use crate::worst_case::rounding::{gamma, outward};
 use crate::worst_case::verified::is_positive;
-use crate::{Matrix, Radius, Unwatched, Watch};
+use crate::{Matrix, Radius, Watch};
 
 /// An operator on symmetric matrices, or tuples of them, that maps positive ones to positive ones. Elements are vectors of coordinates.
 pub(crate) trait Positive: Sync {
@@ -54,8 +54,9 @@ const BREAKDOWN: f64 = 1e-14;
 
 /// The spectral radius. The error covers the whole interval from zero where no lower bound is found. Where numbers overflow, the operator is divided by a
 /// power of two, which is exact; where that does not help either, nothing is known.
+#[cfg(test)]
 pub(crate) fn radius_of_positive(operator: &impl Positive) -> Radius {
-    radius_watched(operator, 0.0, &Unwatched).unwrap_or(Radius::UNKNOWN)
+    radius_watched(operator, 0.0, &crate::Unwatched).unwrap_or(Radius::UNKNOWN)
 }
 
 /// [`radius_of_positive`], one image of which is so many operations; `None` if whoever watches ends it.

@@ -26,6 +26,7 @@ use super::tracked::Tracked;
 use crate::Matrix;
 use crate::lifted::Lifted;
 use crate::lifted::node::Scale;
+use crate::structure::count;
 use crate::timetable::Event;
 
 /// One frame of equal peers.
@@ -122,7 +123,16 @@ impl Symmetric {
             states.resize(size, moved);
             (states, moved)
         });
-        Self { peers: crate::structure::count(peers), count: peers, steps, size, translation, position: rows.object, roundings }
+        Self { peers: count(peers), count: peers, steps, size, translation, position: rows.object, roundings }
+    }
+
+    /// How many operations an image is: at each step two blocks go from one side and from the other through its matrix.
+    pub(crate) fn operations(&self) -> f64 {
+        let of = |step: &Step| match step {
+            Step::Move { map: Map { own, .. }, .. } => 4.0 * count(own.rows()) * count(own.columns()) * (count(own.rows()) + count(own.columns())),
+            Step::Deliver { .. } => 4.0 * count(self.size) * count(self.size),
+        };
+        self.steps.iter().map(of).sum()
     }
 
     fn moved(&self, moment: &Moment, Map { own: map, held }: &Map) -> Moment {

@@ -35,7 +35,7 @@ fn both_ways(overrides: &[&str]) -> (Radius, Radius) {
     let network = NominalNetwork::of(&scene).unwrap();
     let contacts = combinations(&scene).unwrap().remove(0).contacts;
     let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
-    let one = symmetric(&scene, &network, &structure, &mut Vec::new()).unwrap().unwrap();
+    let one = symmetric(&scene, &network, &structure, &Limits::of_unknowns(MOST_UNKNOWNS), &mut Vec::new()).unwrap().unwrap();
     let other = one_by_one(&scene, &network, &structure, &contacts, &[], &Limits::of_unknowns(MOST_UNKNOWNS), &mut Vec::new()).unwrap();
     assert!((one.held.value - other.held.value).abs() <= one.held.error + other.held.error);
     (one.radius, other.radius)
@@ -121,7 +121,7 @@ fn the_noise_of_losses_makes_the_radius_of_the_second_moment() {
             let network = NominalNetwork::of(&scene).unwrap();
             let contacts = combinations(&scene).unwrap().remove(0).contacts;
             let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
-            let expected = symmetric(&scene, &network, &structure, &mut Vec::new()).unwrap().unwrap().radius;
+            let expected = symmetric(&scene, &network, &structure, &Limits::of_unknowns(MOST_UNKNOWNS), &mut Vec::new()).unwrap().unwrap().radius;
             let found = by_noise(&overrides);
             assert!((found - expected.value).abs() <= expected.error + 1e-11 * expected.value, "{overrides:?}: {found}, expected {expected:?}");
         }
@@ -378,7 +378,7 @@ fn the_mean_of_many_runs_is_what_the_operator_says() {
     let node = structure.node(&scene, 0);
     let (nodes, weights) = ([node, node], Matrix::from_fn(2, 2, |row, column| if row == column { 0.0 } else { 1.0 }));
     let lifted = Lifted { nodes: &nodes, weights: &weights, timetable: &timetable, ..structure.quotient(&scene, &nodes) };
-    let operator = events(&lifted, &[line(1, 0), line(0, 1)], &instants);
+    let operator = super::build::events(&lifted, &[line(1, 0), line(0, 1)], &instants);
     // All at rest and at the origin, but for the copy of the second peer, which nobody has heard of yet. In the operator, in order: device and copy of
     // the first but for the copy's position, of the second, samples under way, what is held.
     let kept = operator.kept.len();

@@ -18,7 +18,7 @@ use super::lyapunov::{Component, Factors, largest_square};
 use super::norm::mirror;
 use super::rounding::real;
 use super::symmetric::{cholesky, solve, triangle_inverse};
-use crate::Matrix;
+use crate::{Matrix, Watch};
 
 /// How much of the distance between λ and the centre's own is kept.
 const KEPT: f64 = 0.15;
@@ -31,16 +31,16 @@ const CENTRED: f64 = 0.3;
 /// Squares of rates below this, for matrices with entries near 1, are as good as zero.
 const NOTHING: f64 = 1e-14;
 
-/// Shapes with a smaller rate than those given, until a stage lowers it by less than the relative `accuracy`.
-pub(super) fn improve(component: &Component<'_>, start: Factors, accuracy: f64) -> Factors {
+/// Shapes with a smaller rate than those given, until a stage lowers it by less than the relative `accuracy`; `None` if the watch ends it.
+pub(super) fn improve(component: &Component<'_>, start: Factors, accuracy: f64, watch: &dyn Watch) -> Option<Factors> {
     let mut best = start;
-    let Some(mut images) = component.images(&best.factors) else { return best };
+    let Some(mut images) = component.images(&best.factors) else { return Some(best) };
     let mut square = 1.3 * best.square;
     for _ in 0..STAGES {
         if !(best.square > NOTHING && best.square.is_finite()) {
             break;
         }
-        let Some(centre) = centre(component, &images, square) else { break };
+        let Some(centre) = centre(component, &images, square, watch) else { break };
         let changes: Option<Vec<Matrix>> = centre.iter().map(cholesky).collect();
         let Some(changes) = changes else { break };
         // One common size, which no rate depends on, so that hundreds of stages would not overflow.
@@ -61,15 +61,18 @@ pub(super) fn improve(component: &Component<'_>, start: Factors, accuracy: f64) 
             break;
         }
     }
-    best
+    if watch.stops() { None } else { Some(best) }
 }
 
-/// The barrier's minimum near the round shapes, as shapes; `None` if rounding got the better of it.
-fn centre(component: &Component<'_>, images: &[Matrix], square: f64) -> Option<Vec<Matrix>> {
+/// The barrier's minimum near the round shapes, as shapes; `None` if rounding got the better of it, or the watch ends it.
+fn centre(component: &Component<'_>, images: &[Matrix], square: f64, watch: &dyn Watch) -> Option<Vec<Matrix>> {
     let barrier = Barrier::new(component, images, square);
     let mut shapes = vec![Matrix::identity(component.size); component.nodes.len()];
     let mut value = barrier.value(&shapes)?;
     for _ in 0..STEPS {
+        if watch.stops() {
+            return None;
+        }
         let (gradient, hessian) = barrier.derivatives(&shapes)?;
         let factor = cholesky(&hessian)?;
         let direction = solve(&factor, &gradient);

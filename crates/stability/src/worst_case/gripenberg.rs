@@ -30,7 +30,7 @@ use super::pattern::Edge;
 use super::rounding::{gamma, outward, real, root_above};
 use super::symmetric::{cholesky, triangle_inverse};
 use super::verified::Certificate;
-use crate::Matrix;
+use crate::{Matrix, Unwatched, Watch};
 
 /// How long to search.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -74,19 +74,33 @@ impl Automaton {
     /// The bounds hold whatever the effort; they differ by at most its accuracy if [`WorstCase::complete`].
     #[must_use]
     pub fn worst_case(&self, effort: &Effort) -> WorstCase {
+        self.worst_case_watched(effort, &Unwatched).expect("without a watch nothing ends it")
+    }
+
+    /// [`Automaton::worst_case`], watched: it is asked before each product, and in each round of the search for a certificate; `None` if the watch ends it.
+    #[must_use]
+    pub fn worst_case_watched(&self, effort: &Effort, watch: &dyn Watch) -> Option<WorstCase> {
+        watch.expects(real_of(effort.products) * self.product_operations());
         let exponent = self.exponent();
         let scaled = self.scaled(exponent);
         let accuracy = libm::ldexp(effort.accuracy, exponent);
         // Branching makes up for what the shapes are not.
-        let certificate = Certificate::find(self, accuracy.clamp(1e-6, 1e-2)).ok();
-        let mut search = Search::new(&scaled, certificate.as_ref(), accuracy);
-        search.run(effort.products);
+        let certificate = Certificate::find_watched(self, accuracy.clamp(1e-6, 1e-2), watch)?.ok();
+        let mut search = Search::new(&scaled, certificate.as_ref(), accuracy, watch)?;
+        search.run(effort.products, watch)?;
         let lower = libm::ldexp(search.lower, -exponent);
         let upper = libm::ldexp(search.upper(), -exponent);
         // Whatever is of the order of underflow says nothing.
         let lower = if lower > f64::MIN_POSITIVE { lower } else { 0.0 };
         let cycle = if lower > 0.0 { search.cycle } else { Vec::new() };
-        WorstCase { lower, upper, cycle, products: search.products, complete: upper - lower <= effort.accuracy, certificate }
+        // The rest is not needed.
+        watch.done(real_of(effort.products.saturating_sub(search.products)) * self.product_operations());
+        Some(WorstCase { lower, upper, cycle, products: search.products, complete: upper - lower <= effort.accuracy, certificate })
+    }
+
+    /// What a product takes: itself, and about as much again for each of the squarings that bound its norm.
+    fn product_operations(&self) -> f64 {
+        4.0 * real(self.size()).powi(3)
     }
 }
 
@@ -118,6 +132,8 @@ struct Leaf {
 }
 
 struct Search {
+    /// Those of a product.
+    operations: f64,
     accuracy: f64,
     steps: Vec<Step>,
     /// The steps from each node.
@@ -138,13 +154,14 @@ struct Search {
 }
 
 impl Search {
-    fn new(automaton: &Automaton, certificate: Option<&Certificate>, accuracy: f64) -> Self {
-        let steps = steps(automaton, certificate);
+    fn new(automaton: &Automaton, certificate: Option<&Certificate>, accuracy: f64, watch: &dyn Watch) -> Option<Self> {
+        let steps = steps(automaton, certificate, watch)?;
         let mut from = vec![Vec::new(); automaton.pattern().nodes()];
         for (number, step) in steps.iter().enumerate() {
             from[step.edge.from].push(number);
         }
-        Self {
+        Some(Self {
+            operations: automaton.product_operations(),
             accuracy,
             steps,
             from,
@@ -157,11 +174,16 @@ impl Search {
             room: MOST_KEPT,
             norms: Norms::default(),
             closed: BTreeSet::new(),
-        }
+        })
     }
 
-    fn run(&mut self, budget: u64) {
+    /// Goes on as long as there is something to gain; `None` if the watch ends it.
+    fn run(&mut self, budget: u64, watch: &dyn Watch) -> Option<()> {
         for number in 0..self.steps.len() {
+            if watch.stops() {
+                return None;
+            }
+            watch.done(self.operations);
             let step = &self.steps[number];
             let (product, norm) = (step.image.clone(), step.norm);
             self.look_at(number, product, norm, step.edge.from, f64::INFINITY, 0, None);
@@ -178,6 +200,9 @@ impl Search {
                 None => self.product(leaf.trail),
             };
             for place in 0..self.from[leaf.node].len() {
+                if watch.stops() {
+                    return None;
+                }
                 let number = self.from[leaf.node][place];
                 let step = &self.steps[number];
                 let product = step.image.times(step.norm, &above, leaf.norm);
@@ -187,8 +212,10 @@ impl Search {
                 let useless = libm::pow(leaf.bound, real(length)) * (1.0 + 1e-9);
                 let norm = self.norms.above(&product.matrix, Sharpness { enough, beyond: sharp * real(length), useless });
                 self.look_at(number, product, norm, leaf.root, leaf.bound, leaf.length, leaf.trail);
+                watch.done(self.operations);
             }
         }
+        Some(())
     }
 
     /// Takes in the path that goes on from another by one step.
@@ -275,7 +302,7 @@ impl Search {
 }
 
 /// The edges on cycles in the coordinates of a certificate's shapes; of round ones, where there is none.
-fn steps(automaton: &Automaton, certificate: Option<&Certificate>) -> Vec<Step> {
+fn steps(automaton: &Automaton, certificate: Option<&Certificate>, watch: &dyn Watch) -> Option<Vec<Step>> {
     let identity = || vec![Matrix::identity(automaton.size()); automaton.pattern().nodes()];
     let factors: Option<Vec<Matrix>> = certificate.and_then(|certificate| certificate.shapes().iter().map(cholesky).collect());
     let inverses = factors.as_ref().and_then(|factors| factors.iter().map(Inverse::of).collect::<Option<Vec<Inverse>>>());
@@ -287,9 +314,12 @@ fn steps(automaton: &Automaton, certificate: Option<&Certificate>) -> Vec<Step> 
         }
     };
     let step = |edge: &Edge| {
+        if watch.stops() {
+            return None;
+        }
         let image = image(&automaton.matrices()[edge.symbol], &factors[edge.to], &inverses[edge.from]);
         let norm = norm_above(&image.matrix, Sharpness { enough: 0.0, beyond: 1e-4, useless: f64::INFINITY });
-        Step { edge: *edge, image, norm }
+        Some(Step { edge: *edge, image, norm })
     };
     automaton.recurrent().map(step).collect()
 }
@@ -333,6 +363,11 @@ fn image(matrix: &Matrix, to: &Matrix, from: &Inverse) -> Approximate {
     Approximate { matrix: image, error: outward(rounding + norm * from.gap) + real(size * size) * f64::MIN_POSITIVE }
 }
 
+#[expect(clippy::cast_precision_loss, reason = "an estimate")]
+fn real_of(products: u64) -> f64 {
+    products as f64
+}
+
 fn absolute(matrix: &Matrix) -> Matrix {
     Matrix::from_fn(matrix.rows(), matrix.columns(), |i, j| matrix[(i, j)].abs())
 }
@@ -369,9 +404,9 @@ mod tests {
         let automaton = Automaton::runs(matrices.to_vec(), 1, 2).unwrap();
         let bounds = |room: usize| {
             let certificate = Certificate::find(&automaton, 1e-2).unwrap();
-            let mut search = Search::new(&automaton, Some(&certificate), 1e-6);
+            let mut search = Search::new(&automaton, Some(&certificate), 1e-6, &Unwatched).unwrap();
             search.room = room;
-            search.run(3_000);
+            search.run(3_000, &Unwatched).unwrap();
             (search.lower, search.upper(), search.products)
         };
         let (lower, upper, products) = bounds(MOST_KEPT);

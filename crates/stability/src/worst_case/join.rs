@@ -8,17 +8,20 @@
 use super::lyapunov::{Component, Factors, largest_square};
 use super::norm::gram;
 use super::symmetric::{cholesky, eigen, triangle_inverse};
-use crate::Matrix;
+use crate::{Matrix, Watch};
 
 /// What a round keeps at least of a shape in directions in which nothing asks for it, so that shapes stay positive definite.
 const FLOOR: f64 = 0.25;
 
-/// The best shapes of so many rounds, from balanced ones on.
-pub(super) fn iterate(component: &Component<'_>, rounds: usize) -> Factors {
+/// The best shapes of a number of rounds, from balanced ones on; `None` if the watch ends it.
+pub(super) fn iterate(component: &Component<'_>, rounds: usize, watch: &dyn Watch) -> Option<Factors> {
     let identity = Matrix::identity(component.size);
     let mut factors = vec![balance(component); component.nodes.len()];
     let mut best = Factors { square: f64::INFINITY, factors: factors.clone() };
     for _ in 0..rounds {
+        if watch.stops() {
+            return None;
+        }
         let Some(images) = component.images(&factors) else { break };
         let square = largest_square(&images);
         if square < best.square {
@@ -33,11 +36,11 @@ pub(super) fn iterate(component: &Component<'_>, rounds: usize) -> Factors {
         }
         for (factor, bound) in factors.iter_mut().zip(&bounds) {
             let half = bound.as_ref().map(|bound| Matrix::from_fn(component.size, component.size, |i, j| 0.5 * (identity[(i, j)] + bound[(i, j)])));
-            let Some(change) = half.as_ref().and_then(cholesky) else { return best };
+            let Some(change) = half.as_ref().and_then(cholesky) else { return Some(best) };
             *factor = change.times(factor);
         }
     }
-    best
+    Some(best)
 }
 
 /// Units for the state's entries, powers of two on the diagonal, in which the rows and columns of all matrices together are of similar size (Osborne 1960).

@@ -12,7 +12,7 @@ use super::norm::gram;
 use super::rounding::real;
 use super::symmetric::{eigen, triangle_inverse};
 use super::{barrier, join};
-use crate::Matrix;
+use crate::{Matrix, Watch};
 
 /// The most unknowns for which a barrier's Hessian, whose factorisation costs their third power, is worth it.
 const MOST_UNKNOWNS: usize = 400;
@@ -55,21 +55,21 @@ pub(super) struct Factors {
     pub factors: Vec<Matrix>,
 }
 
-/// The best shapes that were found, for matrices whose entries are near 1.
-pub(super) fn search(automaton: &Automaton, accuracy: f64) -> Found {
+/// The best shapes that were found, for matrices whose entries are near 1; `None` if the watch ends it.
+pub(super) fn search(automaton: &Automaton, accuracy: f64, watch: &dyn Watch) -> Option<Found> {
     let mut found = Found { rate: 0.0, shapes: vec![Matrix::identity(automaton.size()); automaton.pattern().nodes()] };
     for component in components(automaton) {
-        let mut best = join::iterate(&component, ROUNDS);
+        let mut best = join::iterate(&component, ROUNDS, watch)?;
         let unknowns = component.nodes.len() * component.size * (component.size + 1) / 2;
         if unknowns <= MOST_UNKNOWNS {
-            best = barrier::improve(&component, best, accuracy);
+            best = barrier::improve(&component, best, accuracy, watch)?;
         }
         found.rate = found.rate.max(best.square.sqrt());
         for (node, factor) in component.nodes.iter().zip(&best.factors) {
             found.shapes[*node] = gram(factor);
         }
     }
-    found
+    Some(found)
 }
 
 impl Component<'_> {

@@ -34,6 +34,6 @@ pub(crate) mod verified;
 
 pub use automaton::{Automaton, AutomatonError};
 pub use gripenberg::{Effort, WorstCase};
-pub use of_scene::{Links, Patterns, SceneWorstCase, SceneWorstCaseError, WorstPart, WorstVerdict, worst_case};
+pub use of_scene::{Links, Patterns, SceneWorstCase, SceneWorstCaseError, WorstPart, WorstVerdict, worst_case, worst_case_watched};
 pub use pattern::{Edge, Pattern, PatternError};
 pub use verified::{Certificate, CertificateError};

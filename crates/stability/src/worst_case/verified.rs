@@ -17,7 +17,7 @@ use super::lyapunov;
 use super::norm::mirror;
 use super::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
 use super::symmetric::cholesky;
-use crate::Matrix;
+use crate::{Matrix, Unwatched, Watch};
 
 /// A proof that no allowed product grows faster than a rate. It exists only if it was checked.
 #[derive(Clone, PartialEq, Debug)]
@@ -112,23 +112,31 @@ impl Certificate {
     ///
     /// If nothing that was found could be checked, since numbers overflow.
     pub fn find(automaton: &Automaton, accuracy: f64) -> Result<Self, CertificateError> {
+        Self::find_watched(automaton, accuracy, &Unwatched).expect("without a watch nothing ends it")
+    }
+
+    /// [`Certificate::find`], watched; `None` if the watch ends it.
+    pub(super) fn find_watched(automaton: &Automaton, accuracy: f64, watch: &dyn Watch) -> Option<Result<Self, CertificateError>> {
         // Everything near 1 while it is searched; a power of two changes no digit.
         let exponent = automaton.exponent();
         let scaled = automaton.scaled(exponent);
         let unscaled = |rate: f64| libm::ldexp(rate, -exponent);
-        let found = lyapunov::search(&scaled, accuracy);
+        let found = lyapunov::search(&scaled, accuracy, watch)?;
         // From the rate that the search believes in, outward until the check agrees: rounding costs a little where shapes are far from round.
         let mut excess = 4.0 * UNIT;
         while excess < 1.0 {
+            if watch.stops() {
+                return None;
+            }
             if let Ok(certificate) = Self::new(automaton, unscaled(found.rate * (1.0 + excess) + UNDERFLOW), found.shapes.clone()) {
-                return Ok(certificate);
+                return Some(Ok(certificate));
             }
             excess *= 4.0;
         }
         // Round shapes always do, with any bound of the 2-norms.
         let frobenius = scaled.recurrent().map(|edge| scaled.matrices()[edge.symbol].frobenius_norm()).fold(0.0, f64::max);
         let rate = unscaled(frobenius * (1.0 + 1e-6) + 1e-100);
-        Self::new(automaton, rate, vec![Matrix::identity(automaton.size()); automaton.pattern().nodes()])
+        Some(Self::new(automaton, rate, vec![Matrix::identity(automaton.size()); automaton.pattern().nodes()]))
     }
 
     /// The rate ρ: the joint spectral radius is at most this.

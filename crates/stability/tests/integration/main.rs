@@ -7,6 +7,7 @@ mod admittance;
 mod anchors;
 mod graphs;
 mod mean_square;
+mod random;
 mod reduction;
 mod reference;
 mod strategies;

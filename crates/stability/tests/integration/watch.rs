@@ -4,7 +4,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Admittance, AnalysisError, Limits, Method, Watch, analyse_watched, judge_watched, mean_square_watched};
+use cohaptic_stability::{
+    Admittance, AdmittanceError, AnalysisError, Boundary, BoundaryOptions, Effort, Family, Graph, GraphError, Grid, KeyRange, Limits, Links, Map,
+    Method, Patterns, SceneWorstCaseError, Watch, analyse_on_watched, analyse_watched, judge_watched, mean_square_watched, worst_case_watched,
+};
 
 const THREE: &str = r#"
     scene        = { duration = "1s", count = 3 }
@@ -109,4 +112,108 @@ fn an_admittance_that_is_ended_has_its_first_points() {
     // The threads share 256 points at a time: of the third time it is not known which were looked at first.
     assert!(ended.points.len() >= 512 && ended.points.len() < 700, "{}", ended.points.len());
     assert_eq!(ended.points, whole.points[..ended.points.len()]);
+}
+
+/// Each analysis is gone through once to count how often it asks; ended at the first question, in the middle and at the last, it says so and asks no more
+/// than a few times after that (each of its threads may be at a question of its own).
+#[track_caller]
+fn ends_wherever_it_is_asked(least: usize, run: impl Fn(&Ends) -> bool) {
+    let whole = Ends::at(usize::MAX);
+    assert!(!run(&whole), "it ends by itself");
+    let asked = whole.asked();
+    assert!(asked >= least, "asked {asked} times");
+    for at in [1, asked / 2, asked] {
+        let ends = Ends::at(at);
+        assert!(run(&ends), "ended at {at} of {asked}");
+        assert!(ends.asked() <= at + 16, "{} questions, though it was ended at {at}", ends.asked());
+    }
+}
+
+const LOSS: &str = "link.loss=5%";
+
+/// Equal peers over links that lose independently: an image of the second moment takes microseconds here, and there is a question for each.
+#[test]
+fn the_second_moment_of_equal_peers_ends() {
+    let scene = three(&[LOSS]);
+    ends_wherever_it_is_asked(20, |ends| match mean_square_watched(&scene, &limits(ends)) {
+        Err(AnalysisError::Stopped) => true,
+        found => {
+            assert_eq!(found.unwrap().method.word(), "symmetric");
+            false
+        }
+    });
+}
+
+/// There is a question for each product of matrices.
+#[test]
+fn a_worst_case_ends() {
+    let scene = three(&["link.loss=0%"]);
+    let patterns = Patterns { losses_in_a_row: 2, delay: None, links: Links::Together };
+    let effort = Effort { accuracy: 1e-9, products: 2000 };
+    ends_wherever_it_is_asked(2000, |ends| match worst_case_watched(&scene, &patterns, &effort, ends) {
+        Err(SceneWorstCaseError::Analysis(AnalysisError::Stopped)) => true,
+        found => {
+            found.unwrap();
+            false
+        }
+    });
+}
+
+/// A delay of 8 s is a thousand samples on their way: there is a question for each point of each circle.
+#[test]
+fn a_determinant_ends() {
+    let scene = three(&["link.loss=0%", "link.delay=8s"]);
+    ends_wherever_it_is_asked(1000, |ends| match analyse_watched(&scene, Method::Reduced, ends) {
+        Err(AnalysisError::Stopped) => true,
+        found => {
+            assert_eq!(found.unwrap().method, Method::Determinant);
+            false
+        }
+    });
+}
+
+/// The parts of a graph, and those behind an admittance, are asked about before their eigenvalues are begun.
+#[test]
+fn a_graph_and_the_verdict_of_an_admittance_end() {
+    let scene = three(&["link.loss=0%", "scene.count=8"]);
+    ends_wherever_it_is_asked(5, |ends| match analyse_on_watched(&scene, &Graph::Ring, ends) {
+        Err(GraphError::Analysis(AnalysisError::Stopped)) => true,
+        found => found.is_err(),
+    });
+    ends_wherever_it_is_asked(1, |ends| matches!(Admittance::of_watched(&scene, 0, ends), Err(AdmittanceError::Analysis(AnalysisError::Stopped))));
+}
+
+/// The matrix of many different peers is asked about while it is made: 60 peers with 12 rows each over some 4000 events are ten million entries.
+#[test]
+fn the_frame_of_many_different_peers_ends() {
+    let peers: Vec<String> = (1..=60).map(|peer| format!("peers.peer{peer}.device.mass=0.1{peer:02}")).collect();
+    let overrides: Vec<&str> = ["scene.count=60", "link.loss=0%"].into_iter().chain(peers.iter().map(String::as_str)).collect();
+    let scene = three(&overrides);
+    let ends = Ends::at(3);
+    assert_eq!(analyse_watched(&scene, Method::Reduced, &ends), Err(AnalysisError::Stopped));
+    assert_eq!(ends.asked(), 3);
+}
+
+/// A cell of a map, and a value of a boundary, ends within: what is not finished is not there, and nothing is wrong.
+#[test]
+fn a_cell_and_a_value_end_within() {
+    let text = THREE.replace("24ms", "8ms");
+    let key = |range: &str| KeyRange::parse(range).unwrap();
+    let keys = vec![key("coordination.stiffness=100..2000"), key("coordination.damping=1..10")];
+    let family = Family::new(&text, "three.toml".as_ref(), &["scene.count=2".to_owned()], keys).unwrap();
+    let grid = Grid::new(2, 2).unwrap();
+    let whole = Ends::at(usize::MAX);
+    assert!(Map::resume_watched(&family, grid, Vec::new(), |_, _| (), &whole).unwrap().is_complete());
+    // Four cells: without questions within them there are at most three a row.
+    assert!(whole.asked() > 100, "asked {} times", whole.asked());
+    let (expected, done) = *whole.operations.lock().unwrap();
+    assert!(expected > 0.0 && done > 0.0);
+    let ends = Ends::at(20);
+    let map = Map::resume_watched(&family, grid, Vec::new(), |_, _| (), &ends).unwrap();
+    assert!(map.radius.iter().all(Vec::is_empty), "{map:?}");
+    let along = key("coordination.stiffness=100..2000");
+    let family = Family::new(&text, "three.toml".as_ref(), &["scene.count=2".to_owned()], vec![along.clone()]).unwrap();
+    let options = BoundaryOptions { samples: 4, tolerance: 1.0, ..BoundaryOptions::of(&along) };
+    let found = Boundary::find_watched(&family, options, &[], |_| (), &Ends::at(20)).unwrap();
+    assert!(found.known.is_empty() && !found.is_settled(), "{found:?}");
 }

@@ -1,4 +1,4 @@
-"""Makes radii.json, mean_square.json and admittance.json, or those named on the command line. See README.md."""
+"""Makes radii.json, mean_square.json, admittance.json and random.json, or those named on the command line. See README.md."""
 
 import json
 import sys
@@ -9,6 +9,7 @@ from pathlib import Path
 import admittance
 import cases
 import mean_square
+import random_scenes
 from mpmath import mpf
 from modes import One
 from radius import digits
@@ -51,7 +52,7 @@ def write(name, entries):
 
 
 def main():
-    wanted = sys.argv[1:] or ["radii", "mean_square", "admittance"]
+    wanted = sys.argv[1:] or ["radii", "mean_square", "admittance", "random"]
     with Pool() as pool:
         if "radii" in wanted:
             write("radii.json", radii(pool))
@@ -59,6 +60,8 @@ def main():
             write("mean_square.json", mean_square.entries(pool))
         if "admittance" in wanted:
             write("admittance.json", admittance.entries(pool))
+        if "random" in wanted:
+            write("random.json", random_scenes.entries(pool))
 
 
 if __name__ == "__main__":

@@ -4,10 +4,10 @@
 mod documents;
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use cohaptic_files::read_text;
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
@@ -103,12 +103,12 @@ impl LinkFile {
     /// [`LinkFileError`] if it cannot be read or makes no sense, with the place.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, LinkFileError> {
         let path = path.as_ref();
-        let text = fs::read_to_string(path).map_err(|source| LinkFileError::Io { path: path.to_path_buf(), source })?;
+        let text = read_text(path).map_err(|source| LinkFileError::Io { path: path.to_path_buf(), source })?;
         if path.extension().is_some_and(|extension| extension == "toml") {
             return Self::document(&text, path);
         }
         let folder = path.parent().unwrap_or_else(|| Path::new(""));
-        let file = |name: &str| fs::read_to_string(folder.join(name)).map_err(|error| format!("cannot be read: {error}"));
+        let file = |name: &str| read_text(&folder.join(name)).map_err(|error| format!("cannot be read: {error}"));
         Self::parse_with(&text, file).map_err(|error| LinkFileError::Words { path: path.to_path_buf(), error })
     }
 

@@ -9,8 +9,11 @@ use std::process::ExitCode;
 
 use cohaptic_stability::{Boundary, BoundaryError, BoundaryOptions, Cell, Criterion, Family, KeyRange, Radius};
 
+use cohaptic_units::print::Counted;
+
 use super::rows_file::{Row, RowsFile, fingerprint};
 use super::source::{self, Said};
+use crate::analysis_watch::CellWatch;
 use crate::arguments::BoundaryArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
@@ -108,7 +111,9 @@ fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic
     let cell = |row: &[f64]| Some(Cell { radius: Radius { value: *row.get(1)?, error: *row.get(2)? }, is_nominal: *row.get(3)? != 0.0 });
     let known: Vec<(f64, Cell)> = known.iter().filter_map(|(_, row)| Some((*row.first()?, cell(row)?))).collect();
     let progress = Progress::through_values();
-    let found = Boundary::find(&order.family, order.options, &known, |count| progress.reach_number(count as u64), interrupt::asked);
+    progress.tick();
+    let watch = CellWatch::new(&progress, "value", &interrupt::asked);
+    let found = Boundary::find_watched(&order.family, order.options, &known, |count| progress.reach_number(count as u64), &watch);
     progress.clear();
     found
 }
@@ -138,5 +143,5 @@ fn interrupted(found: &Boundary, rows: Option<RowsFile>, known: &[Row], argument
         }
         _ => "nothing is kept; with --out DIR they are, and the same command goes on from there".to_owned(),
     };
-    Failure::Interrupted(format!("{} values have been looked at: {kept}", found.samples))
+    Failure::Interrupted(format!("{} looked at: {kept}", Counted(found.samples, "value")))
 }

@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 
 use cohaptic_stability::{Boundary, Criterion, Crossing, KeyRange};
 
+use cohaptic_units::print::Counted;
+
 use super::Order;
 
 pub(super) fn describe(order: &Order, found: &Boundary) -> String {
@@ -30,8 +32,11 @@ pub(super) fn describe(order: &Order, found: &Boundary) -> String {
     }
     let unit = &range.unit;
     line(format!(
-        "{} values looked at, {:.3e}{unit} to {:.3e}{unit} apart; crossings to {:.1e}{unit}. What comes and goes between two of them without a trace is not seen",
-        found.samples, found.finest, found.coarsest, order.options.tolerance
+        "{} looked at, {:.3e}{unit} to {:.3e}{unit} apart; crossings to {:.1e}{unit}. What comes and goes between two of them without a trace is not seen",
+        Counted(found.samples, "value"),
+        found.finest,
+        found.coarsest,
+        order.options.tolerance
     ));
     if !found.is_settled() {
         line("NOT SETTLED: it ended after the most values that it may look at; a larger tolerance or a shorter range decides".to_owned());

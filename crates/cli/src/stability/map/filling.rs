@@ -6,6 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use cohaptic_stability::{Map, MapError, MapRow};
 
 use super::Order;
+use crate::analysis_watch::CellWatch;
 use crate::arguments::MapArguments;
 use crate::failure::Failure;
 use crate::progress::Progress;
@@ -82,6 +83,7 @@ fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper) -> Result<(V
     let there: usize = known.iter().flatten().filter(|row| !row.radius.is_empty()).count();
     let progress = Progress::through_rows(rows * order.families.len());
     progress.reach_number(there as u64);
+    progress.tick();
     let mut maps = Vec::new();
     for (variant, (family, known)) in order.families.iter().zip(known).enumerate() {
         let done = |row: usize, cells: &MapRow| {
@@ -89,7 +91,8 @@ fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper) -> Result<(V
             progress.one_more();
         };
         let stop = || interrupt::asked() || keeper.broken.load(Ordering::Relaxed);
-        let filled = Map::resume(family, order.grid, known, done, stop).map_err(|error| (variant, error));
+        let watch = CellWatch::new(&progress, "cell", &stop);
+        let filled = Map::resume_watched(family, order.grid, known, done, &watch).map_err(|error| (variant, error));
         if filled.is_err() {
             progress.clear();
         }
@@ -144,5 +147,5 @@ fn interrupted(maps: &[Map], order: &Order, arguments: &MapArguments) -> Failure
         Some(folder) => format!("they are kept in {}, and the same command goes on from there", output::path(&folder.join(ROWS))),
         None => "nothing is kept; with --out DIR finished rows are, and the same command goes on from there".to_owned(),
     };
-    Failure::Interrupted(format!("{finished} of {all} rows are finished: {kept}"))
+    Failure::Interrupted(format!("{finished} of {} finished: {kept}", output::are(all, "row")))
 }

@@ -4,8 +4,11 @@ use std::fmt::Write as _;
 
 use cohaptic_stability::{Criterion, Verdict};
 
+use cohaptic_units::print::Counted;
+
 use super::document::{Document, notes};
 use super::{Order, VariantMap, glance};
+use crate::output::{are, figure};
 use crate::stability::quantity::label;
 use crate::stability::source;
 
@@ -27,14 +30,15 @@ pub(super) fn describe(order: &Order, maps: &[VariantMap], document: &Document<'
         }
         let _ = writeln!(
             text,
-            "  {:.2} % of {} cells are stable{}{}",
+            "  {:.2} % of {} stable{}{}",
             100.0 * map.stable_fraction(),
-            order.grid.columns() * order.grid.rows(),
+            are(order.grid.columns() * order.grid.rows(), "cell"),
             if map.criterion == Criterion::MeanSquare { " in the mean square" } else { "" },
             least(order, map)
         );
     }
-    let _ = writeln!(text, "\n{} cells computed in {:.3} s: {:.0} a second", document.cells_computed, document.wall_s, document.cells_per_s);
+    let _ =
+        writeln!(text, "\n{} computed in {:.3} s: {:.0} a second", Counted(document.cells_computed, "cell"), document.wall_s, document.cells_per_s);
     for note in notes(maps) {
         let _ = writeln!(text, "note: {note}");
     }
@@ -46,6 +50,6 @@ fn least(order: &Order, VariantMap { map, criterion, .. }: &VariantMap) -> Strin
     let cells = map.y.iter().zip(&map.radius).flat_map(|(y, row)| map.x.iter().zip(row).map(move |(x, radius)| (*radius, *x, *y)));
     let least = cells.filter(|(radius, ..)| radius.is_finite()).min_by(|one, other| one.0.total_cmp(&other.0));
     least.map_or_else(String::new, |(radius, x, y)| {
-        format!("; the least {} is {radius:.6}, at {} and {}", source::name(*criterion), order.x().text(x), order.y().text(y))
+        format!("; the least {} is {}, at {} and {}", source::name(*criterion), figure(radius, 6), order.x().text(x), order.y().text(y))
     })
 }

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Graph, Judgement, Matrix, analyse_on, has_chance};
+use cohaptic_stability::{AnalysisError, Graph, GraphError, Judgement, Matrix, analyse_on_watched, has_chance};
 
+use super::ended;
+use crate::analysis_watch::AnalysisWatch;
 use crate::failure::Failure;
 use crate::text_file;
 
@@ -20,7 +22,13 @@ pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, F
         "star" => Graph::Star,
         file => weights(Path::new(file))?,
     };
-    let mut analysis = analyse_on(scene, &graph).map_err(|error| refused(error.to_string()))?;
+    let watch = AnalysisWatch::new();
+    let found = analyse_on_watched(scene, &graph, &watch);
+    watch.clear();
+    let mut analysis = found.map_err(|error| match error {
+        GraphError::Analysis(AnalysisError::Stopped) => ended(),
+        error => refused(error.to_string()),
+    })?;
     if has_chance(scene) {
         analysis.notes.push(NOMINAL.to_owned());
     }

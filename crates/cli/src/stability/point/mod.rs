@@ -18,6 +18,11 @@ use crate::failure::{Failure, not_analysed};
 use crate::{input, output};
 use document::Document;
 
+/// The user asked for the end.
+fn ended() -> Failure {
+    Failure::Interrupted("the analysis was ended before its verdict".to_owned())
+}
+
 /// Says whether the scene is stable.
 pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let path = &arguments.scene.scene;
@@ -28,13 +33,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
             let watch = AnalysisWatch::new();
             let judged = judge_watched(&scene, arguments.method.into(), &Limits { watch: &watch, ..Limits::of_unknowns(usize::MAX) });
             watch.clear();
-            judged.map_err(|error| {
-                if error == AnalysisError::Stopped {
-                    Failure::Interrupted("the analysis was ended before its verdict".to_owned())
-                } else {
-                    not_analysed(path, &error)
-                }
-            })?
+            judged.map_err(|error| if error == AnalysisError::Stopped { ended() } else { not_analysed(path, &error) })?
         }
     };
     let worst = worst::of(&scene, arguments, path)?;

@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, WorstVerdict};
+
+use crate::output::figure;
 use cohaptic_units::print::Span;
 
 use super::document::{notes, worst_mode};
@@ -80,9 +82,9 @@ fn worst_case(worst: &SceneWorstCase, said: &[String], line: &mut impl FnMut(Str
     };
     line(String::new());
     line(format!("worst case: {verdict}"));
-    line(format!("  growth a sending period between {:.6} and {:.6}", worst.lower, worst.upper));
+    line(format!("  growth a sending period between {} and {}", figure(worst.lower, 6), figure(worst.upper, 6)));
     if let Some(rate) = worst.certificate {
-        line(format!("  a quadratic certificate, checked, proves {rate:.6}"));
+        line(format!("  a quadratic certificate, checked, proves {}", figure(rate, 6)));
     }
     let part = worst.worst();
     if !part.sequence.is_empty() {
@@ -126,6 +128,5 @@ fn method(method: Method) -> &'static str {
 
 fn number(radius: Radius) -> String {
     let Radius { value, error } = radius;
-    // Beyond a few digits before the point, decimals say nothing.
-    if value.is_finite() && value >= 1e9 { format!("{value:.12e} +- {error:.1e}") } else { format!("{value:.12} +- {error:.1e}") }
+    format!("{} +- {error:.1e}", figure(value, 12))
 }

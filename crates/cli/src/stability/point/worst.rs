@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{Effort, Links, Patterns, SceneWorstCase, worst_case};
+use cohaptic_stability::{AnalysisError, Effort, Links, Patterns, SceneWorstCase, SceneWorstCaseError, worst_case_watched};
 use serde::Serialize;
 
+use super::ended;
+use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::{LinksName, PointArguments};
 use crate::failure::Failure;
 
@@ -23,7 +25,13 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
     };
     let patterns = Patterns { losses_in_a_row: arguments.losses_in_a_row.unwrap_or(0), delay: arguments.delay_within, links };
     let effort = Effort { accuracy: arguments.accuracy, products: arguments.products };
-    worst_case(scene, &patterns, &effort).map(Some).map_err(|error| Failure::Input(format!("{}: {error}", crate::input::named(path).display())))
+    let watch = AnalysisWatch::new();
+    let found = worst_case_watched(scene, &patterns, &effort, &watch);
+    watch.clear();
+    found.map(Some).map_err(|error| match error {
+        SceneWorstCaseError::Analysis(AnalysisError::Stopped) => ended(),
+        error => Failure::Input(format!("{}: {error}", crate::input::named(path).display())),
+    })
 }
 
 #[derive(Serialize)]

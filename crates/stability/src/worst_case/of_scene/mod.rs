@@ -61,7 +61,7 @@ use self::prepared::{Prepared, Search};
 use super::gripenberg::Effort;
 use crate::analysis::{Combination, combinations, notes};
 use crate::network::NominalNetwork;
-use crate::{Part, PartKind};
+use crate::{AnalysisError, Part, PartKind, Unwatched, Watch};
 
 /// What the network may do.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -198,10 +198,21 @@ impl SceneWorstCase {
 ///
 /// [`SceneWorstCaseError`] if the scene has no frame of one sample each, if its links do more than delay, or if the patterns are too many.
 pub fn worst_case(scene: &Scene, patterns: &Patterns, effort: &Effort) -> Result<SceneWorstCase, SceneWorstCaseError> {
+    worst_case_watched(scene, patterns, effort, &Unwatched)
+}
+
+/// [`worst_case`], watched: it is asked before each product.
+///
+/// # Errors
+///
+/// As for [`worst_case`], and [`AnalysisError::Stopped`] if the watch ends it.
+pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, watch: &dyn Watch) -> Result<SceneWorstCase, SceneWorstCaseError> {
     let network = patterns.network(scene)?;
     let combinations = combinations(scene)?;
-    let found: Vec<Vec<WorstPart>> =
-        combinations.par_iter().map(|combination| of_combination(scene, &network, combination, patterns, effort)).collect::<Result<_, _>>()?;
+    let found: Vec<Vec<WorstPart>> = combinations
+        .par_iter()
+        .map(|combination| of_combination(scene, &network, combination, patterns, (effort, watch)))
+        .collect::<Result<_, _>>()?;
     let parts: Vec<WorstPart> = found.into_iter().flatten().collect();
     let largest = |value: fn(&WorstPart) -> f64| parts.iter().map(value).fold(0.0, f64::max);
     let (lower, upper) = (largest(|part| part.lower), largest(|part| part.upper));
@@ -244,16 +255,16 @@ fn of_combination(
     network: &NominalNetwork,
     combination: &Combination,
     patterns: &Patterns,
-    effort: &Effort,
+    (effort, watch): (&Effort, &dyn Watch),
 ) -> Result<Vec<WorstPart>, SceneWorstCaseError> {
     let structure = prepared::structure(scene, network, &combination.contacts, patterns)?;
     let Prepared { channels, searches, devices } = Prepared::of(scene, network, &structure, patterns)?;
     let peer = |class: usize| scene.peers[structure.classes[class][0]].name.as_str();
     let name = |channel: &Channel| channel.links.first().map(|link: &Link| format!("{} to {}", peer(link.from), peer(link.to))).unwrap_or_default();
     let searched = |search: &Search| {
-        let found = search.automaton.worst_case(effort);
+        let found = search.automaton.worst_case_watched(effort, watch).ok_or(AnalysisError::Stopped)?;
         let certificate = found.certificate.as_ref().map(super::Certificate::rate);
-        WorstPart {
+        Ok(WorstPart {
             kind: search.kind,
             contacts: combination.words.clone(),
             dimension: search.automaton.size(),
@@ -264,7 +275,7 @@ fn of_combination(
             period: found.cycle.len(),
             products: found.products,
             rounding: search.rounding,
-        }
+        })
     };
     let alone = |device: &Part| {
         let (lower, upper) = ((device.radius.value - device.radius.error).max(0.0), device.radius.value + device.radius.error);
@@ -281,5 +292,5 @@ fn of_combination(
             rounding: device.radius.error,
         }
     };
-    Ok(searches.par_iter().map(searched).chain(devices.par_iter().map(alone)).collect())
+    searches.par_iter().map(searched).chain(devices.par_iter().map(|device| Ok(alone(device)))).collect()
 }

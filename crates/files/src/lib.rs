@@ -10,8 +10,17 @@ use std::path::Path;
 /// measurements, weights.
 pub const MOST_BYTES: u64 = 256 << 20;
 
-/// The most bytes of a capture, which is read packet by packet, 4 GiB.
+/// The most bytes of a file that is read piece by piece, 4 GiB: a capture, a part of a campaign.
 pub const MOST_CAPTURE_BYTES: u64 = 4 << 30;
+
+/// Opens a file that is read piece by piece and from several places, of at most that many bytes.
+///
+/// # Errors
+///
+/// As [`LimitedFile::open`].
+pub fn open(path: &Path, most: u64) -> io::Result<File> {
+    LimitedFile::open(path, most).map(|limited| limited.file)
+}
 
 /// The bytes of a file.
 ///
@@ -23,6 +32,15 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     from.read_to_end(&mut bytes)?;
     Ok(bytes)
+}
+
+/// The text of a file.
+///
+/// # Errors
+///
+/// As [`read_bytes`], and [`io::ErrorKind::InvalidData`] for what is no UTF-8.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    String::from_utf8(read_bytes(path)?).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text: expected UTF-8"))
 }
 
 /// A file that is read up to a limit, beyond which there is an error.
@@ -89,6 +107,15 @@ mod tests {
         assert_eq!(read(file(100).path(), 100).unwrap(), 100);
         assert_eq!(read(file(101).path(), 100).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         assert_eq!(read(file(0).path(), 0).unwrap(), 0);
+    }
+
+    #[test]
+    fn what_is_no_text_is_refused_as_such() {
+        let file = file(0);
+        std::fs::write(file.path(), b"a\xff").unwrap();
+        assert_eq!(read_text(file.path()).unwrap_err().to_string(), "it is no text: expected UTF-8");
+        std::fs::write(file.path(), "ä").unwrap();
+        assert_eq!(read_text(file.path()).unwrap(), "ä");
     }
 
     /// It has no length, and no end.

@@ -1,0 +1,144 @@
+//! A bound of a frame's rounding that stays close however fast disturbances grow.
+//!
+//! With T the matrix of a tick, a computed row set ẑ obeys ẑ⁺ = T·ẑ + r, and each operation rounds what it adds up, so that r is at most u·|T|·s row by row,
+//! s the sums of the sizes of the computed rows and |T| the sizes of the terms that a tick adds up. Hence two recursions over the same events,
+//!
+//! ```text
+//! s⁺ = |T|·s        e⁺ = |T|·e + u·|T|·s
+//! ```
+//!
+//! bound the sums and their errors. No entry of the frame is looked at, only the numbers of the nodes. Of stiff gains each |T| grows by a factor that is
+//! near that of T: with a = KT·h²/(2m) the copy alone goes by about a − 3 a tick, its majorant by a + 4. So e stays about u times the ticks times s,
+//! where the square of the growth ([`Rounding`](super::Rounding)) says nothing any more.
+
+use super::frame::Lifted;
+use super::node::{Body, Node};
+use crate::structure::count;
+use crate::timetable::Event;
+
+/// What the operations of a tick round, relative to the terms that they add up: at most fifteen in a row, the rounding of the step maps' coefficients and of
+/// the units among them.
+const TICK: f64 = 16.0 * f64::EPSILON;
+/// The same of a sample, and of the mean of samples, beside one for each node.
+const MEAN: f64 = 6.0 * f64::EPSILON;
+
+/// A bound of the sum of the sizes of a row, and one of its error.
+#[derive(Clone, Copy, Debug)]
+struct Size {
+    sum: f64,
+    error: f64,
+}
+
+impl Size {
+    const UNIT: Self = Self { sum: 1.0, error: 0.0 };
+    const ZERO: Self = Self { sum: 0.0, error: 0.0 };
+
+    fn plus(self, factor: f64, other: Self) -> Self {
+        Self { sum: self.sum + factor.abs() * other.sum, error: self.error + factor.abs() * other.error }
+    }
+
+    /// Rounded by so much of itself.
+    fn rounded(self, by: f64) -> Self {
+        Self { error: self.error + by * self.sum, ..self }
+    }
+}
+
+/// The rows of a node.
+#[derive(Clone, Copy, Debug)]
+struct NodeSizes {
+    device: [Size; 2],
+    copy: [Size; 2],
+    /// The forces that act next, on the copy and on the device \[N\].
+    pending: [Size; 2],
+}
+
+/// A bound of the errors of all rows of a frame as one matrix, in the 2-norm: of the states at the end and of the samples sent, positions and velocities,
+/// each relative to the reference or not. `compliance` is what the waiting forces of a node are multiplied by to be lengths [m/N].
+pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -> f64 {
+    let nodes = lifted.nodes.len();
+    let begin = |node: usize| {
+        let force = Size { sum: 1.0 / compliance(node), error: 0.0 };
+        NodeSizes { device: [Size::UNIT; 2], copy: [Size::UNIT; 2], pending: [force; 2] }
+    };
+    let mut sizes: Vec<NodeSizes> = (0..nodes).map(begin).collect();
+    let gains = lifted.coordination;
+    let signal = |[x, v]: [Size; 2]| Size::ZERO.plus(gains.stiffness, x).plus(gains.damping / lifted.time, v);
+    let before = signal([Size::UNIT; 2]);
+    let mut sent: Vec<Vec<Size>> = vec![Vec::new(); nodes];
+    let mut squares = 0.0;
+    let reference = |sizes: &[NodeSizes]| if lifted.tied { Size::ZERO } else { sizes[0].copy[0] };
+    // Samples are taken relative to where the reference is at the end, which is not known yet: their own errors now, that of the reference then.
+    let mut positions: Vec<Size> = Vec::new();
+    let of_sample = |sent: &[Vec<Size>], node: usize, sample: i64| usize::try_from(sample).ok().map_or(before, |number| sent[node][number]);
+    let mut held: Vec<Option<Size>> = vec![None; nodes * nodes];
+    for (to, from, sample) in &lifted.timetable.held {
+        held[to * nodes + from] = Some(of_sample(&sent, *from, *sample));
+    }
+    for event in &lifted.timetable.events {
+        match *event {
+            Event::Sample { node } => {
+                let copy = sizes[node].copy;
+                positions.push(copy[0]);
+                squares += copy[1].error * copy[1].error;
+                sent[node].push(signal(copy).rounded(MEAN));
+            }
+            Event::Deliver { from, to, sample } => held[to * nodes + from] = Some(of_sample(&sent, from, sample)),
+            Event::Tick { node, span, .. } => {
+                let target = (0..nodes).fold(Size::ZERO, |sum, from| match held[node * nodes + from] {
+                    Some(sample) => sum.plus(lifted.weights[(node, from)], sample),
+                    None => sum,
+                });
+                let target = target.rounded(MEAN + count(nodes) * f64::EPSILON);
+                tick(&lifted.nodes[node], &mut sizes[node], target, lifted, span);
+            }
+        }
+    }
+    let origin = reference(&sizes);
+    let mut add = |size: Size, origin: Size| {
+        let error = size.error + origin.error + f64::EPSILON * (size.sum + origin.sum);
+        squares += error * error;
+    };
+    positions.into_iter().for_each(|position| add(position, origin));
+    for (node, size) in sizes.iter().enumerate() {
+        if lifted.nodes[node].device.is_some() {
+            add(size.device[0], origin);
+            add(size.device[1], Size::ZERO);
+        }
+        add(size.copy[0], origin);
+        add(size.copy[1], Size::ZERO);
+        if lifted.nodes[node].compute_delay {
+            size.pending.iter().for_each(|force| add(Size::ZERO.plus(compliance(node), *force).rounded(f64::EPSILON), Size::ZERO));
+        }
+    }
+    squares.sqrt()
+}
+
+/// One tick of a node: see [`Node::tick`].
+fn tick(node: &Node, sizes: &mut NodeSizes, target: Size, lifted: &Lifted<'_>, span: std::time::Duration) {
+    let time = lifted.time;
+    let (wall, gains) = (node.wall.unwrap_or(cohaptic_peer::Gains { stiffness: 0.0, damping: 0.0 }), lifted.coordination);
+    let [x, v] = sizes.copy;
+    let mut on_copy = target.plus(gains.stiffness + wall.stiffness, x).plus((gains.damping + wall.damping) / time, v);
+    let mut on_device = Size::ZERO;
+    if node.device.is_some() {
+        let [xh, vh] = sizes.device;
+        let (stiffness, damping) = (node.coupling.stiffness, node.coupling.damping / time);
+        on_device = Size::ZERO.plus(stiffness, xh).plus(stiffness, x).plus(damping, vh).plus(damping, v);
+        on_copy = on_copy.plus(1.0, on_device);
+    }
+    if node.compute_delay {
+        let computed = [on_copy.rounded(TICK), on_device.rounded(TICK)];
+        [on_copy, on_device] = std::mem::replace(&mut sizes.pending, computed);
+    }
+    advance(&node.object, &mut sizes.copy, on_copy, time, span);
+    if let Some(device) = &node.device {
+        advance(device, &mut sizes.device, on_device, time, span);
+    }
+}
+
+fn advance(body: &Body, [x, v]: &mut [Size; 2], force: Size, time: f64, span: std::time::Duration) {
+    let (e, g) = body.map(span).coefficients();
+    let position = x.plus(e[0][0], *x).plus(e[0][1] / time, *v).plus(g[0], force).rounded(TICK);
+    let velocity = v.plus(e[1][0] * time, *x).plus(e[1][1], *v).plus(g[1] * time, force).rounded(TICK);
+    (*x, *v) = (position, velocity);
+}
