@@ -57,7 +57,7 @@ fn slug(text: &str) -> String {
     slug.trim_end_matches('-').to_owned()
 }
 
-/// What is drawn of a group.
+/// The part of a group that is drawn.
 struct Drawn<'a> {
     /// Cost and error of each row of each method, and the costs of those without an error at all.
     methods: Vec<Method<'a>>,

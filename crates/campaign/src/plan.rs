@@ -8,7 +8,7 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Scene, at_peer};
 
 use crate::error::CampaignError;
 use crate::table::Format;
@@ -171,7 +171,7 @@ impl Plan {
     ///
     /// # Errors
     ///
-    /// [`CampaignError::Scene`] if the scene is refused with these values, [`CampaignError::NotRun`] if it is too large or its seeds leave their range.
+    /// [`CampaignError::Scene`] if the scene is refused with these values or too large, [`CampaignError::NotRun`] if its seeds leave their range.
     pub fn scene(&self, combination: u64) -> Result<Scene, CampaignError> {
         let varied = self.varied(combination);
         let overrides: Vec<String> = self.set.iter().chain(&varied).cloned().collect();
@@ -180,7 +180,8 @@ impl Plan {
             Err(error) => return Err(CampaignError::Scene { error: Box::new(error), varied }),
         };
         if let Some(reason) = cohaptic_harness::too_large(&scene) {
-            return Err(CampaignError::NotRun { message: format!("scene.count: {reason}"), varied });
+            let error = Box::new(at_peer(&self.text, &self.file, &overrides, cohaptic_harness::MOST_PEERS, &reason));
+            return Err(CampaignError::Scene { error, varied });
         }
         // Seeds are at most what a scene file may say, so that every run can be repeated alone.
         let most = i64::MAX.unsigned_abs();

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 
 use cohaptic_scene::{SceneError, file_text, text_of};
 
-/// What is read from standard input at most \[bytes\]: far beyond any scene, far below what would fill a machine.
+/// The most that is read from standard input \[bytes\]: far beyond any scene, far below the memory of a machine.
 const MOST: u64 = 64 << 20;
 
 const STANDARD_INPUT: &str = "<standard input>";

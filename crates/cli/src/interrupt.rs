@@ -1,6 +1,6 @@
 //! Ctrl-C and SIGTERM: the first asks for an end in good order, which has most of a second; the second ends at once.
 //!
-//! What is asked often enough ends by itself. What cannot ask, such as the eigenvalues of a large matrix, is ended when its time is over: nothing is lost
+//! A computation that asks often enough ends by itself. One that cannot ask, such as the eigenvalues of a large matrix, is ended when its time is over: nothing is lost
 //! that is whole, because files are written under another name until they are ([`crate::output_file`]), and a command that has whole results before its
 //! end leaves word of what is to be done with them ([`keep`]).
 
@@ -15,7 +15,7 @@ static ASKED: AtomicBool = AtomicBool::new(false);
 /// What must be done even if the program ends at once.
 static LAST: Mutex<Vec<Box<dyn Fn() + Send>>> = Mutex::new(Vec::new());
 
-/// What is done with whole results if the command does not end in time.
+/// The use of whole results if the command does not end in time.
 static KEEP: Mutex<Keep> = Mutex::new(Keep { act: None, begun: false });
 
 struct Keep {

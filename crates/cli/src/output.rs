@@ -34,7 +34,7 @@ pub(crate) fn text(text: &str) -> Result<(), Failure> {
 
 /// Prints one JSON document, which says of which kind and version it is. Numbers that are not finite become `null`.
 pub(crate) fn json(schema: DocumentSchema, document: &impl Serialize) -> Result<(), Failure> {
-    // At once: standard output is written line by line otherwise, and who has asked for the end waits for no million lines.
+    // At once: standard output is written line by line otherwise, and after Ctrl-C nobody waits for a million lines.
     let mut text = serde_json::to_vec_pretty(&schema.of(document)).map_err(io::Error::from).map_err(Failure::StandardOutput)?;
     text.push(b'\n');
     raw(&text)
@@ -64,6 +64,11 @@ pub(crate) fn path(path: &Path) -> String {
 /// `1 cell is`, `2 cells are`.
 pub(crate) fn are(number: usize, one: &str) -> String {
     format!("{} {}", cohaptic_units::print::Counted(number, one), if number == 1 { "is" } else { "are" })
+}
+
+/// A number to six digits: for pictures and pages, beside which a table or a document has all digits.
+pub(crate) fn six_digits(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 /// A figure with that many digits behind the point; in powers of ten where these would be most of it, or not enough: from 10⁶ on and below 10⁻⁴.

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::failure::Failure;
 use crate::output;
 
-/// The text of a file; what is none is refused at its line.
+/// The text of a file; bytes that are no text are refused at their line.
 pub(crate) fn read(path: &Path) -> Result<String, Failure> {
     let bytes = cohaptic_scene::read_bytes(path).map_err(|error| Failure::File { verb: "read", path: path.to_path_buf(), error })?;
     of_bytes(bytes, path)

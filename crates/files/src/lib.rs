@@ -1,6 +1,6 @@
 //! Files that are read: up to a limit, whatever they are.
 //!
-//! A regular file that is longer is refused before it is read. What is none, a pipe or a device, has no length and is read up to the limit.
+//! A regular file that is longer is refused before it is read. A pipe or a device has no length and is read up to the limit.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -38,7 +38,7 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 ///
-/// As [`read_bytes`], and [`io::ErrorKind::InvalidData`] for what is no UTF-8.
+/// As [`read_bytes`], and [`io::ErrorKind::InvalidData`] for bytes that are no UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(read_bytes(path)?).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text: expected UTF-8"))
 }
@@ -52,7 +52,7 @@ pub struct LimitedFile {
 }
 
 impl LimitedFile {
-    /// Opens a file of at most so many bytes.
+    /// Opens a file with a limit of its length \[bytes\].
     ///
     /// # Errors
     ///

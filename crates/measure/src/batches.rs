@@ -78,7 +78,7 @@ fn integrated_time(deviations: &[f64]) -> f64 {
     time.max(0.5)
 }
 
-/// The quantile of Student's law with so many degrees of freedom, at least one.
+/// The quantile of Student's law with a number of degrees of freedom, at least one.
 pub(crate) fn student(probability: f64, freedom: usize) -> f64 {
     // The scale and the degrees of freedom are positive, which is all that can be refused.
     StudentsT::new(0.0, 1.0, count(freedom.max(1))).map_or(f64::INFINITY, |law| law.inverse_cdf(probability))

@@ -1,4 +1,4 @@
-//! How often does the truth lie outside of what is stated? Every figure with an error or an interval, over random links.
+//! How often does the truth lie outside of a stated interval? Every figure with an error or an interval, over random links.
 //!
 //! A standard error is judged at 2.045 of it, Student's 0.975 quantile with 29 degrees of freedom, where it comes from 30 batches, and at 1.96 elsewhere:
 //! then 5 % are outside if it is right. More than that is refused where it happens in one of 10 000 right ones (binomial); there are about 50 figures.

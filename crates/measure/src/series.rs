@@ -82,7 +82,7 @@ pub(crate) fn wilson(happened: u64, of: u64) -> Option<[f64; 2]> {
     wilson_of_effective(happened, of, 1.0, NORMAL_975)
 }
 
-/// The same for events that hang together, of which so many say as much as one independent event, with the quantile that fits how that was found.
+/// Wilson's interval for dependent events, a number of which say as much as one independent event, with the quantile that fits how that number was found.
 fn wilson_of_effective(happened: u64, of: u64, as_one: f64, quantile: f64) -> Option<[f64; 2]> {
     if of == 0 {
         return None;
@@ -95,7 +95,7 @@ fn wilson_of_effective(happened: u64, of: u64, as_one: f64, quantile: f64) -> Op
     Some([if happened == 0 { 0.0 } else { middle - half }, if happened == of { 1.0 } else { middle + half }])
 }
 
-/// Wilson's interval at confidence 0.95 for the share of ones in a series of ones and zeros that may hang together: n events count as so many independent
+/// Wilson's interval at confidence 0.95 for the share of ones in a series of ones and zeros that may depend on each other: n events count as fewer independent
 /// ones as have the variance that batch means give the share, and with Student's quantile instead of the normal one where these tell of more variance than
 /// independent events have. `None` of nothing, and where the memory is too long for batches.
 pub(crate) fn share_interval(indicator: &[f64]) -> Option<[f64; 2]> {

@@ -152,7 +152,7 @@ impl Axis {
         if self.ends_at_ticks { extent.widened_to_ticks(self.multiples) } else { extent }
     }
 
-    /// Ticks of which there are about that many at most.
+    /// Ticks, of which there are about `most` at most.
     pub(crate) fn ticks(&self, extent: Extent, most: usize) -> Ticks {
         if self.categories.is_empty() { Ticks::of(extent, most, self.multiples) } else { Ticks::named(&self.categories) }
     }
@@ -193,7 +193,7 @@ impl Extent {
                 Self { low: first * unit, high: last.max(first + 1.0) * unit, ..self }
             }
             Scale::Logarithmic => {
-                // What is a power of ten but for rounding is one.
+                // A power of ten but for rounding is one.
                 let (first, last) = ((libm::log10(self.low) + 1e-9).floor(), (libm::log10(self.high) - 1e-9).ceil());
                 Self { low: libm::pow(10.0, first), high: libm::pow(10.0, last.max(first + 1.0)), ..self }
             }

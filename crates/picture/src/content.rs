@@ -279,7 +279,7 @@ content_from!(Line, Band, Region, HeatMap, Rug);
 pub(crate) type Reach = (Option<(f64, f64)>, Option<(f64, f64)>);
 
 impl Content {
-    /// Lowest and highest x, and y, of what is neither an endless line nor without a place on axes of these scales.
+    /// Lowest and highest x, and y, of all content but endless lines and values without a place on axes of these scales.
     pub(crate) fn extents(&self, x: Scale, y: Scale) -> Reach {
         let placed = |scale: Scale| move |value: &f64| value.abs() < f64::MAX && (scale == Scale::Linear || *value > 0.0);
         let of = |points: &mut dyn Iterator<Item = (f64, f64)>| {

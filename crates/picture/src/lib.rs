@@ -21,7 +21,7 @@
 //!
 //! `plotters` drew the pictures before. It was judged by those pictures and by its documentation; no second implementation was made with it. Its SVG backend works in
 //! whole pixels, a title that is too long is cut off, the legend lies over the data, and there are no subscripts, no style sheet for a dark page, no hatching and no
-//! colour bar; its logarithmic axis had been replaced in two places. What is left of it, mapping a number to a pixel, is a line here. Nearly all of this crate is
+//! colour bar; its logarithmic axis had been replaced in two places. The rest, mapping a number to a pixel, is a line here. Nearly all of this crate is
 //! about room for text, which it does not know. The colours of heat maps come from `colorous`.
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact values"))]
 

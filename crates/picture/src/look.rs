@@ -69,7 +69,7 @@ pub enum Fill {
     Deep(usize),
     /// A light grey.
     Grey,
-    /// Grey lines from bottom left to top right, for what is of another kind.
+    /// Grey lines from bottom left to top right, for content of another kind.
     Hatch,
     /// Grey lines from top left to bottom right.
     BackHatch,

@@ -14,7 +14,7 @@ pub(crate) struct Frame {
 }
 
 type Point = (f64, f64);
-/// Which coordinate a side limits, where it is, and whether what is greater (1) or less (-1) is inside.
+/// The coordinate that a side limits, its value, and whether greater (1) or lesser (-1) ones are inside.
 type Side = (fn(Point) -> f64, f64, f64);
 
 impl Frame {

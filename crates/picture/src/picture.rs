@@ -59,7 +59,7 @@ impl Picture {
         self.notes.iter().any(|known| known.plain() == note)
     }
 
-    /// With a description for people who do not see the picture, beside the titles.
+    /// With a description for screen readers, beside the titles.
     #[must_use]
     pub fn description(self, description: impl Into<String>) -> Self {
         Self { description: description.into(), ..self }
@@ -85,7 +85,7 @@ impl Picture {
         self
     }
 
-    /// With that many panels beside each other, or fewer where the picture is too narrow. Without it panels are below each other.
+    /// With a number of panels beside each other, or fewer where the picture is too narrow. Without it panels are below each other.
     #[must_use]
     pub fn columns(self, columns: usize) -> Self {
         Self { columns: columns.max(1), ..self }

@@ -235,7 +235,7 @@ fn width_of(letter: char, stand: Stand) -> f64 {
     }
 }
 
-/// A letter as it is shown: what XML cannot hold, what is invisible, and what turns the direction of writing is replaced.
+/// A letter as it is shown: letters that XML cannot hold, that are invisible, or that turn the direction of writing are replaced.
 pub(crate) fn shown(letter: char) -> char {
     match letter {
         '\t' | '\n' | '\r' => ' ',

@@ -28,7 +28,7 @@ pub fn escape(text: &str) -> String {
     escaped
 }
 
-/// A number with at most two decimals; what is no number is 0, what lies beyond any picture is cut.
+/// A number with at most two decimals; NaN is 0, and numbers beyond any picture are cut.
 pub(crate) fn coordinate(value: f64) -> String {
     let value = if value.is_nan() { 0.0 } else { value.clamp(-1e6, 1e6) };
     let text = format!("{value:.2}");

@@ -22,7 +22,7 @@ pub enum AddressError {
 ///
 /// # Errors
 ///
-/// [`AddressError`], which says what is missing; names other than `localhost` are refused.
+/// [`AddressError`], which names the missing part; names other than `localhost` are refused.
 pub fn address(text: &str) -> Result<SocketAddr, AddressError> {
     if let Ok(address) = text.parse() {
         return Ok(address);

@@ -66,7 +66,7 @@ impl Scene {
     }
 }
 
-/// What is wrong with a scene that can be read, at the place where its `peer`-th peer is made, counted from 0: its entry `[[peers]]`, or `scene.count`.
+/// A fault of a scene that can be read, at the place where its `peer`-th peer is made, counted from 0: its entry `[[peers]]`, or `scene.count`.
 #[must_use]
 pub fn at_peer(text: &str, file: &Path, overrides: &[String], peer: usize, message: &str) -> SceneError {
     let sources = Sources { file, text, overrides };
@@ -123,7 +123,7 @@ pub(crate) fn parse_scene(sources: Sources<'_>, live: bool) -> Result<(Scene, No
     parse_document(sources, live, read_document)
 }
 
-/// [`parse_scene`], and what is in each file that the scene names.
+/// [`parse_scene`], and the content of each file that the scene names.
 pub(crate) fn parse_whole(sources: Sources<'_>, live: bool) -> Result<(Scene, Node, BTreeMap<PathBuf, Fingerprint>), SceneError> {
     parse_with_files(sources, live, read_document)
 }

@@ -10,7 +10,7 @@ use crate::structure::count;
 pub struct FrameCost {
     /// Samplings, arrivals and ticks of a frame.
     pub events: usize,
-    /// The numbers that describe the scene at an instant of it: states, samples of the frame and of those before, what is held.
+    /// The numbers that describe the scene at an instant of it: states, samples of the frame and of earlier ones, samples held.
     pub rows: usize,
     /// The joint states of the chains of all links; at least 1.
     pub joint: usize,
@@ -18,7 +18,7 @@ pub struct FrameCost {
 
 /// How often a frame is gone through: by the iteration, and for the bounds that are tried.
 pub(crate) const PASSES: f64 = 60.0;
-/// What is done to each number between two passes: it is made orthogonal, twice, to those of all passes before.
+/// The work for each number between two passes: it is made orthogonal, twice, to those of all passes before.
 const BETWEEN: f64 = 4.0 * 0.5 * PASSES;
 /// What an event does to each of the columns of its rows.
 const OF_AN_EVENT: f64 = 8.0;
@@ -32,7 +32,7 @@ impl FrameCost {
         TO_PREPARE * count(self.events) + PASSES * self.of_a_pass()
     }
 
-    /// One way through the frame, and what is done to all numbers at its end.
+    /// One way through the frame, and the work for all numbers at its end.
     pub(crate) fn of_a_pass(&self) -> f64 {
         OF_AN_EVENT * count(self.joint) * count(self.rows) * count(self.events) + BETWEEN * self.numbers()
     }
@@ -44,7 +44,7 @@ impl FrameCost {
     }
 }
 
-/// How many operations it takes to push that many unit vectors through a frame of that many events along so many axes, and then to find the eigenvalues.
+/// The operations that it takes to push unit vectors through the events of a frame along all axes, and then to find the eigenvalues.
 #[must_use]
 pub fn full_operations(states: usize, events: usize, axes: usize) -> f64 {
     pushed_operations(events, axes) * count(states) + eigenvalue_operations(states)

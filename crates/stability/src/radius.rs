@@ -55,7 +55,7 @@ impl Radius {
         (if low > 0.0 { low } else { 0.0 }, if high >= 0.0 { high } else { f64::INFINITY })
     }
 
-    /// The radius of that many times the matrix, for a power of two above 1.
+    /// The radius of a multiple of the matrix, for a power of two above 1.
     pub(crate) fn scaled(self, factor: f64) -> Self {
         let (low, high) = self.bounds();
         if (factor * high).is_finite() { Self { value: factor * self.value, error: factor * self.error } } else { Self::at_least(factor * low) }

@@ -1,11 +1,11 @@
-//! Who watches a computation, and how much it may take.
+//! The watch over a computation, and the limits of its cost.
 
 /// Sees how far a computation is, and may end it.
 pub trait Watch: Sync {
-    /// So many more operations are to be done, by the estimate (see [`FrameCost`](crate::FrameCost)); called before they are begun.
+    /// Operations that are still to be done, by the estimate (see [`FrameCost`](crate::FrameCost)); called before they are begun.
     fn expects(&self, _operations: f64) {}
 
-    /// So many of them are done.
+    /// The operations that are done.
     fn done(&self, _operations: f64) {}
 
     /// Whether the computation is to be given up; asked every few milliseconds where the computation is a loop.
@@ -20,7 +20,7 @@ pub struct Unwatched;
 
 impl Watch for Unwatched {}
 
-/// What an analysis may take, and who watches it.
+/// The limits of an analysis, and the watch over it.
 #[derive(Clone, Copy)]
 pub struct Limits<'a> {
     /// More numbers of the second moment than this are refused ([`crate::mean_square_within`]).

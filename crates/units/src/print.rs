@@ -37,7 +37,7 @@ impl fmt::Display for Span {
     }
 }
 
-/// So many of something: `1 change`, `2 changes`, `0 entries`, `3 axes`.
+/// A number of things: `1 change`, `2 changes`, `0 entries`, `3 axes`.
 #[derive(Clone, Copy, Debug)]
 pub struct Counted<'a, N>(pub N, pub &'a str);
 

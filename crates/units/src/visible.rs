@@ -55,6 +55,6 @@ mod tests {
         let letters = "µ é Ж 猫 עברית · … — N·s/m ✓ 👍";
         assert_eq!(Visible(letters).to_string(), letters);
         let twice = visible_lines(&visible_lines("\u{ad}\r\n"));
-        assert_eq!(twice, "\\u{ad}\\r\n", "what is shown is shown as it is");
+        assert_eq!(twice, "\\u{ad}\\r\n", "shown text is shown unchanged");
     }
 }

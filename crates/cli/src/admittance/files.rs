@@ -12,7 +12,7 @@ use crate::output_file::{field, write_file};
 
 /// Writes `admittance.csv` and `admittance.svg` into a folder, which is made if it is not there, and gives their paths.
 ///
-/// Of points that are not all that were asked for there is only the table: a picture takes longer than a user waits who has asked for the end.
+/// An incomplete list of points has only the table: a picture takes longer than users wait after Ctrl-C.
 pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve], is_whole: bool, size: Size) -> Result<Vec<String>, Failure> {
     std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "write", path: folder.to_path_buf(), error })?;
     let mut written = Vec::new();

@@ -1,4 +1,4 @@
-//! Numbers on the command line: what is none is refused in words, with the range that is taken.
+//! Numbers on the command line. Any other text is refused in words, with the range that is taken.
 
 use std::num::NonZeroUsize;
 

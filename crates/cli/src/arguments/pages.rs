@@ -1,4 +1,4 @@
-//! `init`, `schema`, `completions` and `man`: files for those who write scenes and for their shells and editors.
+//! `init`, `schema`, `completions` and `man`: files for authors of scenes, their shells and their editors.
 
 use std::path::PathBuf;
 

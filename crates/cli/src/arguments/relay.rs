@@ -15,7 +15,7 @@ use super::numbers::integer;
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::RELAY), override_usage = USAGE)]
 pub(crate) struct RelayArguments {
-    /// A relay file: who speaks to whom over which links; - reads it from standard input. With --listen in its place what the link does, as for cohaptic link: words of tc-netem
+    /// A relay file: the programs, and the links between them; - reads it from standard input. With --listen in its place the impairments of the link, as for cohaptic link: words of tc-netem
     /// (delay 20ms 5ms 25% loss 1%), or keys of the link table of a scene (delay=24ms loss=1%)
     #[arg(required_unless_present = "listen", value_name = "FILE | SPEC", allow_negative_numbers = true)]
     pub(crate) words: Vec<OsString>,

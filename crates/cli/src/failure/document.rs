@@ -29,7 +29,7 @@ struct Place<'a> {
     column: usize,
     /// The dotted path; `null` if the text could not be read that far.
     key: Option<&'a str>,
-    /// What is wrong there and what was expected, in one line.
+    /// The fault at that place and the expectation, in one line.
     fault: &'a str,
 }
 

@@ -38,7 +38,7 @@ pub(crate) fn init(arguments: &InitArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A shipped scene for so many peers, with every key explained.
+/// A shipped scene for a number of peers, with every key explained.
 fn commented(name: &str, text: &str, peers: Option<u32>) -> Result<String, Failure> {
     let mut scene = parsed(text)?;
     let own = peers::count(&scene);

@@ -8,7 +8,7 @@ pub(super) fn count(scene: &Table) -> usize {
     by_number.and_then(|count| usize::try_from(count).ok()).unwrap_or_else(|| entries(scene, "peers").len())
 }
 
-/// Makes it a scene of that many: the last ones are left out, with all that names them, or others like the last one are added. What is expected of the
+/// Changes the number of peers: the last ones are left out, with all that names them, or others like the last one are added. Expectations of the
 /// scene is left out, since it holds for the number that it was computed for.
 pub(super) fn change(scene: &mut Table, wanted: usize) {
     scene.remove("expect");

@@ -1,4 +1,4 @@
-//! What is written is accepted, and is what it was made from.
+//! A written scene is accepted, and equals the scene it was made from.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ fn scene(text: &str, said: &str) -> Scene {
     Scene::parse(text, Path::new("scene.toml"), &[]).unwrap_or_else(|error| panic!("{said}: {error}\n{text}"))
 }
 
-/// Without `--peers` what is written is the scene itself: comments and defaults change nothing.
+/// Without `--peers` the text is the scene itself: comments and defaults change nothing.
 #[test]
 fn what_is_written_is_the_scene_it_was_made_from() {
     for name in shipped::names() {
@@ -27,7 +27,7 @@ fn every_scene_can_be_had_for_other_numbers_of_peers() {
         for peers in [2, 3, 4, 7] {
             let read = scene(&commented(name, text, Some(peers)).unwrap(), name);
             assert_eq!(read.peers.len(), peers as usize, "{name}");
-            // What is expected was computed for one number of peers.
+            // Expectations were computed for one number of peers.
             assert_eq!(read.expect.is_some(), read.peers.len() == own.peers.len() && own.expect.is_some(), "{name}");
         }
     }

@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     Ok(if interrupt::asked() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-/// What is put into the scene: all `--set`, and then the seed.
+/// The overrides of the scene: all `--set`, and then the seed.
 fn overrides(arguments: &RunArguments) -> Vec<String> {
     let seed = arguments.seed.map(|seed| format!("scene.seed={seed}"));
     arguments.scene.overrides.set.iter().cloned().chain(seed).collect()

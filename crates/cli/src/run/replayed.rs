@@ -11,7 +11,7 @@ use crate::arguments::RunArguments;
 use crate::failure::Failure;
 use crate::{input, output, text_file};
 
-/// So many differences are listed.
+/// The most differences that are listed.
 const MOST: usize = 20;
 
 /// Reads `inputs.csv` of a session, and says in what the scene differs from that of the session; if it does, it is refused without `--force`.

@@ -80,7 +80,7 @@ pub(crate) const fn judged(criterion: Criterion, is_nominal: bool) -> &'static s
     if is_nominal { "nominal" } else { criterion.word() }
 }
 
-/// What that many radii leave out, because the second moment cannot be followed there; `None` if there are none. Of one and of several it is said in other
+/// The chance that a number of radii leave out, because the second moment cannot be followed there; `None` if there are none. Of one and of several it is said in other
 /// words: "cell is", "cells are".
 pub(crate) fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
     (count > 0).then(|| {

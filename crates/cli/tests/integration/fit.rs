@@ -41,7 +41,7 @@ fn the_correlation_is_that_of_delays_and_not_of_their_scores() {
     assert!((rho - 0.9).abs() < 0.01, "{rho}");
 }
 
-/// The fates of that link as measurements of a clock that gains so many nanoseconds each millisecond.
+/// The fates of that link as measured by a clock that gains a number of nanoseconds each millisecond.
 fn drifting(desk: &Desk, link: &str, nanos_each_ms: i32) {
     desk.text(&format!("{link} --fates f.csv"));
     let log = desk.read("f.csv");

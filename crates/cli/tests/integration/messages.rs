@@ -1,4 +1,4 @@
-//! Bad inputs and all that the program says to each: where it is, what is wrong, what was expected, and the way out.
+//! Bad inputs and the message to each: the place, the fault, the expectation, and the way out.
 
 use crate::desk::Desk;
 use crate::scenes::TWO;
@@ -174,10 +174,14 @@ fn too_many_peers_are_shown_where_the_first_one_too_many_is() {
     assert_eq!((outcome.status, outcome.stderr), (Some(2), format!("error: {message}\n")));
     let outcome = desk.cohaptic("live many.toml");
     assert_eq!((outcome.status, outcome.stderr), (Some(2), format!("error: {message}\n")));
+    let outcome = desk.cohaptic("campaign many.toml --out out");
+    assert_eq!((outcome.status, outcome.stderr), (Some(2), format!("error: {message}\n")));
     let outcome = desk.cohaptic("check many.toml");
     assert_eq!(outcome.status, Some(2));
     let said: String = outcome.stdout.lines().map(|line| line.trim()).collect();
     assert!(said.contains(&message.lines().map(str::trim).collect::<String>()), "{}", outcome.stdout);
+    let outcome = desk.cohaptic("campaign many.toml --set 'peers=[]' --vary scene.count=2,5000 --out out");
+    assert!(outcome.stderr.contains("scene.count=5000: scene.count: 5000 peers are too many"), "{}", outcome.stderr);
     // Made by number, they are too many where the number is.
     let outcome = desk.cohaptic("run many.toml --set 'peers=[]' --set scene.count=5000");
     assert!(outcome.stderr.starts_with("error: --set scene.count=5000: scene.count: 5000 peers are too many"), "{}", outcome.stderr);

@@ -10,7 +10,7 @@ pub(crate) fn missing(text: &str, printed: &str) -> Vec<String> {
     numbers(text).into_iter().filter(|number| number.contains('.') && !is_known(number)).collect()
 }
 
-/// All runs of digits, with a decimal point within or none; of a number with an exponent what is before it.
+/// All runs of digits, with a decimal point within or none; of a number with an exponent the digits before it.
 fn numbers(text: &str) -> Vec<String> {
     let runs = text.split(|letter: char| !letter.is_ascii_digit() && letter != '.');
     let runs = runs.map(|run| run.trim_matches('.')).filter(|run| !run.is_empty() && run.matches('.').count() < 2);

@@ -6,7 +6,7 @@ pub(crate) struct Notes {
     pub(crate) file: Option<String>,
     pub(crate) not_run: Option<String>,
     pub(crate) run_with: Option<String>,
-    /// What is run, and in place of what.
+    /// The command that is run, and the shown one that it replaces.
     pub(crate) instead: Vec<(String, String)>,
     pub(crate) needs: Option<String>,
     pub(crate) statuses: Option<Vec<i32>>,
@@ -15,7 +15,7 @@ pub(crate) struct Notes {
     pub(crate) printed: bool,
 }
 
-/// What is not compared.
+/// The parts that are not compared.
 #[derive(Debug, Default, Clone)]
 pub(crate) struct Vary {
     /// The figures of lines that have one of these texts; an empty text is in every line.

@@ -174,7 +174,7 @@ fn with_less_work(script: &str, notes: &Notes) -> String {
     notes.instead.iter().fold(script.to_owned(), |script, (run, of)| script.replace(of, run))
 }
 
-/// A page with an output, each kind of fault beside what is right.
+/// A page with an output, each kind of fault beside a right one.
 const PAGE: &str = "<!-- run: scenarios; for: SCENES -->
 ```text
 $ cohaptic check SCENES/network/ideal.toml

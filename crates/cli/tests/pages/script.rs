@@ -2,7 +2,7 @@
 
 /// The words of each command in a script for `sh`, as far as pages need it: quotes, comments, lines that go on, and what separates commands.
 ///
-/// What is done with what they print (`> FILE`) is left out.
+/// Redirections (`> FILE`) are left out.
 pub(crate) fn commands(script: &str) -> Vec<Vec<String>> {
     let (mut all, mut words, mut word) = (Vec::new(), Vec::new(), None::<String>);
     let mut letters = script.chars().peekable();

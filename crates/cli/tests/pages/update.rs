@@ -6,7 +6,7 @@ use crate::compare::{LEFT_OUT, same_line, words};
 use crate::notes::Vary;
 
 /// What the page shows in place of what it shows now: as much of it, if the same places can be found, and all of it otherwise. Lines that only differ in
-/// what is not compared stay as they are.
+/// the parts that are not compared stay as they are.
 pub(crate) fn shown_anew(shown: &[&str], printed: &[&str], vary: &Vary) -> Vec<String> {
     let trimmed: Vec<&str> = printed.iter().map(|line| line.trim_end()).collect();
     let mut anew = shortened(shown, &trimmed).unwrap_or_else(|| owned(&trimmed));

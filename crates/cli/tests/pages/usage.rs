@@ -15,7 +15,7 @@ struct Help {
     parts: Vec<String>,
 }
 
-/// By the words behind `cohaptic`; `None` for what is no command.
+/// By the words behind `cohaptic`; `None` for any other line.
 static HELP: Mutex<BTreeMap<Vec<String>, Option<Help>>> = Mutex::new(BTreeMap::new());
 
 fn help(command: &[String]) -> Option<Help> {

@@ -75,7 +75,7 @@ impl fmt::Display for SceneDifference {
             Self::File { name, .. } => write!(f, "the file {name}: not named in the record"),
             Self::Unsaid => f.write_str("something; the record does not hold the keys of its scene"),
             Self::Program { recorded, now } => {
-                write!(f, "no key and no file, but what is made of them: cohaptic {recorded} in the record, {now} now")
+                write!(f, "no key and no file, but their meaning: cohaptic {recorded} in the record, {now} now")
             }
         }
     }
@@ -143,7 +143,7 @@ impl RecordedScene {
     }
 }
 
-/// What is not the same in two maps, in the order of its names.
+/// The entries in which two maps differ, in the order of their names.
 fn differing<T: Clone + PartialEq>(one: &BTreeMap<String, T>, other: &BTreeMap<String, T>) -> impl Iterator<Item = (String, Option<T>, Option<T>)> {
     let mut names: Vec<&String> = one.keys().chain(other.keys()).collect();
     names.sort();
@@ -271,6 +271,6 @@ mod tests {
         let one = recorded(folder.path(), TEXT, &[]);
         let other = RecordedScene { program: "0.0.1".to_owned(), fingerprint: Fingerprint::of("x"), ..one.clone() };
         let lines: Vec<String> = other.differences(&one).iter().map(ToString::to_string).collect();
-        assert_eq!(lines, [format!("no key and no file, but what is made of them: cohaptic 0.0.1 in the record, {PROGRAM} now")]);
+        assert_eq!(lines, [format!("no key and no file, but their meaning: cohaptic 0.0.1 in the record, {PROGRAM} now")]);
     }
 }

@@ -45,7 +45,7 @@ const MOST_NAMED: usize = 20;
 const STEP: u64 = 10_000;
 
 impl Network {
-    /// For a scene, in that many spans of time.
+    /// For a scene, in a number of spans of time.
     pub(super) fn new(scene: &Scene, spans: usize) -> Self {
         let peers = scene.peers.len();
         let shown: Vec<Shown> = pairs(peers).take(MOST_LINKS).map(|(from, to)| Shown { from, to, ..Shown::default() }).collect();

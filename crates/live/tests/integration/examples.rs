@@ -66,7 +66,7 @@ impl Mechanics {
         };
         let others = Held::new((1..self.peers).map(|_| State::REST));
         let mut peer: Peer<3, _, _> =
-            Peer::new(config, device, object, Coordination::AveragePosition.strategy(self.coordination, self.peers), others);
+            Peer::new(config, device, object, Coordination::AveragePosition.strategy(self.coordination, self.peers as usize), others);
         for k in 0..ticks {
             let now = Instant::from_nanos(k * 1_000_000);
             peer.compute(now);

@@ -50,7 +50,7 @@ fn random_link(rng: &mut TestRng) -> LinkConfig {
     }
 }
 
-/// What is asked of a link, how that compares with what it did, and what it did.
+/// The configured link, its comparison with the measured one, and the measured link.
 fn measured(seed: u64, config: LinkConfig) -> (Asked, Vec<Figure>, Achieved) {
     let asked = Asked::of_config(&config, STREAM.every, STREAM.info.size);
     let mut link = Link::new(seed, &LinkName::between("a", "b"), config);
@@ -69,7 +69,7 @@ fn measured(seed: u64, config: LinkConfig) -> (Asked, Vec<Figure>, Achieved) {
     (asked, figures, accumulator.finish())
 }
 
-/// Asked for and done are one link: what is asked for is the truth.
+/// Configured and measured are one link: the configuration is the truth.
 #[test]
 fn the_truth_lies_within_what_a_link_states_as_often_as_it_says() {
     let mut tally = Tally::default();

@@ -2,7 +2,7 @@
 //!
 //! The arrivals are cut into blocks of equal numbers, in the order of sending, 4 integrated autocorrelation times long or longer ([`crate::batches`]).
 //! Of delays without drift each block is a sample like any other, so that a location of its delays, T, is one independent number from one law, block by
-//! block. So the drift s is where the locations T(d − s·t) of the blocks have no slope in time, and what is left of them tells the standard error, whatever
+//! block. So the drift s is where the locations T(d − s·t) of the blocks have no slope in time, and their residuals tell the standard error, whatever
 //! the law of the delays and their memory: Student's law with two degrees of freedom fewer than blocks. (Drift within a block does no harm, since it is
 //! taken off before the location is.)
 //!

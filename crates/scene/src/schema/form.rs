@@ -125,23 +125,7 @@ impl Form {
     /// The unit of what stands there, if it is always the same.
     #[must_use]
     pub const fn unit(&self) -> &'static str {
-        match self {
-            Self::Number(amount) | Self::Vector(amount) | Self::Triple(amount) => amount.unit(),
-            Self::Text
-            | Self::File
-            | Self::Boolean
-            | Self::Integer(..)
-            | Self::Duration
-            | Self::Rate
-            | Self::Size
-            | Self::Probability
-            | Self::Like(_)
-            | Self::Words(_)
-            | Self::Table(_)
-            | Self::List(_)
-            | Self::Pair(_)
-            | Self::AnyOf(_) => "",
-        }
+        if let Self::Number(amount) | Self::Vector(amount) | Self::Triple(amount) = self { amount.unit() } else { "" }
     }
 }
 
@@ -149,24 +133,12 @@ impl Form {
     /// The table that may stand there, if one may.
     #[must_use]
     pub fn table(&self) -> Option<&'static Table> {
-        match self {
-            Self::Table(table) => Some(table),
-            Self::AnyOf(forms) => forms.iter().find_map(Self::table),
-            Self::Text
-            | Self::File
-            | Self::Boolean
-            | Self::Integer(..)
-            | Self::Number(_)
-            | Self::Vector(_)
-            | Self::Triple(_)
-            | Self::Duration
-            | Self::Rate
-            | Self::Size
-            | Self::Probability
-            | Self::Like(_)
-            | Self::Words(_)
-            | Self::List(_)
-            | Self::Pair(_) => None,
+        if let Self::Table(table) = self {
+            Some(table)
+        } else if let Self::AnyOf(forms) = self {
+            forms.iter().find_map(Self::table)
+        } else {
+            None
         }
     }
 }

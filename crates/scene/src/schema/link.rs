@@ -55,7 +55,7 @@ pub(super) const LINK_KIND: [Key; 4] = [
         "A log of fates: the n-th packet meets the fate of the n-th of the log. Takes away all other keys; \"none\" takes it away",
     ),
     usual("netem", NETEM, "\"none\"", "The link in the words of tc-netem. Takes away all other keys; \"none\" takes it away"),
-    usual("netem-profile", Form::Words(&PROFILES), "\"exact\"", "What is made of the words of netem"),
+    usual("netem-profile", Form::Words(&PROFILES), "\"exact\"", "The meaning of the words of netem"),
 ];
 
 /// Keys of a link alone.
@@ -112,7 +112,7 @@ static LOSS_TABLE: Table = Table::of(&[&[
     optional(
         "every",
         Form::AnyOf(&[Form::Integer(1, MOST), Form::Duration]),
-        "Beside packets or times: again after so many packets, or after such a time",
+        "Beside packets or times: the pattern repeats after this number of packets, or after this time",
     ),
 ]]);
 static GILBERT_ELLIOTT: Table = Table::of(&[&[
@@ -159,7 +159,7 @@ static REORDER_TABLE: Table = Table::of(&[
     &CHANCES,
     &[
         usual("gap", Form::Integer(1, MOST_OF_32_BITS), "1", "Such a packet jumps ahead, at most one in this number of packets"),
-        optional("behind", Form::Integer(1, MOST_OF_32_BITS), "Such a packet is held until so many others have passed it; needs at-most"),
+        optional("behind", Form::Integer(1, MOST_OF_32_BITS), "Such a packet is held until this number of others has passed it; needs at-most"),
         optional("at-most", Form::Duration, "How long a packet is held behind others at most"),
         optional("later", Form::Duration, "Such a packet takes so much longer"),
     ],

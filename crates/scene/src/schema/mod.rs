@@ -1,4 +1,4 @@
-//! What may stand in a file: every key with its meaning, unit, default and form, for editors and for those who begin a scene.
+//! The catalogue of keys: every key with its meaning, unit, default and form, for editors and for authors of scenes.
 //!
 //! The readers of this crate decide what a file means; this is the catalogue of what they read. A test reads files in which every table occurs, and
 //! compares the keys that the readers asked for with those that stand here: neither may have one more. Ranges and units of numbers are those of the

@@ -17,8 +17,8 @@ static RELAY: Table = Table::of(&[&[
     optional("title", Form::Text, "A line for people; without it the name of the file"),
     usual("seed", Form::Integer(0, i64::MAX.unsigned_abs()), "0", "Seed of all random numbers"),
     usual("allow-remote", Form::Boolean, "false", "Whether ports and addresses may be on other machines"),
-    usual("most-packets", Form::Integer(1, 1 << 24), "262144", "So many datagrams may be on their way at once"),
-    usual("most-bytes", Form::Size, "\"64MB\"", "So many bytes of datagrams may be on their way at once"),
+    usual("most-packets", Form::Integer(1, 1 << 24), "262144", "The most datagrams in flight at once"),
+    usual("most-bytes", Form::Size, "\"64MB\"", "The most bytes of datagrams in flight at once"),
     usual("forget-after", Form::Duration, "\"30s\"", "A learnt address that is silent for so long may be replaced"),
     usual("tolerance", Form::Duration, "\"1ms\"", "Later than this is late"),
 ]]);

@@ -27,8 +27,8 @@ static DEFAULT: Table = Table::of(&[&[
     required("right-to-left", TARGET, "The name of a link, pass or drop"),
 ]]);
 static MEMORY: Table = Table::of(&[&[
-    usual("packets", Form::Integer(1, 1 << 32), "262144", "So many packets"),
-    usual("bytes", Form::Size, "\"256MB\"", "So many bytes"),
+    usual("packets", Form::Integer(1, 1 << 32), "262144", "The most packets"),
+    usual("bytes", Form::Size, "\"256MB\"", "The most bytes"),
 ]]);
 static SIDE: Table = Table::of(&[&[
     optional("tun", Form::Text, "Name of a TUN device, which is made and is gone with the router"),

@@ -34,7 +34,7 @@ static SCENE: Table = Table::of(&[&[
     optional(
         "count",
         Form::Integer(2, 1_000_000),
-        "Makes so many equal peers, named peer1, peer2 and so on; entries [[peers]] may change some of them",
+        "The number of equal peers, named peer1, peer2 and so on; entries [[peers]] may change some of them",
     ),
 ]]);
 
@@ -167,7 +167,7 @@ static TIMELINE: Table = Table::of(&[&[
     optional("set", Form::Table(&SET), "The keys that change: of the link, or contact and hand of the peer"),
     optional("coordination", Form::Table(&GAINS), "In place of link or peer, and without set: new gains at every peer"),
 ]]);
-/// What is set of a link or of a peer: which of the two is another key's business.
+/// The key of a link or of a peer that is set: another key says which of the two.
 static SET: Table = Table::over(&[&LINK, &LINK_KIND, &SET_OF_PEER]);
 const SET_OF_PEER: [Key; 2] = [
     optional("contact", Form::AnyOf(const { &[Form::Words(&CONTACTS), Form::Table(&PUSH)] }), "Of a peer: how the device touches the object"),

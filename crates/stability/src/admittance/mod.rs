@@ -139,7 +139,7 @@ impl Admittance {
             })
         };
         let mut points = Vec::with_capacity(frequencies.len());
-        // Threads share a few at a time, so that what is done when they are stopped is done from the first on.
+        // Threads share a few at a time, so that the points that are done at an interruption are the first ones.
         for some in frequencies.chunks(TOGETHER) {
             let found: Vec<Option<Result<AdmittancePoint, AdmittanceError>>> = some.par_iter().map(at).collect();
             for point in found {

@@ -87,7 +87,7 @@ impl Family {
         let at_low = family.scene(&low).map_err(|error| family.no_number(error))?;
         let at_high = family.scene(&high).map_err(|error| family.no_number(error))?;
         crate::plan::plans(&[&at_low])?;
-        // What is left to chance at one end may be nothing at the other: no loss, no jitter. In between a key may take no value at all.
+        // The chance at one end may be none at the other: no loss, no jitter. In between a key may take no value at all.
         let inside: Vec<f64> = family.keys.iter().enumerate().map(|(key, range)| range.odd(key)).collect();
         let chance = has_chance(&at_low) || has_chance(&at_high) || family.scene(&inside).is_ok_and(|scene| has_chance(&scene));
         family.criterion = if chance { Criterion::MeanSquare } else { Criterion::SpectralRadius };

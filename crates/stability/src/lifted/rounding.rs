@@ -1,7 +1,7 @@
 //! How far the rounding of a frame's ticks may take its rows from the exact ones.
 //!
 //! Each tick of a node rounds some ten operations on numbers of at most step·growth: *step* is the largest sum of the sizes of a row of one tick's matrix,
-//! *growth* the largest sum of a row of what the frame has made so far of its unknowns. What is left of the frame magnifies that by about the growth of the
+//! *growth* the largest sum of a row of what the frame has made so far of its unknowns. The rest of the frame magnifies that by about the growth of the
 //! whole frame. Where disturbances grow so fast that the square of the growth says nothing any more, [`majorant`](super::majorant) does.
 
 /// The bound, carried along with the ticks of a frame.

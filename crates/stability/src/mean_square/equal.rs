@@ -1,12 +1,12 @@
 //! Equal peers over equal links that lose independently: the mean-square radius from two small matrices, without a bound of its error.
 //!
-//! A delivery with the probability p = 1 − q turns what is held, h, into h + p·(u − h) + ξ, where u is the sample and ξ a noise of mean zero and variance
+//! A delivery with the probability p = 1 − q turns the sample held, h, into h + p·(u − h) + ξ, where u is the sample and ξ a noise of mean zero and variance
 //! p·q·E(u − h)², independent of everything before it and from link to link. So the scene is its *mean* motion, in which every link passes on p of each
 //! sample, driven by noise whose variance follows from the motion: multiplicative noise, for which stability in the mean square is a gain condition
 //! (Willems & Blankenship 1971; Elia 2005, Theorem 6.4; Lu & Skelton 2002).
 //!
 //! The mean motion of equal peers falls into the common motion and the differences, as in [`Structure`](crate::structure::Structure): a node that hears
-//! itself with the weight w = 1, or w = −1/(N−1). With n what is held if nothing were lost but on average, and ζ the mean over the senders of the noise that
+//! itself with the weight w = 1, or w = −1/(N−1). With n the sample held if losses were replaced by their average, and ζ the mean over the senders of the noise that
 //! is still held, each has the states y = (a, n), a those of the peer and its samples on the way:
 //!
 //! ```text
@@ -57,9 +57,9 @@ struct Delivery {
     /// Counted from the first sample sent in the frame.
     sample: i64,
     arrives: f64,
-    /// What is left at this delivery of a unit of the noise held when the frame begins, and of that of each delivery before.
+    /// The rest, at this delivery, of a unit of the noise held when the frame begins, and of that of each delivery before.
     left: Vec<f64>,
-    /// What is left of its own noise at the end of the frame.
+    /// The rest of its own noise at the end of the frame.
     at_end: f64,
 }
 
@@ -86,7 +86,7 @@ struct Block {
 }
 
 impl Equal {
-    /// Of that many peers with the clock of that timetable of a single node; `hazards` are those of every link.
+    /// The operator of a number of peers with the clock of that timetable of a single node; `hazards` are those of every link.
     pub(crate) fn new(peers: usize, timetable: Timetable, hazards: &Hazards) -> Self {
         let listed = hazards.at.iter().enumerate().flat_map(|(tick, at)| at.iter().map(move |hazard| (tick, *hazard)));
         let mut deliveries: Vec<Delivery> = Vec::new();
@@ -253,7 +253,7 @@ impl Block {
         let Self { schur, size, variance, .. } = self;
         let size = *size;
         let matrix = |row: usize, column: usize| match (row < size, column < size) {
-            // What is held when the frame begins is the first input.
+            // The sample held when the frame begins is the first input.
             (true, _) => schur.at(row, column),
             (false, true) => Complex64::default(),
             (false, false) => Complex64::from(kept),
@@ -262,8 +262,8 @@ impl Block {
         variance.solve(gamma, size + 1, matrix, input);
     }
 
-    /// What is seen at a delivery of unit noise at another one: of what lasts from frame to frame, and, of a noise before it, within this one.
-    /// `left`: what is left of ζ from the beginning of the frame, and of that noise.
+    /// The response at a delivery to unit noise at another one: of the part that lasts from frame to frame, and, of a noise before it, within this one.
+    /// `left`: the rest of ζ from the beginning of the frame, and of that noise.
     fn seen(&self, to: usize, from: usize, (left, within): (f64, f64)) -> Seen {
         let direct = &self.direct[to];
         let size = self.size;
@@ -276,7 +276,7 @@ impl Block {
 
 /// Where a function that rises with γ becomes zero; `lowest` if it is not below zero just above there.
 ///
-/// The inverse of the relation's radius is nearly a straight line from its pole on, so secants are near at once; bisection is what is left if not.
+/// The inverse of the relation's radius is nearly a straight line from its pole on, so secants are near at once; bisection is the way out if not.
 fn root(lowest: f64, rise: &mut impl FnMut(f64) -> f64) -> f64 {
     let mut before = (lowest * (1.0 + 1e-12), 0.0);
     before.1 = rise(before.0);

@@ -376,7 +376,7 @@ fn symmetric(
 pub(crate) enum Followed {
     /// Nothing is left to chance: the square of the spectral radius.
     Certain,
-    /// Equal peers over equal links that lose independently; and what is held without acting.
+    /// Equal peers over equal links that lose independently; and samples that are held without acting.
     Equal { frame: Equal, held: f64 },
     /// By [`mean_square`], each time anew.
     Anew,
@@ -473,7 +473,7 @@ fn one_by_one(
     Ok(Found { radius, held, method: MeanSquareMethod::Events, frame: timetable.frame, unknowns })
 }
 
-/// The sizes of a frame with so many random links, each of which brings every sample that is sent; without the joint states of their chains.
+/// The sizes of a frame with a number of random links, each of which brings every sample that is sent; without the joint states of their chains.
 fn frame_cost(scene: &Scene, timetable: &Timetable, links: usize) -> FrameCost {
     let peers = scene.peers.len().max(1);
     let sent: usize = timetable.sent.iter().sum();

@@ -59,7 +59,7 @@ pub(crate) fn radius_of_positive(operator: &impl Positive) -> Radius {
     radius_watched(operator, 0.0, &crate::Unwatched).unwrap_or(Radius::UNKNOWN)
 }
 
-/// [`radius_of_positive`], one image of which is so many operations; `None` if whoever watches ends it.
+/// [`radius_of_positive`] with the operations of one image; `None` if the watch ends it.
 pub(crate) fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Watch) -> Option<Radius> {
     let watched = Images { operator, factor: 1.0, operations, watch };
     match within_range(&watched, watch) {

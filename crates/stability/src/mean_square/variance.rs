@@ -15,7 +15,7 @@ pub(crate) struct Variance {
 }
 
 impl Variance {
-    /// Solves for that many rows.
+    /// Solves for a number of rows.
     ///
     /// Each entry of X follows from those below it and to its right (Bartels & Stewart 1972; Kitagawa 1977, for the discrete equation): nothing is
     /// assumed of the eigenvalues but that γ is above the products of any two.

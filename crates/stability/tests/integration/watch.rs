@@ -1,4 +1,4 @@
-//! Who watches an analysis sees how far it is, and may end it; what would take too long is refused before it is begun.
+//! A watch sees the progress of an analysis and may end it; an analysis that would take too long is refused before it is begun.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -26,7 +26,7 @@ fn three(overrides: &[&str]) -> Scene {
 struct Ends {
     at: usize,
     asked: AtomicUsize,
-    /// What is expected, and what is done.
+    /// The operations that are expected, and those that are done.
     operations: Mutex<(f64, f64)>,
 }
 
@@ -72,7 +72,7 @@ fn whoever_watches_ends_an_analysis_and_is_not_asked_again() {
     }
 }
 
-/// What is done is of the order of what was expected, and an analysis that is watched is the one that is not.
+/// The operations done are of the order of those expected, and a watch does not change the analysis.
 #[test]
 fn operations_are_about_those_that_are_expected() {
     let scene = three(&[]);

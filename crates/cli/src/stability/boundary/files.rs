@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cohaptic_picture::Size;
-use cohaptic_stability::{Boundary, Cell, Criterion};
+use cohaptic_stability::{Boundary, Cell, Criterion, Crossing};
 
 use super::Order;
 use super::picture::Picture;
@@ -51,7 +51,8 @@ fn samples(order: &Order, found: &Boundary) -> String {
 
 fn picture(order: &Order, found: &Boundary) -> cohaptic_picture::Picture {
     let samples: Vec<(f64, f64)> = found.known.iter().map(|(value, cell)| (*value, cell.radius.value)).collect();
-    let crossings: Vec<(f64, String)> = found.crossings.iter().map(|crossing| (crossing.value, crossing_in_words(&order.range, crossing))).collect();
+    let named = |crossing: &Crossing| crossing_in_words(&order.range, &Crossing { value: output::six_digits(crossing.value), ..*crossing });
+    let crossings: Vec<(f64, String)> = found.crossings.iter().map(|crossing| (crossing.value, named(crossing))).collect();
     let picture = Picture {
         title: &order.title,
         axis: axis_of(&order.range),

@@ -120,7 +120,7 @@ impl<'a> PartDocument<'a> {
     }
 }
 
-/// What is left out, by the analysis and by the mean square, each once. Where there are both figures, a note says which of them it is about.
+/// The simplifications of the analysis and of the mean square, each once. Where there are both figures, a note says which of them it is about.
 pub(super) fn notes(judgement: &Judgement) -> Vec<String> {
     let Some(mean_square) = &judgement.mean_square else {
         return judgement.analysis.notes.clone();

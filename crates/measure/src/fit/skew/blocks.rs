@@ -43,7 +43,7 @@ impl<'a> Blocks<'a> {
     /// The drift without which the locations of the blocks have no slope, to the tolerance. `None` where all that decides was sent at one instant.
     ///
     /// A location of d − s·t falls with s as fast as the time at which it is found is late; blocks follow each other in time, so the moment of the locations
-    /// falls all the way and crosses zero once. It is made of straight pieces: Newton's method, which halves instead where it would leave what is known to
+    /// falls all the way and crosses zero once. It is made of straight pieces: Newton's method, which halves instead where it would leave the interval known to
     /// enclose the root.
     pub(super) fn slope(&self, location: Location, tolerance: f64) -> Option<Slope> {
         let spread: f64 = self.times.iter().map(|time| time * time).sum();

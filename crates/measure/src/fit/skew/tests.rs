@@ -82,7 +82,7 @@ fn is_calibrated(name: &str, law: &Law) -> [Said; MEMORIES.len()] {
         assert_eq!(said.outside[0], said.significant[0], "{name} {memory}");
         // 66 integrated autocorrelation times are seldom taken for fewer than the 20 that it takes.
         assert!(said.told >= 1_330, "{name} {memory}: {said:?}");
-        // Without memory, what is stated is the error that is made: as the least of four it comes out a little low, which the level makes good.
+        // Without memory, the stated error is the error made: as the least of four it comes out a little low, which the level makes good.
         let told = said.told as f64;
         let ratio = said.error / told / (said.square / told).sqrt();
         assert!(memory > 0.0 || (0.8..1.1).contains(&ratio), "{name}: {ratio}");

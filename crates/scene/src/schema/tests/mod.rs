@@ -24,7 +24,7 @@ pub(crate) fn seen(path: &str, known: &[&'static str]) {
     SEEN.with_borrow_mut(|seen| seen.push((path.to_owned(), known.to_vec())));
 }
 
-/// The tables of the catalogue that a path leads to. An element of a list has so many names in a path: a link between two ends has two.
+/// The tables of the catalogue that a path leads to. An element of a list may have several names in a path: a link between two ends has two.
 fn tables_at(form: &'static Form, path: &[&str], names: usize) -> Vec<&'static Table> {
     match form {
         Form::Table(table) => within(table, path),
@@ -75,23 +75,12 @@ fn tables() -> BTreeMap<*const Table, (String, &'static Table)> {
         table.others.into_iter().for_each(|form| walk_form(&format!("{way}.*"), form, all));
     }
     fn walk_form(way: &str, form: &'static Form, all: &mut BTreeMap<*const Table, (String, &'static Table)>) {
-        match form {
-            Form::Table(table) => walk(way, table, all),
-            Form::AnyOf(forms) => forms.iter().for_each(|form| walk_form(way, form, all)),
-            Form::List(form) | Form::Pair(form) => walk_form(way, form, all),
-            Form::Text
-            | Form::File
-            | Form::Boolean
-            | Form::Integer(..)
-            | Form::Number(_)
-            | Form::Vector(_)
-            | Form::Triple(_)
-            | Form::Duration
-            | Form::Rate
-            | Form::Size
-            | Form::Probability
-            | Form::Like(_)
-            | Form::Words(_) => {}
+        if let Form::Table(table) = form {
+            walk(way, table, all);
+        } else if let Form::AnyOf(forms) = form {
+            forms.iter().for_each(|form| walk_form(way, form, all));
+        } else if let Form::List(form) | Form::Pair(form) = form {
+            walk_form(way, form, all);
         }
     }
     let mut all = BTreeMap::new();
@@ -124,7 +113,7 @@ fn visits(samples: &[Sample]) -> Visits {
 fn the_catalogue_has_the_keys_that_the_readers_ask_for_and_no_other() {
     let visits = visits(&samples());
     for (table, (way, fields)) in tables() {
-        // Under names that the file makes up, a reader looks at what is there and asks for nothing.
+        // Under names that the file makes up, a reader takes any key and requires none.
         if fields.others.is_some() {
             continue;
         }
