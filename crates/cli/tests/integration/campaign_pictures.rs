@@ -2,7 +2,7 @@
 
 use cohaptic_picture::testing::{faults, in_browser};
 
-use crate::desk::{Desk, shipped};
+use crate::desk::Desk;
 use crate::scenes::{PAPER, RANDOM, TWO};
 use crate::svg::words;
 
@@ -159,26 +159,4 @@ fn what_is_not_drawn_is_said() {
     let text = desk.text(&format!("campaign random.toml {names} --out names"));
     assert!(text.contains("link.delay has 26 values that are no different numbers, and at most 24 are drawn"), "{text}");
     desk.cohaptic("campaign random.toml --vary link.loss=0%,10% --out small --size 20x20mm").assert_refused(2, &["a picture is 160 px"]);
-}
-
-/// The picture of the page is what the command of the page draws today.
-#[test]
-fn the_picture_of_the_page_is_drawn_by_its_command() {
-    let desk = Desk::new();
-    let scene = shipped("network/loss-independent.toml");
-    let page = shipped("../docs/campaign.md");
-    let page = std::fs::read_to_string(page).unwrap();
-    let command = "--vary link.loss=0%..30%/7 --vary coordination.strategy=average-position,proportional-derivative --runs 100 --out bands";
-    assert!(page.contains(command) && page.contains("](images/campaign.svg)"), "the page has another command");
-    desk.text(&format!("campaign {} {command}", scene.display()));
-    let drawn = desk.read("bands/discrepancy.svg");
-    let file = shipped("../docs/images/campaign.svg");
-    if std::env::var_os("COHAPTIC_UPDATE_PAGES").is_some() {
-        std::fs::write(&file, &drawn).unwrap();
-    }
-    assert!(
-        std::fs::read_to_string(&file).unwrap_or_default() == drawn,
-        "docs/images/campaign.svg is another picture: COHAPTIC_UPDATE_PAGES=1 draws it anew"
-    );
-    assert_eq!(faults(&drawn), [""; 0]);
 }

@@ -30,6 +30,7 @@ mod measured;
 mod messages;
 mod output;
 mod overrides;
+mod page_pictures;
 mod pages;
 mod paper;
 mod records;
