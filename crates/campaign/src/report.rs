@@ -23,7 +23,7 @@ pub struct Report {
     /// The quantiles of each combination, `None` where all of its runs diverged. Empty if they would take too much memory: beyond
     /// [`MOST_RUNS_OF_QUANTILES`] or [`MOST_COMBINATIONS_OF_QUANTILES`].
     pub quantiles: Vec<Option<Quantiles>>,
-    /// What is said of each combination; empty if that is not asked for.
+    /// The judgement of each combination; empty without verdicts.
     pub judgements: Arc<[Judgement]>,
 }
 

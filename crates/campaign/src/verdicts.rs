@@ -1,4 +1,4 @@
-//! What is said of each combination without running it: whether it is stable. How that is judged is not known here.
+//! Judgements of combinations without running them: whether each is stable. The method of judging is not known here.
 
 mod file;
 mod work;
@@ -13,11 +13,11 @@ pub(crate) use work::judge;
 
 /// Judges the scene of a combination. Called from many threads.
 pub trait Judge: Sync {
-    /// What is said of the scene, which depends on the scene alone; `None` if the judgement was ended before its verdict was known.
+    /// The judgement of the scene, which depends on the scene alone; `None` if the judgement was ended before its verdict was known.
     fn judge(&self, scene: &Scene) -> Option<Judgement>;
 }
 
-/// What is said of a combination.
+/// The judgement of a combination.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Judgement {
     /// There is a verdict.

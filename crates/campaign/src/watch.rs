@@ -10,7 +10,7 @@ pub trait Watch: Sync {
     /// So many more combinations have been checked.
     fn checked(&self, _combinations: u64) {}
 
-    /// So many more combinations have been judged.
+    /// A number of combinations more have been judged.
     fn judged(&self, _combinations: u64) {}
 
     /// So many more runs have been done.

@@ -121,7 +121,7 @@ impl<'a> CellWatch<'a> {
     }
 }
 
-/// What is said of cells that take long; nothing of others.
+/// The words about cells that take long; none about others.
 fn note(name: &str, [expected, done, largest]: [f64; 3]) -> Option<String> {
     let long = largest / OPERATIONS_A_SECOND > SHORT;
     long.then(|| format!("; a {name} takes {}, {:.0} % of those begun", estimate(largest), 100.0 * (done / expected).min(1.0)))

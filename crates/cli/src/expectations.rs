@@ -55,5 +55,5 @@ pub(crate) fn columns() -> Table {
 }
 
 /// What the bars of such a table mean.
-pub(crate) const BARS: &str = "All bars have one axis: the lower limit lies at the left mark and the upper limit at the right one, and grey is what is expected. The value that came out is a \
+pub(crate) const BARS: &str = "All bars have one axis: the lower limit lies at the left mark and the upper limit at the right one, and grey is the expected range. The value that came out is a \
     disc where it passed and a cross where it failed; beyond the axis it is a triangle at the end. Where there is one limit, zero, or twice a lower limit, lies where the other mark would be.";

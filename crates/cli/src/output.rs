@@ -71,7 +71,7 @@ pub(crate) fn six_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 
-/// A figure with that many digits behind the point; in powers of ten where these would be most of it, or not enough: from 10⁶ on and below 10⁻⁴.
+/// A figure with `digits` digits behind the point; in powers of ten where these would be most of it, or not enough: from 10⁶ on and below 10⁻⁴.
 pub(crate) fn figure(value: f64, digits: usize) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());
     if plain { format!("{value:.digits$}") } else { format!("{value:.digits$e}") }

@@ -88,7 +88,7 @@ impl Progress {
         Self(bar)
     }
 
-    /// What is passed is shown anew although nothing else is: by what cannot say how far it is.
+    /// Shows the elapsed time anew, for work that cannot say how far it is.
     pub(crate) fn tick(&self) {
         self.0.enable_steady_tick(Duration::from_millis(500));
     }

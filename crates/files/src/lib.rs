@@ -13,7 +13,7 @@ pub const MOST_BYTES: u64 = 256 << 20;
 /// The most bytes of a file that is read piece by piece, 4 GiB: a capture, a part of a campaign.
 pub const MOST_CAPTURE_BYTES: u64 = 4 << 30;
 
-/// Opens a file that is read piece by piece and from several places, of at most that many bytes.
+/// Opens a file that is read piece by piece and from several places, with a limit of its length \[bytes\].
 ///
 /// # Errors
 ///

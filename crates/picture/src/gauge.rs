@@ -1,4 +1,4 @@
-//! A small bar without text, for a cell of a table: what is allowed, and what was measured.
+//! A small bar without text, for a cell of a table: an allowed range and a measured value.
 
 use crate::legend::draw_marker;
 use crate::look::{Look, Marker};
@@ -12,9 +12,9 @@ use crate::xml::{Xml, coordinate};
 /// A gauge has no style sheet of its own: a [`page::Page`](crate::page::Page) shows it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Gauge {
-    /// What is allowed at least.
+    /// The least value that is allowed.
     pub low: Option<f64>,
-    /// What is allowed at most.
+    /// The greatest value that is allowed.
     pub high: Option<f64>,
     /// What was measured; `None`: nothing.
     pub measured: Option<f64>,
@@ -28,7 +28,7 @@ const HEIGHT: f64 = 16.0;
 const BEYOND: f64 = 0.5;
 
 impl Gauge {
-    /// Where a value lies on the common axis; `None` for what is no number.
+    /// Where a value lies on the common axis; `None` for NaN.
     #[must_use]
     pub fn place(&self, value: f64) -> Option<f64> {
         let size = |limit: f64| if limit == 0.0 { (value - limit).abs() } else { limit.abs() };

@@ -5,7 +5,7 @@
 //! colour and by dashes. A picture is light or dark as its reader prefers, in a file, in an `<img>` and within a page. Text stays text. The [`Size`] is one or
 //! two columns of a paper, a page on a screen, or given.
 //!
-//! This crate reads no file and no clock, and prints nothing: equal pictures are equal bytes. Callers decide what is worth showing.
+//! This crate reads no file and no clock, and prints nothing: equal pictures are equal bytes. The choice of content is the callers'.
 //!
 //! ```
 //! use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};

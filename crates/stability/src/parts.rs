@@ -71,7 +71,7 @@ pub(crate) fn radius_of(parts: &[Part]) -> Radius {
     parts.iter().map(|part| part.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 })
 }
 
-/// Takes a scene apart along that many equal axes; the watch is asked before each part and within it.
+/// Takes a scene apart along its equal axes; the watch is asked before each part and within it.
 pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method: Method, watch: &dyn Watch) -> Result<Reduced, AnalysisError> {
     let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
     let quotient = structure.quotient(scene, &nodes);

@@ -16,8 +16,8 @@ struct Shared<'a> {
     failed: Option<CampaignError>,
 }
 
-/// Judges what is missing, and writes each judgement into the journal as soon as it is known. Each has its place, so the number of threads changes nothing.
-/// Stops where the watch or the judge ends it; what is missing then is `None`.
+/// Judges the combinations without a judgement, and writes each judgement into the journal as soon as it is known. Each has its place, so the number of threads changes nothing.
+/// Stops where the watch or the judge ends it; missing judgements are then `None`.
 pub(crate) fn judge(
     plan: &Plan,
     judge: &dyn Judge,

@@ -16,7 +16,7 @@ pub(super) struct ByAnalysis;
 /// Why a scene that changes on its way has no verdict.
 const TIMELINE: &str = "its timeline changes it on its way; simulate it instead, or take the timeline away";
 
-/// At most so many reasons are told apart in notes.
+/// The most reasons that notes tell apart.
 const MOST_REASONS: usize = 5;
 
 impl Judge for ByAnalysis {

@@ -33,7 +33,7 @@ struct Finished {
     report: Report,
     /// Of this time.
     wall_s: f64,
-    /// What verdicts leave out, and what is not drawn.
+    /// The simplifications of verdicts, and the pictures that are not drawn.
     notes: Vec<String>,
     /// All that are there: the table, verdicts, pictures.
     files: Vec<PathBuf>,

@@ -8,13 +8,13 @@ use cohaptic_scene::Bounds;
 pub struct Outcome {
     /// The section of `[expect]`: `stable`, `discrepancy`, `position`, `travel`, `loss` or `delay`.
     pub key: &'static str,
-    /// What is compared, in words: `mean delay on left->right`.
+    /// The quantity that is compared, in words: `mean delay on left->right`.
     pub name: String,
     /// The unit of the numbers below; empty for ratios.
     pub unit: &'static str,
-    /// What is expected at least.
+    /// The least value that is expected.
     pub low: Option<f64>,
-    /// What is expected at most.
+    /// The greatest value that is expected.
     pub high: Option<f64>,
     /// What came out; `None` where there is no number.
     pub measured: Option<f64>,
@@ -27,7 +27,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// The line that says what is not as expected; `None` if everything is.
+    /// The line of an expectation that failed; `None` if it passed.
     #[must_use]
     pub fn failure(&self) -> Option<String> {
         let Self { key, name, expected, found, .. } = self;

@@ -11,7 +11,7 @@ pub struct Html {
     text: String,
 }
 
-/// How something was judged. The words beside a mark say the judgement too, for readers who do not see colours.
+/// How something was judged. The words beside a mark say the judgement too, for readers without colours.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Mark {
     /// It is as it should be.
@@ -115,7 +115,7 @@ impl Html {
         Self { text: format!("<pre>{}</pre>\n", escape(text)) }
     }
 
-    /// What is shown only to readers who ask for it.
+    /// Content that is folded away until it is opened.
     #[must_use]
     pub fn details(summary: &str, content: impl Into<Self>) -> Self {
         Self { text: format!("<details>\n<summary>{}</summary>\n{}</details>\n", escape(summary), content.into().text) }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 const TEXT: f64 = 4.5;
 const LINE: f64 = 3.0;
 
-/// What is wrong with the colours of all pictures and pages, in sentences; empty if nothing is: a colour of the light style that the dark style leaves as it is, or one with too
+/// The faults of the colours of all pictures and pages, in sentences; empty if there are none: a colour of the light style that the dark style leaves as it is, or one with too
 /// little contrast to the ground.
 ///
 /// Grounds and lines that only guide the eye (the grid of a plot, the borders of a table) need no contrast.

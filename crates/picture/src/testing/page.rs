@@ -2,7 +2,7 @@
 
 use super::faults;
 
-/// What is wrong with a page, in sentences; empty if nothing is: its tags do not nest, something comes from elsewhere or is a script, or one of its pictures has
+/// The faults of a page, in sentences; empty if there are none: its tags do not nest, something comes from elsewhere or is a script, or one of its pictures has
 /// [`faults`].
 #[must_use]
 pub fn page_faults(page: &str) -> Vec<String> {

@@ -8,8 +8,7 @@
 //!
 //! both parts in ω² alone. Their first coefficients are found by extrapolation to ω² = 0 (Richardson 1911): the frequency is halved again and again, a
 //! table of differences (Neville) removes one term of the series after the other, and the entry is taken that changed least (Ridders 1982) over three
-//! frequencies. That stops by
-//! itself between frequencies that are too high for the series and those so low that rounding covers what is looked for.
+//! frequencies. That stops by itself between frequencies that are too high for the series and those so low that rounding covers what is looked for.
 
 use std::f64::consts::TAU;
 
@@ -45,7 +44,7 @@ impl LowFrequencyFit {
     /// From the impedance at any frequency up to `highest` with a bound of its rounding, and whether anything ties the device to ground.
     pub(super) fn of(impedance: impl Fn(f64) -> (Complex64, f64), highest: f64, tied: bool) -> Self {
         let frequencies: Vec<f64> = std::iter::successors(Some(highest), |hz| Some(0.5 * hz)).take(FREQUENCIES).collect();
-        // A unit in the last place is for what is done to each here.
+        // A unit in the last place is for the operations on each here.
         let point = |hz: &f64| {
             let (z, noise) = impedance(*hz);
             (TAU * hz, z, noise + 2.0 * f64::EPSILON * z.norm())
@@ -74,7 +73,7 @@ impl LowFrequencyFit {
 /// An entry of the table is (4ᵏ·a − b)/(4ᵏ − 1) of two entries before it, so that what rounding makes of it is at most (4ᵏ·α + β)/(4ᵏ − 1) of theirs: that
 /// is carried along beside the entries, as it grows quickly where the terms themselves are divided by h.
 ///
-/// A series may seem to converge to what is felt in some range of frequencies above the lowest ones. So each frequency has its own estimate, and the best is
+/// A series may seem to converge to the impedance in some range of frequencies above the lowest ones. So each frequency has its own estimate, and the best is
 /// taken of those from the lowest frequency up to the first that contradicts them.
 fn extrapolated(sequence: &[(f64, f64)]) -> Estimate {
     let none = Estimate { value: f64::NAN, error: f64::INFINITY };
@@ -139,7 +138,7 @@ mod tests {
         }
     }
 
-    /// 5 N·s/m at 0.1 Hz and above, and 10⁴ N·s/m below some µHz: what is felt at last counts.
+    /// 5 N·s/m at 0.1 Hz and above, and 10⁴ N·s/m below some µHz: the lowest frequencies count.
     #[test]
     fn a_range_of_frequencies_in_which_something_else_is_felt_is_no_limit() {
         let impedance = |hz: f64| {

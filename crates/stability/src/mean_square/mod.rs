@@ -289,7 +289,7 @@ struct Found {
 }
 
 impl Found {
-    /// One image of the operator is that many operations.
+    /// The operations of one image of the operator.
     fn of(
         operator: &impl Positive,
         operations: f64,

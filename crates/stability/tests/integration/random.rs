@@ -24,10 +24,7 @@ struct Case {
 }
 
 fn cases() -> Vec<Case> {
-    let text = std::fs::read_to_string(
-        std::env::var("RJ").unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/random.json").to_owned()),
-    )
-    .unwrap();
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/random.json")).unwrap();
     let entries: Vec<Value> = serde_json::from_str(&text).unwrap();
     let number = |entry: &Value, key: &str| entry[key].as_str().unwrap().parse::<f64>().unwrap();
     let case = |entry: &Value| {
@@ -45,7 +42,7 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-/// A bound is one: of all these scenes none may be outside. What is compared with is a double, half a unit in the last place from the truth.
+/// A bound is one: of all these scenes none may be outside. The reference is a double, half a unit in the last place from the truth.
 #[test]
 fn no_spectral_radius_is_farther_off_than_it_says() {
     for method in [Method::Reduced, Method::Determinant, Method::Full] {
@@ -66,7 +63,7 @@ fn no_spectral_radius_is_farther_off_than_it_says() {
 }
 
 /// Whatever the gains, from nothing to 10¹⁴ N/m: what the two methods for every scene say is true, and where one is sure the other is too. The determinant,
-/// which is chosen for long delays only, is never sure of what is false.
+/// which is chosen for long delays only, is never sure of a wrong verdict.
 #[test]
 fn the_verdicts_of_all_gains_are_true() {
     for case in cases() {

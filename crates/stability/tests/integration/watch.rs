@@ -194,7 +194,7 @@ fn the_frame_of_many_different_peers_ends() {
     assert_eq!(ends.asked(), 3);
 }
 
-/// A cell of a map, and a value of a boundary, ends within: what is not finished is not there, and nothing is wrong.
+/// A cell of a map, and a value of a boundary, ends within: unfinished cells are left out, and finished ones are right.
 #[test]
 fn a_cell_and_a_value_end_within() {
     let text = THREE.replace("24ms", "8ms");

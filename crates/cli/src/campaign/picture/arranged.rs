@@ -5,11 +5,11 @@ use cohaptic_picture::{Axis, cell_edges};
 
 use crate::stability::quantity::axis_of_key;
 
-/// At most so many panels are beside each other.
+/// The most panels beside each other.
 const MOST_PANELS: usize = 12;
-/// A picture shows at most so many combinations.
+/// The most combinations that a picture shows.
 const MOST_CELLS: usize = 100_000;
-/// At most so many names are beneath each other.
+/// The most names beneath each other.
 const MOST_NAMES: usize = 24;
 
 /// The keys of a campaign, arranged in a picture.

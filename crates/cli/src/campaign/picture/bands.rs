@@ -34,7 +34,7 @@ pub(super) fn shares(sheet: &Sheet<'_>, along: &Along, facet: usize) -> Panel {
     Panel::new(along.axis(), Axis::new(SHARE).range(0.0, 1.0)).with(marked(Line::new(points, Look::of(1)), along).named("diverged"))
 }
 
-/// With its points marked, unless they are so many that marks would hide the line.
+/// With its points marked, unless marks would hide the line.
 pub(super) fn marked(line: Line, along: &Along) -> Line {
     if along.values.len() <= MOST_MARKED { line.marked(Marker::Disc) } else { line }
 }

@@ -18,7 +18,7 @@ use crate::output_file::write_file;
 use arranged::{Arranged, Keys};
 use scale::Scale;
 
-/// Files that were written, and what is to be said of them.
+/// Files that were written, and the notes about them.
 #[derive(Default)]
 pub(super) struct Drawn {
     pub(super) files: Vec<std::path::PathBuf>,
