@@ -30,6 +30,7 @@ mod search;
 mod skew;
 mod table;
 
+use cohaptic_units::print::Counted;
 use serde::Serialize;
 
 pub use correlation::CorrelationFit;
@@ -99,13 +100,13 @@ pub struct Goodness {
 #[non_exhaustive]
 pub enum FitError {
     /// No packet arrived, or there is none.
-    #[error("none of {packets} packets arrived: expected at least {LEAST_RECEIVED} delays")]
+    #[error("none of {} arrived: expected at least {LEAST_RECEIVED} delays", Counted(*packets, "packet"))]
     NothingArrived {
         /// Packets sent.
         packets: usize,
     },
     /// Too few packets arrived.
-    #[error("only {received} packets arrived: expected at least {LEAST_RECEIVED} delays")]
+    #[error("only {} arrived: expected at least {LEAST_RECEIVED} delays", Counted(*received, "packet"))]
     TooFew {
         /// Packets that arrived.
         received: usize,

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Rug};
 use cohaptic_scene::Scene;
+use cohaptic_units::print::Counted;
 use cohaptic_wan::Fate;
 
 use super::band::Bands;
@@ -119,8 +120,8 @@ impl Shown {
     fn losses_in_words(&self) -> String {
         match (self.dropped, self.known) {
             (_, 0) => "no packets".to_owned(),
-            (0, known) => format!("none of {known} packets lost"),
-            (dropped, known) => format!("{dropped} of {known} packets lost ({:.2} %)", 100.0 * count(dropped) / count(known)),
+            (0, known) => format!("none of {} lost", Counted(known, "packet")),
+            (dropped, known) => format!("{dropped} of {} lost ({:.2} %)", Counted(known, "packet"), 100.0 * count(dropped) / count(known)),
         }
     }
 

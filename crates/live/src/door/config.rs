@@ -3,6 +3,8 @@
 use core::fmt;
 use core::time::Duration;
 
+use cohaptic_units::print::Counted;
+
 use crate::{EntropyError, SessionKey};
 
 /// The place of a peer among the peers of the scene, from 0: the sender of its samples.
@@ -101,7 +103,7 @@ impl DoorConfig {
 #[non_exhaustive]
 pub enum DoorError {
     /// A sample has 1 to 3 axes.
-    #[error("{found} axes; a sample has 1 to 3")]
+    #[error("{}; a sample has 1 to 3", Counted(*found, "axis"))]
     Axes {
         /// What was asked for.
         found: usize,

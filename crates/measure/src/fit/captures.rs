@@ -15,6 +15,8 @@ mod reader;
 use std::collections::{BTreeMap, VecDeque};
 use std::io::Read;
 
+use cohaptic_units::print::Counted;
+
 use self::frame::Datagram;
 use super::decimal::Attoseconds;
 use super::{Measurement, Measurements, MeasurementsError};
@@ -47,7 +49,7 @@ pub enum End {
 #[non_exhaustive]
 pub enum CaptureError {
     /// A file is no capture, or damaged.
-    #[error("the capture of the {}: {problem} after {frames} frames", end.name())]
+    #[error("the capture of the {}: {problem} after {}", end.name(), Counted(*frames, "frame"))]
     Unreadable {
         /// Which file.
         end: End,
@@ -57,7 +59,7 @@ pub enum CaptureError {
         problem: CaptureProblem,
     },
     /// A file has no UDP datagrams that were asked for.
-    #[error("the capture of the {} has no UDP datagrams{} in {frames} frames: expected those of the link", end.name(), port.map(|port| format!(" to port {port}")).unwrap_or_default())]
+    #[error("the capture of the {} has no UDP datagrams{} in {}: expected those of the link", end.name(), port.map(|port| format!(" to port {port}")).unwrap_or_default(), Counted(*frames, "frame"))]
     NoDatagrams {
         /// Which file.
         end: End,

@@ -18,6 +18,7 @@
 
 mod blocks;
 
+use cohaptic_units::print::Counted;
 use serde::Serialize;
 
 use self::blocks::Blocks;
@@ -64,7 +65,7 @@ pub enum Location {
 #[non_exhaustive]
 pub enum SkewError {
     /// Too few packets arrived.
-    #[error("only {received} packets arrived: expected at least {LEAST_RECEIVED} delays to tell drift from chance")]
+    #[error("only {} arrived: expected at least {LEAST_RECEIVED} delays to tell drift from chance", Counted(*received, "packet"))]
     TooFew {
         /// Packets that arrived.
         received: usize,
