@@ -183,7 +183,7 @@ mod tests {
         assert_eq!(network.shown[1].distribution(), [(5.0, 0.0), (5.0, 1.0)]);
         assert_eq!(network.shown[0].losses.iter().copied().collect::<Vec<_>>(), [1]);
         for text in
-            ["p1 → p2: 1 of 5 packets lost (20.00 %)", "median 20.00 ms", "p1 → p3: none of 1 packets lost", "p3 → p2: no packets", "nothing arrived"]
+            ["p1 → p2: 1 of 5 packets lost (20.00 %)", "median 20.00 ms", "p1 → p3: none of 1 packet lost", "p3 → p2: no packets", "nothing arrived"]
         {
             assert!(svg.contains(&format!(">{text}</text>")), "{text}");
         }
