@@ -66,6 +66,7 @@ pub fn eight(tick: &Tick<Eight>, numbers: &mut Numbers<Eight>, ticks: u32) {
 
 /// The columns of a response to C unknowns.
 #[inline(never)]
+#[expect(clippy::needless_range_loop, reason = "a column of six rows at once")]
 pub fn columns<const C: usize>(tick: &Tick<f64>, numbers: &mut Numbers<[f64; C]>, ticks: u32) {
     let ((device, on_device), (object, on_object)) = (tick.device.coefficients(), tick.object.coefficients());
     for _ in 0..ticks {

@@ -37,6 +37,7 @@ pub fn eight<L: Law<f64>>(tick: &Tick<Eight>, law: impl Fn(usize) -> L, numbers:
 
 /// The columns of a response, without hands.
 #[inline(never)]
+#[expect(clippy::needless_range_loop, reason = "a column of six rows at once")]
 pub fn columns<const C: usize>(tick: &Tick<f64>, law: &impl Law<f64>, numbers: &mut Numbers<[f64; C]>, ticks: u32) {
     let tick = *tick;
     for _ in 0..ticks {

@@ -17,7 +17,7 @@ pub fn anything() -> impl Strategy<Value = Draft> {
 pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Value = Draft> {
     (peers, 1..=3_usize).prop_flat_map(|(count, axes)| {
         let header = (30..200_u64, any::<u32>(), 0.05..2.0, 0.0..2.0, any::<bool>(), option::weighted(0.3, walls()));
-        let bodies = (place(0.02), place(0.2), select(&Coordination::ALL[..]), gains(2000.0, 20.0), prop_oneof![Just(2000_u64), Just(8000)]);
+        let bodies = (place(0.02), place(0.2), select(Coordination::ALL), gains(2000.0, 20.0), prop_oneof![Just(2000_u64), Just(8000)]);
         let peers = (vec(any_peer(axes), count), any_clocks(count));
         let network = (link(), vec((0..count, 1..count, link()), 0..3), vec(option::weighted(0.2, link()), 2 * count));
         let rest = (integrator(), vec((1..30_u64, change(count, axes)), 0..4));
@@ -110,7 +110,7 @@ pub fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<
 pub fn well_behaved(peers: impl Strategy<Value = usize>, link: impl Strategy<Value = String> + Clone) -> impl Strategy<Value = Draft> {
     peers.prop_flat_map(move |count| {
         let peer = (any::<bool>(), any::<bool>(), 0..2_u64, 0.1..0.3, 1.0..5.0, gains(1500.0, 8.0), -1.0..1.0, -0.01..0.01);
-        let header = (any::<u32>(), 0.5..1.0, 0.5..2.0, select(&Coordination::ALL[..]), 50.0..300.0, 5.0..15.0, 1..=4_u64);
+        let header = (any::<u32>(), 0.5..1.0, 0.5..2.0, select(Coordination::ALL), 50.0..300.0, 5.0..15.0, 1..=4_u64);
         (header, vec(peer, count), link.clone()).prop_map(move |(header, peers, link)| {
             let (seed, mass, damping, strategy, stiffness, gain, multiple) = header;
             let mut draft = Draft { seed, mass, damping, split_mass: false, strategy, link, update: multiple * 2000, ..Draft::calm(count) };

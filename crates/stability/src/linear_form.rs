@@ -93,6 +93,7 @@ impl Mul for Form {
 /// law.
 ///
 /// The gains are those that the law multiplies with, to the bit: every other factor on the way is 1 or 0.
+#[expect(clippy::float_cmp, reason = "a pull has equal gains for both ends to the bit")]
 pub(crate) fn pull_towards_mean(law: &BuiltIn) -> Option<Gains> {
     if Law::<f64>::memory(law) > 0 {
         return None;

@@ -28,7 +28,7 @@ pub(crate) const PLAIN: &str = "jitter = \"0s\", order = \"allow-reordering\", l
 /// Two to four peers that are moved about until the links heal, which then have that delay \[µs\].
 fn moved() -> impl Strategy<Value = (Draft, u64)> {
     let peer = (any::<bool>(), (100.0..4000.0, 0.0..10.0), (0.05..0.3, 0.5..8.0), (-0.03..0.03, -0.3..0.3), 0..8_u64, -2.0..2.0);
-    let object = (0.1..1.0, any::<bool>(), 0.2..3.0, (20.0..1200.0, 0.0..12.0), select(&Coordination::ALL[..]), select(vec![4_u64, 8]), any::<u32>());
+    let object = (0.1..1.0, any::<bool>(), 0.2..3.0, (20.0..1200.0, 0.0..12.0), select(Coordination::ALL), select(vec![4_u64, 8]), any::<u32>());
     (2..=4_usize).prop_flat_map(move |count| {
         (object.clone(), vec(peer.clone(), count), links::any_network(count), 0..=16_000_u64).prop_map(|(object, peers, links, delay)| {
             let (mass, split_mass, damping, (stiffness, gain), strategy, every, seed) = object;

@@ -110,7 +110,7 @@ fn elsewhere(draft: &Draft) -> Scene {
 
 /// Two or three peers, the last of which lives elsewhere, and what their links are like until it comes to stay. If `held`, an arm that wants to rest at 0 holds the first one's device.
 fn scenes() -> impl Strategy<Value = (Draft, Vec<DraftLink>)> {
-    let object = (0.2..1.0, 0.2..3.0, 50.0..600.0, 1.0..10.0, select(&Coordination::ALL[..]), select(vec![4_u64, 8]), 0..=12_000_u32);
+    let object = (0.2..1.0, 0.2..3.0, 50.0..600.0, 1.0..10.0, select(Coordination::ALL), select(vec![4_u64, 8]), 0..=12_000_u32);
     let whole = (object, 2..=3_usize, any::<bool>(), -0.03..0.03, 50.0..400.0).prop_map(|(object, count, held, place, arm)| {
         let (mass, damping, stiffness, gain, strategy, every, delay) = object;
         let mut draft = Draft { mass, damping, strategy, update: 1000 * every, split_mass: false, ..Draft::calm(count) };

@@ -50,7 +50,9 @@ impl Subject {
         let ended = || Failure::Interrupted("the analysis was ended before its first point".to_owned());
         let admittance = Admittance::of_watched(&scene, peer, watch).map_err(|error| match error {
             AdmittanceError::Analysis(AnalysisError::Stopped) => ended(),
-            error => not_analysed(file, &error),
+            error @ (AdmittanceError::NoSuchPeer { .. } | AdmittanceError::Frequency { .. } | AdmittanceError::Analysis(_) | _) => {
+                not_analysed(file, &error)
+            }
         })?;
         let chance = has_chance(&scene).then(|| mean_square_watched(&scene, &Limits { watch, ..Limits::of_unknowns(QUICK_UNKNOWNS) }));
         if chance == Some(Err(AnalysisError::Stopped)) {

@@ -1,4 +1,4 @@
-//! `network.svg`: what each link did, as a row of two panels: delays over time with the losses below them, and the distribution of the delay.
+//! `network.svg`: each link as a row of two panels: delays over time with the losses below them, and the distribution of the delay beside the configured one.
 //!
 //! Memory is bounded: over time the least and greatest delay of each span are kept, and of the distribution how many delays lie in each ten microseconds.
 
@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Rug};
 use cohaptic_scene::Scene;
 use cohaptic_units::print::Counted;
-use cohaptic_wan::Fate;
+use cohaptic_wan::{Delay, Fate};
 
 use super::band::Bands;
 use crate::PacketRow;
@@ -29,6 +29,8 @@ struct Shown {
     to: usize,
     /// How many packets took how long, in steps of [`STEP`].
     delays: BTreeMap<u64, u64>,
+    /// The configured propagation delay; `None` if it is a recording, or changes on the way.
+    configured: Option<Delay>,
     /// In which spans packets were sent that never arrived.
     losses: BTreeSet<usize>,
     /// All packets whose fate is known, and those of them that were dropped.
@@ -49,7 +51,12 @@ impl Network {
     /// For a scene, in a number of spans of time.
     pub(super) fn new(scene: &Scene, spans: usize) -> Self {
         let peers = scene.peers.len();
-        let shown: Vec<Shown> = pairs(peers).take(MOST_LINKS).map(|(from, to)| Shown { from, to, ..Shown::default() }).collect();
+        let configured = |from: usize, to: usize| {
+            let config = scene.links.between(from, to).as_fixed().filter(|_| scene.timeline.is_empty());
+            config.map(|config| config.delay.clone())
+        };
+        let shown = pairs(peers).take(MOST_LINKS).map(|(from, to)| Shown { from, to, configured: configured(from, to), ..Shown::default() });
+        let shown: Vec<Shown> = shown.collect();
         Self { peers, delays: Bands::new(scene.duration, spans, shown.len()), shown }
     }
 
@@ -85,7 +92,10 @@ impl Network {
                 .with(lost);
             let shares = Panel::new(delay(), Axis::new("Share of packets").range(0.0, 1.0))
                 .titled(link.median_in_words())
-                .with(Line::steps(link.distribution(), Look::of(0)).named("no longer than this"));
+                .with(Line::steps(link.distribution(), Look::of(0)).named("no longer than this"))
+                .with_all(
+                    link.configured.as_ref().map(|delay| Line::new(configured_distribution(delay), Look::reference()).named("configured delay")),
+                );
             picture = picture.panel(over_time).panel(shares);
         }
         let rest: Vec<String> = pairs(self.peers).skip(self.shown.len()).map(|(from, to)| name(from, to)).collect();
@@ -132,6 +142,23 @@ impl Shown {
     }
 }
 
+/// The points of the configured distribution between its quantiles 0.001 and 0.999.
+const QUANTILES: u16 = 500;
+
+/// The probability that a packet takes no longer than each delay \[ms\], by the law of the delay alone: queues and other stages come on top of it.
+fn configured_distribution(delay: &Delay) -> Vec<(f64, f64)> {
+    let Some(law) = delay.law() else {
+        let mean = 1e3 * delay.mean().as_secs_f64();
+        return vec![(mean, 0.0), (mean, 1.0)];
+    };
+    (0..QUANTILES)
+        .map(|place| {
+            let probability = (f64::from(place) + 0.5) / f64::from(QUANTILES);
+            (law.quantile(probability) / 1e6, probability)
+        })
+        .collect()
+}
+
 #[expect(clippy::cast_precision_loss, reason = "delays of more than a month and counts beyond 2^53 do not occur")]
 fn milliseconds(steps: u64) -> f64 {
     steps as f64 * (STEP as f64 / 1e6)
@@ -144,9 +171,11 @@ fn count(number: u64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use cohaptic_picture::testing::faults;
     use cohaptic_units::{Bytes, Instant};
-    use cohaptic_wan::DropCause;
+    use cohaptic_wan::{Correlation, Distribution, DropCause, Jitter};
 
     use super::*;
 
@@ -188,6 +217,27 @@ mod tests {
             assert!(svg.contains(&format!(">{text}</text>")), "{text}");
         }
         assert!(!svg.contains("Not shown"));
+    }
+
+    /// Uniform from 20 to 30 ms: a straight line between the two; a constant delay is a step.
+    #[test]
+    fn the_configured_distribution_is_that_of_the_law() {
+        let sd = Duration::from_nanos(2_886_751);
+        let jitter = Jitter { sd, distribution: Distribution::Uniform, floor: Duration::ZERO, correlation: Correlation::None };
+        let uniform = configured_distribution(&Delay::with_jitter(Duration::from_millis(25), jitter).unwrap());
+        // √12 · 2.886751 ms is 10 ms to a nanosecond.
+        assert!(uniform.iter().all(|(delay, probability)| (delay - (20.0 + 10.0 * probability)).abs() < 1e-5), "{uniform:?}");
+        assert_eq!(configured_distribution(&Delay::constant(Duration::from_millis(24))), [(24.0, 0.0), (24.0, 1.0)]);
+        let (_, svg) = network(2, &[(1, 0, Some(24))]);
+        assert_eq!(svg.matches(">configured delay</text>").count(), 1, "{svg}");
+    }
+
+    /// After a change on the way a link has more than one configured delay.
+    #[test]
+    fn a_link_that_changes_has_no_configured_distribution() {
+        let text = SCENE.replace("COUNT", "2") + "timeline = [{ at = \"0.5s\", link = \"all\", set = { delay = \"48ms\" } }]\n";
+        let scene = Scene::parse(&text, "scene.toml".as_ref(), &[]).unwrap();
+        assert!(Network::new(&scene, 10).shown.iter().all(|link| link.configured.is_none()));
     }
 
     #[test]

@@ -14,6 +14,9 @@ use super::plot::{self, Panel, Plot};
 use super::trajectory::Trajectory;
 use crate::{Observer, PacketRow, Summary, TickRow};
 
+/// The name of a file, and the picture in it as SVG.
+type RecordedPicture = (&'static str, String);
+
 /// Writes `trajectory.csv` and `packets.csv` while the scene runs, and with [`Recorder::finish`] the rest.
 #[derive(Debug)]
 pub struct Recorder {
@@ -86,7 +89,7 @@ impl Recorder {
     /// # Errors
     ///
     /// [`RecordError`] if a file cannot be written.
-    pub fn finish_with_pictures(self, summary: &Summary) -> Result<(Vec<PathBuf>, Vec<(&'static str, String)>), RecordError> {
+    pub fn finish_with_pictures(self, summary: &Summary) -> Result<(Vec<PathBuf>, Vec<RecordedPicture>), RecordError> {
         let Self { folder, title, names, trajectory, packets, plotted, size } = self;
         let mut files = vec![trajectory.finish()?, packets.finish()?, links::write(&folder, summary)?];
         let mut pictures = Vec::new();

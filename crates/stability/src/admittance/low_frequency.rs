@@ -78,7 +78,7 @@ impl LowFrequencyFit {
 fn extrapolated(sequence: &[(f64, f64)]) -> Estimate {
     let none = Estimate { value: f64::NAN, error: f64::INFINITY };
     let mut estimates = Vec::with_capacity(sequence.len());
-    let (mut before, mut earlier): (Vec<(f64, f64)>, Vec<(f64, f64)>) = (Vec::new(), Vec::new());
+    let (mut before, mut earlier) = (Vec::<(f64, f64)>::new(), Vec::<(f64, f64)>::new());
     for (value, noise) in sequence {
         let mut best = none;
         let mut row = vec![(*value, *noise)];

@@ -145,7 +145,7 @@ impl Family {
     ///
     /// # Errors
     ///
-    /// As [`Family::radius`], and [`AnalysisError::Stopped`] if the watch ends it.
+    /// As [`Family::radius`], and [`AnalysisError::Stopped`](crate::AnalysisError::Stopped) if the watch ends it.
     pub fn radius_watched(&self, values: &[f64], scratch: &mut FamilyScratch, watch: &dyn Watch) -> Result<Cell<f64>, FamilyError> {
         self.evaluate::<false>(values, scratch, watch).map(|cell| Cell { radius: cell.radius.value, is_nominal: cell.is_nominal })
     }

@@ -73,6 +73,7 @@ impl Automaton {
     ///
     /// The bounds hold whatever the effort; they differ by at most its accuracy if [`WorstCase::complete`].
     #[must_use]
+    #[expect(clippy::missing_panics_doc, reason = "nothing ends what nobody watches")]
     pub fn worst_case(&self, effort: &Effort) -> WorstCase {
         self.worst_case_watched(effort, &Unwatched).expect("without a watch nothing ends it")
     }

@@ -111,6 +111,7 @@ impl Certificate {
     /// # Errors
     ///
     /// If nothing that was found could be checked, since numbers overflow.
+    #[expect(clippy::missing_panics_doc, reason = "nothing ends what nobody watches")]
     pub fn find(automaton: &Automaton, accuracy: f64) -> Result<Self, CertificateError> {
         Self::find_watched(automaton, accuracy, &Unwatched).expect("without a watch nothing ends it")
     }

@@ -27,7 +27,13 @@ pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, F
     watch.clear();
     let mut analysis = found.map_err(|error| match error {
         GraphError::Analysis(AnalysisError::Stopped) => ended(),
-        error => refused(error.to_string()),
+        error @ (GraphError::Analysis(_)
+        | GraphError::Unequal { .. }
+        | GraphError::Weight { .. }
+        | GraphError::Alone { .. }
+        | GraphError::Irregular
+        | GraphError::NotLinear
+        | _) => refused(error.to_string()),
     })?;
     if has_chance(scene) {
         analysis.notes.push(NOMINAL.to_owned());

@@ -30,7 +30,15 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
     watch.clear();
     found.map(Some).map_err(|error| match error {
         SceneWorstCaseError::Analysis(AnalysisError::Stopped) => ended(),
-        error => Failure::Input(format!("{}: {error}", crate::input::named(path).display())),
+        error @ (SceneWorstCaseError::Analysis(_)
+        | SceneWorstCaseError::Automaton(_)
+        | SceneWorstCaseError::Delays { .. }
+        | SceneWorstCaseError::Overtaking { .. }
+        | SceneWorstCaseError::Frame { .. }
+        | SceneWorstCaseError::Pattern { .. }
+        | SceneWorstCaseError::TooMany { .. }
+        | SceneWorstCaseError::TooLarge { .. }
+        | _) => Failure::Input(format!("{}: {error}", crate::input::named(path).display())),
     })
 }
 

@@ -118,7 +118,7 @@ fn what_is_no_capture_is_refused() {
     assert_eq!(problem(b"sequence,copy"), CaptureProblem::Format);
     assert_eq!(problem(b""), CaptureProblem::CutOff);
     assert_eq!(problem(&good[..good.len() - 3]), CaptureProblem::CutOff);
-    assert_eq!(refused(&good[..good.len() - 3]).to_string(), "the capture of the sender: the file ends within a block after 1 frames");
+    assert_eq!(refused(&good[..good.len() - 3]).to_string(), "the capture of the sender: the file ends within a block after 1 frame");
     assert!(matches!(refused(&capture(&[])), CaptureError::NoDatagrams { end: End::Sender, frames: 0, port: None }));
 }
 
