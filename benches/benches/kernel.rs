@@ -1,5 +1,6 @@
 //! The tick of a peer, as runs and analyses compute it, beside the tick written by hand for each kind of numbers.
 #![allow(missing_docs, reason = "criterion's macros make public functions")]
+#![allow(clippy::cast_precision_loss, reason = "places and lanes are small")]
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -35,7 +36,10 @@ fn start(place: usize, column: usize) -> f64 {
     1e-3 * (1.0 + place as f64 + column as f64 / 8.0)
 }
 
-fn group<N: Clone>(criterion: &mut Criterion, name: &str, numbers: &Numbers<N>, ways: &[(&str, &dyn Fn(&mut Numbers<N>))]) {
+/// A way of computing ticks, with its name.
+type Way<'a, N> = (&'a str, &'a dyn Fn(&mut Numbers<N>));
+
+fn group<N: Clone>(criterion: &mut Criterion, name: &str, numbers: &Numbers<N>, ways: &[Way<'_, N>]) {
     let mut group = criterion.benchmark_group(format!("kernel/{name}"));
     group.throughput(Throughput::Elements(u64::from(TICKS)));
     for (name, way) in ways {

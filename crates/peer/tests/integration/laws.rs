@@ -8,6 +8,11 @@ use proptest::prelude::*;
 
 use crate::cases;
 
+#[expect(clippy::cast_precision_loss, reason = "a handful of peers")]
+fn count(others: &[Body]) -> f64 {
+    others.len() as f64
+}
+
 /// Position and velocity along one axis.
 type Body = (f64, f64);
 
@@ -27,7 +32,7 @@ fn pull(gains: Gains, own: Body, other: Body) -> f64 {
 /// What both ways of adding up n terms may be apart: each term is rounded at most three times and each sum at most n + 4 times, by 2⁻⁵³ of the sizes.
 fn rounding(gains: Gains, own: Body, others: &[Body]) -> f64 {
     let size = |other: &Body| gains.stiffness * (own.0.abs() + other.0.abs()) + gains.damping * (own.1.abs() + other.1.abs());
-    2.0 * (others.len() as f64 + 7.0) * f64::EPSILON / 2.0 * others.iter().map(size).sum::<f64>()
+    2.0 * (count(others) + 7.0) * f64::EPSILON / 2.0 * others.iter().map(size).sum::<f64>()
 }
 
 fn body() -> impl Strategy<Value = Body> {
@@ -52,9 +57,9 @@ proptest! {
     /// Rakhsha & Constantinescu 2015, eq. (4): the mean of the pulls of all others.
     #[test]
     fn average_position_is_the_mean_over_the_others(gains in gains(), own in body(), others in vec(body(), 1..12)) {
-        let mean = others.iter().map(|other| pull(gains, own, *other)).sum::<f64>() / others.len() as f64;
+        let mean = others.iter().map(|other| pull(gains, own, *other)).sum::<f64>() / count(&others);
         let force = force(Coordination::AveragePosition, gains, own, &others);
-        prop_assert!((force - mean).abs() <= rounding(gains, own, &others) / others.len() as f64, "{force} is not {mean}");
+        prop_assert!((force - mean).abs() <= rounding(gains, own, &others) / count(&others), "{force} is not {mean}");
     }
 
     /// New gains act as if the law had been made with them.

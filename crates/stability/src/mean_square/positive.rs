@@ -54,12 +54,8 @@ const BREAKDOWN: f64 = 1e-14;
 
 /// The spectral radius. The error covers the whole interval from zero where no lower bound is found. Where numbers overflow, the operator is divided by a
 /// power of two, which is exact; where that does not help either, nothing is known.
-#[cfg(test)]
-pub(crate) fn radius_of_positive(operator: &impl Positive) -> Radius {
-    radius_watched(operator, 0.0, &crate::Unwatched).unwrap_or(Radius::UNKNOWN)
-}
-
-/// [`radius_of_positive`] with the operations of one image; `None` if the watch ends it.
+///
+/// One image takes a number of `operations`; `None` if the watch ends it.
 pub(crate) fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Watch) -> Option<Radius> {
     let watched = Images { operator, factor: 1.0, operations, watch };
     match within_range(&watched, watch) {
