@@ -68,8 +68,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     let (keeper, json) = (Arc::clone(&known), arguments.json);
     interrupt::keep(move || {
         let scenes = keeper.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let finished = scenes.iter().filter(|scene| !scene.is_interrupted()).count();
-        let said = format!("{finished} of {} scenes were checked", scenes.len());
+        let said = finished(&scenes);
         // The exit status is all that is left to say that it could not be printed.
         if print(scenes, json).is_ok() { said } else { format!("{said}, and cannot be printed") }
     });
@@ -89,7 +88,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     };
     interrupt::kept();
     progress.clear();
-    let status = scenes.iter().map(|scene| scene.status).max().unwrap_or(0);
+    let (status, finished) = (scenes.iter().map(|scene| scene.status).max().unwrap_or(0), finished(&scenes));
     // What was checked is printed even if the disk is full.
     let written = arguments.page.as_ref().map_or(Ok(()), |file| write_file(file, page::html(&scenes, &arguments.overrides.set)));
     print(scenes, arguments.json)?;
@@ -97,7 +96,13 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     if !arguments.json {
         output::wrote(&arguments.page);
     }
-    Ok(ExitCode::from(if interrupt::asked() { INTERRUPTED } else { status }))
+    if interrupt::asked() { Err(Failure::Interrupted(finished)) } else { Ok(ExitCode::from(status)) }
+}
+
+/// How many scenes were checked before the end, in words.
+fn finished(scenes: &[Checked]) -> String {
+    let finished = scenes.iter().filter(|scene| !scene.is_interrupted()).count();
+    format!("{finished} of {} scenes were checked", scenes.len())
 }
 
 fn print(scenes: Vec<Checked>, json: bool) -> Result<(), Failure> {
@@ -123,6 +128,10 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
             let judged = |scene: &Scene, stable: bool| judged(scene, stable, |note| notes.borrow_mut().push(note));
             let checked = harness::check_with(&scene, model, judged, || !interrupt::asked());
             let failures = checked.failures();
+            if !failures.is_empty() && interrupt::asked() {
+                // What failed may have failed by the interruption alone.
+                return Checked { expects: scene.expect.is_some(), ..Checked::interrupted(file) };
+            }
             let expectations = checked.outcomes.iter().map(OutcomeDocument::new).collect();
             let status = if failures.is_empty() { 0 } else { EXPECTATION };
             let (file, expects) = (output::path(input::named(file)), scene.expect.is_some());

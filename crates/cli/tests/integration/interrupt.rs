@@ -96,7 +96,7 @@ fn a_check_that_is_interrupted_has_not_passed() {
     let desk = Desk::with("two.toml", &format!("{TWO}\n[expect]\ndiscrepancy = {{ max = 1.0 }}\n"));
     // A check writes nothing that would show that it has begun.
     let outcome = interrupted(&desk, "check two.toml --json --set scene.duration=24h", listens);
-    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(130), ""));
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(130), "interrupted: 0 of 1 scenes were checked\n"));
     let document = parse(&outcome.stdout);
     assert_eq!(document["scenes"][0]["passed"], false);
     assert!(document["scenes"][0]["failures"][0].as_str().unwrap().starts_with("interrupted"), "{document:#}");

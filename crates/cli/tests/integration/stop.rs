@@ -23,6 +23,9 @@ fn stopped(desk: &Desk, line: &str, signal: &str) -> Outcome {
 /// Far more than reading a scene takes, and than starting up [1/100 s].
 const HALF_A_SECOND: u64 = 50;
 
+/// Enough to be past the frame of 400 users, which asks whether to go on [1/100 s].
+const TWO_SECONDS: u64 = 200;
+
 /// [`stopped`] after a span of computing [1/100 s].
 fn stopped_after(worked: u64, desk: &Desk, line: &str, signal: &str) -> Outcome {
     // Files, for nobody reads a pipe meanwhile.
@@ -86,9 +89,10 @@ fn many() -> String {
 fn an_analysis_ends_while_it_works_out_the_eigenvalues_of_a_large_matrix() {
     let desk = Desk::with("many.toml", &many());
     for signal in ["-INT", "-TERM"] {
-        let outcome = stopped(&desk, "stability point many.toml --json", signal);
+        let outcome = stopped_after(TWO_SECONDS, &desk, "stability point many.toml --json", signal);
         assert_interrupted(&outcome);
-        assert_eq!(outcome.stdout, "");
+        // A machine that is slow may still be at the frame, which ends by itself and says so.
+        assert!(outcome.stdout.is_empty() || parse(&outcome.stdout)["status"] == 130, "{outcome:?}");
     }
 }
 

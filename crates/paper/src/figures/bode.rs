@@ -52,7 +52,7 @@ fn panel(responses: &Responses, one: bool, magnitude: bool) -> Panel {
     let up = if magnitude {
         Axis::new("Magnitude").unit("dB re 1 m/(N·s)").multiples_of(20).range(-60.0, 60.0)
     } else {
-        Axis::new("Phase").unit("degrees").multiples_of(45).range(-270.0, 60.0)
+        Axis::new("Phase").unit("degrees").multiples_of(45).range(-270.0, 90.0)
     };
     let (word, quantity) = (if one { "one touches" } else { "all touch" }, if magnitude { "magnitude" } else { "phase" });
     Panel::new(frequency, up)
