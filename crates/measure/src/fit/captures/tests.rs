@@ -103,7 +103,7 @@ fn frames_of_all_kinds_are_read() {
         let mut other = v4;
         other[place] = value;
         let error = datagrams(End::Receiver, pcap(MICROS, 101, &[], &other).as_slice(), Some(7)).unwrap_err();
-        assert_eq!(error.to_string(), "the capture of the receiver has no UDP datagrams to port 7 in 1 frames: expected those of the link");
+        assert_eq!(error.to_string(), "the capture of the receiver has no UDP datagrams to port 7 in 1 frame: expected those of the link");
     }
 }
 
