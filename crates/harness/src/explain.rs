@@ -89,7 +89,7 @@ pub fn explain(scene: &Scene) -> Explanation {
     if in_arrays {
         rows.model(
             "runs that nobody watches",
-            "in arrays, eight peers at a time; many runs of a campaign side by side",
+            "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
             "all tick together, nothing changes on the way, and over the links nothing waits; a run that is recorded has events",
         );
     }
@@ -166,7 +166,10 @@ impl Rows {
             Scaling::None => "as written",
             Scaling::InverseN => "scaled by 4(N-1)/N^2",
         };
-        let model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), Number(gains.stiffness), Number(gains.damping));
+        let mut model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), Number(gains.stiffness), Number(gains.damping));
+        for (place, parameter) in spec.strategy.parameters().iter().enumerate() {
+            model.push_str(&format!(", {} = {}", parameter.key, Span(spec.settings.of(spec.strategy).get(place))));
+        }
         self.model("coordination", model, format!("gains {scaling}; the mean of the samples held is kept until one changes"));
         let len = wire::datagram_len(scene.axes.count());
         self.model(

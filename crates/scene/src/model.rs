@@ -4,6 +4,7 @@ use core::time::Duration;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use cohaptic_peer::coordination::LawSettings;
 use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::{DropCause, LinkModel};
@@ -99,6 +100,8 @@ pub struct CoordinationSpec {
     pub scaling: Scaling,
     /// KT and BT as written, before scaling.
     pub gains: Gains,
+    /// The parameters that strategies have of their own, of every strategy.
+    pub settings: LawSettings,
     /// The period of sending, Tn; a whole multiple of every peer's tick, on its own clock.
     pub update: Duration,
 }

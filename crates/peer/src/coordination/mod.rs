@@ -12,8 +12,8 @@ mod registry;
 mod strategy;
 
 pub use average_position::AveragePosition;
-pub use law::{Law, LawParameters, Observation};
+pub use law::{Law, LawParameter, LawParameters, LawValues, Observation, Pull};
 pub use law_strategy::LawStrategy;
 pub use proportional_derivative::ProportionalDerivative;
-pub use registry::{BuiltIn, Coordination};
+pub use registry::{BuiltIn, Coordination, LawSettings};
 pub use strategy::{Command, Context, Strategy};

@@ -12,6 +12,7 @@ use cohaptic_wan::{Arrivals, DirectLinks, LinkName, LinkStats};
 use super::quads::{self, Quad};
 use super::{Sample, others};
 use crate::arrays::blocks::Blocks;
+use crate::arrays::lead::mean_lead;
 
 /// Ticks ahead that lie in the wheel; what arrives later than that is kept aside.
 const HORIZON: u64 = 256;
@@ -179,6 +180,23 @@ impl<const A: usize, const L: usize> Single<A, L> {
     /// What has arrived is held from now on.
     pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
         self.take_in(tick, Instant::MAX);
+    }
+
+    /// By how much what a peer holds has moved on since it was sent: along an axis, at a receiver, in a run. `sent` says when a sample of a sender was sent.
+    pub(in crate::arrays) fn lead(
+        &self,
+        (axis, peer, run): (usize, usize, usize),
+        now: Instant,
+        horizon: f64,
+        sent: impl Fn(usize, u64) -> Instant,
+    ) -> f64 {
+        let first = peer * row_of(self.peers);
+        let moving = |place: usize| {
+            let sender = place + usize::from(place >= peer);
+            let newest = self.next[(first + place) * L + run].checked_sub(1);
+            (newest.map_or(Instant::ZERO, |newest| sent(sender, newest)), quads::velocity(&self.held[axis], first + place, run))
+        };
+        mean_lead((0..self.peers - 1).map(moving), now, horizon, others(self.peers))
     }
 
     /// The means are those of what is held.
