@@ -9,6 +9,7 @@ mod law;
 mod law_strategy;
 mod proportional_derivative;
 mod registry;
+mod smoothed_average_position;
 mod strategy;
 
 pub use average_position::AveragePosition;
@@ -16,4 +17,5 @@ pub use law::{Law, LawParameter, LawParameters, LawValues, Observation, Pull};
 pub use law_strategy::LawStrategy;
 pub use proportional_derivative::ProportionalDerivative;
 pub use registry::{BuiltIn, Coordination, LawSettings};
+pub use smoothed_average_position::SmoothedAveragePosition;
 pub use strategy::{Command, Context, Strategy};

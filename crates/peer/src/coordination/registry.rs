@@ -2,7 +2,9 @@
 
 use core::time::Duration;
 
-use super::{AveragePosition, Law, LawParameter, LawParameters, LawStrategy, LawValues, Observation, ProportionalDerivative, Pull};
+use super::{
+    AveragePosition, Law, LawParameter, LawParameters, LawStrategy, LawValues, Observation, ProportionalDerivative, Pull, SmoothedAveragePosition,
+};
 use crate::{Gains, Motion, Number};
 
 macro_rules! registry {
@@ -114,6 +116,7 @@ macro_rules! registry {
 registry! {
     AveragePosition: "average-position", "to the mean of the others";
     ProportionalDerivative: "proportional-derivative", "to each of the others";
+    SmoothedAveragePosition: "smoothed-average-position", "to the mean of the others, by a force that follows with a lag";
 }
 
 /// The parameters that laws alone have, of every law: a scene has them whatever its strategy is.

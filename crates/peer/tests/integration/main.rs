@@ -7,6 +7,7 @@ mod ageing;
 mod late_samples;
 mod laws;
 mod own_parts;
+mod smoothed_average_position;
 mod step_map;
 mod wire;
 
