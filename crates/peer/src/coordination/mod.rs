@@ -5,6 +5,7 @@
 //! calls; every law is one, and so is a type that is simulated and not a law.
 
 mod average_position;
+mod extrapolated;
 mod law;
 mod law_strategy;
 mod proportional_derivative;
@@ -13,6 +14,7 @@ mod smoothed_average_position;
 mod strategy;
 
 pub use average_position::AveragePosition;
+pub use extrapolated::Extrapolated;
 pub use law::{Law, LawParameter, LawParameters, LawValues, Observation, Pull};
 pub use law_strategy::LawStrategy;
 pub use proportional_derivative::ProportionalDerivative;

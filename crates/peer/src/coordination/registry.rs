@@ -3,7 +3,8 @@
 use core::time::Duration;
 
 use super::{
-    AveragePosition, Law, LawParameter, LawParameters, LawStrategy, LawValues, Observation, ProportionalDerivative, Pull, SmoothedAveragePosition,
+    AveragePosition, Extrapolated, Law, LawParameter, LawParameters, LawStrategy, LawValues, Observation, ProportionalDerivative, Pull,
+    SmoothedAveragePosition,
 };
 use crate::{Gains, Motion, Number};
 
@@ -117,6 +118,7 @@ registry! {
     AveragePosition: "average-position", "to the mean of the others";
     ProportionalDerivative: "proportional-derivative", "to each of the others";
     SmoothedAveragePosition: "smoothed-average-position", "to the mean of the others, by a force that follows with a lag";
+    Extrapolated: "extrapolated", "to the mean of where the others are by now, by their velocities";
 }
 
 /// The parameters that laws alone have, of every law: a scene has them whatever its strategy is.

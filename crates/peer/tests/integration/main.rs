@@ -4,6 +4,7 @@
 #![allow(clippy::float_cmp, reason = "what must agree to the bit is compared so")]
 
 mod ageing;
+mod extrapolated;
 mod late_samples;
 mod laws;
 mod own_parts;
