@@ -112,7 +112,7 @@ fn a_million_packets_lost_copied_and_delayed_have_the_same_fates_however_they_ar
         offer_all(&mut link);
         let stats = link.stats();
         assert_eq!(stats.offered() + stats.duplicated(), stats.dropped_in_all() + stats.in_flight());
-        (drain(&mut link, late), *link.stats())
+        (drain(&mut link, late), link.stats())
     });
     assert_eq!(soon.1, late.1);
     assert!(soon.0 == late.0);

@@ -74,7 +74,7 @@ impl Lane {
         LaneSnapshot {
             link: name.to_owned(),
             from,
-            stats: *self.link.stats(),
+            stats: self.link.stats(),
             delivered_bytes: self.delivered_bytes,
             overload: self.overload,
             recent_delay: recent.summary(),

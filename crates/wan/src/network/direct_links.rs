@@ -366,7 +366,7 @@ mod tests {
             arrivals.sort_unstable();
             arrivals.retain(|(at, _)| *at <= until);
             assert_eq!(delivered, *arrivals, "{}", direct[place]);
-            assert_eq!(links.stats(place), *link.stats(), "{}", direct[place]);
+            assert_eq!(links.stats(place), link.stats(), "{}", direct[place]);
         }
     }
 

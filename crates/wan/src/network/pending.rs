@@ -4,8 +4,11 @@ use core::num::NonZeroU32;
 
 use cohaptic_units::{Bytes, Instant};
 
+use super::config::{NetworkEvent, NodeId};
 use crate::event_queue::Event;
+use crate::fates::fate::Fate;
 use crate::packet::PacketInfo;
+use crate::packet::damage::Damage;
 
 /// A packet on its way.
 #[derive(Clone, Debug)]
@@ -17,6 +20,16 @@ pub(super) struct InNetwork<P> {
     pub(super) path: Path,
     pub(super) size: SizeAndMarks,
     pub(super) payload: P,
+}
+
+impl<P> InNetwork<P> {
+    #[inline(always)]
+    pub(super) fn event(self, at: Instant, fate: Fate, damage: Option<Damage>) -> NetworkEvent<P> {
+        let Self { sequence, sent, path, size, payload, .. } = self;
+        let (from, to) = (NodeId(path.from.into()), NodeId(path.to.into()));
+        let (copy, marked, size) = (size.copy(), size.has(SizeAndMarks::MARKED), size.size());
+        NetworkEvent { from, to, sequence, copy, sent, at, size, payload, fate, marked, damage }
+    }
 }
 
 /// The size of a packet in the upper 24 bits, and below what happened to it. A bit is always set, so that an `Option` of what has it is no larger.
@@ -37,6 +50,10 @@ impl SizeAndMarks {
 
     pub(super) fn size(self) -> Bytes {
         Bytes::new((self.0.get() >> 8).into())
+    }
+
+    pub(super) fn info(self) -> PacketInfo {
+        PacketInfo { size: self.size(), ecn_capable: self.has(Self::ECN_CAPABLE) }
     }
 
     pub(super) fn copy(self) -> u8 {

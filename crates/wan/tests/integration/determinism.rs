@@ -173,7 +173,7 @@ proptest! {
         both[1].extend(drain_network(&mut network).into_iter().map(of_network));
         let [of_link, of_network] = both;
         prop_assert_eq!(of_link, of_network);
-        prop_assert_eq!(Some(*alone.stats()), network.link_stats(NodeId(0), NodeId(1)));
+        prop_assert_eq!(Some(alone.stats()), network.link_stats(NodeId(0), NodeId(1)));
     }
 
     /// Also when the one node more comes first in the list, so that all the others have other numbers.

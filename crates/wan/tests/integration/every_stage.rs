@@ -195,7 +195,7 @@ proptest! {
         both[1].extend(drain_network(&mut network).into_iter().map(of_network));
         let [of_link, of_network] = both;
         prop_assert_eq!(of_link, of_network);
-        prop_assert_eq!(Some(*alone.stats()), network.link_stats(left, right));
+        prop_assert_eq!(Some(alone.stats()), network.link_stats(left, right));
     }
 
     /// A limit that is never reached needs the engine that keeps packets; without it the link is a function from a packet to its arrival.
