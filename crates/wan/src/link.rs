@@ -8,14 +8,14 @@ use core::fmt;
 use cohaptic_units::{Bytes, Instant};
 
 use crate::event_queue::{Event, EventQueue};
-use crate::fates::fate::{DropCause, Fate, PacketRecord};
+use crate::fates::fate::{DropCause, Fate};
+use crate::fates::record::{PacketEvent, PacketRecord};
 use crate::fates::stats::LinkStats;
 use crate::line::filter::{Filter, Offered};
 use crate::line::model::LinkModel;
 use crate::line::name::LinkName;
 use crate::line::pipeline::{Outcome, TimeWentBack, check_time};
 use crate::line::{Line, Sink};
-use crate::packet::damage::Damage;
 use crate::packet::{Marks, Outputs, PacketInfo};
 
 /// A directed link as a state machine: packets in with [`Link::handle_packet`], packets and their fates out with [`Link::poll_event`].
@@ -40,48 +40,7 @@ pub struct Link<P> {
 struct Traffic<P> {
     pending: EventQueue<Pending<P>>,
     /// Events that have happened and were not polled yet.
-    happened: VecDeque<LinkEvent<P>>,
-}
-
-/// What became of one packet, or that a copy of it was made.
-#[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub struct LinkEvent<P> {
-    /// The number of the packet on this link, from 0.
-    pub sequence: u64,
-    /// 0 for the packet itself, 1 for a copy that the link made. With [`Fate::Duplicated`] it is the number of the new copy.
-    pub copy: u8,
-    /// When it was offered.
-    pub sent: Instant,
-    /// When it arrived or was dropped, or when the copy was made.
-    pub at: Instant,
-    /// Its size.
-    pub size: Bytes,
-    /// What it carries, as it was offered: see `damage`.
-    pub payload: P,
-    /// What became of it.
-    pub fate: Fate,
-    /// Whether an active queue marked it: congestion experienced.
-    pub marked: bool,
-    /// The bits that were flipped. [`Damage::apply`] flips them.
-    pub damage: Option<Damage>,
-}
-
-impl<P> LinkEvent<P> {
-    /// The event as a row of a fate log.
-    #[must_use]
-    pub const fn record(&self) -> PacketRecord {
-        PacketRecord {
-            sequence: self.sequence,
-            copy: self.copy,
-            offered: self.sent,
-            at: self.at,
-            size: self.size,
-            fate: self.fate,
-            marked: self.marked,
-            damaged: self.damage.is_some(),
-        }
-    }
+    happened: VecDeque<PacketEvent<P>>,
 }
 
 impl<P: Clone> Link<P> {
@@ -119,10 +78,10 @@ impl<P: Clone> Link<P> {
         let info = info.into();
         let sequence = self.line.offered();
         if self.line.filters(&Offered { sequence, now, info, payload: &payload }) {
-            self.drop(now, DropCause::Filter, InLink { sequence, sent: now, size: info.size, payload });
+            self.drop(now, DropCause::Filter, InLink { sequence, offered: now, size: info.size, payload });
             return Ok(());
         }
-        let packet = InLink { sequence, sent: now, size: info.size, payload };
+        let packet = InLink { sequence, offered: now, size: info.size, payload };
         match self.line.offer(now, self.line.words()) {
             Outcome::Arrives(at) => self.traffic.pending.push(Pending { at, packet, copy: 0, marks: None }),
             Outcome::Dropped(cause) => self.drop(now, cause, packet),
@@ -154,7 +113,7 @@ impl<P: Clone> Link<P> {
     /// The next packet that has arrived or was dropped, or a copy that was made; `None` when all have been polled.
     #[must_use]
     #[inline]
-    pub fn poll_event(&mut self) -> Option<LinkEvent<P>> {
+    pub fn poll_event(&mut self) -> Option<PacketEvent<P>> {
         if let Some(event) = self.traffic.happened.pop_front() {
             return Some(event);
         }
@@ -199,14 +158,14 @@ impl<P: Clone> Link<P> {
     }
 
     #[inline(always)]
-    fn arrive(&mut self, pending: Pending<P>) -> LinkEvent<P> {
+    fn arrive(&mut self, pending: Pending<P>) -> PacketEvent<P> {
         let Pending { at, packet, copy, marks } = pending;
         let marks = marks.map_or_else(Marks::default, |marks| *marks);
         if marks.discarded_on_arrival {
             self.line.discard();
             return packet.event(at, Fate::Dropped(DropCause::Checksum), copy, marks);
         }
-        self.line.deliver(packet.sent, at);
+        self.line.deliver(packet.offered, at);
         packet.event(at, Fate::Delivered(at), copy, marks)
     }
 
@@ -237,16 +196,18 @@ impl<P> Sink<InLink<P>> for Traffic<P> {
 #[derive(Clone, Debug)]
 struct InLink<P> {
     sequence: u64,
-    sent: Instant,
+    offered: Instant,
     size: Bytes,
     payload: P,
 }
 
 impl<P> InLink<P> {
     #[inline]
-    fn event(self, at: Instant, fate: Fate, copy: u8, marks: Marks) -> LinkEvent<P> {
-        let Self { sequence, sent, size, payload } = self;
-        LinkEvent { sequence, copy, sent, at, size, payload, fate, marked: marks.congestion, damage: marks.damage }
+    fn event(self, at: Instant, fate: Fate, copy: u8, marks: Marks) -> PacketEvent<P> {
+        let Self { sequence, offered, size, payload } = self;
+        let Marks { congestion: marked, damage, .. } = marks;
+        let record = PacketRecord { path: (), sequence, copy, offered, at, size, fate, marked, damaged: damage.is_some() };
+        PacketEvent { record, payload, damage }
     }
 }
 

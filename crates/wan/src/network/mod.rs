@@ -10,6 +10,7 @@
 
 mod config;
 pub(crate) mod direct_links;
+pub(crate) mod id;
 mod pending;
 mod traffic;
 
@@ -17,11 +18,13 @@ use alloc::vec::Vec;
 
 use cohaptic_units::Instant;
 
-pub use config::{AccessLine, NetworkConfig, NetworkError, NetworkEvent, NodeId};
-use pending::{Hop, InNetwork, Path, Pending, SizeAndMarks};
+pub use config::{AccessLine, NetworkConfig, NetworkError};
+use id::{LinkId, NodeId, Path};
+use pending::{InNetwork, LineId, Pending, SizeAndMarks};
 use traffic::{Exits, Traffic};
 
 use crate::fates::fate::{DropCause, Fate};
+use crate::fates::record::PacketEvent;
 use crate::fates::stats::LinkStats;
 use crate::line::Line;
 use crate::line::direct::Words;
@@ -97,9 +100,10 @@ impl<P: Clone> Network<P> {
         };
         for from in 0..nodes {
             for to in 0..nodes {
-                let model = if from == to { LinkModel::default() } else { link(NodeId(from.into()), NodeId(to.into())).into() };
+                let path = Path { from: NodeId(from), to: NodeId(to) };
+                let model = if from == to { LinkModel::default() } else { link(path.from, path.to).into() };
                 network.is_random |= model.is_random();
-                let line = network.line(&network.link_name(Path { from, to }), model);
+                let line = network.line(&network.link_name(path), model);
                 network.lines.links.push(line);
             }
         }
@@ -113,7 +117,7 @@ impl<P: Clone> Network<P> {
     /// [`NetworkError::NoLine`] if there is no such node.
     pub fn with_access_line(mut self, access: AccessLine, model: impl Into<LinkModel>) -> Result<Self, NetworkError> {
         let (AccessLine::Uplink(node) | AccessLine::Downlink(node)) = access;
-        let name = self.config.nodes.get(node.0 as usize).ok_or(NetworkError::NoLine(access))?;
+        let name = self.config.nodes.get(node.index()).ok_or(NetworkError::NoLine(access))?;
         let name = match access {
             AccessLine::Uplink(_) => LinkName::uplink(name),
             AccessLine::Downlink(_) => LinkName::downlink(name),
@@ -122,9 +126,9 @@ impl<P: Clone> Network<P> {
         match access {
             AccessLine::Uplink(_) => {
                 self.paths = alloc::vec![0; self.lines.links.len()];
-                self.lines.uplinks[node.0 as usize] = Some(line);
+                self.lines.uplinks[node.index()] = Some(line);
             }
-            AccessLine::Downlink(_) => self.lines.downlinks[node.0 as usize] = Some(line),
+            AccessLine::Downlink(_) => self.lines.downlinks[node.index()] = Some(line),
         }
         self.has_inner_events = true;
         Ok(self)
@@ -143,7 +147,7 @@ impl<P: Clone> Network<P> {
     ) -> Result<Self, NetworkError> {
         let path = self.path(from, to)?;
         let link = self.link(path);
-        self.lines.links[link as usize].set_filter(Filter::new(drops));
+        self.lines.links[link.index()].set_filter(Filter::new(drops));
         self.has_filters = true;
         Ok(self)
     }
@@ -158,19 +162,19 @@ impl<P: Clone> Network<P> {
         let path = self.path(from, to)?;
         let link = self.link(path);
         self.let_pass(now)?;
-        let sequence = match self.paths.get_mut(link as usize) {
-            None => self.lines.links[link as usize].offered(),
+        let sequence = match self.paths.get_mut(link.index()) {
+            None => self.lines.links[link.index()].offered(),
             Some(count) => {
                 *count += 1;
                 *count - 1
             }
         };
         let info = info.into();
-        let packet = InNetwork { sequence, sent: now, entered: now, path, size: SizeAndMarks::new(info), payload };
-        if self.lines.uplinks[from.0 as usize].is_some() {
-            self.enter(now, Hop::Uplink, from.0, packet);
+        let packet = InNetwork { sequence, offered: now, entered: now, path, size: SizeAndMarks::new(info), payload };
+        if self.lines.uplinks[from.index()].is_some() {
+            self.enter(now, LineId::Uplink(from), packet);
         } else {
-            self.enter(now, Hop::Link, link, packet);
+            self.enter(now, LineId::Link(link), packet);
         }
         Ok(())
     }
@@ -183,40 +187,41 @@ impl<P: Clone> Network<P> {
     /// [`NetworkError`] if time went back or there is no such node; nothing was changed.
     pub fn handle_broadcast(&mut self, now: Instant, from: NodeId, info: impl Into<PacketInfo>, payload: P) -> Result<(), NetworkError> {
         let info = info.into();
-        let sender = self.place(from).ok_or(NetworkError::NoLink { from, to: from })?;
+        if from.0 >= self.nodes {
+            return Err(NetworkError::NoLink { from, to: from });
+        }
         if !self.paths.is_empty() {
-            for to in (0..self.nodes).filter(|to| *to != sender) {
-                self.handle_packet(now, from, NodeId(to.into()), info, payload.clone())?;
+            for to in (0..self.nodes).map(NodeId).filter(|to| *to != from) {
+                self.handle_packet(now, from, to, info, payload.clone())?;
             }
             return Ok(());
         }
         self.let_pass(now)?;
         let size = SizeAndMarks::new(info);
         if !self.is_random {
-            for to in (0..self.nodes).filter(|to| *to != sender) {
-                let path = Path { from: sender, to };
+            for to in (0..self.nodes).map(NodeId).filter(|to| *to != from) {
+                let path = Path { from, to };
                 let link = self.link(path);
-                let sequence = self.lines.links[link as usize].offered();
-                let packet = InNetwork { sequence, sent: now, entered: now, path, size, payload: payload.clone() };
-                self.offer(now, Hop::Link, link, packet, [0; 2]);
+                let sequence = self.lines.links[link.index()].offered();
+                let packet = InNetwork { sequence, offered: now, entered: now, path, size, payload: payload.clone() };
+                self.offer(now, LineId::Link(link), packet, [0; 2]);
             }
             return Ok(());
         }
-        let first = self.link(Path { from: sender, to: 0 });
         let mut begin = 0;
         while begin < self.nodes {
             // All draws of some packets before any other work: so a processor computes several at once. It took 10 % off a packet with jitter.
             let end = self.nodes.min(begin + DRAWN_AT_ONCE);
             let mut words = [[0; 2]; DRAWN_AT_ONCE as usize];
-            for (words, to) in words.iter_mut().zip(begin..end) {
-                *words = self.lines.links[(first + u32::from(to)) as usize].words();
+            for (words, to) in words.iter_mut().zip((begin..end).map(NodeId)) {
+                *words = self.lines.links[self.link(Path { from, to }).index()].words();
             }
-            for (words, to) in words.into_iter().zip(begin..end).filter(|(_, to)| *to != sender) {
-                let path = Path { from: sender, to };
-                let link = first + u32::from(to);
-                let sequence = self.lines.links[link as usize].offered();
-                let packet = InNetwork { sequence, sent: now, entered: now, path, size, payload: payload.clone() };
-                self.offer(now, Hop::Link, link, packet, words);
+            for (words, to) in words.into_iter().zip((begin..end).map(NodeId)).filter(|(_, to)| *to != from) {
+                let path = Path { from, to };
+                let link = self.link(path);
+                let sequence = self.lines.links[link.index()].offered();
+                let packet = InNetwork { sequence, offered: now, entered: now, path, size, payload: payload.clone() };
+                self.offer(now, LineId::Link(link), packet, words);
             }
             begin = end;
         }
@@ -243,7 +248,7 @@ impl<P: Clone> Network<P> {
     /// The next packet that has arrived or was dropped, up to the last instant given; `None` when all have been polled.
     #[must_use]
     #[inline(always)]
-    pub fn poll_event(&mut self) -> Option<NetworkEvent<P>> {
+    pub fn poll_event(&mut self) -> Option<PacketEvent<P, Path>> {
         if let Some(event) = self.traffic.happened.pop_front() {
             return Some(event);
         }
@@ -266,14 +271,14 @@ impl<P: Clone> Network<P> {
     /// [`NetworkError`] if time went back or there is no such link; nothing was changed.
     pub fn set_link(&mut self, now: Instant, from: NodeId, to: NodeId, model: impl Into<LinkModel>) -> Result<(), NetworkError> {
         let path = self.path(from, to)?;
-        let line = self.link(path);
+        let link = self.link(path);
         self.let_pass(now)?;
         let model = model.into();
         self.has_inner_events |= !model.is_direct();
         self.is_random |= model.is_random();
         let name = self.link_name(path);
         let seed = self.config.seed;
-        self.with_engine(Hop::Link, line, |line, outputs, exits| line.reconfigure(now, seed, &name, model, outputs, exits));
+        self.with_engine(LineId::Link(link), |line, outputs, exits| line.reconfigure(now, seed, &name, model, outputs, exits));
         Ok(())
     }
 
@@ -281,16 +286,15 @@ impl<P: Clone> Network<P> {
     #[must_use]
     pub fn link_stats(&self, from: NodeId, to: NodeId) -> Option<LinkStats> {
         let path = self.path(from, to).ok()?;
-        let line = self.link(path);
-        Some(self.lines.links.get(line as usize)?.stats())
+        Some(self.lines.links.get(self.link(path).index())?.stats())
     }
 
     /// The counters of an access line; `None` if the node has none.
     #[must_use]
     pub fn access_stats(&self, access: AccessLine) -> Option<LinkStats> {
         let line = match access {
-            AccessLine::Uplink(node) => self.lines.uplinks.get(node.0 as usize),
-            AccessLine::Downlink(node) => self.lines.downlinks.get(node.0 as usize),
+            AccessLine::Uplink(node) => self.lines.uplinks.get(node.index()),
+            AccessLine::Downlink(node) => self.lines.downlinks.get(node.index()),
         };
         Some(line?.as_ref()?.stats())
     }
@@ -301,26 +305,19 @@ impl<P: Clone> Network<P> {
     }
 
     fn link_name(&self, path: Path) -> LinkName {
-        LinkName::between(&self.config.nodes[usize::from(path.from)], &self.config.nodes[usize::from(path.to)])
-    }
-
-    #[inline]
-    fn place(&self, node: NodeId) -> Option<u16> {
-        u16::try_from(node.0).ok().filter(|place| *place < self.nodes)
+        LinkName::between(&self.config.nodes[path.from.index()], &self.config.nodes[path.to.index()])
     }
 
     #[inline]
     fn path(&self, from: NodeId, to: NodeId) -> Result<Path, NetworkError> {
-        match (self.place(from), self.place(to)) {
-            (Some(sender), Some(receiver)) if sender != receiver => Ok(Path { from: sender, to: receiver }),
-            _ => Err(NetworkError::NoLink { from, to }),
-        }
+        let exists = from.0 < self.nodes && to.0 < self.nodes && from != to;
+        if exists { Ok(Path { from, to }) } else { Err(NetworkError::NoLink { from, to }) }
     }
 
-    /// The number of a path's link.
+    /// The link of a path.
     #[inline]
-    fn link(&self, path: Path) -> u32 {
-        u32::from(path.from) * u32::from(self.nodes) + u32::from(path.to)
+    fn link(&self, path: Path) -> LinkId {
+        LinkId(u32::from(path.from.0) * u32::from(self.nodes) + u32::from(path.to.0))
     }
 
     /// Lets time pass. Inner events happen now, so that what they leave behind is there for the next packet; mere arrivals wait to be polled.
@@ -345,81 +342,77 @@ impl<P: Clone> Network<P> {
 
     /// Lets one pending event happen, and gives the arrival if it is a packet's last.
     #[inline(always)]
-    fn happen(&mut self, pending: Pending<P>) -> Option<NetworkEvent<P>> {
-        let Pending { at, sequence, sent, entered, place, path, size, payload } = pending;
-        let hop = place.hop();
+    fn happen(&mut self, pending: Pending<P>) -> Option<PacketEvent<P, Path>> {
+        let Pending { at, sequence, offered, entered, turn, path, size, payload } = pending;
+        let line = turn.line();
         let Some(payload) = payload else {
-            self.wake(at, hop, place.line());
+            self.wake(at, line);
             return None;
         };
-        let packet = InNetwork { sequence, sent, entered, path, size, payload };
-        if size.has(SizeAndMarks::DISCARDED_ON_ARRIVAL)
-            && (hop == Hop::Downlink || self.lines.downlinks[usize::from(path.to)].is_none())
-            && hop != Hop::Uplink
-        {
-            self.lines.get_mut(hop, place.line()).discard();
+        let packet = InNetwork { sequence, offered, entered, path, size, payload };
+        let next = match line {
+            LineId::Uplink(_) => Some(LineId::Link(self.link(path))),
+            LineId::Link(_) if self.has_inner_events && self.lines.downlinks[path.to.index()].is_some() => Some(LineId::Downlink(path.to)),
+            LineId::Link(_) | LineId::Downlink(_) => None,
+        };
+        if size.has(SizeAndMarks::DISCARDED_ON_ARRIVAL) && next.is_none() {
+            self.lines.get_mut(line).discard();
             return Some(self.traffic.event(packet, at, Fate::Dropped(DropCause::Checksum)));
         }
-        self.lines.get_mut(hop, place.line()).deliver(entered, at);
-        let packet = InNetwork { entered: at, ..packet };
-        match hop {
-            Hop::Uplink => self.enter(at, Hop::Link, self.link(path), packet),
-            Hop::Link if self.has_inner_events && self.lines.downlinks[usize::from(path.to)].is_some() => {
-                self.enter(at, Hop::Downlink, path.to.into(), packet);
-            }
-            Hop::Link | Hop::Downlink => return Some(self.traffic.event(packet, at, Fate::Delivered(at))),
-        }
+        self.lines.get_mut(line).deliver(entered, at);
+        let Some(next) = next else { return Some(self.traffic.event(packet, at, Fate::Delivered(at))) };
+        self.enter(at, next, InNetwork { entered: at, ..packet });
         None
     }
 
     #[cold]
-    fn wake(&mut self, at: Instant, hop: Hop, line: u32) {
-        self.with_engine(hop, line, |line, outputs, exits| line.wake(at, outputs, exits));
+    fn wake(&mut self, at: Instant, line: LineId) {
+        self.with_engine(line, |line, outputs, exits| line.wake(at, outputs, exits));
     }
 
     /// Hands a packet to a line.
-    fn enter(&mut self, now: Instant, hop: Hop, line: u32, packet: InNetwork<P>) {
-        let words = self.lines.get_mut(hop, line).words();
-        self.offer(now, hop, line, packet, words);
+    fn enter(&mut self, now: Instant, line: LineId, packet: InNetwork<P>) {
+        let words = self.lines.get_mut(line).words();
+        self.offer(now, line, packet, words);
     }
 
     /// Offers a packet that has these first random words to a line.
     #[inline(always)]
-    fn offer(&mut self, now: Instant, hop: Hop, line: u32, packet: InNetwork<P>, words: Words) {
-        if self.has_filters && self.is_filtered(now, hop, line, &packet) {
+    fn offer(&mut self, now: Instant, line: LineId, packet: InNetwork<P>, words: Words) {
+        if self.has_filters && self.is_filtered(now, line, &packet) {
             return self.drop(now, DropCause::Filter, packet);
         }
-        match self.lines.get_mut(hop, line).offer(now, words) {
-            Outcome::Arrives(at) => self.traffic.schedule(at, hop, line, packet),
+        match self.lines.get_mut(line).offer(now, words) {
+            Outcome::Arrives(at) => self.traffic.schedule(at, line, packet),
             Outcome::Dropped(cause) => self.drop(now, cause, packet),
-            Outcome::Enters => self.enter_engine(now, hop, line, packet),
+            Outcome::Enters => self.enter_engine(now, line, packet),
         }
     }
 
     /// Whether the line's filter takes the packet.
     #[inline(never)]
-    fn is_filtered(&mut self, now: Instant, hop: Hop, line: u32, packet: &InNetwork<P>) -> bool {
+    fn is_filtered(&mut self, now: Instant, line: LineId, packet: &InNetwork<P>) -> bool {
         let offered = Offered { sequence: packet.sequence, now, info: packet.size.info(), payload: &packet.payload };
-        self.lines.get_mut(hop, line).filters(&offered)
+        self.lines.get_mut(line).filters(&offered)
     }
 
     #[inline(never)]
-    fn enter_engine(&mut self, now: Instant, hop: Hop, line: u32, packet: InNetwork<P>) {
+    fn enter_engine(&mut self, now: Instant, line: LineId, packet: InNetwork<P>) {
         let marks = Marks {
             congestion: packet.size.has(SizeAndMarks::MARKED),
             damage: self.traffic.take_damage(&packet),
             discarded_on_arrival: packet.size.has(SizeAndMarks::DISCARDED_ON_ARRIVAL),
         };
-        self.with_engine(hop, line, |line, outputs, exits| line.enter(now, packet.size.info(), marks, packet, outputs, exits));
+        self.with_engine(line, |line, outputs, exits| line.enter(now, packet.size.info(), marks, packet, outputs, exits));
     }
 
     /// Lets a line's engine do something, and asks it when to be woken.
-    fn with_engine(&mut self, hop: Hop, line: u32, act: impl FnOnce(&mut Line<P, InNetwork<P>>, &mut Outputs<InNetwork<P>>, &mut Exits<'_, P>)) {
-        let engine = self.lines.get_mut(hop, line);
+    fn with_engine(&mut self, line: LineId, act: impl FnOnce(&mut Line<P, InNetwork<P>>, &mut Outputs<InNetwork<P>>, &mut Exits<'_, P>)) {
+        let engine = self.lines.get_mut(line);
         let before = self.traffic.happened.len();
-        act(engine, &mut self.outputs, &mut Exits { traffic: &mut self.traffic, hop, line });
+        act(engine, &mut self.outputs, &mut Exits { traffic: &mut self.traffic, line });
         if let Some(at) = engine.announce() {
-            self.traffic.announce(at, hop, line);
+            self.traffic.announce(at, line);
         }
         if !self.has_inner_events && self.traffic.happened.len() > before {
             // The engine stands for a direct pipeline: arrivals that wait to be polled came before this drop, as in `drop`.
@@ -443,11 +436,11 @@ impl<P: Clone> Network<P> {
 
 impl<P> Lines<P> {
     #[inline(always)]
-    fn get_mut(&mut self, hop: Hop, line: u32) -> &mut Line<P, InNetwork<P>> {
-        let access = match hop {
-            Hop::Link => return &mut self.links[line as usize],
-            Hop::Uplink => &mut self.uplinks[line as usize],
-            Hop::Downlink => &mut self.downlinks[line as usize],
+    fn get_mut(&mut self, line: LineId) -> &mut Line<P, InNetwork<P>> {
+        let access = match line {
+            LineId::Link(link) => return &mut self.links[link.index()],
+            LineId::Uplink(node) => &mut self.uplinks[node.index()],
+            LineId::Downlink(node) => &mut self.downlinks[node.index()],
         };
         access.as_mut().expect("a packet is in an access line only where there is one")
     }

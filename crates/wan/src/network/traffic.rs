@@ -4,10 +4,11 @@ use alloc::collections::{BTreeMap, VecDeque};
 
 use cohaptic_units::Instant;
 
-use super::config::NetworkEvent;
-use super::pending::{Hop, InNetwork, Path, Pending, Place, SizeAndMarks};
+use super::id::{NodeId, Path};
+use super::pending::{InNetwork, LineId, Pending, SizeAndMarks, Turn};
 use crate::event_queue::EventQueue;
 use crate::fates::fate::Fate;
+use crate::fates::record::PacketEvent;
 use crate::line::Sink;
 use crate::packet::Marks;
 use crate::packet::damage::Damage;
@@ -15,7 +16,7 @@ use crate::packet::damage::Damage;
 #[derive(Clone, Debug)]
 pub(super) struct Traffic<P> {
     pub(super) pending: EventQueue<Pending<P>>,
-    pub(super) happened: VecDeque<NetworkEvent<P>>,
+    pub(super) happened: VecDeque<PacketEvent<P, Path>>,
     /// The damage to packets on their way that are flagged as damaged.
     damages: BTreeMap<(Path, u64, u8), Damage>,
 }
@@ -27,20 +28,20 @@ impl<P> Traffic<P> {
 
     /// The packet propagates on that line.
     #[inline(always)]
-    pub(super) fn schedule(&mut self, at: Instant, hop: Hop, line: u32, packet: InNetwork<P>) {
-        let InNetwork { sequence, sent, entered, path, size, payload } = packet;
-        self.pending.push(Pending { at, sequence, sent, entered, place: Place::arrival(hop, line), path, size, payload: Some(payload) });
+    pub(super) fn schedule(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) {
+        let InNetwork { sequence, offered, entered, path, size, payload } = packet;
+        self.pending.push(Pending { at, sequence, offered, entered, turn: Turn::arrival(line), path, size, payload: Some(payload) });
     }
 
     /// The line's engine must be woken.
-    pub(super) fn announce(&mut self, at: Instant, hop: Hop, line: u32) {
-        let place = Place::waking(hop, line);
-        let (path, size) = (Path { from: 0, to: 0 }, SizeAndMarks::NOTHING);
-        self.pending.push(Pending { at, sequence: 0, sent: at, entered: at, place, path, size, payload: None });
+    pub(super) fn announce(&mut self, at: Instant, line: LineId) {
+        let turn = Turn::waking(line);
+        let (path, size) = (Path { from: NodeId(0), to: NodeId(0) }, SizeAndMarks::NOTHING);
+        self.pending.push(Pending { at, sequence: 0, offered: at, entered: at, turn, path, size, payload: None });
     }
 
     #[inline(always)]
-    pub(super) fn event(&mut self, packet: InNetwork<P>, at: Instant, fate: Fate) -> NetworkEvent<P> {
+    pub(super) fn event(&mut self, packet: InNetwork<P>, at: Instant, fate: Fate) -> PacketEvent<P, Path> {
         let damage = self.take_damage(&packet);
         packet.event(at, fate, damage)
     }
@@ -59,15 +60,14 @@ impl<P> Traffic<P> {
 /// Where the packets of one line's engine go.
 pub(super) struct Exits<'a, P> {
     pub(super) traffic: &'a mut Traffic<P>,
-    pub(super) hop: Hop,
-    pub(super) line: u32,
+    pub(super) line: LineId,
 }
 
 impl<P> Exits<'_, P> {
     fn marked(&self, packet: InNetwork<P>, copy: u8, marks: &Marks) -> InNetwork<P> {
         let size = packet
             .size
-            .with(1 << self.hop as u32, copy == 1)
+            .with(self.line.copy_bit(), copy == 1)
             .with(SizeAndMarks::MARKED, marks.congestion)
             .with(SizeAndMarks::DAMAGED, marks.damage.is_some())
             .with(SizeAndMarks::DISCARDED_ON_ARRIVAL, marks.discarded_on_arrival);
@@ -81,7 +81,7 @@ impl<P> Sink<InNetwork<P>> for Exits<'_, P> {
         if let Some(damage) = marks.damage {
             self.traffic.damages.insert((packet.path, packet.sequence, packet.size.copy()), damage);
         }
-        self.traffic.schedule(at, self.hop, self.line, packet);
+        self.traffic.schedule(at, self.line, packet);
     }
 
     fn happened(&mut self, at: Instant, fate: Fate, packet: InNetwork<P>, copy: u8, marks: Marks) {

@@ -30,7 +30,7 @@ impl Ledger {
     }
 
     fn drain_network(&mut self, network: &mut Network<Payload>) -> Result<(), TestCaseError> {
-        drain_network(network).into_iter().try_for_each(|event| self.note(event.from, event.to, event.sequence, event.fate))
+        drain_network(network).into_iter().try_for_each(|event| self.note(event.path.from, event.path.to, event.sequence, event.fate))
     }
 
     fn known(&self) -> u64 {
