@@ -4,7 +4,9 @@ use core::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::excerpt::{Excerpt, escape, shorten};
+use cohaptic_units::Excerpt;
+
+use super::text::{escape, shorten};
 
 /// Why a file is refused.
 #[derive(Debug, thiserror::Error)]

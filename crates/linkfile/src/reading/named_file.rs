@@ -5,9 +5,11 @@ use core::ops::Range;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use cohaptic_units::Excerpt;
+
 use super::context::Context;
 use super::values;
-use crate::document::{Diagnostic, Excerpt, Node, Origin};
+use crate::document::{Diagnostic, Node, Origin};
 use crate::fingerprint::Fingerprint;
 
 /// What is wrong in the text of a file, and where.

@@ -153,7 +153,7 @@ fn without_exponent(text: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use cohaptic_linkfile::document::Excerpt;
+    use cohaptic_units::Excerpt;
 
     use super::*;
 

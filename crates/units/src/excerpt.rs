@@ -2,10 +2,12 @@
 //!
 //! Whatever stands in the source, what is shown is one line of at most [`LONGEST`] characters without control characters.
 
+use alloc::string::{String, ToString as _};
+use alloc::vec::Vec;
 use core::fmt;
 use core::ops::Range;
 
-use cohaptic_units::Visible;
+use crate::Visible;
 
 /// The longest line that is shown whole [character].
 const LONGEST: usize = 200;
@@ -27,18 +29,14 @@ pub struct Excerpt {
 
 impl Excerpt {
     /// Finds a span of bytes in a text. A span over several lines is shown on its first one; one past the end at the end.
+    #[must_use]
     pub fn new(text: &str, span: Range<usize>) -> Self {
-        let start = character_boundary(text, span.start);
-        let end = character_boundary(text, span.end.max(start));
-        let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
-        let line_end = text[start..].find('\n').map_or(text.len(), |newline| start + newline);
-        let line_end = if text[start..line_end].ends_with('\r') { line_end - 1 } else { line_end };
-        let (before, marked, after) = (&text[line_start..start], &text[start..end.min(line_end).max(start)], end.min(line_end).max(start));
-        let (before, marked) = (Shown::of(before), Shown::of(marked));
-        let after = Shown::of(&text[after..line_end.max(after)]);
-        let line = text[..line_start].bytes().filter(|byte| *byte == b'\n').count() + 1;
-        let column = text[line_start..start].chars().count() + 1;
-        Self::cut(line, column, &before, &marked, &after)
+        let Spot { line, marked } = Spot::of(text, span);
+        let shown = |range: Range<usize>| Shown::of(&text[range]);
+        let number = text[..line.start].bytes().filter(|byte| *byte == b'\n').count() + 1;
+        let column = text[line.start..marked.start].chars().count() + 1;
+        let (before, after) = (shown(line.start..marked.start), shown(marked.end..line.end.max(marked.end)));
+        Self::cut(number, column, &before, &shown(marked), &after)
     }
 
     /// Keeps the neighbourhood of the caret where the line is too long.
@@ -65,6 +63,10 @@ impl Excerpt {
     }
 
     /// Writes the line between bars with carets under the place; the number of the line stands before it if `numbered`.
+    ///
+    /// # Errors
+    ///
+    /// Those of the writer.
     pub fn write(&self, f: &mut fmt::Formatter<'_>, numbered: bool) -> fmt::Result {
         let number = if numbered { self.line.to_string() } else { String::new() };
         let margin = number.len();
@@ -74,24 +76,25 @@ impl Excerpt {
     }
 }
 
-/// A text as it is shown.
-pub(super) fn escape(text: &str) -> String {
-    Visible(text).to_string()
+/// The bytes of a line of a text, without its end, and those of a span that begins in it. All are boundaries of characters.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Spot {
+    /// The line.
+    pub line: Range<usize>,
+    /// The part of the span in this line; empty at the end of the text for a span past it.
+    pub marked: Range<usize>,
 }
 
-/// A text of the scene within a message: in quotes, and not longer than anyone wants to read.
-#[must_use]
-pub fn quote(text: &str) -> String {
-    format!("\"{}\"", shorten(text))
-}
-
-/// The beginning of a text that is too long for a message.
-#[must_use]
-pub fn shorten(text: &str) -> String {
-    const LONGEST: usize = 80;
-    match text.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.to_owned(),
+impl Spot {
+    /// Finds the line in which a span of bytes begins.
+    #[must_use]
+    pub fn of(text: &str, span: Range<usize>) -> Self {
+        let start = character_boundary(text, span.start);
+        let end = character_boundary(text, span.end.max(start));
+        let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
+        let line_end = text[start..].find('\n').map_or(text.len(), |newline| start + newline);
+        let line_end = if text[start..line_end].ends_with('\r') { line_end - 1 } else { line_end };
+        Self { line: line_start..line_end, marked: start..end.min(line_end).max(start) }
     }
 }
 
@@ -99,7 +102,7 @@ struct Shown(Vec<char>);
 
 impl Shown {
     fn of(text: &str) -> Self {
-        Self(escape(text).chars().collect())
+        Self(Visible(text).to_string().chars().collect())
     }
 }
 
