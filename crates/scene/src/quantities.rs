@@ -1,7 +1,7 @@
 //! The quantities of mechanics: their ranges and units, and vectors of them.
 
 use cohaptic_linkfile::document::{Node, Value};
-use cohaptic_linkfile::reading::values::{self, Quantity};
+use cohaptic_linkfile::reading::values::{self, Quantity, ReadNumber as _};
 use cohaptic_units::print::Counted;
 
 use crate::context::SceneContext;

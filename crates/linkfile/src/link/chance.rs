@@ -3,7 +3,7 @@
 use cohaptic_wan::Chance;
 
 use crate::document::Node;
-use crate::reading::values::{self, CORRELATION};
+use crate::reading::values::{self, CORRELATION, ReadNumber as _};
 use crate::reading::{Context, TableReader};
 
 /// `"1%"` or `{ probability, correlation }`.

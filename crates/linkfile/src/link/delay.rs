@@ -6,7 +6,7 @@ use cohaptic_wan::{Correlation, Delay, Distribution, Jitter};
 
 use super::distribution::read_distribution;
 use crate::document::Node;
-use crate::reading::values::{self, CORRELATION};
+use crate::reading::values::{self, CORRELATION, ReadNumber as _};
 use crate::reading::{Context, TableReader, only_one};
 
 /// The delay of a link with its jitter.

@@ -6,7 +6,7 @@ use cohaptic_wan::{Bursts, FourState, GilbertElliott, GilbertElliottInTime, Loss
 use super::chance::read_chance;
 use super::loss_pattern::{read_lost_packets, read_lost_times};
 use crate::document::Node;
-use crate::reading::values::{self, PACKETS};
+use crate::reading::values::{self, PACKETS, ReadNumber as _};
 use crate::reading::{Context, TableReader, only_one};
 
 const EXPECTED: &str =

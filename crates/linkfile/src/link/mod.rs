@@ -22,36 +22,36 @@ mod trace;
 
 pub use modulators::read_modulators;
 
+use cohaptic_wan::parameters::Key;
 use cohaptic_wan::{LinkConfig, LinkModel, Loss, Order, Outages};
 
 use crate::document::{Entry, Node, Value};
 use crate::reading::{Context, TableReader, values};
+use crate::schema::link::LINK;
 
-/// What may be said about a link.
-pub const LINK_KEYS: [&str; 22] = [
-    "delay",
-    "jitter",
-    "order",
-    "loss",
-    "mark-instead-of-loss",
-    "duplicate",
-    "corrupt",
-    "reorder",
-    "rate",
-    "queue",
-    "overhead",
-    "cells",
-    "token-bucket",
-    "slots",
-    "mtu",
-    "limit",
-    "outage",
-    "trace",
-    "modulated",
-    "replay",
-    "netem",
-    "netem-profile",
-];
+/// The keys of a link, in the order in which they are explained.
+pub static LINK_KEYS: [&str; names_in(&LINK)] = {
+    let mut names = [""; names_in(&LINK)];
+    let (mut count, mut group) = (0, 0);
+    while group < LINK.len() {
+        let mut key = 0;
+        while key < LINK[group].len() {
+            names[count] = LINK[group][key].name;
+            (count, key) = (count + 1, key + 1);
+        }
+        group += 1;
+    }
+    names
+};
+
+const fn names_in(groups: &[&[Key]]) -> usize {
+    let (mut count, mut group) = (0, 0);
+    while group < groups.len() {
+        count += groups[group].len();
+        group += 1;
+    }
+    count
+}
 
 /// Reads the keys of a link. `beside`: keys of the same table that somebody else reads.
 pub fn read_link(node: &Node, context: Context<'_>, beside: &[&'static str]) -> Option<LinkModel> {

@@ -1,13 +1,21 @@
 //! `modulated`: keys that hold while a modulator is in one of its states.
 
-use cohaptic_wan::{LinkConfig, Modulated};
+use cohaptic_wan::{LINK_KIND_PARAMETERS, LinkConfig, Modulated};
 
 use super::{LINK_KEYS, read_config};
 use crate::document::{Node, Value, quote};
 use crate::reading::{Context, TableReader, one_of, values};
 
-/// Keys that say what kind of link it is cannot change with a state.
-const NOT_OF_A_STATE: [&str; 4] = ["modulated", "replay", "netem", "netem-profile"];
+/// Keys that say which kind of link it is cannot change with a state.
+const NOT_OF_A_STATE: [&str; LINK_KIND_PARAMETERS.len()] = {
+    let mut names = [""; LINK_KIND_PARAMETERS.len()];
+    let mut key = 0;
+    while key < names.len() {
+        names[key] = LINK_KIND_PARAMETERS[key].name;
+        key += 1;
+    }
+    names
+};
 
 /// `{ by = "cell", good = { … }, bad = { … } }`: the keys of each state laid over `keys`, those of the link.
 pub(super) fn read_modulated(node: &Node, keys: &Node, context: Context<'_>) -> Option<Modulated> {

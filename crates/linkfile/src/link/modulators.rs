@@ -6,7 +6,7 @@ use cohaptic_wan::{Modulator, ModulatorState};
 
 use super::sojourn::{SOJOURN, read_sojourn};
 use crate::document::{Node, Value, quote};
-use crate::reading::values::{self, WEIGHT};
+use crate::reading::values::{self, ReadNumber as _, WEIGHT};
 use crate::reading::{Context, Modulators, TableReader, one_of};
 
 /// Reads the list. `None` where something was refused.

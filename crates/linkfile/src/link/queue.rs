@@ -5,7 +5,7 @@ use cohaptic_wan::{CoDel, Discipline, QueueLimit, Red};
 
 use super::is_unlimited;
 use crate::document::{Node, quote};
-use crate::reading::values::{self, FRACTION};
+use crate::reading::values::{self, FRACTION, ReadNumber as _};
 use crate::reading::{Context, TableReader, only_one};
 
 /// What a queue is, apart from what it stands before.

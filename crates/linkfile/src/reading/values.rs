@@ -4,96 +4,22 @@ use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, ParseError, Probability, Rate, parse};
 
+pub use cohaptic_wan::parameters::{CORRELATION, FRACTION, PACKETS, Quantity, WEIGHT};
+
 use super::context::Context;
 use super::names::one_of;
 use crate::document::{Node, Value, quote, shorten};
 
-/// The range and the unit of a number.
-#[derive(Clone, Copy, Debug)]
-pub struct Quantity {
-    range: Range,
-    unit: &'static str,
+/// Reads a number in its range.
+pub trait ReadNumber {
+    /// The number; `None` after a fault.
+    fn read(self, node: &Node, context: Context<'_>) -> Option<f64>;
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Range {
-    Any,
-    NotNegative,
-    Positive,
-    Fraction,
-    Correlation,
-}
-
-/// At least zero, beside others.
-pub const WEIGHT: Quantity = Quantity::not_negative("");
-/// At least zero \[packet\].
-pub const PACKETS: Quantity = Quantity::not_negative("packets");
-/// From 0 to 1.
-pub const FRACTION: Quantity = Quantity { range: Range::Fraction, unit: "" };
-/// From −1 to below 1.
-pub const CORRELATION: Quantity = Quantity { range: Range::Correlation, unit: "" };
-
-impl Quantity {
-    /// Any number [unit].
-    #[must_use]
-    pub const fn any(unit: &'static str) -> Self {
-        Self { range: Range::Any, unit }
-    }
-
-    /// At least zero [unit].
-    #[must_use]
-    pub const fn not_negative(unit: &'static str) -> Self {
-        Self { range: Range::NotNegative, unit }
-    }
-
-    /// Above zero [unit].
-    #[must_use]
-    pub const fn positive(unit: &'static str) -> Self {
-        Self { range: Range::Positive, unit }
-    }
-
-    /// In words: `a number above zero \[kg\]`.
-    #[must_use]
-    pub fn expected(self) -> String {
-        let range = match self.range {
-            Range::Any => "a number",
-            Range::NotNegative => "a number of at least zero",
-            Range::Positive => "a number above zero",
-            Range::Fraction => "a number from 0 to 1",
-            Range::Correlation => "a number from -1 to below 1",
-        };
-        if self.unit.is_empty() { range.to_owned() } else { format!("{range} [{}]", self.unit) }
-    }
-
-    /// The unit, as in messages; empty for a plain number.
-    #[must_use]
-    pub const fn unit(self) -> &'static str {
-        self.unit
-    }
-
-    /// The range as JSON Schema says it: keywords and bounds.
-    #[must_use]
-    pub const fn bounds(self) -> &'static [(&'static str, i8)] {
-        match self.range {
-            Range::Any => &[],
-            Range::NotNegative => &[("minimum", 0)],
-            Range::Positive => &[("exclusiveMinimum", 0)],
-            Range::Fraction => &[("minimum", 0), ("maximum", 1)],
-            Range::Correlation => &[("minimum", -1), ("exclusiveMaximum", 1)],
-        }
-    }
-
-    /// Reads a number in that range.
-    pub fn read(self, node: &Node, context: Context<'_>) -> Option<f64> {
+impl ReadNumber for Quantity {
+    fn read(self, node: &Node, context: Context<'_>) -> Option<f64> {
         let value = number(node, context, &self.expected())?;
-        let within = match self.range {
-            Range::Any => true,
-            Range::NotNegative => value >= 0.0,
-            Range::Positive => value > 0.0,
-            Range::Fraction => (0.0..=1.0).contains(&value),
-            Range::Correlation => (-1.0..1.0).contains(&value),
-        };
-        if !within {
+        if !self.contains(value) {
             context.fault_at(node, format!("{} is out of range: expected {}", written(node), self.expected()));
             return None;
         }

@@ -5,8 +5,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::form::{Form, Key, Need, Table, Words};
-use crate::reading::values::Quantity;
+use cohaptic_wan::parameters::{Form, Key, Need, Quantity, Table, Words};
 
 /// A number, space or none, and the letters of a unit. Which units there are the reader says, in a message that names them.
 const WITH_UNIT: &str = r"^\s*[0-9.]+\s*[A-Za-zµμ]+\s*$";

@@ -7,13 +7,12 @@
 //! [`json_schema`] is the catalogue as a JSON Schema. It is coarser than the readers: what depends on another key, such as a unit that fits, a peer that
 //! exists, or two keys that exclude each other, is left to them.
 
-mod form;
 mod json;
 pub mod link;
 mod relay;
 mod router;
 
-pub use form::{Form, Key, Need, Table, Words, number, optional, required, somewhere, usual, vector};
+pub use cohaptic_wan::parameters::{Form, Key, Need, Table, Words, joined, number, optional, required, somewhere, usual, vector};
 pub use json::json_schema;
 pub use relay::ROOT as RELAY;
 pub use router::ROOT as ROUTER;

@@ -1,7 +1,7 @@
 //! The keys of a relay file.
 
-use super::form::{Form, Table, optional, required, usual};
 use super::link::{LINK_CHANGE, LINK_ENTRY, LINK_TABLE, LINKS_BETWEEN, MODULATOR};
+use cohaptic_wan::parameters::{Form, Table, optional, required, usual};
 
 /// The top of a relay file.
 pub static ROOT: Table = Table::of(&[&[

@@ -1,7 +1,7 @@
 //! The keys of a router file.
 
-use super::form::{Form, Table, optional, required, usual};
 use super::link::{LINK_TABLE, MODULATOR};
+use cohaptic_wan::parameters::{Form, Table, optional, required, usual};
 
 /// The top of a router file.
 pub static ROOT: Table = Table::of(&[&[

@@ -4,8 +4,8 @@ use cohaptic_peer::Coordination;
 use cohaptic_wan::DropCause;
 
 use cohaptic_linkfile::schema::{
-    Form, Key, Table,
-    link::{ALL_LINKS, LINK, LINK_ENTRY, LINK_KIND, LINK_TABLE, LINKS_BETWEEN, MODULATOR},
+    Form, Key, Table, joined,
+    link::{ALL_LINKS, LINK, LINK_ENTRY, LINK_TABLE, LINKS_BETWEEN, MODULATOR},
     number, optional, required, somewhere, usual, vector,
 };
 
@@ -159,7 +159,7 @@ static TIMELINE: Table = Table::of(&[&[
     optional("coordination", Form::Table(&GAINS), "In place of link or peer, and without set: new gains at every peer"),
 ]]);
 /// The key of a link or of a peer that is set: another key says which of the two.
-static SET: Table = Table::over(&[&LINK, &LINK_KIND, &SET_OF_PEER]);
+static SET: Table = Table::over(&joined::<15>(&[LINK.as_slice(), &[&SET_OF_PEER]]));
 const SET_OF_PEER: [Key; 2] = [
     optional("contact", Form::AnyOf(const { &[Form::Words(&CONTACTS), Form::Table(&PUSH)] }), "Of a peer: how the device touches the object"),
     optional("hand", HAND, "Of a peer: what the user does"),

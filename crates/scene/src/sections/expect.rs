@@ -5,7 +5,7 @@ use core::time::Duration;
 use cohaptic_linkfile::LinkSelector;
 use cohaptic_linkfile::document::Node;
 use cohaptic_linkfile::mesh::{read_link_or_line, read_peer_name};
-use cohaptic_linkfile::reading::values::{self, Quantity};
+use cohaptic_linkfile::reading::values::{self, Quantity, ReadNumber as _};
 use cohaptic_linkfile::reading::{Context, TableReader};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::DropCause;

@@ -1,7 +1,7 @@
 //! What a hand does: `hand` of a peer.
 
 use cohaptic_linkfile::document::{Node, quote};
-use cohaptic_linkfile::reading::values::Quantity;
+use cohaptic_linkfile::reading::values::{Quantity, ReadNumber as _};
 use cohaptic_linkfile::reading::{Context, TableReader, only_one};
 use cohaptic_peer::{ArmConfig, Hand, Signal};
 use cohaptic_units::Hertz;

@@ -3,6 +3,7 @@
 use core::time::Duration;
 
 use cohaptic_linkfile::document::Node;
+use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_peer::{Coordination, Gains, Integrator};
 

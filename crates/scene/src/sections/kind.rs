@@ -1,6 +1,7 @@
 //! Where a peer lives: `kind`, `silence` and `falcon` of a peer.
 
 use cohaptic_linkfile::document::{Node, quote};
+use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_peer::DeviceConfig;
 use cohaptic_units::print::Counted;

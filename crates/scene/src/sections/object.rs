@@ -1,6 +1,7 @@
 //! `[object]`: the shared virtual object.
 
 use cohaptic_linkfile::document::Node;
+use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{TableReader, values};
 use cohaptic_peer::Enclosure;
 

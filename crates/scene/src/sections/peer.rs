@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use cohaptic_linkfile::document::{Node, Value, quote};
 use cohaptic_linkfile::link::read_link;
+use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_peer::{Clock, Contact, DeviceConfig, Direction, Drift, Gains, Hand};
 use cohaptic_units::print::Span;

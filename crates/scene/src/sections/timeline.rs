@@ -6,6 +6,7 @@ use cohaptic_linkfile::LinkSelector;
 use cohaptic_linkfile::document::Node;
 use cohaptic_linkfile::link::is_empty;
 use cohaptic_linkfile::mesh::{LinkClasses, OnLinks, read_key_changes, read_links_between, read_peer_name};
+use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, only_one, values};
 use cohaptic_peer::{Contact, Gains, Hand};
 use cohaptic_units::Instant;

@@ -2,7 +2,9 @@
 
 use cohaptic_units::Bytes;
 
+use crate::laws::chance;
 use crate::laws::chance::Chance;
+use crate::parameters::{Form, Key, UNLIMITED, usual};
 use crate::stages::corruption::Corruption;
 use crate::stages::delay::Delay;
 use crate::stages::loss::Loss;
@@ -10,8 +12,10 @@ use crate::stages::order::Order;
 use crate::stages::outage::Outages;
 use crate::stages::path_trace::PathTrace;
 use crate::stages::queue::{Bottleneck, Discipline, TokenBucket};
+use crate::stages::queue::{bottleneck, token_bucket};
 use crate::stages::reorder::Reorder;
 use crate::stages::slots::Slots;
+use crate::stages::{corruption, delay, loss, order, outage, path_trace, reorder, slots};
 
 /// The configuration of one directed link: which impairments it has, each checked when it was made.
 ///
@@ -95,3 +99,26 @@ impl LinkConfig {
         *self == Self { layout, outages, loss, delay, order, ..Self::default() }
     }
 }
+
+/// The parameters of the largest packet.
+const MTU: [Key; 1] = [usual("mtu", Form::AnyOf(&[Form::Size, UNLIMITED]), "\"unlimited\"", "Larger packets are dropped")];
+/// The parameters of how many packets may be inside.
+const LIMIT: [Key; 1] =
+    [usual("limit", Form::Like(&["1000 packets", "unlimited"]), "\"unlimited\"", "How many packets may be inside, waiting and propagating together")];
+
+/// The parameters of a link, stage by stage, in the order in which they are explained.
+pub const LINK_PARAMETERS: [&[Key]; 13] = [
+    &delay::KEYS,
+    &order::KEYS,
+    &loss::KEYS,
+    &chance::KEYS,
+    &corruption::KEYS,
+    &reorder::KEYS,
+    &bottleneck::KEYS,
+    &token_bucket::KEYS,
+    &slots::KEYS,
+    &MTU,
+    &LIMIT,
+    &outage::KEYS,
+    &path_trace::KEYS,
+];

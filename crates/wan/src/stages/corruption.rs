@@ -6,9 +6,11 @@ use core::ops::Range;
 
 use cohaptic_units::Probability;
 
+use crate::laws::chance::CHANCES;
 use crate::laws::chance::{Chance, ChanceStage};
 use crate::packet::PacketInfo;
 use crate::packet::damage::Damage;
+use crate::parameters::{Form, Key, MOST_OF_32_BITS, Table, optional, usual};
 use crate::random::{PacketDraws, Purpose, unit};
 
 /// Which bits of which packets are flipped, and who notices.
@@ -135,6 +137,21 @@ fn each_with(count: u64, rate: Probability, packet: PacketDraws) -> Vec<u64> {
         next += 1;
     }
 }
+
+/// The parameter of flipped bits.
+pub(crate) const KEYS: [Key; 1] =
+    [usual("corrupt", CORRUPT, "0", "Probability that a bit of a packet is flipped, or a table that says which bits and what the receiver does")];
+const CORRUPT: Form = Form::AnyOf(&[Form::Probability, Form::Table(&CORRUPT_TABLE)]);
+static CORRUPT_TABLE: Table = Table::of(&[
+    &CHANCES,
+    &[
+        usual("bits", Form::Integer(1, MOST_OF_32_BITS), "1", "How many different bits of such a packet are flipped"),
+        optional("bit-error-rate", Form::Probability, "In place of probability and bits: each bit by itself"),
+        optional("bytes", Form::Like(&["8-15"]), "The first and the last byte that may be hit, counted from 0"),
+        usual("checksum", Form::Words(&CHECKSUMS), "\"discards\"", "What the receiver does with a damaged packet"),
+    ],
+]);
+const CHECKSUMS: [(&str, &str); 2] = [("discards", "it is dropped when it arrives"), ("passes", "it is taken, and the peer's own checks decide")];
 
 #[cfg(test)]
 mod tests {

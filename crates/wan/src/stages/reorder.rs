@@ -7,8 +7,10 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
+use crate::laws::chance::CHANCES;
 use crate::laws::chance::{Chance, ChanceStage};
 use crate::packet::Carried;
+use crate::parameters::{Form, Key, MOST_OF_32_BITS, Table, optional, usual};
 
 /// Which packets leave their place, and how.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -154,3 +156,17 @@ impl<T> ReorderStage<T> {
         }
     }
 }
+
+/// The parameter of reordering on purpose.
+pub(crate) const KEYS: [Key; 1] =
+    [usual("reorder", REORDER, "0", "Probability that a packet jumps ahead of those before it, or a table that says how packets leave their place")];
+const REORDER: Form = Form::AnyOf(&[Form::Probability, Form::Table(&REORDER_TABLE)]);
+static REORDER_TABLE: Table = Table::of(&[
+    &CHANCES,
+    &[
+        usual("gap", Form::Integer(1, MOST_OF_32_BITS), "1", "Such a packet jumps ahead, at most one in this number of packets"),
+        optional("behind", Form::Integer(1, MOST_OF_32_BITS), "Such a packet is held until this number of others has passed it; needs at-most"),
+        optional("at-most", Form::Duration, "How long a packet is held behind others at most"),
+        optional("later", Form::Duration, "Such a packet takes so much longer"),
+    ],
+]);

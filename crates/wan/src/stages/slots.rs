@@ -7,7 +7,9 @@ use core::time::Duration;
 use cohaptic_units::{Bytes, Instant};
 
 use crate::packet::Carried;
+use crate::parameters::{Form, Key, MOST, NONE, Table, optional, usual};
 use crate::random::{Purpose, Stream, unit};
+use crate::stages::delay::JITTER;
 use crate::stages::delay::{Delay, DelayStage};
 
 /// When slots open and what they take.
@@ -168,6 +170,22 @@ impl<T> SlotStage<T> {
         self.bytes_left = self.config.bytes.map_or(Bytes::new(u64::MAX).get(), NonZeroU64::get);
     }
 }
+
+/// The parameter of slots.
+pub(crate) const KEYS: [Key; 1] = [usual(
+    "slots",
+    Form::AnyOf(const { &[Form::Table(&SLOTS), NONE] }),
+    "\"none\"",
+    "The line sends only now and then, all that has gathered or so much of it",
+)];
+static SLOTS: Table = Table::of(&[&[
+    optional("min", Form::Duration, "The shortest time from slot to slot"),
+    optional("max", Form::Duration, "The longest time from slot to slot; without it min"),
+    optional("delay", Form::Duration, "In place of min and max: the mean time from slot to slot"),
+    optional("jitter", JITTER, "Beside delay: how the time from slot to slot varies"),
+    optional("packets", Form::Integer(1, MOST), "How many packets leave in a slot at most"),
+    optional("bytes", Form::Size, "How many bytes leave in a slot at most"),
+]]);
 
 #[cfg(test)]
 mod tests {

@@ -13,12 +13,14 @@ use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
 
-use super::codel::{self, CoDelState};
-use super::limit::Waiting;
-use super::red::{self, RedState};
+use super::codel::{self, CODEL, CoDelState};
+use super::framing::{CELLS, SIGNED_SIZE};
+use super::limit::{LIMIT, Waiting};
+use super::red::{self, RED, RedState};
 use super::{CoDel, DeliveryTrace, Framing, QueueLimit, Red};
 use crate::fates::fate::DropCause;
 use crate::packet::{Carried, Exit, Output, Outputs};
+use crate::parameters::{Form, Key, NONE, Table, UNLIMITED, optional, required, usual};
 
 /// A serialiser and the queue before it.
 #[derive(Clone, PartialEq, Debug)]
@@ -291,6 +293,28 @@ impl<T> BottleneckStage<T> {
 fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, packet: Carried<T>) {
     outputs.push(Output { packet, exit: Exit::Dropped(now, cause) });
 }
+
+/// The parameters of the line and of the queue before it.
+pub(crate) const KEYS: [Key; 4] = [
+    usual("rate", Form::AnyOf(&[Form::Rate, UNLIMITED]), "\"unlimited\"", "How fast packets are sent, in bits per second"),
+    optional("queue", Form::Table(&QUEUE), "How much may wait for the line, and which packets are dropped. Needs rate or a recorded line"),
+    usual("overhead", SIGNED_SIZE, "\"0B\"", "What each packet costs beyond its own size. Needs rate or a recorded line"),
+    usual("cells", Form::AnyOf(const { &[Form::Table(&CELLS), NONE] }), "\"none\"", "Packets travel in whole cells. Needs rate or a recorded line"),
+];
+static QUEUE: Table = Table::of(&[&[
+    required("limit", LIMIT, "How much may wait"),
+    usual("discipline", Form::AnyOf(const { &[Form::Words(&DISCIPLINES), Form::Table(&DISCIPLINE)] }), "\"tail-drop\"", "Which packets are dropped"),
+]]);
+const DISCIPLINES: [(&str, &str); 4] = [
+    ("tail-drop", "the newest when the queue is full"),
+    ("head-drop", "the oldest when the queue is full"),
+    ("codel", "the oldest when they wait too long for too long"),
+    ("red", "some of the newest, the more the longer the queue is on average; needs a limit in bytes"),
+];
+static DISCIPLINE: Table = Table::of(&[&[
+    optional("codel", Form::Table(&CODEL), "The oldest when they wait more than the target for an interval"),
+    optional("red", Form::Table(&RED), "Some of the newest when the average queue is above min, all above max"),
+]]);
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,6 @@
 //! What a packet costs on the line beyond its own bytes.
 
+use crate::parameters::{Form, Table, required, usual};
 use cohaptic_units::Bytes;
 
 /// How a packet is framed on the line. The default adds nothing.
@@ -34,6 +35,12 @@ impl Framing {
         })
     }
 }
+
+/// The packets of a link in cells.
+pub(crate) static CELLS: Table =
+    Table::of(&[&[required("payload", Form::Size, "What a cell carries"), usual("overhead", Form::Size, "\"0B\"", "What a cell costs beyond that")]]);
+/// A size that may be negative.
+pub(crate) const SIGNED_SIZE: Form = Form::Like(&["28B", "-14B"]);
 
 #[cfg(test)]
 mod tests {

@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 
+use crate::parameters::Form;
 use cohaptic_units::Bytes;
 
 /// How much may wait in a queue. What is being sent does not count.
@@ -36,3 +37,6 @@ impl QueueLimit {
         }
     }
 }
+
+/// How much may wait.
+pub(crate) const LIMIT: Form = Form::Like(&["100 packets", "64kB", "50ms", "unlimited"]);

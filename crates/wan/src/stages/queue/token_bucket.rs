@@ -10,10 +10,12 @@ use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
 
-use super::limit::Waiting;
+use super::framing::SIGNED_SIZE;
+use super::limit::{LIMIT, Waiting};
 use super::{Framing, QueueLimit};
 use crate::fates::fate::DropCause;
 use crate::packet::{Carried, Exit, Output, Outputs};
+use crate::parameters::{Form, Key, NONE, Table, optional, required, usual};
 
 /// A token bucket and the queue before it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -211,6 +213,19 @@ impl<T> TokenBucketStage<T> {
         turn
     }
 }
+
+/// The parameter of the bucket.
+pub(crate) const KEYS: [Key; 1] =
+    [usual("token-bucket", Form::AnyOf(const { &[Form::Table(&TOKEN_BUCKET), NONE] }), "\"none\"", "How much may leave in bursts")];
+static TOKEN_BUCKET: Table = Table::of(&[&[
+    required("rate", Form::Rate, "How fast the bucket fills"),
+    required("burst", Form::Size, "What the bucket holds"),
+    optional("peak", Form::Table(&PEAK), "A second, smaller bucket, which limits how fast a burst leaves"),
+    usual("limit", LIMIT, "\"unlimited\"", "How much may wait for tokens"),
+    usual("overhead", SIGNED_SIZE, "\"0B\"", "What each packet costs beyond its own size"),
+]]);
+static PEAK: Table =
+    Table::of(&[&[required("rate", Form::Rate, "How fast a burst leaves"), required("burst", Form::Size, "At least the largest packet")]]);
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,11 @@
-//! The words in which the catalogue is written.
+//! Parameters as data: each with its key, form, unit, default and documentation.
+//!
+//! The file of a stage says its parameters in these words. This crate reads no files: readers, schemas, editors and pages of documentation take the parameters
+//! from here.
 
-use crate::reading::values::Quantity;
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::String;
 
 /// A table: its keys, and what may stand under names that the file makes up.
 #[derive(Debug)]
@@ -42,6 +47,24 @@ impl Table {
     pub fn key(&self, name: &str) -> Option<&'static Key> {
         self.keys().find(|key| key.name == name)
     }
+}
+
+/// Groups of keys one behind the other. `M` is the number of all groups.
+#[must_use]
+pub const fn joined<const M: usize>(parts: &[&[&'static [Key]]]) -> [&'static [Key]; M] {
+    let mut all: [&'static [Key]; M] = [&[]; M];
+    let (mut count, mut part) = (0, 0);
+    while part < parts.len() {
+        let mut group = 0;
+        while group < parts[part].len() {
+            all[count] = parts[part][group];
+            count += 1;
+            group += 1;
+        }
+        part += 1;
+    }
+    assert!(count == M);
+    all
 }
 
 /// A key and what may stand under it.
@@ -169,3 +192,100 @@ pub const fn number(quantity: Quantity) -> Form {
 pub const fn vector(quantity: Quantity) -> Form {
     Form::Vector(quantity)
 }
+
+/// The range and the unit of a number.
+#[derive(Clone, Copy, Debug)]
+pub struct Quantity {
+    range: Range,
+    unit: &'static str,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Range {
+    Any,
+    NotNegative,
+    Positive,
+    Fraction,
+    Correlation,
+}
+
+impl Quantity {
+    /// Any number [unit].
+    #[must_use]
+    pub const fn any(unit: &'static str) -> Self {
+        Self { range: Range::Any, unit }
+    }
+
+    /// At least zero [unit].
+    #[must_use]
+    pub const fn not_negative(unit: &'static str) -> Self {
+        Self { range: Range::NotNegative, unit }
+    }
+
+    /// Above zero [unit].
+    #[must_use]
+    pub const fn positive(unit: &'static str) -> Self {
+        Self { range: Range::Positive, unit }
+    }
+
+    /// In words: `a number above zero \[kg\]`.
+    #[must_use]
+    pub fn expected(self) -> String {
+        let range = match self.range {
+            Range::Any => "a number",
+            Range::NotNegative => "a number of at least zero",
+            Range::Positive => "a number above zero",
+            Range::Fraction => "a number from 0 to 1",
+            Range::Correlation => "a number from -1 to below 1",
+        };
+        if self.unit.is_empty() { range.to_owned() } else { format!("{range} [{}]", self.unit) }
+    }
+
+    /// The unit, as in messages; empty for a plain number.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        self.unit
+    }
+
+    /// The range as JSON Schema says it: keywords and bounds.
+    #[must_use]
+    pub const fn bounds(self) -> &'static [(&'static str, i8)] {
+        match self.range {
+            Range::Any => &[],
+            Range::NotNegative => &[("minimum", 0)],
+            Range::Positive => &[("exclusiveMinimum", 0)],
+            Range::Fraction => &[("minimum", 0), ("maximum", 1)],
+            Range::Correlation => &[("minimum", -1), ("exclusiveMaximum", 1)],
+        }
+    }
+
+    /// Whether a number is in the range.
+    #[must_use]
+    pub fn contains(self, value: f64) -> bool {
+        match self.range {
+            Range::Any => true,
+            Range::NotNegative => value >= 0.0,
+            Range::Positive => value > 0.0,
+            Range::Fraction => (0.0..=1.0).contains(&value),
+            Range::Correlation => (-1.0..1.0).contains(&value),
+        }
+    }
+}
+
+/// At least zero, beside others.
+pub const WEIGHT: Quantity = Quantity::not_negative("");
+/// At least zero \[packet\].
+pub const PACKETS: Quantity = Quantity::not_negative("packets");
+/// From 0 to 1.
+pub const FRACTION: Quantity = Quantity { range: Range::Fraction, unit: "" };
+/// From −1 to below 1.
+pub const CORRELATION: Quantity = Quantity { range: Range::Correlation, unit: "" };
+
+/// The word that takes away a table below.
+pub(crate) const NONE: Form = Form::Words(&[("none", "takes away what it is laid over")]);
+/// The word that takes away a limit below.
+pub(crate) const UNLIMITED: Form = Form::Words(&[("unlimited", "takes away the limit that it is laid over")]);
+/// The largest integer of TOML.
+pub(crate) const MOST: u64 = i64::MAX.unsigned_abs();
+/// The largest integer of 32 bits.
+pub(crate) const MOST_OF_32_BITS: u64 = u32::MAX as u64;
