@@ -1,5 +1,8 @@
 //! How long something stays as it is.
 
+use alloc::format;
+use alloc::string::String;
+use cohaptic_units::print::Span;
 use core::time::Duration;
 
 use crate::parameters::{Form, Table, optional, required};
@@ -69,6 +72,19 @@ static ERLANG: Table = Table::of(&[&[
     required("mean", Form::Duration, "The mean of all stages together"),
     required("stages", Form::Integer(1, 1000), "How many stages"),
 ]]);
+
+impl Sojourn {
+    /// The law and the mean in words.
+    pub(crate) fn words(self) -> String {
+        let law = match self {
+            Self::Fixed(_) => "always",
+            Self::Exponential(_) => "exponential,",
+            Self::Uniform(..) => "uniform,",
+            Self::Erlang(..) => "Erlang,",
+        };
+        format!("{law} {}", Span(self.mean()))
+    }
+}
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,12 @@
 //! What kind of link it is.
 
+use crate::laws::sojourn::Sojourn;
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use cohaptic_units::print::Counted;
 use core::time::Duration;
 
 use crate::fates::log::FateLog;
@@ -180,3 +185,22 @@ static MODULATED: Table = Table::with_others(
 static STATE: Table = Table::over(&LINK_PARAMETERS);
 const PROFILES: [(&str, &str); 2] = [("exact", "what the words say"), ("kernel-6.6", "what Linux 6.6 does when it is told so")];
 const NETEM: Form = Form::Like(&["delay 20ms 5ms 25% distribution normal loss gemodel 1% 10%", "none"]);
+
+impl LinkModel {
+    /// The link in words: each stage that is configured, with its numbers.
+    #[must_use]
+    pub fn words(&self) -> String {
+        match self {
+            Self::Fixed(config) => config.words(),
+            Self::Modulated(modulated) => {
+                let states = modulated.modulator().states().iter().zip(modulated.configs()).enumerate().map(|(place, (state, config))| {
+                    let lasts = state.sojourn.map_or_else(|| "for ever".to_owned(), Sojourn::words);
+                    format!("state {} ({lasts}): {}", place + 1, config.words())
+                });
+                format!("as \"{}\" goes; {}", modulated.modulator().name(), states.collect::<Vec<_>>().join("; "))
+            }
+            Self::Replay(log) => format!("a replay of {}, and nothing after it", Counted(log.packets(), "packet")),
+            Self::Kernel(netem) => format!("netem of Linux 6.6, to the bit: {}", netem.words()),
+        }
+    }
+}

@@ -1,6 +1,10 @@
 //! What a link does to its packets.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
 use cohaptic_units::Bytes;
+use cohaptic_units::print::{Counted, Span};
 
 use crate::laws::chance;
 use crate::laws::chance::Chance;
@@ -122,3 +126,31 @@ pub const LINK_PARAMETERS: [&[Key]; 13] = [
     &outage::KEYS,
     &path_trace::KEYS,
 ];
+
+impl LinkConfig {
+    /// The stages in words with their numbers, in the order in which packets pass them.
+    pub(crate) fn words(&self) -> String {
+        let Self { mtu, outages, loss, marks_instead_of_loss, duplication, corruption, limit, token_bucket, .. } = self;
+        let mut stages = Vec::new();
+        stages.extend(mtu.map(|mtu| format!("packets of at most {mtu}")));
+        stages.extend(outages.words());
+        stages.extend(loss.words().map(|loss| if *marks_instead_of_loss { format!("{loss} (marked, not lost)") } else { loss }));
+        stages.extend((!duplication.is_never()).then(|| format!("{} sent twice", duplication.words())));
+        stages.extend(corruption.as_ref().map(Corruption::words));
+        stages.extend(limit.map(|limit| format!("at most {} inside", Counted(limit, "packet"))));
+        stages.extend(token_bucket.as_ref().map(TokenBucket::words));
+        stages.extend(self.bottleneck.as_ref().map(Bottleneck::words));
+        stages.extend(self.slots.as_ref().map(Slots::words));
+        stages.extend(self.reorder.as_ref().map(Reorder::words));
+        stages.extend(self.trace.as_ref().map(|trace| format!("a recorded delay of at least {}, and its loss", Span(trace.least()))));
+        stages.push(format!("delay {}", self.delay.words()));
+        if self.order == Order::InOrder {
+            stages.push("in order".into());
+        }
+        let text = stages.join(", then ");
+        match self.layout {
+            Layout::Netem => format!("{text} (rate and slots behind the delay, as in netem)"),
+            Layout::Physical => text,
+        }
+    }
+}

@@ -1,7 +1,10 @@
 //! Bits that are flipped on the way.
 
 use alloc::collections::BTreeSet;
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
+use cohaptic_units::print::Counted;
 use core::ops::Range;
 
 use cohaptic_units::Probability;
@@ -152,6 +155,22 @@ static CORRUPT_TABLE: Table = Table::of(&[
     ],
 ]);
 const CHECKSUMS: [(&str, &str); 2] = [("discards", "it is dropped when it arrives"), ("passes", "it is taken, and the peer's own checks decide")];
+
+impl Corruption {
+    /// The flipped bits in words.
+    pub(crate) fn words(&self) -> String {
+        let bits = match self.bits {
+            Flips::Bits { packets, count } => format!("{} flipped in {}", Counted(count, "bit"), packets.words()),
+            Flips::Rate(rate) => format!("each bit flipped with {:e}", rate.get()),
+        };
+        let within = self.within.as_ref().map_or_else(String::new, |range| format!(", bytes {} to {}", range.start, range.end - 1));
+        let checksum = match self.checksum {
+            Checksum::Discards => "discarded on arrival",
+            Checksum::Passes => "handed over",
+        };
+        format!("{bits}{within} ({checksum})")
+    }
+}
 
 #[cfg(test)]
 mod tests {

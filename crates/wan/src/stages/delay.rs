@@ -1,6 +1,9 @@
 //! Propagation delay with jitter.
 
 use alloc::boxed::Box;
+use alloc::format;
+use alloc::string::String;
+use alloc::string::ToString as _;
 use alloc::sync::Arc;
 use core::time::Duration;
 
@@ -355,6 +358,21 @@ static LAW_FILE: Table = Table::of(&[&[
     optional("table", Form::File, "A .dist table as tc reads it"),
     optional("empirical", Form::File, "A CSV file of measured delays with the header delay, in seconds"),
 ]]);
+
+impl Delay {
+    /// The mean and the jitter in words.
+    pub(crate) fn words(&self) -> String {
+        let mean = Span(self.mean());
+        let Some(Jitter { sd, distribution, floor, correlation }) = self.jitter() else { return mean.to_string() };
+        let floor = if *floor == Duration::ZERO { String::new() } else { format!(", never below {}", Span(*floor)) };
+        let memory = match correlation {
+            Correlation::None => String::new(),
+            Correlation::PerPacket(correlation) => format!(", correlation {correlation} from packet to packet"),
+            Correlation::InTime(time) => format!(", correlated over {}", Span(*time)),
+        };
+        format!("{mean}, {} jitter of {}{floor}{memory}", distribution.words(), Span(*sd))
+    }
+}
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,10 @@
 //! Outages: spans during which a link takes no packet. Scheduled, random, or when nobody uses it.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::string::ToString as _;
 use alloc::vec::Vec;
+use cohaptic_units::print::{Counted, Span};
 use core::time::Duration;
 
 use cohaptic_units::Instant;
@@ -236,6 +240,19 @@ static IDLE_OUTAGE: Table = Table::of(&[&[
     required("after", Form::Duration, "For how long nothing was sent"),
     required("down", Form::Duration, "For how long the link is down then"),
 ]]);
+
+impl Outages {
+    /// The kinds of outages in words; `None` if there are none.
+    pub(crate) fn words(&self) -> Option<String> {
+        let mut kinds = Vec::new();
+        if !self.scheduled.is_empty() {
+            kinds.push(Counted(self.scheduled.len(), "outage").to_string());
+        }
+        kinds.extend(self.random.map(|random| format!("random outages (up {}, down {})", random.up.words(), random.down.words())));
+        kinds.extend(self.idle.map(|idle| format!("an outage of {} after {} without a packet", Span(idle.down), Span(idle.after))));
+        (!kinds.is_empty()).then(|| kinds.join(" and "))
+    }
+}
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,10 @@
 //! Packets that are put out of order on purpose.
 
 use alloc::collections::VecDeque;
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
+use cohaptic_units::print::Span;
 use core::num::NonZeroU32;
 use core::time::Duration;
 
@@ -170,3 +173,16 @@ static REORDER_TABLE: Table = Table::of(&[
         optional("later", Form::Duration, "Such a packet takes so much longer"),
     ],
 ]);
+
+impl Reorder {
+    /// The displacement in words.
+    pub(crate) fn words(&self) -> String {
+        let packets = self.packets.words();
+        match self.how {
+            Displacement::Jump { gap } if gap.get() == 1 => format!("{packets} jump ahead"),
+            Displacement::Jump { gap } => format!("{packets} of every {gap}th packet jump ahead"),
+            Displacement::Behind { packets: count, at_most } => format!("{packets} held until {count} have passed, at most {}", Span(at_most)),
+            Displacement::Later { by } => format!("{packets} later by {}", Span(by)),
+        }
+    }
+}

@@ -1,6 +1,11 @@
 //! Slots: a line that sends only now and then, and then all that has gathered (Wi-Fi aggregation, a modem's grants; netem's `slot`).
 
 use alloc::collections::VecDeque;
+use alloc::format;
+use alloc::string::String;
+use alloc::string::ToString as _;
+use alloc::vec::Vec;
+use cohaptic_units::print::{Counted, Span};
 use core::num::NonZeroU64;
 use core::time::Duration;
 
@@ -186,6 +191,21 @@ static SLOTS: Table = Table::of(&[&[
     optional("packets", Form::Integer(1, MOST), "How many packets leave in a slot at most"),
     optional("bytes", Form::Size, "How many bytes leave in a slot at most"),
 ]]);
+
+impl Slots {
+    /// The slots in words.
+    pub(crate) fn words(&self) -> String {
+        let gap = match self.gap() {
+            SlotGap::Between { min, max } if min == max => format!("every {}", Span(*min)),
+            SlotGap::Between { min, max } => format!("every {} to {}", Span(*min), Span(*max)),
+            SlotGap::Drawn(gap) => format!("every {}", gap.words()),
+        };
+        let packets = self.packets.map(|packets| Counted(packets.get(), "packet").to_string());
+        let bytes = self.bytes.map(|bytes| Counted(bytes.get(), "byte").to_string());
+        let share: Vec<String> = [packets, bytes].into_iter().flatten().collect();
+        format!("slots {gap}{}", if share.is_empty() { String::new() } else { format!(" for {}", share.join(" or ")) })
+    }
+}
 
 #[cfg(test)]
 mod tests {

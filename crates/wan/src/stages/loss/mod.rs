@@ -5,7 +5,11 @@ mod gilbert_elliott;
 mod in_time;
 mod pattern;
 
+use crate::laws::chance::percent;
 use alloc::boxed::Box;
+use alloc::format;
+use alloc::string::String;
+use cohaptic_units::print::Span;
 
 use crate::laws::chance::CHANCE;
 use crate::parameters::{Form, Key, MOST, PACKETS, Table, number, optional, required, usual};
@@ -199,3 +203,25 @@ static BURSTS: Table = Table::of(&[&[
     usual("isolated", Form::Probability, "0", "The fraction lost outside of bursts"),
     usual("good-run", number(PACKETS), "1", "The mean number received in a row within a burst"),
 ]]);
+
+impl Loss {
+    /// The model in words; `None` if there is none.
+    pub(crate) fn words(&self) -> Option<String> {
+        let mean = self.mean().map_or_else(String::new, |mean| format!(", {} on average", percent(mean)));
+        Some(match self {
+            Self::None => return None,
+            Self::Independent(probability) => format!("independent loss {}", percent(probability.get())),
+            Self::Correlated(packets) => format!("loss of {}", packets.words()),
+            Self::GilbertElliott(_) => format!("Gilbert-Elliott loss{mean}"),
+            Self::GilbertElliottInTime(chain) => {
+                let (good, bad) = chain.mean_times();
+                format!("Gilbert-Elliott loss in time (good {}, bad {}){mean}", Span(good), Span(bad))
+            }
+            Self::FourState(_) => format!("four-state loss{mean}"),
+            Self::Pattern(pattern) => match pattern.counts() {
+                Counts::Packets => format!("loss of chosen packets{mean}"),
+                Counts::Nanoseconds => format!("loss at chosen times{mean}"),
+            },
+        })
+    }
+}

@@ -8,7 +8,12 @@
 //! What leaves in any window t is at most R·t plus one packet, because the service time is rounded up. A departure at an instant makes room for
 //! a packet that is offered at the same instant. A change of rate in the middle of a packet integrates the bits: what is already on the wire stays sent.
 
+use super::limit::words_of_limit;
 use alloc::collections::VecDeque;
+use alloc::format;
+use alloc::string::String;
+use alloc::string::ToString as _;
+use cohaptic_units::print::Span;
 use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
@@ -315,6 +320,23 @@ static DISCIPLINE: Table = Table::of(&[&[
     optional("codel", Form::Table(&CODEL), "The oldest when they wait more than the target for an interval"),
     optional("red", Form::Table(&RED), "Some of the newest when the average queue is above min, all above max"),
 ]]);
+
+impl Bottleneck {
+    /// The queue and the line in words.
+    pub(crate) fn words(&self) -> String {
+        let discipline = match self.discipline {
+            Discipline::TailDrop => String::new(),
+            Discipline::HeadDrop => ", head-drop".into(),
+            Discipline::Red(_) => ", RED".into(),
+            Discipline::CoDel(codel) => format!(", CoDel {} in {}", Span(codel.target), Span(codel.interval)),
+        };
+        let service = match &self.service {
+            Service::Rate(rate) => rate.to_string(),
+            Service::Recorded(trace) => format!("a recorded line of {:.3} Mbit/s on average", trace.mean_rate() / 1e6),
+        };
+        format!("queue ({}{discipline}) before {service}{}", words_of_limit(self.limit), self.framing.words())
+    }
+}
 
 #[cfg(test)]
 mod tests {

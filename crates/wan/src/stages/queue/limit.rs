@@ -1,5 +1,8 @@
 //! How much may wait.
 
+use alloc::string::String;
+use alloc::string::ToString as _;
+use cohaptic_units::print::{Counted, Span};
 use core::time::Duration;
 
 use crate::parameters::Form;
@@ -40,3 +43,13 @@ impl QueueLimit {
 
 /// How much may wait.
 pub(crate) const LIMIT: Form = Form::Like(&["100 packets", "64kB", "50ms", "unlimited"]);
+
+/// A limit in words.
+pub(super) fn words_of_limit(limit: Option<QueueLimit>) -> String {
+    match limit {
+        None => "unlimited".into(),
+        Some(QueueLimit::Packets(packets)) => Counted(packets, "packet").to_string(),
+        Some(QueueLimit::Bytes(bytes)) => bytes.to_string(),
+        Some(QueueLimit::Time(wait)) => Span(wait).to_string(),
+    }
+}

@@ -5,7 +5,10 @@
 //!
 //! Unlike a serialiser, a bucket lets a packet pass at once while it has credit: it limits how much, not how fast.
 
+use super::limit::words_of_limit;
 use alloc::collections::VecDeque;
+use alloc::format;
+use alloc::string::String;
 use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
@@ -226,6 +229,15 @@ static TOKEN_BUCKET: Table = Table::of(&[&[
 ]]);
 static PEAK: Table =
     Table::of(&[&[required("rate", Form::Rate, "How fast a burst leaves"), required("burst", Form::Size, "At least the largest packet")]]);
+
+impl TokenBucket {
+    /// The bucket in words.
+    pub(crate) fn words(&self) -> String {
+        let peak = self.peak.map_or_else(String::new, |peak| format!(", peak {} in bursts of {}", peak.rate, peak.burst));
+        let framing = self.framing.words();
+        format!("queue ({}) before a token bucket of {} at {}{peak}{framing}", words_of_limit(self.limit), self.burst, self.rate)
+    }
+}
 
 #[cfg(test)]
 mod tests {
