@@ -7,7 +7,7 @@ use crate::output;
 
 /// The text of a file; bytes that are no text are refused at their line.
 pub(crate) fn read(path: &Path) -> Result<String, Failure> {
-    let bytes = cohaptic_scene::read_bytes(path).map_err(|error| Failure::File { verb: "read", path: path.to_path_buf(), error })?;
+    let bytes = cohaptic_files::read_bytes(path).map_err(|error| Failure::File { verb: "read", path: path.to_path_buf(), error })?;
     of_bytes(bytes, path)
 }
 

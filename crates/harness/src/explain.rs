@@ -1,5 +1,6 @@
 //! What a scene makes the program model, what it leaves out, and why.
 
+#[cfg(test)]
 mod links;
 
 use cohaptic_peer::{Contact, Hand, Integrator, wire};
@@ -7,7 +8,6 @@ use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
 
-use self::links::describe_link;
 use crate::arrays::Shape;
 use crate::plan::{DeviceChoice, Model, Plan, Ticking};
 
@@ -186,7 +186,7 @@ impl Rows {
             if config.is_constant_delay() {
                 self.model(&part, format!("constant delay {}", Span(config.mean_delay())), "one addition a packet: nothing else is configured");
             } else {
-                self.model(&part, describe_link(config), "a chain of the stages that are configured");
+                self.model(&part, config.words(), "a chain of the stages that are configured");
             }
         }
         let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
@@ -198,7 +198,7 @@ impl Rows {
             self.model("packets on the way", "a calendar queue", "arrivals are not in the order of sending");
         }
         for (peer, direction, line) in access_lines(scene) {
-            self.model(&format!("{direction} of {peer}"), describe_link(line), "shared by all that passes it");
+            self.model(&format!("{direction} of {peer}"), line.words(), "shared by all that passes it");
         }
         let timeline_is_random = scene.timeline.iter().any(|change| {
             matches!(&change.what, ChangeKind::Link(link) if link.config.has_chance())

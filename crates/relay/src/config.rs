@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::net::SocketAddr;
 
-use cohaptic_scene::{LinkTable, RelayFile, RelayLimits};
+use cohaptic_linkfile::{LinkTable, RelayFile, RelayLimits};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, NodeId};
 

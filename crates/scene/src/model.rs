@@ -2,14 +2,13 @@
 
 use core::time::Duration;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use cohaptic_peer::coordination::LawSettings;
 use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::{DropCause, LinkModel};
 
-use crate::LinkTable;
+use cohaptic_linkfile::{LinkChange, LinkSelector, LinkTable};
 
 /// A scene, ready to be run. Every number in it has been checked; every peer it names exists.
 #[derive(Clone, PartialEq, Debug)]
@@ -256,17 +255,6 @@ pub enum ChangeKind {
     Coordination(Gains),
 }
 
-/// One link with its new configuration.
-#[derive(Clone, PartialEq, Debug)]
-pub struct LinkChange {
-    /// The sender's place in [`Scene::peers`].
-    pub from: usize,
-    /// The receiver's place in [`Scene::peers`].
-    pub to: usize,
-    /// From now on.
-    pub config: Arc<LinkModel>,
-}
-
 /// What must come out of a run for `cohaptic check` to pass. Absent entries are not looked at.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Expect {
@@ -349,22 +337,4 @@ pub struct ExpectDelay {
     pub min: Option<Duration>,
     /// At most this.
     pub max: Option<Duration>,
-}
-
-/// Which links are meant, by the places of peers in [`Scene::peers`].
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum LinkSelector {
-    /// All links between peers.
-    All,
-    /// One directed link.
-    Between {
-        /// The sender.
-        from: usize,
-        /// The receiver.
-        to: usize,
-    },
-    /// The line that a peer sends through.
-    Uplink(usize),
-    /// The line that a peer receives through.
-    Downlink(usize),
 }

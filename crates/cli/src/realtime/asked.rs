@@ -44,7 +44,7 @@ mod tests {
 
     #[test]
     fn both_delays_are_said_and_that_it_was_changed() {
-        let model = cohaptic_scene::link_from_keys(&["delay=24ms".to_owned()]).unwrap();
+        let model = cohaptic_linkfile::link_from_keys(&["delay=24ms".to_owned()]).unwrap();
         let mut link = Link::new(0, &LinkName::between("a", "b"), model.clone());
         let asked = AskedDelay::of(&model);
         assert_eq!(asked.beside(&link.stats()), None, "nothing was delivered yet");

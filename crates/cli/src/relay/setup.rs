@@ -5,9 +5,10 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use cohaptic_linkfile::{RelayFile, relay_link_keys_of_text};
 use cohaptic_realtime::Tolerance;
 use cohaptic_relay::{Form, Limits, Proxy, RelayConfig};
-use cohaptic_scene::{LinkKeys, RelayFile, relay_link_keys_of_text};
+use cohaptic_scene::LinkKeys;
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 

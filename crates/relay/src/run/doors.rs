@@ -326,7 +326,7 @@ mod tests {
     use std::sync::Arc;
     use std::time::Duration;
 
-    use cohaptic_scene::{LinkTable, link_from_keys};
+    use cohaptic_linkfile::{LinkTable, link_from_keys};
 
     use super::*;
     use crate::{Limits, Mesh, Program, Proxy};

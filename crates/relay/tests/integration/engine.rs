@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use cohaptic_linkfile::{LinkTable, RelayFile};
 use cohaptic_realtime::udp::Ecn;
 use cohaptic_relay::{Arrival, Change, ConfigError, Engine, Form, Intake, Limits, Mesh, Port, RelayConfig};
-use cohaptic_scene::{LinkTable, RelayFile};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo, Path};
 use proptest::prelude::*;

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use cohaptic_linkfile::router::{NamedLink, Side};
 use cohaptic_realtime::Lateness;
-use cohaptic_scene::router_file::{NamedLink, Side};
 use cohaptic_units::Instant;
 use cohaptic_wan::{Fate, Link, LinkModel, LinkName, PacketEvent, PacketInfo, PacketRecord};
 

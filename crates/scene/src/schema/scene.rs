@@ -4,9 +4,13 @@ use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::LawValues;
 use cohaptic_wan::DropCause;
 
-use super::form::{Amount, Form, Key, Table, Words, number, optional, required, somewhere, usual, vector};
-use super::link::{LINK, LINK_KIND, LINK_TABLE, MODULATOR};
-use crate::values::{
+use cohaptic_linkfile::schema::{
+    Form, Key, Table, joined,
+    link::{ALL_LINKS, LINK, LINK_ENTRY, LINK_TABLE, LINKS_BETWEEN, MODULATOR},
+    number, optional, required, somewhere, usual, vector,
+};
+
+use crate::quantities::{
     ADDED_MASS, ANGLE, DAMPING, DISTANCE, FORCE, FREQUENCY, MASS, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS, VELOCITY, WALL_STIFFNESS,
 };
 
@@ -22,7 +26,7 @@ pub(super) static ROOT: Table = Table::of(&[&[
     optional("peers", Form::List(&Form::Table(&PEERS)), "One peer each: its own keys are laid over those of [peer]"),
     optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
     optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
-    optional("links", Form::List(&Form::Table(&LINKS)), "One direction of one pair each: its own keys are laid over those of [link]"),
+    optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction of one pair each: its own keys are laid over those of [link]"),
     optional("timeline", Form::List(&Form::Table(&TIMELINE)), "What changes while the scene runs"),
     optional("expect", Form::Table(&EXPECT), "What must come out: makes the scene a test for cohaptic check"),
 ]]);
@@ -179,8 +183,7 @@ static CLOCK: Table = Table::of(&[&[
     usual("offset", Form::Duration, "\"0s\"", "By how much its first tick is late"),
     usual("drift", DRIFT, "0", "How fast it runs: parts per million as text, or seconds gained in a second"),
 ]]);
-const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number(Amount(ANY))]);
-const ANY: crate::values::Quantity = ANGLE;
+const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number(ANGLE)]);
 static SILENCE: Table = Table::of(&[&[
     usual("after", Form::Duration, "\"100ms\"", "After how long a silence the pull fades"),
     usual("fade", Form::Duration, "\"250ms\"", "How long that takes"),
@@ -189,7 +192,7 @@ static FALCON: Table = Table::of(&[&[
     usual("device", Form::Like(&["first", "simulated"]), "\"first\"", "The first that no other peer has, one that is simulated, or a serial number"),
     usual("counts-per-newton-metre", number(POSITIVE_COUNTS), "10000", "Motor counts for a torque at the joint of an arm"),
     usual("force-limit", number(POSITIVE_FORCE), "4", "No greater force is sent to the motors"),
-    usual("origin", Form::Triple(Amount(POSITION)), "[0, 0, 0.125]", "The place in the device's coordinates that is the origin of the scene"),
+    usual("origin", Form::Triple(POSITION), "[0, 0, 0.125]", "The place in the device's coordinates that is the origin of the scene"),
 ]]);
 
 const HAND: Form = Form::AnyOf(&[Form::Words(&[("none", "nothing; takes away what [peer] says")]), Form::Table(&HAND_TABLE)]);
@@ -215,18 +218,6 @@ static FOLLOWS: Table = Table::of(&[&[
     optional("file", Form::File, "A recorded motion: a CSV with the header t,x (and y, z), in seconds and metres"),
 ]]);
 
-static LINKS: Table = Table::over(&[&ENDS, &LINK, &LINK_KIND]);
-/// The two ends of a link.
-pub(super) const ENDS: [Key; 2] =
-    [required("from", Form::Text, "The name of the one that sends"), required("to", Form::Text, "The name of the one that receives")];
-/// Entries `[\[links\]]`.
-pub(super) static LINK_ENTRY: &Table = &LINKS;
-
-const ALL: Words = &[("all", "every link")];
-static ENDS_TABLE: Table = Table::of(&[&ENDS]);
-/// Which links a change is of.
-pub(super) const LINKS_BETWEEN: Form = Form::AnyOf(&[Form::Words(ALL), Form::Table(&ENDS_TABLE)]);
-
 static TIMELINE: Table = Table::of(&[&[
     required("at", Form::Duration, "When, from the beginning of the scene"),
     optional("link", LINKS_BETWEEN, "Which links change: all, or one by its ends"),
@@ -235,7 +226,7 @@ static TIMELINE: Table = Table::of(&[&[
     optional("coordination", Form::Table(&GAINS), "In place of link or peer, and without set: new gains at every peer"),
 ]]);
 /// The key of a link or of a peer that is set: another key says which of the two.
-static SET: Table = Table::over(&[&LINK, &LINK_KIND, &SET_OF_PEER]);
+static SET: Table = Table::over(&joined::<15>(&[LINK.as_slice(), &[&SET_OF_PEER]]));
 const SET_OF_PEER: [Key; 2] = [
     optional("contact", Form::AnyOf(const { &[Form::Words(&CONTACTS), Form::Table(&PUSH)] }), "Of a peer: how the device touches the object"),
     optional("hand", HAND, "Of a peer: what the user does"),
@@ -263,7 +254,7 @@ static EXPECT_POSITION: Table = Table::of(&[&OF_PEER, &[required("at", Form::Dur
 static EXPECT_TRAVEL: Table = Table::of(&[&OF_PEER, &[required("distance", number(DISTANCE), "How far from where it began")], &TIME_BOUNDS]);
 const LINK_OR_LINE: [Key; 1] = [usual(
     "link",
-    Form::AnyOf(const { &[Form::Words(ALL), Form::Table(&SELECTOR)] }),
+    Form::AnyOf(const { &[Form::Words(ALL_LINKS), Form::Table(&SELECTOR)] }),
     "\"all\"",
     "Which link: all, one by its ends, or an access line",
 )];

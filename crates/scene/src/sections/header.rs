@@ -2,14 +2,14 @@
 
 use core::time::Duration;
 
+use cohaptic_linkfile::document::Node;
+use cohaptic_linkfile::reading::values::ReadNumber as _;
+use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_peer::coordination::{LawSettings, LawValues};
 use cohaptic_peer::{Coordination, Gains, Integrator};
 
-use crate::context::Context;
 use crate::model::{Axes, CoordinationSpec, Scaling};
-use crate::table_reader::TableReader;
-use crate::tree::Node;
-use crate::values::{self, DAMPING, STIFFNESS};
+use crate::quantities::{DAMPING, STIFFNESS};
 
 /// The most peers that `count` makes: a slip of the finger must not take all memory. Each takes about two kilobytes.
 const MOST_PEERS: u64 = 1_000_000;
