@@ -12,7 +12,7 @@
 
 use core::convert::Infallible;
 
-use rand_core::TryRng;
+use rand::TryRng;
 
 /// What a random number is drawn for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use cohaptic_wan::netem::kernel::{Prng, Table};
 use cohaptic_wan::random::unit;
-use rand_core::TryRng;
+use rand::TryRng;
 
 use super::ways::{MEAN, SD, next_word};
 
