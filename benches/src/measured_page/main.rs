@@ -7,15 +7,16 @@ mod campaign;
 mod page;
 mod programs;
 mod steps;
-mod whole_file;
 
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use arguments::Arguments;
 use clap::Parser as _;
+use cohaptic_files::write_whole;
 use page::Page;
 use programs::Programs;
 use steps::Measured;
@@ -58,13 +59,19 @@ fn measure(arguments: &Arguments) -> Result<Vec<&'static str>, String> {
             }
         };
         for (path, content) in &measured.files {
-            whole_file::write(&docs.join(path), content)?;
+            write(&docs.join(path), content)?;
         }
         page.set(step, step.section(&programs, &measured.body));
-        whole_file::write(&file, &page.text())?;
+        write(&file, &page.text())?;
         eprintln!("      done in {:.1} s", start.elapsed().as_secs_f64());
     }
     Ok(failed)
+}
+
+/// Writes a file, and makes the folder for it.
+fn write(path: &Path, content: &str) -> Result<(), String> {
+    let written = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| write_whole(path, |file| file.write_all(content.as_bytes())));
+    written.map_err(|error| format!("cannot write {}: {error}", path.display()))
 }
 
 fn read(file: &Path) -> Result<Page, String> {

@@ -4,8 +4,10 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
+use cohaptic_files::write_whole;
+
 use crate::error::CampaignError;
-use crate::folder::{Folder, Manifest, write_whole};
+use crate::folder::{Folder, Manifest};
 use crate::plan::{Parts, Plan};
 use crate::report::{Report, Tally};
 use crate::table::{Column, Head, Row, TableError, columns};

@@ -11,7 +11,6 @@
 
 mod lock;
 mod manifest;
-mod whole_file;
 
 use std::collections::BTreeSet;
 use std::io;
@@ -22,7 +21,6 @@ use crate::table::Format;
 use lock::Lock;
 
 pub(crate) use manifest::Manifest;
-pub(crate) use whole_file::write_whole;
 
 const MANIFEST: &str = "campaign.json";
 const LOCK: &str = "campaign.lock";
@@ -58,7 +56,7 @@ impl Folder {
                 return Ok(true);
             }
             // What a campaign leaves that was killed before it had a manifest.
-            if name != LOCK && name != whole_file::partial_name(MANIFEST.as_ref()) {
+            if name != LOCK && name != cohaptic_files::partial_name(MANIFEST.as_ref()) {
                 others.insert(name);
             }
         }
@@ -123,7 +121,7 @@ impl Folder {
         let unreadable = |error| CampaignError::File { verb: "read", path: self.path.clone(), error };
         for entry in std::fs::read_dir(&self.path).map_err(unreadable)? {
             let path = entry.map_err(unreadable)?.path();
-            if whole_file::is_partial(&path) {
+            if is_partial(&path) {
                 std::fs::remove_file(&path).map_err(|error| CampaignError::File { verb: "remove", path, error })?;
             }
         }
@@ -144,11 +142,35 @@ impl Folder {
     }
 }
 
+/// Whether a file of a campaign was being written: `campaign.json.partial`, `part-….partial`, `runs.….partial`, `verdicts.csv.partial`.
+fn is_partial(path: &Path) -> bool {
+    let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+    name.ends_with(cohaptic_files::PARTIAL) && ["campaign.", "part-", "runs.", "verdicts."].iter().any(|begin| name.starts_with(begin))
+}
+
 /// Removes a file if it is there.
 fn remove(path: PathBuf) -> Result<(), CampaignError> {
     match std::fs::remove_file(&path) {
         Ok(()) => Ok(()),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
         Err(error) => Err(CampaignError::File { verb: "remove", path, error }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_files_of_a_campaign_are_swept() {
+        for (name, swept) in [
+            ("a/part-00012.parquet.partial", true),
+            ("runs.csv.partial", true),
+            ("campaign.json.partial", true),
+            ("part-00012.parquet", false),
+            ("thesis.partial", false),
+        ] {
+            assert_eq!(is_partial(name.as_ref()), swept, "{name}");
+        }
     }
 }

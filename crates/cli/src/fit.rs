@@ -1,7 +1,6 @@
 //! `cohaptic fit`.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -14,7 +13,7 @@ use serde::Serialize;
 use crate::arguments::FitArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::output_file::OutputFile;
+use crate::output_file::write_file;
 use crate::{output, text_file};
 
 /// What `cohaptic fit --json` prints.
@@ -51,9 +50,7 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     let fitted = fit::fit(&measurements).map_err(|error| named(&error))?;
     let scene = fitted.link.to_scene_toml();
     if let Some(path) = &arguments.out {
-        let (file, mut to) = OutputFile::create(path)?;
-        let written = to.write_all(scene.as_bytes()).and_then(|()| to.flush()).map(|()| to);
-        file.finish(written)?;
+        write_file(path, &scene)?;
     }
     if arguments.json {
         output::json(DocumentSchema::Fit, &Document { fitted: &fitted, scene: &scene, skew, matched })?;

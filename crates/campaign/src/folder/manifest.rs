@@ -1,10 +1,11 @@
 //! What a campaign is, as a file in its folder: the same command goes on, another one is refused.
 
+use std::io::Write as _;
 use std::path::Path;
 
+use cohaptic_files::write_whole;
 use serde::{Deserialize, Serialize};
 
-use super::write_whole;
 use crate::error::CampaignError;
 use crate::plan::{Parts, Plan};
 use crate::table::Roster;
@@ -74,7 +75,7 @@ impl Manifest {
 
     pub(crate) fn write(&self, path: &Path) -> Result<(), CampaignError> {
         let text = self.text();
-        let written = write_whole(path, |mut file| std::io::Write::write_all(&mut file, text.as_bytes()));
+        let written = write_whole(path, |file| file.write_all(text.as_bytes()));
         written.map_err(|error| CampaignError::File { verb: "write", path: path.to_path_buf(), error })
     }
 

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use cohaptic_files::WholeFile;
+
 use super::{Column, Row, comma_separated, parquet_file};
 
 /// As what the table is written.
@@ -69,7 +71,7 @@ impl Format {
     }
 
     /// A file of its own with these rows.
-    pub(crate) fn write(self, file: &File, head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
+    pub(crate) fn write(self, file: &mut WholeFile, head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
         match self {
             Self::Parquet => parquet_file::write(file, head, rows),
             Self::Csv => Ok(comma_separated::write(file, head.columns, rows)?),
@@ -77,7 +79,7 @@ impl Format {
     }
 
     /// One file with the rows of all parts, one after the other. Each is given with how many rows it must have.
-    pub(crate) fn merge<'a>(self, file: &File, head: Head<'_>, parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
+    pub(crate) fn merge<'a>(self, file: &mut WholeFile, head: Head<'_>, parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
         match self {
             Self::Parquet => parquet_file::merge(file, head, parts),
             Self::Csv => comma_separated::merge(file, head.columns, parts),

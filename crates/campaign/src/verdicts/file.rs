@@ -1,12 +1,13 @@
 //! Judgements as files: a journal that grows by a line for each combination that is judged, and one table of all of them.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Seek as _, SeekFrom, Write as _};
+use std::io::{self, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
+
+use cohaptic_files::write_whole;
 
 use super::{Judgement, Verdict, Words};
 use crate::error::CampaignError;
-use crate::folder::write_whole;
 use crate::plan::Plan;
 use crate::table::{TableError, number_text, value_text};
 
@@ -97,15 +98,14 @@ fn line(cells: impl Iterator<Item = String>) -> io::Result<Vec<u8>> {
 
 /// Writes the table of all judgements: a row for each combination, with the values of its keys.
 pub(crate) fn write_all(path: &Path, plan: &Plan, judgements: &[Judgement]) -> Result<(), CampaignError> {
-    let written = write_whole(path, |file| -> io::Result<()> {
-        let mut to = BufWriter::new(file);
+    let written = write_whole(path, |to| -> io::Result<()> {
         let keys = plan.variations().iter().map(|vary| vary.column());
         to.write_all(&line(std::iter::once("combination".to_owned()).chain(keys).chain(COLUMNS.map(str::to_owned)))?)?;
         for (combination, judgement) in (0..).zip(judgements) {
             let values = plan.values(combination).map(|varied| value_text(&varied.value));
             to.write_all(&line(std::iter::once(combination.to_string()).chain(values).chain(cells(judgement)))?)?;
         }
-        to.flush()
+        Ok(())
     });
     written.map_err(|error| CampaignError::File { verb: "write", path: path.to_path_buf(), error })
 }

@@ -13,6 +13,7 @@ use core::fmt;
 use std::collections::BTreeMap;
 
 use cohaptic_scene::{Fingerprint, Scene, SceneContent};
+use cohaptic_units::print::csv_quoted;
 
 use super::inputs::{InputsError, shorten};
 use super::rows::HEADER;
@@ -176,10 +177,7 @@ impl fmt::Display for RecordedScene {
         writeln!(f, "{HEADER}")?;
         writeln!(f, "0,program,,,{}", self.program)?;
         writeln!(f, "0,scene,,,{}", self.fingerprint)?;
-        let mut row = |kind: &str, name: &str, value: &str| {
-            let line = SceneContent::line(name, value).replace('"', "\"\"");
-            writeln!(f, "0,{kind},,,\"{line}\"")
-        };
+        let mut row = |kind: &str, name: &str, value: &str| writeln!(f, "0,{kind},,,{}", csv_quoted(&SceneContent::line(name, value)));
         for (name, bytes) in &self.content.files {
             row("file", name, &format!("\"{bytes}\""))?;
         }

@@ -18,6 +18,7 @@ use std::path::Path;
 use cohaptic_peer::State;
 use cohaptic_scene::{LinkKeys, PeerKind, Scene};
 use cohaptic_units::Instant;
+use cohaptic_units::print::csv_quoted;
 
 use super::inputs::{Input, InputRow, InputsError, Recorded, shorten};
 
@@ -53,7 +54,7 @@ impl fmt::Display for InputLine<'_> {
                 }
                 Ok(())
             }
-            Input::Link { from, to, keys } => write!(f, "link,{},{},\"{}\"", name(*from), name(*to), keys.to_string().replace('"', "\"\"")),
+            Input::Link { from, to, keys } => write!(f, "link,{},{},{}", name(*from), name(*to), csv_quoted(&keys.to_string())),
             Input::End => f.write_str("end,,,"),
         }
     }
