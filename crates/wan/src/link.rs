@@ -7,11 +7,16 @@ use core::fmt;
 
 use cohaptic_units::{Bytes, Instant};
 
-use crate::event_queue::Event;
-use crate::filter::{Filter, Offered};
+use crate::event_queue::{Event, EventQueue};
+use crate::fates::fate::PacketRecord;
+use crate::fates::fate::{DropCause, Fate};
+use crate::fates::stats::LinkStats;
+use crate::line::filter::{Filter, Offered};
+use crate::line::model::LinkModel;
+use crate::line::name::LinkName;
+use crate::line::pipeline::{Outcome, Pipeline, TimeWentBack, check_time};
+use crate::packet::damage::Damage;
 use crate::packet::{Exit, Marks, Outputs, Packet, PacketInfo};
-use crate::pipeline::{Outcome, Pipeline, check_time};
-use crate::{Damage, DropCause, EventQueue, Fate, LinkModel, LinkName, LinkStats, PacketRecord, TimeWentBack};
 
 /// A directed link as a state machine: packets in with [`Link::handle_packet`], packets and their fates out with [`Link::poll_event`].
 ///

@@ -10,11 +10,15 @@ use cohaptic_units::print::Span;
 use cohaptic_units::{Probability, Rate};
 
 use super::{ChanceSpec, Contradiction, DelaySpec, Distribution, GemodelSpec, JitterSpec, LossSpec, Netem, RateSpec, SlotGap, StateSpec, TableName};
-use crate::law::DistTable;
-use crate::{
-    Bottleneck, Cells, Chance, ChanceError, Checksum, Correlation, Corruption, Delay, DelayError, Displacement, Flips, FourState, FourStateError,
-    Framing, GilbertElliott, Jitter, Layout, LinkConfig, Loss, Reorder, Slots,
-};
+use crate::laws::chance::{Chance, ChanceError};
+use crate::laws::delay::DistTable;
+use crate::stages::config::{Layout, LinkConfig};
+use crate::stages::corruption::{Checksum, Corruption, Flips};
+use crate::stages::delay::{Correlation, Delay, DelayError, Jitter};
+use crate::stages::loss::{FourState, FourStateError, GilbertElliott, Loss};
+use crate::stages::queue::{Bottleneck, Cells, Framing};
+use crate::stages::reorder::{Displacement, Reorder};
+use crate::stages::slots::Slots;
 
 /// Why words that `tc` accepts ask for what cannot be.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
@@ -192,13 +196,13 @@ fn delay(spec: &DelaySpec, tables: Tables<'_>) -> Result<Delay, ExactError> {
 
 fn with_jitter(option: &'static str, mean: Duration, spec: &JitterSpec, tables: Tables<'_>) -> Result<Delay, ExactError> {
     let (distribution, sd) = match &spec.distribution {
-        None | Some(Distribution::Uniform) => (crate::Distribution::Uniform, deviation_of_half_width(spec.time)),
-        Some(Distribution::Normal) => (crate::Distribution::Normal, spec.time),
-        Some(Distribution::Pareto) => (crate::Distribution::Pareto, spec.time),
-        Some(Distribution::ParetoNormal) => (crate::Distribution::ParetoNormal, spec.time),
+        None | Some(Distribution::Uniform) => (crate::laws::delay::Distribution::Uniform, deviation_of_half_width(spec.time)),
+        Some(Distribution::Normal) => (crate::laws::delay::Distribution::Normal, spec.time),
+        Some(Distribution::Pareto) => (crate::laws::delay::Distribution::Pareto, spec.time),
+        Some(Distribution::ParetoNormal) => (crate::laws::delay::Distribution::ParetoNormal, spec.time),
         Some(Distribution::Table(name)) => {
             let table = tables(name).ok_or_else(|| ExactError::NoTable(name.clone()))?;
-            (crate::Distribution::Table(table), spec.time)
+            (crate::laws::delay::Distribution::Table(table), spec.time)
         }
     };
     let correlation = spec.correlation.map_or(Correlation::None, |percent| Correlation::PerPacket(percent.fraction()));

@@ -24,6 +24,7 @@
 mod error;
 mod exact;
 pub mod kernel;
+pub(crate) mod kernel_link;
 mod number;
 mod parse;
 mod percent;

@@ -5,7 +5,9 @@ use alloc::vec::Vec;
 
 use cohaptic_units::{Bytes, Instant};
 
-use crate::{Damage, Fate, TimeWentBack};
+use crate::fates::fate::Fate;
+use crate::line::pipeline::TimeWentBack;
+use crate::packet::damage::Damage;
 
 /// A node of a network, by its place from 0.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]

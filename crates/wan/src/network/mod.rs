@@ -9,6 +9,7 @@
 //! *downlink*, one line that all it receives passes after them.
 
 mod config;
+pub(crate) mod direct_links;
 mod pending;
 
 use alloc::collections::{BTreeMap, VecDeque};
@@ -19,12 +20,16 @@ use cohaptic_units::Instant;
 pub use config::{AccessLine, NetworkConfig, NetworkError, NetworkEvent, NodeId};
 use pending::{Hop, InNetwork, Path, Pending, Place, SizeAndMarks};
 
-use crate::direct::Words;
-use crate::filter::{Filter, Offered};
+use crate::event_queue::EventQueue;
+use crate::fates::fate::{DropCause, Fate};
+use crate::fates::stats::{Flow, LinkStats, Seldom};
+use crate::line::direct::Words;
+use crate::line::filter::{Filter, Offered};
+use crate::line::model::LinkModel;
+use crate::line::name::LinkName;
+use crate::line::pipeline::{Outcome, Pipeline, TimeWentBack, check_time};
+use crate::packet::damage::Damage;
 use crate::packet::{Exit, Marks, Outputs, Packet, PacketInfo};
-use crate::pipeline::{Outcome, Pipeline, check_time};
-use crate::stats::{Flow, Seldom};
-use crate::{Damage, DropCause, EventQueue, Fate, LinkModel, LinkName, LinkStats, TimeWentBack};
 
 /// For so many receivers of a packet, random words are drawn in one go.
 const DRAWN_AT_ONCE: u16 = 8;
@@ -504,7 +509,7 @@ impl<P: Clone> Network<P> {
             }
         }
         self.outputs = outputs;
-        if let Some(at) = self.line_mut(hop, line).pipeline.engine().and_then(crate::engine::Engine::announce) {
+        if let Some(at) = self.line_mut(hop, line).pipeline.engine().and_then(crate::line::engine::Engine::announce) {
             self.announce(hop, line, at);
         }
     }

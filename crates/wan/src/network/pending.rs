@@ -4,8 +4,8 @@ use core::num::NonZeroU32;
 
 use cohaptic_units::{Bytes, Instant};
 
-use crate::PacketInfo;
 use crate::event_queue::Event;
+use crate::packet::PacketInfo;
 
 /// A packet on its way.
 #[derive(Clone, Debug)]

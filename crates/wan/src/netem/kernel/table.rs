@@ -3,7 +3,7 @@
 use alloc::boxed::Box;
 
 use super::built_in;
-use crate::law::{DistTable, DistTableError, dist_file_entries};
+use crate::laws::delay::{DistTable, DistTableError, dist_file_entries};
 
 /// An inverse distribution function at equal steps, in multiples of 1/8192 of the deviation: what a `.dist` file holds.
 #[derive(Clone, PartialEq, Eq, Debug)]

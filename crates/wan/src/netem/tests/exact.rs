@@ -5,12 +5,16 @@ use core::time::Duration;
 
 use cohaptic_units::{Probability, Rate};
 
-use crate::law::{DistTable, Distribution};
+use crate::laws::chance::Chance;
+use crate::laws::delay::{DistTable, Distribution};
 use crate::netem::{ExactError, Netem, TableName};
-use crate::{
-    Bottleneck, Cells, Chance, Checksum, Correlation, Corruption, Delay, Displacement, Flips, FourState, Framing, GilbertElliott, Jitter, Layout,
-    LinkConfig, Loss, Reorder, Slots,
-};
+use crate::stages::config::{Layout, LinkConfig};
+use crate::stages::corruption::{Checksum, Corruption, Flips};
+use crate::stages::delay::{Correlation, Delay, Jitter};
+use crate::stages::loss::{FourState, GilbertElliott, Loss};
+use crate::stages::queue::{Bottleneck, Cells, Framing};
+use crate::stages::reorder::{Displacement, Reorder};
+use crate::stages::slots::Slots;
 
 const MILLISECOND: Duration = Duration::from_millis(1);
 

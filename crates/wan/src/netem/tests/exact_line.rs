@@ -4,8 +4,11 @@ use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
 
+use crate::fates::fate::{DropCause, Fate};
+use crate::line::name::LinkName;
+use crate::link::{Link, LinkEvent};
 use crate::netem::Netem;
-use crate::{DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName};
+use crate::stages::config::LinkConfig;
 
 fn config(words: &str) -> LinkConfig {
     Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap()

@@ -1,6 +1,6 @@
 //! The built-in tables and the files.
 
-use crate::law::DistTableError;
+use crate::laws::delay::DistTableError;
 use crate::netem::kernel::correlated::distributed;
 use crate::netem::kernel::tests::{deviation, mean};
 use crate::netem::kernel::{Prng, Table};

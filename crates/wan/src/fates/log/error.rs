@@ -1,0 +1,132 @@
+//! Why a fate log is refused.
+
+use alloc::string::String;
+use core::fmt;
+
+use cohaptic_units::Instant;
+
+use super::row::FateRow;
+use crate::fates::fate::DropCause;
+
+/// Why a text or a list of records is no complete fate log. Lines are counted from 1, the header being line 1.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FateLogError {
+    /// The first line is not the header.
+    #[error("line 1: found \"{found}\", expected the header \"{}\"", FateRow::HEADER)]
+    Header {
+        /// The first line.
+        found: String,
+    },
+    /// A row does not have eight cells.
+    #[error("line {line}: found {found} cells, expected {} ({})", FateRow::COLUMNS.len(), FateRow::HEADER)]
+    Cells {
+        /// The line.
+        line: u64,
+        /// How many cells it has.
+        found: usize,
+    },
+    /// A cell cannot be read.
+    #[error("line {line}, column {column}: found \"{found}\", expected {expected}")]
+    Cell {
+        /// The line.
+        line: u64,
+        /// The name of the column.
+        column: &'static str,
+        /// What stands there.
+        found: String,
+        /// What would have been right.
+        expected: &'static str,
+    },
+    /// The fate has no such name.
+    #[error("line {line}, column fate: found \"{found}\", expected {FateNames}")]
+    UnknownFate {
+        /// The line.
+        line: u64,
+        /// What stands there.
+        found: String,
+    },
+    /// A packet has no row, though a later one has.
+    #[error("packet {sequence} has no row, though line {line} has packet {later}: expected every packet from 0")]
+    Missing {
+        /// The packet without a row.
+        sequence: u64,
+        /// Where a later one stands.
+        line: u64,
+        /// Its number.
+        later: u64,
+    },
+    /// A packet was offered before the one before it.
+    #[error("line {line}: offered at {offered}, expected not before the packet before it (line {earlier_line}: {earlier})")]
+    OfferedBefore {
+        /// The line.
+        line: u64,
+        /// When the packet was offered.
+        offered: Instant,
+        /// The line of the packet before it.
+        earlier_line: u64,
+        /// When that one was offered.
+        earlier: Instant,
+    },
+    /// Something happened to a packet before it was offered, or its arrival has two instants.
+    #[error("line {line}: offered at {offered} and done with at {at}: expected an instant not before it was offered, and the same in the fate")]
+    ImpossibleTime {
+        /// The line.
+        line: u64,
+        /// When the packet was offered.
+        offered: Instant,
+        /// When this is said to have happened.
+        at: Instant,
+    },
+    /// Two rows of a packet differ in when it was offered or in its size.
+    #[error("line {line}: packet {sequence} has another size or offering instant than on line {other_line}")]
+    Contradiction {
+        /// The packet.
+        sequence: u64,
+        /// One line.
+        line: u64,
+        /// The other.
+        other_line: u64,
+    },
+    /// A packet or copy ends twice.
+    #[error("line {line}: copy {copy} of packet {sequence} has a second end: expected one row `delivered` or with a drop cause")]
+    TwoEnds {
+        /// The packet.
+        sequence: u64,
+        /// The copy; 0 is the packet itself.
+        copy: u8,
+        /// The line of an end too many.
+        line: u64,
+    },
+    /// A packet or copy never ends.
+    #[error("copy {copy} of packet {sequence} has no end: expected a row `delivered` or with a drop cause (was the log cut off?)")]
+    NoEnd {
+        /// The packet.
+        sequence: u64,
+        /// The copy; 0 is the packet itself.
+        copy: u64,
+    },
+    /// There are more copies than were made.
+    #[error("packet {sequence} has {copies} copies beyond itself and {made} rows `duplicated`: expected as many of one as of the other")]
+    CopyFromNowhere {
+        /// The packet.
+        sequence: u64,
+        /// Copies with an end, the packet itself not counted.
+        copies: u64,
+        /// Rows that say a copy was made.
+        made: u64,
+    },
+}
+
+/// All that the column `fate` may hold.
+struct FateNames;
+
+impl fmt::Display for FateNames {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("delivered, duplicated")?;
+        for cause in DropCause::ALL {
+            write!(f, ", {}", cause.name())?;
+        }
+        Ok(())
+    }
+}

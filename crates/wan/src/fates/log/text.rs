@@ -1,0 +1,90 @@
+//! Reads the text of a fate log.
+
+use alloc::string::ToString;
+use alloc::vec::Vec;
+use core::str::FromStr;
+
+use cohaptic_units::{Bytes, Instant};
+
+use super::error::FateLogError;
+use super::row::FateRow;
+use crate::fates::fate::{DropCause, Fate, PacketRecord};
+
+/// A record and the line on which it stood.
+pub(super) type Numbered = (u64, PacketRecord);
+
+/// Reads every row, and the line it stands on.
+pub(super) fn rows(text: &str) -> Result<Vec<Numbered>, FateLogError> {
+    // A byte order mark is what some spreadsheets begin a file with.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut lines = text.lines();
+    let header = lines.next().unwrap_or_default();
+    if header != FateRow::HEADER {
+        return Err(FateLogError::Header { found: header.to_string() });
+    }
+    (2..).zip(lines).map(|(line, row)| Ok((line, record(line, row)?))).collect()
+}
+
+fn record(line: u64, row: &str) -> Result<PacketRecord, FateLogError> {
+    let mut cells = [""; FateRow::COLUMNS.len()];
+    let found = row.split(',').count();
+    if found != cells.len() {
+        return Err(FateLogError::Cells { line, found });
+    }
+    for (cell, text) in cells.iter_mut().zip(row.split(',')) {
+        *cell = text;
+    }
+    let row = Row { line, cells };
+    let at = Instant::from_nanos(row.number(4)?);
+    Ok(PacketRecord {
+        sequence: row.number(0)?,
+        copy: row.read(1, "a number from 0 to 255")?,
+        offered: Instant::from_nanos(row.number(2)?),
+        at,
+        size: Bytes::new(row.number(3)?),
+        fate: row.fate(5, at)?,
+        marked: row.flag(6)?,
+        damaged: row.flag(7)?,
+    })
+}
+
+struct Row<'a> {
+    line: u64,
+    cells: [&'a str; FateRow::COLUMNS.len()],
+}
+
+impl Row<'_> {
+    fn number(&self, column: usize) -> Result<u64, FateLogError> {
+        self.read(column, "a whole number from 0 to 2^64 - 1")
+    }
+
+    fn read<T: FromStr>(&self, column: usize, expected: &'static str) -> Result<T, FateLogError> {
+        let text = self.cells[column];
+        // Rust reads "+1" too, which no writer of this format writes.
+        let plain = text.bytes().all(|byte| byte.is_ascii_digit());
+        text.parse().ok().filter(|_| plain).ok_or_else(|| self.refused(column, expected))
+    }
+
+    fn flag(&self, column: usize) -> Result<bool, FateLogError> {
+        match self.cells[column] {
+            "0" => Ok(false),
+            "1" => Ok(true),
+            _ => Err(self.refused(column, "0 or 1")),
+        }
+    }
+
+    fn fate(&self, column: usize, at: Instant) -> Result<Fate, FateLogError> {
+        let name = self.cells[column];
+        if let Some(cause) = DropCause::from_name(name) {
+            return Ok(Fate::Dropped(cause));
+        }
+        [Fate::Delivered(at), Fate::Duplicated]
+            .into_iter()
+            .find(|fate| fate.name() == name)
+            .ok_or_else(|| FateLogError::UnknownFate { line: self.line, found: name.to_string() })
+    }
+
+    fn refused(&self, column: usize, expected: &'static str) -> FateLogError {
+        FateLogError::Cell { line: self.line, column: FateRow::COLUMNS[column], found: self.cells[column].to_string(), expected }
+    }
+}

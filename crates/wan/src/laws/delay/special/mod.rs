@@ -1,0 +1,9 @@
+//! The special functions that `libm` lacks, to the last digits of an `f64` and in both tails.
+
+pub(super) mod gamma;
+pub(super) mod gamma_inverse;
+pub(super) mod log_gamma;
+pub(super) mod normal;
+pub(super) mod quadrature;
+pub(super) mod root;
+mod temme;

@@ -1,0 +1,134 @@
+//! The laws before they are shifted and stretched.
+
+use alloc::sync::Arc;
+
+use super::gamma_map::GammaMap;
+use super::special::{gamma, gamma_inverse, normal};
+use super::tail::Tail;
+use super::{DistTable, Empirical, pareto_normal};
+use crate::laws::normal::standard_normal;
+
+/// A law with its form alone; a delay is origin + scale·X.
+#[derive(Clone, Debug)]
+pub(super) enum Standard {
+    /// Zero.
+    Constant,
+    Normal,
+    /// On [−√3, √3].
+    Uniform,
+    /// From 1, tail index 3.
+    Pareto,
+    /// See [`pareto_normal`].
+    ParetoNormal,
+    /// Of mean 0 and standard deviation 1.
+    Laplace,
+    /// e^(σ·z).
+    LogNormal {
+        sigma: f64,
+    },
+    /// Of scale 1.
+    Gamma(Arc<GammaMap>),
+    /// Of scale 1: e^t, where e is exponential.
+    Weibull {
+        inverse_shape: f64,
+    },
+    Empirical(Arc<Empirical>),
+    /// The entries as they stand.
+    Table(Arc<DistTable>),
+}
+
+const SQRT_3: f64 = 1.732_050_807_568_877_2;
+
+impl Standard {
+    /// F⁻¹(Φ(z)).
+    #[inline]
+    pub(super) fn at_normal(&self, z: f64) -> f64 {
+        match self {
+            Self::Normal => z,
+            Self::LogNormal { sigma } => libm::exp(sigma * z),
+            Self::Gamma(map) => map.at_normal(z),
+            Self::ParetoNormal => pareto_normal::at(z, normal::below(-z)),
+            Self::Constant | Self::Uniform | Self::Pareto | Self::Laplace | Self::Weibull { .. } | Self::Empirical(_) | Self::Table(_) => {
+                self.at(Tail::of_normal(z))
+            }
+        }
+    }
+
+    /// F⁻¹ at a place.
+    pub(super) fn at(&self, place: Tail) -> f64 {
+        match self {
+            Self::Constant => 0.0,
+            Self::Normal => place.normal(),
+            Self::Uniform => match place {
+                Tail::Below(p) => SQRT_3 * (2.0 * p - 1.0),
+                Tail::Above(q) => SQRT_3 * (1.0 - 2.0 * q),
+            },
+            Self::Pareto => 1.0 / libm::cbrt(place.above()),
+            Self::ParetoNormal => pareto_normal::at(place.normal(), place.above()),
+            Self::Laplace => match place {
+                Tail::Below(p) => libm::log(2.0 * p) * core::f64::consts::FRAC_1_SQRT_2,
+                Tail::Above(q) => -libm::log(2.0 * q) * core::f64::consts::FRAC_1_SQRT_2,
+            },
+            Self::LogNormal { sigma } => libm::exp(sigma * place.normal()),
+            Self::Gamma(map) => gamma_inverse::inverse(map.shape(), place, place.normal()),
+            Self::Weibull { inverse_shape } => libm::pow(-place.log_above(), *inverse_shape),
+            Self::Empirical(values) => values.at(place),
+            Self::Table(table) => table.at(place),
+        }
+    }
+
+    /// One draw. Where a normal number is the quickest way there, it is made by the ziggurat, which seldom asks for more words.
+    #[inline]
+    pub(super) fn draw(&self, word: u64, more: impl FnMut() -> u64) -> f64 {
+        match self {
+            Self::Normal => standard_normal(word, more),
+            Self::LogNormal { .. } | Self::Gamma(_) => self.at_normal(standard_normal(word, more)),
+            Self::Constant
+            | Self::Uniform
+            | Self::Pareto
+            | Self::ParetoNormal
+            | Self::Laplace
+            | Self::Weibull { .. }
+            | Self::Empirical(_)
+            | Self::Table(_) => self.at(Tail::of_word(word)),
+        }
+    }
+
+    /// The probabilities of at most x and of more, each accurate where it is small.
+    pub(super) fn tails(&self, x: f64) -> (f64, f64) {
+        let of_normal = |z: f64| (normal::below(z), normal::below(-z));
+        match self {
+            Self::Constant => {
+                if x < 0.0 {
+                    (0.0, 1.0)
+                } else {
+                    (1.0, 0.0)
+                }
+            }
+            Self::Normal => of_normal(x),
+            Self::Uniform => {
+                let above = (0.5 * (1.0 - x / SQRT_3)).clamp(0.0, 1.0);
+                ((0.5 * (1.0 + x / SQRT_3)).clamp(0.0, 1.0), above)
+            }
+            Self::Pareto if x <= 1.0 => (0.0, 1.0),
+            Self::Pareto => (-libm::expm1(-3.0 * libm::log(x)), 1.0 / (x * x * x)),
+            Self::ParetoNormal => of_normal(pareto_normal::normal_of(x)),
+            Self::Laplace => {
+                let shorter = 0.5 * libm::exp(-x.abs() * core::f64::consts::SQRT_2);
+                if x < 0.0 { (shorter, 1.0 - shorter) } else { (1.0 - shorter, shorter) }
+            }
+            Self::LogNormal { .. } | Self::Gamma(_) | Self::Weibull { .. } if x <= 0.0 => (0.0, 1.0),
+            Self::LogNormal { sigma } => of_normal(libm::log(x) / sigma),
+            Self::Gamma(map) => {
+                let at = gamma::incomplete(map.shape(), x);
+                (at.below, at.above)
+            }
+            Self::Weibull { inverse_shape } => {
+                let hazard = libm::pow(x, 1.0 / inverse_shape);
+                (-libm::expm1(-hazard), libm::exp(-hazard))
+            }
+            Self::Empirical(values) => values.tails(x),
+            Self::Table(table) => table.tails(x),
+        }
+    }
+}

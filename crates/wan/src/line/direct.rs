@@ -1,0 +1,87 @@
+//! The stages that decide at once and make no copies: outage, loss, delay with jitter, order.
+//!
+//! A link with no other stage is these and nothing else: a function from a packet to its arrival.
+
+use alloc::boxed::Box;
+
+use cohaptic_units::Instant;
+
+use crate::fates::fate::DropCause;
+use crate::line::name::LinkName;
+use crate::random::{Purpose, Stream};
+use crate::stages::config::LinkConfig;
+use crate::stages::delay::DelayStage;
+use crate::stages::loss::LossStage;
+use crate::stages::order::OrderStage;
+use crate::stages::outage::OutageStage;
+
+/// The first words of a packet for loss and for jitter.
+pub(crate) type Words = [u64; 2];
+
+#[derive(Clone, Debug)]
+pub(crate) struct Direct {
+    /// The random numbers of the link, one address a packet.
+    pub(crate) draws: Stream,
+    is_random: bool,
+    /// In a box, as whatever is seldom: the links of a large mesh fill the cache.
+    outages: Option<Box<OutageStage>>,
+    pub(crate) loss: Option<LossStage>,
+    pub(crate) delay: DelayStage,
+    pub(crate) order: OrderStage,
+}
+
+impl Direct {
+    pub(crate) fn new(seed: u64, name: &LinkName, config: &LinkConfig) -> Self {
+        let draws = Stream::new(seed, name.as_str().as_bytes());
+        Self {
+            draws,
+            is_random: config.is_random(),
+            outages: OutageStage::new(config.outages.clone(), draws).map(Box::new),
+            loss: LossStage::new(config.loss.clone(), draws.packet(0).first(Purpose::InitialState)),
+            delay: DelayStage::new(&config.delay),
+            order: OrderStage::new(config.order),
+        }
+    }
+
+    /// The first random words of packet number `number`, which [`Direct::offer`] wants; zeros if the link draws none.
+    #[inline]
+    pub(crate) fn words(&self, number: u64) -> Words {
+        if self.is_random { self.draws.packet(number).loss_and_jitter() } else { [0; 2] }
+    }
+
+    /// When a packet arrives, or why it never does.
+    #[inline(always)]
+    pub(crate) fn offer(&mut self, now: Instant, number: u64, [loss_word, jitter_word]: Words) -> Result<Instant, DropCause> {
+        if self.is_down(now) {
+            return Err(DropCause::Outage);
+        }
+        let packet = self.draws.packet(number);
+        if let Some(loss) = &mut self.loss
+            && loss.loses(now, number, loss_word, packet)
+        {
+            return Err(DropCause::Loss);
+        }
+        let delay = self.delay.draw_nanos(now, jitter_word, packet);
+        Ok(self.order.arrival(now.saturating_add_nanos(delay)))
+    }
+
+    pub(crate) const fn has_outages(&self) -> bool {
+        self.outages.is_some()
+    }
+
+    /// Whether the link is down for a packet that is offered `now`.
+    #[inline]
+    pub(crate) fn is_down(&mut self, now: Instant) -> bool {
+        self.outages.as_mut().is_some_and(|outages| outages.is_down(now, self.draws))
+    }
+
+    /// Changes the configuration, keeping what the stages remember.
+    pub(crate) fn reconfigure(&mut self, now: Instant, config: &LinkConfig) {
+        self.is_random = config.is_random();
+        self.outages = OutageStage::reconfigured(self.outages.take().map(|stage| *stage), now, config.outages.clone(), self.draws).map(Box::new);
+        let initial = self.draws.packet(0).first(Purpose::InitialState);
+        self.loss = LossStage::reconfigured(self.loss.take(), config.loss.clone(), initial);
+        self.delay.reconfigure(&config.delay);
+        self.order.set_policy(config.order);
+    }
+}

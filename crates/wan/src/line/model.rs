@@ -1,0 +1,154 @@
+//! What kind of link it is.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use crate::fates::log::FateLog;
+use crate::netem::kernel::{Qdisc, QdiscError, Table};
+use crate::netem::{Netem, TableName};
+use crate::stages::config::{Layout, LinkConfig};
+use crate::stages::modulation::Modulated;
+
+/// What a link is: one configuration, several in turn, a recording, or Linux's netem to the bit.
+#[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
+#[expect(clippy::large_enum_variant, reason = "nearly all links are of the large variant, and a scene shares one model between its links")]
+pub enum LinkModel {
+    /// One configuration.
+    Fixed(LinkConfig),
+    /// A configuration for each state of a modulator.
+    Modulated(Modulated),
+    /// The n-th packet meets the fate of the n-th packet of the log, as long after it was offered. What is offered after the log has ended is dropped.
+    Replay(Arc<FateLog>),
+    /// What Linux 6.6 does with these words: see [`crate::netem::kernel`].
+    Kernel(KernelNetem),
+}
+
+/// A kernel's netem, checked. Its packets have the length of the link's, so that an overhead counts from there; each link draws with a seed of its own, unless
+/// the words name one.
+#[derive(Clone, PartialEq, Debug)]
+pub struct KernelNetem {
+    words: Netem,
+    tables: Arc<[(TableName, Table)]>,
+}
+
+impl KernelNetem {
+    /// Checks the words. `tables` has those distributions that they name and that are not built in.
+    ///
+    /// # Errors
+    ///
+    /// [`QdiscError`] if options contradict each other, a delay is beyond what `tc` counts, or a table is missing.
+    pub fn new(words: Netem, tables: Vec<(TableName, Table)>) -> Result<Self, QdiscError> {
+        let checked = Self { words, tables: tables.into() };
+        checked.build::<()>(0)?;
+        Ok(checked)
+    }
+
+    /// The words.
+    #[must_use]
+    pub const fn words(&self) -> &Netem {
+        &self.words
+    }
+
+    pub(crate) fn qdisc<T>(&self, seed: u64) -> Qdisc<T> {
+        self.build(seed).expect("it was built once when it was checked")
+    }
+
+    fn build<T>(&self, seed: u64) -> Result<Qdisc<T>, QdiscError> {
+        let table = |wanted: &TableName| self.tables.iter().find(|(name, _)| name == wanted).map(|(_, table)| table.clone());
+        Qdisc::with_tables(&self.words, seed, table)
+    }
+}
+
+impl Default for LinkModel {
+    /// The ideal link.
+    fn default() -> Self {
+        Self::Fixed(LinkConfig::default())
+    }
+}
+
+impl From<LinkConfig> for LinkModel {
+    fn from(config: LinkConfig) -> Self {
+        Self::Fixed(config)
+    }
+}
+
+impl From<Modulated> for LinkModel {
+    fn from(modulated: Modulated) -> Self {
+        Self::Modulated(modulated)
+    }
+}
+
+impl From<KernelNetem> for LinkModel {
+    fn from(netem: KernelNetem) -> Self {
+        Self::Kernel(netem)
+    }
+}
+
+impl LinkModel {
+    /// The configuration, if there is but one.
+    #[must_use]
+    pub const fn as_fixed(&self) -> Option<&LinkConfig> {
+        match self {
+            Self::Fixed(config) => Some(config),
+            Self::Modulated(_) | Self::Replay(_) | Self::Kernel(_) => None,
+        }
+    }
+
+    /// The order of its stages, if it has stages.
+    pub(crate) fn layout(&self) -> Option<Layout> {
+        match self {
+            Self::Fixed(config) => Some(config.layout),
+            Self::Modulated(modulated) => modulated.configs().first().map(|config| config.layout),
+            Self::Replay(_) | Self::Kernel(_) => None,
+        }
+    }
+
+    /// Whether all that the link does is to delay every packet by the same span.
+    #[must_use]
+    pub fn is_constant_delay(&self) -> bool {
+        self.as_fixed().is_some_and(LinkConfig::is_constant_delay)
+    }
+
+    /// The mean propagation delay asked for, of all states alike; zero where only a recording knows.
+    #[must_use]
+    pub fn mean_delay(&self) -> Duration {
+        match self {
+            Self::Fixed(config) => config.delay.mean(),
+            Self::Modulated(modulated) => {
+                let configs = modulated.configs();
+                configs.iter().map(|config| config.delay.mean()).sum::<Duration>() / u32::try_from(configs.len()).unwrap_or(u32::MAX)
+            }
+            Self::Replay(_) => Duration::ZERO,
+            Self::Kernel(netem) => netem.words().delay.as_ref().map_or(Duration::ZERO, |delay| delay.time),
+        }
+    }
+
+    /// Whether anything that this link does is left to chance.
+    #[must_use]
+    pub fn has_chance(&self) -> bool {
+        match self {
+            Self::Fixed(config) => config.has_chance(),
+            Self::Modulated(_) | Self::Kernel(_) => true,
+            Self::Replay(_) => false,
+        }
+    }
+
+    /// Whether this link draws random numbers for loss or for jitter as soon as a packet is offered.
+    pub(crate) fn is_random(&self) -> bool {
+        match self {
+            Self::Fixed(config) => config.is_random(),
+            Self::Modulated(_) | Self::Replay(_) | Self::Kernel(_) => false,
+        }
+    }
+
+    /// Whether what becomes of a packet is known as soon as it is offered, and nothing is copied: what [`crate::DirectLinks`] takes.
+    #[must_use]
+    pub fn is_direct(&self) -> bool {
+        match self {
+            Self::Fixed(config) => config.is_direct(),
+            Self::Modulated(_) | Self::Replay(_) | Self::Kernel(_) => false,
+        }
+    }
+}

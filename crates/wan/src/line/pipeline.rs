@@ -1,0 +1,212 @@
+//! One link without what is on the way: what decides what becomes of a packet, compiled to the least that the link needs.
+//!
+//! | link | compiled to |
+//! | --- | --- |
+//! | a constant delay | one addition |
+//! | outage, loss, jitter, order policy | a function from a packet to its arrival |
+//! | anything else | an engine that keeps packets, copies them and asks to be woken |
+
+use alloc::boxed::Box;
+
+use cohaptic_units::Instant;
+
+use crate::fates::fate::DropCause;
+use crate::line::direct::{Direct, Words};
+use crate::line::engine::{Engine, Kind};
+use crate::line::model::LinkModel;
+use crate::line::name::LinkName;
+use crate::line::replay::ReplayStage;
+use crate::line::staged::Staged;
+use crate::netem::kernel_link::KernelStage;
+use crate::packet::Outputs;
+use crate::random::{Purpose, Stream};
+use crate::stages::config::LinkConfig;
+use crate::stages::modulation::ModulationStage;
+use crate::stages::order::{Order, OrderStage};
+
+/// Time was given that is earlier than a time given before. Nothing was changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("time went back to {now} after {was}")]
+#[non_exhaustive]
+pub struct TimeWentBack {
+    /// The time given.
+    pub now: Instant,
+    /// The latest time given before.
+    pub was: Instant,
+}
+
+/// Checks that time does not go back, and remembers it.
+pub(crate) fn check_time(clock: &mut Instant, now: Instant) -> Result<(), TimeWentBack> {
+    if now < *clock {
+        return Err(TimeWentBack { now, was: *clock });
+    }
+    *clock = now;
+    Ok(())
+}
+
+/// What becomes of an offered packet, as far as it is known at once.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Outcome {
+    Arrives(Instant),
+    Dropped(DropCause),
+    /// It must go into the engine: see [`Pipeline::engine`].
+    Enters,
+}
+
+/// What a link is compiled to.
+#[derive(Clone, Debug)]
+pub(crate) enum Pipeline<T> {
+    /// Nothing but a constant delay \[ns\]. The order stage only remembers the latest arrival, for a live change to `in-order`.
+    Constant(u64, OrderStage),
+    Direct(Box<Direct>),
+    Engine(Box<Engine<T>>),
+}
+
+impl<T: Clone> Pipeline<T> {
+    /// The least that this model needs, or the most general if `general`.
+    pub(crate) fn new(seed: u64, name: &LinkName, model: LinkModel, general: bool) -> Self {
+        match model {
+            LinkModel::Fixed(config) if config.is_constant_delay() && !general => {
+                Self::Constant(constant_nanos(&config), OrderStage::new(Order::AllowReordering))
+            }
+            LinkModel::Fixed(config) if config.is_direct() && !general => Self::Direct(Box::new(Direct::new(seed, name, &config))),
+            LinkModel::Fixed(_) | LinkModel::Modulated(_) | LinkModel::Replay(_) | LinkModel::Kernel(_) => {
+                Self::Engine(Box::new(Engine::new(kind(Instant::ZERO, seed, name, model, None))))
+            }
+        }
+    }
+
+    /// The first random words of packet number `number`, which [`Pipeline::offer`] wants; zeros if it wants none.
+    #[inline]
+    pub(crate) fn words(&self, number: u64) -> Words {
+        match self {
+            Self::Direct(direct) => direct.words(number),
+            Self::Constant(..) | Self::Engine(_) => [0; 2],
+        }
+    }
+
+    /// Decides about packet number `number` of this link.
+    #[inline]
+    pub(crate) fn offer(&mut self, now: Instant, number: u64, words: Words) -> Outcome {
+        match self {
+            Self::Constant(delay, order) => Outcome::Arrives(order.arrival(now.saturating_add_nanos(*delay))),
+            Self::Direct(direct) => match direct.offer(now, number, words) {
+                Ok(at) => Outcome::Arrives(at),
+                Err(cause) => Outcome::Dropped(cause),
+            },
+            Self::Engine(_) => Outcome::Enters,
+        }
+    }
+
+    /// The engine, if the link has one.
+    pub(crate) fn engine(&mut self) -> Option<&mut Engine<T>> {
+        match self {
+            Self::Engine(engine) => Some(engine),
+            Self::Constant(..) | Self::Direct(_) => None,
+        }
+    }
+
+    /// When the engine must be woken, if the link has one.
+    #[inline]
+    pub(crate) fn next_wake(&self) -> Option<Instant> {
+        match self {
+            Self::Engine(engine) => engine.next_at(),
+            Self::Constant(..) | Self::Direct(_) => None,
+        }
+    }
+
+    /// Changes the model. What propagates keeps its delay. What leaves the engine by that is in `outputs`.
+    pub(crate) fn reconfigure(&mut self, now: Instant, seed: u64, name: &LinkName, model: LinkModel, outputs: &mut Outputs<T>) {
+        match (self, model) {
+            (Self::Constant(delay, _), LinkModel::Fixed(config)) if config.is_constant_delay() => *delay = constant_nanos(&config),
+            (Self::Direct(direct), LinkModel::Fixed(config)) if config.is_direct() => direct.reconfigure(now, &config),
+            (Self::Engine(engine), model) => reconfigure_engine(engine, now, seed, name, model, outputs),
+            (pipeline, model) => {
+                let past = match pipeline {
+                    Self::Direct(direct) => Some((**direct).clone()),
+                    Self::Constant(delay, order) => {
+                        let delay = crate::stages::delay::Delay::constant(core::time::Duration::from_nanos(*delay));
+                        let mut direct = Direct::new(seed, name, &LinkConfig { delay, ..LinkConfig::default() });
+                        direct.order = *order;
+                        Some(direct)
+                    }
+                    Self::Engine(_) => None,
+                };
+                *pipeline = match (model, past) {
+                    (LinkModel::Fixed(config), Some(mut direct)) if config.is_direct() => {
+                        direct.reconfigure(now, &config);
+                        Self::Direct(Box::new(direct))
+                    }
+                    (model, past) => Self::Engine(Box::new(Engine::new(kind(now, seed, name, model, past)))),
+                };
+            }
+        }
+    }
+}
+
+fn reconfigure_engine<T: Clone>(engine: &mut Engine<T>, now: Instant, seed: u64, name: &LinkName, model: LinkModel, outputs: &mut Outputs<T>) {
+    engine.pass(now, outputs);
+    match (&mut engine.kind, model) {
+        // Packets inside are at a place in the old order of stages, which they go on in; new ones find the stages that remember as they are.
+        (Kind::Staged(staged), model) if model.layout().is_some_and(|layout| layout != staged.layout()) => {
+            let past = staged.direct().clone();
+            engine.replace(kind(now, seed, name, model, Some(past)));
+        }
+        (Kind::Staged(staged), LinkModel::Fixed(config)) => staged.reconfigure(now, config, None, outputs),
+        (Kind::Staged(staged), LinkModel::Modulated(modulated)) => {
+            let modulation = ModulationStage::new(seed, modulated, now);
+            staged.reconfigure(now, modulation.config().clone(), Some(modulation), outputs);
+        }
+        (_, model) => engine.replace(kind(now, seed, name, model, None)),
+    }
+}
+
+/// The engine for a model, around the stages that decide at once if they have a past.
+fn kind<T: Clone>(now: Instant, seed: u64, name: &LinkName, model: LinkModel, past: Option<Direct>) -> Kind<T> {
+    let staged = |config: LinkConfig, modulation| {
+        // A link that becomes one with stages later begins its outages then.
+        let direct = past.unwrap_or_else(|| {
+            let mut direct = Direct::new(seed, name, &LinkConfig::default());
+            direct.reconfigure(now, &config);
+            direct
+        });
+        Kind::Staged(Box::new(Staged::new(now, direct, config, modulation)))
+    };
+    match model {
+        LinkModel::Fixed(config) => staged(config, None),
+        LinkModel::Modulated(modulated) => {
+            let modulation = ModulationStage::new(seed, modulated, now);
+            staged(modulation.config().clone(), Some(modulation))
+        }
+        LinkModel::Replay(log) => Kind::Replay(ReplayStage::new(log)),
+        LinkModel::Kernel(netem) => {
+            let seed = Stream::new(seed, name.as_str().as_bytes()).packet(0).first(Purpose::InitialState);
+            Kind::Kernel(Box::new(KernelStage::new(netem.qdisc(seed))))
+        }
+    }
+}
+
+fn constant_nanos(config: &LinkConfig) -> u64 {
+    u64::try_from(config.delay.mean().as_nanos()).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::netem::Netem;
+
+    fn of_words(words: &str, general: bool) -> Pipeline<()> {
+        let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+        Pipeline::new(1, &LinkName::between("a", "b"), config.into(), general)
+    }
+
+    #[test]
+    fn a_link_of_words_is_compiled_to_the_least_that_it_needs() {
+        assert!(matches!(of_words("delay 24ms", false), Pipeline::Constant(24_000_000, _)));
+        assert!(matches!(of_words("delay 24ms 2ms loss 1%", false), Pipeline::Direct(_)));
+        for words in ["delay 24ms limit 10", "delay 24ms duplicate 1%", "delay 24ms rate 1mbit", "delay 24ms loss 1% ecn"] {
+            assert!(matches!(of_words(words, false), Pipeline::Engine(_)), "{words}");
+        }
+        assert!(matches!(of_words("delay 24ms", true), Pipeline::Engine(_)));
+    }
+}

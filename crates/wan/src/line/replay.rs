@@ -1,0 +1,80 @@
+//! A link that replays a fate log.
+
+use alloc::collections::BinaryHeap;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::cmp::Reverse;
+use core::time::Duration;
+
+use cohaptic_units::Instant;
+
+use crate::fates::fate::PacketRecord;
+use crate::fates::fate::{DropCause, Fate};
+use crate::fates::log::FateLog;
+use crate::packet::damage::Damage;
+use crate::packet::{Carried, Exit, Output, Outputs};
+
+/// The log, and what is yet to happen of it other than arrivals.
+#[derive(Clone, Debug)]
+pub(crate) struct ReplayStage<T> {
+    log: Arc<FateLog>,
+    /// By instant and place in `later`.
+    order: BinaryHeap<Reverse<(Instant, usize)>>,
+    later: Vec<Option<Output<T>>>,
+}
+
+impl<T: Clone> ReplayStage<T> {
+    pub(crate) const fn new(log: Arc<FateLog>) -> Self {
+        Self { log, order: BinaryHeap::new(), later: Vec::new() }
+    }
+
+    pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) {
+        let log = Arc::clone(&self.log);
+        let records = log.of_packet(packet.number);
+        if records.is_empty() {
+            outputs.push(Output { packet, exit: Exit::Dropped(now, DropCause::EndOfLog) });
+            return;
+        }
+        // The log may write the number of the packet or of the copy beside a copy's making: the n-th made is the n-th that ends.
+        let mut copies = records.iter().filter(|record| record.copy > 0 && record.fate.is_end()).map(|record| record.copy);
+        for record in records {
+            let at = now.saturating_add(after(record));
+            let (copy, exit) = match record.fate {
+                Fate::Delivered(_) => (record.copy, Exit::Arrives(at)),
+                Fate::Dropped(cause) => (record.copy, Exit::Dropped(at, cause)),
+                Fate::Duplicated => (copies.next().unwrap_or(record.copy), Exit::Copied(at)),
+            };
+            let mut packet = packet.clone().as_copy(copy);
+            packet.marks.congestion |= record.marked;
+            if record.damaged {
+                packet.marks.damage(Some(Damage::unknown()), false);
+            }
+            let output = Output { packet, exit };
+            if at == now || matches!(exit, Exit::Arrives(_)) {
+                outputs.push(output);
+            } else {
+                self.order.push(Reverse((at, self.later.len())));
+                self.later.push(Some(output));
+            }
+        }
+    }
+
+    pub(crate) fn next_at(&self) -> Option<Instant> {
+        self.order.peek().map(|Reverse((at, _))| *at)
+    }
+
+    pub(crate) fn pass(&mut self, now: Instant, outputs: &mut Outputs<T>) {
+        while self.next_at().is_some_and(|at| at <= now) {
+            let Some(Reverse((_, place))) = self.order.pop() else { break };
+            outputs.extend(self.later[place].take());
+        }
+        if self.order.is_empty() {
+            self.later.clear();
+        }
+    }
+}
+
+/// How long after its offer it happened.
+fn after(record: &PacketRecord) -> Duration {
+    record.at.saturating_duration_since(record.offered)
+}

@@ -1,0 +1,97 @@
+//! What a link does to its packets.
+
+use cohaptic_units::Bytes;
+
+use crate::laws::chance::Chance;
+use crate::stages::corruption::Corruption;
+use crate::stages::delay::Delay;
+use crate::stages::loss::Loss;
+use crate::stages::order::Order;
+use crate::stages::outage::Outages;
+use crate::stages::path_trace::PathTrace;
+use crate::stages::queue::{Bottleneck, Discipline, TokenBucket};
+use crate::stages::reorder::Reorder;
+use crate::stages::slots::Slots;
+
+/// The configuration of one directed link: which impairments it has, each checked when it was made.
+///
+/// The default is the ideal link: no loss, no queue, no delay. Packets pass the stages in the order of the fields, unless `layout` says otherwise.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct LinkConfig {
+    /// The largest packet that the link takes; `None`: any.
+    pub mtu: Option<Bytes>,
+    /// When the link is down. A packet offered meanwhile is dropped; what is already on the way arrives.
+    pub outages: Outages,
+    /// Which packets are lost. Loss stands before the queue: a lost packet uses no bandwidth.
+    pub loss: Loss,
+    /// Whether a packet that understands ECN is marked where another would be lost.
+    pub marks_instead_of_loss: bool,
+    /// Which packets are sent twice. The copy goes its own way from here on.
+    pub duplication: Chance,
+    /// Which bits are flipped.
+    pub corruption: Option<Corruption>,
+    /// How many packets may be inside the link, waiting and propagating together, when another comes; `None`: any number.
+    pub limit: Option<u64>,
+    /// How much may leave in bursts; `None`: anything.
+    pub token_bucket: Option<TokenBucket>,
+    /// The rate at which packets are serialised, and the queue before it; `None`: unlimited, nothing waits.
+    pub bottleneck: Option<Bottleneck>,
+    /// When the link sends at all; `None`: always.
+    pub slots: Option<Slots>,
+    /// Packets that are put out of order on purpose.
+    pub reorder: Option<Reorder>,
+    /// A recorded delay and loss, on top of the others.
+    pub trace: Option<PathTrace>,
+    /// The propagation delay and its jitter.
+    pub delay: Delay,
+    /// Whether a packet may overtake another.
+    pub order: Order,
+    /// In which order packets pass the stages.
+    pub layout: Layout,
+}
+
+/// In which order packets pass the stages.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[non_exhaustive]
+pub enum Layout {
+    /// That of the fields of [`LinkConfig`]: first what the network does, then the queue, then propagation.
+    #[default]
+    Physical,
+    /// That of `netem`: duplication before loss, and the rate and the slots behind the delay, so that a queue forms of what has already travelled.
+    Netem,
+}
+
+impl LinkConfig {
+    /// Whether this link draws random numbers for loss or for jitter, which most random links do.
+    #[must_use]
+    pub fn is_random(&self) -> bool {
+        self.loss.is_random() || self.delay.jitter().is_some()
+    }
+
+    /// Whether anything that this link does is left to chance.
+    #[must_use]
+    pub fn has_chance(&self) -> bool {
+        self.is_random()
+            || self.outages.random().is_some()
+            || !self.duplication.is_never()
+            || self.corruption.is_some()
+            || self.slots.is_some()
+            || self.reorder.is_some()
+            || self.trace.is_some()
+            || self.bottleneck.as_ref().is_some_and(|bottleneck| matches!(bottleneck.discipline, Discipline::Red(_)))
+    }
+
+    /// Whether all that this link does is to delay every packet by the same span.
+    #[must_use]
+    pub fn is_constant_delay(&self) -> bool {
+        // The order policy counts: a live change to a shorter delay lets later packets overtake. The order of stages does not where there is one.
+        *self == Self { layout: self.layout, delay: Delay::constant(self.delay.mean()), ..Self::default() }
+    }
+
+    /// Whether a packet's fate is known as soon as it is offered, and there are no copies: nothing waits, nothing is counted.
+    pub(crate) fn is_direct(&self) -> bool {
+        // In both layouts these follow each other in the same order.
+        let Self { layout, outages, loss, delay, order, .. } = self.clone();
+        *self == Self { layout, outages, loss, delay, order, ..Self::default() }
+    }
+}

@@ -1,0 +1,156 @@
+//! Which packets are lost.
+
+mod four_state;
+mod gilbert_elliott;
+mod in_time;
+mod pattern;
+
+use alloc::boxed::Box;
+
+use cohaptic_units::{Instant, Probability};
+
+pub use four_state::{Bursts, FourState, FourStateError};
+pub use gilbert_elliott::GilbertElliott;
+pub use in_time::{GilbertElliottInTime, NoTime};
+pub use pattern::{Counts, Pattern, PatternError};
+
+use crate::laws::chance::{Chance, ChanceStage};
+use crate::random::{PacketDraws, Purpose, unit};
+
+/// A loss model.
+#[derive(Clone, PartialEq, Debug, Default)]
+#[non_exhaustive]
+pub enum Loss {
+    /// Nothing is lost, and no random number is drawn.
+    #[default]
+    None,
+    /// Every packet is lost with the same probability, whatever happened to the others.
+    Independent(Probability),
+    /// A packet is more likely lost if the one before was; mean and autocorrelation are exactly those asked for.
+    Correlated(Chance),
+    /// Losses come in bursts: a Markov chain of a good and a bad state.
+    GilbertElliott(GilbertElliott),
+    /// The same in continuous time: a burst is so long in seconds, not in packets.
+    GilbertElliottInTime(GilbertElliottInTime),
+    /// Bursts with packets received within, and losses between them.
+    FourState(FourState),
+    /// Chosen packets or chosen spans of time; nothing is drawn.
+    Pattern(Pattern),
+}
+
+impl Loss {
+    /// The long-run fraction of packets lost, `None` where it depends on the start or on what is sent when.
+    #[must_use]
+    pub fn mean(&self) -> Option<f64> {
+        match self {
+            Self::None => Some(0.0),
+            Self::Independent(probability) => Some(probability.get()),
+            Self::Correlated(chance) => Some(chance.probability().get()),
+            Self::GilbertElliott(chain) => chain.mean_loss(),
+            Self::GilbertElliottInTime(chain) => Some(chain.mean_loss()),
+            Self::FourState(chain) => Some(chain.mean_loss()),
+            Self::Pattern(pattern) => pattern.mean_loss(),
+        }
+    }
+
+    /// The mean number of packets lost one after another, `None` where there is no simple law: losses with other causes between, or chosen ones.
+    ///
+    /// 1/(1−p) for independent losses, 1/((1−ρ)(1−p)) for correlated ones, 1/r for a Gilbert–Elliott chain that loses all in the bad state and nothing in the
+    /// good one.
+    #[must_use]
+    pub fn mean_run(&self) -> Option<f64> {
+        let run = match self {
+            Self::Independent(probability) => 1.0 / (1.0 - probability.get()),
+            Self::Correlated(chance) => 1.0 / ((1.0 - chance.correlation()) * (1.0 - chance.probability().get())),
+            Self::GilbertElliott(chain) if (chain.h, chain.k) == (Probability::ZERO, Probability::ONE) => 1.0 / chain.r.get(),
+            Self::None | Self::GilbertElliott(_) | Self::GilbertElliottInTime(_) | Self::FourState(_) | Self::Pattern(_) => return None,
+        };
+        (run.is_finite() && self.mean().is_some_and(|mean| mean > 0.0)).then_some(run)
+    }
+
+    /// The autocorrelation of losses `lag` packets apart, `None` where there is no simple law or nothing varies.
+    #[must_use]
+    pub fn autocorrelation(&self, lag: u32) -> Option<f64> {
+        self.mean().filter(|mean| *mean > 0.0 && *mean < 1.0)?;
+        match self {
+            Self::Independent(_) => Some(if lag == 0 { 1.0 } else { 0.0 }),
+            Self::Correlated(chance) => Some(libm::pow(chance.correlation(), f64::from(lag))),
+            Self::GilbertElliott(chain) => chain.autocorrelation(lag),
+            Self::None | Self::GilbertElliottInTime(_) | Self::FourState(_) | Self::Pattern(_) => None,
+        }
+    }
+
+    /// Whether random numbers are drawn for it.
+    #[must_use]
+    pub const fn is_random(&self) -> bool {
+        !matches!(self, Self::None | Self::Pattern(_))
+    }
+}
+
+/// The loss stage of one link: the model and what it remembers.
+#[derive(Clone, Debug)]
+pub(crate) enum LossStage {
+    Independent(Probability),
+    /// In a box, as whatever is seldom: the links of a large mesh fill the cache.
+    WithMemory(Box<Remembering>),
+}
+
+/// A model that looks at more than a packet's own word.
+#[derive(Clone, Debug)]
+pub(crate) enum Remembering {
+    Correlated(Option<ChanceStage>),
+    GilbertElliott(GilbertElliott, gilbert_elliott::State),
+    InTime(GilbertElliottInTime, Option<in_time::Seen>),
+    FourState(FourState, four_state::State),
+    Pattern(Pattern),
+}
+
+impl LossStage {
+    /// The stage for a model; `None` if nothing is ever lost. `initial` is the random word for the state in which a chain begins.
+    pub(crate) fn new(loss: Loss, initial: u64) -> Option<Self> {
+        Self::reconfigured(None, loss, initial)
+    }
+
+    /// The stage with a new model; a chain of the same kind stays in the state it is in.
+    pub(crate) fn reconfigured(before: Option<Self>, loss: Loss, initial: u64) -> Option<Self> {
+        let before = match before {
+            Some(Self::WithMemory(before)) => Some(*before),
+            Some(Self::Independent(_)) | None => None,
+        };
+        let stage = match (before, loss) {
+            (_, Loss::None) => return None,
+            (_, Loss::Independent(probability)) => return Some(Self::Independent(probability)),
+            (Some(Remembering::GilbertElliott(_, state)), Loss::GilbertElliott(chain)) => Remembering::GilbertElliott(chain, state),
+            (_, Loss::GilbertElliott(chain)) => Remembering::GilbertElliott(chain, chain.stationary_state(initial)),
+            (Some(Remembering::InTime(_, seen)), Loss::GilbertElliottInTime(chain)) => Remembering::InTime(chain, seen),
+            (_, Loss::GilbertElliottInTime(chain)) => Remembering::InTime(chain, None),
+            (Some(Remembering::FourState(_, state)), Loss::FourState(chain)) => Remembering::FourState(chain, state),
+            (_, Loss::FourState(chain)) => Remembering::FourState(chain, chain.initial_state(unit(initial))),
+            (Some(Remembering::Correlated(stage)), Loss::Correlated(chance)) => Remembering::Correlated(ChanceStage::reconfigured(stage, chance)),
+            (_, Loss::Correlated(chance)) => Remembering::Correlated(ChanceStage::new(chance)),
+            (_, Loss::Pattern(pattern)) => Remembering::Pattern(pattern),
+        };
+        Some(Self::WithMemory(Box::new(stage)))
+    }
+
+    /// Whether a packet is lost. `word` is the first of its words for loss.
+    #[inline]
+    pub(crate) fn loses(&mut self, now: Instant, number: u64, word: u64, packet: PacketDraws) -> bool {
+        match self {
+            Self::Independent(probability) => probability.happens(word),
+            Self::WithMemory(stage) => stage.loses(now, number, word, packet),
+        }
+    }
+}
+
+impl Remembering {
+    fn loses(&mut self, now: Instant, number: u64, word: u64, packet: PacketDraws) -> bool {
+        match self {
+            Self::Correlated(chance) => chance.as_mut().is_some_and(|chance| chance.happens(word)),
+            Self::GilbertElliott(chain, state) => chain.loses(state, word, packet.more(Purpose::Loss).next_word()),
+            Self::InTime(chain, seen) => chain.loses(seen, now, word, packet.more(Purpose::Loss).next_word()),
+            Self::FourState(chain, state) => chain.loses(state, unit(word)),
+            Self::Pattern(pattern) => pattern.covers(number, now),
+        }
+    }
+}

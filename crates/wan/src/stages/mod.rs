@@ -1,0 +1,15 @@
+//! The stages of a link: in each file one impairment, its parameters with their checks, and the stage that keeps what the impairment remembers.
+//!
+//! [`config`] lists them.
+
+pub(crate) mod config;
+pub(crate) mod corruption;
+pub(crate) mod delay;
+pub(crate) mod loss;
+pub(crate) mod modulation;
+pub(crate) mod order;
+pub(crate) mod outage;
+pub(crate) mod path_trace;
+pub(crate) mod queue;
+pub(crate) mod reorder;
+pub(crate) mod slots;

@@ -1,0 +1,301 @@
+//! Outages: spans during which a link takes no packet. Scheduled, random, or when nobody uses it.
+
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use cohaptic_units::Instant;
+
+use crate::laws::sojourn::Sojourn;
+use crate::random::{Purpose, Stream};
+
+/// One outage: packets offered at `from` or later, but before `to`, are dropped.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Outage {
+    /// The first instant at which the link is down.
+    pub from: Instant,
+    /// The first instant at which it is up again.
+    pub to: Instant,
+}
+
+/// When a link is down: whenever one of the three says so.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Outages {
+    /// In order of time, none empty and none overlapping another.
+    scheduled: Vec<Outage>,
+    random: Option<RandomOutages>,
+    idle: Option<IdleOutages>,
+}
+
+/// A link that fails and is repaired, again and again. It begins up.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct RandomOutages {
+    /// How long it is up.
+    pub up: Sojourn,
+    /// How long it is down.
+    pub down: Sojourn,
+}
+
+/// A link that goes down when nothing was sent for a while (a dial-up line, a sleeping radio), and comes up again after another while.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct IdleOutages {
+    /// How long nothing must be sent. What an outage drops does not count as sent.
+    pub after: Duration,
+    /// How long it is down then. Nothing being sent, it goes down again `after` that.
+    pub down: Duration,
+}
+
+/// Why a list of outages is refused. The index counts from zero in the order given.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OutagesError {
+    /// The outage ends before it begins, or when it begins.
+    #[error("outage {index} ends at {to}, which is not after {from} when it begins")]
+    Empty {
+        /// Which outage.
+        index: usize,
+        /// When it begins.
+        from: Instant,
+        /// When it ends.
+        to: Instant,
+    },
+    /// The outage begins before the one listed before it has ended.
+    #[error("outage {index} begins at {from}, before the one listed before it has ended at {ended}")]
+    Overlap {
+        /// Which outage.
+        index: usize,
+        /// When it begins.
+        from: Instant,
+        /// When the previous one ends.
+        ended: Instant,
+    },
+    /// A span that never ends, or has no law.
+    #[error("a link must be up and down for some time: expected spans above zero, the longest not below the shortest")]
+    NoTime,
+}
+
+impl Outages {
+    /// Checks the list.
+    ///
+    /// # Errors
+    ///
+    /// [`OutagesError`] if an outage is empty or the list is not in order of time.
+    pub fn new(outages: Vec<Outage>) -> Result<Self, OutagesError> {
+        let mut ended = Instant::ZERO;
+        for (index, &Outage { from, to }) in outages.iter().enumerate() {
+            if to <= from {
+                return Err(OutagesError::Empty { index, from, to });
+            }
+            if from < ended {
+                return Err(OutagesError::Overlap { index, from, ended });
+            }
+            ended = to;
+        }
+        Ok(Self { scheduled: outages, ..Self::default() })
+    }
+
+    /// With random failures.
+    ///
+    /// # Errors
+    ///
+    /// [`OutagesError::NoTime`] if a span is zero or its bounds are out of order.
+    pub fn with_random(self, random: RandomOutages) -> Result<Self, OutagesError> {
+        let sound = random.up.is_sound() && random.down.is_sound();
+        if sound { Ok(Self { random: Some(random), ..self }) } else { Err(OutagesError::NoTime) }
+    }
+
+    /// With outages when idle.
+    ///
+    /// # Errors
+    ///
+    /// [`OutagesError::NoTime`] if a span is zero.
+    pub fn with_idle(self, idle: IdleOutages) -> Result<Self, OutagesError> {
+        if idle.after.is_zero() || idle.down.is_zero() { Err(OutagesError::NoTime) } else { Ok(Self { idle: Some(idle), ..self }) }
+    }
+
+    /// The random failures.
+    #[must_use]
+    pub const fn random(&self) -> Option<RandomOutages> {
+        self.random
+    }
+
+    /// The outages when idle.
+    #[must_use]
+    pub const fn idle(&self) -> Option<IdleOutages> {
+        self.idle
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.scheduled.is_empty() && self.random.is_none() && self.idle.is_none()
+    }
+
+    /// Whether a scheduled outage covers `now`. Down at the first instant of an outage, up at its end.
+    #[must_use]
+    #[inline]
+    pub fn scheduled_at(&self, now: Instant) -> bool {
+        let next = self.scheduled.partition_point(|outage| outage.to <= now);
+        self.scheduled.get(next).is_some_and(|outage| outage.from <= now)
+    }
+
+    /// The scheduled outages in order of time.
+    #[must_use]
+    pub fn scheduled(&self) -> &[Outage] {
+        &self.scheduled
+    }
+}
+
+/// The stage: whether the link is up.
+#[derive(Clone, Debug)]
+pub(crate) struct OutageStage {
+    outages: Outages,
+    /// The span of random failures that the link is in: even ones are up.
+    span: u64,
+    span_ends: Instant,
+    /// When something was last taken, or the begin of time.
+    last_taken: Instant,
+}
+
+impl OutageStage {
+    /// The stage from the begin of time; `None` if the link is never down.
+    pub(crate) fn new(outages: Outages, draws: Stream) -> Option<Self> {
+        Self::reconfigured(None, Instant::ZERO, outages, draws)
+    }
+
+    /// The stage with new outages. A link that fails at random stays in the span that it is in; one that begins to do so begins up, and one that begins to
+    /// go down when idle was used just now.
+    pub(crate) fn reconfigured(before: Option<Self>, now: Instant, outages: Outages, draws: Stream) -> Option<Self> {
+        if before.is_none() && outages.is_empty() {
+            return None;
+        }
+        let begin = Self { outages: Outages::default(), span: 0, span_ends: Instant::MAX, last_taken: now };
+        let mut stage = before.unwrap_or(begin);
+        if stage.outages.idle.is_none() {
+            stage.last_taken = now;
+        }
+        if let (None, Some(random)) = (stage.outages.random, outages.random) {
+            // No span is drawn twice: one that had begun before is not begun again.
+            if stage.span_ends < Instant::MAX {
+                stage.span += 2 - stage.span % 2;
+            }
+            stage.span_ends = now.saturating_add(drawn(random.up, draws, stage.span));
+        }
+        stage.outages = outages;
+        Some(stage)
+    }
+
+    /// Whether the link is down for a packet that is offered `now`.
+    pub(crate) fn is_down(&mut self, now: Instant, draws: Stream) -> bool {
+        let mut down = self.outages.scheduled_at(now);
+        if let Some(random) = self.outages.random {
+            while self.span_ends <= now {
+                self.span += 1;
+                let law = if self.span.is_multiple_of(2) { random.up } else { random.down };
+                self.span_ends = self.span_ends.saturating_add(drawn(law, draws, self.span));
+                if self.span_ends == Instant::MAX {
+                    break;
+                }
+            }
+            down |= self.span % 2 == 1;
+        }
+        if let Some(IdleOutages { after, down: length }) = self.outages.idle {
+            let cycle = after.saturating_add(length).as_nanos();
+            let idle = now.saturating_duration_since(self.last_taken).as_nanos();
+            down |= idle % cycle >= after.as_nanos();
+            if !down {
+                self.last_taken = now;
+            }
+        }
+        down
+    }
+}
+
+fn drawn(law: Sojourn, draws: Stream, span: u64) -> Duration {
+    let mut draws = draws.packet(span).draws(Purpose::Outage);
+    law.draw(|| draws.next_word())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outage(from: u64, to: u64) -> Outage {
+        Outage { from: Instant::from_nanos(from), to: Instant::from_nanos(to) }
+    }
+
+    #[test]
+    fn a_link_is_down_from_the_first_instant_and_up_at_the_last() {
+        let outages = Outages::new(vec![outage(10, 20), outage(20, 30), outage(50, 60)]).unwrap();
+        let down: Vec<u64> = (0..70).filter(|&t| outages.scheduled_at(Instant::from_nanos(t))).collect();
+        assert_eq!(down, (10..30).chain(50..60).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn an_outage_that_is_empty_or_out_of_order_is_refused() {
+        assert!(matches!(Outages::new(vec![outage(10, 10)]), Err(OutagesError::Empty { index: 0, .. })));
+        assert!(matches!(Outages::new(vec![outage(10, 20), outage(15, 30)]), Err(OutagesError::Overlap { index: 1, .. })));
+    }
+
+    /// Up for 30 ms and down for 10 ms on the average, seen every 0.1 ms for 1000 s: a quarter down. Over about 25 000 cycles the fraction has a relative
+    /// standard error of √(1/25 000)·√2·0.75 (both spans exponential): 0.0017 of 0.25.
+    #[test]
+    fn random_failures_take_their_share() {
+        let millis = Duration::from_millis;
+        let random = RandomOutages { up: Sojourn::Exponential(millis(30)), down: Sojourn::Exponential(millis(10)) };
+        let draws = Stream::new(4, b"outage");
+        let mut stage = OutageStage::new(Outages::default().with_random(random).unwrap(), draws).unwrap();
+        let seen = 10_000_000_u64;
+        let down = (0..seen).filter(|n| stage.is_down(Instant::from_nanos(n * 100_000), draws)).count();
+        assert!((down as f64 / seen as f64 - 0.25).abs() < 4.5 * 0.0017, "{down}");
+    }
+
+    #[test]
+    fn an_idle_link_goes_down_and_up_until_somebody_finds_it_up() {
+        let nanos = Duration::from_nanos;
+        let outages = Outages::default().with_idle(IdleOutages { after: nanos(10), down: nanos(5) }).unwrap();
+        let draws = Stream::new(0, b"");
+        let mut stage = OutageStage::new(outages, draws).unwrap();
+        let down: Vec<u64> = [0, 9, 18, 28, 32, 33, 44, 63, 67].into_iter().filter(|t| stage.is_down(Instant::from_nanos(*t), draws)).collect();
+        // Taken at 0, 9 and 18; down from 28 to 33, when it is taken again; down from 43 to 48, up to 58, down to 63, taken.
+        assert_eq!(down, [28, 32, 44]);
+    }
+
+    #[test]
+    fn a_link_that_begins_to_fail_again_draws_new_spans() {
+        let random = RandomOutages { up: Sojourn::Exponential(Duration::from_millis(30)), down: Sojourn::Exponential(Duration::from_millis(10)) };
+        let (draws, random) = (Stream::new(4, b"outage"), Outages::default().with_random(random).unwrap());
+        let mut stage = None;
+        let ends: std::collections::BTreeSet<Instant> = (0..100)
+            .map(|_| {
+                let failing = OutageStage::reconfigured(stage.take(), Instant::ZERO, random.clone(), draws).unwrap();
+                let ends = failing.span_ends;
+                stage = OutageStage::reconfigured(Some(failing), Instant::ZERO, Outages::default(), draws);
+                ends
+            })
+            .collect();
+        assert_eq!(ends.len(), 100);
+        assert_eq!(
+            OutageStage::new(random, draws).unwrap().span_ends,
+            Instant::ZERO.saturating_add(drawn(Sojourn::Exponential(Duration::from_millis(30)), draws, 0))
+        );
+    }
+
+    #[test]
+    fn a_link_that_begins_to_sleep_was_used_just_now() {
+        let nanos = Duration::from_nanos;
+        let idle = Outages::default().with_idle(IdleOutages { after: nanos(10), down: nanos(5) }).unwrap();
+        let draws = Stream::new(0, b"");
+        let mut stage = OutageStage::reconfigured(None, Instant::from_nanos(12), idle, draws).unwrap();
+        assert!(!stage.is_down(Instant::from_nanos(13), draws));
+        assert!(stage.is_down(Instant::from_nanos(23), draws));
+    }
+
+    #[test]
+    fn no_time_is_refused() {
+        let zero = IdleOutages { after: Duration::ZERO, down: Duration::from_secs(1) };
+        assert_eq!(Outages::default().with_idle(zero), Err(OutagesError::NoTime));
+        let never =
+            RandomOutages { up: Sojourn::Fixed(Duration::from_secs(1)), down: Sojourn::Uniform(Duration::from_secs(2), Duration::from_secs(1)) };
+        assert_eq!(Outages::default().with_random(never), Err(OutagesError::NoTime));
+    }
+}

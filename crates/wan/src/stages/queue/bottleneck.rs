@@ -1,0 +1,387 @@
+//! The bottleneck: a first-in-first-out queue before a serialiser.
+//!
+//! ```text
+//! offered ──► [ waiting … ] ──► serialiser, 8·(size on the line)/R per packet ──► propagation
+//!             limit counts these    the packet in service is not counted
+//! ```
+//!
+//! What leaves in any window t is at most R·t plus one packet, because the service time is rounded up. A departure at an instant makes room for
+//! a packet that is offered at the same instant. A change of rate in the middle of a packet integrates the bits: what is already on the wire stays sent.
+
+use alloc::collections::VecDeque;
+use core::time::Duration;
+
+use cohaptic_units::{Bytes, Instant, Rate};
+
+use super::codel::{self, CoDelState};
+use super::limit::Waiting;
+use super::red::{self, RedState};
+use super::{CoDel, DeliveryTrace, Framing, QueueLimit, Red};
+use crate::fates::fate::DropCause;
+use crate::packet::{Carried, Exit, Output, Outputs};
+
+/// A serialiser and the queue before it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Bottleneck {
+    /// How fast it sends.
+    pub service: Service,
+    /// What a packet costs on the line.
+    pub framing: Framing,
+    /// How much may wait; `None`: no limit.
+    pub limit: Option<QueueLimit>,
+    /// Which packets are dropped.
+    pub discipline: Discipline,
+}
+
+/// How fast a line sends.
+#[derive(Clone, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum Service {
+    /// Always at this rate.
+    Rate(Rate),
+    /// At the instants of a recording.
+    Recorded(DeliveryTrace),
+}
+
+/// Which packets of a queue are dropped. The limit holds with all of them.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[non_exhaustive]
+pub enum Discipline {
+    /// The newest, when the queue is full.
+    #[default]
+    TailDrop,
+    /// The oldest that wait, when the queue is full, until the newest fits.
+    HeadDrop,
+    /// Some of the newest, before the queue is full.
+    Red(Red),
+    /// Some of the oldest, when they have waited too long for too long.
+    CoDel(CoDel),
+}
+
+impl Bottleneck {
+    /// A line of that rate with an unlimited queue.
+    #[must_use]
+    pub fn at_rate(rate: Rate) -> Self {
+        Self { service: Service::Rate(rate), framing: Framing::default(), limit: None, discipline: Discipline::default() }
+    }
+}
+
+/// A part of a packet, in 10⁻⁹ bit: see [`Rate::transmission_time`].
+fn giga_bits(bytes: Bytes) -> u128 {
+    u128::from(bytes.get()) * 8_000_000_000
+}
+
+/// The stage: what waits and what is on the line.
+#[derive(Clone, Debug)]
+pub(crate) struct BottleneckStage<T> {
+    config: Bottleneck,
+    waiting: VecDeque<(Instant, Carried<T>)>,
+    /// Wider than [`Bytes`], whose sum would saturate and then count wrongly.
+    waiting_bytes: u128,
+    /// What the waiting packets take on the line, in 10⁻⁹ bit.
+    waiting_bits: u128,
+    in_service: Option<InService<T>>,
+    /// Since when the line has had nothing to send.
+    idle_since: Instant,
+    red: RedState,
+    codel: CoDelState,
+}
+
+#[derive(Clone, Debug)]
+struct InService<T> {
+    packet: Carried<T>,
+    /// Since when what is left is sent at the present rate.
+    since: Instant,
+    /// What was left then, in 10⁻⁹ bit.
+    left: u128,
+    /// When something happens to it next: it has left, or some of it may leave.
+    next: Instant,
+    /// How many opportunities there are then, on a recorded line.
+    opportunities: u64,
+}
+
+impl<T> BottleneckStage<T> {
+    /// An idle line.
+    pub(crate) fn new(config: Bottleneck) -> Self {
+        Self {
+            config,
+            waiting: VecDeque::new(),
+            waiting_bytes: 0,
+            waiting_bits: 0,
+            in_service: None,
+            idle_since: Instant::ZERO,
+            red: RedState::default(),
+            codel: CoDelState::default(),
+        }
+    }
+
+    /// Takes a packet: it is sent, waits, or comes out dropped, perhaps others in its stead. `word` is its random word for queues.
+    pub(crate) fn offer(&mut self, now: Instant, mut packet: Carried<T>, word: impl FnOnce() -> u64, outputs: &mut Outputs<T>) {
+        if let Discipline::Red(red) = self.config.discipline {
+            match self.red_verdict(&red, now, packet.info.ecn_capable, word()) {
+                red::Verdict::Pass => {}
+                red::Verdict::Mark => packet.marks.congestion = true,
+                red::Verdict::Drop => return drop(outputs, now, DropCause::Red, packet),
+            }
+        }
+        if self.in_service.is_none() {
+            self.serve(now, now, packet, outputs);
+            return;
+        }
+        let size = packet.info.size;
+        while !self.admits(now, size) {
+            let head = if self.config.discipline == Discipline::HeadDrop { self.take_head() } else { None };
+            match head {
+                Some((_, head)) => drop(outputs, now, DropCause::QueueFull, head),
+                None => return drop(outputs, now, DropCause::QueueFull, packet),
+            }
+        }
+        self.waiting_bytes += u128::from(size.get());
+        self.waiting_bits += self.on_the_line(&packet);
+        self.waiting.push_back((now, packet));
+    }
+
+    /// When [`BottleneckStage::release`] must be called next.
+    pub(crate) fn next_at(&self) -> Option<Instant> {
+        self.in_service.as_ref().map(|service| service.next)
+    }
+
+    /// What leaves the line `now`, which is the instant announced, and what is dropped.
+    pub(crate) fn release(&mut self, now: Instant, released: &mut VecDeque<Carried<T>>, outputs: &mut Outputs<T>) {
+        let Some(service) = self.in_service.take() else { return };
+        match &self.config.service {
+            Service::Rate(_) => {
+                released.push_back(service.packet);
+                self.serve_next(now, outputs);
+            }
+            Service::Recorded(trace) => {
+                let mut budget = giga_bits(trace.bytes()).saturating_mul(service.opportunities.into());
+                self.in_service = Some(service);
+                while let Some(service) = &mut self.in_service {
+                    if service.left > budget {
+                        service.left -= budget;
+                        break;
+                    }
+                    budget -= service.left;
+                    released.extend(self.in_service.take().map(|service| service.packet));
+                    self.serve_next(now, outputs);
+                    if budget == 0 {
+                        break;
+                    }
+                }
+                self.announce(now);
+            }
+        }
+    }
+
+    /// Changes rate, framing, limit and discipline. What waits keeps its place even beyond a smaller limit; what is on the line keeps the bits already
+    /// sent.
+    pub(crate) fn reconfigure(&mut self, now: Instant, config: Bottleneck) {
+        if let (Some(service), Service::Rate(rate)) = (&mut self.in_service, &self.config.service) {
+            service.left = service.left.saturating_sub(rate.bits_sent(now.saturating_duration_since(service.since)));
+        }
+        if core::mem::discriminant(&self.config.discipline) != core::mem::discriminant(&config.discipline) {
+            (self.red, self.codel) = (RedState::default(), CoDelState::default());
+        }
+        self.config = config;
+        self.waiting_bits = self.waiting.iter().map(|(_, packet)| giga_bits(self.config.framing.on_the_line(packet.info.size))).sum();
+        self.announce(now);
+    }
+
+    /// Everything that waits or is on the line, in order: what a link gives up with its bottleneck.
+    pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
+        self.in_service.into_iter().map(|service| service.packet).chain(self.waiting.into_iter().map(|(_, packet)| packet))
+    }
+
+    fn on_the_line(&self, packet: &Carried<T>) -> u128 {
+        giga_bits(self.config.framing.on_the_line(packet.info.size))
+    }
+
+    fn admits(&self, now: Instant, size: Bytes) -> bool {
+        let Some(limit) = self.config.limit else { return true };
+        let time = if matches!(limit, QueueLimit::Time(_)) { self.time_to_send_all(now) } else { Duration::ZERO };
+        limit.admits(Waiting { packets: self.waiting.len() as u64, bytes: self.waiting_bytes, time }, size)
+    }
+
+    /// When the line will have sent all that it has: how long the newest packet would wait.
+    fn time_to_send_all(&self, now: Instant) -> Duration {
+        let Some(service) = &self.in_service else { return Duration::ZERO };
+        match &self.config.service {
+            Service::Rate(rate) => {
+                let sent = rate.bits_sent(now.saturating_duration_since(service.since));
+                rate.transmission_time(service.left.saturating_sub(sent) + self.waiting_bits)
+            }
+            Service::Recorded(trace) => {
+                let needed = (service.left + self.waiting_bits).div_ceil(giga_bits(trace.bytes())).max(1);
+                let done = u64::try_from(needed).ok().and_then(|needed| trace.nth_after(now, needed));
+                done.unwrap_or(Instant::MAX).saturating_duration_since(now)
+            }
+        }
+    }
+
+    fn red_verdict(&mut self, red: &Red, now: Instant, ecn_capable: bool, word: u64) -> red::Verdict {
+        let idle = if self.in_service.is_none() { now.saturating_duration_since(self.idle_since) } else { Duration::ZERO };
+        // Time that was idle counts once.
+        self.idle_since = now;
+        let unit = match &self.config.service {
+            Service::Rate(rate) => rate.serialisation_time(self.config.framing.on_the_line(red.mean_packet())).as_secs_f64(),
+            #[expect(clippy::cast_precision_loss, reason = "a decay")]
+            Service::Recorded(trace) => red.mean_packet().get() as f64 * 8.0 / trace.mean_rate(),
+        };
+        let idle_packets = if unit > 0.0 { idle.as_secs_f64() / unit } else { 0.0 };
+        self.red.verdict(red, self.waiting_bytes, idle_packets, ecn_capable, word)
+    }
+
+    fn take_head(&mut self) -> Option<(Instant, Carried<T>)> {
+        let (since, packet) = self.waiting.pop_front()?;
+        self.waiting_bytes -= u128::from(packet.info.size.get());
+        self.waiting_bits -= self.on_the_line(&packet);
+        Some((since, packet))
+    }
+
+    fn serve_next(&mut self, now: Instant, outputs: &mut Outputs<T>) {
+        match self.take_head() {
+            Some((since, packet)) => self.serve(now, since, packet, outputs),
+            None => {
+                self.codel.empty();
+                self.idle_since = now;
+            }
+        }
+    }
+
+    /// Begins to send a packet that has waited since then, or what comes after it if an active queue drops it.
+    fn serve(&mut self, now: Instant, mut since: Instant, mut packet: Carried<T>, outputs: &mut Outputs<T>) {
+        if let Discipline::CoDel(codel) = self.config.discipline {
+            loop {
+                let sojourn = now.saturating_duration_since(since);
+                match self.codel.verdict(&codel, now, sojourn, self.waiting_bytes, packet.info.ecn_capable) {
+                    codel::Verdict::Send => break,
+                    codel::Verdict::Mark => {
+                        packet.marks.congestion = true;
+                        break;
+                    }
+                    codel::Verdict::Drop => {
+                        drop(outputs, now, DropCause::CoDel, packet);
+                        let Some(next) = self.take_head() else {
+                            self.codel.empty();
+                            self.idle_since = now;
+                            return;
+                        };
+                        (since, packet) = next;
+                    }
+                }
+            }
+        }
+        let left = self.on_the_line(&packet);
+        self.in_service = Some(InService { packet, since: now, left, next: now, opportunities: 0 });
+        self.announce(now);
+    }
+
+    /// Says when what is on the line leaves, from `now` on.
+    fn announce(&mut self, now: Instant) {
+        let Some(service) = &mut self.in_service else { return };
+        service.since = now;
+        match &self.config.service {
+            Service::Rate(rate) => service.next = now.saturating_add(rate.transmission_time(service.left)),
+            Service::Recorded(trace) => (service.next, service.opportunities) = trace.next_after(now).unwrap_or((Instant::MAX, 1)),
+        }
+    }
+}
+
+fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, packet: Carried<T>) {
+    outputs.push(Output { packet, exit: Exit::Dropped(now, cause) });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packet::{Marks, Packet};
+
+    /// 64 bytes take 512 µs.
+    fn megabit(limit: Option<QueueLimit>, discipline: Discipline) -> BottleneckStage<char> {
+        BottleneckStage::new(Bottleneck { limit, discipline, ..Bottleneck::at_rate(Rate::bits_per_sec(1_000_000).unwrap()) })
+    }
+
+    fn micros(t: u64) -> Instant {
+        Instant::from_nanos(t * 1_000)
+    }
+
+    /// Offers a packet and gives what was dropped.
+    fn offer(stage: &mut BottleneckStage<char>, now: u64, size: u64, item: char) -> Vec<char> {
+        let info = Bytes::new(size).into();
+        let packet = Packet::new(0, info, Marks::default(), item);
+        let mut outputs = Vec::new();
+        stage.offer(micros(now), packet, || 0, &mut outputs);
+        outputs.into_iter().map(|output| output.packet.item).collect()
+    }
+
+    /// All that leaves up to `until`, with the microsecond at which it does.
+    fn leaves(stage: &mut BottleneckStage<char>, until: u64) -> Vec<(char, u64)> {
+        let mut left = Vec::new();
+        while let Some(at) = stage.next_at().filter(|at| *at <= micros(until)) {
+            let mut released = VecDeque::new();
+            stage.release(at, &mut released, &mut Vec::new());
+            left.extend(released.into_iter().map(|packet| (packet.item, at.as_nanos() / 1_000)));
+        }
+        left
+    }
+
+    #[test]
+    fn a_full_queue_refuses_the_newest_packet() {
+        let mut stage = megabit(Some(QueueLimit::Packets(1)), Discipline::TailDrop);
+        let dropped: Vec<char> = [(0, 'a'), (1, 'b'), (2, 'c')].into_iter().flat_map(|(t, item)| offer(&mut stage, t, 64, item)).collect();
+        assert_eq!(dropped, ['c']);
+        assert_eq!(leaves(&mut stage, 9_999), [('a', 512), ('b', 1024)]);
+    }
+
+    #[test]
+    fn a_full_queue_that_drops_from_the_head_takes_the_newest() {
+        let mut stage = megabit(Some(QueueLimit::Bytes(Bytes::new(100))), Discipline::HeadDrop);
+        assert!(offer(&mut stage, 0, 64, 'a').is_empty());
+        assert!(offer(&mut stage, 0, 30, 'b').is_empty());
+        assert!(offer(&mut stage, 0, 40, 'c').is_empty());
+        assert_eq!(offer(&mut stage, 0, 80, 'd'), ['b', 'c']);
+        assert_eq!(offer(&mut stage, 0, 101, 'e'), ['d', 'e']);
+    }
+
+    #[test]
+    fn a_limit_in_bytes_counts_what_waits() {
+        let mut stage = megabit(Some(QueueLimit::Bytes(Bytes::new(100))), Discipline::TailDrop);
+        let offered = [(64, 'a'), (64, 'b'), (64, 'c'), (36, 'd')];
+        let dropped: Vec<char> = offered.into_iter().flat_map(|(size, item)| offer(&mut stage, 0, size, item)).collect();
+        assert_eq!(dropped, ['c']);
+    }
+
+    /// Each of the packets ahead takes 512 µs: with 1 ms at most, the third waits 1024 − 100 µs, the fourth would wait 1436.
+    #[test]
+    fn a_limit_in_time_counts_what_is_ahead() {
+        let mut stage = megabit(Some(QueueLimit::Time(Duration::from_millis(1))), Discipline::TailDrop);
+        let dropped: Vec<char> =
+            [(0, 'a'), (0, 'b'), (100, 'c'), (100, 'd')].into_iter().flat_map(|(t, item)| offer(&mut stage, t, 64, item)).collect();
+        assert_eq!(dropped, ['d']);
+    }
+
+    #[test]
+    fn a_change_of_rate_keeps_the_bits_already_sent() {
+        let mut stage = megabit(None, Discipline::TailDrop);
+        offer(&mut stage, 0, 64, 'a');
+        // Half of the packet is sent at 1 Mbit/s; the other 256 bits take 128 µs at 2 Mbit/s.
+        stage.reconfigure(micros(256), Bottleneck::at_rate(Rate::bits_per_sec(2_000_000).unwrap()));
+        assert_eq!(leaves(&mut stage, 9_999), [('a', 384)]);
+    }
+
+    /// 100 bytes at 1, 2 and 2 ms, then again: 150 bytes need two opportunities, two packets of 40 share what is left with each other.
+    #[test]
+    fn a_recorded_line_shares_its_opportunities() {
+        let trace = DeliveryTrace::parse("1\n2\n2\n", Bytes::new(100)).unwrap();
+        let mut stage = BottleneckStage::new(Bottleneck { service: Service::Recorded(trace), ..Bottleneck::at_rate(Rate::bits_per_sec(1).unwrap()) });
+        for (size, item) in [(150, 'a'), (40, 'b'), (40, 'c'), (90, 'd')] {
+            offer(&mut stage, 0, size, item);
+        }
+        assert_eq!(leaves(&mut stage, 9_999), [('a', 2000), ('b', 2000), ('c', 2000), ('d', 3000)]);
+        // What is not used is lost: at 5 ms there are 100 bytes, not more.
+        offer(&mut stage, 4_500, 100, 'e');
+        offer(&mut stage, 4_500, 100, 'f');
+        assert_eq!(leaves(&mut stage, 9_999), [('e', 5000), ('f', 6000)]);
+    }
+}

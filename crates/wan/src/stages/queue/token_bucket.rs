@@ -1,0 +1,291 @@
+//! The token bucket: a mean rate with bursts (the filter of `tc-tbf`).
+//!
+//! A bucket of B bytes fills at the rate R. The first packet that waits leaves as soon as the bucket holds its size, and takes as much away. So for
+//! any departures i … k: sᵢ + … + sₖ ≤ B + R·(tₖ − tᵢ). With a peak bucket the same holds for the peak rate and its own, smaller size.
+//!
+//! Unlike a serialiser, a bucket lets a packet pass at once while it has credit: it limits how much, not how fast.
+
+use alloc::collections::VecDeque;
+use core::time::Duration;
+
+use cohaptic_units::{Bytes, Instant, Rate};
+
+use super::limit::Waiting;
+use super::{Framing, QueueLimit};
+use crate::fates::fate::DropCause;
+use crate::packet::{Carried, Exit, Output, Outputs};
+
+/// A token bucket and the queue before it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct TokenBucket {
+    /// How fast the bucket fills.
+    pub rate: Rate,
+    /// What it holds; it begins full. A packet that takes more can never leave and is dropped.
+    pub burst: Bytes,
+    /// A second bucket that limits how fast a burst leaves.
+    pub peak: Option<Peak>,
+    /// What a packet takes from the bucket.
+    pub framing: Framing,
+    /// How much may wait; `None`: no limit.
+    pub limit: Option<QueueLimit>,
+}
+
+/// The bucket of the peak rate.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Peak {
+    /// How fast it fills.
+    pub rate: Rate,
+    /// What it holds: at least one packet of the largest size.
+    pub burst: Bytes,
+}
+
+/// A bucket: 10⁻⁹ bits that are in it since an instant.
+#[derive(Clone, Copy, Debug)]
+struct Bucket {
+    rate: Rate,
+    size: u128,
+    tokens: u128,
+    since: Instant,
+}
+
+impl Bucket {
+    fn full(now: Instant, rate: Rate, burst: Bytes) -> Self {
+        let size = giga_bits(burst);
+        Self { rate, size, tokens: size, since: now }
+    }
+
+    fn fill(&mut self, now: Instant) {
+        let came = self.rate.bits_sent(now.saturating_duration_since(self.since));
+        self.tokens = self.tokens.saturating_add(came).min(self.size);
+        self.since = self.since.max(now);
+    }
+
+    /// When it will hold that much, seen from the last fill.
+    fn holds_at(&self, needed: u128) -> Instant {
+        self.since.saturating_add(self.rate.transmission_time(needed.saturating_sub(self.tokens)))
+    }
+}
+
+fn giga_bits(bytes: Bytes) -> u128 {
+    u128::from(bytes.get()) * 8_000_000_000
+}
+
+/// The stage.
+#[derive(Clone, Debug)]
+pub(crate) struct TokenBucketStage<T> {
+    config: TokenBucket,
+    mean: Bucket,
+    peak: Option<Bucket>,
+    waiting: VecDeque<Carried<T>>,
+    waiting_bytes: u128,
+}
+
+impl<T> TokenBucketStage<T> {
+    /// Full buckets.
+    pub(crate) fn new(now: Instant, config: TokenBucket) -> Self {
+        let mean = Bucket::full(now, config.rate, config.burst);
+        let peak = config.peak.map(|peak| Bucket::full(now, peak.rate, peak.burst));
+        Self { config, mean, peak, waiting: VecDeque::new(), waiting_bytes: 0 }
+    }
+
+    /// Takes a packet. It comes back if it may leave at once.
+    pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) -> Option<Carried<T>> {
+        let needed = self.needed(&packet);
+        if needed > self.largest() {
+            outputs.push(Output { packet, exit: Exit::Dropped(now, DropCause::Mtu) });
+            return None;
+        }
+        if self.waiting.is_empty() {
+            self.fill(now);
+            if self.pay(needed) {
+                return Some(packet);
+            }
+        }
+        let size = packet.info.size;
+        if !self.admits(now, size) {
+            outputs.push(Output { packet, exit: Exit::Dropped(now, DropCause::QueueFull) });
+            return None;
+        }
+        self.waiting_bytes += u128::from(size.get());
+        self.waiting.push_back(packet);
+        None
+    }
+
+    /// When the first packet that waits may leave.
+    pub(crate) fn next_at(&self) -> Option<Instant> {
+        let needed = self.needed(self.waiting.front()?);
+        let mean = self.mean.holds_at(needed);
+        Some(self.peak.map_or(mean, |peak| mean.max(peak.holds_at(needed))))
+    }
+
+    /// The packet that leaves `now`, which is the instant announced.
+    pub(crate) fn release(&mut self, now: Instant) -> Option<Carried<T>> {
+        self.fill(now);
+        let packet = self.waiting.pop_front()?;
+        self.waiting_bytes -= u128::from(packet.info.size.get());
+        let paid = self.pay(self.needed(&packet));
+        // Past the end of time nothing can be announced: what would leave then leaves at the end.
+        debug_assert!(paid || now == Instant::MAX, "what waits fits into the buckets, and is released when they hold it");
+        Some(packet)
+    }
+
+    /// Changes rates, sizes and limit. Tokens that came until now stay, as far as the new buckets hold them; a new peak bucket is full. What waits and is
+    /// now too large for them could never leave: it is dropped.
+    pub(crate) fn reconfigure(&mut self, now: Instant, config: TokenBucket, outputs: &mut Outputs<T>) {
+        self.fill(now);
+        let change = |old: Bucket, rate, burst| {
+            let size = giga_bits(burst);
+            Bucket { rate, size, tokens: old.tokens.min(size), since: old.since }
+        };
+        self.mean = change(self.mean, config.rate, config.burst);
+        self.peak = config.peak.map(|peak| match self.peak {
+            Some(old) => change(old, peak.rate, peak.burst),
+            None => Bucket::full(now, peak.rate, peak.burst),
+        });
+        self.config = config;
+        let largest = self.largest();
+        for packet in core::mem::take(&mut self.waiting) {
+            if self.needed(&packet) > largest {
+                self.waiting_bytes -= u128::from(packet.info.size.get());
+                outputs.push(Output { packet, exit: Exit::Dropped(now, DropCause::Mtu) });
+            } else {
+                self.waiting.push_back(packet);
+            }
+        }
+    }
+
+    /// Everything that waits, in order.
+    pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
+        self.waiting.into_iter()
+    }
+
+    /// What the largest packet takes that may ever leave.
+    fn largest(&self) -> u128 {
+        self.peak.map_or(self.mean.size, |peak| peak.size.min(self.mean.size))
+    }
+
+    fn needed(&self, packet: &Carried<T>) -> u128 {
+        giga_bits(self.config.framing.on_the_line(packet.info.size))
+    }
+
+    fn fill(&mut self, now: Instant) {
+        self.mean.fill(now);
+        if let Some(peak) = &mut self.peak {
+            peak.fill(now);
+        }
+    }
+
+    /// Takes the tokens if they are there.
+    fn pay(&mut self, needed: u128) -> bool {
+        let there = self.mean.tokens >= needed && self.peak.is_none_or(|peak| peak.tokens >= needed);
+        if there {
+            self.mean.tokens -= needed;
+            if let Some(peak) = &mut self.peak {
+                peak.tokens -= needed;
+            }
+        }
+        there
+    }
+
+    fn admits(&self, now: Instant, size: Bytes) -> bool {
+        let Some(limit) = self.config.limit else { return true };
+        let time = match limit {
+            QueueLimit::Time(_) => self.turn_of(size).saturating_duration_since(now),
+            QueueLimit::Packets(_) | QueueLimit::Bytes(_) => Duration::ZERO,
+        };
+        limit.admits(Waiting { packets: self.waiting.len() as u64, bytes: self.waiting_bytes, time }, size)
+    }
+
+    /// When another packet of that size would leave, at the present rates: that is the turn of one that takes no time to leave.
+    fn turn_of(&self, size: Bytes) -> Instant {
+        let (mut mean, mut peak) = (self.mean, self.peak);
+        let mut turn = mean.since;
+        for size in self.waiting.iter().map(|packet| packet.info.size).chain([size]) {
+            let needed = giga_bits(self.config.framing.on_the_line(size));
+            turn = mean.holds_at(needed).max(peak.map_or(Instant::ZERO, |peak| peak.holds_at(needed)));
+            for bucket in [Some(&mut mean), peak.as_mut()].into_iter().flatten() {
+                bucket.fill(turn);
+                bucket.tokens = bucket.tokens.saturating_sub(needed);
+            }
+        }
+        turn
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packet::{Marks, Packet};
+
+    /// A byte a microsecond, 100 at once.
+    fn bucket(peak: Option<Peak>) -> TokenBucketStage<char> {
+        let rate = Rate::bits_per_sec(8_000_000).unwrap();
+        TokenBucketStage::new(Instant::ZERO, TokenBucket { rate, burst: Bytes::new(100), peak, framing: Framing::default(), limit: None })
+    }
+
+    fn micros(t: u64) -> Instant {
+        Instant::from_nanos(t * 1_000)
+    }
+
+    /// Offers packets of 40 bytes at these microseconds; when they leave, and how many never do.
+    fn departures(mut stage: TokenBucketStage<char>, offers: &[u64], size: u64) -> (Vec<u64>, usize) {
+        let (mut left, mut outputs) = (Vec::new(), Vec::new());
+        let mut pass = |stage: &mut TokenBucketStage<char>, until: Instant| {
+            while let Some(at) = stage.next_at().filter(|at| *at <= until) {
+                left.extend(stage.release(at).map(|_| at.as_nanos() / 1_000));
+            }
+            left.len()
+        };
+        let mut at_once = Vec::new();
+        for &t in offers {
+            pass(&mut stage, micros(t));
+            let packet = Packet::new(0, Bytes::new(size).into(), Marks::default(), 'x');
+            at_once.extend(stage.offer(micros(t), packet, &mut outputs).map(|_| t));
+        }
+        pass(&mut stage, Instant::MAX);
+        at_once.extend(left);
+        at_once.sort_unstable();
+        (at_once, outputs.len())
+    }
+
+    #[test]
+    fn credit_passes_at_once_and_the_rest_at_the_rate() {
+        // 100 bytes of credit: two packets at once, the third when 20 more have come.
+        assert_eq!(departures(bucket(None), &[0, 0, 0, 0, 500], 40), (vec![0, 0, 20, 60, 500], 0));
+    }
+
+    #[test]
+    fn a_peak_spreads_the_burst() {
+        let peak = Peak { rate: Rate::bits_per_sec(16_000_000).unwrap(), burst: Bytes::new(40) };
+        assert_eq!(departures(bucket(Some(peak)), &[0, 0, 0], 40), (vec![0, 20, 40], 0));
+    }
+
+    /// 100 bytes of credit for two packets; the third leaves at 20 µs, the fourth at 60, a fifth would at 100. Behind a peak of a byte in 2 µs they leave at
+    /// 0, 80, 160 …, though the mean bucket would let them go sooner.
+    #[test]
+    fn no_packet_waits_longer_than_a_limit_in_time() {
+        let limit = |micros| Some(QueueLimit::Time(Duration::from_micros(micros)));
+        let with = |peak, limit| {
+            let mut stage = bucket(peak);
+            stage.config.limit = limit;
+            stage
+        };
+        assert_eq!(departures(with(None, limit(60)), &[0, 0, 0, 0, 0], 40), (vec![0, 0, 20, 60], 1));
+        assert_eq!(departures(with(None, limit(59)), &[0, 0, 0, 0, 0], 40), (vec![0, 0, 20], 2));
+        let peak = Peak { rate: Rate::bits_per_sec(4_000_000).unwrap(), burst: Bytes::new(40) };
+        assert_eq!(departures(with(Some(peak), limit(160)), &[0, 0, 0, 0, 0], 40), (vec![0, 80, 160], 2));
+    }
+
+    #[test]
+    fn what_would_leave_past_the_end_of_time_leaves_at_it() {
+        let mut stage = bucket(None);
+        stage.config.rate = Rate::bits_per_sec(1).unwrap();
+        stage.reconfigure(Instant::from_nanos(u64::MAX - 1), stage.config, &mut Vec::new());
+        assert_eq!(departures(stage, &[u64::MAX / 1000; 3], 60), (vec![u64::MAX / 1000; 3], 0));
+    }
+
+    #[test]
+    fn what_no_bucket_holds_is_dropped() {
+        assert_eq!(departures(bucket(None), &[0, 1], 101), (vec![], 2));
+    }
+}

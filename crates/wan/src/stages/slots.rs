@@ -1,0 +1,241 @@
+//! Slots: a line that sends only now and then, and then all that has gathered (Wi-Fi aggregation, a modem's grants; netem's `slot`).
+
+use alloc::collections::VecDeque;
+use core::num::NonZeroU64;
+use core::time::Duration;
+
+use cohaptic_units::{Bytes, Instant};
+
+use crate::packet::Carried;
+use crate::random::{Purpose, Stream, unit};
+use crate::stages::delay::{Delay, DelayStage};
+
+/// When slots open and what they take.
+///
+/// A packet that finds a slot coming waits for it; one that finds none opens the next one, a gap after its own instant. When a slot's share is used up,
+/// the next one opens a gap later.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Slots {
+    gap: SlotGap,
+    /// How many packets leave in a slot; `None`: any number.
+    pub packets: Option<NonZeroU64>,
+    /// How many bytes leave in a slot, the packet that exceeds them included; `None`: any number.
+    pub bytes: Option<NonZeroU64>,
+}
+
+/// How long it is from one slot to the next.
+#[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum SlotGap {
+    /// Uniform between two spans.
+    Between {
+        /// The shortest.
+        min: Duration,
+        /// The longest, not below the shortest.
+        max: Duration,
+    },
+    /// Drawn as a delay is: correlation is that of one gap with the next.
+    Drawn(Delay),
+}
+
+/// The longest gap is shorter than the shortest.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("gaps between slots of {} to {}: expected the longest not below the shortest", cohaptic_units::print::Span(*min), cohaptic_units::print::Span(*max))]
+#[non_exhaustive]
+pub struct SlotsError {
+    /// The shortest.
+    pub min: Duration,
+    /// The longest.
+    pub max: Duration,
+}
+
+impl Slots {
+    /// Slots whose gaps are uniform between two spans, and that take anything.
+    ///
+    /// # Errors
+    ///
+    /// [`SlotsError`] if `max` is below `min`.
+    pub fn new(min: Duration, max: Duration) -> Result<Self, SlotsError> {
+        if max < min {
+            return Err(SlotsError { min, max });
+        }
+        Ok(Self { gap: SlotGap::Between { min, max }, packets: None, bytes: None })
+    }
+
+    /// Slots whose gaps have the law of a delay, and that take anything.
+    #[must_use]
+    pub const fn drawn(gap: Delay) -> Self {
+        Self { gap: SlotGap::Drawn(gap), packets: None, bytes: None }
+    }
+
+    /// The gap from one slot to the next.
+    #[must_use]
+    pub const fn gap(&self) -> &SlotGap {
+        &self.gap
+    }
+}
+
+/// The stage and what waits for a slot.
+#[derive(Clone, Debug)]
+pub(crate) struct SlotStage<T> {
+    config: Slots,
+    /// Draws the gaps that have a law.
+    law: Option<DelayStage>,
+    waiting: VecDeque<Carried<T>>,
+    /// The slot that comes, or the last one.
+    opens: Instant,
+    /// How many slots there were: the address of their draws.
+    count: u64,
+    packets_left: u64,
+    bytes_left: u64,
+}
+
+impl<T> SlotStage<T> {
+    pub(crate) fn new(config: Slots) -> Self {
+        let law = match &config.gap {
+            SlotGap::Between { .. } => None,
+            SlotGap::Drawn(delay) => Some(DelayStage::new(delay)),
+        };
+        Self { config, law, waiting: VecDeque::new(), opens: Instant::ZERO, count: 0, packets_left: 0, bytes_left: 0 }
+    }
+
+    /// New gaps and shares from the next slot on. Correlated gaps go on from where they are.
+    pub(crate) fn reconfigure(&mut self, config: Slots) {
+        self.law = match (self.law.take(), &config.gap) {
+            (_, SlotGap::Between { .. }) => None,
+            (None, SlotGap::Drawn(delay)) => Some(DelayStage::new(delay)),
+            (Some(mut law), SlotGap::Drawn(delay)) => {
+                law.reconfigure(delay);
+                Some(law)
+            }
+        };
+        self.config = config;
+    }
+
+    /// Takes a packet, which leaves with a slot.
+    pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, draws: Stream) {
+        if self.waiting.is_empty() && (self.count == 0 || self.opens < now || self.is_used_up()) {
+            self.open_next(now, draws);
+        }
+        self.waiting.push_back(packet);
+    }
+
+    /// When the slot opens for which something waits.
+    pub(crate) fn next_at(&self) -> Option<Instant> {
+        (!self.waiting.is_empty()).then_some(self.opens)
+    }
+
+    /// What leaves with the slot that opens `now`.
+    pub(crate) fn release(&mut self, now: Instant, draws: Stream, released: &mut VecDeque<Carried<T>>) {
+        while !self.is_used_up() {
+            let Some(packet) = self.waiting.pop_front() else { return };
+            self.packets_left -= 1;
+            self.bytes_left = self.bytes_left.saturating_sub(packet.info.size.get().max(1));
+            released.push_back(packet);
+        }
+        self.open_next(now, draws);
+    }
+
+    /// Everything that waits, in order.
+    pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
+        self.waiting.into_iter()
+    }
+
+    const fn is_used_up(&self) -> bool {
+        self.packets_left == 0 || self.bytes_left == 0
+    }
+
+    fn open_next(&mut self, now: Instant, draws: Stream) {
+        let draws = draws.packet(self.count);
+        let word = draws.first(Purpose::Slot);
+        let gap = match (&self.config.gap, &mut self.law) {
+            (SlotGap::Between { min, max }, _) => {
+                #[expect(
+                    clippy::cast_precision_loss,
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a gap of some milliseconds"
+                )]
+                let beyond = (unit(word) * (*max - *min).as_nanos() as f64) as u64;
+                min.saturating_add(Duration::from_nanos(beyond))
+            }
+            (SlotGap::Drawn(_), Some(law)) => Duration::from_nanos(law.draw_nanos_for(Purpose::Slot, now, word, draws)),
+            (SlotGap::Drawn(delay), None) => delay.mean(),
+        };
+        self.count += 1;
+        self.opens = now.saturating_add(gap);
+        self.packets_left = self.config.packets.map_or(u64::MAX, NonZeroU64::get);
+        self.bytes_left = self.config.bytes.map_or(Bytes::new(u64::MAX).get(), NonZeroU64::get);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packet::{Marks, Packet};
+
+    fn run(config: Slots, offers: &[u64]) -> Vec<(u64, u64)> {
+        let draws = Stream::new(1, b"slots");
+        let mut stage = SlotStage::new(config);
+        let mut left = Vec::new();
+        let pass = |stage: &mut SlotStage<u64>, until: u64, left: &mut Vec<(u64, u64)>| {
+            while let Some(at) = stage.next_at().filter(|at| at.as_nanos() <= until) {
+                let mut released = VecDeque::new();
+                stage.release(at, draws, &mut released);
+                left.extend(released.into_iter().map(|packet| (packet.item, at.as_nanos())));
+            }
+        };
+        for &t in offers {
+            pass(&mut stage, t, &mut left);
+            let now = Instant::from_nanos(t);
+            let packet = Packet::new(0, Bytes::new(40).into(), Marks::default(), t);
+            stage.offer(now, packet, draws);
+        }
+        pass(&mut stage, u64::MAX, &mut left);
+        left
+    }
+
+    fn every(nanos: u64) -> Slots {
+        Slots::new(Duration::from_nanos(nanos), Duration::from_nanos(nanos)).unwrap()
+    }
+
+    #[test]
+    fn what_gathers_leaves_together() {
+        assert_eq!(run(every(10), &[0, 3, 9, 25]), [(0, 10), (3, 10), (9, 10), (25, 35)]);
+    }
+
+    #[test]
+    fn a_slot_takes_its_share() {
+        let two = Slots { packets: NonZeroU64::new(2), ..every(10) };
+        assert_eq!(run(two, &[0, 1, 2, 3, 4]), [(0, 10), (1, 10), (2, 20), (3, 20), (4, 30)]);
+        // 40 bytes are exceeded by the second packet of 40, which still leaves; then nothing is left.
+        let bytes = Slots { bytes: NonZeroU64::new(41), ..every(10) };
+        assert_eq!(run(bytes, &[0, 1, 2]), [(0, 10), (1, 10), (2, 20)]);
+    }
+
+    #[test]
+    fn gaps_lie_between_the_two_spans() {
+        let config = Slots::new(Duration::from_nanos(100), Duration::from_nanos(300)).unwrap();
+        let offers: Vec<u64> = (0..2000).map(|n| n * 1000).collect();
+        let gaps: Vec<u64> = run(config, &offers).into_iter().map(|(offered, left)| left - offered).collect();
+        assert!(gaps.iter().all(|gap| (100..300).contains(gap)));
+        // Uniform: mean 200, standard error 57.7/√2000 = 1.29.
+        let mean = gaps.iter().sum::<u64>() as f64 / 2000.0;
+        assert!((mean - 199.5).abs() < 4.5 * 1.29, "{mean}");
+        assert!(Slots::new(Duration::from_nanos(2), Duration::from_nanos(1)).is_err());
+    }
+
+    /// Gaps of 400 ± 50 ns, normal: of 2000 the mean is known to 50/√2000 = 1.12 ns and the deviation to 50/√4000 = 0.79 ns; 4.5 of them.
+    #[test]
+    fn gaps_have_the_law_of_a_delay() {
+        let law = crate::stages::delay::Jitter::new(Duration::from_nanos(50), crate::laws::delay::Distribution::Normal);
+        let config = Slots::drawn(Delay::with_jitter(Duration::from_nanos(400), law).unwrap());
+        let offers: Vec<u64> = (0..2000).map(|n| n * 1000).collect();
+        let gaps: Vec<f64> = run(config, &offers).into_iter().map(|(offered, left)| (left - offered) as f64).collect();
+        let mean = gaps.iter().sum::<f64>() / 2000.0;
+        let sd = (gaps.iter().map(|gap| (gap - mean).powi(2)).sum::<f64>() / 2000.0).sqrt();
+        assert!((mean - 400.0).abs() < 4.5 * 1.12, "{mean}");
+        assert!((sd - 50.0).abs() < 4.5 * 0.79, "{sd}");
+        assert_eq!(run(Slots::drawn(Delay::constant(Duration::from_nanos(10))), &[0, 3, 9, 25]), [(0, 10), (3, 10), (9, 10), (25, 35)]);
+    }
+}
