@@ -72,7 +72,6 @@ pub struct Visitor {
 
 /// Why there are no more visits.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum Failure {
     /// A socket.
     #[error(transparent)]

@@ -9,7 +9,6 @@ use crate::vary::VaryError;
 
 /// Why there is no campaign, or why it ended.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum CampaignError {
     /// A text does not vary a key.
     #[error(transparent)]

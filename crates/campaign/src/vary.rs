@@ -36,7 +36,6 @@ pub(crate) struct Varied {
 
 /// Why a text does not vary a key.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum VaryError {
     /// There is no `=`, or nothing before it.
     #[error(

@@ -164,7 +164,6 @@ fn model(loss: &LossFit) -> String {
         LossModel::Independent { .. } => "independent".to_owned(),
         LossModel::GilbertElliott { p, r, h, k } => format!("Gilbert-Elliott p {p:.5} r {r:.5} h {h:.3} k {k:.5}"),
         LossModel::GilbertElliottInTime { mean_good_s, mean_bad_s } => format!("in time, good {mean_good_s:.4} s bad {mean_bad_s:.4} s"),
-        _ => String::new(),
     }
 }
 

@@ -36,7 +36,6 @@ impl ServerConfig {
 
 /// Why there is no server.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum ServeError {
     /// Other machines would reach it.
     #[error(

@@ -19,7 +19,6 @@ pub struct Token(String);
 
 /// Why there is no token.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
-#[non_exhaustive]
 pub enum TokenError {
     /// Too short to be secret, or too long to be carried.
     #[error("a token of {found} characters: expected {SHORTEST} to {LONGEST}, random ones; leave it out to get one")]

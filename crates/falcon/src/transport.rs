@@ -89,7 +89,6 @@ impl fmt::Display for Fault {
 
 /// A transfer that failed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
-#[non_exhaustive]
 pub enum TransportError {
     /// The device is gone, and will not come back on this transport.
     #[error("the device was unplugged; plug it in again and start anew")]

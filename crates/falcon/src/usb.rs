@@ -204,7 +204,6 @@ fn transport_error(during: Operation, error: TransferError) -> TransportError {
 
 /// No device could be opened.
 #[derive(Clone, Debug, Error)]
-#[non_exhaustive]
 pub enum UsbError {
     /// None is plugged in.
     #[error("no Novint Falcon (USB 0403:cb48) is plugged in: check the cable and the power supply")]

@@ -211,7 +211,6 @@ impl<const A: usize, S: Strategy<A>, E: Elsewhere<A>> World<A, S, E> {
                         member.peer.strategy_mut().set_gains(gains.scaled(self.coordination_factor));
                     }
                 }
-                _ => unreachable!("every kind of change of this workspace is listed"),
             }
         }
     }

@@ -36,7 +36,6 @@ pub use order::OrderFigures;
 /// Serialised, it is one flat object in SI units: `mean_s`, `sd_s`, `loss`, `reordered` and so on; [`FateCounts`] is serialised on its own. What is
 /// not defined (a mean of nothing) is left out.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Achieved {
     /// How often each fate befell.
     #[serde(skip)]
@@ -65,7 +64,6 @@ pub struct Achieved {
 
 /// How often each fate befell: `offered + duplicated = delivered + dropped + in flight`.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
-#[non_exhaustive]
 pub struct FateCounts {
     /// Packets handed to the link.
     pub offered: u64,

@@ -15,7 +15,6 @@ use crate::series::{self, count};
 
 /// One figure.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Figure {
     /// Its name: `mean_s`, `sd_s`, `quantile_0.95_s`, `autocorrelation_1`, `loss`, `duplicated`, `damaged`.
     pub name: String,

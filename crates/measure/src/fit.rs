@@ -47,7 +47,6 @@ use crate::series::{self, count};
 
 /// A link and how good the estimate is. Serialised: `link{…}, goodness{…}`.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Fitted {
     /// The link.
     pub link: FittedLink,
@@ -57,7 +56,6 @@ pub struct Fitted {
 
 /// What the estimate rests on, and the models that were not chosen.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Goodness {
     /// Packets sent.
     pub packets: usize,
@@ -97,7 +95,6 @@ pub struct Goodness {
 
 /// Why no link can be estimated.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum FitError {
     /// No packet arrived, or there is none.
     #[error("none of {} arrived: expected at least {LEAST_RECEIVED} delays", Counted(*packets, "packet"))]

@@ -78,8 +78,6 @@ impl fmt::Display for Comment<'_> {
             Fate::Delivered(at) => write!(f, "delivered after {}", Span(at.saturating_duration_since(record.offered)))?,
             Fate::Dropped(cause) => write!(f, "dropped: {}", cause.name())?,
             Fate::Duplicated => f.write_str("duplicated")?,
-            // `Fate` may grow.
-            _ => f.write_str(record.fate.name())?,
         }
         if record.copy > 0 {
             write!(f, ", copy {}", record.copy)?;

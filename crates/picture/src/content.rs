@@ -250,7 +250,6 @@ impl Rug {
 
 /// Anything that a panel can show.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum Content {
     /// A line or marks.
     Line(Line),

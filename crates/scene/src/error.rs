@@ -9,7 +9,6 @@ use crate::tree::shorten;
 
 /// Why there is no [`Scene`](crate::Scene).
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SceneError {
     /// Something in the scene, an override, or a file of hand motion makes no sense.
     #[error("{0}")]

@@ -41,7 +41,6 @@ pub struct Link<P> {
 
 /// What became of one packet, or that a copy of it was made.
 #[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub struct LinkEvent<P> {
     /// The number of the packet on this link, from 0.
     pub sequence: u64,

@@ -16,7 +16,6 @@ use rand::TryRng;
 
 /// What a random number is drawn for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum Purpose {
     /// Whether a packet is lost.
     Loss,

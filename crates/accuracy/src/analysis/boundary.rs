@@ -110,7 +110,7 @@ fn grows(mut scene: Scene, seconds: u64) -> bool {
         Stability::Stable => false,
         Stability::Undecided { ratio } => ratio > 1.0,
         // Nothing interrupts; and what else there may be is no sign of stability.
-        Stability::Unstable | Stability::Interrupted | _ => true,
+        Stability::Unstable | Stability::Interrupted => true,
     }
 }
 

@@ -161,7 +161,7 @@ fn replay(path: &Path) -> Result<Spec, Failure> {
     let text = text_file::read(path)?;
     let log = fates::read(text.as_bytes()).map_err(|error| match error {
         ReadError::Io(error) => unreadable(error),
-        other @ (ReadError::Log(_) | _) => Failure::Input(format!("{}: {other}", output::path(path))),
+        other @ ReadError::Log(_) => Failure::Input(format!("{}: {other}", output::path(path))),
     })?;
     let packets = u64::try_from(log.packets()).ok();
     let model = LinkModel::Replay(Arc::new(log));

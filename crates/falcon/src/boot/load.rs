@@ -64,7 +64,6 @@ pub enum Progress {
 
 /// Why the firmware did not get into the device.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
-#[non_exhaustive]
 pub enum BootError {
     /// The transport failed.
     #[error(transparent)]

@@ -186,7 +186,6 @@ fn run<T: Transport, const A: usize>(mut turns: Turns<T, A>, shared: &Shared) ->
 
 /// The device could not be started.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum StartError {
     /// A number of the configuration makes no sense.
     #[error(transparent)]

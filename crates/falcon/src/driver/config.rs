@@ -77,7 +77,6 @@ impl Default for DriverConfig {
 
 /// A configuration that makes no sense.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
-#[non_exhaustive]
 pub enum DriverConfigError {
     /// A limit of force.
     #[error(transparent)]

@@ -22,7 +22,6 @@ use crate::world::{Nobody, Step, Watch, World};
 
 /// What a disturbance did.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum Stability {
     /// It died out.
     Stable,

@@ -22,7 +22,6 @@ pub(super) fn describe_link(model: &LinkModel) -> String {
         }
         LinkModel::Replay(log) => format!("a replay of {}, and nothing after it", Counted(log.packets(), "packet")),
         LinkModel::Kernel(netem) => format!("netem of Linux 6.6, to the bit: {}", netem.words()),
-        _ => "a link".into(),
     }
 }
 
@@ -48,7 +47,7 @@ fn describe_config(config: &LinkConfig) -> String {
     let text = stages.join(", then ");
     match config.layout {
         Layout::Netem => format!("{text} (rate and slots behind the delay, as in netem)"),
-        Layout::Physical | _ => text,
+        Layout::Physical => text,
     }
 }
 
@@ -78,7 +77,6 @@ fn describe_loss(loss: &Loss) -> Option<String> {
             Counts::Packets => format!("loss of chosen packets{mean}"),
             Counts::Nanoseconds => format!("loss at chosen times{mean}"),
         },
-        _ => "loss".into(),
     })
 }
 
@@ -86,7 +84,6 @@ fn describe_corruption(corruption: &Corruption) -> String {
     let bits = match corruption.bits {
         Flips::Bits { packets, count } => format!("{} flipped in {}", Counted(count, "bit"), chance(packets)),
         Flips::Rate(rate) => format!("each bit flipped with {:e}", rate.get()),
-        _ => "bits flipped".into(),
     };
     let within = corruption.within.as_ref().map_or_else(String::new, |range| format!(", bytes {} to {}", range.start, range.end - 1));
     let checksum = match corruption.checksum {
@@ -108,12 +105,10 @@ fn describe_bottleneck(bottleneck: &Bottleneck) -> String {
         Discipline::HeadDrop => ", head-drop".into(),
         Discipline::Red(_) => ", RED".into(),
         Discipline::CoDel(codel) => format!(", CoDel {} in {}", Span(codel.target), Span(codel.interval)),
-        _ => ", managed".into(),
     };
     let service = match &bottleneck.service {
         Service::Rate(rate) => rate.to_string(),
         Service::Recorded(trace) => format!("a recorded line of {:.3} Mbit/s on average", trace.mean_rate() / 1e6),
-        _ => "a line".into(),
     };
     format!("queue ({}{discipline}) before {service}{}", limit(bottleneck.limit), framing(bottleneck.framing))
 }
@@ -124,7 +119,6 @@ fn limit(limit: Option<QueueLimit>) -> String {
         Some(QueueLimit::Packets(packets)) => Counted(packets, "packet").to_string(),
         Some(QueueLimit::Bytes(bytes)) => bytes.to_string(),
         Some(QueueLimit::Time(wait)) => Span(wait).to_string(),
-        Some(_) => "limited".into(),
     }
 }
 
@@ -139,7 +133,6 @@ fn describe_slots(slots: &Slots) -> String {
         SlotGap::Between { min, max } if min == max => format!("every {}", Span(*min)),
         SlotGap::Between { min, max } => format!("every {} to {}", Span(*min), Span(*max)),
         SlotGap::Drawn(gap) => format!("every {}", mean_and_jitter(gap)),
-        _ => "now and then".into(),
     };
     let packets = slots.packets.map(|packets| Counted(packets.get(), "packet").to_string());
     let bytes = slots.bytes.map(|bytes| Counted(bytes.get(), "byte").to_string());
@@ -154,7 +147,6 @@ fn describe_reorder(reorder: &Reorder) -> String {
         Displacement::Jump { gap } => format!("{packets} of every {gap}th packet jump ahead"),
         Displacement::Behind { packets: count, at_most } => format!("{packets} held until {count} have passed, at most {}", Span(at_most)),
         Displacement::Later { by } => format!("{packets} later by {}", Span(by)),
-        _ => format!("{packets} out of order"),
     }
 }
 
@@ -170,7 +162,6 @@ fn mean_and_jitter(delay: &Delay) -> String {
         Correlation::None => String::new(),
         Correlation::PerPacket(correlation) => format!(", correlation {correlation} from packet to packet"),
         Correlation::InTime(time) => format!(", correlated over {}", Span(*time)),
-        _ => ", correlated".into(),
     };
     format!("{mean}, {} jitter of {}{floor}{memory}", law(distribution), Span(*sd))
 }
@@ -187,7 +178,6 @@ const fn law(distribution: &Distribution) -> &'static str {
         Distribution::Laplace => "Laplace",
         Distribution::Empirical(_) => "measured",
         Distribution::Table(_) => "tabulated",
-        _ => "random",
     }
 }
 
@@ -197,7 +187,6 @@ fn sojourn(sojourn: Sojourn) -> String {
         Sojourn::Exponential(_) => "exponential,",
         Sojourn::Uniform(..) => "uniform,",
         Sojourn::Erlang(..) => "Erlang,",
-        _ => "random,",
     };
     format!("{law} {}", Span(sojourn.mean()))
 }

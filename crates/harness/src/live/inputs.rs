@@ -67,7 +67,6 @@ pub(crate) enum Recorded {
 
 /// Why a text is no record of the inputs of a scene. Lines are counted from 1, the header being line 1.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum InputsError {
     /// The first line is not the header.
     #[error("line 1: found \"{found}\", expected the header \"{HEADER}\"")]

@@ -30,7 +30,6 @@ pub struct RecordedScene {
 
 /// Something in which a scene differs from the one that was recorded. Values are TOML; `None`: it is not there.
 #[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum SceneDifference {
     /// A key.
     Key {

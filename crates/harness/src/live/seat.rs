@@ -24,7 +24,6 @@ pub enum Presence {
 
 /// Why a sample from outside was refused. Nothing changed but a counter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SampleError {
     /// The peer does not live in another process.
     #[error("peer {peer} is no peer of kind \"udp\" of this scene")]

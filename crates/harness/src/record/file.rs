@@ -9,7 +9,6 @@ use cohaptic_files::{WholeFile, partial_name};
 /// Why a record could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}: {source}", path.display())]
-#[non_exhaustive]
 pub struct RecordError {
     /// The file or folder.
     pub path: PathBuf,

@@ -33,7 +33,6 @@ impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
                     *member.peer.device_mut() = DeviceModel::Unsimulated(UnsimulatedDevice::InHand(hand));
                 }
                 PeerKind::Simulated => {}
-                _ => unreachable!("every kind of peer of this workspace is listed"),
             }
         }
         self

@@ -58,7 +58,6 @@ impl Joining {
 
 /// Why a datagram is no welcome for this joining.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum WelcomeError {
     /// It is no welcome at all, or not one made with the key.
     #[error(transparent)]
@@ -107,7 +106,6 @@ impl Joined {
 
 /// Why a datagram from the door cannot be opened.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum OpenError {
     /// It has another length than a sealed sample of this session.
     #[error("{found} bytes; expected {expected}")]

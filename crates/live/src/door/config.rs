@@ -100,7 +100,6 @@ impl DoorConfig {
 
 /// Why a door cannot be made.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum DoorError {
     /// A sample has 1 to 3 axes.
     #[error("{}; a sample has 1 to 3", Counted(*found, "axis"))]

@@ -8,7 +8,6 @@ use crate::handshake::HandshakeError;
 
 /// Why the door did not let a datagram in. Nothing but a counter has changed.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-#[non_exhaustive]
 pub enum Refusal {
     /// Shorter than the header of a sample.
     TooShort,
@@ -113,7 +112,7 @@ impl Refusal {
             DecodeError::Length { .. } => Self::Length,
             DecodeError::NotFinite { .. } => Self::NotFinite,
             // What a later version of the decoder may find wrong is a byte that this one does not know.
-            DecodeError::Reserved | _ => Self::Reserved,
+            DecodeError::Reserved => Self::Reserved,
         }
     }
 
@@ -136,7 +135,6 @@ impl fmt::Display for Refusal {
 
 /// What the door has done. Every datagram that was handed in is admitted, welcomed or refused: the three add up to [`DoorStats::handled`].
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-#[non_exhaustive]
 pub struct DoorStats {
     /// Datagrams that were handed in.
     pub handled: u64,

@@ -12,7 +12,6 @@ const SECOND: Duration = Duration::from_secs(1);
 
 /// What a seat is like at an instant.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub struct SeatStatus<'a> {
     /// Its place.
     pub place: Place,

@@ -39,7 +39,6 @@ pub struct FalconFault {
 
 /// Why a Falcon cannot be had.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum FaultKind {
     /// It is not there, or may not be opened.
     #[error(transparent)]

@@ -22,7 +22,6 @@ const BODY_LEN: usize = 72;
 
 /// What is wrong with a hello or a welcome.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum HandshakeError {
     /// It begins with other bytes.
     #[error("it is no such datagram")]

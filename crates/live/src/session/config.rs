@@ -53,7 +53,6 @@ impl SessionConfig {
 
 /// Why a session cannot begin, or had to end.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SessionError {
     /// Strangers could join.
     #[error(

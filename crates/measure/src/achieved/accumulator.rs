@@ -49,7 +49,6 @@ pub(super) enum Outcome {
 /// A record came after one of a later instant. Nothing was changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("a record of {at} came after one of {latest}: expected records in the order in which things happened")]
-#[non_exhaustive]
 pub struct RecordOutOfOrder {
     /// The instant of the record.
     pub at: Instant,
@@ -105,8 +104,6 @@ impl Accumulator {
                 }
                 self.arrives(record, at, first_copy);
             }
-            // `Fate` may grow; what is no end and makes no copy changes no figure here.
-            _ => {}
         }
         Ok(())
     }

@@ -9,7 +9,6 @@ use crate::series::{self, NORMAL_975, count, seconds};
 
 /// Figures of the delays of the packets that arrived, the first copy of each.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct DelayFigures {
     /// The mean \[s\].
     pub mean_s: f64,

@@ -10,7 +10,6 @@ use crate::series::{self, NORMAL_975, count_u64, wilson};
 
 /// Figures of which packets arrived, in the order of sending.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct LossFigures {
     /// Packets of which a copy arrived.
     pub received: u64,

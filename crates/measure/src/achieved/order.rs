@@ -6,7 +6,6 @@ use crate::series::{count_u64, share_interval};
 
 /// Figures of the order in which packets arrived; extra copies are passed over.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct OrderFigures {
     /// The share of packets received that are reordered: their number is below `NextExp`, the greatest number that has arrived plus one (RFC 4737,
     /// section 3.3). `None` if nothing arrived.

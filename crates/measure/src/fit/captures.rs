@@ -23,7 +23,6 @@ use super::{Measurement, Measurements, MeasurementsError};
 
 /// What two captures say together.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub struct Matched {
     /// The packets of the sender, in the order of sending; times from the first.
     pub measurements: Measurements,
@@ -46,7 +45,6 @@ pub enum End {
 
 /// Why two captures are not read.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum CaptureError {
     /// A file is no capture, or damaged.
     #[error("the capture of the {}: {problem} after {}", end.name(), Counted(*frames, "frame"))]
@@ -75,7 +73,6 @@ pub enum CaptureError {
 
 /// What is wrong with a capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum CaptureProblem {
     /// It does not begin as a capture does.
     #[error("found no pcap or pcapng header, expected one of the two formats")]

@@ -23,7 +23,6 @@ use crate::series::{self, count};
 
 /// One law fitted to the delays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct LawFit {
     /// The law.
     pub distribution: DelayLaw,

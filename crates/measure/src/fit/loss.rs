@@ -19,7 +19,6 @@ use crate::series::{count, share_error};
 /// A model of which packets are lost.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
 pub enum LossModel {
     /// Nothing was lost.
     None,
@@ -50,7 +49,6 @@ pub enum LossModel {
 
 /// A model fitted to the losses.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct LossFit {
     /// The model.
     pub model: LossModel,

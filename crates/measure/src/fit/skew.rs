@@ -29,7 +29,6 @@ use crate::batches::{Batches, TooFew, student};
 ///
 /// A path whose delay itself grows linearly looks the same. The constant offset of the clocks cannot be found from one direction.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Skew {
     /// Seconds that the receiver's clock gains each second of the sender's.
     pub seconds_per_second: f64,
@@ -48,7 +47,6 @@ pub struct Skew {
 /// A number that stands for the delays of a block.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
 pub enum Location {
     /// The mean.
     Mean,
@@ -62,7 +60,6 @@ pub enum Location {
 
 /// Why no drift can be estimated.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SkewError {
     /// Too few packets arrived.
     #[error("only {} arrived: expected at least {LEAST_RECEIVED} delays to tell drift from chance", Counted(*received, "packet"))]

@@ -31,7 +31,6 @@ pub struct Router<D = AnyDevice, C = MonotonicClock> {
 
 /// Why a router came to an end by itself.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum RunError {
     /// A device gives no more packets.
     #[error("{}: cannot read the device: {source}", side.name())]

@@ -35,7 +35,6 @@ pub struct NetworkConfig {
 
 /// Why a call failed. Nothing was changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum NetworkError {
     /// An earlier call had a later instant.
     #[error(transparent)]
@@ -55,7 +54,6 @@ pub enum NetworkError {
 
 /// What became of one packet, end to end, or that a copy of it was made.
 #[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub struct NetworkEvent<P> {
     /// Who sent it.
     pub from: NodeId,

@@ -32,8 +32,7 @@ pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, F
         | GraphError::Weight { .. }
         | GraphError::Alone { .. }
         | GraphError::Irregular
-        | GraphError::NotLinear
-        | _) => refused(error.to_string()),
+        | GraphError::NotLinear) => refused(error.to_string()),
     })?;
     if has_chance(scene) {
         analysis.notes.push(NOMINAL.to_owned());
