@@ -8,8 +8,7 @@ use cohaptic_accuracy::short;
 use cohaptic_benches::effort::Effort;
 use serde::Deserialize;
 
-use crate::programs::Programs;
-use crate::steps::Measured;
+use crate::programs::{Measured, Programs};
 
 /// Where everything that the command writes lies.
 const FOLDER: &str = "out/measured/accuracy";

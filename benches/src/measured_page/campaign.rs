@@ -6,8 +6,7 @@ use std::path::PathBuf;
 use cohaptic_benches::effort::Effort;
 use serde::Deserialize;
 
-use crate::programs::Programs;
-use crate::steps::Measured;
+use crate::programs::{Measured, Programs};
 
 /// What is run: two scenes that go side by side, and one that goes event by event.
 const SCENES: [&str; 3] = ["paper/5-1-ap-2100", "network/loss-independent", "network/queue-codel"];

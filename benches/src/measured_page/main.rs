@@ -18,8 +18,7 @@ use arguments::Arguments;
 use clap::Parser as _;
 use cohaptic_files::write_whole;
 use page::Page;
-use programs::Programs;
-use steps::Measured;
+use programs::{Measured, Programs};
 
 fn main() -> ExitCode {
     match measure(&Arguments::parse()) {

@@ -13,8 +13,8 @@ use serde::Serialize;
 use crate::arguments::FitArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::output_file::write_file;
-use crate::{output, text_file};
+use crate::file::write_file;
+use crate::{file, output};
 
 /// What `cohaptic fit --json` prints.
 #[derive(Serialize)]
@@ -77,7 +77,7 @@ fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Fai
               (of what `cohaptic link` did, give the file of --fates instead)",
         ));
     }
-    let text = text_file::of_bytes(bytes, path)?;
+    let text = file::text_of(bytes, path)?;
     if text.trim_start_matches('\u{feff}').starts_with(FateRow::HEADER) {
         return Ok((Measurements::from_fates(&FateLog::parse(&text).map_err(|error| named(&error))?), None));
     }

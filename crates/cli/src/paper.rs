@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::arguments::PaperArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::output_file::write_file;
+use crate::file::write_file;
 use crate::progress::Progress;
 use crate::{interrupt, output};
 

@@ -6,8 +6,6 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 use thiserror::Error;
 
-use crate::ftdi::Request;
-
 /// Bytes to and from a device behind an FT232R, and a clock.
 pub trait Transport {
     /// The time on the transport's own clock, which shows zero when it was made and never goes back.
@@ -37,6 +35,38 @@ pub trait Transport {
     ///
     /// [`TransportError`].
     fn read(&mut self, into: &mut [u8], patience: Duration) -> Result<usize, TransportError>;
+}
+
+/// Requests of the chip that are used here.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Request {
+    /// Purges a buffer: see [`PURGE_RX`](crate::ftdi::PURGE_RX) and [`PURGE_TX`](crate::ftdi::PURGE_TX).
+    Reset,
+    /// Sets the lines RTS and DTR.
+    ModemControl,
+    /// Sets the flow control.
+    FlowControl,
+    /// Sets the speed, as a divisor.
+    BaudRate,
+    /// Sets bits, parity and stop bits.
+    DataFormat,
+    /// Sets after how many milliseconds the chip sends what it has.
+    LatencyTimer,
+}
+
+impl Request {
+    /// Its number on the wire.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        match self {
+            Self::Reset => 0,
+            Self::ModemControl => 1,
+            Self::FlowControl => 2,
+            Self::BaudRate => 3,
+            Self::DataFormat => 4,
+            Self::LatencyTimer => 9,
+        }
+    }
 }
 
 /// What was being done.

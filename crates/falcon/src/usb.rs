@@ -11,8 +11,8 @@ use nusb::{DeviceInfo, Endpoint, Interface, MaybeFuture};
 use thiserror::Error;
 
 use crate::clock::WallClock;
-use crate::ftdi::{ENDPOINT_IN, ENDPOINT_OUT, INTERFACE, PACKET, PAYLOAD, PRODUCT, Request, VENDOR, strip_status};
-use crate::transport::{Fault, Operation, Transport, TransportError};
+use crate::ftdi::{ENDPOINT_IN, ENDPOINT_OUT, INTERFACE, PACKET, PAYLOAD, PRODUCT, VENDOR, strip_status};
+use crate::transport::{Fault, Operation, Request, Transport, TransportError};
 
 /// A control transfer that takes longer has failed.
 const CONTROL_PATIENCE: Duration = Duration::from_millis(500);

@@ -5,6 +5,9 @@ use cohaptic_wan::Fate;
 
 use crate::live::InputRow;
 
+/// Instants, or ticks in arrays, between two calls of [`Observer::keep_going`].
+pub(crate) const INSTANTS_BETWEEN_QUESTIONS: u32 = 1024;
+
 /// Sees what happens in a run, while it happens, in the order in which it happens.
 ///
 /// Peers are named by their place in [`cohaptic_scene::Scene::peers`]. The rows borrow from the running scene: copy what you keep. By default an

@@ -6,7 +6,7 @@ use cohaptic_scene::{Axes, FromScene, Scene, Strategies};
 
 use crate::arrays::{Arrays, Shape};
 use crate::disturbance::Disturbance;
-use crate::observer::Observer;
+use crate::observer::{INSTANTS_BETWEEN_QUESTIONS, Observer};
 use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
 use crate::world::{Elsewhere, Nobody, Step, Watch, World};
@@ -23,9 +23,6 @@ pub fn too_large(scene: &Scene) -> Option<String> {
         format!("{peers} peers are too many to be simulated, with {links} links between them: expected at most {MOST_PEERS} peers")
     })
 }
-
-/// How many instants pass between two calls of [`Observer::keep_going`].
-pub(crate) const BREATH: u32 = 1024;
 
 /// A scene in virtual time, as fast as the processor goes.
 ///
@@ -100,7 +97,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
 fn run_to_end<const A: usize, S: Strategy<A>, O: Observer>(mut world: World<A, S>, observer: &mut O) -> Result<Summary, O::Error> {
     let watch = Watch::of(observer);
     loop {
-        for _ in 0..BREATH {
+        for _ in 0..INSTANTS_BETWEEN_QUESTIONS {
             if let Step::Ended(ending) = world.step(observer, watch)? {
                 return Ok(world.summary(ending));
             }

@@ -11,6 +11,7 @@ use cohaptic_wan::{Distribution, DropCause, Fate, PacketRecord};
 use serde::Serialize;
 
 use crate::asked::{Asked, QUANTILES};
+use crate::batches;
 use crate::series::{self, count};
 
 /// One figure.
@@ -97,7 +98,7 @@ impl Beside {
         let delays: Vec<f64> = by_packet.iter().filter_map(|delay| *delay).collect();
         let (mean, variance) = (series::mean(&delays), series::variance(&delays));
         let independent = variance.map(|variance| (variance / count(delays.len())).sqrt());
-        let mean_error = worst(series::batch_standard_error(&delays), independent);
+        let mean_error = worst(batches::batch_standard_error(&delays), independent);
         if let Some(wanted) = asked.mean_s {
             figures.push(figure("mean_s", wanted, mean, mean_error, ROUNDING_S));
         }
@@ -106,7 +107,7 @@ impl Beside {
         let squares_vary = !delay.law().is_some_and(|law| matches!(law.distribution(), Distribution::Pareto | Distribution::ParetoNormal));
         if let (Some(wanted), Some(mean)) = (asked.sd_s, mean) {
             let squares: Vec<f64> = delays.iter().map(|delay| (delay - mean).powi(2)).collect();
-            let error = sd.and_then(|sd| if sd > 0.0 { Some(series::batch_standard_error(&squares)? / (2.0 * sd)) } else { Some(0.0) });
+            let error = sd.and_then(|sd| if sd > 0.0 { Some(batches::batch_standard_error(&squares)? / (2.0 * sd)) } else { Some(0.0) });
             figures.push(figure("sd_s", wanted, sd, error.filter(|_| squares_vary), ROUNDING_S));
         }
         let Some(law) = delay.law() else { return };
@@ -142,7 +143,7 @@ impl Beside {
                 };
                 let influences: Vec<f64> = by_packet.windows(2).filter_map(influence).collect();
                 let independent = series::variance(&influences).map(|variance| (variance / count(influences.len())).sqrt());
-                worst(series::batch_standard_error(&influences), independent)
+                worst(batches::batch_standard_error(&influences), independent)
             });
             figures.push(figure("autocorrelation_1", wanted, achieved, error.filter(|_| squares_vary), 0.0));
         }
@@ -154,7 +155,7 @@ fn of_share(name: &str, share: f64, asked: f64, happened: &[f64], shown: Option<
     let achieved = series::mean(happened);
     // Of what was asked for: of nothing that happened one cannot tell.
     let independent = (share * (1.0 - share) / count(happened.len().max(1))).sqrt();
-    let error = worst(series::batch_standard_error(happened), Some(independent));
+    let error = worst(batches::batch_standard_error(happened), Some(independent));
     let judged = figure(name, share, achieved, error, 1e-12);
     Figure { asked, achieved: shown.or(achieved), ..judged }
 }

@@ -1,9 +1,7 @@
-//! A whole picture: title, panels in a grid, legend; and the document it becomes.
+//! A whole picture: title, panels in a grid, legend.
 
-use crate::axis::Scale;
 use crate::content::Reach;
-use crate::draw;
-use crate::layout::{Layout, whole};
+use crate::extent::{Scale, whole};
 use crate::legend::LegendPlace;
 use crate::panel::{Extents, Panel};
 use crate::size::Size;
@@ -119,12 +117,6 @@ impl Picture {
     #[must_use]
     pub fn without_ground(self) -> Self {
         Self { ground: false, ..self }
-    }
-
-    /// The document: valid as a file and as a part of a page of HTML.
-    #[must_use]
-    pub fn svg(&self) -> String {
-        draw::document(self, &Layout::of(self))
     }
 
     /// Columns that have room for a plot with its labels.

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use cohaptic_files::WholeFile;
 
-use super::format::{GIST, rows_missing};
-use super::{Column, Gist, Gists, Row, TableError, Value};
+use super::file::{GIST, Gist, Gists, TableError, rows_missing};
+use super::{Column, Row, Value};
 
 pub(super) fn write(file: &mut WholeFile, columns: &[Column], rows: &[Row]) -> io::Result<()> {
     let mut to = csv::Writer::from_writer(file);

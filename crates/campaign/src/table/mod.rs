@@ -2,6 +2,7 @@
 
 mod columns;
 mod comma_separated;
+mod file;
 mod format;
 mod parquet_file;
 mod roster;
@@ -11,8 +12,8 @@ use std::sync::Arc;
 
 pub(crate) use columns::columns;
 pub(crate) use comma_separated::{number_text, text as value_text};
+pub(crate) use file::{Gist, Head, TableError};
 pub use format::Format;
-pub(crate) use format::{Gist, Gists, Head, TableError};
 pub(crate) use roster::Roster;
 pub(crate) use row::{Place, row};
 

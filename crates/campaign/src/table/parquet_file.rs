@@ -18,8 +18,8 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 
-use super::format::{GIST, Head, rows_missing};
-use super::{Column, Gist, Gists, Kind, Row, TableError, Value};
+use super::file::{GIST, Gist, Gists, Head, TableError, rows_missing};
+use super::{Column, Kind, Row, Value};
 
 /// Under which key a file says what it belongs to.
 const ABOUT: &str = "cohaptic.campaign";

@@ -8,8 +8,8 @@ use cohaptic_units::print::csv_field;
 use super::bode;
 use super::curve::Curve;
 use crate::failure::Failure;
+use crate::file::write_file;
 use crate::output;
-use crate::output_file::write_file;
 
 /// Writes `admittance.csv` and `admittance.svg` into a folder, which is made if it is not there, and gives their paths.
 ///

@@ -20,7 +20,7 @@ use crate::arguments::CheckArguments;
 use crate::document_schema::DocumentSchema;
 use crate::expectations::OutcomeDocument;
 use crate::failure::{self, EXPECTATION, Failure, INTERRUPTED, scene_status};
-use crate::output_file::write_file;
+use crate::file::write_file;
 use crate::progress::Progress;
 use crate::{input, interrupt, output};
 

@@ -9,8 +9,8 @@ use cohaptic_files::WholeFile;
 
 use super::document::buttons;
 use crate::failure::Failure;
+use crate::file::unwritten;
 use crate::output;
-use crate::output_file::unwritten;
 
 /// The columns. What is not known is left empty.
 pub(super) const HEADER: &str = "t,phase,homed,encoder1,encoder2,encoder3,x,y,z,vx,vy,vz,fx,fy,fz,buttons";

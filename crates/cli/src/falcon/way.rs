@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use cohaptic_falcon::ftdi::Request;
+use cohaptic_falcon::transport::Request;
 use cohaptic_falcon::transport::{Transport, TransportError};
 use cohaptic_units::Instant;
 

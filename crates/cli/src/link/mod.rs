@@ -21,7 +21,7 @@ use serde::Serialize;
 use crate::arguments::LinkArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
-use crate::output_file::unwritten;
+use crate::file::unwritten;
 use crate::progress::Progress;
 use crate::{interrupt, output};
 use spec::Spec;

@@ -21,7 +21,7 @@ use cohaptic_units::Instant;
 use crate::arguments::RunArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
-use crate::output_file::write_file;
+use crate::file::write_file;
 use crate::progress::Progress;
 use crate::{failure, input, interrupt, output};
 use document::Document;

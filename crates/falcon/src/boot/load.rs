@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::Firmware;
 use crate::ftdi::{self, PAYLOAD, STATUS};
 use crate::protocol::{Command, Framer, Leds, Report};
-use crate::transport::{Transport, TransportError};
+use crate::transport::{Request, Transport, TransportError};
 
 const HELLO: [u8; 3] = [0x0A, 0x43, 0x0D];
 const HELLO_ANSWER: [u8; 4] = [0x0A, 0x44, 0x2C, 0x0D];
@@ -207,7 +207,7 @@ fn greet<T: Transport + ?Sized>(transport: &mut T, options: &BootOptions) -> Res
             }
         }
         // What is left of a broken answer would spoil the next.
-        transport.control(ftdi::Request::Reset, ftdi::PURGE_RX)?;
+        transport.control(Request::Reset, ftdi::PURGE_RX)?;
     }
     Err(BootError::NoBootLoader { greetings: options.greetings.max(1) })
 }

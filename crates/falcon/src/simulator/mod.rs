@@ -29,9 +29,10 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
-use crate::ftdi::{BAUD_HANDSHAKE, BAUD_RUNNING, DTR_HIGH, DTR_LOW, PURGE_RX, PURGE_TX, Request};
+use crate::ftdi::{BAUD_HANDSHAKE, BAUD_RUNNING, DTR_HIGH, DTR_LOW, PURGE_RX, PURGE_TX};
 use crate::kinematics::Triple;
 use crate::protocol::{Buttons, Leds};
+use crate::transport::Request;
 use chip::Chip;
 use encoders::Encoders;
 use faults::Dice;

@@ -21,9 +21,9 @@ pub(crate) use device::{HandDevice, UnsimulatedDevice};
 
 pub use attendance::{Datagram, Transmit};
 pub use device::LiveDevice;
-pub use inputs::{Input, InputRow, Inputs, InputsError};
+pub use inputs::{HEADER, Input, InputRow, Inputs, InputsError};
 pub use recorded::{RecordedScene, SceneDifference};
 pub use replay::replay;
-pub use rows::{HEADER, InputLine};
+pub use rows::InputLine;
 pub use scene::{LiveScene, PeerState};
 pub use seat::{Presence, SampleError, SeatStats};

@@ -15,8 +15,7 @@ use std::collections::BTreeMap;
 use cohaptic_scene::{Fingerprint, Scene, SceneContent};
 use cohaptic_units::print::csv_quoted;
 
-use super::inputs::{InputsError, shorten};
-use super::rows::HEADER;
+use super::inputs::{HEADER, InputsError, shorten};
 
 /// The scene with which inputs were recorded.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use crate::series::{count_u64, share_interval};
+use crate::batches::share_interval;
+use crate::series::count_u64;
 
 /// Figures of the order in which packets arrived; extra copies are passed over.
 #[derive(Clone, PartialEq, Debug, Serialize)]

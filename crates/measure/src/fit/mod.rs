@@ -192,13 +192,13 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
         spacing_s,
         evenly_spaced,
         mean_s: series::mean(&delays).expect("there are delays"),
-        mean_se_s: series::batch_standard_error(&delays).map(|error| error.hypot(error_of_drift(measurements, &arrivals))),
+        mean_se_s: batches::batch_standard_error(&delays).map(|error| error.hypot(error_of_drift(measurements, &arrivals))),
         sd_s: series::variance(&delays).expect("there are at least two delays").sqrt(),
         least_s,
         floor_robson_whitlock_s: robson_whitlock(&sorted),
         laws,
         correlation,
-        loss_interval_95: series::share_interval(&packets.iter().map(|packet| f64::from(u8::from(packet.delay_s.is_none()))).collect::<Vec<_>>()),
+        loss_interval_95: batches::share_interval(&packets.iter().map(|packet| f64::from(u8::from(packet.delay_s.is_none()))).collect::<Vec<_>>()),
         losses,
     };
     let link = FittedLink { delay_s: best.mean_s, jitter, loss: goodness.losses.first().expect("one model always applies").model };

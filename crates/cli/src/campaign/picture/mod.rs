@@ -14,7 +14,7 @@ use cohaptic_picture::{Panel, Picture, Size};
 
 use super::Finished;
 use crate::failure::Failure;
-use crate::output_file::write_file;
+use crate::file::write_file;
 use arranged::{Arranged, Keys};
 use scale::Scale;
 

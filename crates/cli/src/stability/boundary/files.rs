@@ -10,8 +10,8 @@ use super::Order;
 use super::picture::Picture;
 use super::words::crossing_in_words;
 use crate::failure::Failure;
+use crate::file::write_file;
 use crate::output;
-use crate::output_file::write_file;
 use crate::stability::quantity::axis_of;
 use crate::stability::source;
 

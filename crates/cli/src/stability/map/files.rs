@@ -9,8 +9,8 @@ use cohaptic_units::print::csv_field;
 use super::picture::{Axis, Outline, Picture};
 use super::{Order, VariantMap};
 use crate::failure::Failure;
+use crate::file::write_file;
 use crate::output;
-use crate::output_file::write_file;
 use crate::stability::quantity::axis_of;
 use crate::stability::source;
 
