@@ -7,7 +7,7 @@ use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use cohaptic_realtime::udp::DoorConfig;
+use cohaptic_realtime::udp::EndpointConfig;
 use cohaptic_realtime::{Clock as _, Lateness, LatenessSummary, MonotonicClock, Pacer, Pacing, Wishes, prepare_thread};
 use cohaptic_relay::{Form, Limits, Mesh, Program, Relay, RelayConfig, RunOptions};
 use cohaptic_scene::LinkTable;
@@ -84,7 +84,7 @@ pub(crate) fn relay(pacing: Pacing, rate: u64, span: Duration) -> Done {
     let link = LinkConfig { delay: Delay::constant(DELAY), ..LinkConfig::default() };
     let form = Form::Mesh(Mesh { programs, links: LinkTable::uniform(2, link) });
     let config = RelayConfig { seed: 1, form, limits: Limits::default(), changes: Vec::new() };
-    let relay = Relay::bind(config, DoorConfig::default())?;
+    let relay = Relay::bind(config, EndpointConfig::default())?;
     let to = relay.ports().nth(1).map(|(_, address)| address).ok_or("no port")?;
     let stop = Arc::new(AtomicBool::new(false));
     let is_over = Arc::clone(&stop);

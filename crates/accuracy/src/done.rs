@@ -3,12 +3,12 @@
 use crate::{AccuracyError, Row, Watch};
 
 /// The rows so far, and who watches.
-pub(crate) struct Done<'a> {
+pub(crate) struct RowSink<'a> {
     pub(crate) rows: Vec<Row>,
     pub(crate) watch: &'a dyn Watch,
 }
 
-impl Done<'_> {
+impl RowSink<'_> {
     /// A row is done.
     ///
     /// # Errors

@@ -12,7 +12,7 @@
 //! Nothing here is printed and no clock is read.
 //!
 //! ```
-//! use cohaptic_campaign::{Asked, Campaign, Format, NoWatch, Outcome, Plan, Variation};
+//! use cohaptic_campaign::{PlanSpec, Campaign, Format, NoWatch, Outcome, Plan, Variation};
 //!
 //! let text = r#"
 //!     scene = { duration = "100ms", count = 2 }
@@ -23,7 +23,7 @@
 //! "#;
 //! let folder = tempfile::tempdir()?;
 //! let variations = vec![Variation::parse("coordination.stiffness=500..1500/3")?];
-//! let asked = Asked { text, file: "two.toml".as_ref(), set: &[], variations, runs: 10, format: Format::Csv, part: None, program: "an example" };
+//! let asked = PlanSpec { text, file: "two.toml".as_ref(), set: &[], variations, runs: 10, format: Format::Csv, part: None, program: "an example" };
 //! let mut campaign = Campaign::open(Plan::new(asked)?, &folder.path().join("out"), &NoWatch)?;
 //! let Outcome::Finished(report) = campaign.run(&NoWatch)? else { unreachable!() };
 //! assert_eq!((report.combinations.len(), report.runs), (3, 30));
@@ -44,7 +44,7 @@ mod work;
 
 pub use campaign::{Campaign, Outcome};
 pub use error::CampaignError;
-pub use plan::{Asked, MOST_COMBINATIONS, MOST_RUNS, Plan};
+pub use plan::{CampaignPlan, MOST_COMBINATIONS, MOST_RUNS, PlanSpec};
 pub use quantiles::{MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Quantiles};
 pub use report::{CombinationReport, Report};
 pub use table::{Column, Format, Kind, Value};

@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::{input, output};
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct ExplainDocument<'a> {
     title: &'a str,
     models: Vec<Model<'a>>,
     left_out: &'a [String],
@@ -55,9 +55,9 @@ pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure>
     Ok(ExitCode::SUCCESS)
 }
 
-fn document<'a>(scene: &'a Scene, explanation: &'a Explanation) -> Document<'a> {
+fn document<'a>(scene: &'a Scene, explanation: &'a Explanation) -> ExplainDocument<'a> {
     let Explanation { models, left_out, dimensions, cost } = explanation;
-    Document {
+    ExplainDocument {
         title: &scene.title,
         models: models.iter().map(|row| Model { part: &row.part, model: &row.model, reason: &row.reason }).collect(),
         left_out,

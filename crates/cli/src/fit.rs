@@ -18,7 +18,7 @@ use crate::{file, output};
 
 /// What `cohaptic fit --json` prints.
 #[derive(Serialize)]
-struct Document<'a> {
+struct FitDocument<'a> {
     #[serde(flatten)]
     fitted: &'a Fitted,
     /// The keys of a scene.
@@ -53,7 +53,7 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
         write_file(path, &scene)?;
     }
     if arguments.json {
-        output::json(DocumentSchema::Fit, &Document { fitted: &fitted, scene: &scene, skew, matched })?;
+        output::json(DocumentSchema::Fit, &FitDocument { fitted: &fitted, scene: &scene, skew, matched })?;
     } else {
         output::text(&describe(&fitted, &scene, skew, matched))?;
         output::wrote(&arguments.out);

@@ -67,7 +67,7 @@ pub(crate) fn kept() {
 }
 
 /// Whether the user has asked for the end.
-pub(crate) fn asked() -> bool {
+pub(crate) fn requested() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 

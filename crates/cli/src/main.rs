@@ -75,7 +75,7 @@ fn main() -> ExitCode {
     };
     match done {
         // What was asked to end has ended, whatever came of it.
-        Ok(_) if interrupt::asked() => ExitCode::from(failure::INTERRUPTED),
+        Ok(_) if interrupt::requested() => ExitCode::from(failure::INTERRUPTED),
         Ok(code) => code,
         Err(failure) => report::report(&failure),
     }

@@ -16,7 +16,7 @@ use crate::progress::Progress;
 use crate::{interrupt, output};
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct PaperDocument<'a> {
     claims: Vec<Claim<'a>>,
     figures: Vec<Figure<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -50,7 +50,7 @@ impl Watch for Bar {
     }
 
     fn stops(&self) -> bool {
-        interrupt::asked()
+        interrupt::requested()
     }
 }
 
@@ -78,7 +78,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
     }
     let document = document(&reproduction, arguments.out.is_some());
     if arguments.json {
-        output::json(DocumentSchema::Paper, &Document { wall_s: Some(wall_s), ..document })?;
+        output::json(DocumentSchema::Paper, &PaperDocument { wall_s: Some(wall_s), ..document })?;
     } else {
         output::text(&describe(&reproduction))?;
         output::wrote(arguments.out.as_ref().map(|folder| folder.join("index.html")));
@@ -86,7 +86,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn document(reproduction: &Reproduction, has_files: bool) -> Document<'_> {
+fn document(reproduction: &Reproduction, has_files: bool) -> PaperDocument<'_> {
     let claims = reproduction.claims.iter().map(|claim| Claim {
         id: claim.id,
         claim: claim.claim,
@@ -101,7 +101,7 @@ fn document(reproduction: &Reproduction, has_files: bool) -> Document<'_> {
         file: has_files.then(|| format!("{}.svg", figure.id)),
         title: &figure.title,
     });
-    Document { claims: claims.collect(), figures: figures.collect(), wall_s: None }
+    PaperDocument { claims: claims.collect(), figures: figures.collect(), wall_s: None }
 }
 
 fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure> {

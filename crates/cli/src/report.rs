@@ -67,17 +67,17 @@ pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
 }
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct ErrorDocument<'a> {
     /// The exit status.
     status: u8,
     /// As on standard error, without `error:`.
     message: &'a str,
     /// Where it is; `null` where no text is meant.
-    place: Option<Place<'a>>,
+    place: Option<FaultLocation<'a>>,
 }
 
 #[derive(Serialize)]
-struct Place<'a> {
+struct FaultLocation<'a> {
     /// `null` for an option.
     file: Option<String>,
     /// What was given on the command line; `null` for a file.
@@ -95,23 +95,23 @@ struct Place<'a> {
 /// Prints the document of a failure.
 fn print(failure: &Failure, message: &str, status: u8) -> Result<(), Failure> {
     let place = failure.scene_error().and_then(|error| error.diagnostic()).map(|diagnostic| place(failure, diagnostic));
-    output::json(DocumentSchema::Error, &Document { status, message, place })
+    output::json(DocumentSchema::Error, &ErrorDocument { status, message, place })
 }
 
 /// Prints the document of arguments that make no sense.
 fn print_usage(message: &str, status: u8) -> Result<(), Failure> {
     let message = message.strip_prefix("error: ").unwrap_or(message).trim_end();
-    output::json(DocumentSchema::Error, &Document { status, message, place: None })
+    output::json(DocumentSchema::Error, &ErrorDocument { status, message, place: None })
 }
 
-fn place<'a>(failure: &Failure, diagnostic: &'a Diagnostic) -> Place<'a> {
+fn place<'a>(failure: &Failure, diagnostic: &'a Diagnostic) -> FaultLocation<'a> {
     let argument = diagnostic.override_text().map(|text| {
         // Keys of a link are words of their own, and no override.
         let is_word = matches!(failure, Failure::LinkKeys(_));
         if is_word { text.strip_prefix("link.").unwrap_or(text).to_owned() } else { format!("{} {text}", failure.option()) }
     });
     let key = diagnostic.key();
-    Place {
+    FaultLocation {
         file: diagnostic.file().map(output::path),
         argument,
         line: diagnostic.line(),

@@ -38,7 +38,7 @@ pub(crate) enum Ticking {
 pub(crate) enum DeviceChoice {
     /// The device is simulated.
     Simulated,
-    /// Nobody moves it and it touches nothing.
+    /// NoRemote moves it and it touches nothing.
     Resting,
     /// It touches nothing and nobody looks at it.
     Unobserved,

@@ -9,7 +9,7 @@ use crate::disturbance::Disturbance;
 use crate::observer::{INSTANTS_BETWEEN_QUESTIONS, Observer};
 use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
-use crate::world::{Elsewhere, Nobody, Step, Watch, World};
+use crate::world::{NoRemote, Remote, Step, Watch, World};
 
 /// The most peers that a simulation takes: it makes every one of their N·(N−1) links. A scene may have more, for what does not simulate.
 pub const MOST_PEERS: usize = 4096;
@@ -77,9 +77,9 @@ impl<'a, S: Strategies> Simulation<'a, S> {
             return Ok(summary);
         }
         match plan.axes {
-            Axes::One => run_to_end(self.world::<1, _>(&plan, Nobody), observer),
-            Axes::Two => run_to_end(self.world::<2, _>(&plan, Nobody), observer),
-            Axes::Three => run_to_end(self.world::<3, _>(&plan, Nobody), observer),
+            Axes::One => run_to_end(self.world::<1, _>(&plan, NoRemote), observer),
+            Axes::Two => run_to_end(self.world::<2, _>(&plan, NoRemote), observer),
+            Axes::Three => run_to_end(self.world::<3, _>(&plan, NoRemote), observer),
         }
     }
 
@@ -89,8 +89,8 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         if is_unseen { Shape::of(self.scene, plan, &self.strategies) } else { None }
     }
 
-    pub(crate) fn world<const A: usize, E: Elsewhere<A>>(&self, plan: &Plan, elsewhere: E) -> World<A, S::Strategy<A>, E> {
-        World::new(self.scene, plan, self.disturbance, elsewhere, |peer| self.strategies.strategy(self.scene, peer))
+    pub(crate) fn world<const A: usize, E: Remote<A>>(&self, plan: &Plan, remote: E) -> World<A, S::Strategy<A>, E> {
+        World::new(self.scene, plan, self.disturbance, remote, |peer| self.strategies.strategy(self.scene, peer))
     }
 }
 

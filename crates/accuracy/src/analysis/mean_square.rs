@@ -10,7 +10,7 @@ use cohaptic_stability::mean_square;
 use super::references::{Reference, mean_square_reference};
 use super::{Effort, row};
 use crate::cost::{median_time, processor_time};
-use crate::done::Done;
+use crate::done::RowSink;
 use crate::{AccuracyError, Row};
 
 const UNIT: &str = "mean-square radius [1]";
@@ -26,7 +26,7 @@ const BEGIN: u32 = 12;
 /// Runs are taken together in so many batches, whose spread tells the uncertainty.
 const BATCHES: u32 = 10;
 
-pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let Reference { name, scene, radius, .. } = mean_square_reference();
     let case = format!("mean square, {name}");
     let found = mean_square(&scene)?;
@@ -53,7 +53,7 @@ struct Estimate {
     spread: f64,
 }
 
-fn estimate(scene: &Scene, runs: u32, done: &Done<'_>) -> Result<Estimate, AccuracyError> {
+fn estimate(scene: &Scene, runs: u32, done: &RowSink<'_>) -> Result<Estimate, AccuracyError> {
     let mut scene = scene.clone();
     scene.duration = scene.coordination.update * (BEGIN + 2 * WINDOW);
     // Two copies apart, which no hand moves.

@@ -9,7 +9,7 @@ mod monte_carlo;
 mod radius;
 pub mod references;
 
-use crate::done::Done;
+use crate::done::RowSink;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
 
 /// How much work there is in the rows.
@@ -55,7 +55,7 @@ pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyErr
 ///
 /// As [`crate::measure`].
 pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    let mut done = Done { rows: Vec::new(), watch };
+    let mut done = RowSink { rows: Vec::new(), watch };
     radius::measure(effort, &mut done)?;
     boundary::measure(effort, &mut done)?;
     mean_square::measure(effort, &mut done)?;

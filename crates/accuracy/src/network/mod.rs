@@ -16,7 +16,7 @@ pub mod ways;
 
 use std::time::Duration;
 
-use crate::done::Done;
+use crate::done::RowSink;
 use crate::network::errors::Look;
 use crate::rounds::Rounds;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
@@ -81,7 +81,7 @@ pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyErr
 ///
 /// As [`crate::measure`].
 pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    let mut done = Done { rows: Vec::new(), watch };
+    let mut done = RowSink { rows: Vec::new(), watch };
     delays::measure(effort, &mut done)?;
     losses::measure(effort, &mut done)?;
     correlation::measure(effort, &mut done)?;

@@ -7,7 +7,7 @@ use cohaptic_files::write_whole;
 use serde::{Deserialize, Serialize};
 
 use crate::error::CampaignError;
-use crate::plan::{Parts, Plan};
+use crate::plan::{CampaignPlan, Parts};
 use crate::table::Roster;
 
 /// How files of a campaign are laid out. Another layout is another number.
@@ -41,7 +41,7 @@ pub(crate) struct Manifest {
 
 impl Manifest {
     /// Of a plan that was checked.
-    pub(crate) fn new(plan: &Plan, fingerprint: u64, roster: Roster, parts: Parts) -> Self {
+    pub(crate) fn new(plan: &CampaignPlan, fingerprint: u64, roster: Roster, parts: Parts) -> Self {
         Self {
             layout: LAYOUT,
             program: plan.program().to_owned(),
@@ -93,7 +93,7 @@ impl Manifest {
     }
 
     /// What this campaign, which is there, has that the plan has not, in words; nothing if it is the same one. Files that scenes name are not compared.
-    pub(crate) fn differences(&self, plan: &Plan) -> Vec<String> {
+    pub(crate) fn differences(&self, plan: &CampaignPlan) -> Vec<String> {
         let mut differences = Vec::new();
         let mut compare = |what: &str, there: String, here: String| {
             if there != here {

@@ -24,7 +24,7 @@ pub const MOST_RUNS: u64 = 1_000_000_000;
 
 /// What a user asks for.
 #[derive(Clone, Debug)]
-pub struct Asked<'a> {
+pub struct PlanSpec<'a> {
     /// The text of the scene.
     pub text: &'a str,
     /// Its file, for messages; its folder is where files that the scene names are looked for.
@@ -45,7 +45,7 @@ pub struct Asked<'a> {
 
 /// A campaign as it is asked for: its runs are numbered from 0, combination by combination.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct CampaignPlan {
     text: String,
     file: PathBuf,
     set: Vec<String>,
@@ -58,15 +58,15 @@ pub struct Plan {
     verdicts: bool,
 }
 
-impl Plan {
+impl CampaignPlan {
     /// Puts together what is asked for. The scene is not read yet.
     ///
     /// # Errors
     ///
     /// [`CampaignError`] if a key is varied twice, if there are no runs, too many, or too many combinations, if a part is of no runs, or if seeds are varied
     /// and counted up.
-    pub fn new(asked: Asked<'_>) -> Result<Self, CampaignError> {
-        let Asked { text, file, set, variations, runs, format, part, program } = asked;
+    pub fn new(asked: PlanSpec<'_>) -> Result<Self, CampaignError> {
+        let PlanSpec { text, file, set, variations, runs, format, part, program } = asked;
         for (place, vary) in variations.iter().enumerate() {
             if variations[..place].iter().any(|other| same_key(other.key(), vary.key())) {
                 return Err(CampaignError::SameKey { key: vary.key().to_owned() });

@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use super::Plan;
+use super::CampaignPlan;
 use super::check::Checked;
 use crate::error::CampaignError;
 
@@ -35,7 +35,7 @@ pub(crate) struct Parts {
 
 impl Parts {
     /// Follows from what is asked for, and from nothing of the machine.
-    pub(crate) fn of(plan: &Plan, checked: &Checked, columns: usize) -> Result<Self, CampaignError> {
+    pub(crate) fn of(plan: &CampaignPlan, checked: &Checked, columns: usize) -> Result<Self, CampaignError> {
         let runs = plan.runs();
         if let Some(size) = plan.part() {
             let parts = runs.div_ceil(size);

@@ -15,7 +15,7 @@ pub(crate) use comma_separated::{number_text, text as value_text};
 pub(crate) use file::{Gist, Head, TableError};
 pub use format::Format;
 pub(crate) use roster::Roster;
-pub(crate) use row::{Place, row};
+pub(crate) use row::{RunId, row};
 
 /// What a column holds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

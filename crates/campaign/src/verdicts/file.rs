@@ -8,7 +8,7 @@ use cohaptic_files::write_whole;
 
 use super::{Judgement, Verdict, Words};
 use crate::error::CampaignError;
-use crate::plan::Plan;
+use crate::plan::CampaignPlan;
 use crate::table::{TableError, number_text, value_text};
 
 /// What helps where the table of judgements is not as it was written.
@@ -97,7 +97,7 @@ fn line(cells: impl Iterator<Item = String>) -> io::Result<Vec<u8>> {
 }
 
 /// Writes the table of all judgements: a row for each combination, with the values of its keys.
-pub(crate) fn write_all(path: &Path, plan: &Plan, judgements: &[Judgement]) -> Result<(), CampaignError> {
+pub(crate) fn write_all(path: &Path, plan: &CampaignPlan, judgements: &[Judgement]) -> Result<(), CampaignError> {
     let written = write_whole(path, |to| -> io::Result<()> {
         let keys = plan.variations().iter().map(|vary| vary.column());
         to.write_all(&line(std::iter::once("combination".to_owned()).chain(keys).chain(COLUMNS.map(str::to_owned)))?)?;
@@ -111,7 +111,7 @@ pub(crate) fn write_all(path: &Path, plan: &Plan, judgements: &[Judgement]) -> R
 }
 
 /// The judgements of a table; `None` if there is no table.
-pub(crate) fn read_whole(path: &Path, plan: &Plan) -> Result<Option<Vec<Judgement>>, CampaignError> {
+pub(crate) fn read_whole(path: &Path, plan: &CampaignPlan) -> Result<Option<Vec<Judgement>>, CampaignError> {
     let file = match File::open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -126,7 +126,7 @@ pub(crate) fn read_whole(path: &Path, plan: &Plan) -> Result<Option<Vec<Judgemen
     read.map(Some)
 }
 
-fn read(file: File, plan: &Plan) -> Result<Vec<Judgement>, TableError> {
+fn read(file: File, plan: &CampaignPlan) -> Result<Vec<Judgement>, TableError> {
     let mut reader = csv::Reader::from_reader(io::BufReader::new(file));
     let (mut judgements, mut words, mut cells) = (Vec::new(), Words::default(), csv::StringRecord::new());
     let content =

@@ -10,7 +10,7 @@ mod words;
 use std::process::ExitCode;
 
 use curve::Curve;
-use document::Document;
+use document::AdmittanceDocument;
 
 use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::AdmittanceArguments;
@@ -44,7 +44,7 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
         None => Vec::new(),
     };
     if arguments.scene.json {
-        output::json(DocumentSchema::Admittance, &Document::new(&arguments.peer, &curves, &files, is_interrupted))?;
+        output::json(DocumentSchema::Admittance, &AdmittanceDocument::new(&arguments.peer, &curves, &files, is_interrupted))?;
     } else {
         output::text(&words::describe(&arguments.peer, &curves))?;
         output::wrote(&files);

@@ -6,7 +6,7 @@ use cohaptic_falcon::driver::{Driver, DriverConfig, DriverError, Setpoint, Stati
 use cohaptic_falcon::kinematics::Triple;
 use cohaptic_units::Instant;
 
-use super::way::Way;
+use super::any_transport::AnyTransport;
 use crate::failure::Failure;
 use crate::interrupt;
 
@@ -48,7 +48,7 @@ pub(super) enum End {
 /// A driver and how well its loop keeps its time.
 #[derive(Debug)]
 pub(super) struct Bench {
-    driver: Driver<Way>,
+    driver: Driver<AnyTransport>,
     begun: Instant,
     next: Instant,
     late: u64,
@@ -56,7 +56,7 @@ pub(super) struct Bench {
 }
 
 impl Bench {
-    pub(super) fn open(way: Way, config: DriverConfig) -> Result<Self, DriverError> {
+    pub(super) fn open(way: AnyTransport, config: DriverConfig) -> Result<Self, DriverError> {
         let driver = Driver::open(way, config)?;
         let now = driver.now();
         Ok(Self { driver, begun: now, next: now, late: 0, worst: Duration::ZERO })
@@ -72,7 +72,7 @@ impl Bench {
     fn exchanges(&mut self, most: Option<Duration>, task: &mut impl Task) -> Result<End, Failure> {
         loop {
             let now = self.driver.now();
-            if interrupt::asked() {
+            if interrupt::requested() {
                 return Ok(End::Interrupted);
             }
             if most.is_some_and(|most| self.passed() >= most) {

@@ -11,7 +11,7 @@ use std::time::Instant as Clock;
 use cohaptic_files::WholeFile;
 use cohaptic_measure::achieved::{Accumulator, Achieved, FateCounts};
 use cohaptic_measure::asked::Asked;
-use cohaptic_measure::beside::{Beside, Figure};
+use cohaptic_measure::comparison::{Comparison, Figure};
 use cohaptic_measure::fates::FateWriter;
 use cohaptic_measure::pcapng::CaptureWriter;
 use cohaptic_measure::steady::SteadyStream;
@@ -32,7 +32,7 @@ const PACKETS: u64 = 100_000;
 
 /// What `cohaptic link --json` prints.
 #[derive(Serialize)]
-struct Document<'a> {
+struct LinkDocument<'a> {
     asked: AskedDocument<'a>,
     achieved: &'a Achieved,
     compared: &'a [Figure],
@@ -67,7 +67,7 @@ pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     if arguments.json {
         output::json(
             DocumentSchema::Link,
-            &Document {
+            &LinkDocument {
                 asked: AskedDocument { spec: &spec.said, figures: &spec.asked },
                 achieved: &measured.achieved,
                 compared: &measured.figures,
@@ -95,7 +95,7 @@ fn drive(arguments: &LinkArguments, spec: &Spec) -> Result<Measured, Failure> {
     let mut link = Link::new(arguments.seed, &LinkName::between("sender", "receiver"), spec.model.clone());
     let mut sinks = Sinks::create(arguments)?;
     let mut accumulator = Accumulator::new();
-    let mut beside = Beside::default();
+    let mut beside = Comparison::default();
     let progress = Progress::through_packets(wanted);
     let start = Clock::now();
     let sent = stream.over(
@@ -108,7 +108,7 @@ fn drive(arguments: &LinkArguments, spec: &Spec) -> Result<Measured, Failure> {
         },
         |sent| {
             progress.reach_number(sent);
-            !interrupt::asked()
+            !interrupt::requested()
         },
     )?;
     let wall_s = start.elapsed().as_secs_f64();

@@ -40,7 +40,7 @@ pub(super) fn snapshot(status: &Status, axes: usize) -> Snapshot {
         lateness: vec![quantiles(&status.ticks), quantiles(&status.releases)],
         links: status.links.iter().map(link).collect(),
         peers: status.peers.iter().map(|peer| view(peer, axes, now)).collect(),
-        refused: status.door.map_or_else(Vec::new, |door| {
+        refused: status.admission.map_or_else(Vec::new, |door| {
             let refused = door.refusals().filter(|(_, count)| *count > 0);
             refused.map(|(cause, count): (Refusal, u64)| (cause.name(), count)).collect()
         }),

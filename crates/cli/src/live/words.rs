@@ -38,7 +38,7 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
         line(format!("{} ({}) ends at {}{seat}", peer.name, spec.kind.name(), position.join(", ")));
     }
     line(packets(summary));
-    if let Some((door, socket)) = &report.door {
+    if let Some((door, socket)) = &report.admission {
         line(format!("door at {}: {} let in, {} sent", socket.address, Counted(door.admitted, "sample"), door.sent));
         let refused: Vec<String> = door.refusals().filter(|(_, count)| *count > 0).map(|(cause, count)| format!("{count} {cause}")).collect();
         if !refused.is_empty() {

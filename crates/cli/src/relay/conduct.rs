@@ -48,7 +48,7 @@ pub(super) fn conduct(
                 // Nobody can change anything.
                 Err(RecvTimeoutError::Disconnected) => thread::sleep(GLANCE),
             }
-            stop.store(interrupt::asked(), Ordering::Relaxed);
+            stop.store(interrupt::requested(), Ordering::Relaxed);
             progress.say(realtime::status(&control.latest()));
         }
         running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(failure)

@@ -6,22 +6,22 @@
 //!
 //! What a peer's silence does to the others is written in `docs/model.md`.
 
-mod attendance;
 mod device;
 mod fade;
 mod inputs;
+mod presence;
 mod recorded;
 mod replay;
 mod rows;
 mod scene;
 mod seat;
 
-pub(crate) use attendance::Attendance;
 pub(crate) use device::{HandDevice, UnsimulatedDevice};
+pub(crate) use presence::RemotePeers;
 
-pub use attendance::{Datagram, Transmit};
 pub use device::LiveDevice;
 pub use inputs::{HEADER, Input, InputRow, Inputs, InputsError};
+pub use presence::{Datagram, Transmit};
 pub use recorded::{RecordedScene, SceneDifference};
 pub use replay::replay;
 pub use rows::InputLine;

@@ -9,9 +9,9 @@ use cohaptic_scene::{Axes, LinkKeys, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, LinkStats};
 
-use super::attendance::{Attendance, Transmit};
 use super::device::LiveDevice;
 use super::inputs::{Input, InputRow};
+use super::presence::{RemotePeers, Transmit};
 use super::seat::{Presence, SampleError, SeatStats};
 use crate::observer::Observer;
 use crate::plan::{Model, Plan};
@@ -40,9 +40,9 @@ pub struct LiveScene {
 
 /// A world with as many axes as the scene has.
 enum AnyWorld {
-    One(Box<World<1, LawStrategy<1>, Attendance<1>>>),
-    Two(Box<World<2, LawStrategy<2>, Attendance<2>>>),
-    Three(Box<World<3, LawStrategy<3>, Attendance<3>>>),
+    One(Box<World<1, LawStrategy<1>, RemotePeers<1>>>),
+    Two(Box<World<2, LawStrategy<2>, RemotePeers<2>>>),
+    Three(Box<World<3, LawStrategy<3>, RemotePeers<3>>>),
 }
 
 macro_rules! each {
@@ -81,9 +81,9 @@ impl LiveScene {
         let plan = Plan::new(scene, Model::Least, true);
         let simulation = Simulation::new(scene, Model::Least);
         let world = match plan.axes {
-            Axes::One => AnyWorld::One(Box::new(simulation.world(&plan, Attendance::new(scene)).seated(scene, devices))),
-            Axes::Two => AnyWorld::Two(Box::new(simulation.world(&plan, Attendance::new(scene)).seated(scene, devices))),
-            Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan, Attendance::new(scene)).seated(scene, devices))),
+            Axes::One => AnyWorld::One(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
+            Axes::Two => AnyWorld::Two(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
+            Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
         };
         // The session that peers of the scene have: see `Scene::peer_config`.
         Self { world, session: scene.seed, open: Instant::ZERO, ended: None }

@@ -1,7 +1,7 @@
 //! The running scene: its peers, its network, its clock, with A simulated axes.
 
-mod elsewhere;
 mod live;
+mod remote;
 
 use std::time::Duration;
 
@@ -17,10 +17,10 @@ use crate::plan::{DeviceChoice, Plan};
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
 
-pub(crate) use elsewhere::{Elsewhere, Nobody};
+pub(crate) use remote::{NoRemote, Remote};
 
 /// A scene in the middle of a run; E is who of its peers lives elsewhere.
-pub(crate) struct World<const A: usize, S, E: Elsewhere<A> = Nobody> {
+pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     /// The axes that the scene has, of the A that are simulated.
     axes: usize,
     names: Vec<String>,
@@ -41,7 +41,7 @@ pub(crate) struct World<const A: usize, S, E: Elsewhere<A> = Nobody> {
     ticking: Vec<usize>,
     /// In lockstep, the next tick at which anybody sends.
     earliest_send: u64,
-    elsewhere: E,
+    remote: E,
 }
 
 /// A peer with its clock.
@@ -97,9 +97,9 @@ pub(crate) enum Step {
     Ended(Ending),
 }
 
-impl<const A: usize, S: Strategy<A>, E: Elsewhere<A>> World<A, S, E> {
+impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     /// The scene at its beginning, with the strategies that `strategy` makes for the places of the peers.
-    pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>, elsewhere: E, strategy: impl Fn(usize) -> S) -> Self {
+    pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>, remote: E, strategy: impl Fn(usize) -> S) -> Self {
         let initial: Vec<State<A>> = (0..scene.peers.len()).map(|place| scene.initial_state(place)).collect();
         let member = |place| Member::new(scene, plan, &initial, disturbance, place, strategy(place));
         let members: Vec<Member<A, S, E::Device>> = (0..scene.peers.len()).map(member).collect();
@@ -119,7 +119,7 @@ impl<const A: usize, S: Strategy<A>, E: Elsewhere<A>> World<A, S, E> {
             finite: true,
             ticking: (0..scene.peers.len()).collect(),
             earliest_send: 0,
-            elsewhere,
+            remote,
         }
     }
 
@@ -221,7 +221,7 @@ impl<const A: usize, S: Strategy<A>, E: Elsewhere<A>> World<A, S, E> {
 
     /// Step 1: those whose time it is send their sample to everybody else.
     fn send(&mut self, now: Instant) {
-        if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.elsewhere.lead()].tick < self.earliest_send {
+        if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.remote.lead()].tick < self.earliest_send {
             return;
         }
         let others = self.members.len() - 1;
@@ -248,7 +248,7 @@ impl<const A: usize, S: Strategy<A>, E: Elsewhere<A>> World<A, S, E> {
             if let Fate::Delivered(_) = event.fate {
                 let receiver = &mut self.members[event.to.0 as usize];
                 let sample = self.datagrams.sample(event.payload);
-                match self.elsewhere.receive(now, &event, sample, self.axes, &mut receiver.peer) {
+                match self.remote.receive(now, &event, sample, self.axes, &mut receiver.peer) {
                     None | Some(Ok(Reception::Newest)) => {}
                     Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
                     Some(Err(_)) if event.damage.is_some() => receiver.refused_samples += 1,
@@ -279,13 +279,13 @@ impl<const A: usize, S: Strategy<A>, E: Elsewhere<A>> World<A, S, E> {
             }
             Schedule::EventDriven(_) => None,
         };
-        if let (Some(span), false, true) = (lockstep, watch.ticks, E::IS_NOBODY) {
+        if let (Some(span), false, true) = (lockstep, watch.ticks, E::IS_EMPTY) {
             self.move_together(now, span);
             return Ok(());
         }
         for &place in &self.ticking {
             let member = &mut self.members[place];
-            self.elsewhere.attend(now, place, &mut member.peer, self.axes, observer)?;
+            self.remote.attend(now, place, &mut member.peer, self.axes, observer)?;
             let forces = member.peer.compute(now);
             let object = member.peer.object().state();
             self.latest[place] = object.position;
@@ -332,7 +332,7 @@ impl<const A: usize, S: Strategy<A>, E: Elsewhere<A>> World<A, S, E> {
     fn measure_discrepancy(&mut self) {
         let (mut low, mut high) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A]);
         for (place, position) in self.latest.iter().enumerate() {
-            if !self.elsewhere.is_there(place) {
+            if !self.remote.is_there(place) {
                 continue;
             }
             for axis in 0..A {

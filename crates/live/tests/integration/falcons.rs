@@ -11,7 +11,7 @@ use std::time::Duration;
 use cohaptic_falcon::calibration::Calibration;
 use cohaptic_falcon::device::{Axes, Axis, DeviceConfig, SteppedFalcon};
 use cohaptic_falcon::driver::DriverConfig;
-use cohaptic_falcon::ftdi::Request;
+use cohaptic_falcon::transport::Request;
 use cohaptic_falcon::safety::Limits;
 use cohaptic_falcon::simulator::{MechanicsConfig, SharedSimulator, SimulatedTransport, Simulator, SimulatorConfig, Waypoints};
 use cohaptic_falcon::transport::{Transport, TransportError};

@@ -19,7 +19,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::variants::Variant;
 use crate::{input, output};
-use document::Document;
+use document::MapDocument;
 use filling::Filled;
 
 /// Everything that is asked for, checked: nothing is written before there is one.
@@ -63,7 +63,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         files = files::write(folder, &order, &mut maps, arguments.pictures.size())?;
         rows.map_or(Ok(()), super::rows_file::RowsFile::remove)?;
     }
-    let document = Document::new(&order, &maps, wall_s, cells, &files);
+    let document = MapDocument::new(&order, &maps, wall_s, cells, &files);
     if arguments.scene.json {
         output::json(DocumentSchema::StabilityMap, &document)?;
     } else {

@@ -133,9 +133,9 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// What the door has done. Every datagram that was handed in is admitted, welcomed or refused: the three add up to [`DoorStats::handled`].
+/// What the door has done. Every datagram that was handed in is admitted, welcomed or refused: the three add up to [`AdmissionStats::handled`].
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-pub struct DoorStats {
+pub struct AdmissionStats {
     /// Datagrams that were handed in.
     pub handled: u64,
     /// Samples that were let in.
@@ -151,7 +151,7 @@ pub struct DoorStats {
     refused: [u64; Refusal::ALL.len()],
 }
 
-impl DoorStats {
+impl AdmissionStats {
     /// How many datagrams were refused for that cause.
     #[must_use]
     pub const fn refused(&self, cause: Refusal) -> u64 {

@@ -6,13 +6,13 @@ use cohaptic_wan::{LinkModel, LinkStats};
 
 /// The mean delay that a link was asked for when the run began, and how often it was changed since.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub(crate) struct AskedDelay {
+pub(crate) struct ConfiguredDelay {
     /// `None` where only a recording knows.
     pub(crate) first: Option<Duration>,
     pub(crate) changes: u64,
 }
 
-impl AskedDelay {
+impl ConfiguredDelay {
     pub(crate) fn of(model: &LinkModel) -> Self {
         let is_recording = matches!(model, LinkModel::Replay(_));
         Self { first: (!is_recording).then(|| model.mean_delay()), changes: 0 }
@@ -46,12 +46,12 @@ mod tests {
     fn both_delays_are_said_and_that_it_was_changed() {
         let model = cohaptic_scene::link_from_keys(&["delay=24ms".to_owned()]).unwrap();
         let mut link = Link::new(0, &LinkName::between("a", "b"), model.clone());
-        let asked = AskedDelay::of(&model);
+        let asked = ConfiguredDelay::of(&model);
         assert_eq!(asked.beside(link.stats()), None, "nothing was delivered yet");
         link.handle_packet(Instant::ZERO, PacketInfo { size: Bytes::new(1), ecn_capable: false }, ()).unwrap();
         link.handle_timeout(Instant::from_nanos(24_000_000)).unwrap();
         assert_eq!(asked.beside(link.stats()).unwrap(), "mean delay 24.000 ms, asked 24.000 ms");
-        let changed = AskedDelay { changes: 2, ..asked };
+        let changed = ConfiguredDelay { changes: 2, ..asked };
         assert_eq!(changed.beside(link.stats()).unwrap(), "mean delay 24.000 ms, asked 24.000 ms at first, changed 2 times");
     }
 }

@@ -47,11 +47,11 @@ struct Seen {
 
 /// Takes the records of one link in any order and sets figures beside those asked for. It holds 48 bytes a packet.
 #[derive(Clone, Debug, Default)]
-pub struct Beside {
+pub struct Comparison {
     packets: Vec<Seen>,
 }
 
-impl Beside {
+impl Comparison {
     /// Takes one record. Packets are numbered from 0 without gaps.
     pub fn record(&mut self, record: &PacketRecord) {
         let Ok(number) = usize::try_from(record.sequence) else { return };
@@ -196,7 +196,7 @@ mod tests {
     fn figures(asked: &str, done: &str) -> Vec<Figure> {
         let info = PacketInfo { size: Bytes::new(64), ecn_capable: true };
         let stream = SteadyStream { packets: 60_000, every: Duration::from_millis(1), info };
-        let mut beside = Beside::default();
+        let mut beside = Comparison::default();
         let mut link = Link::new(5, &LinkName::between("a", "b"), config(done));
         stream
             .over(

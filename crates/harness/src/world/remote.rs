@@ -13,12 +13,12 @@ use crate::observer::Observer;
 ///
 /// A type parameter of the world and not a field that may be empty: virtual time, where everybody lives here, is not to carry what live scenes need. As a
 /// field, with ages in every peer, it cost two peers a seventh of a tick and ten of them a tenth, though nothing ever came of its questions.
-pub(crate) trait Elsewhere<const A: usize> {
+pub(crate) trait Remote<const A: usize> {
     /// What stands for a device that nobody simulates.
     type Device: Device<A> + From<RestingDevice<A>>;
 
     /// Whether all live here whatever the scene, so that they may tick in one loop that asks nothing.
-    const IS_NOBODY: bool;
+    const IS_EMPTY: bool;
 
     /// The first of those who live here, by whose ticks all of them tick in lockstep.
     fn lead(&self) -> usize;
@@ -49,12 +49,12 @@ pub(crate) trait Elsewhere<const A: usize> {
 
 /// Everybody lives here: virtual time.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Nobody;
+pub(crate) struct NoRemote;
 
-impl<const A: usize> Elsewhere<A> for Nobody {
+impl<const A: usize> Remote<A> for NoRemote {
     type Device = RestingDevice<A>;
 
-    const IS_NOBODY: bool = true;
+    const IS_EMPTY: bool = true;
 
     #[inline(always)]
     fn lead(&self) -> usize {

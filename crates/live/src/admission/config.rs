@@ -39,7 +39,7 @@ pub struct Limits {
 
 /// What a door is made of.
 #[derive(Clone, Debug)]
-pub struct DoorConfig {
+pub struct AdmissionConfig {
     /// Only peers of one session understand each other; the seed of the scene.
     pub session: u64,
     /// How many axes the scene has, 1 to 3.
@@ -58,7 +58,7 @@ pub struct DoorConfig {
     pub limits: Option<Limits>,
 }
 
-impl DoorConfig {
+impl AdmissionConfig {
     /// Without a key and limits, and with a second until a silent peer counts as gone.
     #[must_use]
     pub const fn new(session: u64, axes: usize, peers: u32, update: Duration, seats: Vec<Seat>) -> Self {
@@ -71,27 +71,27 @@ impl DoorConfig {
         Self { key, ..self }
     }
 
-    pub(super) fn check(&self) -> Result<(), DoorError> {
+    pub(super) fn check(&self) -> Result<(), AdmissionConfigError> {
         if !(1..=3).contains(&self.axes) {
-            return Err(DoorError::Axes { found: self.axes });
+            return Err(AdmissionConfigError::Axes { found: self.axes });
         }
         let ticks = self.seats.iter().map(|seat| (seat.tick, "tick"));
         for (span, name) in ticks.chain([(self.update, "update"), (self.stale_after, "stale_after")]) {
             if span.is_zero() || u64::try_from(span.as_nanos()).is_err() {
-                return Err(DoorError::Span { name, found: span });
+                return Err(AdmissionConfigError::Span { name, found: span });
             }
         }
         if let Some(limits) = self.limits
             && [limits.position, limits.velocity].into_iter().any(|limit| limit.is_nan() || limit <= 0.0)
         {
-            return Err(DoorError::Limits { found: limits });
+            return Err(AdmissionConfigError::Limits { found: limits });
         }
         for seat in &self.seats {
             if seat.place.0 >= self.peers {
-                return Err(DoorError::Beyond { place: seat.place, peers: self.peers });
+                return Err(AdmissionConfigError::Beyond { place: seat.place, peers: self.peers });
             }
             if self.seats.iter().filter(|other| other.place == seat.place).count() > 1 {
-                return Err(DoorError::Twice { place: seat.place });
+                return Err(AdmissionConfigError::Twice { place: seat.place });
             }
         }
         Ok(())
@@ -100,7 +100,7 @@ impl DoorConfig {
 
 /// Why a door cannot be made.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-pub enum DoorError {
+pub enum AdmissionConfigError {
     /// A sample has 1 to 3 axes.
     #[error("{}; a sample has 1 to 3", Counted(*found, "axis"))]
     Axes {

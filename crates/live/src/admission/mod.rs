@@ -35,8 +35,8 @@ use crate::handshake::{HANDSHAKE_LEN, HELLO_MAGIC, Hello, Welcome};
 use crate::seal::{JoiningKeys, MAX_DATAGRAM, SEAL_LEN, Sealed, nonce_of};
 use crate::{Entropy, Nonce, SessionKey};
 
-pub use config::{DoorConfig, DoorError, Limits, Place, Seat};
-pub use refusal::{DoorStats, Refusal};
+pub use config::{AdmissionConfig, AdmissionConfigError, Limits, Place, Seat};
+pub use refusal::{AdmissionStats, Refusal};
 pub use seats::SeatStatus;
 pub use window::WINDOW;
 
@@ -94,11 +94,11 @@ impl Admitted {
 
 /// Decides about every datagram of a session. See the [module](self).
 ///
-/// The driver hands in whatever its socket receives, with [`Door::handle_datagram`], does what the answer says, and asks [`Door::seal`] for the bytes
+/// The driver hands in whatever its socket receives, with [`AdmissionControl::handle_datagram`], does what the answer says, and asks [`AdmissionControl::seal`] for the bytes
 /// of what goes out. There are no deadlines to keep: what has become old is noticed when it matters. Time must not go back; if it does, nothing
 /// becomes old in between.
 #[derive(Debug)]
-pub struct Door {
+pub struct AdmissionControl {
     session: u64,
     axes: usize,
     peers: u32,
@@ -110,7 +110,7 @@ pub struct Door {
     secret: Secret,
     /// By place.
     seats: Vec<SeatState>,
-    stats: DoorStats,
+    stats: AdmissionStats,
 }
 
 struct Secret(Zeroizing<[u8; 32]>);
@@ -129,22 +129,22 @@ enum Under {
     New(Box<JoiningKeys>),
 }
 
-impl Door {
+impl AdmissionControl {
     /// A door with all its seats free. 32 bytes are drawn from `entropy`, now and never again: with the same ones it does the same to the same
     /// datagrams.
     ///
     /// # Errors
     ///
-    /// [`DoorError`] if the configuration makes no sense or there are no random bytes.
-    pub fn new(config: DoorConfig, entropy: &mut impl Entropy) -> Result<Self, DoorError> {
+    /// [`AdmissionConfigError`] if the configuration makes no sense or there are no random bytes.
+    pub fn new(config: AdmissionConfig, entropy: &mut impl Entropy) -> Result<Self, AdmissionConfigError> {
         config.check()?;
         let mut secret = Zeroizing::new([0; 32]);
         entropy.fill(&mut secret[..])?;
-        let DoorConfig { session, axes, peers, update, mut seats, key, stale_after, limits } = config;
+        let AdmissionConfig { session, axes, peers, update, mut seats, key, stale_after, limits } = config;
         seats.sort_by_key(|seat| seat.place);
         let seats = seats.into_iter().map(SeatState::free).collect();
         let secret = Secret(secret);
-        Ok(Self { session, axes, peers, update, key, stale_after, limits, secret, seats, stats: DoorStats::default() })
+        Ok(Self { session, axes, peers, update, key, stale_after, limits, secret, seats, stats: AdmissionStats::default() })
     }
 
     /// Decides about a datagram that was received from `from`.
@@ -167,7 +167,7 @@ impl Door {
 
     /// Makes a sample of another peer ready for the one in that seat: writes it, sealed if there is a key, and gives its address and the length.
     ///
-    /// `None` if nobody has the seat, if who has it was not heard for [`DoorConfig::stale_after`], if `place` is no seat, or if `sample` is longer than
+    /// `None` if nobody has the seat, if who has it was not heard for [`AdmissionConfig::stale_after`], if `place` is no seat, or if `sample` is longer than
     /// a sample. So somebody who lies about his address cannot have another flooded for longer than that.
     pub fn seal(&mut self, now: Instant, place: Place, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<(SocketAddr, usize)> {
         let ready = self.make_ready(now, place, sample, out);
@@ -180,7 +180,7 @@ impl Door {
 
     /// What the door has done.
     #[must_use]
-    pub const fn stats(&self) -> &DoorStats {
+    pub const fn stats(&self) -> &AdmissionStats {
         &self.stats
     }
 

@@ -13,14 +13,14 @@ use rustix::net::{AddressFamily, SocketFlags, SocketType, bind, ipproto, socket_
 
 use super::kernel_drops::kernel_drops;
 use super::outbox::{Outbox, Run};
-use super::{DoorCounts, Ecn, ReceiveBuffers};
+use super::{Ecn, EndpointCounts, ReceiveBuffers};
 use crate::MonotonicClock;
 
 /// What to ask for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct DoorConfig {
+pub struct EndpointConfig {
     /// How many bytes should wait in the kernel until they are read. The kernel counts headers and what it keeps itself: a small datagram takes about
-    /// 800 bytes. It may grant less: see [`UdpDoor::granted_receive_buffer`].
+    /// 800 bytes. It may grant less: see [`UdpEndpoint::granted_receive_buffer`].
     pub receive_buffer: usize,
     /// Longer datagrams are dropped when they come in, and counted.
     pub largest: usize,
@@ -28,7 +28,7 @@ pub struct DoorConfig {
     pub waiting: usize,
 }
 
-impl Default for DoorConfig {
+impl Default for EndpointConfig {
     /// 8 MiB, datagrams of any length, 4096 that wait.
     fn default() -> Self {
         Self { receive_buffer: 8 << 20, largest: 65_535, waiting: 4096 }
@@ -60,27 +60,27 @@ pub struct Datagram<'a> {
 
 /// A UDP socket that never blocks. An IPv6 one takes IPv6 alone, so that every sender has one address.
 #[derive(Debug)]
-pub struct UdpDoor {
+pub struct UdpEndpoint {
     socket: UdpSocket,
     state: UdpSocketState,
     address: SocketAddr,
     granted: usize,
-    config: DoorConfig,
+    config: EndpointConfig,
     outbox: Outbox,
-    counts: DoorCounts,
+    counts: EndpointCounts,
 }
 
-impl UdpDoor {
+impl UdpEndpoint {
     /// Opens a socket; port 0 is a free one.
     ///
     /// # Errors
     ///
     /// [`BindError`] if the address is taken, or is none of this machine's.
-    pub fn bind(address: SocketAddr, config: DoorConfig) -> Result<Self, BindError> {
+    pub fn bind(address: SocketAddr, config: EndpointConfig) -> Result<Self, BindError> {
         Self::open(address, config).map_err(|source| BindError { address, source })
     }
 
-    fn open(address: SocketAddr, config: DoorConfig) -> io::Result<Self> {
+    fn open(address: SocketAddr, config: EndpointConfig) -> io::Result<Self> {
         let family = if address.is_ipv6() { AddressFamily::INET6 } else { AddressFamily::INET };
         let socket = socket_with(family, SocketType::DGRAM, SocketFlags::CLOEXEC | SocketFlags::NONBLOCK, Some(ipproto::UDP))?;
         if address.is_ipv6() {
@@ -101,7 +101,7 @@ impl UdpDoor {
             setsockopt(&socket, Ipv4PacketInfo, &false)?;
         }
         let (address, granted) = (socket.local_addr()?, sockopt::socket_recv_buffer_size(&socket)?);
-        Ok(Self { socket, state, address, granted, config, outbox: Outbox::default(), counts: DoorCounts::default() })
+        Ok(Self { socket, state, address, granted, config, outbox: Outbox::default(), counts: EndpointCounts::default() })
     }
 
     /// Where it listens.
@@ -119,7 +119,7 @@ impl UdpDoor {
 
     /// What it did so far.
     #[must_use]
-    pub const fn counts(&self) -> &DoorCounts {
+    pub const fn counts(&self) -> &EndpointCounts {
         &self.counts
     }
 
@@ -133,7 +133,7 @@ impl UdpDoor {
     }
 
     /// Hands on what has come in, one batch at most, in the order in which it came, and says how many datagrams the kernel gave: after fewer than
-    /// [`UdpDoor::BATCH`] there are no more for now. Never blocks.
+    /// [`UdpEndpoint::BATCH`] there are no more for now. Never blocks.
     ///
     /// # Errors
     ///
@@ -187,7 +187,7 @@ impl UdpDoor {
         }
     }
 
-    /// Takes a datagram to be sent with the next [`UdpDoor::flush`], and says so; beyond [`DoorConfig::waiting`] it is dropped and counted.
+    /// Takes a datagram to be sent with the next [`UdpEndpoint::flush`], and says so; beyond [`EndpointConfig::waiting`] it is dropped and counted.
     #[inline]
     pub fn queue(&mut self, to: SocketAddr, bytes: &[u8], ecn: Option<Ecn>) -> bool {
         let has_room = self.outbox.len() < self.config.waiting;
@@ -257,7 +257,7 @@ impl UdpDoor {
     }
 }
 
-impl AsFd for UdpDoor {
+impl AsFd for UdpEndpoint {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.socket.as_fd()
     }

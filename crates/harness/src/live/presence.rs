@@ -49,7 +49,7 @@ pub struct Transmit {
 
 /// Everybody who lives elsewhere.
 #[derive(Debug)]
-pub(crate) struct Attendance<const A: usize> {
+pub(crate) struct RemotePeers<const A: usize> {
     seats: Vec<Option<Seat>>,
     /// What the others are to each who lives here.
     ages: Vec<Ages<A>>,
@@ -64,7 +64,7 @@ pub(crate) struct Attendance<const A: usize> {
     pub(crate) undrained: Option<Instant>,
 }
 
-impl<const A: usize> Attendance<A> {
+impl<const A: usize> RemotePeers<A> {
     pub(crate) fn new(scene: &Scene) -> Self {
         let peers = scene.peers.len();
         let seat = |(place, peer): (usize, &cohaptic_scene::PeerSpec)| {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use cohaptic_benches_realtime::machine;
 use cohaptic_live::client::{Joined, Joining};
-use cohaptic_live::{Admission, Door, DoorConfig, DoorStats, MAX_DATAGRAM, Place, Refusal, Seat, SessionKey, SystemEntropy};
+use cohaptic_live::{Admission, AdmissionConfig, AdmissionControl, AdmissionStats, MAX_DATAGRAM, Place, Refusal, Seat, SessionKey, SystemEntropy};
 use cohaptic_peer::State;
 use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_units::Instant;
@@ -33,7 +33,7 @@ type Datagram = ([u8; MAX_DATAGRAM], usize);
 
 /// A door whose seat is taken, and the peer that has it.
 struct Subject {
-    door: Door,
+    door: AdmissionControl,
     joined: Option<Joined>,
     key: Option<SessionKey>,
     /// The number of the next sample.
@@ -61,15 +61,15 @@ pub(crate) fn costs() -> Result<Vec<Cost>, Box<dyn Error>> {
     Ok(costs.into())
 }
 
-const fn forged(stats: &DoorStats) -> u64 {
+const fn forged(stats: &AdmissionStats) -> u64 {
     stats.refused(Refusal::Forged)
 }
 
 impl Subject {
     fn new(key: Option<SessionKey>) -> Result<Self, Box<dyn Error>> {
         let seat = Seat { place: SEAT, name: "program".to_owned(), tick: Duration::from_millis(1) };
-        let config = DoorConfig::new(SESSION, AXES, 3, Duration::from_millis(8), vec![seat]).with_key(key.clone());
-        let mut door = Door::new(config, &mut SystemEntropy)?;
+        let config = AdmissionConfig::new(SESSION, AXES, 3, Duration::from_millis(8), vec![seat]).with_key(key.clone());
+        let mut door = AdmissionControl::new(config, &mut SystemEntropy)?;
         let joined = match &key {
             None => None,
             Some(key) => {
@@ -104,7 +104,7 @@ impl Subject {
     }
 
     /// Decides about samples, of which the last bit is flipped if asked. All must be counted under `fate`.
-    fn take(&mut self, from: SocketAddr, flip: u8, fate: impl Fn(&DoorStats) -> u64) -> Result<Duration, Box<dyn Error>> {
+    fn take(&mut self, from: SocketAddr, flip: u8, fate: impl Fn(&AdmissionStats) -> u64) -> Result<Duration, Box<dyn Error>> {
         let mut rounds = Vec::new();
         for _ in 0..ROUNDS {
             let mut datagrams = (0..COUNT).map(|_| self.sample()).collect::<Result<Vec<Datagram>, _>>()?;
@@ -115,7 +115,7 @@ impl Subject {
     }
 
     /// Decides about hellos.
-    fn hello(&mut self, from: SocketAddr, flip: u8, fate: impl Fn(&DoorStats) -> u64) -> Result<Duration, Box<dyn Error>> {
+    fn hello(&mut self, from: SocketAddr, flip: u8, fate: impl Fn(&AdmissionStats) -> u64) -> Result<Duration, Box<dyn Error>> {
         let key = self.key.clone().ok_or("a hello needs a key")?;
         let hello = Joining::draw(SESSION, SEAT, &key, &mut SystemEntropy)?.hello();
         let mut bytes = [0; MAX_DATAGRAM];
@@ -132,7 +132,7 @@ impl Subject {
         Ok(median(rounds))
     }
 
-    fn decide(&mut self, from: SocketAddr, datagrams: &[Datagram], fate: &impl Fn(&DoorStats) -> u64) -> Result<Duration, Box<dyn Error>> {
+    fn decide(&mut self, from: SocketAddr, datagrams: &[Datagram], fate: &impl Fn(&AdmissionStats) -> u64) -> Result<Duration, Box<dyn Error>> {
         let counted = fate(self.door.stats());
         let before = machine::thread_time();
         for (bytes, len) in datagrams {

@@ -7,7 +7,7 @@ use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
 
-use cohaptic_realtime::udp::{BindError, DoorConfig, DoorCounts, ReceiveBuffers, UdpDoor};
+use cohaptic_realtime::udp::{BindError, EndpointConfig, EndpointCounts, ReceiveBuffers, UdpEndpoint};
 use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock};
 use cohaptic_units::Instant;
 use rustix::event::{Timespec, epoll};
@@ -18,11 +18,11 @@ use crate::config::{Form, RelayConfig};
 use crate::engine::{Arrival, Engine, Intake, Port};
 
 /// All sockets.
-pub(super) struct Doors {
+pub(super) struct Ports {
     /// Those of a mesh are its programs'; those of a proxy the one that listens, and then the clients'.
-    doors: Vec<Option<Door>>,
+    ports: Vec<Option<OpenPort>>,
     layout: Layout,
-    config: DoorConfig,
+    config: EndpointConfig,
     /// Readable when one of them is.
     epoll: OwnedFd,
     buffers: ReceiveBuffers,
@@ -37,8 +37,8 @@ pub(super) struct Doors {
 }
 
 #[derive(Debug)]
-struct Door {
-    socket: UdpDoor,
+struct OpenPort {
+    socket: UdpEndpoint,
     /// When what waits in it to be sent should leave.
     departures: VecDeque<Instant>,
     is_dirty: bool,
@@ -52,7 +52,7 @@ enum Layout {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
-    counts: DoorCounts,
+    counts: EndpointCounts,
     kernel_drops: u64,
 }
 
@@ -62,10 +62,10 @@ const BATCHES: usize = 8;
 /// So many datagrams leave before what has come in has its turn.
 const RELEASES: usize = 1024;
 
-impl Doors {
+impl Ports {
     /// Opens the ports that are there from the beginning.
-    pub(super) fn open(config: &RelayConfig, door: DoorConfig) -> Result<Self, BindError> {
-        let (ports, layout): (Vec<SocketAddr>, _) = match &config.form {
+    pub(super) fn open(config: &RelayConfig, endpoint: EndpointConfig) -> Result<Self, BindError> {
+        let (addresses, layout): (Vec<SocketAddr>, _) = match &config.form {
             Form::Mesh(mesh) => {
                 let names = mesh.programs.iter().map(|program| program.name.clone()).collect();
                 (mesh.programs.iter().map(|program| program.port).collect(), Layout::Mesh(names))
@@ -75,10 +75,10 @@ impl Doors {
         let nowhere = SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0));
         let failed = |address: SocketAddr| move |error: Errno| BindError { address, source: error.into() };
         let epoll = epoll::create(epoll::CreateFlags::CLOEXEC).map_err(failed(nowhere))?;
-        let mut doors = Self {
-            doors: Vec::new(),
+        let mut ports = Self {
+            ports: Vec::new(),
             layout,
-            config: door,
+            config: endpoint,
             epoll,
             buffers: ReceiveBuffers::new(),
             opened: Vec::new(),
@@ -86,10 +86,10 @@ impl Doors {
             left: Tally::default(),
             without_socket: 0,
         };
-        for (place, port) in ports.into_iter().enumerate() {
-            doors.open_at(place, port)?;
+        for (place, address) in addresses.into_iter().enumerate() {
+            ports.open_at(place, address)?;
         }
-        Ok(doors)
+        Ok(ports)
     }
 
     /// What becomes readable when something has come.
@@ -100,7 +100,7 @@ impl Doors {
     /// Hands what has come in to the engine. Says up to when all has been: time must not be let pass beyond, or what came earlier would be late.
     pub(super) fn receive(&mut self, engine: &mut Engine, clock: &MonotonicClock) -> io::Result<Heard> {
         let mut heard = Heard { count: 0, until: clock.now() };
-        if self.doors.len() == 1 {
+        if self.ports.len() == 1 {
             self.receive_at(0, engine, clock, &mut heard)?;
         } else {
             // Asking the kernel which of them have something costs less than asking two of them.
@@ -122,7 +122,7 @@ impl Doors {
     }
 
     fn receive_at(&mut self, place: usize, engine: &mut Engine, clock: &MonotonicClock, heard: &mut Heard) -> io::Result<()> {
-        let Some(Some(door)) = self.doors.get_mut(place) else { return Ok(()) };
+        let Some(Some(open)) = self.ports.get_mut(place) else { return Ok(()) };
         let port = match (&self.layout, u32::try_from(place).unwrap_or(u32::MAX)) {
             (Layout::Mesh(_), place) => Port::Program(place),
             (Layout::Proxy { .. }, 0) => Port::Listen,
@@ -130,7 +130,7 @@ impl Doors {
         };
         let (opened, mut last) = (&mut self.opened, None);
         for batch in 1..=BATCHES {
-            let count = door.socket.receive(&mut self.buffers, clock, |datagram| {
+            let count = open.socket.receive(&mut self.buffers, clock, |datagram| {
                 last = Some(datagram.at);
                 let intake = engine.stage(Arrival { at: datagram.at, port, from: datagram.from, bytes: datagram.bytes, ecn: datagram.ecn });
                 if let Intake::FromNewClient(slot) = intake {
@@ -138,7 +138,7 @@ impl Doors {
                 }
             })?;
             heard.count += count;
-            if count < UdpDoor::BATCH {
+            if count < UdpEndpoint::BATCH {
                 break;
             }
             if batch == BATCHES {
@@ -159,8 +159,8 @@ impl Doors {
 
     fn follow(&mut self, engine: &mut Engine, clients: SocketAddr) {
         while let Some(slot) = engine.poll_closed() {
-            if let Some(door) = self.doors.get_mut(slot as usize + 1).and_then(Option::take) {
-                self.left.add(&door.socket);
+            if let Some(port) = self.ports.get_mut(slot as usize + 1).and_then(Option::take) {
+                self.left.add(&port.socket);
             }
         }
         while let Some(slot) = self.opened.pop() {
@@ -172,13 +172,13 @@ impl Doors {
     }
 
     fn open_at(&mut self, place: usize, address: SocketAddr) -> Result<(), BindError> {
-        let socket = UdpDoor::bind(address, self.config)?;
+        let socket = UdpEndpoint::bind(address, self.config)?;
         epoll::add(&self.epoll, &socket, epoll::EventData::new_u64(place as u64), epoll::EventFlags::IN)
             .map_err(|error| BindError { address, source: error.into() })?;
-        while self.doors.len() <= place {
-            self.doors.push(None);
+        while self.ports.len() <= place {
+            self.ports.push(None);
         }
-        self.doors[place] = Some(Door { socket, departures: VecDeque::new(), is_dirty: false });
+        self.ports[place] = Some(OpenPort { socket, departures: VecDeque::new(), is_dirty: false });
         Ok(())
     }
 
@@ -193,12 +193,12 @@ impl Doors {
                 Port::Client(slot) => slot as usize + 1,
             };
             // Always there: clients without a socket have been sent away.
-            let Some(Some(door)) = self.doors.get_mut(place) else { continue };
-            if door.socket.queue(release.to, release.bytes, release.ecn) {
+            let Some(Some(port)) = self.ports.get_mut(place) else { continue };
+            if port.socket.queue(release.to, release.bytes, release.ecn) {
                 // When it should have left had it been offered when it came.
                 let late = u64::try_from(release.late.as_nanos()).unwrap_or(u64::MAX);
-                door.departures.push_back(Instant::from_nanos(release.at.as_nanos().saturating_sub(late)));
-                if !core::mem::replace(&mut door.is_dirty, true) {
+                port.departures.push_back(Instant::from_nanos(release.at.as_nanos().saturating_sub(late)));
+                if !core::mem::replace(&mut port.is_dirty, true) {
                     self.dirty.push(place);
                 }
             }
@@ -210,9 +210,9 @@ impl Doors {
     /// to its link later than it came is that much later, too.
     #[inline]
     pub(super) fn send(&mut self, clock: &MonotonicClock, lateness: &mut Lateness) {
-        let doors = &mut self.doors;
+        let ports = &mut self.ports;
         self.dirty.retain(|place| {
-            let Some(Some(Door { socket, departures, is_dirty })) = doors.get_mut(*place) else { return false };
+            let Some(Some(OpenPort { socket, departures, is_dirty })) = ports.get_mut(*place) else { return false };
             socket.flush_with(
                 || clock.now(),
                 |before, count| departures.drain(..count.min(departures.len())).for_each(|at| lateness.record(before.saturating_duration_since(at))),
@@ -237,8 +237,8 @@ impl Doors {
             Layout::Mesh(names) => names.get(place).map_or("", String::as_str),
             Layout::Proxy { .. } => "listen",
         };
-        let doors = self.doors.iter().take(count).enumerate();
-        doors.filter_map(move |(place, door)| Some((name(place), door.as_ref()?.socket.local_address())))
+        let ports = self.ports.iter().take(count).enumerate();
+        ports.filter_map(move |(place, port)| Some((name(place), port.as_ref()?.socket.local_address())))
     }
 
     /// Clients that were sent away because no socket could be had.
@@ -250,7 +250,7 @@ impl Doors {
     pub(super) fn report(&self) -> Vec<PortReport> {
         let mut ports: Vec<PortReport> = Vec::new();
         for (place, (name, address)) in self.addresses().enumerate() {
-            if let Some(Some(Door { socket, .. })) = self.doors.get(place) {
+            if let Some(Some(OpenPort { socket, .. })) = self.ports.get(place) {
                 ports.push(PortReport {
                     name: name.to_owned(),
                     address: Some(address),
@@ -262,8 +262,8 @@ impl Doors {
         }
         if let Layout::Proxy { .. } = self.layout {
             let mut tally = self.left;
-            self.doors.iter().skip(1).flatten().for_each(|door| tally.add(&door.socket));
-            let granted = self.doors.iter().skip(1).flatten().map(|door| door.socket.granted_receive_buffer()).min();
+            self.ports.iter().skip(1).flatten().for_each(|port| tally.add(&port.socket));
+            let granted = self.ports.iter().skip(1).flatten().map(|port| port.socket.granted_receive_buffer()).min();
             ports.push(PortReport {
                 name: "clients".to_owned(),
                 address: None,
@@ -276,9 +276,9 @@ impl Doors {
     }
 }
 
-impl fmt::Debug for Doors {
+impl fmt::Debug for Ports {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Doors").field("layout", &self.layout).field("config", &self.config).finish_non_exhaustive()
+        f.debug_struct("Ports").field("layout", &self.layout).field("config", &self.config).finish_non_exhaustive()
     }
 }
 
@@ -292,7 +292,7 @@ pub(super) struct Heard {
 }
 
 impl Tally {
-    fn add(&mut self, socket: &UdpDoor) {
+    fn add(&mut self, socket: &UdpEndpoint) {
         let (sum, more) = (&mut self.counts, socket.counts());
         sum.received += more.received;
         sum.oversized += more.oversized;
@@ -337,17 +337,17 @@ mod tests {
         let link = link_from_keys(&[]).unwrap();
         let proxy = Proxy { listen: here, to: SocketAddr::from((Ipv4Addr::LOCALHOST, 9)), forth: link.clone(), back: link, most_clients: 2 };
         let config = RelayConfig { seed: 0, form: Form::Proxy(proxy), limits: Limits::default(), changes: Vec::new() };
-        let (mut doors, mut engine) = (Doors::open(&config, DoorConfig::default()).unwrap(), Engine::new(config).unwrap());
+        let (mut ports, mut engine) = (Ports::open(&config, EndpointConfig::default()).unwrap(), Engine::new(config).unwrap());
         // Somebody has it.
         let taken = std::net::UdpSocket::bind(here).unwrap();
         for (clients, expected) in [(taken.local_addr().unwrap(), (0, 1)), (here, (1, 1))] {
-            doors.layout = Layout::Proxy { clients };
+            ports.layout = Layout::Proxy { clients };
             let from = SocketAddr::from((Ipv4Addr::LOCALHOST, 10));
             let intake = engine.handle_datagram(Arrival { at: Instant::ZERO, port: Port::Listen, from, bytes: b"ask", ecn: None });
             let Intake::FromNewClient(slot) = intake else { panic!("{intake:?}") };
-            doors.opened.push(slot);
-            doors.follow_clients(&mut engine);
-            assert_eq!((engine.clients(), doors.without_socket()), expected);
+            ports.opened.push(slot);
+            ports.follow_clients(&mut engine);
+            assert_eq!((engine.clients(), ports.without_socket()), expected);
         }
     }
 
@@ -361,7 +361,7 @@ mod tests {
         let form = Form::Mesh(Mesh { programs: vec![program("left", left), program("right", right)], links });
         let config = RelayConfig { seed: 0, form, limits: Limits::default(), changes: Vec::new() };
         let clock = MonotonicClock::start();
-        let (mut doors, mut engine) = (Doors::open(&config, DoorConfig::default()).unwrap(), Engine::new(config).unwrap());
+        let (mut ports, mut engine) = (Ports::open(&config, EndpointConfig::default()).unwrap(), Engine::new(config).unwrap());
         let late = Duration::from_millis(5);
         let passed = Instant::ZERO.saturating_add(late);
         while clock.now() < passed {
@@ -369,9 +369,9 @@ mod tests {
         }
         engine.handle_timeout(passed);
         engine.handle_datagram(Arrival { at: Instant::ZERO, port: Port::Program(1), from: left, bytes: b"late", ecn: None });
-        assert!(!doors.take_releases(&mut engine));
+        assert!(!ports.take_releases(&mut engine));
         let mut lateness = Lateness::new();
-        doors.send(&clock, &mut lateness);
+        ports.send(&clock, &mut lateness);
         assert_eq!(lateness.count(), 1);
         assert!(lateness.summary().max >= late, "{:?}", lateness.summary());
     }

@@ -8,15 +8,15 @@ use cohaptic_falcon::transport::{Transport, TransportError};
 use cohaptic_units::Instant;
 
 /// USB or simulated: what is behind it does not know which.
-pub(super) struct Way(Box<dyn Transport>);
+pub(super) struct AnyTransport(Box<dyn Transport>);
 
-impl Way {
+impl AnyTransport {
     pub(super) fn new(transport: impl Transport + 'static) -> Self {
         Self(Box::new(transport))
     }
 }
 
-impl Transport for Way {
+impl Transport for AnyTransport {
     fn now(&self) -> Instant {
         self.0.now()
     }
@@ -38,7 +38,7 @@ impl Transport for Way {
     }
 }
 
-impl fmt::Debug for Way {
+impl fmt::Debug for AnyTransport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Way").field("now", &self.now()).finish_non_exhaustive()
     }
