@@ -133,7 +133,7 @@ fn today() -> String {
     date(SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs() / 86_400)
 }
 
-/// The date so many days after the beginning of 1970, as in 2025-03-01: by the rule of the calendar, a leap year every four years but for three of four centuries.
+/// The date a number of days after the beginning of 1970, as in 2025-03-01: by the rule of the calendar, a leap year every four years but for three of four centuries.
 fn date(days: u64) -> String {
     // Counted from the first of March of year 0, so that the leap day is the last of its year.
     let days = days + 719_468;

@@ -1,4 +1,4 @@
-//! What is measured: the relay, a forwarder with a task a packet, and bare threads.
+//! The subjects: the relay, a forwarder with a task a packet, and bare threads.
 
 use std::error::Error;
 use std::net::{SocketAddr, UdpSocket};
@@ -64,7 +64,7 @@ fn measure(
 ) -> Done {
     let (memory, start) = (machine::memory(), machine::process_time());
     let sent = generate(source, to, rate, span);
-    // What is on its way arrives.
+    // Datagrams on their way arrive.
     std::thread::sleep(DELAY + Duration::from_millis(200));
     let after = machine::memory();
     let Said { error, sent: forwarded, at_socket, overload, clamped, refused } = end(&sent)?;

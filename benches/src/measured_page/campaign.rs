@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::programs::{Measured, Programs};
 
-/// What is run: two scenes that go side by side, and one that goes event by event.
+/// The scenes: two that go side by side, and one that goes event by event.
 const SCENES: [&str; 3] = ["paper/5-1-ap-2100", "network/loss-independent", "network/queue-codel"];
 
 /// How many, the option, and the name of the folder.

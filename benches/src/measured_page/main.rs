@@ -1,4 +1,4 @@
-//! Writes `docs/measured.md` and the pages that have a program of their own: `benches/measure`, which builds what is needed first.
+//! Writes `docs/measured.md` and the pages that have a program of their own: `benches/measure`, which builds the programs first.
 #![allow(clippy::print_stderr, reason = "a line for each step is what people look at while it runs")]
 
 mod accuracy;

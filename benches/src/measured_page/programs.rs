@@ -59,12 +59,12 @@ impl Programs {
 pub(crate) struct Measured {
     /// What stands below the commands.
     pub(crate) body: String,
-    /// Files in `docs/`, and what is in them.
+    /// Files in `docs/`, and their content.
     pub(crate) files: Vec<(PathBuf, String)>,
 }
 
 impl Measured {
-    /// What is said of a step that could not be done here.
+    /// The note on a step that could not be done here.
     pub(crate) fn nothing(why: &str) -> Self {
         Self { body: format!("**Not measured then:** {why}. The page linked above, if it is there, is from an earlier day.\n"), files: Vec::new() }
     }

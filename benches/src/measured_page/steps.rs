@@ -176,7 +176,7 @@ one link alone, a stability map, and what each of the others does not model: [pe
         }
     }
 
-    /// The first lines of the section: what is asked, and the commands.
+    /// The first lines of the section: the question, and the commands.
     pub(crate) fn head(self, effort: Effort) -> String {
         let commands: String = self.commands(effort).iter().map(|command| format!("    {command}\n")).collect();
         format!("{}\n\n{}\n\n{commands}", self.heading(), self.question())

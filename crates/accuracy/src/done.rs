@@ -1,8 +1,8 @@
-//! What is done.
+//! Where rows go as they are measured.
 
 use crate::{AccuracyError, Row, Watch};
 
-/// The rows so far, and who watches.
+/// The rows so far, and the watcher.
 pub(crate) struct RowSink<'a> {
     pub(crate) rows: Vec<Row>,
     pub(crate) watch: &'a dyn Watch,

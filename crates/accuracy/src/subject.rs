@@ -1,4 +1,4 @@
-//! What is looked at.
+//! The subjects of the measurement.
 
 use crate::{AccuracyError, Options, Row, Watch, analysis, least, motion, network, real_time, time};
 

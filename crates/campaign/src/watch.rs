@@ -1,4 +1,4 @@
-//! Who looks on.
+//! The watcher of a campaign.
 
 /// Is told how far a campaign has come, and can end it. Called from many threads.
 pub trait Watch: Sync {

@@ -134,7 +134,7 @@ impl Work<'_> {
 }
 
 impl Scenes {
-    /// At most so many are kept.
+    /// The most that are kept.
     const MOST: usize = 64;
 
     fn get(&self, combination: u64, plan: &CampaignPlan) -> Result<Arc<Scene>, CampaignError> {

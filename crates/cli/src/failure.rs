@@ -116,7 +116,7 @@ impl Failure {
     }
 }
 
-/// Why the variant of a scene that can be read cannot be had, where an option other than `--set` said what is different.
+/// Why the variant of a scene that can be read cannot be had, where an option other than `--set` gave the difference.
 pub(crate) fn of_variant(error: SceneError, option: &'static str, overrides: &[String]) -> Failure {
     let text = error.diagnostic().and_then(Diagnostic::override_text);
     if text.is_some_and(|text| overrides.iter().any(|given| given == text)) { Failure::Override { option, error } } else { Failure::Scene(error) }

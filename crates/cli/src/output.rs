@@ -56,7 +56,7 @@ pub(crate) fn wrote(files: impl IntoIterator<Item = impl AsRef<Path>>) {
     }
 }
 
-/// A path as text. What is not Unicode in it is replaced: JSON cannot hold it.
+/// A path as text. Bytes that are not Unicode are replaced: JSON cannot hold it.
 pub(crate) fn path(path: &Path) -> String {
     path.to_string_lossy().into_owned()
 }

@@ -1,4 +1,4 @@
-//! What is known of a device only roughly, as numbers that a laboratory may replace.
+//! Properties of a device that are known only roughly, as numbers that a laboratory may replace.
 
 use core::ops::RangeInclusive;
 

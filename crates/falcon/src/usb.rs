@@ -26,7 +26,7 @@ const CANCEL_PATIENCE: Duration = Duration::from_secs(1);
 pub struct Listed {
     /// Its serial number, if the system tells.
     pub serial: Option<String>,
-    /// What it calls itself: `FALCON HAPTIC`, by what is known.
+    /// What it calls itself: `FALCON HAPTIC`, by published drivers.
     pub product: Option<String>,
     /// The bus it is on, as the system names it.
     pub bus: String,

@@ -1,4 +1,4 @@
-//! Who watches a run.
+//! The observer of a run.
 
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::Fate;
@@ -44,7 +44,7 @@ pub trait Observer {
         Ok(())
     }
 
-    /// Something has come into a [live session](crate::live) from outside: what is seen here, in this order, is what a replay needs.
+    /// Something has come into a [live session](crate::live) from outside: a replay needs the rows seen here, in this order.
     ///
     /// # Errors
     ///

@@ -27,7 +27,7 @@ pub fn too_large(scene: &Scene) -> Option<String> {
 /// A scene in virtual time, as fast as the processor goes.
 ///
 /// At one instant, in this order: changes of the timeline; peers that tick sample and send; packets that have arrived are applied; forces are
-/// computed; everybody who ticks moves to the next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
+/// computed; each peer that ticks moves to the next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
 #[derive(Debug)]
 pub struct Simulation<'a, S = FromScene> {
     scene: &'a Scene,

@@ -118,7 +118,7 @@ fn cell(mesh: Mesh) {
     }
 }
 
-/// The ticks that are worth so many times those compared.
+/// The ticks that are worth this multiple of those compared.
 fn length(times: f64) -> u64 {
     ((COMPARED as f64 * times) as u64).clamp(1_000, 20_000_000).next_multiple_of(8)
 }

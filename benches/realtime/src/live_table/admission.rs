@@ -14,7 +14,7 @@ use cohaptic_units::Instant;
 /// So many datagrams are decided about in a round.
 pub(crate) const COUNT: u32 = 10_000;
 
-/// The median of so many rounds is taken.
+/// The rounds of which the median is taken.
 pub(crate) const ROUNDS: usize = 21;
 
 const AXES: usize = 3;

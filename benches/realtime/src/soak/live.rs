@@ -78,7 +78,7 @@ pub(super) struct Live {
     thread: JoinHandle<Result<LiveEnd, SessionError>>,
 }
 
-/// Who looks on.
+/// The onlooker.
 struct Host {
     clock: MonotonicClock,
     earliest: Instant,

@@ -168,7 +168,7 @@ fn drain(mut socket: UdpEndpoint, end: &AtomicBool) -> io::Result<(u64, Option<u
 /// What must be equal in a relay at any moment.
 pub(super) fn accounts(look: &StreamLook) -> Vec<Account> {
     let inside = look.intake.offered.saturating_sub(look.delivered + look.dropped);
-    // Of more than it sends at once, some have left their link and wait for their turn. That many only gather when the machine pauses for a second.
+    // Of more than it sends at once, some have left their link and wait for their turn. As many only gather when the machine pauses for a second.
     let open = (look.held > AT_ONCE).then_some("some wait to be sent after a pause of the machine");
     vec![Account { open, ..Account::of("packets that the relay holds, and those inside its links", look.held, inside) }]
 }

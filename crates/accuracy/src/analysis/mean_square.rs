@@ -17,13 +17,13 @@ const UNIT: &str = "mean-square radius [1]";
 const COST: &str = "ms a verdict";
 const REFERENCE: &str = "12 digits, by an independent computation";
 
-/// Frames whose squares are added up, and compared with those of as many frames after them: so many that the phase of what swings counts little, so late
+/// Frames whose squares are added up, and compared with those of as many frames after them: enough that the phase of an oscillation counts little, so late
 /// that what dies out sooner is gone, so early that few runs do not decide alone.
 const WINDOW: u32 = 24;
 /// The first of them.
 const BEGIN: u32 = 12;
 
-/// Runs are taken together in so many batches, whose spread tells the uncertainty.
+/// The batches in which runs are taken together, whose spread tells the uncertainty.
 const BATCHES: u32 = 10;
 
 pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {

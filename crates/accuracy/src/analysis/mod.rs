@@ -1,5 +1,5 @@
 //! Whether a scene is stable: what a verdict costs by each method, and how far it is from numbers of fifty digits; and by runs that are left to chance,
-//! how much so many of them tell.
+//! how much a number of them tells.
 
 mod boundary;
 mod every_pattern;

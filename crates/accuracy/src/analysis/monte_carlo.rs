@@ -1,4 +1,4 @@
-//! The probability of an event, from runs: how far it is from the exact one, and how wide the interval is that so many runs leave.
+//! The probability of an event, from runs: how far it is from the exact one, and how wide the interval is that a number of runs leaves.
 
 use super::every_pattern::{LIMIT, exact, happens, scene};
 use super::{Effort, row};
@@ -9,7 +9,7 @@ use crate::{AccuracyError, Row};
 const COST: &str = "s a verdict";
 const REFERENCE: &str = "every pattern of losses, weighed";
 
-/// 97.5 % of a normal law lie below so many deviations.
+/// 97.5 % of a normal law lie below this number of deviations.
 const Z: f64 = 1.959_963_984_540_054;
 
 pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {

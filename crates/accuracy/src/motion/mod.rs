@@ -60,7 +60,7 @@ pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyErr
     Ok(rows)
 }
 
-/// A scene, and what is right.
+/// A scene, and its reference.
 pub(crate) struct Work {
     pub(crate) pair: Pair,
     /// The bodies after every tick.
@@ -153,7 +153,7 @@ pub(crate) fn program_boundary(motion: &MotionScene, (key, low, high): (&str, f6
     Ok(boundary.crossings.first().map(|crossing| crossing.value))
 }
 
-/// The larger one; what is no number is worse than any.
+/// The larger one; a NaN is worse than any.
 fn worse(before: f64, now: f64) -> f64 {
     if now.is_nan() { f64::INFINITY } else { before.max(now) }
 }

@@ -78,7 +78,7 @@ delay = "8ms"
     boundary: None,
 };
 
-/// Two who hold the object, one of them with an arm that stays where it is, the other pushing with 1 N.
+/// Two peers hold the object, one of them with an arm that stays where it is, the other pushing with 1 N.
 pub(crate) const COUPLED: MotionScene = MotionScene {
     name: "coupled peers",
     text: r#"

@@ -155,7 +155,7 @@ fn tail_error(law: &Law, look: Look, found: f64) -> f64 {
     ((found - exact) / (exact - MEAN)).abs()
 }
 
-/// Of so many draws. Perfect ones are about 0.87/√n away too, on average: √(π/2)·ln 2 (Kolmogorov).
+/// Of n draws. Perfect ones are about 0.87/√n away too, on average: √(π/2)·ln 2 (Kolmogorov).
 fn sampled(law: &Law, look: Look, count: usize, sampler: &mut impl FnMut() -> f64) -> Wrong {
     let mut delays: Vec<f64> = (0..count).map(|_| sampler()).collect();
     delays.sort_by(f64::total_cmp);

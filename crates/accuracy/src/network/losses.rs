@@ -12,7 +12,7 @@ use crate::{AccuracyError, Row};
 const MEAN: &str = "mean loss [relative]";
 const RUN: &str = "mean run of losses [relative]";
 
-/// A model and who else has it.
+/// A model and the other programs that have it.
 struct Case {
     name: &'static str,
     ours: Loss,

@@ -1,8 +1,8 @@
-//! Laws of delay and models of loss: what a draw costs, and how far what is drawn is from what was asked.
+//! Laws of delay and models of loss: what a draw costs, and how far the draws are from the law asked for.
 //!
 //! - [`ways`] to draw a delay: tables as netem has them and finer ones, the inverse of the law, what the program draws, and others' samplers;
 //! - [`errors`] of a way: computed from its table or its function, so that they are the same every time. What can only be drawn is drawn often, and
-//!   the row says how much of its error is that of so many draws.
+//!   the row says how much of its error is that of the number of draws.
 //! - loss models: how many packets it takes until the mean loss and the mean run of losses are known to some error, beside what theory says;
 //! - jitter that hangs together from packet to packet: what was asked for, and what comes out.
 
@@ -32,7 +32,7 @@ pub struct Effort {
     pub rounds: usize,
     /// How many packets are sent for the correlation of jitter.
     pub correlated_packets: usize,
-    /// For each number of packets through a loss model, how many runs of so many there are.
+    /// For each number of packets through a loss model, the number of runs.
     pub loss_runs: &'static [(usize, usize)],
 }
 

@@ -87,7 +87,7 @@ impl Manifest {
         text
     }
 
-    /// The parts that a campaign of that many runs is cut into.
+    /// The parts that a campaign of a number of runs is cut into.
     pub(crate) const fn parts(&self, runs: u64) -> Parts {
         Parts { runs, size: self.part_runs }
     }

@@ -1,4 +1,4 @@
-//! What is asked for: which runs there are, and the scene of each.
+//! The plan of a campaign: which runs there are, and the scene of each.
 
 mod check;
 mod fingerprint;
@@ -59,7 +59,7 @@ pub struct CampaignPlan {
 }
 
 impl CampaignPlan {
-    /// Puts together what is asked for. The scene is not read yet.
+    /// Puts a plan together. The scene is not read yet.
     ///
     /// # Errors
     ///
@@ -131,7 +131,7 @@ impl CampaignPlan {
         &self.variations
     }
 
-    /// What a combination puts into the scene, on top of what is set in all runs: texts `KEY=VALUE`.
+    /// What a combination puts into the scene, on top of the overrides of all runs: texts `KEY=VALUE`.
     #[must_use]
     pub fn varied(&self, combination: u64) -> Vec<String> {
         self.places(combination).into_iter().zip(&self.variations).map(|(place, vary)| vary.override_text(place)).collect()

@@ -15,7 +15,7 @@ pub(crate) struct Head<'a> {
     pub(crate) program: &'a str,
 }
 
-/// What is looked at to sum a run up.
+/// The figures that sum a run up.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Gist {
     pub(crate) diverged: bool,
@@ -33,7 +33,7 @@ pub(crate) type Gists<'a> = &'a mut dyn FnMut(Gist);
 pub(crate) enum TableError {
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// What is in a file is not what was written there.
+    /// The content of a file is not the content that was written.
     #[error("{0}")]
     Content(String),
     /// Of the parts that are put together, this one cannot be read.

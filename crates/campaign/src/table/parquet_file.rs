@@ -1,4 +1,4 @@
-//! Apache Parquet. What is written depends on the rows alone: no times, no random names. Nothing is compressed: most of a table is numbers whose last digits
+//! Apache Parquet. The file depends on the rows alone: no times, no random names. Nothing is compressed: most of a table is numbers whose last digits
 //! look random, and what repeats is stored as a dictionary anyway.
 
 use std::fs::File;

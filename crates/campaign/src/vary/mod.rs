@@ -166,7 +166,7 @@ impl Variation {
     ///
     /// # Panics
     ///
-    /// If there are not so many values.
+    /// If there are fewer values.
     #[must_use]
     pub fn override_text(&self, place: usize) -> String {
         format!("{}={}", self.key, self.values[place].text)
@@ -194,7 +194,7 @@ impl Variation {
         self.logarithmic
     }
 
-    /// A value by its place, as a number in the unit of all; `None` if it is text, or if there are not so many.
+    /// A value by its place, as a number in the unit of all; `None` if it is text, or if there are fewer.
     #[must_use]
     pub fn number(&self, place: usize) -> Option<f64> {
         match &self.values.get(place)?.value {
@@ -205,7 +205,7 @@ impl Variation {
         }
     }
 
-    /// A value by its place, as it is written; empty if there are not so many.
+    /// A value by its place, as it is written; empty if there are fewer.
     #[must_use]
     pub fn value_text(&self, place: usize) -> &str {
         self.values.get(place).map_or("", |varied| &varied.text)

@@ -7,7 +7,7 @@ use cohaptic_falcon::transport::Request;
 use cohaptic_falcon::transport::{Transport, TransportError};
 use cohaptic_units::Instant;
 
-/// USB or simulated: what is behind it does not know which.
+/// USB or simulated: the device behind it does not know which.
 pub(super) struct AnyTransport(Box<dyn Transport>);
 
 impl AnyTransport {

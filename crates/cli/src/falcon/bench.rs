@@ -16,7 +16,7 @@ const PERIOD: Duration = Duration::from_millis(1);
 /// A turn that is later than this is counted. The serial chip hands over what has come once a millisecond, by its own clock: somewhat less is no fault.
 const LATE: Duration = Duration::from_micros(100);
 
-/// What is done with a device.
+/// The work on a device.
 pub(super) trait Task {
     /// The force on the grip \[N\] that is wanted at `at`, counted from the first exchange; `None` wants none.
     fn wants(&mut self, at: Duration, status: &Status) -> Option<Triple>;

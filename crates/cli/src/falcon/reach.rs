@@ -112,7 +112,7 @@ pub(super) fn read_firmware(path: Option<&Path>) -> Result<Option<Firmware>, Fai
     })
 }
 
-/// Sees to it that firmware runs; what is in the way, in words.
+/// Sees to it that firmware runs; the obstacle, in words.
 pub(super) fn make_ready(way: &mut AnyTransport, firmware: Option<&Firmware>) -> Result<FirmwareState, String> {
     let options = BootOptions::DEFAULT;
     let Some(firmware) = firmware else {

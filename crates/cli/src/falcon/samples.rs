@@ -12,7 +12,7 @@ use crate::failure::Failure;
 use crate::file::unwritten;
 use crate::output;
 
-/// The columns. What is not known is left empty.
+/// The columns. Unknown values are left empty.
 pub(super) const HEADER: &str = "t,phase,homed,encoder1,encoder2,encoder3,x,y,z,vx,vy,vz,fx,fy,fz,buttons";
 
 /// A row, without its line break.

@@ -1,4 +1,4 @@
-//! Between a session and those who look on: nothing here waits.
+//! Between a session and onlookers: nothing here waits.
 
 use std::sync::mpsc::Receiver;
 

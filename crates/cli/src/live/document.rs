@@ -45,7 +45,7 @@ struct LivePeer {
     seat: Option<SeatDocument>,
 }
 
-/// What came in from a peer that lives elsewhere.
+/// What came in from a peer that is remote.
 #[derive(Serialize)]
 struct SeatDocument {
     taken: u64,

@@ -50,7 +50,7 @@ fn make_key(file: &Path) -> Result<ExitCode, Failure> {
 fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let mut overrides = arguments.overrides.set.clone();
     if let Some(length) = arguments.length {
-        // What is expected of the whole scene, which may be longer, is not looked at in a session anyway.
+        // Expectations of the whole scene, which may be longer, are not looked at in a session anyway.
         overrides.extend([format!("scene.duration={}", Span(length)), "expect={}".to_owned()]);
     }
     let overrides = overrides.as_slice();

@@ -47,7 +47,7 @@ pub(super) fn snapshot(status: &Status, axes: usize) -> Snapshot {
     }
 }
 
-/// What a terminal shows behind the progress: how late ticks are, and who is not there.
+/// What a terminal shows behind the progress: how late ticks are, and which peers are absent.
 pub(super) fn note(scene: &Scene, snapshot: &Snapshot) -> String {
     let late = snapshot.lateness.first().map_or_else(String::new, |ticks| format!("  ticks p99 {:.0} µs late", micros(ticks.p99)));
     let missing = snapshot.peers.iter().zip(&scene.peers).filter(|(peer, _)| matches!(peer.status, Shown::Absent | Shown::Stale));

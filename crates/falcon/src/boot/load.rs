@@ -47,9 +47,9 @@ impl Default for BootOptions {
 pub enum Progress {
     /// An attempt begins; counted from 1.
     Attempt(u32),
-    /// The boot loader is there, after so many greetings.
+    /// The boot loader is there, after this number of greetings.
     Greeted(u32),
-    /// So many bytes of so many are over and came back right.
+    /// `done` bytes of `of` are over and came back right.
     Loaded {
         /// Bytes that are over.
         done: usize,
@@ -206,7 +206,7 @@ fn greet<T: Transport + ?Sized>(transport: &mut T, options: &BootOptions) -> Res
                 break;
             }
         }
-        // What is left of a broken answer would spoil the next.
+        // The rest of a broken answer would spoil the next.
         transport.control(Request::Reset, ftdi::PURGE_RX)?;
     }
     Err(BootError::NoBootLoader { greetings: options.greetings.max(1) })

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! [`Simulator`] knows no clock: time is an argument. [`SimulatedTransport`] gives it one, virtual or that of the machine, and is what a driver is given.
-//! What is not known of the device is a number of [`SimulatorConfig`].
+//! Each unknown of the device is a number of [`SimulatorConfig`].
 
 mod chip;
 mod config;

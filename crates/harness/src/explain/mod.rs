@@ -14,9 +14,9 @@ use crate::plan::{DeviceChoice, Model, Plan, Ticking};
 /// What `cohaptic explain` shows.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Explanation {
-    /// What is modelled how.
+    /// The parts that are modelled, and how.
     pub models: Vec<ModelRow>,
-    /// What is not modelled, and why not.
+    /// The parts that are not modelled, and why.
     pub left_out: Vec<String>,
     /// The sizes of the state.
     pub dimensions: Dimensions,

@@ -1,4 +1,4 @@
-//! A scene some of whose peers live elsewhere: in other processes, or with their device in somebody's hand.
+//! A scene some of whose peers are remote: in other processes, or with their device in somebody's hand.
 //!
 //! [`LiveScene`] is a state machine. Whoever drives it hands in what comes from outside with the instant at which it came, lets time pass, and sends on what
 //! the network has delivered. It reads no clock and touches no socket: driven by the clock of the wall it is a live session, driven by the recorded

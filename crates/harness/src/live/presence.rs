@@ -1,4 +1,4 @@
-//! Who of those that live elsewhere is there, what the others feel of them, and what is to be sent to them.
+//! The presence of remote peers: which are there, what the others feel of them, and the datagrams to be sent to them.
 
 use std::collections::VecDeque;
 
@@ -47,18 +47,18 @@ pub struct Transmit {
     pub datagram: Datagram,
 }
 
-/// Everybody who lives elsewhere.
+/// The remote peers of a scene.
 #[derive(Debug)]
 pub(crate) struct RemotePeers<const A: usize> {
     seats: Vec<Option<Seat>>,
-    /// What the others are to each who lives here.
+    /// The ages of the others, for each local peer.
     ages: Vec<Ages<A>>,
     /// What each (sender, receiver) was last told.
     told: Vec<Option<Age>>,
     outbox: VecDeque<Transmit>,
     /// Whether any peer lives in another process.
     pub(crate) has_processes: bool,
-    /// The first of those who live here.
+    /// The first local peer.
     pub(crate) lead: usize,
     /// When something came in from outside whose consequences have not been looked at.
     pub(crate) undrained: Option<Instant>,
@@ -91,7 +91,7 @@ impl<const A: usize> RemotePeers<A> {
         self.seat(place).is_some_and(|seat| seat.is_process)
     }
 
-    /// Notices who has fallen silent, and calls `silent` for each.
+    /// Notices peers that have fallen silent, and calls `silent` for each.
     pub(crate) fn notice_silence(&mut self, now: Instant, mut silent: impl FnMut(usize)) {
         for (place, seat) in self.seats.iter_mut().enumerate() {
             if seat.as_mut().is_some_and(|seat| seat.notice_silence(now)) {
@@ -133,7 +133,7 @@ impl<const A: usize> RemotePeers<A> {
         }
     }
 
-    /// Tells a peer that is about to tick what it feels of those who live elsewhere.
+    /// Tells a peer that is about to tick what it feels of the remote peers.
     pub(crate) fn tell<D: Device<A>, S: Strategy<A>>(&mut self, to: usize, now: Instant, peer: &mut Peer<A, D, S>) {
         let peers = self.seats.len();
         for (from, seat) in self.seats.iter().enumerate().filter(|(from, _)| *from != to) {

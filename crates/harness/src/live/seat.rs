@@ -1,4 +1,4 @@
-//! The place of a peer that lives elsewhere, taken or not.
+//! The place of a peer that is remote, taken or not.
 
 use std::time::Duration;
 
@@ -70,7 +70,7 @@ pub struct SeatStats {
     pub most_late: Duration,
 }
 
-/// The place of a peer that lives elsewhere.
+/// The place of a peer that is remote.
 #[derive(Clone, Debug)]
 pub(crate) struct Seat {
     pub(crate) is_process: bool,

@@ -57,7 +57,7 @@ pub(crate) fn create_folder(path: &Path) -> Result<(), RecordError> {
     fs::create_dir_all(path).map_err(|source| RecordError { path: path.to_path_buf(), source })
 }
 
-/// Adds a number with the fewest digits that read back as the same `f64`; `inf`, `-inf` and `NaN` for what is no number.
+/// Adds a number with the fewest digits that read back as the same `f64`; `inf`, `-inf` and `NaN` for values that are not finite.
 pub(crate) fn push_f64(line: &mut Vec<u8>, value: f64) {
     line.extend_from_slice(ryu::Buffer::new().format(value).as_bytes());
 }

@@ -31,7 +31,7 @@ impl InputRecorder {
         Ok(Self { file, names: scene.peers.iter().map(|peer| peer.name.clone()).collect(), line: Vec::new() })
     }
 
-    /// Writes what is left and gives the file its name.
+    /// Writes the rest and gives the file its name.
     ///
     /// # Errors
     ///

@@ -9,7 +9,7 @@ use super::file::{RecordFile, push_display};
 use crate::PacketRow;
 use crate::record::RecordError;
 
-/// Columns `link,sequence,sent,arrived,fate`. `arrived` is empty for a packet that was dropped; what is on the way at the end has no row. A copy has a row of its own, with the number of its packet.
+/// Columns `link,sequence,sent,arrived,fate`. `arrived` is empty for a packet that was dropped; a packet on the way at the end has no row. A copy has a row of its own, with the number of its packet.
 #[derive(Debug)]
 pub(crate) struct Packets {
     file: RecordFile,

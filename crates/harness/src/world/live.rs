@@ -1,4 +1,4 @@
-//! A running scene some of whose peers live elsewhere.
+//! A running scene some of whose peers are remote.
 
 use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, State, Strategy};
@@ -15,7 +15,7 @@ use crate::plan::ticking;
 use crate::schedule::Schedule;
 
 impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
-    /// The scene at its beginning, with nobody there yet of those who live elsewhere.
+    /// The scene at its beginning, with all remote peers absent.
     pub(crate) fn seated(mut self, scene: &Scene, mut devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
         self.ticking.retain(|place| !self.remote.is_process(*place));
         let here = |place: &usize| &scene.peers[*place];

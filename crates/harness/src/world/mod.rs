@@ -19,7 +19,7 @@ use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
 
 pub(crate) use remote::{NoRemote, Remote};
 
-/// A scene in the middle of a run; E is who of its peers lives elsewhere.
+/// A scene in the middle of a run; E holds its remote peers.
 pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     /// The axes that the scene has, of the A that are simulated.
     axes: usize,
@@ -28,7 +28,7 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     network: Network<Handle>,
     datagrams: Datagrams<A>,
     schedule: Schedule,
-    /// What is yet to change, the next change last.
+    /// The changes to come, the next one last.
     changes: Vec<Change>,
     coordination_factor: f64,
     end: Instant,
@@ -37,7 +37,7 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     latest: Vec<[f64; A]>,
     max_discrepancy: f64,
     finite: bool,
-    /// Who ticks at the present instant, if not all who live here.
+    /// The peers that tick at the present instant, if not all local ones.
     ticking: Vec<usize>,
     /// In lockstep, the next tick at which anybody sends.
     earliest_send: u64,
@@ -234,7 +234,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             let local_time = member.clock.local_time(member.tick);
             let stored = self.datagrams.store(others, self.axes, |datagram| member.peer.sample(local_time, datagram));
             let (handle, len) = stored.expect("a run ends before a state that is not finite is sent");
-            // Capable of ECN, so that a queue that marks has something to mark: nobody sends less for it, but what is marked arrives.
+            // Capable of ECN, so that a queue that marks has something to mark: nobody sends less for it, but a marked packet arrives.
             let info = PacketInfo { size: Bytes::new(len as u64), ecn_capable: true };
             self.network.handle_broadcast(now, node(from), info, handle).expect("instants come in order");
         }
@@ -270,7 +270,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         Ok(())
     }
 
-    /// Steps 3 and 4: everybody who ticks computes forces and moves to the next tick.
+    /// Steps 3 and 4: each peer that ticks computes forces and moves to the next tick.
     fn compute_and_move<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
         let lockstep = match &mut self.schedule {
             Schedule::Lockstep { tick, next } => {
@@ -314,7 +314,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         Ok(())
     }
 
-    /// What happens to each who ticks, where all tick and nobody watches: it took 10 % off a tick.
+    /// The work of each peer that ticks, where all tick and nobody watches: it took 10 % off a tick.
     #[inline]
     fn move_together(&mut self, now: Instant, span: Duration) {
         let mut finite = true;

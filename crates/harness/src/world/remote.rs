@@ -1,4 +1,4 @@
-//! What a running scene asks about peers that live elsewhere.
+//! The questions of a running scene about its remote peers.
 
 use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_peer::{Device, Peer, ReceiveError, Reception, RestingDevice, Strategy};
@@ -9,18 +9,18 @@ use super::DeviceModel;
 use crate::datagrams::Handle;
 use crate::observer::Observer;
 
-/// The peers of a running scene that live elsewhere: in other processes, or with their device in somebody's hand.
+/// The peers of a running scene that are remote: in other processes, or with their device in somebody's hand.
 ///
-/// A type parameter of the world and not a field that may be empty: virtual time, where everybody lives here, is not to carry what live scenes need. As a
+/// A type parameter of the world and not a field that may be empty: virtual time, where all peers are local, is not to carry what live scenes need. As a
 /// field, with ages in every peer, it cost two peers a seventh of a tick and ten of them a tenth, though nothing ever came of its questions.
 pub(crate) trait Remote<const A: usize> {
     /// What stands for a device that nobody simulates.
     type Device: Device<A> + From<RestingDevice<A>>;
 
-    /// Whether all live here whatever the scene, so that they may tick in one loop that asks nothing.
+    /// Whether all peers are local whatever the scene, so that they may tick in one loop that asks nothing.
     const IS_EMPTY: bool;
 
-    /// The first of those who live here, by whose ticks all of them tick in lockstep.
+    /// The first local peer, by whose ticks all of them tick in lockstep.
     fn lead(&self) -> usize;
 
     /// Whether a peer is there, so that it is of interest how far its copy is from the others.
@@ -36,7 +36,7 @@ pub(crate) trait Remote<const A: usize> {
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>>;
 
-    /// What those who live elsewhere are to a peer that is about to tick; its own device may be one of them.
+    /// Tells a peer that is about to tick the ages of the remote peers; its own device may be one of them.
     fn attend<S: Strategy<A>, O: Observer>(
         &mut self,
         now: Instant,
@@ -47,7 +47,7 @@ pub(crate) trait Remote<const A: usize> {
     ) -> Result<(), O::Error>;
 }
 
-/// Everybody lives here: virtual time.
+/// All peers are local: virtual time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NoRemote;
 

@@ -50,7 +50,7 @@ pub struct AdmissionConfig {
     pub update: Duration,
     /// The peers that are other programs, in any order.
     pub seats: Vec<Seat>,
-    /// With a key only its holders can join. Without one anybody can who reaches the socket.
+    /// With a key only its holders can join. Without one every program can that reaches the socket.
     pub key: Option<SessionKey>,
     /// After how long a peer that is not heard counts as gone: nothing is sent to it any more, and its seat can be taken.
     pub stale_after: Duration,

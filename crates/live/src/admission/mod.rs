@@ -8,7 +8,7 @@
 //!
 //! Without a key the first sample for a seat joins, and the seat belongs to its address until it has been silent for a while. With a key a peer says
 //! hello, is answered by a nonce of the server, and joins with the first sample that is sealed under keys made of both nonces. The door remembers
-//! nothing of who has asked:
+//! nothing of those that asked:
 //!
 //! - The server's nonce is a keyed hash of the seat, of how often the seat was taken, and of the address that asked. The client's nonce comes with
 //!   every sealed sample. So the door can make the keys again when a sample needs them.
@@ -16,7 +16,7 @@
 //!   has a wrong tag.
 //! - A hello changes nothing. Whoever repeats recorded ones gets answers he can do nothing with.
 //!
-//! Memory is that of the seats. The numbers of a seat never go back for those inside: what is let in has the number of the joining in its upper 24
+//! Memory is that of the seats. The numbers of a seat never go back for those inside: an admitted sample has the number of the joining in its upper 24
 //! bits and the number that the peer gave it in the lower 40, so a peer that joins again and counts from 0 is newer than it was.
 
 mod config;
@@ -59,7 +59,7 @@ const SEQUENCE_AT: core::ops::Range<usize> = 24..32;
 pub enum Admission {
     /// A sample for the scene.
     Sample {
-        /// Who sent it.
+        /// The sender.
         place: Place,
         /// Whether it took the seat: for the first time, or again.
         joined: bool,
@@ -167,8 +167,8 @@ impl AdmissionControl {
 
     /// Makes a sample of another peer ready for the one in that seat: writes it, sealed if there is a key, and gives its address and the length.
     ///
-    /// `None` if nobody has the seat, if who has it was not heard for [`AdmissionConfig::stale_after`], if `place` is no seat, or if `sample` is longer than
-    /// a sample. So somebody who lies about his address cannot have another flooded for longer than that.
+    /// `None` if nobody has the seat, if its holder was not heard for [`AdmissionConfig::stale_after`], if `place` is no seat, or if `sample` is longer than
+    /// a sample. So a false address cannot have another program flooded for longer than that.
     pub fn seal(&mut self, now: Instant, place: Place, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<(SocketAddr, usize)> {
         let ready = self.make_ready(now, place, sample, out);
         match ready {
@@ -184,7 +184,7 @@ impl AdmissionControl {
         &self.stats
     }
 
-    /// Every seat, by place: who has it and since when he was not heard.
+    /// Every seat, by place: its holder and since when that was not heard.
     pub fn seats(&self, now: Instant) -> impl Iterator<Item = SeatStatus<'_>> {
         self.seats.iter().map(move |seat| seat.status(now, self.stale_after))
     }

@@ -33,7 +33,7 @@ pub enum Refusal {
     ForeignSession,
     /// From a place that is none of the door's seats.
     UnknownSeat,
-    /// For a seat that somebody else has, who has been heard lately.
+    /// For a seat whose holder is another program that was heard lately.
     SeatTaken,
     /// A hello, or a sealed sample, in a session without a key.
     Keyless,

@@ -1,4 +1,4 @@
-//! One seat: who has it, which numbers were seen, and whether it can be taken.
+//! One seat: its holder, which numbers were seen, and whether it can be taken.
 
 use core::time::Duration;
 use std::net::SocketAddr;
@@ -29,7 +29,7 @@ pub struct SeatStatus<'a> {
     pub admitted: u64,
 }
 
-/// A seat and who has it.
+/// A seat and its holder.
 #[derive(Debug)]
 pub(super) struct SeatState {
     seat: Seat,
@@ -40,7 +40,7 @@ pub(super) struct SeatState {
     welcomes: Option<(Instant, u32)>,
 }
 
-/// Who has a seat, present or gone.
+/// The holder of a seat, present or gone.
 #[derive(Debug)]
 pub(super) struct Occupant {
     pub(super) address: SocketAddr,
@@ -71,7 +71,7 @@ impl SeatState {
         self.occupant.as_ref()
     }
 
-    /// Who has the seat and was heard lately.
+    /// The holder of the seat, if heard lately.
     pub(super) fn present(&self, now: Instant, stale_after: Duration) -> Option<&Occupant> {
         self.occupant.as_ref().filter(|occupant| since(occupant.heard, now) < stale_after)
     }
@@ -115,7 +115,7 @@ impl SeatState {
             Under::Present => None,
             Under::New(keys) => Some(keys),
         };
-        // New keys from the address of the one who is there: the same program has begun anew. Anybody else waits until he has gone.
+        // New keys from the address of the holder: the same program has begun anew. Anybody else waits until he has gone.
         if present && !same_address {
             return Err(Refusal::SeatTaken);
         }

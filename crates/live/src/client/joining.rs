@@ -1,7 +1,7 @@
 //! The datagrams of one joining in a session with a key.
 //!
-//! [`Joining::hello`] → send, again every quarter of a second until → [`Joining::handle_welcome`] → [`Joined::seal`] what is sent, [`Joined::open`] what
-//! is received.
+//! [`Joining::hello`] → send, again every quarter of a second until → [`Joining::handle_welcome`] → [`Joined::seal`] each sample sent, [`Joined::open`]
+//! each datagram received.
 
 use cohaptic_peer::wire;
 

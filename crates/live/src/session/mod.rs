@@ -27,7 +27,7 @@ use watch::Watch;
 pub use config::{SessionConfig, SessionError};
 pub use status::{LinkStatus, PeerStatus, Report, SocketCounts, Status};
 
-/// Who looks on while a session runs, changes links, and ends it. Called on the thread that has to be on time: calls must neither wait nor take long.
+/// The conductor of a session: looks on while it runs, changes links, and ends it. Called on the thread that has to be on time: calls must neither wait nor take long.
 pub trait Conductor {
     /// Whether to go on. Asked at least 50 times a second.
     fn keep_going(&mut self) -> bool;

@@ -70,11 +70,11 @@ impl Outside {
         std::os::fd::AsFd::as_fd(&self.socket)
     }
 
-    /// Hands on the samples that have come in and may, with the instant at which the kernel saw them, and answers who asks to join.
+    /// Hands on the samples that have come in and may, with the instant at which the kernel saw them, and answers requests to join.
     pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<()> {
         let Self { socket, buffers, admission, .. } = self;
         let mut replies = Vec::new();
-        // One batch: more than come in between two ticks of a session in order. What is beyond waits in the kernel until the next look, which is after the next
+        // One batch: more than come in between two ticks of a session in order. The rest waits in the kernel until the next look, which is after the next
         // tick if that is due, so that a flood cannot keep the loop from its ticks.
         socket.receive(buffers, clock, |datagram| match admission.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
             Admission::Sample { place, sample, .. } => take(datagram.at, place.0 as usize, sample.bytes()),

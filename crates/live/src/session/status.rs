@@ -12,7 +12,7 @@ use cohaptic_wan::LinkStats;
 
 use crate::AdmissionStats;
 
-/// A session at one moment, for those who look on.
+/// A session at one moment, for onlookers.
 #[derive(Clone, Debug)]
 pub struct Status {
     /// Since it began, in logical time.
@@ -72,7 +72,7 @@ pub struct Report {
     pub validity: Validity,
     /// By how much the clock on the wall was ahead of logical time when the last thing happened.
     pub behind: Duration,
-    /// What came in at each peer that lives elsewhere; `None` for one that is simulated here.
+    /// What came in at each peer that is remote; `None` for one that is simulated here.
     pub seats: Vec<Option<SeatStats>>,
     /// What the door has done, and the socket before it.
     pub admission: Option<(AdmissionStats, SocketCounts)>,

@@ -33,8 +33,8 @@ pub use order::OrderFigures;
 
 /// The figures of one link.
 ///
-/// Serialised, it is one flat object in SI units: `mean_s`, `sd_s`, `loss`, `reordered` and so on; [`FateCounts`] is serialised on its own. What is
-/// not defined (a mean of nothing) is left out.
+/// Serialised, it is one flat object in SI units: `mean_s`, `sd_s`, `loss`, `reordered` and so on; [`FateCounts`] is serialised on its own. A figure
+/// that is not defined (a mean of nothing) is left out.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Achieved {
     /// How often each fate befell.

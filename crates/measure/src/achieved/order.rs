@@ -19,7 +19,7 @@ pub struct OrderFigures {
     /// section 4.2.2).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reordering_extent_mean: Option<f64>,
-    /// The greatest extent \[arrivals\]: a buffer of so many packets restores the order.
+    /// The greatest extent \[arrivals\]: a buffer of this number of packets restores the order.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reordering_extent_max: Option<u64>,
 }

@@ -61,7 +61,7 @@ pub fn page_in_browser(folder: &Path, page: &str) -> Option<Vec<String>> {
     Some(faults)
 }
 
-/// With which colours a browser draws each kind of element (`path.line s0|fill|stroke|color|background`) of a document for a reader who prefers that scheme.
+/// With which colours a browser draws each kind of element (`path.line s0|fill|stroke|color|background`) of a document for a reader of that scheme.
 /// `None` where there is no `chromium` on the path; see [`in_browser`].
 ///
 /// # Panics

@@ -48,7 +48,7 @@ pub struct BindError {
 /// A datagram that came in.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Datagram<'a> {
-    /// Who sent it.
+    /// The sender.
     pub from: SocketAddr,
     /// What it carries.
     pub bytes: &'a [u8],
@@ -110,7 +110,7 @@ impl UdpEndpoint {
         self.address
     }
 
-    /// How many bytes may wait in the kernel, as the kernel counts them. It grants twice what is asked for, and on a system that allows no more (`sysctl
+    /// How many bytes may wait in the kernel, as the kernel counts them. It grants twice the size asked for, and on a system that allows no more (`sysctl
     /// net.core.rmem_max`) less.
     #[must_use]
     pub const fn granted_receive_buffer(&self) -> usize {
@@ -199,7 +199,7 @@ impl UdpEndpoint {
         has_room
     }
 
-    /// Sends what was queued, in that order, until the kernel's buffer is full; what is left waits for the next call. A datagram that cannot be sent is
+    /// Sends what was queued, in that order, until the kernel's buffer is full; the rest waits for the next call. A datagram that cannot be sent is
     /// counted, and the others go on.
     ///
     /// Datagrams to one address, of one length, that were queued one after the other go in one call, which the kernel or the far end cuts (segmentation

@@ -129,7 +129,7 @@ impl Relay {
         let (mut look_at, mut heard) = (Instant::ZERO, None);
         let mut pacer = Pacer::new(options.pacing);
         loop {
-            // What came in first: then nothing that has not been read came before what is let pass.
+            // Arrivals first: then no unread datagram came before the instant that is let pass.
             let Heard { until, count } = match heard.take() {
                 Some(heard) => heard,
                 None => self.ports.receive(&mut self.engine, &clock)?,

@@ -56,10 +56,10 @@ struct Tally {
     kernel_drops: u64,
 }
 
-/// So many batches are read from one socket before the others, and what is due, have their turn.
+/// The batches read from one socket before the others, and due departures, have their turn.
 const BATCHES: usize = 8;
 
-/// So many datagrams leave before what has come in has its turn.
+/// The datagrams that leave before arrivals have their turn.
 const RELEASES: usize = 1024;
 
 impl Ports {
@@ -351,7 +351,7 @@ mod tests {
         }
     }
 
-    /// What is offered to its link later than it came leaves that much later than it should, however soon it is sent then.
+    /// A datagram offered to its link later than it came leaves that much later than it should, however soon it is sent then.
     #[test]
     fn what_was_offered_late_is_released_late() {
         let [left, right] = [SocketAddr::from((Ipv4Addr::LOCALHOST, 9)), SocketAddr::from((Ipv4Addr::LOCALHOST, 10))];

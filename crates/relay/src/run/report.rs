@@ -23,7 +23,7 @@ pub struct Report {
     pub ports: Vec<PortReport>,
     /// What came in.
     pub intake: IntakeCounts,
-    /// How late each datagram was handed to the kernel: the release error. It includes what is in `clamped`.
+    /// How late each datagram was handed to the kernel: the release error. It includes the share in `clamped`.
     pub release: Lateness,
     /// By how much datagrams were offered later than they came, of those that were.
     pub clamped: Lateness,

@@ -2,7 +2,7 @@
 //!
 //! Both files are read for UDP datagrams (pcap or pcapng; Ethernet, raw IP, Linux "cooked" and loopback frames; IPv4 and IPv6). A datagram of the
 //! sender's file is matched with one of the receiver's that has the same payload and the same IP identification, the first with the first, the second
-//! with the second, and so on; what is left over is then matched by payload alone, for paths that rewrite identifications. Addresses and ports do not
+//! with the second, and so on; the rest is then matched by payload alone, for paths that rewrite identifications. Addresses and ports do not
 //! count: they may be translated. A datagram of the sender that has no match is lost.
 //!
 //! So payloads should differ, by a sequence number say; where several datagrams are equal and one of them is lost, the wrong ones may be matched:
@@ -53,7 +53,7 @@ pub enum CaptureError {
         end: End,
         /// How many frames were read before.
         frames: usize,
-        /// What is wrong.
+        /// The fault.
         problem: CaptureProblem,
     },
     /// A file has no UDP datagrams that were asked for.
@@ -71,7 +71,7 @@ pub enum CaptureError {
     Measurements(#[from] MeasurementsError),
 }
 
-/// What is wrong with a capture.
+/// The fault of a capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum CaptureProblem {
     /// It does not begin as a capture does.
@@ -156,7 +156,7 @@ fn matched(sent: &[Datagram], arrived: &[Datagram]) -> Result<Matched, Measureme
     })
 }
 
-/// Pairs what is not paired yet by equal keys, in the order of occurrence; gives the number of the sender's datagrams whose key is not the only one.
+/// Pairs datagrams that are not paired yet by equal keys, in the order of occurrence; gives the number of the sender's datagrams whose key is not the only one.
 fn pair<K: Ord>(
     sent: &[Datagram],
     arrived: &[Datagram],

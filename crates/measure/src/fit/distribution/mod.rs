@@ -86,7 +86,7 @@ fn judge(law: &Law, sorted: &[f64]) -> LawFit {
     }
 }
 
-/// Exact up to 50 000 delays; with more, at that many of them, which misses at most 1/50 000.
+/// Exact up to 50 000 delays; with more, at 50 000 of them, which misses at most 1/50 000.
 fn kolmogorov(law: &Law, sorted: &[f64]) -> f64 {
     let n = count(sorted.len());
     let step = sorted.len().div_ceil(COMPARED);
@@ -141,7 +141,7 @@ fn floor(name: DelayLaw, sorted: &[f64], effective: f64) -> Option<f64> {
     Some((least - distance).max(0.0))
 }
 
-/// At most so many order statistics, at the middles of equal shares; the least is among them.
+/// The most order statistics, at the middles of equal shares; the least is among them.
 fn thin(sorted: &[f64]) -> Vec<f64> {
     if sorted.len() <= THINNED {
         return sorted.to_vec();

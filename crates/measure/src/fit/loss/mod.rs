@@ -3,7 +3,7 @@
 //! | model | parameters | estimate |
 //! | --- | --- | --- |
 //! | independent | 1 | the share lost |
-//! | Gilbert–Elliott with h = 0, k = 1 | 2 | p = n₀₁/n₀, r = n₁₀/n₁ from counted transitions (greatest likelihood; Gilbert 1960 calls bad what is lost) |
+//! | Gilbert–Elliott with h = 0, k = 1 | 2 | p = n₀₁/n₀, r = n₁₀/n₁ from counted transitions (greatest likelihood; Gilbert 1960 calls the lossy state bad) |
 //! | the same in continuous time | 2 | greatest likelihood with the true gaps: P(bad, bad) = π + (1 − π)·e^{−λΔ}; used where packets are not evenly spaced |
 //! | general Gilbert–Elliott | 4 | Baum–Welch (see `hidden_markov`); only where packets are evenly spaced |
 //!
