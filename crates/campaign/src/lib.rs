@@ -12,7 +12,7 @@
 //! Nothing here is printed and no clock is read.
 //!
 //! ```
-//! use cohaptic_campaign::{PlanSpec, Campaign, Format, NoWatch, Outcome, Plan, Variation};
+//! use cohaptic_campaign::{PlanSpec, Campaign, Format, NoWatch, Outcome, CampaignPlan, Variation};
 //!
 //! let text = r#"
 //!     scene = { duration = "100ms", count = 2 }
@@ -23,8 +23,8 @@
 //! "#;
 //! let folder = tempfile::tempdir()?;
 //! let variations = vec![Variation::parse("coordination.stiffness=500..1500/3")?];
-//! let asked = PlanSpec { text, file: "two.toml".as_ref(), set: &[], variations, runs: 10, format: Format::Csv, part: None, program: "an example" };
-//! let mut campaign = Campaign::open(Plan::new(asked)?, &folder.path().join("out"), &NoWatch)?;
+//! let spec = PlanSpec { text, file: "two.toml".as_ref(), set: &[], variations, runs: 10, format: Format::Csv, part: None, program: "an example" };
+//! let mut campaign = Campaign::open(CampaignPlan::new(spec)?, &folder.path().join("out"), &NoWatch)?;
 //! let Outcome::Finished(report) = campaign.run(&NoWatch)? else { unreachable!() };
 //! assert_eq!((report.combinations.len(), report.runs), (3, 30));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

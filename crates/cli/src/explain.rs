@@ -47,11 +47,13 @@ struct Cost {
 pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure> {
     let scene = input::with(&arguments.scene.scene, |text, file| Scene::parse(text, file, &arguments.scene.overrides.set))?;
     let explanation = harness::explain(&scene);
-    if arguments.scene.json {
-        output::json(DocumentSchema::Explain, &document(&scene, &explanation))?;
-    } else {
-        output::text(&describe(&scene, &explanation))?;
-    }
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::EXPLAIN,
+        &document(&scene, &explanation),
+        || describe(&scene, &explanation),
+        output::NO_FILES,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 

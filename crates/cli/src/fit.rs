@@ -1,6 +1,5 @@
 //! `cohaptic fit`.
 
-use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -52,12 +51,13 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     if let Some(path) = &arguments.out {
         write_file(path, &scene)?;
     }
-    if arguments.json {
-        output::json(DocumentSchema::Fit, &FitDocument { fitted: &fitted, scene: &scene, skew, matched })?;
-    } else {
-        output::text(&describe(&fitted, &scene, skew, matched))?;
-        output::wrote(&arguments.out);
-    }
+    output::answer(
+        arguments.json,
+        DocumentSchema::FIT,
+        &FitDocument { fitted: &fitted, scene: &scene, skew, matched },
+        || describe(&fitted, &scene, skew, matched),
+        &arguments.out,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -95,10 +95,7 @@ fn unreadable(path: &Path, error: std::io::Error) -> Failure {
 fn describe(fitted: &Fitted, scene: &str, skew: Option<Skew>, matched: Option<Matched>) -> String {
     let goodness = &fitted.goodness;
     let mut text = format!("{scene}\n");
-    // Writing to a string does not fail.
-    let mut line = |line: String| {
-        let _ = writeln!(text, "{line}");
-    };
+    let mut line = |line: String| text.push_str(&format!("{line}\n"));
     let spaced = if goodness.evenly_spaced { "evenly" } else { "unevenly" };
     line(format!(
         "{}, {} arrived, one every {} ({spaced}); they say as much as {:.0} independent ones",

@@ -77,12 +77,13 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
         write_files(folder, &reproduction)?;
     }
     let document = document(&reproduction, arguments.out.is_some());
-    if arguments.json {
-        output::json(DocumentSchema::Paper, &PaperDocument { wall_s: Some(wall_s), ..document })?;
-    } else {
-        output::text(&describe(&reproduction))?;
-        output::wrote(arguments.out.as_ref().map(|folder| folder.join("index.html")));
-    }
+    output::answer(
+        arguments.json,
+        DocumentSchema::PAPER,
+        &PaperDocument { wall_s: Some(wall_s), ..document },
+        || describe(&reproduction),
+        arguments.out.as_ref().map(|folder| folder.join("index.html")),
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -115,7 +116,7 @@ fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure
         }
     }
     // Without the time that it took: the same bytes every time.
-    let mut claims = serde_json::to_vec_pretty(&DocumentSchema::Paper.of(&document(reproduction, true))).unwrap_or_default();
+    let mut claims = serde_json::to_vec_pretty(&DocumentSchema::PAPER.of(&document(reproduction, true))).unwrap_or_default();
     claims.push(b'\n');
     write_file(&folder.join("claims.json"), &claims)?;
     write_file(&folder.join("index.html"), page::html(reproduction).as_bytes())

@@ -95,13 +95,13 @@ struct FaultLocation<'a> {
 /// Prints the document of a failure.
 fn print(failure: &Failure, message: &str, status: u8) -> Result<(), Failure> {
     let place = failure.scene_error().and_then(|error| error.diagnostic()).map(|diagnostic| place(failure, diagnostic));
-    output::json(DocumentSchema::Error, &ErrorDocument { status, message, place })
+    output::json(DocumentSchema::ERROR, &ErrorDocument { status, message, place })
 }
 
 /// Prints the document of arguments that make no sense.
 fn print_usage(message: &str, status: u8) -> Result<(), Failure> {
     let message = message.strip_prefix("error: ").unwrap_or(message).trim_end();
-    output::json(DocumentSchema::Error, &ErrorDocument { status, message, place: None })
+    output::json(DocumentSchema::ERROR, &ErrorDocument { status, message, place: None })
 }
 
 fn place<'a>(failure: &Failure, diagnostic: &'a Diagnostic) -> FaultLocation<'a> {

@@ -1,6 +1,5 @@
 //! What the driver needs of the way to a device, be it USB or simulated.
 
-use core::fmt;
 use core::time::Duration;
 
 use cohaptic_units::Instant;
@@ -69,52 +68,38 @@ impl Request {
     }
 }
 
-/// What was being done.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+/// The transfer that failed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 pub enum Operation {
     /// A control transfer.
+    #[error("setting up the serial chip")]
     Control,
     /// A bulk transfer out.
+    #[error("writing to the device")]
     Write,
     /// A bulk transfer in.
+    #[error("reading from the device")]
     Read,
 }
 
-impl fmt::Display for Operation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Control => "setting up the serial chip",
-            Self::Write => "writing to the device",
-            Self::Read => "reading from the device",
-        })
-    }
-}
-
 /// What a transfer failed of.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 pub enum Fault {
-    /// It took too long.
+    /// The deadline passed.
+    #[error("it took too long")]
     TimedOut,
     /// The endpoint stalled.
+    #[error("the endpoint stalled")]
     Stalled,
     /// A fault of the wire or of the protocol.
+    #[error("a fault of the wire or of the protocol")]
     Wire,
     /// The operating system refused the request.
+    #[error("the operating system refused it")]
     Refused,
     /// Another error, with the operating system's number.
+    #[error("error {0} of the operating system")]
     Other(u32),
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::TimedOut => f.write_str("it took too long"),
-            Self::Stalled => f.write_str("the endpoint stalled"),
-            Self::Wire => f.write_str("a fault of the wire or of the protocol"),
-            Self::Refused => f.write_str("the operating system refused it"),
-            Self::Other(code) => write!(f, "error {code} of the operating system"),
-        }
-    }
 }
 
 /// A transfer that failed.

@@ -37,9 +37,7 @@ fn document(picture: &Picture, layout: &Layout) -> String {
     ));
     xml.text.push_str(&format!("<style>\n{}</style>\n", style()));
     xml.text.push_str(PATTERNS);
-    if picture.ground {
-        xml.element("rect", &[("class", "paper"), ("width", &width), ("height", &height)]);
-    }
+    xml.element("rect", &[("class", "paper"), ("width", &width), ("height", &height)]);
     let font = picture.size.font;
     let mut y = layout.margin;
     for (lines, size, class) in [(&layout.title, TITLE * font, "ink"), (&layout.notes, font, "quiet")] {

@@ -22,7 +22,6 @@ pub struct Picture {
     pub(crate) shared_y: bool,
     pub(crate) legend: LegendPlace,
     pub(crate) aspect: f64,
-    pub(crate) ground: bool,
 }
 
 impl Picture {
@@ -40,7 +39,6 @@ impl Picture {
             shared_y: false,
             legend: LegendPlace::default(),
             aspect: 0.6,
-            ground: true,
         }
     }
 
@@ -111,12 +109,6 @@ impl Picture {
     #[must_use]
     pub fn aspect(self, aspect: f64) -> Self {
         Self { aspect: if aspect.is_finite() { aspect.clamp(0.1, 3.0) } else { self.aspect }, ..self }
-    }
-
-    /// Without a ground of its own, for a page that has one.
-    #[must_use]
-    pub fn without_ground(self) -> Self {
-        Self { ground: false, ..self }
     }
 
     /// Columns that have room for a plot with its labels.

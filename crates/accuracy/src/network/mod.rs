@@ -16,10 +16,10 @@ pub mod ways;
 
 use std::time::Duration;
 
-use crate::done::RowSink;
 use crate::network::errors::Look;
 use crate::rounds::Rounds;
-use crate::{AccuracyError, Options, Row, Subject, Watch};
+use crate::row_sink::RowSink;
+use crate::{AccuracyError, Row, Subject, Watch};
 
 /// How much work there is in the rows.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -55,12 +55,6 @@ impl Effort {
         loss_runs: &[(1000, 400), (10_000, 200), (100_000, 50), (1_000_000, 10)],
     };
 
-    /// The one of these options.
-    #[must_use]
-    pub const fn of(options: Options) -> Self {
-        if options.quick { Self::QUICK } else { Self::FULL }
-    }
-
     pub(crate) const fn rounds(self) -> Rounds {
         Rounds { count: self.rounds, span: Duration::from_micros(200) }
     }
@@ -71,16 +65,7 @@ impl Effort {
 /// # Errors
 ///
 /// As [`crate::measure`].
-pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    rows_with(Effort::of(options), watch)
-}
-
-/// The same with another effort.
-///
-/// # Errors
-///
-/// As [`crate::measure`].
-pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+pub fn rows(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
     let mut done = RowSink { rows: Vec::new(), watch };
     delays::measure(effort, &mut done)?;
     losses::measure(effort, &mut done)?;
@@ -89,19 +74,8 @@ pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, Accuracy
 }
 
 /// A row of this subject without its case, method and errors.
-fn row(case: &str, method: &str, setting: String, (cost, cost_unit): (f64, &'static str)) -> Row {
-    Row {
-        subject: Subject::Network,
-        case: case.to_owned(),
-        method: method.to_owned(),
-        setting,
-        cost: Some(cost),
-        cost_unit,
-        error: None,
-        error_unit: "",
-        reference: "",
-        note: String::new(),
-    }
+fn row(case: &str, method: &str, setting: String, cost: (f64, &'static str)) -> Row {
+    Row::of(Subject::Network, case, method, setting, cost)
 }
 
 /// A count as a number.

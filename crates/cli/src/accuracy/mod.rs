@@ -115,7 +115,7 @@ impl Conclusion {
         let written = out.as_ref().map_or(Ok(()), |folder| files::write(folder, rows, about, *size));
         if *json {
             output::json(
-                DocumentSchema::Accuracy,
+                DocumentSchema::ACCURACY,
                 &AccuracyDocument { rows: rows.iter().map(document).collect(), interrupted: about.partial, wall_s: *wall_s },
             )?;
         } else {

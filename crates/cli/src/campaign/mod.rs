@@ -58,12 +58,13 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
         finished.files.extend(files);
         finished.notes.extend(notes);
     }
-    if arguments.scene.json {
-        output::json(DocumentSchema::Campaign, &CampaignDocument::new(&finished, &arguments.out))?;
-    } else {
-        output::text(&words::describe(&finished))?;
-        output::wrote(&finished.files);
-    }
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::CAMPAIGN,
+        &CampaignDocument::new(&finished, &arguments.out),
+        || words::describe(&finished),
+        &finished.files,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 

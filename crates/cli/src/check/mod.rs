@@ -106,7 +106,7 @@ fn finished(scenes: &[Checked]) -> String {
 }
 
 fn print(scenes: Vec<Checked>, json: bool) -> Result<(), Failure> {
-    if json { output::json(DocumentSchema::Check, &CheckDocument { scenes }) } else { output::text(&describe(&scenes)) }
+    if json { output::json(DocumentSchema::CHECK, &CheckDocument { scenes }) } else { output::text(&describe(&scenes)) }
 }
 
 /// The scenes that a path means; standard input means itself.

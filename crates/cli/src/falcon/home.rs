@@ -56,11 +56,7 @@ pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
         traffic,
         seen: Seen::of(&homing.last),
     };
-    if which.json {
-        output::json(DocumentSchema::FalconHome, &document)?;
-    } else {
-        output::text(&document.describe(&target.name(), state))?;
-    }
+    output::answer(which.json, DocumentSchema::FALCON_HOME, &document, || document.describe(&target.name(), state), output::NO_FILES)?;
     match end {
         End::Enough => Ok(ExitCode::SUCCESS),
         End::Interrupted => Ok(ExitCode::from(INTERRUPTED)),

@@ -60,11 +60,13 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<ExitCode, Failure> {
         }
     }
     let document = ProbeDocument { falcons };
-    if arguments.which.json {
-        output::json(DocumentSchema::FalconProbe, &document)?;
-    } else {
-        output::text(&document.falcons.iter().map(Entry::describe).collect::<String>())?;
-    }
+    output::answer(
+        arguments.which.json,
+        DocumentSchema::FALCON_PROBE,
+        &document,
+        || document.falcons.iter().map(Entry::describe).collect::<String>(),
+        output::NO_FILES,
+    )?;
     let is_whole = document.falcons.iter().all(|entry| entry.error.is_none());
     Ok(ExitCode::from(if interrupt::requested() {
         INTERRUPTED

@@ -82,11 +82,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failur
     };
     let end = bench.run(Some(arguments.length), &mut simulating)?;
     let document = simulating.document(&bench, arguments, end);
-    if arguments.json {
-        output::json(DocumentSchema::FalconSimulate, &document)?;
-    } else {
-        output::text(&document.describe())?;
-    }
+    output::answer(arguments.json, DocumentSchema::FALCON_SIMULATE, &document, || document.describe(), output::NO_FILES)?;
     // A driver that gives up has done what was to be seen.
     Ok(if end == End::Interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }

@@ -73,7 +73,7 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
         files,
     };
     if which.json {
-        output::json(DocumentSchema::FalconWatch, &document)?;
+        output::json(DocumentSchema::FALCON_WATCH, &document)?;
     } else if !watching.prints_rows {
         output::text(&document.describe(&target.name()))?;
     }

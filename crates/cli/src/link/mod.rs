@@ -66,7 +66,7 @@ pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     let measured = drive(arguments, &spec)?;
     if arguments.json {
         output::json(
-            DocumentSchema::Link,
+            DocumentSchema::LINK,
             &LinkDocument {
                 asked: AskedDocument { spec: &spec.said, figures: &spec.asked },
                 achieved: &measured.achieved,

@@ -78,7 +78,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let host = SessionConductor::new(control.look(), wanted, pairs, elapsed, scene.axes.count());
     let report = conduct(&scene, session, host, &control)?;
     if arguments.json {
-        output::json(DocumentSchema::Live, &LiveDocument::new(&scene, &report))?;
+        output::json(DocumentSchema::LIVE, &LiveDocument::new(&scene, &report))?;
     } else {
         let mut text = words::describe(&scene, &report);
         if let Some(folder) = &arguments.out {

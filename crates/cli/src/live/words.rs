@@ -1,7 +1,5 @@
 //! A session in words.
 
-use std::fmt::Write as _;
-
 use cohaptic_harness::Ending;
 use cohaptic_harness::live::SeatStats;
 use cohaptic_live::Report;
@@ -14,10 +12,7 @@ use crate::run::words::{length, packets};
 
 pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     let mut text = format!("{}\n", scene.title);
-    // Writing to a string does not fail.
-    let mut line = |line: String| {
-        let _ = writeln!(text, "  {line}");
-    };
+    let mut line = |line: String| text.push_str(&format!("  {line}\n"));
     let summary = &report.summary;
     let lasted = Span(summary.duration);
     match summary.ending {

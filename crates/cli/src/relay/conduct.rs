@@ -49,7 +49,7 @@ pub(super) fn conduct(
                 Err(RecvTimeoutError::Disconnected) => thread::sleep(GLANCE),
             }
             stop.store(interrupt::requested(), Ordering::Relaxed);
-            progress.say(realtime::status(&control.latest()));
+            progress.note(realtime::status(&control.latest()));
         }
         running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(failure)
     });

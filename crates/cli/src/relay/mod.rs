@@ -40,7 +40,7 @@ pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     let asked = setup.asked(&edits, report.elapsed);
     let is_interrupted = interrupt::requested();
     if arguments.json {
-        output::json(DocumentSchema::Relay, &RelayDocument::new(&setup, &report, &asked, is_interrupted))?;
+        output::json(DocumentSchema::RELAY, &RelayDocument::new(&setup, &report, &asked, is_interrupted))?;
     } else {
         output::text(&words::describe(&setup, &report, &asked))?;
     }

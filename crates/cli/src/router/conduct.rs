@@ -57,7 +57,7 @@ pub(super) fn conduct(
         while !running.is_finished() {
             thread::sleep(GLANCE);
             stop.store(interrupt::requested(), Ordering::Relaxed);
-            progress.say(realtime::status(&control.latest()));
+            progress.note(realtime::status(&control.latest()));
         }
         Ok(running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     });

@@ -35,7 +35,7 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     let control = LiveControl::open(real_time, status::description(&file), Box::new(KeyedLinks { keys, folder, changes }))?;
     let ran = conduct::conduct(router, &file, arguments, until, &control, wanted)?;
     if arguments.json {
-        output::json(DocumentSchema::Router, &RouterDocument::new(&file, &ran))?;
+        output::json(DocumentSchema::ROUTER, &RouterDocument::new(&file, &ran))?;
     } else {
         output::text(&words::describe(&file, &ran))?;
     }

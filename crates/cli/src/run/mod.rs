@@ -67,7 +67,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         let mut document = RunDocument::new(&scene, &first);
         document.replayed_otherwise = replayed_otherwise.unwrap_or_default();
         document.against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| Box::new(RunDocument::new(variant, run)));
-        output::json(DocumentSchema::Run, &document)?;
+        output::json(DocumentSchema::RUN, &document)?;
     } else {
         let mut text = format!("{}\n{}", scene.title, describe(&scene, &first));
         if let Some((variant, run)) = variant.as_ref().zip(second.as_ref()) {

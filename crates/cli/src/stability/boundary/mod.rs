@@ -62,12 +62,13 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
         written = files::write(folder, &order, &found, arguments.pictures.size())?;
         rows.map_or(Ok(()), RowsFile::remove)?;
     }
-    if arguments.scene.json {
-        output::json(DocumentSchema::StabilityBoundary, &BoundaryDocument::new(&order, &found, &written))?;
-    } else {
-        output::text(&words::describe(&order, &found))?;
-        output::wrote(&written);
-    }
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::STABILITY_BOUNDARY,
+        &BoundaryDocument::new(&order, &found, &written),
+        || words::describe(&order, &found),
+        &written,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -64,12 +64,13 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         rows.map_or(Ok(()), super::rows_file::RowsFile::remove)?;
     }
     let document = MapDocument::new(&order, &maps, wall_s, cells, &files);
-    if arguments.scene.json {
-        output::json(DocumentSchema::StabilityMap, &document)?;
-    } else {
-        output::text(&words::describe(&order, &maps, &document, arguments.out.is_none()))?;
-        output::wrote(&files);
-    }
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::STABILITY_MAP,
+        &document,
+        || words::describe(&order, &maps, &document, arguments.out.is_none()),
+        &files,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
