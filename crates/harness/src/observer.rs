@@ -1,9 +1,12 @@
-//! Who watches a run.
+//! The observer of a run.
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{PacketRecord, Path};
 
 use crate::live::InputRow;
+
+/// Instants, or ticks in arrays, between two calls of [`Observer::keep_going`].
+pub(crate) const INSTANTS_BETWEEN_QUESTIONS: u32 = 1024;
 
 /// Sees what happens in a run, while it happens, in the order in which it happens.
 ///
@@ -41,7 +44,7 @@ pub trait Observer {
         Ok(())
     }
 
-    /// Something has come into a [live session](crate::live) from outside: what is seen here, in this order, is what a replay needs.
+    /// Something has come into a [live session](crate::live) from outside: a replay needs the rows seen here, in this order.
     ///
     /// # Errors
     ///

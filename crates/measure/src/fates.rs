@@ -47,7 +47,6 @@ impl<W: Write> FateWriter<W> {
 
 /// Why a file is not read as a fate log.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ReadError {
     /// The file cannot be read, or is not UTF-8.
     #[error("cannot be read: {0}")]

@@ -86,7 +86,6 @@ pub enum Reception {
 
 /// Why a datagram was refused. Nothing changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ReceiveError {
     /// It is no sample.
     #[error(transparent)]

@@ -57,7 +57,6 @@ pub struct Sample<const A: usize> {
 
 /// Why a datagram is no sample.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum DecodeError {
     /// It is shorter than a header.
     #[error("{len} bytes are too short for a sample")]

@@ -12,7 +12,7 @@ use cohaptic_wan::{LinkModel, NodeId};
 pub struct RelayConfig {
     /// The seed of every random stream.
     pub seed: u64,
-    /// Who talks to whom.
+    /// The topology: which programs talk to each other.
     pub form: Form,
     /// What it may take.
     pub limits: Limits,
@@ -20,7 +20,7 @@ pub struct RelayConfig {
     pub changes: Vec<Change>,
 }
 
-/// Who talks to whom.
+/// The topology: which programs talk to each other.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one")]
 pub enum Form {
@@ -91,7 +91,6 @@ pub struct Change {
 
 /// Why there is no such relay.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ConfigError {
     /// Fewer than two programs, or a table of links for another number of them.
     #[error("{programs} programs and links between {links}: expected at least two programs, and links between as many")]

@@ -141,7 +141,6 @@ pub struct PeerSpec {
 
 /// Where a peer lives. In virtual time every peer is simulated, whatever its kind; a live session (`cohaptic live`) goes by it.
 #[derive(Clone, PartialEq, Debug, Default)]
-#[non_exhaustive]
 pub enum PeerKind {
     /// In this program: device, hand and copy are simulated.
     #[default]
@@ -231,7 +230,6 @@ pub struct Change {
 
 /// What changes.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum ChangeKind {
     /// A link takes a new configuration; what is on the way keeps its delay.
     Link(LinkChange),

@@ -6,7 +6,6 @@ use cohaptic_units::print::Span;
 
 /// Why a scene cannot be analysed.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum AnalysisError {
     /// Its clocks never come back to where they were.
     #[error("the clocks of this scene have no common period: expected ticks, updates and drifts whose multiples meet within 584 years")]

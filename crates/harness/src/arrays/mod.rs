@@ -21,7 +21,7 @@ use cohaptic_units::Instant;
 use cohaptic_wan::LinkStats;
 use pulp::NullaryFnOnce;
 
-use crate::simulation::BREATH;
+use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
 use crate::summary::{Ending, LinkSummary, PeerSummary, Summary};
 use blocks::{Blocks, Moved};
 use place::Places;
@@ -84,7 +84,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         let mut tick = 0;
         loop {
             let now = Instant::from_nanos(tick * tick_nanos);
-            if tick > 0 && tick % u64::from(BREATH) == 0 {
+            if tick > 0 && tick % u64::from(INSTANTS_BETWEEN_QUESTIONS) == 0 {
                 let before = Instant::from_nanos((tick - 1) * tick_nanos);
                 if !keep_going(before) {
                     self.end_all(tick, |_| Ending::Interrupted(before));

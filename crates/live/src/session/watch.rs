@@ -1,4 +1,4 @@
-//! What is measured while a session runs.
+//! The figures of a session while it runs.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! What comes in, what leaves, and what is counted of both.
+//! Arrivals, departures, and the counters of both.
 
 use core::time::Duration;
 use std::net::SocketAddr;
@@ -25,7 +25,7 @@ pub struct Arrival<'a> {
     pub at: Instant,
     /// Where.
     pub port: Port,
-    /// Who sent it.
+    /// The sender.
     pub from: SocketAddr,
     /// What it carries. Its length is its size on the link: headers are not counted, and [`cohaptic_wan::Framing`] can add them.
     pub bytes: &'a [u8],

@@ -239,7 +239,7 @@ impl Engine {
                     self.pool.put(event.payload);
                 }
                 // The copy, which has an end of its own.
-                Fate::Duplicated | _ => {
+                Fate::Duplicated => {
                     self.packets += 1;
                     self.bytes += length;
                 }

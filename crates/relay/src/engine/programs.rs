@@ -1,4 +1,4 @@
-//! Who sent it, in a mesh: programs by their addresses, given or learnt.
+//! The sender of a datagram, in a mesh: programs by their addresses, given or learnt.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ impl Programs {
         Self { places, programs: programs.iter().map(known).collect(), forget_after, last: None }
     }
 
-    /// Who sends from that address to the port of program `to`; `None`: a stranger.
+    /// The program that sends from that address to the port of program `to`; `None`: a stranger.
     #[inline]
     pub(super) fn sender(&mut self, from: SocketAddr, to: NodeId, now: Instant) -> Option<NodeId> {
         let place = match self.last {

@@ -31,7 +31,7 @@ impl Core {
                     self.recording.note(at, what);
                 }
                 Fate::Dropped(cause) => self.recording.note(event.at, Happening::Lost { packet, why: Lost::Link(cause) }),
-                Fate::Duplicated | _ => self.recording.note(event.at, Happening::Copied { packet }),
+                Fate::Duplicated => self.recording.note(event.at, Happening::Copied { packet }),
             }
         }
     }

@@ -4,7 +4,6 @@ use cohaptic_units::Instant;
 
 /// Why a packet was dropped.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-#[non_exhaustive]
 pub enum DropCause {
     /// A predicate of the program took it.
     Filter,
@@ -64,7 +63,6 @@ impl DropCause {
 
 /// What became of a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[non_exhaustive]
 pub enum Fate {
     /// It came out of the far end at this instant.
     Delivered(Instant),

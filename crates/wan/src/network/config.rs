@@ -28,7 +28,6 @@ pub struct NetworkConfig {
 
 /// Why a call failed. Nothing was changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum NetworkError {
     /// An earlier call had a later instant.
     #[error(transparent)]

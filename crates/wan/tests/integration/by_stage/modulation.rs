@@ -27,7 +27,6 @@ fn path(modulator: &Modulator, until: u64) -> Vec<(u64, usize)> {
             Sojourn::Exponential(mean) => mean.as_nanos() as f64 * exponential(),
             Sojourn::Uniform(from, to) => from.as_nanos() as f64 + (to - from).as_nanos() as f64 * draws.next_unit(),
             Sojourn::Erlang(mean, stages) => mean.as_nanos() as f64 / f64::from(stages) * (0..stages).map(|_| exponential()).sum::<f64>(),
-            other => unreachable!("no model for {other:?}"),
         };
         let end = begin + (span.round_ties_even() as u64).max(1);
         if end > until {
