@@ -51,7 +51,12 @@ fn group<N: Clone>(criterion: &mut Criterion, name: &str, numbers: &Numbers<N>, 
 fn kernels(criterion: &mut Criterion) {
     let tick = tick();
     let law = AveragePosition { gains: tick.coordination };
-    let registered = Coordination::AveragePosition.law(&LawParameters { gains: tick.coordination, peers: 3, tick: std::time::Duration::from_millis(1), own: LawValues::default() });
+    let registered = Coordination::AveragePosition.law(&LawParameters {
+        gains: tick.coordination,
+        peers: 3,
+        tick: Duration::from_millis(1),
+        own: LawValues::default(),
+    });
     group(
         criterion,
         "one peer",

@@ -53,6 +53,11 @@ impl Scene {
     fn law_parameters(&self, peer: usize) -> LawParameters {
         let peers = self.peers.len();
         let CoordinationSpec { strategy, scaling, gains, settings, .. } = &self.coordination;
-        LawParameters { gains: gains.scaled(scaling.coordination_factor(peers)), peers, tick: self.peers[peer].clock.tick, own: *settings.of(*strategy) }
+        LawParameters {
+            gains: gains.scaled(scaling.coordination_factor(peers)),
+            peers,
+            tick: self.peers[peer].clock.tick,
+            own: *settings.of(*strategy),
+        }
     }
 }

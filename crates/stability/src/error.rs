@@ -43,7 +43,9 @@ pub enum AnalysisError {
         strategy: &'static str,
     },
     /// Ages of samples between clocks that differ.
-    #[error("{strategy} coordination uses the ages of samples, which do not repeat where clocks differ: expected one tick, offset and drift for all peers")]
+    #[error(
+        "{strategy} coordination uses the ages of samples, which do not repeat where clocks differ: expected one tick, offset and drift for all peers"
+    )]
     AgesByClocks {
         /// Its name.
         strategy: &'static str,

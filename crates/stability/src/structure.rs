@@ -152,14 +152,7 @@ impl Structure {
 
     /// The system of the classes' averages.
     pub(crate) fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
-        Lifted {
-            nodes,
-            weights: &self.weights,
-            timetable: &self.timetable,
-            sampling: Sampling::of(nodes),
-            time: self.time(scene),
-            tied: self.tied,
-        }
+        Lifted { nodes, weights: &self.weights, timetable: &self.timetable, sampling: Sampling::of(nodes), time: self.time(scene), tied: self.tied }
     }
 }
 

@@ -59,7 +59,7 @@ proptest! {
 
     /// Of a copy under an acceleration of at most a, a sample is extrapolated to within ½·a·age²: here of one under a constant acceleration, exactly that.
     #[test]
-    fn the_error_of_a_sample_is_that_of_its_acceleration(x in -0.1..0.1, v in -1.0..1.0, a in -20.0..20.0, age in 0..200_u64) {
+    fn the_error_of_a_sample_is_that_of_its_acceleration(x in -0.1..0.1, v in -1.0..1.0, a in -20.0..20.0_f64, age in 0..200_u64) {
         let t = age as f64 * 1e-3;
         let now = (x + v * t + 0.5 * a * t * t, v + a * t);
         let force = force(Gains { stiffness: 1.0, damping: 0.0 }, Duration::from_millis(200), now, &[((x, v), age)]);

@@ -19,8 +19,16 @@ const PLACE: u32 = 1;
 /// Peer 1 of three.
 fn receiver() -> Receiver {
     let gains = Gains { stiffness: 1000.0, damping: 5.0 };
-    let config =
-        PeerConfig { session: SESSION, place: PLACE, axes: 1, contact: Contact::None, coupling: gains, tick: Duration::from_millis(1), compute_delay: false, enclosure: None };
+    let config = PeerConfig {
+        session: SESSION,
+        place: PLACE,
+        axes: 1,
+        contact: Contact::None,
+        coupling: gains,
+        tick: Duration::from_millis(1),
+        compute_delay: false,
+        enclosure: None,
+    };
     let clock = Clock::regular(Duration::from_millis(1));
     let object = ObjectCopy::new(CopyConfig { mass: 0.15, damping: 0.0 }, State::REST, Integrator::Exact, &clock);
     let held = Held::new([state(0, 0), state(2, 0)]);

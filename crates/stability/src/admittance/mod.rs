@@ -15,8 +15,8 @@ use cohaptic_scene::Scene;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::linear_form::LinearLaw;
 use crate::lifted::{Body, Lifted, Node, Sampling};
+use crate::linear_form::LinearLaw;
 use crate::network::NominalNetwork;
 use crate::parts::{radius_of, reduced};
 use crate::structure::{Contacts, Structure, arm, count, device_plant};

@@ -80,8 +80,9 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
     let reference = |sizes: &[NodeSizes]| if lifted.tied { Size::ZERO } else { sizes[0].copy[0] };
     // Samples are taken relative to where the reference is at the end, which is not known yet: their own errors now, that of the reference then.
     let mut positions: Vec<Size> = Vec::new();
-    let of_sample =
-        |sent: &[Vec<Vec<Size>>], node: usize, sample: i64| usize::try_from(sample).ok().map_or_else(|| before.clone(), |number| sent[node][number].clone());
+    let of_sample = |sent: &[Vec<Vec<Size>>], node: usize, sample: i64| {
+        usize::try_from(sample).ok().map_or_else(|| before.clone(), |number| sent[node][number].clone())
+    };
     let oldest = lifted.timetable.oldest();
     let mut held: Vec<Option<Vec<Size>>> = vec![None; nodes * nodes];
     for (to, from, sample) in &lifted.timetable.held {
@@ -139,10 +140,12 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>,
     let [x, v] = sizes.copy;
     let remembered = |sum: Size, by: &[f64]| by.iter().zip(&sizes.memory).fold(sum, |sum, (by, number)| sum.plus(*by, *number));
     let next = node.law.memory.iter().zip(&heard[1..]).map(|(row, heard)| {
-        remembered(heard.plus(row.own.stiffness, x).plus(row.own.damping / time, v), &row.memory).rounded(TICK + count(row.memory.len()) * f64::EPSILON)
+        remembered(heard.plus(row.own.stiffness, x).plus(row.own.damping / time, v), &row.memory)
+            .rounded(TICK + count(row.memory.len()) * f64::EPSILON)
     });
     let next: Vec<Size> = next.collect();
-    let mut on_copy = remembered(heard[0], &node.law.force.memory).plus(gains.stiffness + wall.stiffness, x).plus((gains.damping + wall.damping) / time, v);
+    let mut on_copy =
+        remembered(heard[0], &node.law.force.memory).plus(gains.stiffness + wall.stiffness, x).plus((gains.damping + wall.damping) / time, v);
     let mut on_device = Size::ZERO;
     if node.device.is_some() {
         let [xh, vh] = sizes.device;
