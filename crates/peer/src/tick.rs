@@ -1,5 +1,7 @@
-//! The tick of a peer along one axis: equations (7) to (9) of Rakhsha & Constantinescu (2015), in any [`Number`]. Equation (10) is the law,
-//! [`AveragePosition`](crate::coordination::AveragePosition).
+//! The tick of a peer along one axis: equations (7) to (10) of Rakhsha & Constantinescu (2015), in any [`Number`].
+//!
+//! With the desired motion (xd, vd) the mean of the samples held, equation (10) is the law of the paper,
+//! [`AveragePosition`](crate::coordination::AveragePosition); other laws have other desired motions or gains.
 
 use crate::coordination::{Law, Observation};
 use crate::{Gains, Motion, Number};
@@ -10,6 +12,14 @@ use crate::{Gains, Motion, Number};
 pub fn grasp<N: Number>(coupling: &Gains<N>, apart: Motion<N>) -> N {
     //= Rakhsha & Constantinescu 2015, eq. (9): FC = KC·(xH − xO) + BC·(vH − vO)
     coupling.force(apart)
+}
+
+/// FT \[N\] that draws a copy to a desired motion, where `apart` is the motion of the copy relative to it: xO − xd and vO − vd.
+#[must_use]
+#[inline(always)]
+pub fn coordinate<N: Number>(coordination: &Gains<N>, apart: Motion<N>) -> N {
+    //= Rakhsha & Constantinescu 2015, eq. (10): FT = KT·(xO − xd) + BT·(vO − vd)
+    coordination.force(apart)
 }
 
 /// The force on a copy \[N\], apart from its damping and the walls.

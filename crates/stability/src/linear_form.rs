@@ -145,23 +145,24 @@ impl LinearLaw {
             if let Some(unknown) = unknown {
                 memory[unknown] = Form::unknown(5);
             }
-            let force = forms.force(&seen, &mut memory);
-            std::iter::once(force).chain(memory).collect::<Vec<Form>>()
+            (forms.force(&seen, &mut memory), memory)
         };
-        let mut rows = come_out(None).iter().map(LawRow::of).collect::<Option<Vec<LawRow>>>()?;
+        let (force, memory) = come_out(None);
+        let mut law = Self {
+            force: LawRow::of(&force)?,
+            memory: memory.iter().map(LawRow::of).collect::<Option<_>>()?,
+            horizon: Law::<f64>::horizon(law),
+        };
         for unknown in 0..remembered {
-            for (row, form) in rows.iter_mut().zip(come_out(Some(unknown))) {
-                LawRow::of(&form)?;
+            let (force, memory) = come_out(Some(unknown));
+            for (row, form) in law.rows_mut().zip(std::iter::once(&force).chain(&memory)) {
+                LawRow::of(form)?;
                 row.memory.push(form.by[5]);
             }
         }
-        let mut rows = rows.into_iter();
-        let force = rows.next()?;
-        let horizon = Law::<f64>::horizon(law);
-        let mut law = Self { force, memory: rows.collect(), horizon };
-        if horizon.is_none() {
+        if law.horizon.is_none() {
             // Without a horizon the lead is zero.
-            std::iter::once(&mut law.force).chain(&mut law.memory).for_each(|row| row.ahead = 0.0);
+            law.rows_mut().for_each(|row| row.ahead = 0.0);
         }
         Some(law)
     }
@@ -175,6 +176,10 @@ impl LinearLaw {
     /// FT, and then what the law remembers.
     pub(crate) fn rows(&self) -> impl Iterator<Item = &LawRow> {
         std::iter::once(&self.force).chain(&self.memory)
+    }
+
+    fn rows_mut(&mut self) -> impl Iterator<Item = &mut LawRow> {
+        std::iter::once(&mut self.force).chain(&mut self.memory)
     }
 
     /// KT and BT of a law that pulls the copy towards the mean of the samples held and remembers nothing: FT = KT·(x − x̄) + BT·(v − v̄). `None` for any

@@ -73,7 +73,7 @@ pub(crate) fn radius_of(parts: &[Part]) -> Radius {
 
 /// Takes a scene apart along its equal axes; the watch is asked before each part and within it.
 pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method: Method, watch: &dyn Watch) -> Result<Reduced, AnalysisError> {
-    let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
+    let nodes = structure.nodes(scene);
     let quotient = structure.quotient(scene, &nodes);
     let mut parts = Vec::new();
     let mut rigid_modes = usize::from(!structure.tied);

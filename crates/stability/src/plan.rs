@@ -1,5 +1,6 @@
 //! Radii of one linear scene again and again, while its numbers change: nothing is kept but the radius, and nothing is computed twice.
 
+use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::{Gains, Plant};
 use cohaptic_scene::Scene;
 
@@ -46,11 +47,12 @@ pub(crate) struct PlanScratch {
     equal: EqualScratch,
 }
 
-/// What the step maps of a class were computed from.
+/// What the step maps and the linear form of the law of a class were computed from.
 #[derive(Clone, Debug)]
 struct Bodies {
     object: Plant,
     device: Plant,
+    law: BuiltIn,
     /// Of a device that touches nothing.
     loose: Option<Radius>,
 }
@@ -150,9 +152,14 @@ impl Plan {
         let classes = self.structure.classes.len();
         let loose = |class: usize| (!self.structure.touching[class]).then(|| loose_device(&self.structure, scene, class).0);
         if scratch.nodes.len() != classes {
-            scratch.nodes = (0..classes).map(|class| self.structure.node(scene, class)).collect();
+            scratch.nodes = self.structure.nodes(scene);
             let bodies =
-                |class: usize| Bodies { object: object_plant(scene), device: device_plant(self.representative(scene, class)), loose: loose(class) };
+                |class: usize| Bodies {
+                object: object_plant(scene),
+                device: device_plant(self.representative(scene, class)),
+                law: scene.law(self.structure.classes[class][0]),
+                loose: loose(class),
+            };
             scratch.bodies = (0..classes).map(bodies).collect();
             return;
         }
@@ -171,7 +178,11 @@ impl Plan {
                 node.device = node.device.map(|_| Body::new(device, scene.integrator, &spec.clock));
             }
             node.coupling = self.structure.coupling(spec);
-            node.law = self.structure.law(scene, class);
+            let law = scene.law(self.structure.classes[class][0]);
+            if bodies.law != law {
+                bodies.law = law;
+                node.law = self.structure.law(scene, class);
+            }
             node.wall = node.wall.and(scene.object.enclosure).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping });
         }
     }

@@ -109,15 +109,20 @@ impl Structure {
         linear_law(scene, self.classes[class][0]).expect("a structure is made only of scenes whose laws have one")
     }
 
+    /// The nodes of all classes.
+    pub(crate) fn nodes(&self, scene: &Scene) -> Vec<Node> {
+        (0..self.classes.len()).map(|class| self.node(scene, class)).collect()
+    }
+
     /// Which numbers of a sample the laws of all classes use.
     pub(crate) fn sampling(&self, scene: &Scene) -> Sampling {
-        let nodes: Vec<Node> = (0..self.classes.len()).map(|class| self.node(scene, class)).collect();
-        Sampling::of(&nodes)
+        Sampling::of(&self.nodes(scene))
     }
 
     /// Whether the laws of all classes hear nothing.
     pub(crate) fn is_silent(&self, scene: &Scene) -> bool {
-        self.sampling(scene).is_silent(self.time(scene))
+        let nodes = self.nodes(scene);
+        Sampling::of(&nodes).is_silent(self.time(scene, &nodes))
     }
 
     /// The node that stands for a class.
@@ -144,15 +149,15 @@ impl Structure {
         -1.0 / count(self.peers - 1)
     }
 
-    /// The common time of the classes \[s\].
-    pub(crate) fn time(&self, scene: &Scene) -> f64 {
+    /// The common time of the classes, of which those are the nodes \[s\].
+    pub(crate) fn time(&self, scene: &Scene, nodes: &[Node]) -> f64 {
         let peers = self.classes.iter().zip(&self.touching).map(|(class, touching)| (class[0], *touching));
-        common_time(scene, self.timetable.frame, self.law(scene, 0).force.own, peers, self.at_wall)
+        common_time(scene, self.timetable.frame, nodes[0].law.force.own, peers, self.at_wall)
     }
 
     /// The system of the classes' averages.
     pub(crate) fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
-        Lifted { nodes, weights: &self.weights, timetable: &self.timetable, sampling: Sampling::of(nodes), time: self.time(scene), tied: self.tied }
+        Lifted { nodes, weights: &self.weights, timetable: &self.timetable, sampling: Sampling::of(nodes), time: self.time(scene, nodes), tied: self.tied }
     }
 }
 

@@ -3,6 +3,7 @@
 //! Over an ideal network the difference modes of N copies have the stiffness N/(N−1)·KT (Rakhsha & Constantinescu 2015, equation 6): bounded in N.
 
 use super::{Law, LawParameter, LawParameters, Observation, Pull};
+use crate::tick::coordinate;
 use crate::{Gains, Number};
 
 /// The law of Rakhsha & Constantinescu (2015).
@@ -31,7 +32,6 @@ impl<C: Copy> AveragePosition<C> {
 impl<N: Number> Law<N> for AveragePosition<N> {
     #[inline(always)]
     fn force(&self, seen: &Observation<N>, _memory: &mut [N]) -> N {
-        //= Rakhsha & Constantinescu 2015, eq. (10): FT = KT·(xO − xd) + BT·(vO − vd)
-        self.gains.force(seen.own.relative_to(seen.mean))
+        coordinate(&self.gains, seen.own.relative_to(seen.mean))
     }
 }

@@ -4,6 +4,7 @@
 //! Copies that move alike at one velocity then exert no force on each other, however old the samples are.
 
 use super::{Law, LawParameter, LawParameters, Observation, Pull};
+use crate::tick::coordinate;
 use crate::{Gains, Motion, Number};
 
 /// The average-position law with extrapolated samples.
@@ -39,7 +40,7 @@ impl<N: Number> Law<N> for Extrapolated<N> {
 
     #[inline(always)]
     fn force(&self, seen: &Observation<N>, _memory: &mut [N]) -> N {
-        self.gains.force(seen.own.relative_to(self.target(seen)))
+        coordinate(&self.gains, seen.own.relative_to(self.target(seen)))
     }
 
     #[inline(always)]

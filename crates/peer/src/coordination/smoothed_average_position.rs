@@ -4,6 +4,7 @@
 //! FT(k) = a·FT(k − 1) + (1 − a)·F(k) with a = e^(−Tc/lag).
 
 use super::{Law, LawParameter, LawParameters, Observation, Pull};
+use crate::tick::coordinate;
 use crate::{Gains, Number};
 
 /// The average-position law behind a first-order lag.
@@ -43,7 +44,7 @@ impl<N: Number> Law<N> for SmoothedAveragePosition<N> {
 
     #[inline(always)]
     fn force(&self, seen: &Observation<N>, memory: &mut [N]) -> N {
-        let pull = self.gains.force(seen.own.relative_to(seen.mean));
+        let pull = coordinate(&self.gains, seen.own.relative_to(seen.mean));
         memory[0] = self.kept * memory[0] + self.taken * pull;
         memory[0]
     }

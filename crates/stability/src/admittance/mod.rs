@@ -95,8 +95,8 @@ impl Admittance {
     /// From classes of which the pushed peer is one by itself.
     fn of_classes(scene: &Scene, structure: Structure, peer: usize, watch: &dyn Watch) -> Result<Self, AnalysisError> {
         let radius = radius_of(&reduced(&structure, scene, 1, Method::Reduced, watch)?.parts);
-        let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
-        let time = structure.time(scene);
+        let nodes = structure.nodes(scene);
+        let time = structure.time(scene, &nodes);
         let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
         let Structure { timetable, weights, tied, .. } = structure;
         Ok(Self { nodes, weights, timetable, time, tied, pushed, highest: 0.0, radius, notes: Vec::new() })

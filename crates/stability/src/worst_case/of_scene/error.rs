@@ -15,6 +15,12 @@ pub enum SceneWorstCaseError {
     /// The scene cannot be analysed at all.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
+    /// The law of the scene uses position and velocity of a sample by themselves, as one that extrapolates does.
+    #[error("the worst case does not follow {strategy} coordination, which uses the ages of samples: expected another strategy")]
+    Ages {
+        /// Its name.
+        strategy: &'static str,
+    },
     /// The pattern is too large, or a matrix overflowed.
     #[error(transparent)]
     Automaton(#[from] AutomatonError),

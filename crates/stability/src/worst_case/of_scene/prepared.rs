@@ -63,8 +63,11 @@ impl Prepared {
             }
             Ok(Search { kind, automaton, rounding })
         };
-        let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
+        let nodes = structure.nodes(scene);
         let quotient = structure.quotient(scene, &nodes);
+        if quotient.sampling.channels() > 1 {
+            return Err(SceneWorstCaseError::Ages { strategy: scene.coordination.strategy.name() });
+        }
         let everything = |channel: &Channel| channel.links.iter().copied().enumerate().collect();
         let whole = if structure.classes.len() < scene.peers.len() { PartKind::Together } else { PartKind::Whole };
         let mut searches = vec![search(whole, &Block { lifted: quotient, links: channels.iter().map(everything).collect() })?];
