@@ -105,7 +105,9 @@ macro_rules! impairments {
     };
 }
 
-impairments! {}
+impairments! {
+    14 => spike: crate::stages::spike::Spike,
+}
 
 #[cfg(test)]
 mod tests {

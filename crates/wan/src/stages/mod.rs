@@ -17,3 +17,4 @@ pub(crate) mod path_trace;
 pub(crate) mod queue;
 pub(crate) mod reorder;
 pub(crate) mod slots;
+pub(crate) mod spike;
