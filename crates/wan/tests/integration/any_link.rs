@@ -293,6 +293,7 @@ pub(crate) fn any_delay() -> BoxedStrategy<Delay> {
 }
 
 /// Any of the impairments that describe themselves, with any values of their forms.
+#[expect(clippy::panic, reason = "a test may fail")]
 fn listed() -> impl Strategy<Value = Impairments> {
     let value = |form: &Form| match form {
         Form::Duration => (0..60u64).prop_map(|millis| ParameterValue::Duration(Duration::from_millis(millis))).boxed(),
