@@ -18,7 +18,7 @@ mod metrics;
 mod server;
 mod snapshot;
 mod token;
-mod toml_text;
+mod typed;
 mod views;
 
 pub use board::{Board, Latest};

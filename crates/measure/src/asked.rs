@@ -80,8 +80,14 @@ impl Asked {
         let law = config.delay.law();
         let seconds = |nanos: f64| nanos / 1e9;
         let traced = config.trace.is_some();
+        let listed = config.listed.extra_delay();
         let varied = config.delay.jitter().is_some();
-        let alone = config.token_bucket.is_none() && config.bottleneck.is_none() && config.slots.is_none() && config.reorder.is_none() && !traced;
+        let alone = config.token_bucket.is_none()
+            && config.bottleneck.is_none()
+            && config.slots.is_none()
+            && config.reorder.is_none()
+            && !traced
+            && listed.is_none();
         let in_order = config.order == Order::InOrder && varied;
         let damaged = config.corruption.as_ref().map(|corruption| match corruption.bits {
             Flips::Bits { packets, .. } => packets.probability().get(),
@@ -92,11 +98,21 @@ impl Asked {
             }
         });
         Self {
-            mean_s: (!traced).then(|| law.map_or_else(|| config.delay.mean().as_secs_f64(), |law| seconds(law.mean()))),
-            sd_s: (!traced).then(|| law.map_or(0.0, |law| seconds(law.sd()))),
+            mean_s: (!traced).then(|| {
+                let mean = law.map_or_else(|| config.delay.mean().as_secs_f64(), |law| seconds(law.mean()));
+                listed.map_or(mean, |listed| mean + listed.mean)
+            }),
+            sd_s: (!traced).then(|| {
+                let sd = law.map_or(0.0, |law| seconds(law.sd()));
+                listed.map_or(sd, |listed| libm::sqrt(sd * sd + listed.variance))
+            }),
             least_s: (!traced).then(|| config.delay.least().as_secs_f64()),
-            quantiles_s: law.map(|law| QUANTILES.into_iter().map(|(name, p)| (name, seconds(law.quantile(p)))).collect()).unwrap_or_default(),
-            autocorrelation: autocorrelation(config, every),
+            // Of a sum of delays, quantiles and autocorrelation do not follow from those of its parts.
+            quantiles_s: law
+                .filter(|_| listed.is_none())
+                .map(|law| QUANTILES.into_iter().map(|(name, p)| (name, seconds(law.quantile(p)))).collect())
+                .unwrap_or_default(),
+            autocorrelation: if listed.is_none() { autocorrelation(config, every) } else { Vec::new() },
             loss: config.loss.mean().filter(|_| !traced),
             loss_run_mean: config.loss.mean_run().filter(|_| !traced),
             loss_autocorrelation: (1..=LAGS).filter(|_| !traced).map_while(|lag| config.loss.autocorrelation(lag)).collect(),

@@ -14,16 +14,16 @@ use crate::read::parse_scene;
 ///
 /// # Errors
 ///
-/// As [`Scene::read_live`].
+/// As [`Scene::read_live`](crate::Scene::read_live).
 pub fn link_keys(path: &Path, overrides: &[String]) -> Result<KeysOfLinks, FileError> {
     with_text(path, |text| link_keys_of_text(text, path, overrides))
 }
 
-/// [`link_keys`] of a scene that is a text; `file` as in [`Scene::parse`].
+/// [`link_keys`] of a scene that is a text; `file` as in [`Scene::parse`](crate::Scene::parse).
 ///
 /// # Errors
 ///
-/// As [`Scene::parse_live`].
+/// As [`Scene::parse_live`](crate::Scene::parse_live).
 pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<KeysOfLinks, FileError> {
     let mut keys = KeysOfLinks::new();
     let mut beginning = true;
@@ -36,11 +36,11 @@ pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Resul
 }
 
 /// The changes that the timeline of a scene makes to the keys of links: the instant, and all keys of each link that changes then. In order of time, as in
-/// [`Scene::timeline`]. A change by hand in between does not count: the timeline says what a link is.
+/// [`Scene::timeline`](crate::Scene::timeline). A change by hand in between does not count: the timeline says what a link is.
 ///
 /// # Errors
 ///
-/// As [`Scene::parse_live`].
+/// As [`Scene::parse_live`](crate::Scene::parse_live).
 pub fn link_key_changes_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<Vec<(Instant, KeysOfLinks)>, FileError> {
     let mut changes = Vec::new();
     let mut beginning = true;

@@ -81,6 +81,8 @@ pub use packet::damage::Damage;
 pub use stages::config::{LINK_PARAMETERS, Layout, LinkConfig};
 pub use stages::corruption::{Checksum, Corruption, Flips};
 pub use stages::delay::{Correlation, Delay, DelayError, Jitter};
+pub use stages::impairment::{ExtraDelay, ParameterValue, Refusal, Values};
+pub use stages::list::Impairments;
 pub use stages::loss::{Bursts, Counts, FourState, FourStateError, GilbertElliott, GilbertElliottInTime, Loss, NoTime, Pattern, PatternError};
 pub use stages::modulation::{MODULATOR, Modulated, Modulator, ModulatorError, ModulatorState};
 pub use stages::order::Order;

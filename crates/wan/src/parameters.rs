@@ -49,7 +49,11 @@ impl Table {
     }
 }
 
-/// Groups of keys one behind the other. `M` is the number of all groups.
+/// Groups of keys one behind the other.
+///
+/// # Panics
+///
+/// If `M` is not the number of all groups; in a constant, that fails to compile.
 #[must_use]
 pub const fn joined<const M: usize>(parts: &[&[&'static [Key]]]) -> [&'static [Key]; M] {
     let mut all: [&'static [Key]; M] = [&[]; M];

@@ -39,6 +39,8 @@ pub enum Purpose {
     Modulation,
     /// When a slot opens: the draws of "packet" n are those of the n-th slot.
     Slot,
+    /// The process of an impairment of [the list](crate::Impairments), by its code: the draws of "packet" n are those of its n-th event.
+    Listed(u8),
 }
 
 impl Purpose {
@@ -56,6 +58,7 @@ impl Purpose {
             Self::Outage => 8,
             Self::Modulation => 10,
             Self::Slot => 12,
+            Self::Listed(code) => code as u64,
         }
     }
 }
@@ -276,13 +279,27 @@ mod tests {
 
     #[test]
     fn no_two_draws_share_an_address() {
-        use Purpose::{Corruption, Duplication, InitialState, Jitter, Loss, Modulation, Outage, Queue, Reordering, Slot, TraceLoss};
+        use Purpose::{Corruption, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Outage, Queue, Reordering, Slot, TraceLoss};
         let mut words = std::collections::BTreeSet::new();
         let mut count = 0;
         for (seed, label) in [(1, "a->b"), (2, "a->b"), (1, "b->a"), (1, "a->b\0")] {
             let stream = Stream::new(seed, label.as_bytes());
             for (number, copy) in [(0, 0), (1, 0), (0, 1), (256, 0), (1 << 16, 0), (0, 255)] {
-                for purpose in [Loss, Jitter, Duplication, Corruption, Reordering, Queue, InitialState, TraceLoss, Outage, Modulation, Slot] {
+                for purpose in [
+                    Loss,
+                    Jitter,
+                    Duplication,
+                    Corruption,
+                    Reordering,
+                    Queue,
+                    InitialState,
+                    TraceLoss,
+                    Outage,
+                    Modulation,
+                    Slot,
+                    Listed(14),
+                    Listed(16),
+                ] {
                     let mut draws = stream.copy(number, copy).draws(purpose);
                     words.extend(core::iter::repeat_with(|| draws.next_word()).take(6));
                     count += 6;

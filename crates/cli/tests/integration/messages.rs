@@ -82,9 +82,9 @@ const OTHERS: &[Bad] = &[
     ),
     bad("run \u{202e}two.toml --set link.dlay=1", "\\u{202e}two.toml: cannot be read: No such file or directory (os error 2)"),
     bad(
-        "run two.toml --set link.dlay=\u{202e}1",
-        "--set link.dlay=\\u{202e}1: link.dlay: unknown key: expected one of delay, jitter, order, loss, mark-instead-of-loss, duplicate, corrupt, \
-         reorder, rate, queue, overhead, cells, token-bucket, slots, mtu, limit, outage, trace, modulated, replay, netem, netem-profile; did you mean \"delay\"?\n |\n | link.dlay=\\u{202e}1\n |      ^^^^",
+        "run two.toml --set simulation.substep=\u{202e}1",
+        "--set simulation.substep=\\u{202e}1: simulation.substep: unknown key: expected one of integrator, substeps; did you mean \"substeps\"?\n |\n | \
+         simulation.substep=\\u{202e}1\n |            ^^^^^^^",
     ),
     bad(
         "admittance two.toml --peer left --from 1e300",

@@ -12,7 +12,7 @@ use serde_json::{Map, Value, json};
 use super::App;
 use super::answer::{Refusal, json as answer};
 use super::read::{named, with_keys};
-use crate::toml_text;
+use crate::typed;
 
 /// Bodies beyond this are refused \[bytes\]. Every key of a link at its longest is a hundredth of it.
 const LARGEST_BODY: usize = 64 * 1024;
@@ -58,7 +58,7 @@ fn pair(key: String, value: &Value) -> Result<(String, String), Refusal> {
     if key.is_empty() || !key.chars().all(bare) {
         return Err(unprocessable(format!("{key:?} is no name of a link key: expected letters, digits, \"-\" and \"_\"")));
     }
-    let value = toml_text::from_json(value).map_err(|reason| unprocessable(format!("{key}: {reason}")))?;
+    let value = typed::from_json(value).map_err(|reason| unprocessable(format!("{key}: {reason}")))?;
     Ok((key, value))
 }
 

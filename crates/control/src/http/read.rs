@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use super::App;
 use super::answer::{Refusal, json as answer};
-use crate::{metrics, toml_text, views};
+use crate::{metrics, typed, views};
 
 /// Everything that changes by itself.
 pub(super) async fn state(State(app): State<Arc<App>>) -> Response {
@@ -60,7 +60,7 @@ pub(super) fn with_keys(app: &App, links: &[usize]) -> Vec<Value> {
     let editor = app.editor();
     let view = |link: &usize| {
         let mut view = views::link(app.board.description(), &latest.snapshot, *link);
-        let keys: Map<String, Value> = editor.keys(*link).into_iter().map(|(key, value)| (key, toml_text::shown(&value).into())).collect();
+        let keys: Map<String, Value> = editor.keys(*link).into_iter().map(|(key, value)| (key, typed::shown(&value).into())).collect();
         view["keys"] = keys.into();
         view
     };

@@ -6,6 +6,7 @@ mod corrupt;
 mod delay;
 mod distribution;
 mod exclusive;
+mod listed;
 mod loss;
 mod loss_pattern;
 mod modulated;
@@ -95,6 +96,7 @@ fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
     let slots = table.optional("slots", None, slots::read_slots);
     let mtu = table.optional("mtu", None, |node, context| if is_unlimited(node) { Some(None) } else { values::size(node, context).map(Some) });
     let limit = table.optional("limit", None, queue::read_packets);
+    let listed = listed::read_listed(&mut table, context);
     let outages = table.optional("outage", Outages::default(), outage::read_outages);
     trace?;
     Some(LinkConfig {
@@ -111,6 +113,7 @@ fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
         reorder: reorder?,
         trace: path,
         delay: delay?,
+        listed: listed?,
         order: order?,
         ..LinkConfig::default()
     })

@@ -5,7 +5,7 @@ use cohaptic_wan::parameters::{Form, Key, Table, Words, joined, required};
 use cohaptic_wan::{LINK_KIND_PARAMETERS, LINK_PARAMETERS};
 
 /// The keys of a link, of every kind.
-pub const LINK: [&[Key]; 14] = joined(&[&LINK_PARAMETERS, &[&LINK_KIND_PARAMETERS]]);
+pub const LINK: [&[Key]; 15] = joined(&[&LINK_PARAMETERS, &[&LINK_KIND_PARAMETERS]]);
 
 /// Keys of a link alone.
 pub static LINK_TABLE: Table = Table::of(&LINK);
@@ -16,7 +16,7 @@ pub static LINK_CHANGE: Table = Table::over(&LINK);
 pub const ENDS: [Key; 2] =
     [required("from", Form::Text, "The name of the one that sends"), required("to", Form::Text, "The name of the one that receives")];
 /// An entry `[\[links\]]`.
-pub static LINK_ENTRY: Table = Table::over(&joined::<15>(&[&[&ENDS], &LINK]));
+pub static LINK_ENTRY: Table = Table::over(&joined::<16>(&[&[&ENDS], &LINK]));
 
 /// The word for every link.
 pub const ALL_LINKS: Words = &[("all", "every link")];

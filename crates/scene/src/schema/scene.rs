@@ -226,7 +226,7 @@ static TIMELINE: Table = Table::of(&[&[
     optional("coordination", Form::Table(&GAINS), "In place of link or peer, and without set: new gains at every peer"),
 ]]);
 /// The key of a link or of a peer that is set: another key says which of the two.
-static SET: Table = Table::over(&joined::<15>(&[LINK.as_slice(), &[&SET_OF_PEER]]));
+static SET: Table = Table::over(&joined::<16>(&[LINK.as_slice(), &[&SET_OF_PEER]]));
 const SET_OF_PEER: [Key; 2] = [
     optional("contact", Form::AnyOf(const { &[Form::Words(&CONTACTS), Form::Table(&PUSH)] }), "Of a peer: how the device touches the object"),
     optional("hand", HAND, "Of a peer: what the user does"),

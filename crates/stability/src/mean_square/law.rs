@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cohaptic_wan::law::Law;
 use cohaptic_wan::{
-    Chance, Checksum, Displacement, Flips, FourState, GilbertElliott, GilbertElliottInTime, Layout, LinkConfig, LinkModel, Loss, Order,
+    Chance, Checksum, Displacement, Flips, FourState, GilbertElliott, GilbertElliottInTime, Impairments, Layout, LinkConfig, LinkModel, Loss, Order,
 };
 
 use super::arrivals::Arrival;
@@ -235,6 +235,9 @@ fn refuse(config: &LinkConfig) -> Result<(), &'static str> {
     }
     if config.slots.is_some() || config.trace.is_some() {
         return Err("it has slots or a recorded path");
+    }
+    if config.listed != Impairments::default() {
+        return Err("it has an impairment without a law here");
     }
     if queues && spread {
         return Err("it has a queue beside jitter, reordering or duplicates");

@@ -5,7 +5,8 @@ use std::time::Duration;
 use cohaptic_units::Bytes;
 use cohaptic_units::print::Span;
 use cohaptic_wan::{
-    Chance, Counts, Delay, Discipline, Fate, FateLog, Layout, LinkConfig, LinkModel, Loss, Order, Outages, Pattern, Service, SlotGap, Slots, Sojourn,
+    Chance, Counts, Delay, Discipline, Fate, FateLog, Impairments, Layout, LinkConfig, LinkModel, Loss, Order, Outages, Pattern, Service, SlotGap,
+    Slots, Sojourn,
 };
 
 /// A link without chance, and in words what was replaced by what.
@@ -85,6 +86,12 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
         let mean = config.delay.mean();
         replaced.push(format!("jitter is replaced by the mean delay, {}", Span(mean)));
         config.delay = Delay::constant(mean);
+    }
+    if let Some(extra) = config.listed.extra_delay() {
+        let mean = Duration::try_from_secs_f64(extra.mean).unwrap_or(Duration::MAX);
+        replaced.push(format!("{} is replaced by its mean delay, {}", config.listed.words().join(", then "), Span(mean)));
+        config.listed = Impairments::default();
+        config.delay = Delay::constant(config.delay.mean().saturating_add(mean));
     }
     if config.mtu.is_some_and(|mtu| size <= mtu) {
         config.mtu = None;

@@ -5,14 +5,18 @@ use std::f64::consts::{PI, TAU};
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Admittance, AdmittanceError, Verdict, admittance, ideal};
 use num_complex::Complex64;
+use serde_json::Value;
 
 use crate::anchors::scene;
 
 /// The paper's scene of that many peers of whom one touches.
 fn one_touches(count: usize, strategy: &str) -> Scene {
-    let mut overrides = vec![format!("scene.count={count}"), format!("coordination.strategy={strategy}"), "peer.contact=none".to_owned()];
-    overrides.push("peers.peer1.contact=grasp".to_owned());
-    scene(&overrides.iter().map(String::as_str).collect::<Vec<_>>())
+    one_touches_with(count, strategy, &[])
+}
+
+fn one_touches_with(count: usize, strategy: &str, overrides: &[&str]) -> Scene {
+    let (count, strategy) = (format!("scene.count={count}"), format!("coordination.strategy={strategy}"));
+    scene(&[&[count.as_str(), strategy.as_str(), "peer.contact=none", "peers.peer1.contact=grasp"], overrides].concat())
 }
 
 #[track_caller]
@@ -20,12 +24,16 @@ fn assert_close(found: Complex64, expected: Complex64, relative: f64) {
     assert!((found - expected).norm() <= relative * expected.norm(), "{found} is not {expected}");
 }
 
-/// The component at ω, computed apart in long arithmetic. What rounding may have done is as much as is claimed, and little.
 #[test]
 fn what_was_computed_in_long_arithmetic() {
-    let entries: serde_json::Value = serde_json::from_str(include_str!("../reference/admittance.json")).unwrap();
-    let entries = entries.as_array().unwrap();
+    let entries: Vec<Value> = serde_json::from_str(include_str!("../reference/admittance.json")).unwrap();
     assert!(entries.len() >= 30);
+    compare(&entries);
+}
+
+/// The component at ω, computed apart in long arithmetic. What rounding may have done is as much as is claimed, and little.
+#[track_caller]
+pub(crate) fn compare(entries: &[Value]) {
     for entry in entries {
         let scene = Scene::parse(entry["scene"].as_str().unwrap(), "reference.toml".as_ref(), &[]).unwrap();
         let peer = scene.peers.iter().position(|peer| peer.name == entry["peer"].as_str().unwrap()).unwrap();
@@ -194,9 +202,10 @@ mod simulated {
             if k % 8 == 0 {
                 sent.push(peers.iter().map(|peer| *peer.object().state()).collect());
                 if let Some(frame) = sent.len().checked_sub(1 + delay) {
+                    let sent_at = Instant::ZERO.saturating_add_nanos(8_000_000 * u64::try_from(frame).unwrap());
                     for to in 0..n {
                         for from in (0..n).filter(|from| *from != to) {
-                            peers[to].hold(if from < to { from } else { from - 1 }, sent[frame][from]);
+                            peers[to].hold(if from < to { from } else { from - 1 }, sent_at, sent[frame][from]);
                         }
                     }
                 }
@@ -236,8 +245,16 @@ mod simulated {
     /// 5000 frames are 40 s: whole periods of a multiple of 0.025 Hz.
     #[test]
     fn the_definition_carried_out_gives_the_same() {
-        for (count, strategy) in [(2, "average-position"), (3, "average-position"), (3, "proportional-derivative")] {
-            let scene = one_touches(count, strategy);
+        let scenes = [
+            one_touches(2, "average-position"),
+            one_touches(3, "average-position"),
+            one_touches(3, "proportional-derivative"),
+            one_touches_with(2, "smoothed-average-position", &["coordination.stiffness=200.0"]),
+            one_touches(3, "extrapolated"),
+            // Ages of 8 to 15 ms.
+            one_touches_with(2, "extrapolated", &["coordination.extrapolated.horizon=11ms"]),
+        ];
+        for scene in scenes {
             let lifted = Admittance::of(&scene, 0).unwrap();
             for hz in [0.05, 1.0, 7.3, 40.0, 62.5, 125.0, 130.0] {
                 assert_close(stepped(&scene, hz, 5000, 1)[0], lifted.at(hz).unwrap().value, 1e-6);

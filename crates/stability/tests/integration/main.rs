@@ -6,6 +6,7 @@
 mod admittance;
 mod anchors;
 mod graphs;
+mod laws;
 mod mean_square;
 mod random;
 mod reduction;

@@ -1,4 +1,4 @@
-"""Makes radii.json, mean_square.json, admittance.json and random.json, or those named on the command line. See README.md."""
+"""Makes radii.json, mean_square.json, admittance.json, random.json and laws.json, or those named on the command line. See README.md."""
 
 import json
 import sys
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import admittance
 import cases
+import laws
 import mean_square
 import random_scenes
 from mpmath import mpf
@@ -52,7 +53,7 @@ def write(name, entries):
 
 
 def main():
-    wanted = sys.argv[1:] or ["radii", "mean_square", "admittance", "random"]
+    wanted = sys.argv[1:] or ["radii", "mean_square", "admittance", "random", "laws"]
     with Pool() as pool:
         if "radii" in wanted:
             write("radii.json", radii(pool))
@@ -62,6 +63,8 @@ def main():
             write("admittance.json", admittance.entries(pool))
         if "random" in wanted:
             write("random.json", random_scenes.entries(pool))
+        if "laws" in wanted:
+            write("laws.json", laws.entries(pool))
 
 
 if __name__ == "__main__":

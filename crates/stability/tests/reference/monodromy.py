@@ -5,8 +5,13 @@ each instant is done to the rows in the order that the model prescribes: sample,
 is assumed about symmetry, delays, phases or clocks: every directed link has its own held sample and its own samples in flight.
 
 The state, at the beginning of a frame (an instant that is a multiple of Tn, before anything happens at it):
-    for each peer, its device and copy as they will be at its first tick of the frame; with a compute delay also the forces computed at its last tick;
+    for each peer, its device and copy as they will be at its first tick of the frame; with a compute delay also the forces computed at its last tick, and
+    with a lag the coordination force of that tick;
     for each directed link, the sample held and the samples in flight, oldest first.
+
+A law that extrapolates knows the age of what it holds. Without chance that age is known at every tick: samples are held as they were sent. With outcomes
+the age depends on chance, so the position held is kept extrapolated to the present: it moves on from instant to instant, by the time that passes times
+the velocity held, and a sample arrives moved on by its age. This is the same below the horizon, and beyond it is not covered.
 """
 
 from plant import Exact, Maps
@@ -46,6 +51,12 @@ class Timing:
         starts = [(self.first_tick(receiver, s + delay), s) for s in sent]
         return [(tick, s) for tick, s in starts if self.t0 <= tick < self.t1]
 
+    def held(self, sender, receiver):
+        """When what is held at the beginning of the frame was sent."""
+        delay = self.scene.links[sender, receiver].delay
+        sent = self.sends(sender, self.t0 - delay - 3 * self.scene.update, self.t0)
+        return max(s for s in sent if self.first_tick(receiver, s + delay) < self.t0)
+
 
 class Frame:
     """One frame. `states` names the entries of the state; `matrix` maps it over the frame.
@@ -55,9 +66,11 @@ class Frame:
 
     `outcomes` says for a directed link what becomes of the sample that would come into force in this frame: None if it is lost, or the delay in ns
     with which it comes, which must bring it into force within the same frame.
+
+    With `echo` the scene is one peer with a link to itself, which hears its own samples times that factor: one of many equal peers, see modes.py.
     """
 
-    def __init__(self, scene, arithmetic=Exact, forced=None, outcomes=None, maps=None):
+    def __init__(self, scene, arithmetic=Exact, forced=None, outcomes=None, maps=None, echo=None):
         self.scene, self.timing = scene, Timing(scene)
         count = len(scene.peers)
         peers, pairs = range(count), list(scene.links)
@@ -68,6 +81,8 @@ class Frame:
             self.states += [("xH", i), ("vH", i), ("xO", i), ("vO", i)]
             if scene.peers[i].compute_delay:
                 self.states += [("fH", i), ("fO", i)]
+            if scene.lag is not None:
+                self.states.append(("fT", i))
         for pair in pairs:
             self.states += [("held x", pair), ("held v", pair)]
             for place in range(len(flights[pair])):
@@ -89,7 +104,27 @@ class Frame:
         device = [[unit("xH", i), unit("vH", i)] for i in peers]
         copy = [[unit("xO", i), unit("vO", i)] for i in peers]
         pending = [[unit("fH", i), unit("fO", i)] if scene.peers[i].compute_delay else None for i in peers]
+        lagging = [unit("fT", i) if scene.lag is not None else None for i in peers]
         held = {pair: (unit("held x", pair), unit("held v", pair)) for pair in pairs}
+        moving = scene.horizon is not None and outcomes is not None
+        ageing = scene.horizon is not None and outcomes is None
+        assert scene.horizon is None or len({p.offset for p in scene.peers}) == 1, "ages are those of clocks that show the same"
+        since = {pair: timing.held(*pair) for pair in pairs} if ageing else {}
+        present = timing.t0
+
+        def moved_on(state, span):
+            """A sample extrapolated by a span in ns."""
+            return state[0] + arithmetic.number(span) / 10**9 * state[1], state[1]
+
+        def pass_time(instant):
+            """What is held moves on to an instant."""
+            if moving:
+                held.update({pair: moved_on(state, instant - present) for pair, state in held.items()})
+            return instant
+
+        def seen(pair):
+            return moved_on(held[pair], min(instant - since[pair], scene.horizon)) if ageing else held[pair]
+
         sample = {}
         for pair in pairs:
             for place, sent in enumerate(flights[pair]):
@@ -115,6 +150,7 @@ class Frame:
         self.outputs = []
         for instant in sorted({t for t, _ in ticks}):
             ticking = [i for t, i in ticks if t == instant]
+            present = pass_time(instant)
             for i in ticking:  # sample and send
                 if (instant, i) in sending:
                     sample[i, instant] = tuple(copy[i])
@@ -123,14 +159,23 @@ class Frame:
                     for tick, sent in due.get((j, i), ()):
                         if tick == instant:
                             held[j, i] = newest((j, i), sent)
+                            if moving:
+                                held[j, i] = moved_on(held[j, i], instant - sent)
+                            since[j, i] = sent
                 # Forces.
                 m = maps[i]
-                mean = [sum((held[j, i][q] for j in peers if j != i), start=zero) / (count - 1) for q in (0, 1)]
+                if echo is None:
+                    known = {j: seen((j, i)) for j in peers if j != i}
+                    mean = [sum((known[j][q] for j in known), start=zero) / (count - 1) for q in (0, 1)]
+                else:
+                    mean = [echo * number for number in seen((i, i))]
                 if scene.peers[i].touches:
                     fc = m.kc * (device[i][0] - copy[i][0]) + m.bc * (device[i][1] - copy[i][1])
                 else:
                     fc = zero
                 ft = m.kt * (copy[i][0] - mean[0]) + m.bt * (copy[i][1] - mean[1])
+                if scene.lag is not None:
+                    ft = lagging[i] = m.kept * lagging[i] + (1 - m.kept) * ft
                 applied = [fc, fc - ft]
                 if pending[i] is not None:
                     applied, pending[i] = pending[i], applied
@@ -141,11 +186,15 @@ class Frame:
                 # Move.
                 device[i] = move(m.device, device[i], hand - applied[0])
                 copy[i] = move(m.copy, copy[i], applied[1])
+        present = pass_time(timing.t1)
+        assert not ageing or all(since[pair] == timing.held(*pair) + scene.update for pair in pairs), "ages repeat from frame to frame"
         final = {}
         for i in peers:
             final.update({("xH", i): device[i][0], ("vH", i): device[i][1], ("xO", i): copy[i][0], ("vO", i): copy[i][1]})
             if pending[i] is not None:
                 final.update({("fH", i): pending[i][0], ("fO", i): pending[i][1]})
+            if scene.lag is not None:
+                final["fT", i] = lagging[i]
         for pair in pairs:
             final["held x", pair], final["held v", pair] = held[pair]
             flying = timing.in_flight(*pair, timing.t1)
@@ -187,12 +236,13 @@ def rigid_modes(scene):
     return modes
 
 
-def relative(scene, states, matrix):
+def relative(scene, states, matrix, rigid=None):
     """The matrix of the relative motion: positions are counted from the first peer's copy, which is left out, and so are free devices.
 
-    With e the displacement of everything together (M·e = e) and z = z' + x·e, x the reference: z'⁺ = (M − e·(row of x)) z'.
+    With e the displacement of everything together (M·e = e) and z = z' + x·e, x the reference: z'⁺ = (M − e·(row of x)) z'. `rigid` are the modes to leave
+    out, where they are not those of the scene.
     """
-    rigid = rigid_modes(scene)
+    rigid = rigid_modes(scene) if rigid is None else rigid
     left_out = set()
     for mode in rigid:
         if mode != "scene":

@@ -4,6 +4,8 @@ The doubles nearest to the decimal numbers of a scene are its numbers; durations
 one copy, scaled gains, the step maps) is computed in the arithmetic asked for.
 """
 
+import math
+
 import mpmath
 import numpy as np
 import scipy.linalg
@@ -18,6 +20,7 @@ class Exact:
 
     dtype = object
     number = staticmethod(mpf)
+    power_of_e = staticmethod(mpmath.exp)
 
     @staticmethod
     def exponential(x):
@@ -35,6 +38,7 @@ class Double:
     dtype = float
     number = staticmethod(float)
     exponential = staticmethod(scipy.linalg.expm)
+    power_of_e = staticmethod(math.exp)
     zeros = staticmethod(lambda *shape: np.zeros(shape))
 
 
@@ -76,3 +80,5 @@ class Maps:
         if scene.inverse_n:
             scale = scale * 4 * (n - 1) / n**2
         self.kt, self.bt = number(scene.stiffness) * scale, number(scene.rate) * scale
+        # Of a force with a lag: the share that is left of the one of the tick before.
+        self.kept = arithmetic.power_of_e(-number(peer.tick) / scene.lag) if scene.lag else number(0)

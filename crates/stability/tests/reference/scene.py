@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 UNITS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9, "min": 60 * 10**9, "h": 3600 * 10**9}
+SMOOTHED, EXTRAPOLATED = "smoothed-average-position", "extrapolated"
+# The laws that have a parameter of their own: its key and its default.
+LAWS = {SMOOTHED: ("lag", "10ms"), EXTRAPOLATED: ("horizon", "100ms")}
 
 
 def nanoseconds(text):
@@ -55,6 +58,8 @@ class Scene:
     peers: list
     links: dict = field(default_factory=dict)  # (from, to) -> Link
     identical: bool = False  # made by `count`
+    lag: int | None = None  # of smoothed-average-position [ns]
+    horizon: int | None = None  # of extrapolated [ns]
 
 
 def take(table, *known):
@@ -124,7 +129,11 @@ def parse(text):
     root = take(tomllib.loads(text), "scene", "object", "coordination", "peer", "peers", "link", "links")
     head = take(root["scene"], "title", "duration", "seed", "count")
     thing = take(root["object"], "mass", "damping", "split-mass")
-    coordination = take(root["coordination"], "strategy", "stiffness", "damping", "update", "scaling")
+    coordination = take(root["coordination"], "strategy", "stiffness", "damping", "update", "scaling", *LAWS)
+    strategy = coordination["strategy"]
+    if strategy not in ("average-position", "proportional-derivative", *LAWS):
+        raise ValueError(f"a strategy not covered: {strategy}")
+    own_of_laws = {law: nanoseconds(take(coordination.get(law, {}), key).get(key, default)) for law, (key, default) in LAWS.items()}
     common = root.get("peer", {})
     tables = {f"peer{i + 1}": common for i in range(head.get("count", 0))}
     for entry in root.get("peers", []):
@@ -144,7 +153,7 @@ def parse(text):
         mass=float(thing["mass"]),
         damping=float(thing.get("damping", 0.0)),
         split=thing.get("split-mass", True),
-        proportional_derivative={"average-position": False, "proportional-derivative": True}[coordination["strategy"]],
+        proportional_derivative=strategy == "proportional-derivative",
         stiffness=float(coordination["stiffness"]),
         rate=float(coordination.get("damping", 0.0)),
         inverse_n=coordination.get("scaling", "none") == "inverse-n",
@@ -152,4 +161,6 @@ def parse(text):
         peers=peers,
         links=links,
         identical="peers" not in root and "links" not in root,
+        lag=own_of_laws[SMOOTHED] if strategy == SMOOTHED else None,
+        horizon=own_of_laws[EXTRAPOLATED] if strategy == EXTRAPOLATED else None,
     )

@@ -27,10 +27,13 @@ def scene(
     hand=None,
     loss=None,
     jitter=None,
+    own=None,
     peers=(),
     links=(),
 ):
-    """A scene of n peers. `peers` has for each peer (or for none) the lines of its own; `links` has (from, to, lines), peers counted from 0."""
+    """A scene of n peers. `peers` has for each peer (or for none) the lines of its own; `links` has (from, to, lines), peers counted from 0.
+
+    `own` is the line of the table that the strategy alone has."""
     lines = ["[scene]", 'duration = "1s"']
     if not peers:
         lines.append(f"count = {n}")
@@ -42,6 +45,8 @@ def scene(
     lines += ["", "[coordination]", f'strategy = "{strategy}"', f"stiffness = {number(kt)}", f"damping = {number(bt)}", f'update = "{update}"']
     if scaling:
         lines.append(f'scaling = "{scaling}"')
+    if own:
+        lines += ["", f"[coordination.{strategy}]", own]
     lines += ["", "[peer]"]
     if tick:
         lines.append(f'tick = "{tick}"')

@@ -7,6 +7,7 @@
 //!
 //! A stage that is not configured is `None`, and no packet comes to it. A packet walks from stage to stage until one keeps it, drops it, or lets it out.
 
+use alloc::boxed::Box;
 use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::vec::Vec;
 use core::cmp::Ordering;
@@ -21,6 +22,7 @@ use crate::packet::{Carried, Exit, Output, Outputs};
 use crate::random::Purpose;
 use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::corruption::{Checksum, CorruptionStage};
+use crate::stages::list::ImpairmentStages;
 use crate::stages::modulation::ModulationStage;
 use crate::stages::path_trace::PathTrace;
 use crate::stages::queue::{BottleneckStage, TokenBucketStage};
@@ -84,6 +86,8 @@ pub(crate) struct Staged<T> {
     slots: Option<SlotStage<T>>,
     reorder: ReorderStage<T>,
     trace: Option<PathTrace>,
+    /// In a box, as whatever is seldom.
+    listed: Option<Box<ImpairmentStages>>,
     /// What propagates before other stages, where the layout has any behind.
     line: BinaryHeap<Propagating<T>>,
     /// How many have propagated there: what breaks ties.
@@ -175,6 +179,7 @@ impl<T: Clone> Staged<T> {
             slots: None,
             reorder: ReorderStage::new(),
             trace: None,
+            listed: None,
             line: BinaryHeap::new(),
             line_count: 0,
             modulation: None,
@@ -262,6 +267,7 @@ impl<T: Clone> Staged<T> {
         self.corruption = CorruptionStage::reconfigured(self.corruption.take(), config.corruption);
         self.limit = config.limit;
         self.trace = config.trace;
+        self.listed = ImpairmentStages::reconfigured(self.listed.take(), now, &config.listed, self.direct.draws);
         let mut given_up: Vec<(Stage, Carried<T>)> = Vec::new();
         self.slots = match (self.slots.take(), config.slots) {
             (None, new) => new.map(SlotStage::new),
@@ -312,7 +318,7 @@ impl<T: Clone> Staged<T> {
         match stage {
             Stage::Mtu => self.mtu.is_some(),
             Stage::Outage => self.direct.has_outages(),
-            Stage::Loss => self.direct.loss.is_some() || self.trace.is_some(),
+            Stage::Loss => self.direct.loss.is_some() || self.trace.is_some() || self.listed.is_some(),
             Stage::Duplication => self.duplication.is_some(),
             Stage::Corruption => self.corruption.is_some(),
             Stage::Limit => self.limit.is_some(),
@@ -462,7 +468,8 @@ impl<T: Clone> Staged<T> {
         let traced = self.trace.as_ref().map(|trace| trace.at(now).1);
         let by_trace = traced.is_some_and(|loss| loss.happens(draws.first(Purpose::TraceLoss)));
         let by_model = self.direct.loss.as_mut().is_some_and(|loss| loss.loses(now, packet.number, draws.first(Purpose::Loss), draws));
-        by_model || by_trace
+        let by_listed = self.listed.as_mut().is_some_and(|listed| listed.loses(now, packet.info));
+        by_model || by_trace || by_listed
     }
 
     /// Puts a packet into its place among the others, and lets it propagate.
@@ -490,7 +497,8 @@ impl<T: Clone> Staged<T> {
             let traced = self.trace.as_ref().map_or(0, |trace| trace.at(now).0);
             // Drawing a word that nobody looks at took 5 % of a link with a queue.
             let word = if self.direct.delay.is_random() { draws.first(Purpose::Jitter) } else { 0 };
-            self.direct.delay.draw_nanos(now, word, draws).saturating_add(traced)
+            let listed = self.listed.as_mut().map_or(0, |listed| listed.delay_nanos(now, packet.info));
+            self.direct.delay.draw_nanos(now, word, draws).saturating_add(traced).saturating_add(listed)
         };
         let wanted = match travel {
             Travel::InOrder => now.saturating_add_nanos(delay()),

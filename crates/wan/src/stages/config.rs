@@ -5,12 +5,14 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use cohaptic_units::Bytes;
 use cohaptic_units::print::{Counted, Span};
+use core::fmt;
 
 use crate::laws::chance;
 use crate::laws::chance::Chance;
 use crate::parameters::{Form, Key, UNLIMITED, usual};
 use crate::stages::corruption::Corruption;
 use crate::stages::delay::Delay;
+use crate::stages::list::Impairments;
 use crate::stages::loss::Loss;
 use crate::stages::order::Order;
 use crate::stages::outage::Outages;
@@ -24,7 +26,7 @@ use crate::stages::{corruption, delay, loss, order, outage, path_trace, reorder,
 /// The configuration of one directed link: which impairments it has, each checked when it was made.
 ///
 /// The default is the ideal link: no loss, no queue, no delay. Packets pass the stages in the order of the fields, unless `layout` says otherwise.
-#[derive(Clone, PartialEq, Debug, Default)]
+#[derive(Clone, PartialEq, Default)]
 pub struct LinkConfig {
     /// The largest packet that the link takes; `None`: any.
     pub mtu: Option<Bytes>,
@@ -52,6 +54,8 @@ pub struct LinkConfig {
     pub trace: Option<PathTrace>,
     /// The propagation delay and its jitter.
     pub delay: Delay,
+    /// Impairments that describe themselves: what they lose is lost after `loss`, what they add to the delay is added to that of `delay`.
+    pub listed: Impairments,
     /// Whether a packet may overtake another.
     pub order: Order,
     /// In which order packets pass the stages.
@@ -66,6 +70,22 @@ pub enum Layout {
     Physical,
     /// That of `netem`: duplication before loss, and the rate and the slots behind the delay, so that a queue forms of what has already travelled.
     Netem,
+}
+
+impl fmt::Debug for LinkConfig {
+    /// The listed impairments are shown only where there are any: fingerprints of records are made of this text.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut shown = f.debug_struct("LinkConfig");
+        shown.field("mtu", &self.mtu).field("outages", &self.outages).field("loss", &self.loss);
+        shown.field("marks_instead_of_loss", &self.marks_instead_of_loss).field("duplication", &self.duplication);
+        shown.field("corruption", &self.corruption).field("limit", &self.limit).field("token_bucket", &self.token_bucket);
+        shown.field("bottleneck", &self.bottleneck).field("slots", &self.slots).field("reorder", &self.reorder).field("trace", &self.trace);
+        shown.field("delay", &self.delay).field("order", &self.order).field("layout", &self.layout);
+        if self.listed != Impairments::default() {
+            shown.field("listed", &self.listed);
+        }
+        shown.finish()
+    }
 }
 
 impl LinkConfig {
@@ -85,6 +105,7 @@ impl LinkConfig {
             || self.slots.is_some()
             || self.reorder.is_some()
             || self.trace.is_some()
+            || self.listed != Impairments::default()
             || self.bottleneck.as_ref().is_some_and(|bottleneck| matches!(bottleneck.discipline, Discipline::Red(_)))
     }
 
@@ -110,7 +131,7 @@ const LIMIT: [Key; 1] =
     [usual("limit", Form::Like(&["1000 packets", "unlimited"]), "\"unlimited\"", "How many packets may be inside, waiting and propagating together")];
 
 /// The parameters of a link, stage by stage, in the order in which they are explained.
-pub const LINK_PARAMETERS: [&[Key]; 13] = [
+pub const LINK_PARAMETERS: [&[Key]; 14] = [
     &delay::KEYS,
     &order::KEYS,
     &loss::KEYS,
@@ -124,6 +145,7 @@ pub const LINK_PARAMETERS: [&[Key]; 13] = [
     &LIMIT,
     &outage::KEYS,
     &path_trace::KEYS,
+    Impairments::KEYS,
 ];
 
 impl LinkConfig {
@@ -143,6 +165,7 @@ impl LinkConfig {
         stages.extend(self.reorder.as_ref().map(Reorder::words));
         stages.extend(self.trace.as_ref().map(|trace| format!("a recorded delay of at least {}, and its loss", Span(trace.least()))));
         stages.push(format!("delay {}", self.delay.words()));
+        stages.extend(self.listed.words());
         if self.order == Order::InOrder {
             stages.push("in order".into());
         }

@@ -3,14 +3,15 @@
 use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{Bytes, Instant, Probability};
 use cohaptic_wan::law::{DistTable, Empirical};
 use cohaptic_wan::netem::Netem;
+use cohaptic_wan::parameters::{Form, Table};
 use cohaptic_wan::{
     Between, Bottleneck, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Counts, Delay, DeliveryTrace, Discipline, Displacement,
-    Distribution, FateLog, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter, KernelNetem, Layout, Link,
-    LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, ModulatorState, Order, Outages, PacketEvent, PacketInfo, PacketRecord, PathTrace,
-    Pattern, Peak, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket,
+    Distribution, FateLog, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Impairments, Jitter, KernelNetem, Layout,
+    Link, LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, ModulatorState, Order, Outages, PacketEvent, PacketInfo, PacketRecord,
+    ParameterValue, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket, Values,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -291,6 +292,30 @@ pub(crate) fn any_delay() -> BoxedStrategy<Delay> {
     .boxed()
 }
 
+/// Any of the impairments that describe themselves, with any values of their forms.
+#[expect(clippy::panic, reason = "a test may fail")]
+fn listed() -> impl Strategy<Value = Impairments> {
+    let value = |form: &Form| match form {
+        Form::Duration => (0..60u64).prop_map(|millis| ParameterValue::Duration(Duration::from_millis(millis))).boxed(),
+        Form::Number(_) => (0.0..20.0).prop_map(ParameterValue::Number).boxed(),
+        Form::Probability => (0.0..1.0).prop_map(|p| ParameterValue::Probability(Probability::new(p).unwrap())).boxed(),
+        Form::Integer(least, most) => (*least..=(least + 9).min(*most)).prop_map(ParameterValue::Integer).boxed(),
+        Form::Boolean => any::<bool>().prop_map(ParameterValue::Boolean).boxed(),
+        Form::Words(words) => select(words.iter().map(|(word, _)| ParameterValue::Word(word)).collect::<Vec<_>>()).boxed(),
+        other => panic!("no values of the form {other:?}"),
+    };
+    let values = |table: &Table| table.keys().map(|key| value(&key.form).prop_map(move |value| (key.name, value)).boxed()).collect::<Vec<_>>();
+    let each: Vec<_> = Impairments::KEYS.iter().map(|key| option::weighted(0.3, values(key.form.table().unwrap()))).collect();
+    each.prop_map(|given| {
+        let mut impairments = Impairments::default();
+        for (key, values) in Impairments::KEYS.iter().zip(given) {
+            // Values that are refused leave the impairment out.
+            let _ = impairments.set(key.name, values.map(Values).as_ref());
+        }
+        impairments
+    })
+}
+
 /// Any configuration with that layout.
 pub(crate) fn config_in(layout: Layout) -> BoxedStrategy<LinkConfig> {
     let first = (
@@ -310,11 +335,12 @@ pub(crate) fn config_in(layout: Layout) -> BoxedStrategy<LinkConfig> {
         option::weighted(0.25, path_trace()),
         any_delay(),
         select(vec![Order::AllowReordering, Order::InOrder]),
+        listed(),
     );
     (first, second)
         .prop_map(move |(first, second)| {
             let (mtu, outages, loss, marks_instead_of_loss, duplication, corruption, limit) = first;
-            let (token_bucket, bottleneck, slots, reorder, trace, delay, order) = second;
+            let (token_bucket, bottleneck, slots, reorder, trace, delay, order, listed) = second;
             LinkConfig {
                 mtu,
                 outages,
@@ -329,6 +355,7 @@ pub(crate) fn config_in(layout: Layout) -> BoxedStrategy<LinkConfig> {
                 reorder,
                 trace,
                 delay,
+                listed,
                 order,
                 layout,
             }

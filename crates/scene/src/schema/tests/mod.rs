@@ -269,6 +269,9 @@ fn the_manual_has_the_keys_of_the_catalogue() {
         assert!(manual.split(|c: char| !is_word(c)).any(|word| word == *key), "no page names the key {key}");
     }
     let scenes = page("scenes.md");
+    let of_links = scenes.split("\n## `[link]`").nth(1).and_then(|section| section.split("\n| key").nth(1)).unwrap();
+    let rows: Vec<&str> = of_links.lines().skip(2).take_while(|line| line.starts_with('|')).filter_map(|line| line.split('`').nth(1)).collect();
+    assert_eq!(rows, cohaptic_linkfile::link::LINK_KEYS, "the table of the keys of a link");
     let mut in_keys = false;
     let mut named = 0;
     for line in scenes.lines() {

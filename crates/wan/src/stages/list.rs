@@ -1,0 +1,122 @@
+//! The impairments that describe themselves. One line adds one: `code => field: module::Type`.
+//!
+//! A code is part of the address of each random number, and so of every recorded result: it never changes and is never used twice, and it is even and at
+//! least 14, so that no other purpose shares its words.
+
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
+
+use cohaptic_units::Instant;
+
+use super::impairment::{ExtraDelay, Impairment, ImpairmentStage, Refusal, Values};
+use crate::packet::PacketInfo;
+use crate::parameters::Key;
+use crate::random::Stream;
+
+macro_rules! impairments {
+    ($($code:literal => $field:ident: $type:path,)*) => {
+        /// The impairments of a link that describe themselves; by default none.
+        #[derive(Clone, PartialEq, Default)]
+        pub struct Impairments {
+            $($field: Option<$type>,)*
+        }
+
+        impl Impairments {
+            /// The keys of all impairments, in the order in which packets meet them.
+            pub const KEYS: &[Key] = &[$(<$type as Impairment>::KEY,)*];
+
+            /// The codes of their random numbers.
+            pub(crate) const CODES: &[u8] = &[$($code,)*];
+
+            /// Sets the impairment of that key, or takes it away. Another key is not looked at.
+            ///
+            /// # Errors
+            ///
+            /// [`Refusal`] if the values make no sense together.
+            #[allow(unused_variables, reason = "the list may be empty")]
+            pub fn set(&mut self, key: &str, values: Option<&Values>) -> Result<(), Refusal> {
+                $(if key == <$type as Impairment>::KEY.name {
+                    self.$field = values.map(<$type as Impairment>::of).transpose()?;
+                })*
+                Ok(())
+            }
+
+            /// Each impairment that is configured, in words with its numbers.
+            #[must_use]
+            pub fn words(&self) -> Vec<String> {
+                let all: &[Option<String>] = &[$(self.$field.as_ref().map(Impairment::words),)*];
+                all.iter().flatten().cloned().collect()
+            }
+
+            /// The addition to the delay in the long run; `None` if there is no impairment.
+            #[must_use]
+            pub fn extra_delay(&self) -> Option<ExtraDelay> {
+                let all: &[Option<ExtraDelay>] = &[$(self.$field.as_ref().map(Impairment::extra_delay),)*];
+                let sum = |one: ExtraDelay, other: ExtraDelay| ExtraDelay { mean: one.mean + other.mean, variance: one.variance + other.variance };
+                all.iter().flatten().copied().reduce(sum)
+            }
+        }
+
+        impl fmt::Debug for Impairments {
+            /// Only those that are configured: the text of a link does not change when the list grows.
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                let mut shown = f.debug_struct("Impairments");
+                $(if let Some(config) = &self.$field {
+                    shown.field(stringify!($field), config);
+                })*
+                shown.finish()
+            }
+        }
+
+        /// The stages of the impairments that are configured.
+        #[derive(Clone, Debug, Default)]
+        pub(crate) struct ImpairmentStages {
+            $($field: Option<<$type as Impairment>::Stage>,)*
+        }
+
+        #[allow(unused_variables, unused_mut, clippy::unused_self, clippy::needless_pass_by_ref_mut, reason = "the list may be empty")]
+        impl ImpairmentStages {
+            /// The stages with another configuration from `now` on; `None` if there is none.
+            pub(crate) fn reconfigured(before: Option<Box<Self>>, now: Instant, config: &Impairments, draws: Stream) -> Option<Box<Self>> {
+                if before.is_none() && *config == Impairments::default() {
+                    return None;
+                }
+                let mut stages = before.unwrap_or_default();
+                $(stages.$field = ImpairmentStage::reconfigured(stages.$field.take(), now, config.$field.as_ref(), draws, $code);)*
+                Some(stages)
+            }
+
+            /// Whether one of them loses the packet. Each is asked, so that none depends on another.
+            pub(crate) fn loses(&mut self, now: Instant, packet: PacketInfo) -> bool {
+                let mut lost = false;
+                $(lost |= self.$field.as_mut().is_some_and(|stage| stage.loses(now, packet));)*
+                lost
+            }
+
+            /// How much later the packet arrives by all of them \[ns\].
+            pub(crate) fn delay_nanos(&mut self, now: Instant, packet: PacketInfo) -> u64 {
+                let mut nanos = 0_u64;
+                $(nanos = nanos.saturating_add(self.$field.as_mut().map_or(0, |stage| stage.delay_nanos(now, packet)));)*
+                nanos
+            }
+        }
+    };
+}
+
+impairments! {
+    14 => spike: crate::stages::spike::Spike,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_are_even_and_each_is_used_once() {
+        let codes: alloc::collections::BTreeSet<u8> = Impairments::CODES.iter().copied().collect();
+        assert_eq!(codes.len(), Impairments::CODES.len());
+        assert!(codes.iter().all(|code| *code >= 14 && code % 2 == 0));
+    }
+}
