@@ -9,6 +9,8 @@ use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
+use cohaptic_wan::NodeId;
+
 use crate::address::ToSocketAddrs;
 use crate::context;
 use crate::core::{Shared, SocketId};
@@ -49,11 +51,11 @@ impl UdpSocket {
         Self::bind_on(shared, host, address)
     }
 
-    pub(crate) fn bind_on(shared: Arc<Shared>, host: usize, address: impl ToSocketAddrs) -> io::Result<Self> {
+    pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {
         let address = address.to_socket_addr()?;
         let mut core = shared.lock();
         if !core.is_up(host) {
-            let text = format!("host `{}` is down; `Host::restart` brings it back", core.plan.names()[host]);
+            let text = format!("host `{}` is down; `Host::restart` brings it back", core.plan.names()[host.index()]);
             return Err(io::Error::new(io::ErrorKind::NetworkDown, text));
         }
         let id = core.bind(host, address)?;

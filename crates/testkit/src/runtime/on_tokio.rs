@@ -27,10 +27,11 @@ use cohaptic_units::Instant;
 use tokio::task::LocalSet;
 
 use super::own::{nothing_will_happen, time_stands_still};
-use crate::bed::{Bed, Recorded, Recorder};
+use crate::bed::{Bed, Recorder};
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
 use crate::task::{Spawner, Task, Tasks};
+use crate::wire::Recorded;
 
 /// A millisecond \[ns\]: what tokio's timers are counted in.
 const TICK: u64 = 1_000_000;
@@ -61,7 +62,7 @@ impl Idle {
     fn notice(&self, shared: &Shared) {
         let (now, next) = {
             let core = shared.lock();
-            (core.now, core.next_event())
+            (core.now(), core.next_event())
         };
         let mut state = self.lock();
         if state.armed == Some(armed(next)) && step(now, next).is_none() {
@@ -137,7 +138,13 @@ impl Spawner for Local {
 ///
 /// As [`Testbed::run`](crate::Testbed::run).
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
-pub(crate) fn run<T, F>(core: Core, hosts: usize, program: impl FnOnce(Bed) -> F, origin: &'static Location<'static>, recorded: &mut Recorded) -> T
+pub(crate) fn run<T, F>(
+    core: Core,
+    hosts: usize,
+    program: impl FnOnce(Bed) -> F,
+    origin: &'static Location<'static>,
+    recorded: &mut Option<Recorded>,
+) -> T
 where
     F: Future<Output = T> + 'static,
     T: 'static,
@@ -209,7 +216,7 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
         loop {
             let (now, next) = {
                 let core = shared.lock();
-                (core.now, core.next_event())
+                (core.now(), core.next_event())
             };
             if next.is_some_and(|next| next <= now) {
                 // Due: it was moved to, or has come by tokio's own jump.
