@@ -96,7 +96,7 @@ impl Host {
         UdpSocket::bind_on(Arc::clone(&self.shared), self.node, address)
     }
 
-    /// The host is gone, at once: its tasks are dropped where they wait, its sockets closed. What it has sent is on its way still, and what is sent to it is
+    /// The host is gone, at once: its tasks are dropped where they wait, its sockets closed. Packets that it has sent are on their way still, those sent to it are
     /// lost. Tasks that were not spawned by [`Host::spawn`] or [`Host::start`] (by `tokio::spawn`, say) go on, and their sockets give errors.
     ///
     /// # Panics
@@ -133,7 +133,7 @@ impl Host {
         self.shared.lock().is_up(self.node)
     }
 
-    /// Gives the host addresses that nobody has had, as a phone gets that leaves the house. Those before belong to nobody: what is sent to them, or is on its way, is
+    /// Gives the host addresses that nobody has had, as a phone gets that leaves the house. Those before belong to nobody: packets to them, also those on their way, are
     /// lost. Sockets bound to `0.0.0.0` or `[::]` go on with the new ones, others cannot send any more.
     pub fn change_addresses(&self) -> Addresses {
         self.shared.lock().change_addresses(self.node)

@@ -25,7 +25,7 @@ use crate::core::{Shared, SocketId};
 /// - A datagram that finds the buffer of the socket full is lost: see [`Testbed::receive_buffer`](crate::Testbed::receive_buffer). One that is longer than the
 ///   buffer given to receive it is cut off, as with Linux.
 /// - If no socket is at the port of the peer, a connected socket gets [`io::ErrorKind::ConnectionRefused`], once the answer has come back over the
-///   link: by what is called next, or by what waits to receive.
+///   link: by the next call, or by the call that waits to receive.
 /// - A socket at `[::]` hears IPv6 only.
 /// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out.
 pub struct UdpSocket {

@@ -1,4 +1,4 @@
-//! One link and what is on the way through it.
+//! One link and the packets on the way through it.
 
 use alloc::boxed::Box;
 use alloc::collections::VecDeque;

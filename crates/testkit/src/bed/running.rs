@@ -84,7 +84,7 @@ impl Bed {
         context::expect_running("tasks can be spawned").tasks.spawn(None, Location::caller(), future)
     }
 
-    /// Cuts the way from one host to another: what is sent from now on is lost, and what would arrive. The way back is as before.
+    /// Cuts the way from one host to another: packets that are sent or would arrive from now on are lost. The way back is as before.
     ///
     /// # Panics
     ///

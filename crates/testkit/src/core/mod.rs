@@ -36,10 +36,10 @@ pub(crate) struct Core {
     pub(crate) entropy: entropy::Entropy,
     hosts: Vec<HostState>,
     sockets: Sockets,
-    /// Who is to be woken when nobody holds this any more.
+    /// To be woken when the state is not held any more.
     pub(crate) woken: Vec<Waker>,
-    /// How often the program asked for what takes no time since it last passed.
-    asked: u64,
+    /// How often the program has called without waiting since time last passed.
+    calls: u64,
     /// How often tasks were polled since it last passed, as far as they are counted here.
     #[cfg(feature = "tokio")]
     polled: u64,
@@ -92,7 +92,7 @@ impl Core {
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),
             woken: Vec::new(),
-            asked: 0,
+            calls: 0,
             #[cfg(feature = "tokio")]
             polled: 0,
         }
@@ -111,7 +111,7 @@ impl Core {
     /// Lets time pass: what arrives until then arrives, and then timers go off.
     pub(crate) fn pass(&mut self, now: Instant) {
         if self.wire.set_now(now) {
-            self.asked = 0;
+            self.calls = 0;
             #[cfg(feature = "tokio")]
             {
                 self.polled = 0;
@@ -133,8 +133,8 @@ impl Core {
     /// If it has done so for so often since time last passed that it seems to wait for time without letting it pass.
     #[inline]
     pub(crate) fn note_call(&mut self) {
-        self.asked += 1;
-        if self.asked > self.settings.patience.saturating_mul(10) {
+        self.calls += 1;
+        if self.calls > self.settings.patience.saturating_mul(10) {
             self.lose_patience();
         }
     }
@@ -143,7 +143,7 @@ impl Core {
     #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
     fn lose_patience(&mut self) -> ! {
         // What is dropped while it unwinds may ask again.
-        self.asked = 0;
+        self.calls = 0;
         panic!(
             "time stands still at {} s: a task asks for the time, sends or tries to receive again and again and never waits; `sleep(..).await` lets it pass",
             Seconds(self.now())
@@ -169,7 +169,7 @@ pub(crate) struct Shared {
     clock: Clock,
 }
 
-/// Who tells the time.
+/// The source of the time.
 pub(crate) enum Clock {
     /// The executor of this crate, by [`Core::pass`].
     Own,
@@ -186,7 +186,7 @@ impl Shared {
         Self { core: Mutex::new(core), clock }
     }
 
-    /// The state at this instant. Whoever is to be woken is woken when the guard is gone.
+    /// The state at this instant. Tasks that are to be woken are woken when the guard is dropped.
     pub(crate) fn lock(&self) -> Guard<'_> {
         #[cfg_attr(not(feature = "tokio"), expect(unused_mut, reason = "only tokio's clock moves by itself"))]
         let mut core = self.core.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,4 +1,4 @@
-//! Sockets: where they are bound, what lies in their buffers, and who waits.
+//! Sockets: where they are bound, what lies in their buffers, and the tasks that wait.
 
 use std::collections::VecDeque;
 use std::io;
@@ -77,11 +77,11 @@ impl Sockets {
     }
 
     pub(super) fn get(&self, id: SocketId) -> &SocketState {
-        self.places[id.0].as_ref().expect("whoever has its number keeps it open")
+        self.places[id.0].as_ref().expect("a socket is open as long as its number is held")
     }
 
     pub(super) fn get_mut(&mut self, id: SocketId) -> &mut SocketState {
-        self.places[id.0].as_mut().expect("whoever has its number keeps it open")
+        self.places[id.0].as_mut().expect("a socket is open as long as its number is held")
     }
 
     pub(super) fn all_of(&mut self, host: NodeId) -> impl Iterator<Item = &mut SocketState> {
@@ -94,16 +94,16 @@ const FIRST_DYNAMIC: u16 = 49_152;
 
 impl Core {
     /// Binds a socket of a host that is up.
-    pub(crate) fn bind(&mut self, host: NodeId, asked: SocketAddr) -> io::Result<SocketId> {
-        let (ip, six) = (asked.ip(), asked.is_ipv6());
+    pub(crate) fn bind(&mut self, host: NodeId, wanted: SocketAddr) -> io::Result<SocketId> {
+        let (ip, six) = (wanted.ip(), wanted.is_ipv6());
         if !ip.is_unspecified() && !ip.is_loopback() && !self.plan.of(host).has(ip) {
             let text = format!("{ip} is no address of host `{}`, which has {}", self.plan.names()[host.index()], self.plan.of(host).like(ip));
             return Err(io::Error::new(io::ErrorKind::AddrNotAvailable, text));
         }
-        let port = match asked.port() {
+        let port = match wanted.port() {
             0 => self.free_port(host, ip)?,
             port if self.is_taken(host, ip, port) => {
-                let text = format!("{asked} is taken on host `{}`", self.plan.names()[host.index()]);
+                let text = format!("{wanted} is taken on host `{}`", self.plan.names()[host.index()]);
                 return Err(io::Error::new(io::ErrorKind::AddrInUse, text));
             }
             port => port,

@@ -10,7 +10,7 @@ use crate::link::ToLink;
 use crate::trace::Happening;
 
 impl NodeRun {
-    /// Cuts the way from one node to another: what is sent from now on is lost, and what would arrive. The way back is as before.
+    /// Cuts the way from one node to another: packets that are sent or would arrive from now on are lost. The way back is as before.
     ///
     /// # Panics
     ///

@@ -19,7 +19,7 @@ pub(super) enum Does {
 }
 
 impl NodeRun {
-    /// Lets happen what is due at an instant.
+    /// Lets the events of an instant happen.
     pub(super) fn pass(&mut self, at: Instant) {
         if self.wire.set_now(at) {
             self.done = 0;
@@ -51,7 +51,7 @@ impl NodeRun {
         let mut sent = 0;
         while let Some(transmit) = node.poll_transmit(self.now()) {
             sent += 1;
-            // Who sends one packet for each that comes answers; who sends most of all that is done now, asked but once, never ends to send.
+            // A node that sends one packet for each that comes answers; one that, asked once, sends more than half of all events of this instant never ends to send.
             self.count(if sent > self.patience / 2 { Does::Sends } else { because }, id);
             self.send(id, transmit);
         }
@@ -123,7 +123,7 @@ impl NodeRun {
         }
     }
 
-    /// Counts what is done at one instant.
+    /// Counts the events of one instant.
     #[inline]
     fn count(&mut self, does: Does, node: NodeId) {
         self.done += 1;

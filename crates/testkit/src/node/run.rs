@@ -1,4 +1,4 @@
-//! Nodes that run: their time, what is asked of them, and the way of a packet.
+//! Nodes that run: their time, the questions that they are asked, and the way of a packet.
 
 use std::any::{Any, type_name};
 use std::collections::VecDeque;
@@ -21,9 +21,9 @@ use crate::wire::Wire;
 
 /// Nodes that run.
 ///
-/// Between the steps the test looks at the nodes, changes them, and breaks what is between them. At one instant packets arrive first, in the order of the
-/// [network](cohaptic_wan::Network); then the timers go off that are due, in the order of the nodes; then what is sent at this instant over links without delay
-/// arrives. If the test fails while the run is there, the seed is told, and what [`Nodes::artefacts`] asked for is written.
+/// Between the steps the test looks at the nodes, changes them, and breaks the links between them. At one instant packets arrive first, in the order of the
+/// [network](cohaptic_wan::Network); then the timers go off that are due, in the order of the nodes; then packets arrive that are sent at this instant over links without
+/// delay. If the test fails while the run is there, the seed is told, and what [`Nodes::artefacts`] asked for is written.
 pub struct NodeRun {
     pub(super) names: Vec<String>,
     /// `None`: crashed, or being asked.

@@ -1,4 +1,4 @@
-//! Tokio as the one who polls, with packets that arrive to the nanosecond.
+//! Tokio as the executor, with packets that arrive to the nanosecond.
 //!
 //! Tokio's paused clock jumps to the next of its timers whenever all tasks wait, and its timers are counted in whole milliseconds since the runtime was built. So
 //! the clock must be moved by hand within a millisecond, and back to a whole one before tokio is left to jump:
@@ -102,7 +102,7 @@ struct Local {
     panic: Rc<RefCell<Panic>>,
 }
 
-/// What a task has panicked with, and who is to be told.
+/// The panic of a task, and the waker of the run that is to be told.
 #[derive(Default)]
 struct Panic {
     payload: Option<Box<dyn std::any::Any + Send>>,
@@ -113,7 +113,7 @@ impl Spawner for Local {
     fn start(&self, task: Rc<Task>) {
         let (panic, shared) = (Rc::clone(&self.panic), Arc::clone(&self.shared));
         self.set.spawn_local(poll_fn(move |cx| {
-            // Tokio would keep a panic for whoever joins the task; a test is to fail.
+            // Tokio would keep a panic until the task is joined; a test is to fail.
             let poll = || {
                 let is_too_often = shared.lock().count_poll();
                 if is_too_often {

@@ -1,4 +1,4 @@
-//! Tasks: futures that live on hosts, whoever polls them.
+//! Tasks: futures that live on hosts, with any executor.
 
 mod join;
 
@@ -27,7 +27,7 @@ pub(crate) struct Task {
     program: RefCell<Option<Program>>,
     /// It was stopped while it was polled.
     is_doomed: Cell<bool>,
-    /// Whoever polls it last.
+    /// The waker of its last poll.
     waker: RefCell<Option<Waker>>,
 }
 
@@ -90,7 +90,7 @@ impl fmt::Display for Named<'_> {
     }
 }
 
-/// Who polls tasks.
+/// An executor.
 pub(crate) trait Spawner {
     /// Polls a task from now on, until it is over.
     fn start(&self, task: Rc<Task>);

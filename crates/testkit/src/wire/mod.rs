@@ -1,4 +1,4 @@
-//! The wire between the hosts of a run: one network, what is broken in it, what changes, and what is recorded of it.
+//! The wire between the hosts of a run: one network with its faults, its changes, and the record of its packets.
 //!
 //! Sockets ([`core`](crate::core)) and state machines ([`node`](crate::node)) hand packets in with [`Wire::offer`] and take those that arrive with
 //! [`Wire::poll`], until it gives `None`, after each packet and whenever time has passed.
@@ -17,7 +17,7 @@ use crate::file::LinkChange;
 use crate::seed::hash;
 use crate::trace::{Happening, Lost, PacketName};
 
-/// What can be said of a run before it begins.
+/// The settings of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Settings {
     /// How many bytes of datagrams a socket holds that have not been read.
@@ -112,7 +112,7 @@ impl<P: Parcel> Wire<P> {
         true
     }
 
-    /// Lets what is due on the links happen, and says whether anything was.
+    /// Lets the events happen that are due on the links, and says whether there were any.
     pub(crate) fn pass(&mut self) -> bool {
         let is_due = self.network.poll_timeout().is_some_and(|at| at <= self.now);
         if is_due {

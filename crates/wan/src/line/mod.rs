@@ -157,13 +157,13 @@ impl<P, T: Clone> Line<P, T> {
         matches!(self.pipeline, Pipeline::Engine(_))
     }
 
-    /// When the engine must be woken, for an owner who asks before every step.
+    /// When the engine must be woken, for an owner that asks before every step.
     #[inline]
     pub(crate) fn next_wake(&self) -> Option<Instant> {
         self.pipeline.next_wake()
     }
 
-    /// When the engine must be woken, if that was not said yet, for an owner who writes it down.
+    /// When the engine must be woken, if that was not said yet, for an owner that notes it.
     pub(crate) fn announce(&mut self) -> Option<Instant> {
         self.pipeline.engine()?.announce()
     }

@@ -1,4 +1,4 @@
-//! One link without what is on the way: what decides what becomes of a packet, compiled to the least that the link needs.
+//! The part of a line that decides what becomes of a packet, compiled to the least that the link needs.
 //!
 //! | link | compiled to |
 //! | --- | --- |

@@ -34,7 +34,7 @@ use crate::line::name::LinkName;
 use crate::line::pipeline::{Outcome, TimeWentBack, check_time};
 use crate::packet::{Marks, Outputs, PacketInfo};
 
-/// For so many receivers of a packet, random words are drawn in one go.
+/// Number of receivers of a packet for which random words are drawn at once.
 const DRAWN_AT_ONCE: u16 = 8;
 
 /// A network of N nodes as a state machine.
