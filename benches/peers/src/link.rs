@@ -203,7 +203,7 @@ fn cohaptic(config: &LinkConfig, packets: u64, mut look: impl FnMut(u64)) -> u64
         while let Some(event) = link.poll_event() {
             if matches!(event.fate, Fate::Delivered(_)) {
                 out += 1;
-                look(event.at.as_nanos() - event.sent.as_nanos());
+                look(event.at.as_nanos() - event.offered.as_nanos());
             }
         }
     }

@@ -5,6 +5,8 @@ use std::fmt;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
+use cohaptic_wan::NodeId;
+
 use crate::context;
 
 /// Which host has which name and which addresses.
@@ -15,7 +17,7 @@ use crate::context;
 pub struct AddressPlan {
     names: Vec<String>,
     current: Vec<Addresses>,
-    owners: BTreeMap<IpAddr, usize>,
+    owners: BTreeMap<IpAddr, NodeId>,
     /// The number of the next addresses that nobody has had.
     next: u32,
 }
@@ -55,17 +57,15 @@ impl Addresses {
 
 impl AddressPlan {
     pub(crate) fn new(names: Vec<String>) -> Self {
-        let count = u32::try_from(names.len()).unwrap_or(u32::MAX);
-        let mut plan = Self { names, current: Vec::new(), owners: BTreeMap::new(), next: 1 };
-        (0..count).for_each(|_| {
-            let host = plan.current.len();
-            let addresses = plan.fresh(host);
+        let mut plan = Self { current: Vec::with_capacity(names.len()), names, owners: BTreeMap::new(), next: 1 };
+        for host in 0..plan.names.len() {
+            let addresses = plan.fresh(NodeId::new(host));
             plan.current.push(addresses);
-        });
+        }
         plan
     }
 
-    fn fresh(&mut self, host: usize) -> Addresses {
+    fn fresh(&mut self, host: NodeId) -> Addresses {
         let addresses = Addresses::numbered(self.next);
         self.next += 1;
         self.owners.insert(addresses.v4.into(), host);
@@ -74,12 +74,12 @@ impl AddressPlan {
     }
 
     /// Gives a host addresses that nobody has had. Those that it had belong to nobody from now on.
-    pub(crate) fn change(&mut self, host: usize) -> Addresses {
-        let before = self.current[host];
+    pub(crate) fn change(&mut self, host: NodeId) -> Addresses {
+        let before = self.current[host.index()];
         self.owners.remove(&before.v4.into());
         self.owners.remove(&before.v6.into());
         let addresses = self.fresh(host);
-        self.current[host] = addresses;
+        self.current[host.index()] = addresses;
         addresses
     }
 
@@ -92,13 +92,13 @@ impl AddressPlan {
     /// The addresses of a host; `None` if there is none of that name.
     #[must_use]
     pub fn addresses(&self, name: &str) -> Option<Addresses> {
-        self.place(name).map(|place| self.current[place])
+        self.node(name).map(|host| self.of(host))
     }
 
     /// The name of the host that has this address now.
     #[must_use]
     pub fn owner(&self, address: IpAddr) -> Option<&str> {
-        self.owner_place(address).map(|place| &*self.names[place])
+        self.owner_node(address).map(|host| &*self.names[host.index()])
     }
 
     /// Whether any host has or had that address.
@@ -106,16 +106,16 @@ impl AddressPlan {
         (1..self.next).any(|number| Addresses::numbered(number).has(address))
     }
 
-    pub(crate) fn place(&self, name: &str) -> Option<usize> {
-        self.names.iter().position(|known| known == name)
+    pub(crate) fn node(&self, name: &str) -> Option<NodeId> {
+        self.names.iter().position(|known| known == name).map(NodeId::new)
     }
 
-    pub(crate) fn owner_place(&self, address: IpAddr) -> Option<usize> {
+    pub(crate) fn owner_node(&self, address: IpAddr) -> Option<NodeId> {
         self.owners.get(&address).copied()
     }
 
-    pub(crate) fn of(&self, place: usize) -> Addresses {
-        self.current[place]
+    pub(crate) fn of(&self, host: NodeId) -> Addresses {
+        self.current[host.index()]
     }
 }
 

@@ -5,12 +5,14 @@ use std::io;
 use std::rc::Rc;
 use std::sync::Arc;
 
+use cohaptic_wan::NodeId;
+
 use crate::core::Shared;
 use crate::task::Tasks;
 
 thread_local! {
     static RUNNING: RefCell<Option<Running>> = const { RefCell::new(None) };
-    static HOST: Cell<Option<usize>> = const { Cell::new(None) };
+    static HOST: Cell<Option<NodeId>> = const { Cell::new(None) };
 }
 
 /// A test bed that runs.
@@ -80,13 +82,13 @@ pub(crate) fn ask<T>(what: &str, question: impl FnOnce(&Arc<Shared>) -> T) -> T 
 }
 
 /// The host on which the task that is being polled lives.
-pub(crate) fn host() -> Option<usize> {
+pub(crate) fn host() -> Option<NodeId> {
     HOST.get()
 }
 
 /// Does something as a task of that host.
-pub(crate) fn on_host<T>(host: Option<usize>, act: impl FnOnce() -> T) -> T {
-    struct Back(Option<usize>);
+pub(crate) fn on_host<T>(host: Option<NodeId>, act: impl FnOnce() -> T) -> T {
+    struct Back(Option<NodeId>);
     impl Drop for Back {
         fn drop(&mut self) {
             HOST.set(self.0);

@@ -8,6 +8,8 @@ use std::panic::Location;
 use std::rc::Rc;
 use std::sync::Arc;
 
+use cohaptic_wan::NodeId;
+
 use crate::address::{Addresses, ToSocketAddrs};
 use crate::context;
 use crate::core::Shared;
@@ -18,24 +20,24 @@ use crate::task::JoinHandle;
 #[derive(Clone)]
 pub struct Host {
     shared: Arc<Shared>,
-    place: usize,
+    node: NodeId,
 }
 
 impl Host {
-    pub(crate) const fn new(shared: Arc<Shared>, place: usize) -> Self {
-        Self { shared, place }
+    pub(crate) const fn new(shared: Arc<Shared>, node: NodeId) -> Self {
+        Self { shared, node }
     }
 
     /// Its name.
     #[must_use]
     pub fn name(&self) -> String {
-        self.shared.lock().plan.names()[self.place].clone()
+        self.shared.lock().plan.names()[self.node.index()].clone()
     }
 
     /// The addresses that it has now.
     #[must_use]
     pub fn addresses(&self) -> Addresses {
-        self.shared.lock().plan.of(self.place)
+        self.shared.lock().plan.of(self.node)
     }
 
     /// Its address of version 4.
@@ -45,8 +47,8 @@ impl Host {
     }
 
     #[cfg(feature = "quinn")]
-    pub(crate) const fn place(&self) -> usize {
-        self.place
+    pub(crate) const fn node(&self) -> NodeId {
+        self.node
     }
 
     #[cfg(feature = "quinn")]
@@ -67,7 +69,7 @@ impl Host {
     {
         let running = context::expect_running("tasks can be spawned");
         self.expect_up("spawn a task");
-        running.tasks.spawn(Some(self.place), Location::caller(), future)
+        running.tasks.spawn(Some(self.node), Location::caller(), future)
     }
 
     /// Starts a program on this host, and keeps it: [`Host::restart`] starts it anew.
@@ -82,7 +84,7 @@ impl Host {
     {
         let running = context::expect_running("programs can be started");
         self.expect_up("start a program");
-        running.tasks.set_program(self.place, Location::caller(), Rc::new(move || Box::pin(program())));
+        running.tasks.set_program(self.node, Location::caller(), Rc::new(move || Box::pin(program())));
     }
 
     /// Binds a socket on this host.
@@ -91,10 +93,10 @@ impl Host {
     ///
     /// As [`UdpSocket::bind`]; [`io::ErrorKind::NetworkDown`] if the host is down.
     pub fn bind(&self, address: impl ToSocketAddrs) -> io::Result<UdpSocket> {
-        UdpSocket::bind_on(Arc::clone(&self.shared), self.place, address)
+        UdpSocket::bind_on(Arc::clone(&self.shared), self.node, address)
     }
 
-    /// The host is gone, at once: its tasks are dropped where they wait, its sockets closed. What it has sent is on its way still, and what is sent to it is
+    /// The host is gone, at once: its tasks are dropped where they wait, its sockets closed. Packets that it has sent are on their way still, those sent to it are
     /// lost. Tasks that were not spawned by [`Host::spawn`] or [`Host::start`] (by `tokio::spawn`, say) go on, and their sockets give errors.
     ///
     /// # Panics
@@ -103,8 +105,8 @@ impl Host {
     pub fn crash(&self) {
         let running = context::expect_running("hosts crash");
         // First the sockets: what the tasks do while they are dropped does not reach anybody.
-        self.shared.lock().crash(self.place);
-        running.tasks.stop_all_of(self.place);
+        self.shared.lock().crash(self.node);
+        running.tasks.stop_all_of(self.node);
     }
 
     /// The host is back, with the program of [`Host::start`] begun anew if it has one. Nothing happens to a host that is up.
@@ -116,25 +118,25 @@ impl Host {
         let running = context::expect_running("hosts restart");
         let was_down = {
             let mut core = self.shared.lock();
-            let was_down = !core.is_up(self.place);
-            core.restart(self.place);
+            let was_down = !core.is_up(self.node);
+            core.restart(self.node);
             was_down
         };
         if was_down {
-            running.tasks.restart(self.place);
+            running.tasks.restart(self.node);
         }
     }
 
     /// Whether it is up.
     #[must_use]
     pub fn is_up(&self) -> bool {
-        self.shared.lock().is_up(self.place)
+        self.shared.lock().is_up(self.node)
     }
 
-    /// Gives the host addresses that nobody has had, as a phone gets that leaves the house. Those before belong to nobody: what is sent to them, or is on its way, is
+    /// Gives the host addresses that nobody has had, as a phone gets that leaves the house. Those before belong to nobody: packets to them, also those on their way, are
     /// lost. Sockets bound to `0.0.0.0` or `[::]` go on with the new ones, others cannot send any more.
     pub fn change_addresses(&self) -> Addresses {
-        self.shared.lock().change_addresses(self.place)
+        self.shared.lock().change_addresses(self.node)
     }
 
     #[expect(clippy::panic, reason = "a misuse, and the way out")]

@@ -79,6 +79,7 @@ pub mod strategies;
 mod task;
 pub mod time;
 mod trace;
+mod wire;
 mod words;
 
 pub use address::{AddressPlan, Addresses, ToSocketAddrs};

@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{FateLog, FateLogError, NodeId, PacketRecord, Path};
+use cohaptic_wan::{FateLog, FateLogError, PacketRecord, Path};
 
-use crate::bed::place;
-use crate::core::Seen;
+use crate::bed::path;
 use crate::seed::Seed;
 use crate::trace::Trace;
+use crate::wire::Seen;
 
 /// What was recorded of a run: all that happened, and what became of every packet on its link.
 ///
@@ -50,8 +50,7 @@ impl Record {
     /// If there is no such host.
     #[must_use]
     pub fn fates(&self, from: &str, to: &str) -> FateLog {
-        let [from, to] = [from, to].map(|host| NodeId::new(place(self.trace.hosts(), host)));
-        self.fates_of(Path { from, to })
+        self.fates_of(path(self.trace.hosts(), from, to))
     }
 
     /// Every path with a packet on its link.

@@ -9,6 +9,8 @@ use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
+use cohaptic_wan::NodeId;
+
 use crate::address::ToSocketAddrs;
 use crate::context;
 use crate::core::{Shared, SocketId};
@@ -23,7 +25,7 @@ use crate::core::{Shared, SocketId};
 /// - A datagram that finds the buffer of the socket full is lost: see [`Testbed::receive_buffer`](crate::Testbed::receive_buffer). One that is longer than the
 ///   buffer given to receive it is cut off, as with Linux.
 /// - If no socket is at the port of the peer, a connected socket gets [`io::ErrorKind::ConnectionRefused`], once the answer has come back over the
-///   link: by what is called next, or by what waits to receive.
+///   link: by the next call, or by the call that waits to receive.
 /// - A socket at `[::]` hears IPv6 only.
 /// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out.
 pub struct UdpSocket {
@@ -49,11 +51,11 @@ impl UdpSocket {
         Self::bind_on(shared, host, address)
     }
 
-    pub(crate) fn bind_on(shared: Arc<Shared>, host: usize, address: impl ToSocketAddrs) -> io::Result<Self> {
+    pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {
         let address = address.to_socket_addr()?;
         let mut core = shared.lock();
         if !core.is_up(host) {
-            let text = format!("host `{}` is down; `Host::restart` brings it back", core.plan.names()[host]);
+            let text = format!("host `{}` is down; `Host::restart` brings it back", core.plan.names()[host.index()]);
             return Err(io::Error::new(io::ErrorKind::NetworkDown, text));
         }
         let id = core.bind(host, address)?;

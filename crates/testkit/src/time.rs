@@ -23,7 +23,7 @@ pub fn now() -> Instant {
     context::ask("time is known", |shared| {
         let mut core = shared.lock();
         core.note_call();
-        core.now
+        core.now()
     })
 }
 
@@ -35,7 +35,7 @@ pub fn now() -> Instant {
 #[must_use = "futures do nothing unless they are awaited"]
 pub fn sleep(span: Duration) -> Sleep {
     let shared = context::ask("time passes", Arc::clone);
-    let deadline = shared.lock().now.saturating_add(span);
+    let deadline = shared.lock().now().saturating_add(span);
     Sleep { shared, deadline, timer: None }
 }
 
@@ -89,7 +89,7 @@ impl Future for Sleep {
     fn poll(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<()> {
         let this = &mut *self;
         let mut core = this.shared.lock();
-        if core.now >= this.deadline {
+        if core.now() >= this.deadline {
             match this.timer.take() {
                 Some(timer) => core.timers.cancel(timer),
                 // It has not waited.
@@ -153,7 +153,7 @@ pub async fn timeout<F: Future>(span: Duration, future: F) -> Result<F::Output, 
 pub fn interval(period: Duration) -> Interval {
     assert!(!period.is_zero(), "an interval of no time would never let time pass; expected one longer than zero");
     let shared = context::ask("time passes", Arc::clone);
-    let next = shared.lock().now;
+    let next = shared.lock().now();
     Interval { shared, next, period }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::DropCause;
+use cohaptic_wan::{DropCause, NodeId, Path};
 
 /// What happened, and when.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -15,7 +15,7 @@ pub struct TraceEvent {
     pub what: Happening,
 }
 
-/// What can happen in a test bed. Hosts are counted from 0.
+/// What can happen in a test bed. A host is named by its place among those of the run.
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Happening {
@@ -46,17 +46,17 @@ pub enum Happening {
         packet: PacketName,
     },
     /// A host crashed.
-    Crashed(usize),
+    Crashed(NodeId),
     /// A host was restarted.
-    Restarted(usize),
+    Restarted(NodeId),
     /// A host has new addresses.
-    Readdressed(usize),
+    Readdressed(NodeId),
     /// The way from one host to another was cut.
-    Cut(usize, usize),
+    Cut(Path),
     /// It was mended.
-    Mended(usize, usize),
+    Mended(Path),
     /// The link from one host to another became another one.
-    Relinked(usize, usize),
+    Relinked(Path),
     /// What the program noted: see [`Bed::note`](crate::Bed::note).
     Note(String),
 }
@@ -64,11 +64,9 @@ pub enum Happening {
 /// The name of a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct PacketName {
-    /// The host that sent it.
-    pub from: usize,
-    /// The host to which it was sent.
-    pub to: usize,
-    /// The how many-th of those between the two, from 0.
+    /// From which host to which.
+    pub path: Path,
+    /// Its number on this path, from 0.
     pub sequence: u64,
     /// Which copy of it; 0 is the packet itself.
     pub copy: u8,
@@ -189,12 +187,17 @@ struct Words<'a> {
 }
 
 impl Words<'_> {
-    fn name(&self, host: usize) -> &str {
-        self.hosts.get(host).map_or("?", |name| name)
+    fn name(&self, host: NodeId) -> &str {
+        self.hosts.get(host.index()).map_or("?", |name| name)
+    }
+
+    fn path(&self, f: &mut fmt::Formatter<'_>, path: Path) -> fmt::Result {
+        write!(f, "{} -> {}", self.name(path.from), self.name(path.to))
     }
 
     fn packet(&self, f: &mut fmt::Formatter<'_>, packet: PacketName) -> fmt::Result {
-        write!(f, "{} -> {}  packet {}", self.name(packet.from), self.name(packet.to), packet.sequence)?;
+        self.path(f, packet.path)?;
+        write!(f, "  packet {}", packet.sequence)?;
         if packet.copy == 0 { Ok(()) } else { write!(f, " (copy {})", packet.copy) }
     }
 }
@@ -223,9 +226,18 @@ impl fmt::Display for Words<'_> {
             Happening::Crashed(host) => write!(f, "{} crashed", self.name(*host)),
             Happening::Restarted(host) => write!(f, "{} restarted", self.name(*host)),
             Happening::Readdressed(host) => write!(f, "{} has new addresses", self.name(*host)),
-            Happening::Cut(from, to) => write!(f, "{} -> {} cut", self.name(*from), self.name(*to)),
-            Happening::Mended(from, to) => write!(f, "{} -> {} mended", self.name(*from), self.name(*to)),
-            Happening::Relinked(from, to) => write!(f, "{} -> {} is another link", self.name(*from), self.name(*to)),
+            Happening::Cut(path) => {
+                self.path(f, *path)?;
+                f.write_str(" cut")
+            }
+            Happening::Mended(path) => {
+                self.path(f, *path)?;
+                f.write_str(" mended")
+            }
+            Happening::Relinked(path) => {
+                self.path(f, *path)?;
+                f.write_str(" is another link")
+            }
             Happening::Note(note) => write!(f, "note: {note}"),
         }
     }
@@ -236,7 +248,7 @@ mod tests {
     use super::*;
 
     fn sent(at: u64, sequence: u64) -> TraceEvent {
-        let packet = PacketName { from: 0, to: 1, sequence, copy: 0 };
+        let packet = PacketName { path: Path { from: NodeId(0), to: NodeId(1) }, sequence, copy: 0 };
         TraceEvent { at: Instant::from_nanos(at), what: Happening::Sent { packet, len: 3, digest: 7 } }
     }
 

@@ -1,4 +1,4 @@
-//! Links in plain words: hosts and what is between them, a line each.
+//! Links in plain words: hosts and the links between them, a line each.
 //!
 //! ```text
 //! # Lines that begin with # say nothing.
@@ -11,7 +11,7 @@
 //! ```
 //!
 //! After the colon stand words of `tc-netem`, done exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log. `all` is every link that
-//! no other line names, wherever it stands; without it they are ideal. `hosts` says who takes part and in which order; without it those do whom lines name, in
+//! no other line names, wherever it stands; without it they are ideal. `hosts` names the hosts and their order; without it they are those that lines name, in
 //! the order of the lines. Names are parted from the arrow by blanks.
 
 use std::collections::BTreeMap;
@@ -103,7 +103,7 @@ fn locate(number: usize, line: &str, (span, message): Fault) -> WordsError {
 #[derive(Debug, Default)]
 struct Reader {
     hosts: Vec<String>,
-    /// Whether a line has said who takes part.
+    /// Whether a line has named the hosts.
     is_closed: bool,
     every: Option<LinkModel>,
     links: BTreeMap<(usize, usize), LinkModel>,

@@ -53,7 +53,7 @@ pub struct EventQueue<E> {
     ring: Vec<Vec<Packed>>,
     /// A bit for each bucket that is not empty.
     occupied: [u64; RING / 64],
-    /// Memory of emptied buckets, to be used again: what is touched is what is pending, not the whole ring.
+    /// Memory of emptied buckets, to be used again: so the queue touches memory in proportion to its events, not to the ring.
     spare: Vec<Vec<Packed>>,
     far: BinaryHeap<Reverse<Entry>>,
     len: usize,
@@ -73,7 +73,7 @@ type Packed = u64;
 const RING: usize = 8192;
 const WIDTHS: core::ops::RangeInclusive<u32> = 14..=22;
 const FIRST_WIDTH: u32 = 17;
-/// After so many buckets the width is looked at; it is right if they held between these numbers of events on the average.
+/// Number of buckets after which the width is checked; it is right if they held between these numbers of events on the average.
 const LOOK_EVERY: u32 = 1024;
 const RIGHT_FILL: core::ops::RangeInclusive<u64> = 4..=16;
 
@@ -360,7 +360,7 @@ fn sort<'a>(words: &'a mut [Packed], few: &'a mut [Packed; FEW]) -> &'a mut [Pac
     &mut few[..words.len()]
 }
 
-/// So many words are sorted by counting.
+/// Largest number of words that is sorted by counting.
 const FEW: usize = 24;
 
 /// Events in places of their own, which are used again.

@@ -1,4 +1,4 @@
-//! One link and what is on the way through it.
+//! One link and the packets on the way through it.
 
 use alloc::boxed::Box;
 use alloc::collections::VecDeque;
@@ -77,12 +77,13 @@ impl<P: Clone> Link<P> {
         }
         let info = info.into();
         let sequence = self.line.offered();
-        if self.line.filters(&Offered { sequence, now, info, payload: &payload }) {
-            self.drop(now, DropCause::Filter, InLink { sequence, offered: now, size: info.size, payload });
+        let is_filtered = self.line.has_filter() && self.line.filters(&Offered { sequence, now, info, payload: &payload });
+        let packet = InLink { sequence, offered: now, size: info.size, payload };
+        if is_filtered {
+            self.drop(now, DropCause::Filter, packet);
             return Ok(());
         }
-        let packet = InLink { sequence, offered: now, size: info.size, payload };
-        match self.line.offer(now, self.line.words()) {
+        match self.line.offer(now, None) {
             Outcome::Arrives(at) => self.traffic.pending.push(Pending { at, packet, copy: 0, marks: None }),
             Outcome::Dropped(cause) => self.drop(now, cause, packet),
             Outcome::Enters => self.line.enter(now, info, Marks::default(), packet, &mut self.outputs, &mut self.traffic),
@@ -118,8 +119,8 @@ impl<P: Clone> Link<P> {
             return Some(event);
         }
         // Without an engine arrivals wait here: nothing that comes meanwhile depends on them.
-        let pending = self.traffic.pending.pop_due(self.now)?;
-        Some(self.arrive(pending))
+        let Pending { at, packet, copy, marks } = self.traffic.pending.pop_due(self.now)?;
+        Some(self.arrive(at, packet, copy, marks))
     }
 
     /// Changes the model from `now` on. Packets that propagate keep their delay; one that is being serialised keeps the bits already sent; those that wait
@@ -151,18 +152,17 @@ impl<P: Clone> Link<P> {
                 self.line.wake(wake, &mut self.outputs, &mut self.traffic);
                 continue;
             }
-            let Some(pending) = self.traffic.pending.pop_due(now) else { return };
-            let event = self.arrive(pending);
+            let Some(Pending { at, packet, copy, marks }) = self.traffic.pending.pop_due(now) else { return };
+            let event = self.arrive(at, packet, copy, marks);
             self.traffic.happened.push_back(event);
         }
     }
 
     #[inline(always)]
-    fn arrive(&mut self, pending: Pending<P>) -> PacketEvent<P> {
-        let Pending { at, packet, copy, marks } = pending;
+    fn arrive(&mut self, at: Instant, packet: InLink<P>, copy: u8, marks: Option<Box<Marks>>) -> PacketEvent<P> {
         let marks = marks.map_or_else(Marks::default, |marks| *marks);
         if marks.discarded_on_arrival {
-            self.line.discard();
+            self.line.drop(DropCause::Checksum);
             return packet.event(at, Fate::Dropped(DropCause::Checksum), copy, marks);
         }
         self.line.deliver(packet.offered, at);
@@ -170,7 +170,9 @@ impl<P: Clone> Link<P> {
     }
 
     /// The packet was dropped when it was offered.
+    #[inline(never)]
     fn drop(&mut self, now: Instant, cause: DropCause, packet: InLink<P>) {
+        self.line.drop(cause);
         if !self.line.has_engine() {
             // Arrivals that wait to be polled came before this drop.
             self.let_happen(now);

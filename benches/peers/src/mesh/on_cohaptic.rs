@@ -112,9 +112,9 @@ mod tests {
         }
 
         fn on_packet(&mut self, row: &PacketRow) -> Result<(), Infallible> {
-            let drawn = Draws::new(self.0, row.from, row.to).delay(row.sequence);
+            let drawn = Draws::new(self.0, row.path.from.index(), row.path.to.index()).delay(row.sequence);
             let delivered = matches!(row.fate, cohaptic_wan::Fate::Delivered(_));
-            assert_eq!(delivered.then(|| row.at.as_nanos() - row.sent.as_nanos()), drawn, "{row:?}");
+            assert_eq!(delivered.then(|| row.at.as_nanos() - row.offered.as_nanos()), drawn, "{row:?}");
             self.1 += 1;
             Ok(())
         }

@@ -8,7 +8,7 @@ use cohaptic_wan::{DropCause, Fate, Path};
 use super::folder::{MARK, MARKED};
 use crate::record::Record;
 
-/// The files of a record: their names, and what is in them.
+/// The files of a record: their names and contents.
 pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
     let mut files = Vec::new();
     let mut links = String::new();

@@ -13,13 +13,13 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::LinkModel;
+use cohaptic_wan::{LinkModel, NodeId, Path};
 
 pub use running::Bed;
 
 use crate::artefacts::Artefacts;
 use crate::context::Running;
-use crate::core::{Clock, Core, Seen, Settings, Shared};
+use crate::core::{Clock, Core, Shared};
 use crate::file::{LinkChange, LinkFile};
 use crate::link::ToLink;
 use crate::record::Record;
@@ -27,6 +27,7 @@ use crate::runtime::own::Executor;
 use crate::seed::Seed;
 use crate::task::Tasks;
 use crate::trace::Trace;
+use crate::wire::{Recorded, Settings};
 
 /// Hosts, the links between them, and a program that is run on them in virtual time.
 ///
@@ -53,7 +54,7 @@ use crate::trace::Trace;
 pub struct Testbed {
     names: Vec<String>,
     every: LinkModel,
-    links: BTreeMap<(usize, usize), LinkModel>,
+    links: BTreeMap<Path, LinkModel>,
     changes: Vec<LinkChange>,
     seed: Option<u64>,
     settings: Settings,
@@ -130,9 +131,9 @@ impl Testbed {
     ///
     /// If there is no such host, both are the same, or the words are none.
     pub fn link(mut self, from: &str, to: &str, link: impl ToLink) -> Self {
-        let pair = (self.place(from), self.place(to));
-        assert!(pair.0 != pair.1, "host `{from}` has no link to itself");
-        self.links.insert(pair, link.to_link());
+        let path = path(&self.names, from, to);
+        assert!(path.from != path.to, "host `{from}` has no link to itself");
+        self.links.insert(path, link.to_link());
         self
     }
 
@@ -255,10 +256,6 @@ impl Testbed {
         outcome
     }
 
-    fn place(&self, name: &str) -> usize {
-        place(&self.names, name)
-    }
-
     fn run_once<T, F>(self, seed: &Seed, program: impl FnOnce(Bed) -> F, origin: &'static Location<'static>) -> (T, Record)
     where
         F: Future<Output = T> + 'static,
@@ -269,8 +266,8 @@ impl Testbed {
         settings.keeps_packets |= artefacts.is_wanted();
         settings.traces |= artefacts.is_wanted();
         let (every, links) = (&self.every, &self.links);
-        let mut core = Core::new(&self.names, seed.value, settings, |from, to| links.get(&(from, to)).unwrap_or(every).clone());
-        core.changes = self.changes.iter().cloned().collect();
+        let link = |from, to| links.get(&Path { from, to }).unwrap_or(every).clone();
+        let core = Core::new(&self.names, seed.value, settings, self.changes.clone(), link);
         let mut recorded = None;
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             #[cfg(feature = "tokio")]
@@ -295,6 +292,7 @@ impl From<LinkFile> for Testbed {
     fn from(file: LinkFile) -> Self {
         let LinkFile { hosts, every, links, changes, seed } = file;
         let bed = Self::new(hosts);
+        let links = links.into_iter().map(|((from, to), link)| (Path { from: NodeId::new(from), to: NodeId::new(to) }, link)).collect();
         Self { every, links, changes, seed, ..bed }
     }
 }
@@ -323,30 +321,38 @@ pub(crate) fn name_fault(name: &str) -> Option<String> {
 ///
 /// If there is none.
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
-pub(crate) fn place(names: &[String], name: &str) -> usize {
-    names.iter().position(|known| known == name).unwrap_or_else(|| panic!("there is no host `{name}`; the hosts are {}", names.join(", ")))
+pub(crate) fn node(names: &[String], name: &str) -> NodeId {
+    let index = names.iter().position(|known| known == name);
+    NodeId::new(index.unwrap_or_else(|| panic!("there is no host `{name}`; the hosts are {}", names.join(", "))))
 }
 
-/// What was recorded of a run.
-pub(crate) type Recorded = Option<(Trace, Vec<Seen>, Instant)>;
+/// The path from one host to another.
+///
+/// # Panics
+///
+/// If there is no such host.
+pub(crate) fn path(names: &[String], from: &str, to: &str) -> Path {
+    let [from, to] = [from, to].map(|name| node(names, name));
+    Path { from, to }
+}
 
 /// Takes what was recorded out of a run that ends, however it ends.
 pub(crate) struct Recorder<'a> {
     pub(crate) shared: Arc<Shared>,
     pub(crate) tasks: Rc<Tasks>,
-    pub(crate) recorded: &'a mut Recorded,
+    pub(crate) recorded: &'a mut Option<Recorded>,
 }
 
 impl Drop for Recorder<'_> {
     fn drop(&mut self) {
-        *self.recorded = Some(self.shared.lock().take_recording());
+        *self.recorded = Some(self.shared.lock().wire.recorded());
         // Tasks hold the state, and the state their wakers.
         self.tasks.stop_all();
     }
 }
 
 /// Runs a program on the executor of this crate.
-fn on_own<T, F>(core: Core, hosts: usize, program: impl FnOnce(Bed) -> F, origin: &'static Location<'static>, recorded: &mut Recorded) -> T
+fn on_own<T, F>(core: Core, hosts: usize, program: impl FnOnce(Bed) -> F, origin: &'static Location<'static>, recorded: &mut Option<Recorded>) -> T
 where
     F: Future<Output = T> + 'static,
     T: 'static,

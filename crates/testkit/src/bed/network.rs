@@ -1,6 +1,6 @@
 //! Test beds with the networks that strategies draw.
 
-use cohaptic_wan::LinkModel;
+use cohaptic_wan::{LinkModel, Path};
 
 use super::Testbed;
 use crate::link::ToLink;
@@ -15,7 +15,7 @@ impl Testbed {
     pub fn network(mut self, network: &ImpairedNetwork) -> Self {
         let hosts = self.names.len();
         assert!(network.hosts() == hosts, "a network of {} hosts for a test bed of {hosts}: expected as many", network.hosts());
-        self.links.extend(network.links().map(|(from, to, link)| ((from.index(), to.index()), link.model())));
+        self.links.extend(network.links().map(|(from, to, link)| (Path { from, to }, link.model())));
         self
     }
 }

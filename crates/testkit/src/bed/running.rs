@@ -7,9 +7,9 @@ use std::panic::Location;
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::LinkStats;
+use cohaptic_wan::{LinkStats, NodeId};
 
-use super::place;
+use super::{node, path};
 use crate::address::AddressPlan;
 use crate::context;
 use crate::core::Shared;
@@ -36,14 +36,14 @@ impl Bed {
     /// If there is none of that name.
     #[must_use]
     pub fn host(&self, name: &str) -> Host {
-        Host::new(Arc::clone(&self.shared), self.place(name))
+        Host::new(Arc::clone(&self.shared), node(&self.names(), name))
     }
 
     /// All hosts, in the order in which they were named.
     #[must_use]
     pub fn hosts(&self) -> Vec<Host> {
         let count = self.shared.lock().plan.names().len();
-        (0..count).map(|place| Host::new(Arc::clone(&self.shared), place)).collect()
+        (0..count).map(|host| Host::new(Arc::clone(&self.shared), NodeId::new(host))).collect()
     }
 
     /// Which host has which addresses now.
@@ -67,7 +67,7 @@ impl Bed {
     pub fn now(&self) -> Instant {
         let mut core = self.shared.lock();
         core.note_call();
-        core.now
+        core.now()
     }
 
     /// Starts a task that lives on no host: it survives all crashes, and binds sockets by [`Host::bind`].
@@ -84,7 +84,7 @@ impl Bed {
         context::expect_running("tasks can be spawned").tasks.spawn(None, Location::caller(), future)
     }
 
-    /// Cuts the way from one host to another: what is sent from now on is lost, and what would arrive. The way back is as before.
+    /// Cuts the way from one host to another: packets that are sent or would arrive from now on are lost. The way back is as before.
     ///
     /// # Panics
     ///
@@ -116,9 +116,7 @@ impl Bed {
 
     /// Mends all ways.
     pub fn mend_all(&self) {
-        let mut core = self.shared.lock();
-        let count = core.plan.names().len();
-        (0..count).flat_map(|from| (0..count).map(move |to| (from, to))).for_each(|(from, to)| core.set_cut(from, to, false));
+        self.shared.lock().wire.mend_all();
     }
 
     /// The link from one host to another is another one from now on. What is in it follows the rules of [`cohaptic_wan::Link::set_model`].
@@ -127,9 +125,9 @@ impl Bed {
     ///
     /// If there is no such host, both are the same, or the words are none.
     pub fn set_link(&self, from: &str, to: &str, link: impl ToLink) {
-        let (from_place, to_place) = (self.place(from), self.place(to));
-        assert!(from_place != to_place, "host `{from}` has no link to itself");
-        self.shared.lock().set_link(from_place, to_place, link.to_link());
+        let path = path(&self.names(), from, to);
+        assert!(path.from != path.to, "host `{from}` has no link to itself");
+        self.shared.lock().set_link(path, link.to_link());
     }
 
     /// What the link from one host to another has done so far.
@@ -139,32 +137,30 @@ impl Bed {
     /// If there is no such link.
     #[must_use]
     pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
-        let (from_place, to_place) = (self.place(from), self.place(to));
-        self.shared.lock().link_stats(from_place, to_place).unwrap_or_else(|| unreachable_link(from))
+        let path = path(&self.names(), from, to);
+        self.shared.lock().wire.link_stats(path).unwrap_or_else(|| unreachable_link(from))
     }
 
     /// Notes something in the trace: what a program computes, say, so that two runs are compared by it too.
     pub fn note(&self, text: impl fmt::Display) {
-        let mut core = self.shared.lock();
-        let now = core.now;
-        core.recording.note(now, Happening::Note(text.to_string()));
+        let text = text.to_string();
+        self.shared.lock().wire.note(Happening::Note(text));
     }
 
     /// What has happened so far, if it is recorded: in [`Testbed::run_twice`](crate::Testbed::run_twice) and with [`Testbed::traced`](crate::Testbed::traced).
     #[must_use]
     pub fn trace(&self) -> Trace {
-        self.shared.lock().recording.trace().clone()
+        self.shared.lock().wire.recording().trace().clone()
     }
 
     fn set_cut(&self, from: &str, to: &str, cut: bool) {
-        let (from, to) = (self.place(from), self.place(to));
-        self.shared.lock().set_cut(from, to, cut);
+        let path = path(&self.names(), from, to);
+        self.shared.lock().wire.set_cut(path, cut);
     }
 
-    fn place(&self, name: &str) -> usize {
-        // Not while the state is held: what panics says the names.
-        let names = self.shared.lock().plan.names().to_vec();
-        place(&names, name)
+    /// The names of the hosts: copied, so that the state is not held while a panic says them.
+    fn names(&self) -> Vec<String> {
+        self.shared.lock().plan.names().to_vec()
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use cohaptic_wan::NodeId;
+
 use super::{Core, SocketId};
 use crate::address::Addresses;
 use crate::trace::Happening;
@@ -17,33 +19,33 @@ pub(super) struct HostState {
 }
 
 impl Core {
-    pub(crate) fn is_up(&self, host: usize) -> bool {
-        !self.hosts[host].is_down
+    pub(crate) fn is_up(&self, host: NodeId) -> bool {
+        !self.hosts[host.index()].is_down
     }
 
     /// The host is gone with all its sockets. What it has sent is on its way still.
-    pub(crate) fn crash(&mut self, host: usize) {
-        let state = &mut self.hosts[host];
+    pub(crate) fn crash(&mut self, host: NodeId) {
+        let state = &mut self.hosts[host.index()];
         if std::mem::replace(&mut state.is_down, true) {
             return;
         }
         state.ports.clear();
-        let now = self.now;
+        let now = self.now();
         for socket in self.sockets.all_of(host) {
             socket.die(now, &mut self.woken);
         }
-        self.recording.note(now, Happening::Crashed(host));
+        self.wire.note(Happening::Crashed(host));
     }
 
-    pub(crate) fn restart(&mut self, host: usize) {
-        if std::mem::replace(&mut self.hosts[host].is_down, false) {
-            self.recording.note(self.now, Happening::Restarted(host));
+    pub(crate) fn restart(&mut self, host: NodeId) {
+        if std::mem::replace(&mut self.hosts[host.index()].is_down, false) {
+            self.wire.note(Happening::Restarted(host));
         }
     }
 
     /// The host has other addresses from now on.
-    pub(crate) fn change_addresses(&mut self, host: usize) -> Addresses {
-        self.recording.note(self.now, Happening::Readdressed(host));
+    pub(crate) fn change_addresses(&mut self, host: NodeId) -> Addresses {
+        self.wire.note(Happening::Readdressed(host));
         self.plan.change(host)
     }
 }

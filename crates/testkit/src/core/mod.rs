@@ -4,68 +4,42 @@ mod arrival;
 #[cfg(feature = "quinn")]
 mod entropy;
 mod hosts;
-mod recording;
 mod sending;
 mod sockets;
 mod timers;
 
-use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 
 use bytes::Bytes;
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::{LinkModel, Network, NetworkConfig, NodeId};
+use cohaptic_wan::{LinkModel, NodeId, Path};
 
-pub(crate) use recording::{Recording, Seen, follow_to_the_end, seen};
 pub(crate) use sending::Outgoing;
 pub(crate) use sockets::{Datagram, SocketId};
 pub(crate) use timers::TimerId;
 
 use crate::address::AddressPlan;
 use crate::file::LinkChange;
-use crate::trace::{Happening, Trace};
+use crate::wire::{Settings, Wire};
 use hosts::HostState;
 use sockets::Sockets;
 use timers::Timers;
 
-/// What can be said of a test bed before it runs.
-#[derive(Clone, Debug)]
-pub(crate) struct Settings {
-    /// How many bytes of datagrams a socket holds that have not been read.
-    pub(crate) receive_buffer: usize,
-    /// Whether what happens is recorded.
-    pub(crate) traces: bool,
-    /// Whether what packets carry is part of that.
-    pub(crate) digests: bool,
-    /// Whether packets are recorded, with what they carry.
-    pub(crate) keeps_packets: bool,
-    /// How often tasks may be polled, or the time asked, at one instant.
-    pub(crate) patience: u64,
-}
-
 pub(crate) struct Core {
-    pub(crate) now: Instant,
     pub(crate) plan: AddressPlan,
     pub(crate) settings: Settings,
-    pub(crate) recording: Recording,
+    pub(crate) wire: Wire<Parcel>,
     pub(crate) timers: Timers,
-    /// Links that become other ones, in order of time.
-    pub(crate) changes: VecDeque<LinkChange>,
     #[cfg(feature = "quinn")]
     pub(crate) entropy: entropy::Entropy,
-    network: Network<Parcel>,
     hosts: Vec<HostState>,
     sockets: Sockets,
-    /// By sender, then receiver: whether the way is cut.
-    cut: Vec<bool>,
-    /// By sender, then receiver: how many packets were offered.
-    offered: Vec<u64>,
-    /// Who is to be woken when nobody holds this any more.
+    /// To be woken when the state is not held any more.
     pub(crate) woken: Vec<Waker>,
-    /// How often the program asked for what takes no time since it last passed.
-    asked: u64,
+    /// How often the program has called without waiting since time last passed.
+    calls: u64,
     /// How often tasks were polled since it last passed, as far as they are counted here.
     #[cfg(feature = "tokio")]
     polled: u64,
@@ -90,25 +64,35 @@ enum Kind {
     Unreachable,
 }
 
+impl crate::wire::Parcel for Parcel {
+    fn bytes(&self) -> &Bytes {
+        &self.bytes
+    }
+
+    fn bytes_mut(&mut self) -> &mut Bytes {
+        &mut self.bytes
+    }
+}
+
 impl Core {
-    pub(crate) fn new(names: &[String], seed: u64, settings: Settings, link: impl Fn(usize, usize) -> LinkModel) -> Self {
-        let config = NetworkConfig { seed, nodes: names.to_vec(), general: false };
+    pub(crate) fn new(
+        names: &[String],
+        seed: u64,
+        settings: Settings,
+        changes: Vec<LinkChange>,
+        link: impl FnMut(NodeId, NodeId) -> LinkModel,
+    ) -> Self {
         Self {
-            now: Instant::ZERO,
             plan: AddressPlan::new(names.to_vec()),
-            recording: Recording::new(names.to_vec(), &settings),
+            wire: Wire::new(names, seed, &settings, changes, link),
             settings,
             timers: Timers::default(),
-            changes: VecDeque::new(),
             #[cfg(feature = "quinn")]
             entropy: entropy::Entropy::new(seed),
-            network: Network::new(config, |from, to| link(from.index(), to.index())),
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),
-            cut: vec![false; names.len() * names.len()],
-            offered: vec![0; names.len() * names.len()],
             woken: Vec::new(),
-            asked: 0,
+            calls: 0,
             #[cfg(feature = "tokio")]
             polled: 0,
         }
@@ -116,31 +100,30 @@ impl Core {
 
     /// When the network or a timer wants to be woken.
     pub(crate) fn next_event(&self) -> Option<Instant> {
-        let change = self.changes.front().map(|change| change.at);
-        [self.network.poll_timeout(), self.timers.next(), change].into_iter().flatten().min()
+        [self.wire.next(), self.timers.next()].into_iter().flatten().min()
+    }
+
+    #[inline]
+    pub(crate) const fn now(&self) -> Instant {
+        self.wire.now()
     }
 
     /// Lets time pass: what arrives until then arrives, and then timers go off.
     pub(crate) fn pass(&mut self, now: Instant) {
-        if now > self.now {
-            self.now = now;
-            self.asked = 0;
+        if self.wire.set_now(now) {
+            self.calls = 0;
             #[cfg(feature = "tokio")]
             {
                 self.polled = 0;
             }
         }
-        while self.changes.front().is_some_and(|change| change.at <= now) {
-            if let Some(change) = self.changes.pop_front() {
-                self.change_link(change);
-            }
-        }
-        if self.network.poll_timeout().is_some_and(|at| at <= self.now) {
-            let passed = self.network.handle_timeout(self.now);
-            debug_assert_eq!(passed, Ok(()), "time does not go back");
+        while self.wire.change_next() {
             self.take_arrivals();
         }
-        self.timers.fire(self.now, &mut self.woken);
+        if self.wire.pass() {
+            self.take_arrivals();
+        }
+        self.timers.fire(self.wire.now(), &mut self.woken);
     }
 
     /// The program asks for something that takes no time.
@@ -150,8 +133,8 @@ impl Core {
     /// If it has done so for so often since time last passed that it seems to wait for time without letting it pass.
     #[inline]
     pub(crate) fn note_call(&mut self) {
-        self.asked += 1;
-        if self.asked > self.settings.patience.saturating_mul(10) {
+        self.calls += 1;
+        if self.calls > self.settings.patience.saturating_mul(10) {
             self.lose_patience();
         }
     }
@@ -160,10 +143,10 @@ impl Core {
     #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
     fn lose_patience(&mut self) -> ! {
         // What is dropped while it unwinds may ask again.
-        self.asked = 0;
+        self.calls = 0;
         panic!(
             "time stands still at {} s: a task asks for the time, sends or tries to receive again and again and never waits; `sleep(..).await` lets it pass",
-            Seconds(self.now)
+            Seconds(self.now())
         );
     }
 
@@ -174,51 +157,10 @@ impl Core {
         self.polled > self.settings.patience
     }
 
-    pub(crate) fn set_link(&mut self, from: usize, to: usize, link: LinkModel) {
-        self.change_link(LinkChange { at: self.now, from, to, link });
-    }
-
-    fn change_link(&mut self, change: LinkChange) {
-        let LinkChange { at, from, to, link } = change;
-        let changed = self.network.set_link(at, node(from), node(to), link);
-        debug_assert_eq!(changed, Ok(()), "hosts are checked, and time does not go back");
-        self.recording.note(at, Happening::Relinked(from, to));
+    pub(crate) fn set_link(&mut self, path: Path, link: LinkModel) {
+        self.wire.set_link(self.now(), path, link);
         self.take_arrivals();
     }
-
-    /// What was recorded. Packets that are on their way are followed to their end, in the fates alone.
-    pub(crate) fn take_recording(&mut self) -> (Trace, Vec<Seen>, Instant) {
-        let (trace, mut packets) = self.recording.take();
-        if self.settings.keeps_packets {
-            follow_to_the_end(&mut self.network.clone(), |event| packets.push(seen(event, event.payload.bytes.clone())));
-        }
-        (trace, packets, self.now)
-    }
-
-    pub(crate) fn link_stats(&self, from: usize, to: usize) -> Option<cohaptic_wan::LinkStats> {
-        self.network.link_stats(node(from), node(to))
-    }
-
-    pub(crate) fn set_cut(&mut self, from: usize, to: usize, cut: bool) {
-        let place = self.pair(from, to);
-        if from != to && std::mem::replace(&mut self.cut[place], cut) != cut {
-            self.recording.note(self.now, if cut { Happening::Cut(from, to) } else { Happening::Mended(from, to) });
-        }
-    }
-
-    fn is_cut(&self, from: usize, to: usize) -> bool {
-        self.cut[self.pair(from, to)]
-    }
-
-    const fn pair(&self, from: usize, to: usize) -> usize {
-        from * self.hosts.len() + to
-    }
-}
-
-pub(crate) use node as network_node;
-
-pub(crate) fn node(place: usize) -> NodeId {
-    NodeId::new(place)
 }
 
 /// The state machine, and how what belongs to tasks gets at it.
@@ -227,7 +169,7 @@ pub(crate) struct Shared {
     clock: Clock,
 }
 
-/// Who tells the time.
+/// The source of the time.
 pub(crate) enum Clock {
     /// The executor of this crate, by [`Core::pass`].
     Own,
@@ -244,7 +186,7 @@ impl Shared {
         Self { core: Mutex::new(core), clock }
     }
 
-    /// The state at this instant. Whoever is to be woken is woken when the guard is gone.
+    /// The state at this instant. Tasks that are to be woken are woken when the guard is dropped.
     pub(crate) fn lock(&self) -> Guard<'_> {
         #[cfg_attr(not(feature = "tokio"), expect(unused_mut, reason = "only tokio's clock moves by itself"))]
         let mut core = self.core.lock().unwrap_or_else(PoisonError::into_inner);
@@ -255,7 +197,7 @@ impl Shared {
                 // Once the run is over, tokio's clock is that of the machine.
                 if tokio::runtime::Handle::try_current().is_ok() {
                     let now = Instant::ZERO + origin.elapsed();
-                    if now > core.now {
+                    if now > core.now() {
                         core.pass(now);
                     }
                 }

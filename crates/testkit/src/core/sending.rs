@@ -4,11 +4,9 @@ use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use bytes::Bytes;
-use cohaptic_wan::PacketInfo;
+use cohaptic_wan::{NodeId, Path};
 
-use super::{Core, Kind, Parcel, SocketId, node};
-use crate::seed::hash;
-use crate::trace::{Happening, Lost, PacketName};
+use super::{Core, Kind, Parcel, SocketId};
 
 /// The longest datagram over IPv4 and over IPv6 \[bytes\].
 const LONGEST: [usize; 2] = [65_507, 65_527];
@@ -63,16 +61,16 @@ impl Core {
             if !may_broadcast {
                 return refuse(io::ErrorKind::PermissionDenied, "this socket may not broadcast; `set_broadcast(true)` allows it".into());
             }
-            for other in (0..self.hosts.len()).filter(|other| *other != host) {
-                self.offer(host, other, parcel.clone());
+            for other in (0..self.hosts.len()).map(NodeId::new).filter(|other| *other != host) {
+                self.offer(Path { from: host, to: other }, parcel.clone());
             }
             return Ok(());
         }
-        let receiver = if to.ip().is_loopback() { Some(host) } else { self.plan.owner_place(to.ip()) };
+        let receiver = if to.ip().is_loopback() { Some(host) } else { self.plan.owner_node(to.ip()) };
         if receiver == Some(host) {
-            self.hand_over(host, host, parcel, false);
+            self.hand_over(host, parcel);
         } else if let Some(receiver) = receiver {
-            self.offer(host, receiver, parcel);
+            self.offer(Path { from: host, to: receiver }, parcel);
         } else if !self.plan.was_given(to.ip()) {
             let text = format!("no host has the address {}; the hosts are\n{}", to.ip(), self.plan);
             return refuse(io::ErrorKind::HostUnreachable, text);
@@ -81,7 +79,7 @@ impl Core {
     }
 
     /// The address from which a socket that is bound to `bound` reaches `to`.
-    fn source(&self, host: usize, bound: IpAddr, to: IpAddr) -> io::Result<IpAddr> {
+    fn source(&self, host: NodeId, bound: IpAddr, to: IpAddr) -> io::Result<IpAddr> {
         let addresses = self.plan.of(host);
         if bound.is_unspecified() {
             return Ok(if to.is_loopback() { to } else { addresses.like(to) });
@@ -90,29 +88,18 @@ impl Core {
             return refuse(io::ErrorKind::InvalidInput, format!("a socket at {bound} reaches no other host, and so not {to}"));
         }
         if !bound.is_loopback() && !addresses.has(bound) {
-            let text = format!("host `{}` does not have the address {bound} any more; it has {}", self.plan.names()[host], addresses.like(bound));
+            let text =
+                format!("host `{}` does not have the address {bound} any more; it has {}", self.plan.names()[host.index()], addresses.like(bound));
             return refuse(io::ErrorKind::AddrNotAvailable, text);
         }
         Ok(bound)
     }
 
     /// Hands a packet to its link.
-    pub(super) fn offer(&mut self, from: usize, to: usize, parcel: Parcel) {
-        let pair = self.pair(from, to);
-        if self.cut[pair] {
-            // It does not reach the link, so that it uses up none of the link's numbers.
-            let packet = PacketName { from, to, sequence: self.offered[pair], copy: 0 };
-            return self.recording.note(self.now, Happening::Lost { packet, why: Lost::Cut });
+    pub(super) fn offer(&mut self, path: Path, parcel: Parcel) {
+        let ecn_capable = parcel.ecn_capable;
+        if self.wire.offer(path, parcel, ecn_capable).is_ok() {
+            self.take_arrivals();
         }
-        if self.recording.traces {
-            let packet = PacketName { from, to, sequence: self.offered[pair], copy: 0 };
-            let digest = if self.settings.digests { hash(&parcel.bytes) } else { 0 };
-            self.recording.note(self.now, Happening::Sent { packet, len: parcel.bytes.len(), digest });
-        }
-        self.offered[pair] += 1;
-        let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn_capable: parcel.ecn_capable };
-        let offered = self.network.handle_packet(self.now, node(from), node(to), info, parcel);
-        debug_assert_eq!(offered, Ok(()), "hosts are checked, and time does not go back");
-        self.take_arrivals();
     }
 }

@@ -1,4 +1,4 @@
-//! Sockets: where they are bound, what lies in their buffers, and who waits.
+//! Sockets: where they are bound, what lies in their buffers, and the tasks that wait.
 
 use std::collections::VecDeque;
 use std::io;
@@ -7,6 +7,7 @@ use std::task::Waker;
 
 use bytes::Bytes;
 use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
 
 use super::Core;
 
@@ -32,7 +33,7 @@ pub(crate) struct Datagram {
 
 #[derive(Debug)]
 pub(crate) struct SocketState {
-    pub(super) host: usize,
+    pub(super) host: NodeId,
     pub(super) local: SocketAddr,
     pub(super) peer: Option<SocketAddr>,
     pub(super) inbox: VecDeque<Datagram>,
@@ -76,14 +77,14 @@ impl Sockets {
     }
 
     pub(super) fn get(&self, id: SocketId) -> &SocketState {
-        self.places[id.0].as_ref().expect("whoever has its number keeps it open")
+        self.places[id.0].as_ref().expect("a socket is open as long as its number is held")
     }
 
     pub(super) fn get_mut(&mut self, id: SocketId) -> &mut SocketState {
-        self.places[id.0].as_mut().expect("whoever has its number keeps it open")
+        self.places[id.0].as_mut().expect("a socket is open as long as its number is held")
     }
 
-    pub(super) fn all_of(&mut self, host: usize) -> impl Iterator<Item = &mut SocketState> {
+    pub(super) fn all_of(&mut self, host: NodeId) -> impl Iterator<Item = &mut SocketState> {
         self.places.iter_mut().flatten().filter(move |socket| socket.host == host)
     }
 }
@@ -93,16 +94,16 @@ const FIRST_DYNAMIC: u16 = 49_152;
 
 impl Core {
     /// Binds a socket of a host that is up.
-    pub(crate) fn bind(&mut self, host: usize, asked: SocketAddr) -> io::Result<SocketId> {
-        let (ip, six) = (asked.ip(), asked.is_ipv6());
+    pub(crate) fn bind(&mut self, host: NodeId, wanted: SocketAddr) -> io::Result<SocketId> {
+        let (ip, six) = (wanted.ip(), wanted.is_ipv6());
         if !ip.is_unspecified() && !ip.is_loopback() && !self.plan.of(host).has(ip) {
-            let text = format!("{ip} is no address of host `{}`, which has {}", self.plan.names()[host], self.plan.of(host).like(ip));
+            let text = format!("{ip} is no address of host `{}`, which has {}", self.plan.names()[host.index()], self.plan.of(host).like(ip));
             return Err(io::Error::new(io::ErrorKind::AddrNotAvailable, text));
         }
-        let port = match asked.port() {
+        let port = match wanted.port() {
             0 => self.free_port(host, ip)?,
             port if self.is_taken(host, ip, port) => {
-                let text = format!("{asked} is taken on host `{}`", self.plan.names()[host]);
+                let text = format!("{wanted} is taken on host `{}`", self.plan.names()[host.index()]);
                 return Err(io::Error::new(io::ErrorKind::AddrInUse, text));
             }
             port => port,
@@ -111,12 +112,12 @@ impl Core {
         let (readers, inbox) = (Vec::new(), VecDeque::new());
         let state = SocketState { host, local, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
         let id = self.sockets.insert(state);
-        self.hosts[host].ports.entry((six, port)).or_default().push(id);
+        self.hosts[host.index()].ports.entry((six, port)).or_default().push(id);
         Ok(id)
     }
 
-    fn is_taken(&self, host: usize, ip: IpAddr, port: u16) -> bool {
-        self.hosts[host].ports.get(&(ip.is_ipv6(), port)).is_some_and(|bound| {
+    fn is_taken(&self, host: NodeId, ip: IpAddr, port: u16) -> bool {
+        self.hosts[host.index()].ports.get(&(ip.is_ipv6(), port)).is_some_and(|bound| {
             bound.iter().any(|id| {
                 let other = self.sockets.get(*id).local.ip();
                 other == ip || other.is_unspecified() || ip.is_unspecified()
@@ -124,16 +125,16 @@ impl Core {
         })
     }
 
-    fn free_port(&mut self, host: usize, ip: IpAddr) -> io::Result<u16> {
+    fn free_port(&mut self, host: NodeId, ip: IpAddr) -> io::Result<u16> {
         let count = u16::MAX - FIRST_DYNAMIC + 1;
         for _ in 0..count {
-            let port = FIRST_DYNAMIC + self.hosts[host].next_port;
-            self.hosts[host].next_port = (self.hosts[host].next_port + 1) % count;
+            let port = FIRST_DYNAMIC + self.hosts[host.index()].next_port;
+            self.hosts[host.index()].next_port = (self.hosts[host.index()].next_port + 1) % count;
             if !self.is_taken(host, ip, port) {
                 return Ok(port);
             }
         }
-        let text = format!("all {count} dynamic ports of host `{}` are taken", self.plan.names()[host]);
+        let text = format!("all {count} dynamic ports of host `{}` are taken", self.plan.names()[host.index()]);
         Err(io::Error::new(io::ErrorKind::AddrInUse, text))
     }
 
@@ -142,10 +143,10 @@ impl Core {
         let Some(state) = self.sockets.places[id.0].take() else { return };
         self.sockets.free.push(id.0);
         let key = (state.local.is_ipv6(), state.local.port());
-        if let Some(bound) = self.hosts[state.host].ports.get_mut(&key) {
+        if let Some(bound) = self.hosts[state.host.index()].ports.get_mut(&key) {
             bound.retain(|other| *other != id);
             if bound.is_empty() {
-                self.hosts[state.host].ports.remove(&key);
+                self.hosts[state.host.index()].ports.remove(&key);
             }
         }
     }
@@ -154,7 +155,7 @@ impl Core {
     pub(crate) fn check_alive(&self, id: SocketId) -> io::Result<()> {
         let socket = self.sockets.get(id);
         let Some(at) = socket.died else { return Ok(()) };
-        let name = &self.plan.names()[socket.host];
+        let name = &self.plan.names()[socket.host.index()];
         let text = format!(
             "host `{name}` crashed at {} s, and this socket ({}) with it; after `Host::restart`, bind a new one",
             cohaptic_units::print::Seconds(at),

@@ -1,4 +1,4 @@
-//! Who is to be woken when.
+//! Timers: wakers and their deadlines.
 
 use std::collections::BTreeMap;
 use std::task::Waker;

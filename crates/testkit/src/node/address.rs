@@ -35,6 +35,8 @@ pub fn place_of(address: IpAddr) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_wan::NodeId;
+
     use super::*;
     use crate::address::AddressPlan;
 
@@ -42,7 +44,7 @@ mod tests {
     fn places_have_the_addresses_that_the_hosts_of_a_test_bed_have() {
         let plan = AddressPlan::new((0..300).map(|place| place.to_string()).collect());
         for place in [0, 1, 254, 255, 299] {
-            assert_eq!(addresses(place), plan.of(place));
+            assert_eq!(addresses(place), plan.of(NodeId::new(place)));
             assert_eq!(place_of(addresses(place).v4.into()), Some(place));
             assert_eq!(place_of(addresses(place).v6.into()), Some(place));
         }

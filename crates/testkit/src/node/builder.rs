@@ -5,15 +5,15 @@ use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use cohaptic_wan::LinkModel;
+use cohaptic_wan::{LinkModel, NodeId, Path};
 
 use super::{Node, NodeRun};
-use crate::bed::{check_name, place};
-use crate::core::Settings;
+use crate::bed::{check_name, node, path};
 use crate::file::{LinkChange, LinkFile};
 use crate::link::ToLink;
 use crate::record::Record;
 use crate::seed::Seed;
+use crate::wire::Settings;
 
 /// State machines, and the links between them.
 #[must_use = "nodes do nothing until they are started"]
@@ -21,7 +21,7 @@ pub struct Nodes {
     pub(super) names: Vec<String>,
     pub(super) nodes: Vec<Box<dyn Node>>,
     every: LinkModel,
-    links: BTreeMap<(usize, usize), LinkModel>,
+    links: BTreeMap<Path, LinkModel>,
     /// In order of time.
     pub(super) changes: Vec<LinkChange>,
     seed: Option<u64>,
@@ -86,9 +86,9 @@ impl Nodes {
     ///
     /// If there is no such node, both are the same, or the words are none.
     pub fn link(mut self, from: &str, to: &str, link: impl ToLink) -> Self {
-        let pair = (place(&self.names, from), place(&self.names, to));
-        assert!(pair.0 != pair.1, "node `{from}` has no link to itself");
-        self.links.insert(pair, link.to_link());
+        let path = path(&self.names, from, to);
+        assert!(path.from != path.to, "node `{from}` has no link to itself");
+        self.links.insert(path, link.to_link());
         self
     }
 
@@ -114,9 +114,10 @@ impl Nodes {
             Ok(file) => file,
             Err(error) => panic!("{error}"),
         };
-        let places: Vec<usize> = hosts.iter().map(|host| place(&self.names, host)).collect();
-        let links = links.into_iter().map(|((from, to), link)| ((places[from], places[to]), link)).collect();
-        let changes = changes.into_iter().map(|change| LinkChange { from: places[change.from], to: places[change.to], ..change }).collect();
+        let nodes: Vec<NodeId> = hosts.iter().map(|host| node(&self.names, host)).collect();
+        let links = links.into_iter().map(|((from, to), link)| (Path { from: nodes[from], to: nodes[to] }, link)).collect();
+        let changes =
+            changes.into_iter().map(|change| LinkChange { from: nodes[change.from].index(), to: nodes[change.to].index(), ..change }).collect();
         Self { every, links, changes, seed: seed.or(self.seed), ..self }
     }
 
@@ -163,7 +164,7 @@ impl Nodes {
         assert!(!self.names.is_empty(), "a run without nodes; `add` one before `start`");
         let seed = Seed::choose(self.seed);
         let (every, links) = (self.every.clone(), self.links.clone());
-        NodeRun::new(self, seed, |from, to| links.get(&(from, to)).unwrap_or(&every).clone())
+        NodeRun::new(self, seed, |from, to| links.get(&Path { from, to }).unwrap_or(&every).clone())
     }
 
     /// Runs nodes twice, and gives what came out first, if all that happened was the same to the nanosecond: every packet, with what it carried. `build` makes the

@@ -9,7 +9,7 @@ pub(super) struct Deadlines {
     first: usize,
 }
 
-/// Stands for no deadline: who waits for the last instant there is waits for ever.
+/// Stands for no deadline: to wait for the last instant there is, is to wait for ever.
 const NONE: Instant = Instant::MAX;
 
 impl Deadlines {

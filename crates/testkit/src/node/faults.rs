@@ -3,17 +3,14 @@
 use std::any::Any;
 use std::fmt;
 
-use cohaptic_wan::LinkModel;
-
 use super::run::is_another;
 use super::{Node, NodeRun};
-use crate::bed::place;
-use crate::core::network_node;
+use crate::bed::path;
 use crate::link::ToLink;
 use crate::trace::Happening;
 
 impl NodeRun {
-    /// Cuts the way from one node to another: what is sent from now on is lost, and what would arrive. The way back is as before.
+    /// Cuts the way from one node to another: packets that are sent or would arrive from now on are lost. The way back is as before.
     ///
     /// # Panics
     ///
@@ -45,10 +42,8 @@ impl NodeRun {
 
     /// Mends all ways.
     pub fn mend_all(&mut self) {
-        let names = self.names.clone();
-        for (from, to) in names.iter().flat_map(|from| names.iter().map(move |to| (from, to))) {
-            self.mend(from, to);
-        }
+        self.ask_touched();
+        self.wire.mend_all();
     }
 
     /// The link from one node to another is another one from now on. What is in it follows the rules of [`cohaptic_wan::Link::set_model`].
@@ -57,18 +52,12 @@ impl NodeRun {
     ///
     /// If there is no such node, both are the same, or the words are none.
     pub fn set_link(&mut self, from: &str, to: &str, link: impl ToLink) {
-        let (from_place, to_place) = (place(&self.names, from), place(&self.names, to));
-        assert!(from_place != to_place, "node `{from}` has no link to itself");
+        let path = path(&self.names, from, to);
+        assert!(path.from != path.to, "node `{from}` has no link to itself");
         self.ask_touched();
-        self.change_link(from_place, to_place, link.to_link());
+        self.wire.set_link(self.now(), path, link.to_link());
+        self.take_arrivals();
         self.hand_over();
-    }
-
-    pub(super) fn change_link(&mut self, from: usize, to: usize, link: LinkModel) {
-        let changed = self.network.set_link(self.now, network_node(from), network_node(to), link);
-        debug_assert_eq!(changed, Ok(()), "nodes are checked, and time does not go back");
-        self.recording.note(self.now, Happening::Relinked(from, to));
-        self.take_events();
     }
 
     /// The node is gone, at once, and given back. What it has sent is on its way still; what arrives for it is lost.
@@ -79,12 +68,12 @@ impl NodeRun {
     pub fn crash<T: Node>(&mut self, name: &str) -> T {
         // First the type: a node of another one stays.
         let _: &T = self.node(name);
-        let place = place(&self.names, name);
+        let id = self.id(name);
         self.ask_touched();
-        self.up[place] = false;
-        self.deadlines.set(place, None);
-        self.recording.note(self.now, Happening::Crashed(place));
-        let node = self.nodes[place].take().map(|node| -> Box<dyn Any> { node });
+        self.up[id.index()] = false;
+        self.deadlines.set(id.index(), None);
+        self.wire.note(Happening::Crashed(id));
+        let node = self.nodes[id.index()].take().map(|node| -> Box<dyn Any> { node });
         match node.and_then(|node| node.downcast().ok()) {
             Some(node) => *node,
             None => is_another::<T>(name),
@@ -97,13 +86,13 @@ impl NodeRun {
     ///
     /// If there is none of that name, or it is up.
     pub fn restart(&mut self, name: &str, node: impl Node) {
-        let place = place(&self.names, name);
-        assert!(!self.up[place], "node `{name}` is up; `crash` it before another one takes its place");
+        let id = self.id(name);
+        assert!(!self.up[id.index()], "node `{name}` is up; `crash` it before another one takes its place");
         self.ask_touched();
-        self.up[place] = true;
-        self.nodes[place] = Some(Box::new(node));
-        self.recording.note(self.now, Happening::Restarted(place));
-        self.touch(place);
+        self.up[id.index()] = true;
+        self.nodes[id.index()] = Some(Box::new(node));
+        self.wire.note(Happening::Restarted(id));
+        self.touch(id);
         self.ask_touched();
     }
 
@@ -114,22 +103,19 @@ impl NodeRun {
     /// If there is none of that name.
     #[must_use]
     pub fn is_up(&self, name: &str) -> bool {
-        self.up[place(&self.names, name)]
+        self.up[self.id(name).index()]
     }
 
     /// Notes something in the record: what a node computes, say, so that two runs are compared by it too.
     pub fn note(&mut self, text: impl fmt::Display) {
-        if self.traces {
-            self.recording.note(self.now, Happening::Note(text.to_string()));
+        if self.wire.recording().traces {
+            self.wire.note(Happening::Note(text.to_string()));
         }
     }
 
     fn set_cut(&mut self, from: &str, to: &str, cut: bool) {
-        let (from, to) = (place(&self.names, from), place(&self.names, to));
+        let path = path(&self.names, from, to);
         self.ask_touched();
-        let pair = from * self.names.len() + to;
-        if from != to && std::mem::replace(&mut self.cut[pair], cut) != cut {
-            self.recording.note(self.now, if cut { Happening::Cut(from, to) } else { Happening::Mended(from, to) });
-        }
+        self.wire.set_cut(path, cut);
     }
 }

@@ -81,7 +81,7 @@ pub trait Node: Any {
 /// A packet as it arrives.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Packet {
-    /// Who sent it: the address of a node, with the port that [`Transmit::from_port`] said.
+    /// The sender: the address of a node, with the port that [`Transmit::from_port`] said.
     pub from: SocketAddr,
     /// To whom: an address of the node that gets it.
     pub to: SocketAddr,
@@ -111,7 +111,7 @@ impl Packet {
 pub struct Transmit {
     /// To whom: see [`address()`]. What is sent to an address that no node has is [counted](NodeCounts::unroutable), and lost.
     pub to: SocketAddr,
-    /// The port from which it is sent. Whoever gets it sees it; otherwise it means nothing.
+    /// The port from which it is sent. The receiver sees it; otherwise it means nothing.
     pub from_port: u16,
     /// What it carries.
     pub bytes: Bytes,

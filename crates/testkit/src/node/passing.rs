@@ -2,14 +2,13 @@
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::{Fate, PacketEvent, PacketInfo, Path};
+use cohaptic_wan::{NodeId, Path};
 
 use super::address::{addresses, place_of};
 use super::run::Parcel;
 use super::{NodeRun, Packet, Transmit};
-use crate::core::{network_node, seen};
-use crate::seed::hash;
-use crate::trace::{Happening, Lost, PacketName};
+use crate::trace::{Happening, Lost};
+use crate::wire::Arrival;
 
 /// What a node does that keeps time from passing.
 #[derive(Clone, Copy, Debug)]
@@ -20,116 +19,92 @@ pub(super) enum Does {
 }
 
 impl NodeRun {
-    /// Lets happen what is due at an instant.
+    /// Lets the events of an instant happen.
     pub(super) fn pass(&mut self, at: Instant) {
-        if at > self.now {
-            self.now = at;
+        if self.wire.set_now(at) {
             self.done = 0;
         }
-        while self.changes.front().is_some_and(|change| change.at <= at) {
-            if let Some(change) = self.changes.pop_front() {
-                self.change_link(change.from, change.to, change.link);
-            }
+        while self.wire.change_next() {
+            self.take_arrivals();
         }
-        if self.network.poll_timeout().is_some_and(|at| at <= self.now) {
-            let passed = self.network.handle_timeout(self.now);
-            debug_assert_eq!(passed, Ok(()), "time does not go back");
-            self.take_events();
+        if self.wire.pass() {
+            self.take_arrivals();
             self.hand_over();
         }
         let mut from = 0;
-        while let Some(place) = self.deadlines.due(from, self.now) {
-            from = place + 1;
-            self.count(Does::Wakes, place);
-            self.counts[place].timeouts += 1;
-            if let Some(node) = &mut self.nodes[place] {
-                node.handle_timeout(self.now);
+        while let Some(due) = self.deadlines.due(from, self.now()) {
+            from = due + 1;
+            let (id, now) = (NodeId::new(due), self.now());
+            self.count(Does::Wakes, id);
+            self.counts[due].timeouts += 1;
+            if let Some(node) = &mut self.nodes[due] {
+                node.handle_timeout(now);
             }
-            self.ask(place, Does::Wakes);
+            self.ask(id, Does::Wakes);
         }
         self.hand_over();
     }
 
     /// Asks a node what it wants to send, and when it wants to be woken; `because` of what it is asked.
-    pub(super) fn ask(&mut self, place: usize, because: Does) {
-        let Some(mut node) = self.nodes[place].take() else { return self.deadlines.set(place, None) };
+    pub(super) fn ask(&mut self, id: NodeId, because: Does) {
+        let Some(mut node) = self.nodes[id.index()].take() else { return self.deadlines.set(id.index(), None) };
         let mut sent = 0;
-        while let Some(transmit) = node.poll_transmit(self.now) {
+        while let Some(transmit) = node.poll_transmit(self.now()) {
             sent += 1;
-            // Who sends one packet for each that comes answers; who sends most of all that is done now, asked but once, never ends to send.
-            self.count(if sent > self.patience / 2 { Does::Sends } else { because }, place);
-            self.send(place, transmit);
+            // A node that sends one packet for each that comes answers; one that, asked once, sends more than half of all events of this instant never ends to send.
+            self.count(if sent > self.patience / 2 { Does::Sends } else { because }, id);
+            self.send(id, transmit);
         }
         // What is late is due now: so that nodes are woken in their order, however late they are.
-        let deadline = node.poll_timeout().map(|deadline| deadline.max(self.now));
-        self.deadlines.set(place, deadline);
-        self.nodes[place] = Some(node);
+        let deadline = node.poll_timeout().map(|deadline| deadline.max(self.now()));
+        self.deadlines.set(id.index(), deadline);
+        self.nodes[id.index()] = Some(node);
     }
 
-    fn send(&mut self, from: usize, transmit: Transmit) {
-        self.counts[from].sent += 1;
+    fn send(&mut self, from: NodeId, transmit: Transmit) {
+        self.counts[from.index()].sent += 1;
         let Transmit { to: address, from_port, bytes, ecn_capable } = transmit;
-        let Some(to) = place_of(address.ip()).filter(|place| *place < self.names.len()) else {
-            self.counts[from].unroutable += 1;
-            if self.traces {
-                let note = format!("{} sent {} bytes to {address}, which is no node's address", self.names[from], bytes.len());
-                self.recording.note(self.now, Happening::Note(note));
+        let Some(to) = place_of(address.ip()).filter(|place| *place < self.names.len()).map(NodeId::new) else {
+            self.counts[from.index()].unroutable += 1;
+            if self.wire.recording().traces {
+                let note = format!("{} sent {} bytes to {address}, which is no node's address", self.names[from.index()], bytes.len());
+                self.wire.note(Happening::Note(note));
             }
             return;
         };
         let parcel = Parcel { from_port, to_port: address.port(), is_six: address.is_ipv6(), bytes };
+        let path = Path { from, to };
         if to == from {
             // It does not leave the node, and so meets no link.
-            return self.arrive(from, to, parcel, false);
+            return self.arrive(path, parcel, false);
         }
-        let pair = from * self.names.len() + to;
-        let packet = PacketName { from, to, sequence: self.offered[pair], copy: 0 };
-        if self.cut[pair] {
-            // It does not reach the link, so that it uses up none of the link's numbers.
-            self.counts[from].cut += 1;
-            return self.recording.note(self.now, Happening::Lost { packet, why: Lost::Cut });
+        match self.wire.offer(path, parcel, ecn_capable) {
+            Ok(()) => self.take_arrivals(),
+            Err(_) => self.counts[from.index()].cut += 1,
         }
-        if self.traces {
-            let digest = hash(&parcel.bytes);
-            self.recording.note(self.now, Happening::Sent { packet, len: parcel.bytes.len(), digest });
-        }
-        self.offered[pair] += 1;
-        let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn_capable };
-        let offered = self.network.handle_packet(self.now, network_node(from), network_node(to), info, parcel);
-        debug_assert_eq!(offered, Ok(()), "both are nodes, and time does not go back");
-        self.take_events();
     }
 
     /// Deals with what has come out of the links.
-    pub(super) fn take_events(&mut self) {
-        while let Some(event) = self.network.poll_event() {
-            let (from, to) = (event.path.from.index(), event.path.to.index());
-            self.recording.keep(|| seen(&event, event.payload.bytes.clone()));
-            let packet = PacketName { from, to, sequence: event.sequence, copy: event.copy >> 1 };
-            match event.fate {
-                Fate::Delivered(at) => {
-                    if self.cut[from * self.names.len() + to] {
-                        self.counts[from].cut += 1;
-                        self.recording.note(at, Happening::Lost { packet, why: Lost::Cut });
-                    } else if !self.up[to] {
-                        self.counts[to].while_down += 1;
-                        self.recording.note(at, Happening::Lost { packet, why: Lost::HostDown });
-                    } else {
-                        self.recording.note(at, Happening::Arrived { packet });
-                        let marked = event.marked;
-                        self.arrive(from, to, as_received(event), marked);
-                    }
-                }
-                Fate::Dropped(cause) => self.recording.note(event.at, Happening::Lost { packet, why: Lost::Link(cause) }),
-                Fate::Duplicated => self.recording.note(event.at, Happening::Copied { packet }),
+    pub(super) fn take_arrivals(&mut self) {
+        while let Some(Arrival { packet, at, parcel, marked, is_cut }) = self.wire.poll() {
+            let Path { from, to } = packet.path;
+            if is_cut {
+                self.counts[from.index()].cut += 1;
+                self.wire.ends(packet, at, Err(Lost::Cut));
+            } else if !self.up[to.index()] {
+                self.counts[to.index()].while_down += 1;
+                self.wire.ends(packet, at, Err(Lost::HostDown));
+            } else {
+                self.wire.ends(packet, at, Ok(()));
+                self.arrive(packet.path, parcel, marked);
             }
         }
     }
 
-    fn arrive(&mut self, from: usize, to: usize, parcel: Parcel, marked: bool) {
+    fn arrive(&mut self, Path { from, to }: Path, parcel: Parcel, marked: bool) {
         let Parcel { from_port, to_port, is_six, bytes } = parcel;
-        let address = |place: usize, port: u16| {
-            let addresses = addresses(place);
+        let address = |node: NodeId, port: u16| {
+            let addresses = addresses(node.index());
             let ip = if is_six { addresses.v6.into() } else { addresses.v4.into() };
             std::net::SocketAddr::new(ip, port)
         };
@@ -140,43 +115,36 @@ impl NodeRun {
     pub(super) fn hand_over(&mut self) {
         while let Some((to, packet)) = self.arrived.pop_front() {
             self.count(Does::Receives, to);
-            self.counts[to].arrived += 1;
-            if let Some(node) = &mut self.nodes[to] {
-                node.handle_packet(self.now, packet);
+            self.counts[to.index()].arrived += 1;
+            if let Some(node) = &mut self.nodes[to.index()] {
+                node.handle_packet(self.wire.now(), packet);
             }
             self.ask(to, Does::Receives);
         }
     }
 
-    /// Counts what is done at one instant.
+    /// Counts the events of one instant.
     #[inline]
-    fn count(&mut self, does: Does, place: usize) {
+    fn count(&mut self, does: Does, node: NodeId) {
         self.done += 1;
         if self.done > self.patience {
-            self.give_up(does, place);
+            self.give_up(does, node);
         }
     }
 
     #[cold]
     #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
-    fn give_up(&self, does: Does, place: usize) -> ! {
+    fn give_up(&self, does: Does, node: NodeId) -> ! {
         let what = match does {
             Does::Sends => "sends without end: `poll_transmit` must give `None` when there is nothing more to send now",
             Does::Receives => "answers without end over links without delay: give them one, or let the nodes stop",
             Does::Wakes => "wants to be woken again and again: after `handle_timeout`, `poll_timeout` must name a later instant, or none",
         };
-        panic!("time stands still at {} s after {} packets and timers: node `{}` {what}", Seconds(self.now), self.patience, self.names[place]);
+        panic!(
+            "time stands still at {} s after {} packets and timers: node `{}` {what}",
+            Seconds(self.now()),
+            self.patience,
+            self.names[node.index()]
+        );
     }
-}
-
-/// What a packet carries, with the damage that was done to it.
-fn as_received(event: PacketEvent<Parcel, Path>) -> Parcel {
-    let mut parcel = event.payload;
-    if let Some(damage) = &event.damage {
-        // A copy of it may be on its way still, undamaged.
-        let mut bytes = Vec::from(parcel.bytes);
-        damage.apply(&mut bytes);
-        parcel.bytes = bytes.into();
-    }
-    parcel
 }

@@ -1,4 +1,4 @@
-//! Nodes that run: their time, what is asked of them, and the way of a packet.
+//! Nodes that run: their time, the questions that they are asked, and the way of a packet.
 
 use std::any::{Any, type_name};
 use std::collections::VecDeque;
@@ -8,44 +8,34 @@ use std::time::Duration;
 use bytes::Bytes;
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::{LinkModel, LinkStats, Network, NetworkConfig};
+use cohaptic_wan::{LinkModel, LinkStats, NodeId};
 
 use super::deadlines::Deadlines;
 use super::passing::Does;
 use super::{Node, Nodes, Packet};
 use crate::artefacts::Artefacts;
-use crate::bed::place;
-use crate::core::{Recording, follow_to_the_end, network_node, seen};
-use crate::file::LinkChange;
+use crate::bed::{node, path};
 use crate::record::Record;
 use crate::seed::Seed;
+use crate::wire::Wire;
 
 /// Nodes that run.
 ///
-/// Between the steps the test looks at the nodes, changes them, and breaks what is between them. At one instant packets arrive first, in the order of the
-/// [network](cohaptic_wan::Network); then the timers go off that are due, in the order of the nodes; then what is sent at this instant over links without delay
-/// arrives. If the test fails while the run is there, the seed is told, and what [`Nodes::artefacts`] asked for is written.
+/// Between the steps the test looks at the nodes, changes them, and breaks the links between them. At one instant packets arrive first, in the order of the
+/// [network](cohaptic_wan::Network); then the timers go off that are due, in the order of the nodes; then packets arrive that are sent at this instant over links without
+/// delay. If the test fails while the run is there, the seed is told, and what [`Nodes::artefacts`] asked for is written.
 pub struct NodeRun {
     pub(super) names: Vec<String>,
     /// `None`: crashed, or being asked.
     pub(super) nodes: Vec<Option<Box<dyn Node>>>,
     pub(super) up: Vec<bool>,
-    pub(super) network: Network<Parcel>,
-    /// Links that become other ones, in order of time.
-    pub(super) changes: VecDeque<LinkChange>,
-    pub(super) now: Instant,
+    pub(super) wire: Wire<Parcel>,
     pub(super) deadlines: Deadlines,
-    /// By sender, then receiver: whether the way is cut.
-    pub(super) cut: Vec<bool>,
-    /// By sender, then receiver: how many packets the link has taken.
-    pub(super) offered: Vec<u64>,
     pub(super) counts: Vec<NodeCounts>,
     /// What has arrived and is not handed over yet.
-    pub(super) arrived: VecDeque<(usize, Packet)>,
+    pub(super) arrived: VecDeque<(NodeId, Packet)>,
     /// Nodes that the test has touched.
-    touched: Vec<usize>,
-    pub(super) recording: Recording,
-    pub(super) traces: bool,
+    touched: Vec<NodeId>,
     /// What was done since time last passed.
     pub(super) done: u64,
     pub(super) patience: u64,
@@ -62,6 +52,16 @@ pub(super) struct Parcel {
     /// Whether it is of version 6.
     pub(super) is_six: bool,
     pub(super) bytes: Bytes,
+}
+
+impl crate::wire::Parcel for Parcel {
+    fn bytes(&self) -> &Bytes {
+        &self.bytes
+    }
+
+    fn bytes_mut(&mut self) -> &mut Bytes {
+        &mut self.bytes
+    }
 }
 
 /// What a node has sent and got.
@@ -83,27 +83,20 @@ pub struct NodeCounts {
 }
 
 impl NodeRun {
-    pub(super) fn new(nodes: Nodes, seed: Seed, link: impl Fn(usize, usize) -> LinkModel) -> Self {
+    pub(super) fn new(nodes: Nodes, seed: Seed, link: impl FnMut(NodeId, NodeId) -> LinkModel) -> Self {
         let Nodes { names, nodes, changes, mut settings, time_limit, artefacts, .. } = nodes;
         let artefacts = Artefacts::new(artefacts, &seed);
         settings.traces |= artefacts.is_wanted();
         settings.keeps_packets |= artefacts.is_wanted();
-        let config = NetworkConfig { seed: seed.value, nodes: names.clone(), general: false };
         let count = names.len();
         let mut run = Self {
             nodes: nodes.into_iter().map(Some).collect(),
-            network: Network::new(config, |from, to| link(from.index(), to.index())),
-            changes: changes.into(),
-            now: Instant::ZERO,
+            wire: Wire::new(&names, seed.value, &settings, changes, link),
             up: vec![true; count],
             deadlines: Deadlines::new(count),
-            cut: vec![false; count * count],
-            offered: vec![0; count * count],
             counts: vec![NodeCounts::default(); count],
             arrived: VecDeque::new(),
-            touched: (0..count).collect(),
-            recording: Recording::new(names.clone(), &settings),
-            traces: settings.traces,
+            touched: (0..count).map(NodeId::new).collect(),
             done: 0,
             patience: settings.patience,
             time_limit,
@@ -118,7 +111,7 @@ impl NodeRun {
     /// The time since the run began.
     #[must_use]
     pub const fn now(&self) -> Instant {
-        self.now
+        self.wire.now()
     }
 
     /// The names of the nodes, in the order in which they were added.
@@ -134,8 +127,8 @@ impl NodeRun {
     /// If there is none of that name, it is down, or of another type.
     #[must_use]
     pub fn node<T: Node>(&self, name: &str) -> &T {
-        let place = place(&self.names, name);
-        let node: &dyn Any = self.nodes[place].as_deref().unwrap_or_else(|| is_down(name));
+        let id = self.id(name);
+        let node: &dyn Any = self.nodes[id.index()].as_deref().unwrap_or_else(|| is_down(name));
         node.downcast_ref().unwrap_or_else(|| is_another::<T>(name))
     }
 
@@ -146,9 +139,9 @@ impl NodeRun {
     /// As [`NodeRun::node`].
     #[must_use]
     pub fn node_mut<T: Node>(&mut self, name: &str) -> &mut T {
-        let place = place(&self.names, name);
-        self.touched.push(place);
-        let node: &mut dyn Any = self.nodes[place].as_deref_mut().unwrap_or_else(|| is_down(name));
+        let id = self.id(name);
+        self.touched.push(id);
+        let node: &mut dyn Any = self.nodes[id.index()].as_deref_mut().unwrap_or_else(|| is_down(name));
         node.downcast_mut().unwrap_or_else(|| is_another::<T>(name))
     }
 
@@ -159,7 +152,7 @@ impl NodeRun {
     /// If there is none of that name.
     #[must_use]
     pub fn counts(&self, name: &str) -> NodeCounts {
-        self.counts[place(&self.names, name)]
+        self.counts[self.id(name).index()]
     }
 
     /// What the link from one node to another has done so far.
@@ -170,8 +163,7 @@ impl NodeRun {
     #[must_use]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
-        let (from_place, to_place) = (place(&self.names, from), place(&self.names, to));
-        self.network.link_stats(network_node(from_place), network_node(to_place)).unwrap_or_else(|| panic!("node `{from}` has no link to itself"))
+        self.wire.link_stats(path(&self.names, from, to)).unwrap_or_else(|| panic!("node `{from}` has no link to itself"))
     }
 
     /// When something happens next; `None` if nothing will.
@@ -204,12 +196,12 @@ impl NodeRun {
     ///
     /// As [`NodeRun::step`]; if the instant has passed.
     pub fn run_until(&mut self, until: Instant) {
-        assert!(until >= self.now, "{} s has passed: it is {} s", Seconds(until), Seconds(self.now));
+        assert!(until >= self.now(), "{} s has passed: it is {} s", Seconds(until), Seconds(self.now()));
         self.ask_touched();
         while let Some(next) = self.next().filter(|next| *next <= until) {
             self.pass(next);
         }
-        self.now = until;
+        self.wire.set_now(until);
     }
 
     /// Lets time pass until nothing will happen any more: no packet is on its way, and no node wants to be woken. Gives that instant.
@@ -221,10 +213,10 @@ impl NodeRun {
     pub fn run_until_idle(&mut self) -> Instant {
         while self.step() {
             if self.is_late() {
-                panic!("at {} s something happens still; nodes that always wake again run with `run_until` or `run_while`", Seconds(self.now));
+                panic!("at {} s something happens still; nodes that always wake again run with `run_until` or `run_while`", Seconds(self.now()));
             }
         }
-        self.now
+        self.now()
     }
 
     /// Lets time pass as long as that is so; it is asked after every instant at which something happened. Gives the instant at which it is so no more.
@@ -239,14 +231,14 @@ impl NodeRun {
                 panic!(
                     "nothing will ever happen after {} s, and what was to end has not ended: no packet is on its way, and no node wants to be woken. A lost \
                      packet needs a timer",
-                    Seconds(self.now)
+                    Seconds(self.now())
                 );
             }
             if self.is_late() {
-                panic!("at {} s what was to end has not ended; `Nodes::time_limit` lets it go on for longer", Seconds(self.now));
+                panic!("at {} s what was to end has not ended; `Nodes::time_limit` lets it go on for longer", Seconds(self.now()));
             }
         }
-        self.now
+        self.now()
     }
 
     /// What has happened so far. Packets that are on their way are followed to their end, in the fates alone.
@@ -256,14 +248,13 @@ impl NodeRun {
     /// If it is not [recorded](Nodes::recorded).
     #[must_use]
     pub fn record(&self) -> Record {
-        assert!(self.traces, "nothing was recorded; `Nodes::recorded` asks for it");
-        let (trace, mut packets) = self.recording.so_far();
-        follow_to_the_end(&mut self.network.clone(), |event| packets.push(seen(event, event.payload.bytes.clone())));
-        Record::new(self.seed.clone(), trace, packets, self.now)
+        assert!(self.wire.recording().traces, "nothing was recorded; `Nodes::recorded` asks for it");
+        let (trace, packets, ended) = self.wire.recorded();
+        Record::new(self.seed.clone(), trace, packets, ended)
     }
 
     fn is_late(&self) -> bool {
-        self.now.saturating_duration_since(Instant::ZERO) > self.time_limit
+        self.now().saturating_duration_since(Instant::ZERO) > self.time_limit
     }
 
     /// Asks the nodes that the test has touched.
@@ -271,19 +262,22 @@ impl NodeRun {
         if self.touched.is_empty() {
             return;
         }
-        for place in std::mem::take(&mut self.touched) {
-            self.ask(place, Does::Sends);
+        for node in std::mem::take(&mut self.touched) {
+            self.ask(node, Does::Sends);
         }
         self.hand_over();
     }
 
-    pub(super) fn touch(&mut self, place: usize) {
-        self.touched.push(place);
+    pub(super) fn touch(&mut self, node: NodeId) {
+        self.touched.push(node);
+    }
+
+    pub(super) fn id(&self, name: &str) -> NodeId {
+        node(&self.names, name)
     }
 
     fn next(&self) -> Option<Instant> {
-        let change = self.changes.front().map(|change| change.at);
-        [self.network.poll_timeout(), self.deadlines.next(), change].into_iter().flatten().min()
+        [self.wire.next(), self.deadlines.next()].into_iter().flatten().min()
     }
 }
 
@@ -307,6 +301,6 @@ impl Drop for NodeRun {
 
 impl fmt::Debug for NodeRun {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("NodeRun").field("names", &self.names).field("now", &self.now).finish_non_exhaustive()
+        f.debug_struct("NodeRun").field("names", &self.names).field("now", &self.now()).finish_non_exhaustive()
     }
 }

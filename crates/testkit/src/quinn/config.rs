@@ -81,7 +81,7 @@ pub fn client_config() -> ClientConfig {
     config
 }
 
-/// The TLS of [`server_config`], for those who want to change it: give it protocols (ALPN), say.
+/// The TLS of [`server_config`], to be changed: to give it protocols (ALPN), for instance.
 #[must_use]
 #[expect(clippy::missing_panics_doc, reason = "only constants are unwrapped")]
 pub fn tls_server_config() -> TlsServer {

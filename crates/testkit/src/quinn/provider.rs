@@ -15,7 +15,7 @@ use crate::context;
 const KEY: usize = 32;
 
 /// Cryptography for [`rustls`](::quinn::rustls) that draws its random numbers from the running test bed: handshakes have the same bytes in every run of the same
-/// seed. Whoever knows the seed can read along, so it is good for tests alone.
+/// seed. The seed is enough to read along, so it is good for tests alone.
 #[must_use]
 pub fn crypto_provider() -> Arc<CryptoProvider> {
     Arc::new(CryptoProvider { kx_groups: vec![&Curve], secure_random: &FromTestbed, ..ring::default_provider() })

@@ -12,6 +12,8 @@ use std::time::Instant as StdInstant;
 use ::quinn::{AsyncTimer, AsyncUdpSocket, Runtime};
 
 use super::time::{from_std, to_std};
+use cohaptic_wan::NodeId;
+
 use crate::context;
 use crate::core::Shared;
 use crate::host::Host;
@@ -20,14 +22,14 @@ use crate::time::Sleep;
 /// The runtime of an endpoint that lives on a host.
 pub(super) struct OnHost {
     shared: Arc<Shared>,
-    place: usize,
+    node: NodeId,
     /// Where the endpoint was made: what its tasks are called after.
     origin: &'static Location<'static>,
 }
 
 impl OnHost {
     pub(super) fn new(host: &Host, origin: &'static Location<'static>) -> Self {
-        Self { shared: Arc::clone(host.shared()), place: host.place(), origin }
+        Self { shared: Arc::clone(host.shared()), node: host.node(), origin }
     }
 }
 
@@ -40,8 +42,8 @@ impl Runtime for OnHost {
     fn spawn(&self, future: Pin<Box<dyn Future<Output = ()> + Send>>) {
         let running = context::expect_running("an endpoint works");
         // What a host starts while it goes down is gone with it.
-        if self.shared.lock().is_up(self.place) {
-            drop(running.tasks.spawn(Some(self.place), self.origin, future));
+        if self.shared.lock().is_up(self.node) {
+            drop(running.tasks.spawn(Some(self.node), self.origin, future));
         }
     }
 
@@ -51,13 +53,13 @@ impl Runtime for OnHost {
     }
 
     fn now(&self) -> StdInstant {
-        to_std(self.shared.lock().now)
+        to_std(self.shared.lock().now())
     }
 }
 
 impl fmt::Debug for OnHost {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("OnHost").field("place", &self.place).finish_non_exhaustive()
+        f.debug_struct("OnHost").field("node", &self.node).finish_non_exhaustive()
     }
 }
 

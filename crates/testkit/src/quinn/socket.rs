@@ -77,7 +77,7 @@ impl AsyncUdpSocket for VirtualSocket {
     }
 }
 
-/// Copies a datagram, cut off where the buffer ends, and says what is known of it.
+/// Copies a datagram, cut off where the buffer ends, and describes it.
 fn fill(buffer: &mut [u8], datagram: &Datagram) -> RecvMeta {
     let len = datagram.bytes.len().min(buffer.len());
     buffer[..len].copy_from_slice(&datagram.bytes[..len]);

@@ -1,4 +1,4 @@
-//! Who polls tasks and lets time pass.
+//! The executors: they poll tasks and let time pass.
 
 #[cfg(feature = "tokio")]
 pub(crate) mod on_tokio;

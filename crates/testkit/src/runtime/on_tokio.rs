@@ -1,4 +1,4 @@
-//! Tokio as the one who polls, with packets that arrive to the nanosecond.
+//! Tokio as the executor, with packets that arrive to the nanosecond.
 //!
 //! Tokio's paused clock jumps to the next of its timers whenever all tasks wait, and its timers are counted in whole milliseconds since the runtime was built. So
 //! the clock must be moved by hand within a millisecond, and back to a whole one before tokio is left to jump:
@@ -27,10 +27,11 @@ use cohaptic_units::Instant;
 use tokio::task::LocalSet;
 
 use super::own::{nothing_will_happen, time_stands_still};
-use crate::bed::{Bed, Recorded, Recorder};
+use crate::bed::{Bed, Recorder};
 use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
 use crate::task::{Spawner, Task, Tasks};
+use crate::wire::Recorded;
 
 /// A millisecond \[ns\]: what tokio's timers are counted in.
 const TICK: u64 = 1_000_000;
@@ -61,7 +62,7 @@ impl Idle {
     fn notice(&self, shared: &Shared) {
         let (now, next) = {
             let core = shared.lock();
-            (core.now, core.next_event())
+            (core.now(), core.next_event())
         };
         let mut state = self.lock();
         if state.armed == Some(armed(next)) && step(now, next).is_none() {
@@ -101,7 +102,7 @@ struct Local {
     panic: Rc<RefCell<Panic>>,
 }
 
-/// What a task has panicked with, and who is to be told.
+/// The panic of a task, and the waker of the run that is to be told.
 #[derive(Default)]
 struct Panic {
     payload: Option<Box<dyn std::any::Any + Send>>,
@@ -112,7 +113,7 @@ impl Spawner for Local {
     fn start(&self, task: Rc<Task>) {
         let (panic, shared) = (Rc::clone(&self.panic), Arc::clone(&self.shared));
         self.set.spawn_local(poll_fn(move |cx| {
-            // Tokio would keep a panic for whoever joins the task; a test is to fail.
+            // Tokio would keep a panic until the task is joined; a test is to fail.
             let poll = || {
                 let is_too_often = shared.lock().count_poll();
                 if is_too_often {
@@ -137,7 +138,13 @@ impl Spawner for Local {
 ///
 /// As [`Testbed::run`](crate::Testbed::run).
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
-pub(crate) fn run<T, F>(core: Core, hosts: usize, program: impl FnOnce(Bed) -> F, origin: &'static Location<'static>, recorded: &mut Recorded) -> T
+pub(crate) fn run<T, F>(
+    core: Core,
+    hosts: usize,
+    program: impl FnOnce(Bed) -> F,
+    origin: &'static Location<'static>,
+    recorded: &mut Option<Recorded>,
+) -> T
 where
     F: Future<Output = T> + 'static,
     T: 'static,
@@ -209,7 +216,7 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
         loop {
             let (now, next) = {
                 let core = shared.lock();
-                (core.now, core.next_event())
+                (core.now(), core.next_event())
             };
             if next.is_some_and(|next| next <= now) {
                 // Due: it was moved to, or has come by tokio's own jump.

@@ -91,7 +91,7 @@ impl Executor {
                 drop(core);
                 nothing_will_happen(shared, tasks);
             };
-            if next > core.now {
+            if next > core.now() {
                 polls = 0;
             }
             core.pass(next);
@@ -135,7 +135,7 @@ impl Executor {
 pub(crate) fn time_stands_still(shared: &Shared, polls: u64, last: Option<&Task>) -> ! {
     let (now, hosts) = {
         let core = shared.lock();
-        (core.now, core.plan.names().to_vec())
+        (core.now(), core.plan.names().to_vec())
     };
     let who = last.map_or_else(|| "a task that is over now".to_owned(), |task| Named { task, hosts: &hosts }.to_string());
     panic!(
@@ -155,7 +155,7 @@ pub(crate) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
     const SHOWN: usize = 8;
     let (now, hosts) = {
         let core = shared.lock();
-        (core.now, core.plan.names().to_vec())
+        (core.now(), core.plan.names().to_vec())
     };
     let waiting = tasks.waiting();
     let mut text = String::new();

@@ -23,7 +23,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Whether what is sent may be marked in place of being dropped: the two bits of ECN (RFC 3168) are not both zero.
+    /// Whether datagrams sent may be marked in place of being dropped: the two bits of ECN (RFC 3168) are not both zero.
     pub(super) fn is_ecn_capable(&self) -> bool {
         self.type_of_service.load(Ordering::Relaxed) & 0b11 != 0
     }
@@ -80,7 +80,7 @@ impl UdpSocket {
         self.option(|options| &options.type_of_service)
     }
 
-    /// Sets the type of service of IPv4. If its two lowest bits are not zero, an active queue marks what is sent where it would drop it otherwise (RFC 3168).
+    /// Sets the type of service of IPv4. If its two lowest bits are not zero, an active queue marks a datagram where it would drop it otherwise (RFC 3168).
     ///
     /// # Errors
     ///
@@ -201,7 +201,7 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// None: an error of the socket is given by what is called next.
+    /// None: an error of the socket is given by the next call.
     #[cfg(feature = "tokio")]
     pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         use tokio::io::Ready;

@@ -12,7 +12,7 @@ use super::UdpSocket;
 use crate::core::Datagram;
 
 impl UdpSocket {
-    /// Receives a datagram, whoever sent it; gives its length.
+    /// Receives a datagram from any sender; gives its length.
     ///
     /// # Errors
     ///
@@ -192,7 +192,7 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// None: an error of the socket is given by what is called next.
+    /// None: an error of the socket is given by the next call.
     pub async fn readable(&self) -> io::Result<()> {
         poll_fn(|cx| self.poll_recv_ready(cx)).await
     }

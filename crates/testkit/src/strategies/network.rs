@@ -176,7 +176,7 @@ impl ImpairedNetwork {
     #[cfg(feature = "scenes")]
     pub(super) fn without_host(&self, gone: usize) -> Self {
         let moved = |node: NodeId| {
-            let place = usize::try_from(node.0).unwrap_or(usize::MAX);
+            let place = node.index();
             (place != gone).then_some(NodeId(node.0 - u16::from(place > gone)))
         };
         let mut less = Self::ideal((self.hosts - 1).max(1));
@@ -190,7 +190,7 @@ impl ImpairedNetwork {
     }
 
     fn is_link(&self, from: NodeId, to: NodeId) -> bool {
-        let is_host = |node: NodeId| usize::try_from(node.0).is_ok_and(|node| node < self.hosts);
+        let is_host = |node: NodeId| node.index() < self.hosts;
         is_host(from) && is_host(to) && from != to
     }
 

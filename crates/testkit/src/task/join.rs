@@ -70,7 +70,7 @@ impl<T> Future for JoinHandle<T> {
 /// A program that leaves what comes out of a future in a state.
 pub(crate) fn joined<F: Future>(future: F) -> (impl Future<Output = ()>, Rc<RefCell<State<F::Output>>>) {
     let state = Rc::new(RefCell::new(State { outcome: None, waker: None }));
-    // Whatever becomes of the program, who waits for it is told.
+    // Whatever becomes of the program, the waiting task is told.
     let told = Told(Rc::clone(&state));
     let program = async move {
         let outcome = future.await;

@@ -1,4 +1,4 @@
-//! Tasks: futures that live on hosts, whoever polls them.
+//! Tasks: futures that live on hosts, with any executor.
 
 mod join;
 
@@ -13,6 +13,8 @@ use std::task::{Context, Poll, Waker};
 pub(crate) use join::joined;
 pub use join::{JoinHandle, TaskStopped};
 
+use cohaptic_wan::NodeId;
+
 use crate::context;
 
 /// What a task runs.
@@ -20,17 +22,17 @@ pub(crate) type Program = Pin<Box<dyn Future<Output = ()>>>;
 
 /// A task.
 pub(crate) struct Task {
-    host: Option<usize>,
+    host: Option<NodeId>,
     origin: &'static Location<'static>,
     program: RefCell<Option<Program>>,
     /// It was stopped while it was polled.
     is_doomed: Cell<bool>,
-    /// Whoever polls it last.
+    /// The waker of its last poll.
     waker: RefCell<Option<Waker>>,
 }
 
 impl Task {
-    fn new(host: Option<usize>, origin: &'static Location<'static>, program: Program) -> Rc<Self> {
+    fn new(host: Option<NodeId>, origin: &'static Location<'static>, program: Program) -> Rc<Self> {
         Rc::new(Self { host, origin, program: RefCell::new(Some(program)), is_doomed: Cell::new(false), waker: RefCell::new(None) })
     }
 
@@ -81,14 +83,14 @@ pub(crate) struct Named<'a> {
 
 impl fmt::Display for Named<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.task.host.and_then(|host| self.hosts.get(host)) {
+        match self.task.host.and_then(|host| self.hosts.get(host.index())) {
             Some(host) => write!(f, "the task of host `{host}` that was spawned at {}", self.task.origin),
             None => write!(f, "the task that was spawned at {}", self.task.origin),
         }
     }
 }
 
-/// Who polls tasks.
+/// An executor.
 pub(crate) trait Spawner {
     /// Polls a task from now on, until it is over.
     fn start(&self, task: Rc<Task>);
@@ -111,7 +113,7 @@ impl Tasks {
     }
 
     /// Starts a task on a host.
-    pub(crate) fn spawn<F>(&self, host: Option<usize>, origin: &'static Location<'static>, future: F) -> JoinHandle<F::Output>
+    pub(crate) fn spawn<F>(&self, host: Option<NodeId>, origin: &'static Location<'static>, future: F) -> JoinHandle<F::Output>
     where
         F: Future + 'static,
         F::Output: 'static,
@@ -121,7 +123,7 @@ impl Tasks {
         JoinHandle::new(state, Rc::downgrade(&task))
     }
 
-    fn start(&self, host: Option<usize>, origin: &'static Location<'static>, program: Program) -> Rc<Task> {
+    fn start(&self, host: Option<NodeId>, origin: &'static Location<'static>, program: Program) -> Rc<Task> {
         let task = Task::new(host, origin, program);
         let mut known = self.known.borrow_mut();
         // Now and then those that are over are forgotten: so that they are never more than twice those that run.
@@ -135,14 +137,14 @@ impl Tasks {
     }
 
     /// Starts the program of a host, and keeps it for [`Tasks::restart`].
-    pub(crate) fn set_program(&self, host: usize, origin: &'static Location<'static>, factory: Factory) {
-        self.factories.borrow_mut()[host] = Some((factory, origin));
+    pub(crate) fn set_program(&self, host: NodeId, origin: &'static Location<'static>, factory: Factory) {
+        self.factories.borrow_mut()[host.index()] = Some((factory, origin));
         self.restart(host);
     }
 
     /// Starts the program of a host again, if it has one.
-    pub(crate) fn restart(&self, host: usize) {
-        let factory = self.factories.borrow()[host].clone();
+    pub(crate) fn restart(&self, host: NodeId) {
+        let factory = self.factories.borrow()[host.index()].clone();
         if let Some((factory, origin)) = factory {
             let program = context::on_host(Some(host), || factory());
             self.start(Some(host), origin, program);
@@ -150,7 +152,7 @@ impl Tasks {
     }
 
     /// Stops all tasks of a host.
-    pub(crate) fn stop_all_of(&self, host: usize) {
+    pub(crate) fn stop_all_of(&self, host: NodeId) {
         // Dropping a program may spawn and stop others.
         let of_host: Vec<Rc<Task>> = self.known.borrow().iter().filter_map(Weak::upgrade).filter(|task| task.host == Some(host)).collect();
         of_host.iter().for_each(|task| task.stop());

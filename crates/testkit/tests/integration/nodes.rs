@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use cohaptic_testkit::node::{Node, NodeRun, Nodes, Packet, Transmit, address};
-use cohaptic_testkit::wan::{Chance, Checksum, Corruption, Flips, LinkConfig};
+use cohaptic_testkit::wan::{Chance, Checksum, Corruption, Flips, LinkConfig, NodeId, Path};
 use cohaptic_testkit::{Happening, Instant, Lost};
 use cohaptic_units::Probability;
 use proptest::prelude::*;
@@ -132,7 +132,7 @@ fn a_partition_costs_the_timeouts_that_it_lasts() {
     let lost = record.trace().events().iter().filter(|event| matches!(event.what, Happening::Lost { why: Lost::Cut, .. })).count();
     assert_eq!(lost as u64, run.counts("a").cut + run.counts("b").cut);
     assert_eq!(lost, 10 + 3 * 10);
-    assert!(record.trace().events().iter().any(|event| event.what == Happening::Mended(0, 1)));
+    assert!(record.trace().events().iter().any(|event| event.what == Happening::Mended(Path { from: NodeId(0), to: NodeId(1) })));
 }
 
 #[test]

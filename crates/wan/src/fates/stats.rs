@@ -57,13 +57,14 @@ impl LinkStats {
         self.flow.delivered
     }
 
-    /// Packets that this link marked: congestion experienced.
+    /// Packets, copies included, that left the stages of this link with a mark (congestion experienced); in a network without those that a line before had marked.
     #[must_use]
     pub const fn marked(&self) -> u64 {
         self.seldom.marked
     }
 
-    /// Packets of which this link flipped bits.
+    /// Packets, copies included, that left the stages of this link with flipped bits, whether or not the receiver's checksum discards them; in a network without
+    /// those that a line before had damaged. Damaged packets that a later stage dropped are not counted.
     #[must_use]
     pub const fn damaged(&self) -> u64 {
         self.seldom.damaged

@@ -17,7 +17,7 @@ pub enum Sojourn {
     Exponential(Duration),
     /// Uniform between two spans.
     Uniform(Duration, Duration),
-    /// The sum of so many exponential stages (at least 1), of that mean together: the more stages, the steadier.
+    /// The sum of this number of exponential stages (at least 1), with this mean of the sum: the more stages, the steadier.
     Erlang(Duration, u32),
 }
 

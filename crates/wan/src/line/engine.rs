@@ -10,7 +10,7 @@ use crate::line::staged::Staged;
 use crate::netem::kernel_link::KernelStage;
 use crate::packet::{Carried, Outputs};
 
-/// An engine and, after a change to one of another kind, those before it, until what is inside them has left.
+/// An engine and, after a change to one of another kind, those before it, until the packets inside them have left.
 #[derive(Clone, Debug)]
 pub(crate) struct Engine<T> {
     pub(crate) kind: Kind<T>,
@@ -49,7 +49,7 @@ impl<T: Clone> Engine<T> {
         Self { kind, retiring: Vec::new(), announced: None }
     }
 
-    /// Takes a packet, while so many are inside the link.
+    /// Takes a packet while `inside` others are inside the link.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
         match &mut self.kind {
             Kind::Staged(staged) => staged.offer(now, packet, inside, outputs),
@@ -83,7 +83,7 @@ impl<T: Clone> Engine<T> {
         }
     }
 
-    /// The same, if it was not said yet: for an owner who writes it down.
+    /// When [`Engine::pass`] must be called, if that was not said yet: for an owner that notes it.
     pub(crate) fn announce(&mut self) -> Option<Instant> {
         let next = self.next_at()?;
         if self.announced.is_some_and(|announced| announced <= next) {
@@ -93,7 +93,7 @@ impl<T: Clone> Engine<T> {
         Some(next)
     }
 
-    /// Another engine takes what comes from now on; what is inside goes on as it came in.
+    /// Another engine takes what comes from now on; packets inside go on in the engine that took them.
     pub(crate) fn replace(&mut self, kind: Kind<T>) {
         let before = core::mem::replace(&mut self.kind, kind);
         if before.next_at().is_some() {

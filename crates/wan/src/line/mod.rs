@@ -81,27 +81,33 @@ impl<P, T: Clone> Line<P, T> {
         self.pipeline.words(self.flow.offered)
     }
 
-    /// Whether the filter takes the packet, which is dropped then. Called before [`Line::offer`].
-    #[inline]
+    /// Whether the line has a filter.
+    #[inline(always)]
+    pub(crate) fn has_filter(&self) -> bool {
+        self.rare.as_ref().is_some_and(|rare| rare.filter.is_some())
+    }
+
+    /// Whether the filter takes the packet, which was offered then and is to be [dropped](Line::drop). Called before [`Line::offer`].
+    #[inline(never)]
     pub(crate) fn filters(&mut self, packet: &Offered<'_, P>) -> bool {
         let is_dropped = self.rare.as_ref().and_then(|rare| rare.filter.as_ref()).is_some_and(|filter| filter.drops(packet));
-        if is_dropped {
-            self.flow.offered += 1;
-            self.count_drop(DropCause::Filter);
-        }
+        self.flow.offered += u64::from(is_dropped);
         is_dropped
     }
 
-    /// Decides about the next packet, which has these words. What [enters](Outcome::Enters) the engine is handed to [`Line::enter`].
+    /// Decides about the next packet, whose first random words may have been drawn before. A packet that is [dropped](Outcome::Dropped) is told to [`Line::drop`], one that
+    /// [enters](Outcome::Enters) the engine is handed to [`Line::enter`].
     #[inline(always)]
-    pub(crate) fn offer(&mut self, now: Instant, words: Words) -> Outcome {
+    pub(crate) fn offer(&mut self, now: Instant, words: Option<Words>) -> Outcome {
         let number = self.flow.offered;
         self.flow.offered += 1;
-        let outcome = self.pipeline.offer(now, number, words);
-        if let Outcome::Dropped(cause) = outcome {
-            self.count_drop(cause);
-        }
-        outcome
+        self.pipeline.offer(now, number, words)
+    }
+
+    /// Counts a packet that is dropped.
+    #[inline(never)]
+    pub(crate) fn drop(&mut self, cause: DropCause) {
+        self.rare().seldom.dropped[cause.index()] += 1;
     }
 
     /// Hands the packet that was offered last to the engine, with the marks that lines before this one left on it.
@@ -145,25 +151,19 @@ impl<P, T: Clone> Line<P, T> {
         self.flow.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
     }
 
-    /// Counts a packet that the receiver's checksum discards.
-    #[cold]
-    pub(crate) fn discard(&mut self) {
-        self.count_drop(DropCause::Checksum);
-    }
-
     /// Whether packets may enter an engine, which must be woken.
     #[inline]
     pub(crate) const fn has_engine(&self) -> bool {
         matches!(self.pipeline, Pipeline::Engine(_))
     }
 
-    /// When the engine must be woken, for an owner who asks before every step.
+    /// When the engine must be woken, for an owner that asks before every step.
     #[inline]
     pub(crate) fn next_wake(&self) -> Option<Instant> {
         self.pipeline.next_wake()
     }
 
-    /// When the engine must be woken, if that was not said yet, for an owner who writes it down.
+    /// When the engine must be woken, if that was not said yet, for an owner that notes it.
     pub(crate) fn announce(&mut self) -> Option<Instant> {
         self.pipeline.engine()?.announce()
     }
@@ -183,7 +183,7 @@ impl<P, T: Clone> Line<P, T> {
                     sink.arrives(at, item, copy, marks);
                 }
                 Exit::Dropped(at, cause) => {
-                    self.count_drop(cause);
+                    self.drop(cause);
                     sink.happened(at, Fate::Dropped(cause), item, copy, marks);
                 }
                 Exit::Copied(at) => {
@@ -192,10 +192,6 @@ impl<P, T: Clone> Line<P, T> {
                 }
             }
         }
-    }
-
-    fn count_drop(&mut self, cause: DropCause) {
-        self.rare().seldom.dropped[cause.index()] += 1;
     }
 
     fn rare(&mut self) -> &mut Rare<P> {

@@ -1,4 +1,4 @@
-//! One link without what is on the way: what decides what becomes of a packet, compiled to the least that the link needs.
+//! The part of a line that decides what becomes of a packet, compiled to the least that the link needs.
 //!
 //! | link | compiled to |
 //! | --- | --- |
@@ -75,7 +75,7 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// The first random words of packet number `number`, which [`Pipeline::offer`] wants; zeros if it wants none.
+    /// The first random words of packet number `number`, which [`Pipeline::offer`] takes; zeros if it needs none.
     #[inline]
     pub(crate) fn words(&self, number: u64) -> Words {
         match self {
@@ -84,15 +84,18 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// Decides about packet number `number` of this link.
-    #[inline]
-    pub(crate) fn offer(&mut self, now: Instant, number: u64, words: Words) -> Outcome {
+    /// Decides about packet number `number` of this link, whose first words may have been drawn before.
+    #[inline(always)]
+    pub(crate) fn offer(&mut self, now: Instant, number: u64, words: Option<Words>) -> Outcome {
         match self {
             Self::Constant(delay, order) => Outcome::Arrives(order.arrival(now.saturating_add_nanos(*delay))),
-            Self::Direct(direct) => match direct.offer(now, number, words) {
-                Ok(at) => Outcome::Arrives(at),
-                Err(cause) => Outcome::Dropped(cause),
-            },
+            Self::Direct(direct) => {
+                let words = words.unwrap_or_else(|| direct.words(number));
+                match direct.offer(now, number, words) {
+                    Ok(at) => Outcome::Arrives(at),
+                    Err(cause) => Outcome::Dropped(cause),
+                }
+            }
             Self::Engine(_) => Outcome::Enters,
         }
     }

@@ -14,7 +14,7 @@ use crate::fates::record::PacketRecord;
 use crate::packet::damage::Damage;
 use crate::packet::{Carried, Exit, Output, Outputs};
 
-/// The log, and what is yet to happen of it other than arrivals.
+/// The log, and its events to come other than arrivals.
 #[derive(Clone, Debug)]
 pub(crate) struct ReplayStage<T> {
     log: Arc<FateLog>,

@@ -69,7 +69,7 @@ const NETEM: [Stage; 10] = [
     Stage::Slots,
 ];
 
-/// The stages of one link and what is in them.
+/// The stages of one line and the packets in them.
 #[derive(Clone, Debug)]
 pub(crate) struct Staged<T> {
     layout: &'static [Stage; 10],
@@ -204,7 +204,7 @@ impl<T: Clone> Staged<T> {
         &self.direct
     }
 
-    /// Takes a packet, while so many are inside.
+    /// Takes a packet while `inside` others are inside the line.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
         self.pass(now, outputs);
         self.walk(0, now, packet, inside, outputs);

@@ -1,7 +1,7 @@
 //! Words that mean what they say: the link that they ask for.
 //!
 //! Each option becomes the stage of the same name, in netem's order ([`Layout::Netem`]). Nothing is rounded to ticks and nothing wraps around.
-//! `docs/netem.md` says word by word what is meant, and what the kernel does instead.
+//! `docs/netem.md` says the meaning word by word, and what the kernel does instead.
 
 use alloc::sync::Arc;
 use core::time::Duration;
@@ -181,7 +181,7 @@ fn four_state(spec: &StateSpec) -> Result<FourState, ExactError> {
 
 fn gilbert_elliott(spec: &GemodelSpec) -> GilbertElliott {
     let [p, r, loss_in_bad, loss_in_good] = spec.probabilities();
-    // The words name what is lost, the model what gets through.
+    // The words name the fractions lost, the model the fractions that get through.
     let [p, r, h, k] = [p, r, 1.0 - loss_in_bad, 1.0 - loss_in_good].map(probability);
     GilbertElliott { p, r, h, k }
 }

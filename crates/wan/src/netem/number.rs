@@ -11,7 +11,7 @@ use super::Percent;
 /// A number and what stands behind it.
 struct Number<'a> {
     value: f64,
-    /// The same, if it was written as a plain integer: exact where the other is not.
+    /// The value if it was written as a plain integer: exact where the floating-point value is not.
     integer: Option<u128>,
     unit: &'a str,
 }

@@ -48,8 +48,8 @@ const SEED: &str = "a decimal number from 0 to 18446744073709551615";
 impl Netem {
     /// Reads the options of a netem, in any order: what stands behind `netem` in a command for `tc`.
     ///
-    /// Stricter than `tc`: nothing may be said twice, negative times, sizes and counts are refused, and so are zero where it would switch off what is
-    /// said (`gap 0`, a cell of 0, `rate 0`), rates below a byte per second, and chains whose ways out of a state sum to more than 1. More lenient:
+    /// Stricter than `tc`: nothing may be said twice, negative times, sizes and counts are refused, and so are zero where it would switch off
+    /// an impairment (`gap 0`, a cell of 0, `rate 0`), rates below a byte per second, and chains whose ways out of a state sum to more than 1. More lenient:
     /// `packets` and `bytes` of a slot may stand in either order, and `ns` is a unit of `delay` (as in iproute2 from 6.9 on; there a delay without
     /// unit is nanoseconds, here it is microseconds as in 6.6).
     ///

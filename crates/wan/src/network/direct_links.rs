@@ -1,4 +1,4 @@
-//! Many links that decide at once what becomes of a packet, for drivers that keep what is on the way themselves.
+//! Many links that decide at once what becomes of a packet, for drivers that keep the packets on the way themselves.
 
 use alloc::vec::Vec;
 
@@ -19,8 +19,8 @@ use crate::stages::order::Order;
 /// Links in which nothing waits: a constant delay, or outages, loss, delay with jitter and order. Each is a function from a packet to its arrival, with the
 /// memory that bursts and correlated delays need.
 ///
-/// It is what [`crate::Network`] compiles such links to, with the same random numbers at the same addresses and the same counters, without the queue of what
-/// is on the way: a driver that looks at arrivals on a lattice of its own has a better one. Whether a packet arrives in time to be counted as delivered is
+/// It is what [`crate::Network`] compiles such links to, with the same random numbers at the same addresses and the same counters, without the queue of packets
+/// on the way: a driver that looks at arrivals on a lattice of its own has a better one. Whether a packet arrives in time to be counted as delivered is
 /// known when it is offered, since the driver says until when it will look.
 ///
 /// Links are numbered from 0 as they are added. Those without memory take a cache line each.
@@ -46,7 +46,7 @@ pub struct Arrivals {
     pub at: [Instant; DirectLinks::AT_ONCE],
 }
 
-/// A link.
+/// A link: its counters, and where the rest of it is kept.
 #[derive(Clone, Debug)]
 struct LinkState {
     draws: Stream,
@@ -55,12 +55,12 @@ struct LinkState {
     delivered: u64,
     delay_nanos: u128,
     lost: u64,
-    is: Is,
+    memory: Memory,
 }
 
-/// Which of the kinds without memory, or of the links that remember.
+/// Whether the link remembers earlier packets: one of the kinds that do not, or one of the links that do.
 #[derive(Clone, Copy, Debug)]
-enum Is {
+enum Memory {
     Plain(u16),
     Remembering(u32),
 }
@@ -81,7 +81,7 @@ struct Remembering {
 }
 
 impl DirectLinks {
-    /// To so many links a packet is offered at once: a processor computes several at the same time.
+    /// Number of links to which a packet is offered at once: a processor computes several at the same time.
     pub const AT_ONCE: usize = 8;
 
     /// No links; packets that arrive by `until` will count as delivered.
@@ -98,37 +98,37 @@ impl DirectLinks {
     #[must_use]
     pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) -> bool {
         let Some(config) = model.as_fixed().filter(|_| model.is_direct()) else { return false };
-        let is = match self.kind(config) {
-            Some(kind) => Is::Plain(kind),
+        let memory = match self.kind(config) {
+            Some(kind) => Memory::Plain(kind),
             None => {
                 self.with_memory.push(Remembering { direct: Direct::new(seed, name, config), outage: 0 });
-                Is::Remembering(u32::try_from(self.with_memory.len() - 1).expect("fewer than 2^32 links fit into memory"))
+                Memory::Remembering(u32::try_from(self.with_memory.len() - 1).expect("fewer than 2^32 links fit into memory"))
             }
         };
         let draws = Stream::new(seed, name.as_str().as_bytes());
-        self.links.push(LinkState { draws, offered: 0, latest: Instant::ZERO, delivered: 0, delay_nanos: 0, lost: 0, is });
+        self.links.push(LinkState { draws, offered: 0, latest: Instant::ZERO, delivered: 0, delay_nanos: 0, lost: 0, memory });
         true
     }
 
-    /// Offers a packet to each of `count` links from `first` on, at most [`DirectLinks::AT_ONCE`], but for those whose bit is set in `but`, and writes into
+    /// Offers a packet to each of `count` links from `first` on, at most [`DirectLinks::AT_ONCE`], but for those whose bit is set in `excluded`, and writes into
     /// `arrivals` what becomes of them. Instants must not go back.
     ///
     /// # Panics
     ///
     /// If there are no such links.
     #[inline(always)]
-    pub fn offer(&mut self, now: Instant, first: LinkId, count: usize, but: u8, arrivals: &mut Arrivals) {
+    pub fn offer(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         (arrivals.arrive, arrivals.overtake) = (0, 0);
         let first = first.index();
         match &mut self.kinds[..] {
-            [(_, kind)] if self.with_memory.is_empty() => alike(kind, &mut self.links[first..first + count], now, self.until, but, arrivals),
-            _ => self.offer_one_by_one(now, first, count, but, arrivals),
+            [(_, kind)] if self.with_memory.is_empty() => alike(kind, &mut self.links[first..first + count], now, self.until, excluded, arrivals),
+            _ => self.offer_one_by_one(now, first, count, excluded, arrivals),
         }
     }
 
     #[inline(never)]
-    fn offer_one_by_one(&mut self, now: Instant, first: usize, count: usize, but: u8, arrivals: &mut Arrivals) {
-        for place in (0..count).filter(|place| but >> place & 1 == 0) {
+    fn offer_one_by_one(&mut self, now: Instant, first: usize, count: usize, excluded: u8, arrivals: &mut Arrivals) {
+        for place in (0..count).filter(|place| excluded >> place & 1 == 0) {
             let words = self.links[first + place].words(&self.kinds);
             arrivals.sequences[place] = self.links[first + place].offered;
             if let Some((at, overtakes)) = self.offer_one(now, first + place, words) {
@@ -159,10 +159,10 @@ impl DirectLinks {
     /// If there is no such link.
     #[must_use]
     pub fn stats(&self, link: LinkId) -> LinkStats {
-        let LinkState { offered, delivered, delay_nanos, lost, is, .. } = self.links[link.index()];
-        let outage = match is {
-            Is::Plain(_) => 0,
-            Is::Remembering(place) => self.with_memory[place as usize].outage,
+        let LinkState { offered, delivered, delay_nanos, lost, memory, .. } = self.links[link.index()];
+        let outage = match memory {
+            Memory::Plain(_) => 0,
+            Memory::Remembering(place) => self.with_memory[place as usize].outage,
         };
         LinkStats::counted(offered, delivered, delay_nanos, [(DropCause::Outage, outage), (DropCause::Loss, lost)])
     }
@@ -193,9 +193,9 @@ impl DirectLinks {
     fn offer_one(&mut self, now: Instant, link: usize, words: Words) -> Option<(Instant, bool)> {
         let link = &mut self.links[link];
         let sequence = link.offered;
-        let fate = match link.is {
-            Is::Plain(kind) => self.kinds[usize::from(kind)].1.fate(now, words, link.draws.packet(sequence)),
-            Is::Remembering(place) => {
+        let fate = match link.memory {
+            Memory::Plain(kind) => self.kinds[usize::from(kind)].1.fate(now, words, link.draws.packet(sequence)),
+            Memory::Remembering(place) => {
                 let Remembering { direct, outage } = &mut self.with_memory[place as usize];
                 match direct.offer(now, sequence, words) {
                     Ok(at) => Some(at),
@@ -215,7 +215,7 @@ impl DirectLinks {
 
 /// Offers a packet to neighbouring links of one kind: each step for all of them before the next.
 #[inline(always)]
-fn alike(kind: &mut Kind, links: &mut [LinkState], now: Instant, until: Instant, but: u8, arrivals: &mut Arrivals) {
+fn alike(kind: &mut Kind, links: &mut [LinkState], now: Instant, until: Instant, excluded: u8, arrivals: &mut Arrivals) {
     let mut words = [[0; 2]; DirectLinks::AT_ONCE];
     let Arrivals { sequences, at, .. } = arrivals;
     for (link, (words, sequence)) in links.iter().zip(words.iter_mut().zip(sequences)) {
@@ -226,7 +226,7 @@ fn alike(kind: &mut Kind, links: &mut [LinkState], now: Instant, until: Instant,
     }
     let (mut bit, mut arrive, mut overtake) = (1, 0, 0);
     for (link, (words, at)) in links.iter_mut().zip(words.into_iter().zip(at)) {
-        if but & bit == 0 {
+        if excluded & bit == 0 {
             let fate = kind.fate(now, words, link.draws.packet(link.offered));
             let overtakes = link.count(now, until, fate);
             if let Some(arrival) = fate {
@@ -295,9 +295,9 @@ impl LinkState {
     /// The first random words of the next packet; zeros if it needs none.
     #[inline(always)]
     fn words(&self, kinds: &[(LinkConfig, Kind)]) -> Words {
-        match self.is {
-            Is::Plain(kind) if !kinds[usize::from(kind)].1.is_random => [0; 2],
-            Is::Plain(_) | Is::Remembering(_) => self.draws.packet(self.offered).loss_and_jitter(),
+        match self.memory {
+            Memory::Plain(kind) if !kinds[usize::from(kind)].1.is_random => [0; 2],
+            Memory::Plain(_) | Memory::Remembering(_) => self.draws.packet(self.offered).loss_and_jitter(),
         }
     }
 }
@@ -344,12 +344,12 @@ mod tests {
         for number in 0..500_u64 {
             let now = Instant::from_nanos(number * 8_000_000);
             // Every third packet is not offered to the second link.
-            let but = if number % 3 == 0 { 0b10 } else { 0 };
-            for (place, link) in whole.iter_mut().enumerate().filter(|(place, _)| but >> place & 1 == 0) {
+            let excluded = if number % 3 == 0 { 0b10 } else { 0 };
+            for (place, link) in whole.iter_mut().enumerate().filter(|(place, _)| excluded >> place & 1 == 0) {
                 link.handle_packet(now, PacketInfo::from(Bytes::new(64)), 0).unwrap_or_else(|error| panic!("{place}: {error}"));
             }
             let mut offered = Arrivals::NONE;
-            links.offer(now, LinkId(0), direct.len(), but, &mut offered);
+            links.offer(now, LinkId(0), direct.len(), excluded, &mut offered);
             for place in offered.places() {
                 let so_far = &mut arrivals[place];
                 assert_eq!(offered.overtakes(place), so_far.iter().any(|(at, _)| *at > offered.at[place]));

@@ -38,7 +38,7 @@ impl LinkId {
     ///
     /// # Panics
     ///
-    /// With 2^32 or more: so many links fit into no memory.
+    /// From 2^32 on: no memory holds 2^32 links.
     #[must_use]
     #[inline]
     pub fn new(index: usize) -> Self {

@@ -131,7 +131,7 @@ impl Turn {
     #[inline(always)]
     pub(super) fn line(self) -> LineId {
         let number = self.0 & ((1 << NUMBER_BITS) - 1);
-        let node = NodeId(number as u16);
+        let node = NodeId::new(number as usize);
         match self.0 >> NUMBER_BITS {
             0 | 3 => LineId::Uplink(node),
             1 | 4 => LineId::Link(LinkId(number)),

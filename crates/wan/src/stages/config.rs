@@ -30,7 +30,7 @@ use crate::stages::{corruption, delay, loss, order, outage, path_trace, reorder,
 pub struct LinkConfig {
     /// The largest packet that the link takes; `None`: any.
     pub mtu: Option<Bytes>,
-    /// When the link is down. A packet offered meanwhile is dropped; what is already on the way arrives.
+    /// When the link is down. A packet offered meanwhile is dropped; packets already on the way arrive.
     pub outages: Outages,
     /// Which packets are lost. Loss stands before the queue: a lost packet uses no bandwidth.
     pub loss: Loss,

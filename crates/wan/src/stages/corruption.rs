@@ -16,7 +16,7 @@ use crate::packet::damage::Damage;
 use crate::parameters::{Form, Key, MOST_OF_32_BITS, Table, optional, usual};
 use crate::random::{PacketDraws, Purpose, unit};
 
-/// Which bits of which packets are flipped, and who notices.
+/// Which bits of which packets are flipped, and whether the receiver notices.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Corruption {
     /// How bits are chosen.
@@ -31,7 +31,7 @@ pub struct Corruption {
 /// How bits are chosen.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Flips {
-    /// Some packets are damaged, each of them in so many different bits, every set of them equally likely; in all bits if there are not so many.
+    /// Some packets are damaged, each of them in `count` different bits, every set of them equally likely; in all bits of a packet that has fewer.
     Bits {
         /// Which packets.
         packets: Chance,
@@ -52,7 +52,7 @@ pub enum Checksum {
     Passes,
 }
 
-/// So many bytes at the begin of a packet can be hit: the damage to a packet is a list, and a size alone takes no memory.
+/// Number of bytes at the begin of a packet that can be hit: the damage to a packet is a list, and a size alone takes no memory.
 const LONGEST: u64 = 1 << 16;
 
 /// The stage: the configuration and the answer before.
@@ -96,7 +96,7 @@ impl CorruptionStage {
     }
 }
 
-/// So many different numbers below `count`, every set equally likely (Floyd; Bentley & Floyd, CACM 30(9), 1987).
+/// `wanted` different numbers below `count`, every set equally likely (Floyd; Bentley & Floyd, CACM 30(9), 1987).
 fn some_of(count: u64, wanted: u32, packet: PacketDraws) -> Vec<u64> {
     let mut more = packet.more(Purpose::Corruption);
     let mut chosen = BTreeSet::new();

@@ -120,7 +120,7 @@ pub enum DelayError {
 const LONGEST: Duration = Duration::from_nanos(i64::MAX.unsigned_abs());
 
 impl Delay {
-    /// The same delay for every packet.
+    /// One delay for all packets.
     #[must_use]
     pub const fn constant(mean: Duration) -> Self {
         Self { mean, jitter: None }
@@ -262,7 +262,7 @@ impl DelayStage {
         self.draw_nanos_for(Purpose::Jitter, now, word, packet)
     }
 
-    /// The same from the words for another purpose.
+    /// A delay drawn from the words for another purpose.
     #[inline]
     pub(crate) fn draw_nanos_for(&mut self, purpose: Purpose, now: Instant, word: u64, packet: PacketDraws) -> u64 {
         match &self.law {

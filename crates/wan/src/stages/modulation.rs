@@ -144,7 +144,7 @@ pub struct Modulated {
 
 impl Modulated {
     /// A link that has the n-th configuration while the modulator is in its n-th state. A change of state is a live change: what propagates keeps its
-    /// delay, what is being sent keeps the bits already sent.
+    /// delay, a packet that is being sent keeps the bits already sent.
     ///
     /// # Errors
     ///

@@ -139,7 +139,7 @@ impl PathTrace {
         self.rows.last().map_or((Duration::ZERO, Probability::ZERO), |row| (Duration::from_nanos(row.delay_nanos), row.loss))
     }
 
-    /// The same recording with nothing left to chance: rows that do not lose everything lose nothing.
+    /// This recording without chance: rows that do not lose everything lose nothing.
     #[must_use]
     pub fn without_chance(&self) -> Self {
         let certain = |row: &Row| Row { loss: if row.loss == Probability::ONE { row.loss } else { Probability::ZERO }, ..*row };

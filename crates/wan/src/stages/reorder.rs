@@ -27,12 +27,12 @@ pub struct Reorder {
 /// How a packet leaves its place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Displacement {
-    /// It jumps ahead: it takes no delay at all and overtakes what is under way (netem's reordering). Only every `gap`-th packet may; 1: any.
+    /// It jumps ahead: it takes no delay at all and overtakes the packets under way (netem's reordering). Only every `gap`-th packet may; 1: any.
     Jump {
         /// How many packets there are from one that may jump to the next.
         gap: NonZeroU32,
     },
-    /// It is held back until so many later packets have passed it; 1 swaps two neighbours. If they do not come, it goes on after `at_most`.
+    /// It is held back until this number of later packets has passed it; 1 swaps two neighbours. If they do not come, it goes on after `at_most`.
     Behind {
         /// How many pass it.
         packets: NonZeroU32,

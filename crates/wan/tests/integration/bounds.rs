@@ -161,7 +161,7 @@ proptest! {
             4 => subject.handle_packet(later, left, nobody, Bytes::new(1), 0).unwrap_err(),
             5 => subject.set_link(later, nobody, left, changed).unwrap_err(),
             // Node 2^16 must not be taken for node 0.
-            _ => subject.handle_packet(later, NodeId(u16::MAX), right, Bytes::new(1), 0).unwrap_err(),
+            _ => subject.handle_packet(later, NodeId::new(1 << 16), right, Bytes::new(1), 0).unwrap_err(),
         };
         if let NetworkError::TimeWentBack(TimeWentBack { now: given, was, .. }) = error {
             prop_assert!(which < 3 && (given, was) == (past, now));

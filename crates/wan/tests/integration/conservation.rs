@@ -153,7 +153,7 @@ fn audit_network(plan: &Plan, network: &Network<Payload>, polled: &Ledger, offer
     let (mut in_flight, mut delivered) = (0, 0);
     let mut dropped_by_cause: BTreeMap<DropCause, u64> = BTreeMap::new();
     let mut add = |stats: &LinkStats| -> Result<(), TestCaseError> {
-        balance(&stats)?;
+        balance(stats)?;
         in_flight += stats.in_flight();
         for cause in DropCause::ALL {
             *dropped_by_cause.entry(cause).or_default() += stats.dropped(cause);

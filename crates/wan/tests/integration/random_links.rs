@@ -89,7 +89,7 @@ impl Plan {
     }
 
     pub(crate) fn node_ids(&self) -> impl Iterator<Item = NodeId> {
-        (0..self.nodes).map(|node| NodeId::new(node))
+        (0..self.nodes).map(NodeId::new)
     }
 }
 

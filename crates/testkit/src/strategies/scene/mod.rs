@@ -71,7 +71,7 @@ impl AnyScene {
     #[must_use]
     pub fn draft(&self) -> Draft {
         let mut draft = self.draft.clone();
-        let name = |node: cohaptic_wan::NodeId| usize::try_from(node.0).ok().and_then(|place| draft.peers.get(place)).map(|peer| peer.name.clone());
+        let name = |node: cohaptic_wan::NodeId| draft.peers.get(node.index()).map(|peer| peer.name.clone());
         let link = |(from, to, link): (_, _, &super::ImpairedLink)| {
             Some(DraftLink { from: name(from)?, to: name(to)?, keys: format!("netem = \"{link}\"") })
         };

@@ -10,7 +10,7 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Of what is not cut.
+    /// Those of a law that is not cut.
     pub(super) const STANDARD: Self = Self { mean: 0.0, sd: 1.0 };
 }
 

@@ -2,7 +2,7 @@
 //!
 //! c(k) are the coefficients of g(z) = F⁻¹(Φ(z)) in orthonormal Hermite polynomials, because two standard normals of correlation φ have
 //! E[he_j(X)·he_k(Y)] = φᵏ if j = k and else 0 (Mehler 1866). Smooth laws need some dozens of coefficients. A kink of g at a makes c(k)² fall like
-//! k^(−5/2), a jump like k^(−3/2); what is left after the last coefficient is known, because all squares add up to the variance, and is spread over the
+//! k^(−5/2), a jump like k^(−3/2); the remainder after the last coefficient is known, because all squares add up to the variance, and is spread over the
 //! higher orders by that power.
 
 use alloc::vec;

@@ -118,7 +118,7 @@ const LARGEST_NORMAL: f64 = 37.5;
 
 /// A law of delays: never below its floor, never infinite.
 ///
-/// Cloning is cheap. Making a gamma law takes about 0.1 ms and 13 kB, so many links with one law should share clones of it.
+/// Cloning is cheap. Making a gamma law takes about 0.1 ms and 13 kB, so links with the same law should share clones of it.
 #[derive(Clone, Debug)]
 pub struct Law {
     distribution: Distribution,
@@ -200,13 +200,13 @@ impl Law {
         self.tails(x).1
     }
 
-    /// The mean of what is delivered: the one asked for unless the law is cut at the floor or is a table.
+    /// The mean of the delays drawn: the one asked for unless the law is cut at the floor or is a table.
     #[must_use]
     pub const fn mean(&self) -> f64 {
         self.fit.delivered.mean
     }
 
-    /// The standard deviation of what is delivered: the one asked for unless the law is cut at the floor or is a table.
+    /// The standard deviation of the delays drawn: the one asked for unless the law is cut at the floor or is a table.
     #[must_use]
     pub const fn sd(&self) -> f64 {
         self.fit.delivered.sd

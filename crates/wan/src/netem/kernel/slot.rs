@@ -8,7 +8,7 @@ use super::prng::{Prng, Unseeded};
 use super::table::Table;
 use crate::netem::{SlotGap, SlotSpec};
 
-/// The slots of a qdisc, and what is left of the present one.
+/// The slots of a qdisc, and the packets and bytes that the present one still takes.
 #[derive(Clone, Debug)]
 pub(super) struct Slots {
     gap: Gap,

@@ -26,7 +26,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// [`DistTableError`] for what is no integer of 16 bits (`tc` would cut it off), no entry at all, or more than 16384.
+    /// [`DistTableError`] for an entry that is no integer of 16 bits (`tc` would cut it off), no entry at all, or more than 16384.
     pub fn parse(text: &str) -> Result<Self, DistTableError> {
         Ok(Self { entries: dist_file_entries(text)?.into() })
     }

@@ -91,7 +91,7 @@ fn losses() {
     assert_eq!(exact("loss state 50% 50% 0% 100% 50%"), loss(chain(0.5, 0.5, 0.0, 1.0, 0.5)));
     let model = |p_, r, h, k| Loss::GilbertElliott(GilbertElliott { p: p(p_), r: p(r), h: p(h), k: p(k) });
     assert_eq!(exact("loss gemodel 25%"), loss(model(0.25, 0.75, 0.0, 1.0)));
-    // The words say what is lost, 1 − h and 1 − k; the model what gets through.
+    // The words say the fractions lost, 1 − h and 1 − k; the model the fractions that get through.
     assert_eq!(exact("loss gemodel 1% 10% 75% 25%"), loss(model(0.01, 0.1, 0.25, 0.75)));
     let marks = LinkConfig { marks_instead_of_loss: true, ..loss(Loss::Independent(p(0.01))) };
     assert_eq!(exact("loss 1% ecn"), marks);

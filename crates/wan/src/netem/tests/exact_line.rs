@@ -1,4 +1,4 @@
-//! A line of words that do nearly everything, over a link: what is measured is what was said.
+//! A line of words that do nearly everything, over a link: the figures measured are those of the words.
 
 use core::time::Duration;
 

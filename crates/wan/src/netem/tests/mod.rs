@@ -1,4 +1,4 @@
-//! The words: what is read, what is refused and where, and that printing and reading are inverse.
+//! The words: which are read, which are refused and where, and that printing and reading are inverse.
 
 mod exact;
 mod exact_line;

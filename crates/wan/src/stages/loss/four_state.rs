@@ -48,7 +48,7 @@ pub enum FourStateError {
     Bursts(&'static str),
 }
 
-/// The same model in the words of a person: the parameters of Salsano et al., which tc calls GI.
+/// The four-state model by quantities that can be observed: the parameters of Salsano et al., which tc calls GI.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Bursts {
     /// The mean fraction lost.

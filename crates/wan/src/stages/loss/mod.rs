@@ -36,7 +36,7 @@ pub enum Loss {
     Correlated(Chance),
     /// Losses come in bursts: a Markov chain of a good and a bad state.
     GilbertElliott(GilbertElliott),
-    /// The same in continuous time: a burst is so long in seconds, not in packets.
+    /// The chain of a good and a bad state in continuous time: bursts have a mean length in seconds, not in packets.
     GilbertElliottInTime(GilbertElliottInTime),
     /// Bursts with packets received within, and losses between them.
     FourState(FourState),
@@ -45,7 +45,7 @@ pub enum Loss {
 }
 
 impl Loss {
-    /// The long-run fraction of packets lost, `None` where it depends on the start or on what is sent when.
+    /// The long-run fraction of packets lost, `None` where it depends on the start or on when packets are sent.
     #[must_use]
     pub fn mean(&self) -> Option<f64> {
         match self {

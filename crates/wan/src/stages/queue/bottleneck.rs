@@ -6,7 +6,7 @@
 //! ```
 //!
 //! What leaves in any window t is at most R·t plus one packet, because the service time is rounded up. A departure at an instant makes room for
-//! a packet that is offered at the same instant. A change of rate in the middle of a packet integrates the bits: what is already on the wire stays sent.
+//! a packet that is offered at the same instant. A change of rate in the middle of a packet integrates the bits: bits already on the wire stay sent.
 
 use super::limit::words_of_limit;
 use alloc::collections::VecDeque;
@@ -76,7 +76,7 @@ fn giga_bits(bytes: Bytes) -> u128 {
     u128::from(bytes.get()) * 8_000_000_000
 }
 
-/// The stage: what waits and what is on the line.
+/// The stage: the packets that wait, and the one on the line.
 #[derive(Clone, Debug)]
 pub(crate) struct BottleneckStage<T> {
     config: Bottleneck,
@@ -95,7 +95,7 @@ pub(crate) struct BottleneckStage<T> {
 #[derive(Clone, Debug)]
 struct InService<T> {
     packet: Carried<T>,
-    /// Since when what is left is sent at the present rate.
+    /// Since when the rest of the packet is sent at the present rate.
     since: Instant,
     /// What was left then, in 10⁻⁹ bit.
     left: u128,
@@ -151,7 +151,7 @@ impl<T> BottleneckStage<T> {
         self.in_service.as_ref().map(|service| service.next)
     }
 
-    /// What leaves the line `now`, which is the instant announced, and what is dropped.
+    /// The packets that leave the line `now`, which is the instant announced, and those that are dropped.
     pub(crate) fn release(&mut self, now: Instant, released: &mut VecDeque<Carried<T>>, outputs: &mut Outputs<T>) {
         let Some(service) = self.in_service.take() else { return };
         match &self.config.service {
@@ -179,7 +179,7 @@ impl<T> BottleneckStage<T> {
         }
     }
 
-    /// Changes rate, framing, limit and discipline. What waits keeps its place even beyond a smaller limit; what is on the line keeps the bits already
+    /// Changes rate, framing, limit and discipline. A packet that waits keeps its place even beyond a smaller limit; the one on the line keeps the bits already
     /// sent.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: Bottleneck) {
         if let (Some(service), Service::Rate(rate)) = (&mut self.in_service, &self.config.service) {
@@ -282,7 +282,7 @@ impl<T> BottleneckStage<T> {
         self.announce(now);
     }
 
-    /// Says when what is on the line leaves, from `now` on.
+    /// Says when the packet on the line leaves, from `now` on.
     fn announce(&mut self, now: Instant) {
         let Some(service) = &mut self.in_service else { return };
         service.since = now;
@@ -414,7 +414,7 @@ mod tests {
         assert_eq!(leaves(&mut stage, 9_999), [('a', 384)]);
     }
 
-    /// 100 bytes at 1, 2 and 2 ms, then again: 150 bytes need two opportunities, two packets of 40 share what is left with each other.
+    /// 100 bytes at 1, 2 and 2 ms, then again: 150 bytes need two opportunities, two packets of 40 share the rest.
     #[test]
     fn a_recorded_line_shares_its_opportunities() {
         let trace = DeliveryTrace::parse("1\n2\n2\n", Bytes::new(100)).unwrap();

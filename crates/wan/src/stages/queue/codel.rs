@@ -15,7 +15,7 @@ pub struct CoDel {
     pub target: Duration,
     /// How long it must be exceeded; 100 ms by custom, about the longest round trip.
     pub interval: Duration,
-    /// With no more than so many bytes waiting nothing is dropped: one packet of the largest size.
+    /// With at most this number of bytes waiting nothing is dropped: one packet of the largest size.
     pub mtu: Bytes,
     /// Whether a capable packet is marked where another is dropped.
     pub ecn: bool,

@@ -1,4 +1,4 @@
-//! A line whose capacity was recorded: instants at which it can deliver so many bytes (the format of mahimahi; Netravali et al., USENIX ATC 2015).
+//! A line whose capacity was recorded: instants at which it can deliver a fixed number of bytes (the format of mahimahi; Netravali et al., USENIX ATC 2015).
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;

@@ -11,9 +11,9 @@ use cohaptic_units::Bytes;
 /// How much may wait in a queue. What is being sent does not count.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum QueueLimit {
-    /// At most so many packets wait; with 0, a packet that finds the line busy is dropped.
+    /// At most this number of packets waits; with 0, a packet that finds the line busy is dropped.
     Packets(u64),
-    /// The packets that wait hold at most so many bytes together, framing not counted.
+    /// The packets that wait hold at most this number of bytes together, framing not counted.
     Bytes(Bytes),
     /// No packet waits longer than this: one whose turn would come later, at the present rate, is dropped.
     Time(Duration),

@@ -78,7 +78,7 @@ pub(crate) struct RedState {
 }
 
 impl RedState {
-    /// Decides about a packet that finds `queued` bytes waiting, after the line was idle for so many mean packets' time.
+    /// Decides about a packet that finds `queued` bytes waiting, after the line was idle for the time of `idle_packets` mean packets.
     pub(crate) fn verdict(&mut self, red: &Red, queued: u128, idle_packets: f64, ecn_capable: bool, word: u64) -> Verdict {
         #[expect(clippy::cast_precision_loss, reason = "an average")]
         let queued = queued as f64;

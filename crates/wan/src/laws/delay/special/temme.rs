@@ -2,7 +2,7 @@
 //!
 //! DLMF 8.12.7–8.12.10: C_k(η) = Σ d(k, n)·ηⁿ with d(0, n) = (n + 2)·α(n + 2), d(0, 0) = −1/3,
 //! d(k, n) = (−1)^k·g(k)·d(0, n) + (n + 2)·d(k − 1, n + 2), where λ − 1 = Σ α(n)·ηⁿ inverts ½η² = λ − 1 − ln λ and g(k) are Stirling's
-//! coefficients. Computed in rational numbers; what is below 2·10⁻¹⁹·50^k is left out. For a ≥ 50 and |η| ≤ 1 the error of the sum was 2·10⁻¹⁷.
+//! coefficients. Computed in rational numbers; terms below 2·10⁻¹⁹·50^k are left out. For a ≥ 50 and |η| ≤ 1 the error of the sum was 2·10⁻¹⁷.
 
 /// Where the expansion is used: a at least this,
 pub(super) const LEAST_SHAPE: f64 = 50.0;

@@ -98,7 +98,7 @@ fn every_gap_th_packet_is_reordered_when_all_are_to_be() {
     }
 }
 
-/// The mean distance of reordered packets is gap − 1 + 1/p: that many are delayed, then a draw for each.
+/// The mean distance of reordered packets is gap − 1 + 1/p: gap − 1 packets are delayed, then one after another with probability 1 − p.
 #[test]
 fn a_gap_makes_reordering_rarer_than_said() {
     let run = run("delay 10ms reorder 25% gap 5", 1, 100_000, MILLISECOND);

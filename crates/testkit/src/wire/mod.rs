@@ -1,0 +1,221 @@
+//! The wire between the hosts of a run: one network with its faults, its changes, and the record of its packets.
+//!
+//! Sockets ([`core`](crate::core)) and state machines ([`node`](crate::node)) hand packets in with [`Wire::offer`] and take those that arrive with
+//! [`Wire::poll`], until it gives `None`, after each packet and whenever time has passed.
+
+mod recording;
+
+use std::collections::VecDeque;
+
+use bytes::Bytes;
+use cohaptic_units::Instant;
+use cohaptic_wan::{Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketInfo, Path};
+
+pub(crate) use recording::{Recorded, Recording, Seen};
+
+use crate::file::LinkChange;
+use crate::seed::hash;
+use crate::trace::{Happening, Lost, PacketName};
+
+/// The settings of a run.
+#[derive(Clone, Debug)]
+pub(crate) struct Settings {
+    /// How many bytes of datagrams a socket holds that have not been read.
+    pub(crate) receive_buffer: usize,
+    /// Whether events are recorded.
+    pub(crate) traces: bool,
+    /// Whether the events have digests of the packets' bytes.
+    pub(crate) digests: bool,
+    /// Whether packets are recorded, with their bytes.
+    pub(crate) keeps_packets: bool,
+    /// How often tasks may be polled, or packets and timers handled, at one instant.
+    pub(crate) patience: u64,
+}
+
+/// What travels: bytes, and what its owner put around them.
+pub(crate) trait Parcel: Clone {
+    fn bytes(&self) -> &Bytes;
+    fn bytes_mut(&mut self) -> &mut Bytes;
+}
+
+/// A packet that its link has delivered.
+#[derive(Debug)]
+pub(crate) struct Arrival<P> {
+    pub(crate) packet: PacketName,
+    pub(crate) at: Instant,
+    /// With the damage that the link did to it.
+    pub(crate) parcel: P,
+    /// Whether an active queue marked it.
+    pub(crate) marked: bool,
+    /// Whether the way of the packet is cut, so that it is lost here.
+    pub(crate) is_cut: bool,
+}
+
+pub(crate) struct Wire<P> {
+    now: Instant,
+    hosts: usize,
+    network: Network<P>,
+    /// Links that become other ones, in order of time.
+    changes: VecDeque<LinkChange>,
+    /// By sender, then receiver: whether the way is cut.
+    cut: Vec<bool>,
+    /// By sender, then receiver: how many packets were offered.
+    offered: Vec<u64>,
+    recording: Recording,
+}
+
+impl<P: Parcel> Wire<P> {
+    pub(crate) fn new(
+        names: &[String],
+        seed: u64,
+        settings: &Settings,
+        changes: impl Into<VecDeque<LinkChange>>,
+        link: impl FnMut(NodeId, NodeId) -> LinkModel,
+    ) -> Self {
+        let config = NetworkConfig { seed, nodes: names.to_vec(), general: false };
+        Self {
+            now: Instant::ZERO,
+            hosts: names.len(),
+            network: Network::new(config, link),
+            changes: changes.into(),
+            cut: vec![false; names.len() * names.len()],
+            offered: vec![0; names.len() * names.len()],
+            recording: Recording::new(names.to_vec(), settings),
+        }
+    }
+
+    #[inline]
+    pub(crate) const fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// Sets the time, which does not go back, and says whether it has moved.
+    pub(crate) fn set_now(&mut self, now: Instant) -> bool {
+        let has_moved = now > self.now;
+        self.now = self.now.max(now);
+        has_moved
+    }
+
+    /// When the network must be woken, or a link changes.
+    pub(crate) fn next(&self) -> Option<Instant> {
+        let change = self.changes.front().map(|change| change.at);
+        [self.network.poll_timeout(), change].into_iter().flatten().min()
+    }
+
+    /// Changes the next link that is to change by now, and says whether there was one.
+    pub(crate) fn change_next(&mut self) -> bool {
+        if self.changes.front().is_none_or(|change| change.at > self.now) {
+            return false;
+        }
+        let Some(change) = self.changes.pop_front() else { return false };
+        self.set_link(change.at, Path { from: NodeId::new(change.from), to: NodeId::new(change.to) }, change.link);
+        true
+    }
+
+    /// Lets the events happen that are due on the links, and says whether there were any.
+    pub(crate) fn pass(&mut self) -> bool {
+        let is_due = self.network.poll_timeout().is_some_and(|at| at <= self.now);
+        if is_due {
+            let passed = self.network.handle_timeout(self.now);
+            debug_assert_eq!(passed, Ok(()), "time does not go back");
+        }
+        is_due
+    }
+
+    /// Hands a packet to its link. Fails with the packet's name if the way is cut.
+    pub(crate) fn offer(&mut self, path: Path, parcel: P, ecn_capable: bool) -> Result<(), Lost> {
+        let pair = self.pair(path);
+        let packet = PacketName { path, sequence: self.offered[pair], copy: 0 };
+        if self.cut[pair] {
+            // It does not reach the link, so that it uses up none of the link's numbers.
+            self.note(Happening::Lost { packet, why: Lost::Cut });
+            return Err(Lost::Cut);
+        }
+        let len = parcel.bytes().len();
+        if self.recording.traces {
+            let digest = if self.recording.digests { hash(parcel.bytes()) } else { 0 };
+            self.note(Happening::Sent { packet, len, digest });
+        }
+        self.offered[pair] += 1;
+        let info = PacketInfo { size: cohaptic_units::Bytes::new(len as u64), ecn_capable };
+        let offered = self.network.handle_packet(self.now, path.from, path.to, info, parcel);
+        debug_assert_eq!(offered, Ok(()), "hosts are checked, and time does not go back");
+        Ok(())
+    }
+
+    /// The next packet that has arrived. What becomes of it is told by [`Wire::ends`].
+    pub(crate) fn poll(&mut self) -> Option<Arrival<P>> {
+        loop {
+            let event = self.network.poll_event()?;
+            let packet = PacketName { path: event.path, sequence: event.sequence, copy: event.copy >> 1 };
+            self.recording.keep(&event, |parcel| parcel.bytes().clone());
+            match event.fate {
+                Fate::Delivered(at) => {
+                    let (marked, is_cut) = (event.marked, self.cut[self.pair(event.path)]);
+                    let mut parcel = event.payload;
+                    if let Some(damage) = &event.damage {
+                        // A copy of it may be on its way still, undamaged.
+                        let mut bytes = Vec::from(std::mem::take(parcel.bytes_mut()));
+                        damage.apply(&mut bytes);
+                        *parcel.bytes_mut() = bytes.into();
+                    }
+                    return Some(Arrival { packet, at, parcel, marked, is_cut });
+                }
+                Fate::Dropped(cause) => self.recording.note(event.at, Happening::Lost { packet, why: Lost::Link(cause) }),
+                Fate::Duplicated | _ => self.recording.note(event.at, Happening::Copied { packet }),
+            }
+        }
+    }
+
+    /// Notes whether a packet that its link has delivered has reached a program.
+    pub(crate) fn ends(&mut self, packet: PacketName, at: Instant, end: Result<(), Lost>) {
+        let what = match end {
+            Ok(()) => Happening::Arrived { packet },
+            Err(why) => Happening::Lost { packet, why },
+        };
+        self.recording.note(at, what);
+    }
+
+    /// Makes a link another one.
+    pub(crate) fn set_link(&mut self, at: Instant, path: Path, link: LinkModel) {
+        let changed = self.network.set_link(at, path.from, path.to, link);
+        debug_assert_eq!(changed, Ok(()), "hosts are checked, and time does not go back");
+        self.recording.note(at, Happening::Relinked(path));
+    }
+
+    pub(crate) fn set_cut(&mut self, path: Path, cut: bool) {
+        let pair = self.pair(path);
+        if path.from != path.to && std::mem::replace(&mut self.cut[pair], cut) != cut {
+            self.note(if cut { Happening::Cut(path) } else { Happening::Mended(path) });
+        }
+    }
+
+    pub(crate) fn mend_all(&mut self) {
+        let nodes = || (0..self.hosts).map(NodeId::new);
+        let paths: Vec<Path> = nodes().flat_map(|from| nodes().map(move |to| Path { from, to })).collect();
+        paths.into_iter().for_each(|path| self.set_cut(path, false));
+    }
+
+    /// `None` if both are one host.
+    pub(crate) fn link_stats(&self, path: Path) -> Option<LinkStats> {
+        self.network.link_stats(path.from, path.to)
+    }
+
+    #[inline]
+    pub(crate) fn note(&mut self, what: Happening) {
+        self.recording.note(self.now, what);
+    }
+
+    pub(crate) const fn recording(&self) -> &Recording {
+        &self.recording
+    }
+
+    /// What was recorded so far. Packets that are on their way are followed to their end, in the fates alone, as if nothing more were sent.
+    pub(crate) fn recorded(&self) -> Recorded {
+        self.recording.followed_through(&self.network, self.now, |parcel| parcel.bytes().clone())
+    }
+
+    const fn pair(&self, path: Path) -> usize {
+        path.from.index() * self.hosts + path.to.index()
+    }
+}
