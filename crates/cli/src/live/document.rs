@@ -10,17 +10,17 @@ use cohaptic_scene::Scene;
 use serde::Serialize;
 
 use crate::document_schema::document;
-use crate::documents::{AccessDocument, LatenessDocument, LinkDocument, PeerDocument, ending_name, micros};
+use crate::documents::{LatenessDocument, LinkDocument, access_line, ending_name, micros, peer};
 use crate::output;
 
 /// The answer of `cohaptic live --json`.
 pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
     let summary = &report.summary;
-    let peers = summary.peers.iter().enumerate().map(|(place, peer)| {
+    let peers = summary.peers.iter().enumerate().map(|(place, summary)| {
         document! {
             kind: scene.peers[place].kind.name(),
             #[serde(flatten)]
-            peer: PeerDocument::new(peer),
+            peer: peer(summary),
             #[serde(flatten)]
             seat: report.seats[place].as_ref().map(|seat| document! { seat: of_seat(seat) }),
         }
@@ -37,7 +37,7 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
         behind_us: micros(report.behind),
         peers: peers.collect::<Vec<_>>(),
         links: summary.links.iter().map(|link| LinkDocument::new(scene, link)).collect::<Vec<_>>(),
-        access_lines: summary.access_lines.iter().map(|line| AccessDocument::new(scene, line)).collect::<Vec<_>>(),
+        access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
         max_discrepancy_m: summary.max_discrepancy,
         #[serde(flatten)]
         admission: report.admission.as_ref().map(|(stats, socket)| document! { door: of_admission(stats, socket) }),
