@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::ExitCode;
 
+use cohaptic_files::{LimitedFile, MOST_CAPTURE_BYTES};
 use cohaptic_measure::fit::{self, Fitted, LossFit, LossModel, Measurements, Skew, captures};
-use cohaptic_scene::{LimitedFile, MOST_CAPTURE_BYTES};
 use cohaptic_units::print::Counted;
 use cohaptic_wan::{FateLog, FateRow};
 use serde::Serialize;
@@ -69,7 +69,7 @@ fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Fai
         let left = Matched { unmatched_sent: matched.unmatched_sent, unmatched_arrived: matched.unmatched_arrived, ambiguous: matched.ambiguous };
         return Ok((matched.measurements, Some(left)));
     }
-    let bytes = cohaptic_scene::read_bytes(path).map_err(|error| unreadable(path, error))?;
+    let bytes = cohaptic_files::read_bytes(path).map_err(|error| unreadable(path, error))?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", output::path(path)));
     if captures::is_capture(&bytes) {
         return Err(named(

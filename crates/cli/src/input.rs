@@ -4,7 +4,8 @@ use std::io::{self, Read as _};
 use std::path::Path;
 use std::sync::Mutex;
 
-use cohaptic_scene::{SceneError, file_text, text_of};
+use cohaptic_linkfile::reading::{file_text, text_of};
+use cohaptic_scene::SceneError;
 
 /// The most that is read from standard input \[bytes\]: far beyond any scene, far below the memory of a machine.
 const MOST: u64 = 64 << 20;

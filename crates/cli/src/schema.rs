@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use cohaptic_scene::schema::{FileSchema, json_schema};
+use cohaptic_scene::schema::FileSchema;
 
 use crate::arguments::{FileKind, SchemaArguments};
 use crate::failure::Failure;
@@ -15,6 +15,6 @@ pub(crate) fn schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
         FileKind::Relay => FileSchema::Relay,
         FileKind::Router => FileSchema::Router,
     };
-    output::raw(format!("{}\n", json_schema(kind)).as_bytes())?;
+    output::raw(format!("{}\n", kind.json()).as_bytes())?;
     Ok(ExitCode::SUCCESS)
 }

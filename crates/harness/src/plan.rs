@@ -38,7 +38,7 @@ pub(crate) enum Ticking {
 pub(crate) enum DeviceChoice {
     /// The device is simulated.
     Simulated,
-    /// NoRemote moves it and it touches nothing.
+    /// Nobody moves it and it touches nothing.
     Resting,
     /// It touches nothing and nobody looks at it.
     Unobserved,

@@ -77,6 +77,7 @@ mod tests {
     #[test]
     fn what_was_written_is_read_back_whatever_the_order() {
         let record = |sequence, at, fate| PacketRecord {
+            path: (),
             sequence,
             copy: 0,
             offered: Instant::from_nanos(sequence),

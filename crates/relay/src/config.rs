@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::net::SocketAddr;
 
-use cohaptic_scene::{LinkTable, RelayFile, RelayLimits};
+use cohaptic_linkfile::{LinkTable, RelayFile, RelayLimits};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, NodeId};
 
@@ -128,7 +128,7 @@ impl From<RelayFile> for RelayConfig {
         let programs = file.programs.into_iter().map(|program| Program { name: program.name, port: program.port, address: program.address });
         let changes = file.timeline.into_iter().map(|change| {
             let link = change.link;
-            Change { at: change.at, from: node(link.from), to: node(link.to), model: (*link.config).clone() }
+            Change { at: change.at, from: NodeId::new(link.from), to: NodeId::new(link.to), model: (*link.config).clone() }
         });
         Self {
             seed: file.seed,
@@ -156,7 +156,7 @@ impl RelayConfig {
     /// The link from one node to another.
     pub(crate) fn link(&self, from: NodeId, to: NodeId) -> LinkModel {
         match &self.form {
-            Form::Mesh(mesh) => mesh.links.between(from.0 as usize, to.0 as usize).clone(),
+            Form::Mesh(mesh) => mesh.links.between(from.index(), to.index()).clone(),
             Form::Proxy(proxy) => if from.0 == 0 { &proxy.forth } else { &proxy.back }.clone(),
         }
     }
@@ -169,14 +169,10 @@ impl RelayConfig {
             Form::Mesh(mesh) => mesh.programs.len(),
             Form::Proxy(_) => 2,
         };
-        let is_link = |from: NodeId, to: NodeId| from != to && (from.0 as usize) < nodes && (to.0 as usize) < nodes;
+        let is_link = |from: NodeId, to: NodeId| from != to && (from.index()) < nodes && (to.index()) < nodes;
         match self.changes.iter().find(|change| !is_link(change.from, change.to)) {
             Some(Change { from, to, .. }) => Err(ConfigError::NoLink { from: *from, to: *to }),
             None => Ok(()),
         }
     }
-}
-
-pub(crate) fn node(place: usize) -> NodeId {
-    NodeId(u32::try_from(place).unwrap_or(u32::MAX))
 }

@@ -13,13 +13,13 @@
 //! It does not answer, fragment or route packets, and does not count hops: hosts see a wire. Other frames (ARP) cross at once. Linux only. Nothing here
 //! prints.
 //!
-//! Read [`Engine`] first, then [`Router`]. The file is [`cohaptic_scene::router_file::RouterFile`].
+//! Read [`Engine`] first, then [`Router`]. The file is [`cohaptic_linkfile::router::RouterFile`].
 //!
 //! ```
 //! use std::path::Path;
 //!
 //! use cohaptic_router::{Engine, Framing, Packet};
-//! use cohaptic_scene::router_file::{RouterFile, Side};
+//! use cohaptic_linkfile::router::{RouterFile, Side};
 //! use cohaptic_units::Instant;
 //!
 //! let text = r#"
@@ -39,7 +39,7 @@
 //! let departure = engine.poll_departure().expect("it has arrived");
 //! assert_eq!((departure.at.as_nanos(), departure.to), (24_000_000, Side::Right));
 //! assert_eq!(departure.packet.bytes(), bytes);
-//! # Ok::<(), cohaptic_scene::SceneError>(())
+//! # Ok::<(), cohaptic_linkfile::SceneError>(())
 //! ```
 
 mod engine;

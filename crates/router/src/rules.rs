@@ -1,6 +1,6 @@
 //! Which packet goes where: the first rule that applies to it decides, and if none does, the default of the side that it comes from.
 
-use cohaptic_scene::router_file::{Ports, RouterFile, RuleSpec, Side, Target};
+use cohaptic_linkfile::router::{Ports, RouterFile, RuleSpec, Side, Target};
 
 use crate::packet::Headers;
 

@@ -1,78 +1,14 @@
 //! What a scene says: as one number, and key by key, so that a record can tell whether it belongs to a scene and, if it does not, what differs.
 
-use core::fmt::{self, Write as _};
-use core::str::FromStr;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::SceneError;
+use cohaptic_linkfile::document::{Node, Sources, Value, join, key_text, value_text};
+use cohaptic_linkfile::reading::{Parsed, with_text};
+use cohaptic_linkfile::{FileError, Fingerprint};
+
 use crate::model::Scene;
-use crate::read::{parse_whole, with_text};
-use crate::source::Sources;
-use crate::toml_text::{key_text, value_text};
-use crate::tree::{Node, Value, join};
-
-/// A number that other texts do not have: FNV-1a of 64 bits (Fowler, Noll & Vo 1991). It is no protection against malice.
-///
-/// Its display form is 16 hexadecimal digits, which it is read from again.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub struct Fingerprint(u64);
-
-impl Fingerprint {
-    const NONE: Self = Self(0xcbf2_9ce4_8422_2325);
-
-    /// That of a text.
-    #[must_use]
-    pub fn of(text: impl fmt::Display) -> Self {
-        let mut fingerprint = Self::NONE;
-        // Writing a number does not fail.
-        let _ = write!(fingerprint, "{text}");
-        fingerprint
-    }
-
-    /// That of bytes.
-    #[must_use]
-    pub fn of_bytes(bytes: &[u8]) -> Self {
-        Self::NONE.and(bytes)
-    }
-
-    /// As a number.
-    #[must_use]
-    pub const fn get(self) -> u64 {
-        self.0
-    }
-
-    fn and(self, bytes: &[u8]) -> Self {
-        Self(bytes.iter().fold(self.0, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)))
-    }
-}
-
-impl fmt::Write for Fingerprint {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        *self = self.and(text.as_bytes());
-        Ok(())
-    }
-}
-
-impl fmt::Display for Fingerprint {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:016x}", self.0)
-    }
-}
-
-/// A text is no fingerprint.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("expected 16 hexadecimal digits")]
-pub struct FingerprintError;
-
-impl FromStr for Fingerprint {
-    type Err = FingerprintError;
-
-    fn from_str(text: &str) -> Result<Self, FingerprintError> {
-        let digits = text.len() == 16 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
-        u64::from_str_radix(text, 16).ok().filter(|_| digits).map(Self).ok_or(FingerprintError)
-    }
-}
+use crate::read::parse_scene;
 
 impl Scene {
     /// That of all that the scene says, and that the files say which it names. The same scene under another name, in another folder, with other words for the
@@ -100,7 +36,7 @@ pub struct SceneContent {
 /// # Errors
 ///
 /// As [`Scene::read_live`].
-pub fn scene_content(path: &Path, overrides: &[String]) -> Result<SceneContent, SceneError> {
+pub fn scene_content(path: &Path, overrides: &[String]) -> Result<SceneContent, FileError> {
     with_text(path, |text| scene_content_of_text(text, path, overrides))
 }
 
@@ -109,8 +45,8 @@ pub fn scene_content(path: &Path, overrides: &[String]) -> Result<SceneContent, 
 /// # Errors
 ///
 /// As [`Scene::parse_live`].
-pub fn scene_content_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<SceneContent, SceneError> {
-    let (_, document, files) = parse_whole(Sources { file, text, overrides }, true)?;
+pub fn scene_content_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<SceneContent, FileError> {
+    let Parsed { document, files, .. } = parse_scene(Sources { file, text, overrides }, true, &mut |_, _, _| ())?;
     let mut keys = BTreeMap::new();
     collect(&document, "", &mut keys);
     keys.retain(|key, _| key != "scene.title" && key != "expect" && !key.starts_with("expect."));
@@ -174,19 +110,6 @@ mod tests {
         std::fs::write(folder.path().join("hand.csv"), "t,fx\n0,1\n").unwrap();
         let file = folder.path().join("two.toml");
         (folder, file)
-    }
-
-    /// The published values of FNV-1a of 64 bits (Fowler, Noll & Vo; `draft-eastlake-fnv`, appendix C).
-    #[test]
-    fn fingerprints_are_fnv_1a() {
-        for (text, number) in [("", 0xcbf2_9ce4_8422_2325), ("a", 0xaf63_dc4c_8601_ec8c), ("foobar", 0x8594_4171_f739_67e8)] {
-            assert_eq!(Fingerprint::of(text).get(), number);
-            assert_eq!(Fingerprint::of_bytes(text.as_bytes()).get(), number);
-        }
-        assert_eq!("85944171f73967e8".parse(), Ok(Fingerprint::of("foobar")));
-        for text in ["", "85944171f73967e", "85944171f73967e80", "+5944171f73967e8", "85944171f73967eg"] {
-            assert_eq!(text.parse::<Fingerprint>(), Err(FingerprintError), "{text}");
-        }
     }
 
     #[test]

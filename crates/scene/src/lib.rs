@@ -7,7 +7,7 @@
 //! It does not run a scene. The fields of a [`Scene`] have gains as written; [`Scene::peer_config`] gives the parts of a peer with every scaling applied. Nothing
 //! here is printed.
 //!
-//! Read [`Scene::parse`] first, then [`Scene`]. The file of a router, which has links but no people, is a [`router_file::RouterFile`].
+//! Read [`Scene::parse`] first, then [`Scene`]. The document, its faults and the links are those of `cohaptic-linkfile`.
 //!
 //! ```
 //! use std::path::Path;
@@ -28,44 +28,23 @@
 //! # Ok::<(), cohaptic_scene::SceneError>(())
 //! ```
 
-mod address;
 mod assembly;
 mod content;
 mod context;
-mod error;
-mod excerpt;
 mod link_keys;
-mod link_table;
 mod model;
-mod names;
-mod overrides;
-mod quantity_text;
+mod quantities;
 mod read;
-mod relay_file;
-pub mod router_file;
 mod scaling;
 pub mod schema;
 mod sections;
-mod source;
 mod strategies;
-mod table_reader;
 #[cfg(test)]
 mod tests;
-mod toml_text;
-mod tree;
-mod values;
 
-pub use address::{AddressError, address};
-pub use cohaptic_files::{LimitedFile, MOST_BYTES, MOST_CAPTURE_BYTES, read_bytes};
-pub use content::{Fingerprint, FingerprintError, SceneContent, scene_content, scene_content_of_text};
-pub use error::{Diagnostic, SceneError};
-pub use link_keys::{
-    KeysOfLinks, LinkKeys, link_from_keys, link_key_changes, link_key_changes_of_text, link_keys, link_keys_of_text, relay_link_keys,
-    relay_link_keys_of_text,
-};
-pub use link_table::LinkTable;
+pub use cohaptic_linkfile::{Diagnostic, FileError as SceneError, Fingerprint, KeysOfLinks, LinkChange, LinkKeys, LinkSelector, LinkTable};
+pub use content::{SceneContent, scene_content, scene_content_of_text};
+pub use link_keys::{link_key_changes_of_text, link_keys, link_keys_of_text};
 pub use model::*;
-pub use quantity_text::{number_and_unit, text_of_quantity};
-pub use read::{at_peer, file_text, scene_files, text_of};
-pub use relay_file::{RelayChange, RelayFile, RelayLimits, RelayProgram};
+pub use read::{at_peer, scene_files};
 pub use strategies::{FromScene, Strategies};

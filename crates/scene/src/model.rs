@@ -2,13 +2,13 @@
 
 use core::time::Duration;
 use std::path::PathBuf;
-use std::sync::Arc;
 
+use cohaptic_peer::coordination::LawSettings;
 use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::{DropCause, LinkModel};
 
-use crate::LinkTable;
+use cohaptic_linkfile::{LinkChange, LinkSelector, LinkTable};
 
 /// A scene, ready to be run. Every number in it has been checked; every peer it names exists.
 #[derive(Clone, PartialEq, Debug)]
@@ -99,6 +99,8 @@ pub struct CoordinationSpec {
     pub scaling: Scaling,
     /// KT and BT as written, before scaling.
     pub gains: Gains,
+    /// The parameters that strategies have of their own, of every strategy.
+    pub settings: LawSettings,
     /// The period of sending, Tn; a whole multiple of every peer's tick, on its own clock.
     pub update: Duration,
 }
@@ -251,17 +253,6 @@ pub enum ChangeKind {
     Coordination(Gains),
 }
 
-/// One link with its new configuration.
-#[derive(Clone, PartialEq, Debug)]
-pub struct LinkChange {
-    /// The sender's place in [`Scene::peers`].
-    pub from: usize,
-    /// The receiver's place in [`Scene::peers`].
-    pub to: usize,
-    /// From now on.
-    pub config: Arc<LinkModel>,
-}
-
 /// What must come out of a run for `cohaptic check` to pass. Absent entries are not looked at.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Expect {
@@ -344,22 +335,4 @@ pub struct ExpectDelay {
     pub min: Option<Duration>,
     /// At most this.
     pub max: Option<Duration>,
-}
-
-/// Which links are meant, by the places of peers in [`Scene::peers`].
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum LinkSelector {
-    /// All links between peers.
-    All,
-    /// One directed link.
-    Between {
-        /// The sender.
-        from: usize,
-        /// The receiver.
-        to: usize,
-    },
-    /// The line that a peer sends through.
-    Uplink(usize),
-    /// The line that a peer receives through.
-    Downlink(usize),
 }

@@ -36,9 +36,17 @@ pub enum AnalysisError {
         /// How many are looked at at most.
         most: u128,
     },
-    /// The strategy is not average-position coordination in another form.
+    /// The strategy has no linear form.
     #[error("{strategy} coordination cannot be taken apart by equal peers: only the general path follows it")]
     OtherStrategy {
+        /// Its name.
+        strategy: &'static str,
+    },
+    /// Ages of samples between clocks that differ.
+    #[error(
+        "{strategy} coordination uses the ages of samples, which do not repeat where clocks differ: expected one tick, offset and drift for all peers"
+    )]
+    AgesByClocks {
         /// Its name.
         strategy: &'static str,
     },

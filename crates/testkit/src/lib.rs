@@ -45,8 +45,8 @@
 //! | `strategies` | yes | strategies of proptest for links and networks, and `proptest` itself |
 //! | `tokio` | yes | `Testbed::on_tokio`, for programs that use tokio's timers and tasks, and the methods of sockets whose arguments are of tokio's types |
 //! | `pcapng` | yes | captures among what a failed test leaves behind |
-//! | `files` | | scene files and relay files (TOML) as hosts and links; files of plain words need no feature |
-//! | `scenes` | | scene files as tests, and strategies for scenes of coordination; brings `files` and `strategies` |
+//! | `files` | | relay files (TOML) as hosts and links; files of plain words need no feature |
+//! | `scenes` | | scene files as hosts and links and as tests, and strategies for scenes of coordination; brings `files` and `strategies` |
 //! | `quinn` | | QUIC by quinn, and `quinn` itself |
 //!
 //! # Variables of the environment

@@ -19,6 +19,7 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
+use cohaptic_units::Excerpt;
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{FateLog, LinkModel};
 
@@ -39,24 +40,21 @@ pub(crate) struct Words {
 /// Why a text says no links, and where.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct WordsError {
-    line: usize,
-    column: usize,
+    excerpt: Excerpt,
     message: String,
-    shown: String,
-    width: usize,
 }
 
 impl WordsError {
     /// The line, from 1.
     #[must_use]
     pub const fn line(&self) -> usize {
-        self.line
+        self.excerpt.line
     }
 
     /// The column, from 1, in characters.
     #[must_use]
     pub const fn column(&self) -> usize {
-        self.column
+        self.excerpt.column
     }
 
     /// What is wrong, and what was expected.
@@ -71,10 +69,9 @@ impl std::error::Error for WordsError {}
 impl fmt::Display for WordsError {
     /// The place, the message, and the line with the place marked.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { line, column, message, shown, width } = self;
-        let margin = line.to_string().len();
-        let (before, width) = (column - 1, *width.max(&1));
-        write!(f, "{line}:{column}: {message}\n{:margin$} |\n{line} | {shown}\n{:margin$} | {:before$}{:^<width$}", "", "", "", "")
+        let Excerpt { line, column, .. } = self.excerpt;
+        writeln!(f, "{line}:{column}: {}", self.message)?;
+        self.excerpt.write(f, true)
     }
 }
 
@@ -98,9 +95,9 @@ pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, Str
 }
 
 fn locate(number: usize, line: &str, (span, message): Fault) -> WordsError {
-    let shown: String = line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    let characters = |range: Range<usize>| line.get(range).map_or(0, |part| part.chars().count());
-    WordsError { line: number, column: characters(0..span.start) + 1, message, shown, width: characters(span) }
+    let mut excerpt = Excerpt::new(line, span);
+    excerpt.line = number;
+    WordsError { excerpt, message }
 }
 
 #[derive(Debug, Default)]

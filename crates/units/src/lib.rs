@@ -20,6 +20,7 @@
 
 extern crate alloc;
 
+mod excerpt;
 mod frequency;
 mod instant;
 pub mod parse;
@@ -29,6 +30,7 @@ mod rate;
 mod size;
 mod visible;
 
+pub use excerpt::{Excerpt, Spot};
 pub use frequency::{Hertz, RadPerSec};
 pub use instant::Instant;
 pub use parse::ParseError;

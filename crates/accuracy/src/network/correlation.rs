@@ -84,7 +84,7 @@ fn delays(model: &LinkModel, seed: u64, packets: usize) -> Vec<f64> {
     let mut note = |link: &mut Link<usize>| {
         while let Some(event) = link.poll_event() {
             if let Fate::Delivered(at) = event.fate {
-                delays[event.payload] = at.saturating_duration_since(event.sent).as_secs_f64();
+                delays[event.payload] = at.saturating_duration_since(event.offered).as_secs_f64();
             }
         }
     };

@@ -1,6 +1,6 @@
 //! `LOW..HIGH/COUNT` and `LOW..HIGH/COUNT:log`.
 
-use cohaptic_scene::{number_and_unit, text_of_quantity};
+use cohaptic_linkfile::{number_and_unit, text_of_quantity};
 
 use super::{MOST_VALUES, Varied, VaryError};
 use crate::table::Value;

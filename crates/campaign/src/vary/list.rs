@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cohaptic_scene::number_and_unit;
+use cohaptic_linkfile::number_and_unit;
 
 use super::{MOST_VALUES, Varied, VaryError};
 use crate::table::{Kind, Value};

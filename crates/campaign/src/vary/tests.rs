@@ -108,7 +108,7 @@ proptest::proptest! {
             if let Ok(vary) = Variation::parse(&text) {
                 for value in vary.values() {
                     if let Value::Number(number) = value.value {
-                        let read = cohaptic_scene::number_and_unit(value.text.trim_matches(['"', '\''])).unwrap().0;
+                        let read = cohaptic_linkfile::number_and_unit(value.text.trim_matches(['"', '\''])).unwrap().0;
                         proptest::prop_assert_eq!((read + 0.0).to_bits(), number.to_bits());
                     }
                 }

@@ -2,7 +2,7 @@
 
 use std::net::{SocketAddr, ToSocketAddrs as _};
 
-use cohaptic_scene::{AddressError, address};
+use cohaptic_linkfile::{AddressError, address};
 
 /// An address with a port. Of several that a name has, the first of IPv4 is taken, or else the first: both ends of a relay are then of one kind.
 pub(crate) fn looked_up(text: &str) -> Result<SocketAddr, String> {

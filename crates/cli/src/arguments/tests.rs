@@ -98,8 +98,8 @@ fn the_help_of_relay_router_and_run_shows_keys_that_they_have() {
         for set in shown {
             let set = std::slice::from_ref(&set);
             let read = match name {
-                "cohaptic relay" => cohaptic_scene::RelayFile::parse(relay, path, set).map(drop),
-                "cohaptic router" => cohaptic_scene::router_file::RouterFile::parse(router, path, set).map(drop),
+                "cohaptic relay" => cohaptic_linkfile::RelayFile::parse(relay, path, set).map(drop),
+                "cohaptic router" => cohaptic_linkfile::router::RouterFile::parse(router, path, set).map(drop),
                 _ => cohaptic_scene::Scene::parse(scene, path, set).map(drop),
             };
             read.unwrap_or_else(|error| panic!("{name}: {error}"));

@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_scene::schema::{FileSchema, Form, Key, Need, Table};
+use cohaptic_linkfile::schema::{Form, Key, Need, Table};
+use cohaptic_scene::schema::FileSchema;
 use toml::Value;
 
 /// Where comments begin, if the line before them is not longer.

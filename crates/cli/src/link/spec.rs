@@ -3,9 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use cohaptic_linkfile::link_from_keys;
 use cohaptic_measure::asked::Asked;
 use cohaptic_measure::fates::{self, ReadError};
-use cohaptic_scene::{LinkKeys, link_from_keys};
+use cohaptic_scene::LinkKeys;
 use cohaptic_wan::law::DistTable;
 use cohaptic_wan::netem::kernel::Table;
 use cohaptic_wan::netem::{ExactError, Netem, TableName};

@@ -44,14 +44,14 @@ mod tests {
 
     #[test]
     fn both_delays_are_said_and_that_it_was_changed() {
-        let model = cohaptic_scene::link_from_keys(&["delay=24ms".to_owned()]).unwrap();
+        let model = cohaptic_linkfile::link_from_keys(&["delay=24ms".to_owned()]).unwrap();
         let mut link = Link::new(0, &LinkName::between("a", "b"), model.clone());
         let asked = ConfiguredDelay::of(&model);
-        assert_eq!(asked.beside(link.stats()), None, "nothing was delivered yet");
+        assert_eq!(asked.beside(&link.stats()), None, "nothing was delivered yet");
         link.handle_packet(Instant::ZERO, PacketInfo { size: Bytes::new(1), ecn_capable: false }, ()).unwrap();
         link.handle_timeout(Instant::from_nanos(24_000_000)).unwrap();
-        assert_eq!(asked.beside(link.stats()).unwrap(), "mean delay 24.000 ms, asked 24.000 ms");
+        assert_eq!(asked.beside(&link.stats()).unwrap(), "mean delay 24.000 ms, asked 24.000 ms");
         let changed = ConfiguredDelay { changes: 2, ..asked };
-        assert_eq!(changed.beside(link.stats()).unwrap(), "mean delay 24.000 ms, asked 24.000 ms at first, changed 2 times");
+        assert_eq!(changed.beside(&link.stats()).unwrap(), "mean delay 24.000 ms, asked 24.000 ms at first, changed 2 times");
     }
 }

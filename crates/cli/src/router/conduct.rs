@@ -5,9 +5,9 @@ use std::sync::mpsc::Receiver;
 use std::thread;
 use std::time::Duration;
 
+use cohaptic_linkfile::router::{RouterFile, Side};
 use cohaptic_realtime::{Prepared, Validity, prepare_thread};
 use cohaptic_router::{Report, Router, RunError};
-use cohaptic_scene::router_file::{RouterFile, Side};
 use cohaptic_units::Instant;
 
 use super::status;

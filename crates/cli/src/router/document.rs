@@ -1,8 +1,8 @@
 //! The JSON document of a router.
 
+use cohaptic_linkfile::router::{RouterFile, Side};
 use cohaptic_realtime::Wish;
 use cohaptic_router::{Count, LaneSnapshot, Received, Written};
-use cohaptic_scene::router_file::{RouterFile, Side};
 use serde::Serialize;
 
 use super::conduct::{Ending, RouterRun};

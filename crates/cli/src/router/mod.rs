@@ -9,8 +9,8 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::mpsc::channel;
 
+use cohaptic_linkfile::router::{RouterFile, Side};
 use cohaptic_router::Router;
-use cohaptic_scene::router_file::{RouterFile, Side};
 use cohaptic_units::Instant;
 
 use crate::arguments::RouterArguments;
@@ -49,7 +49,7 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
 
 /// `left (tun left0 in the namespace lab)`.
 fn attached(file: &RouterFile, side: Side) -> String {
-    use cohaptic_scene::router_file::Attachment;
+    use cohaptic_linkfile::router::Attachment;
     let attachment = match side {
         Side::Left => &file.left,
         Side::Right => &file.right,

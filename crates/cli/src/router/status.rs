@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use cohaptic_control::{Description, Kind, LinkCounters, LinkName, Snapshot};
+use cohaptic_linkfile::router::{RouterFile, Side};
 use cohaptic_realtime::Validity;
 use cohaptic_router::{LaneSnapshot, Report, Written};
-use cohaptic_scene::router_file::{RouterFile, Side};
 use cohaptic_units::Instant;
 
 use crate::output;

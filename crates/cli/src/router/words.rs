@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use cohaptic_linkfile::router::{RouterFile, Side};
 use cohaptic_router::{LaneSnapshot, Received, Written};
-use cohaptic_scene::router_file::{RouterFile, Side};
 use cohaptic_units::print::Counted;
 
 use super::attached;

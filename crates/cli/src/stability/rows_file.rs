@@ -27,7 +27,7 @@ impl RowsFile {
     ///
     /// Nothing is written if it belongs to something else.
     pub(crate) fn open(path: PathBuf, header: &[String]) -> Result<(Self, Vec<Row>), Failure> {
-        let bytes = match cohaptic_scene::read_bytes(&path) {
+        let bytes = match cohaptic_files::read_bytes(&path) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             Err(error) => return Err(Failure::File { verb: "read", path, error }),

@@ -1,5 +1,6 @@
 //! What a scene makes the program model, what it leaves out, and why.
 
+#[cfg(test)]
 mod links;
 
 use cohaptic_peer::{Contact, Hand, Integrator, wire};
@@ -7,7 +8,6 @@ use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
 
-use self::links::describe_link;
 use crate::arrays::Shape;
 use crate::plan::{DeviceChoice, Model, Plan, Ticking};
 
@@ -89,7 +89,7 @@ pub fn explain(scene: &Scene) -> Explanation {
     if in_arrays {
         rows.model(
             "runs that nobody watches",
-            "in arrays, eight peers at a time; many runs of a campaign side by side",
+            "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
             "all tick together, nothing changes on the way, and over the links nothing waits; a run that is recorded has events",
         );
     }
@@ -166,7 +166,10 @@ impl Rows {
             Scaling::None => "as written",
             Scaling::InverseN => "scaled by 4(N-1)/N^2",
         };
-        let model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), Number(gains.stiffness), Number(gains.damping));
+        let mut model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), Number(gains.stiffness), Number(gains.damping));
+        for (place, parameter) in spec.strategy.parameters().iter().enumerate() {
+            model.push_str(&format!(", {} = {}", parameter.key, Span(spec.settings.of(spec.strategy).get(place))));
+        }
         self.model("coordination", model, format!("gains {scaling}; the mean of the samples held is kept until one changes"));
         let len = wire::datagram_len(scene.axes.count());
         self.model(
@@ -183,7 +186,7 @@ impl Rows {
             if config.is_constant_delay() {
                 self.model(&part, format!("constant delay {}", Span(config.mean_delay())), "one addition a packet: nothing else is configured");
             } else {
-                self.model(&part, describe_link(config), "a chain of the stages that are configured");
+                self.model(&part, config.words(), "a chain of the stages that are configured");
             }
         }
         let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
@@ -195,7 +198,7 @@ impl Rows {
             self.model("packets on the way", "a calendar queue", "arrivals are not in the order of sending");
         }
         for (peer, direction, line) in access_lines(scene) {
-            self.model(&format!("{direction} of {peer}"), describe_link(line), "shared by all that passes it");
+            self.model(&format!("{direction} of {peer}"), line.words(), "shared by all that passes it");
         }
         let timeline_is_random = scene.timeline.iter().any(|change| {
             matches!(&change.what, ChangeKind::Link(link) if link.config.has_chance())

@@ -27,11 +27,11 @@ impl Packets {
     pub(crate) fn on_packet(&mut self, row: &PacketRow) -> Result<(), RecordError> {
         let line = &mut self.line;
         line.clear();
-        line.extend_from_slice(LinkName::between(&self.names[row.from], &self.names[row.to]).as_str().as_bytes());
+        line.extend_from_slice(LinkName::between(&self.names[row.path.from.index()], &self.names[row.path.to.index()]).as_str().as_bytes());
         line.push(b',');
         push_display(line, row.sequence);
         line.push(b',');
-        push_display(line, Seconds(row.sent));
+        push_display(line, Seconds(row.offered));
         line.push(b',');
         if let Fate::Delivered(at) = row.fate {
             push_display(line, Seconds(at));

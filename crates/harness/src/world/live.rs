@@ -4,10 +4,10 @@ use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, State, Strategy};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{LinkModel, LinkStats, NetworkEvent, PacketInfo};
+use cohaptic_wan::{LinkModel, LinkStats, NodeId, PacketEvent, PacketInfo, Path};
 
 use super::remote::{Remote, datagram};
-use super::{DeviceModel, Step, Watch, World, node, row};
+use super::{DeviceModel, Step, Watch, World, row};
 use crate::datagrams::Handle;
 use crate::live::{Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, RemotePeers, SampleError, SeatStats, Transmit, UnsimulatedDevice};
 use crate::observer::Observer;
@@ -93,7 +93,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         let stored = self.datagrams.store(copies, self.axes, |bytes| sample.encode(self.axes, bytes));
         let (handle, len) = stored.expect("what was decoded can be decoded again");
         let info = PacketInfo { size: Bytes::new(len as u64), ecn_capable: true };
-        self.network.handle_broadcast(at, node(place), info, handle).expect("instants come in order");
+        self.network.handle_broadcast(at, NodeId::new(place), info, handle).expect("instants come in order");
         self.remote.undrained = Some(at);
         Ok(())
     }
@@ -105,7 +105,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         self.remote.undrained = Some(at);
     }
 
-    /// NoRemote feels a force of the session any more.
+    /// Nobody feels a force of the session any more.
     pub(crate) fn let_go(&mut self, now: Instant) {
         for member in &mut self.members {
             if let Some(device) = member.peer.device_mut().hand_mut() {
@@ -139,7 +139,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
 
     pub(crate) fn link_stats(&self, from: usize, to: usize) -> Option<LinkStats> {
         let is_there = |place: usize| place < self.members.len();
-        (is_there(from) && is_there(to)).then(|| self.network.link_stats(node(from), node(to))).flatten()
+        (is_there(from) && is_there(to)).then(|| self.network.link_stats(NodeId::new(from), NodeId::new(to))).flatten()
     }
 
     /// The device, if it is here, and the copy of a peer.
@@ -182,12 +182,12 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
     fn receive<S: Strategy<A>>(
         &mut self,
         now: Instant,
-        event: &NetworkEvent<Handle>,
+        event: &PacketEvent<Handle, Path>,
         sample: &Sample<A>,
         axes: usize,
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>> {
-        let ends = (event.from.0 as usize, event.to.0 as usize);
+        let ends = (event.path.from.index(), event.path.to.index());
         let mut buffer = [0; MAX_LEN];
         if self.is_process(ends.1) {
             let len = datagram(sample, axes, event.damage.as_ref(), &mut buffer).len();

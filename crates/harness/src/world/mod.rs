@@ -12,7 +12,7 @@ use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, 
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
-use crate::observer::{Observer, PacketRow, StateRow, TickRow};
+use crate::observer::{Observer, StateRow, TickRow};
 use crate::plan::{DeviceChoice, Plan};
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
@@ -216,7 +216,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 
     fn set_link(&mut self, at: Instant, from: usize, to: usize, link: &LinkModel) {
-        self.network.set_link(at, node(from), node(to), link.clone()).expect("changes are in order of time");
+        self.network.set_link(at, NodeId::new(from), NodeId::new(to), link.clone()).expect("changes are in order of time");
     }
 
     /// Step 1: those whose time it is send their sample to everybody else.
@@ -236,7 +236,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             let (handle, len) = stored.expect("a run ends before a state that is not finite is sent");
             // Capable of ECN, so that a queue that marks has something to mark: nobody sends less for it, but a marked packet arrives.
             let info = PacketInfo { size: Bytes::new(len as u64), ecn_capable: true };
-            self.network.handle_broadcast(now, node(from), info, handle).expect("instants come in order");
+            self.network.handle_broadcast(now, NodeId::new(from), info, handle).expect("instants come in order");
         }
         self.earliest_send = self.members.iter().map(|member| member.next_send).min().unwrap_or(0);
     }
@@ -246,7 +246,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         self.network.handle_timeout(now).expect("instants come in order");
         while let Some(event) = self.network.poll_event() {
             if let Fate::Delivered(_) = event.fate {
-                let receiver = &mut self.members[event.to.0 as usize];
+                let receiver = &mut self.members[event.path.to.index()];
                 let sample = self.datagrams.sample(event.payload);
                 match self.remote.receive(now, &event, sample, self.axes, &mut receiver.peer) {
                     None | Some(Ok(Reception::Newest)) => {}
@@ -262,9 +262,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             }
             // Making a copy is no end: the packet and its copy each have one.
             if watch.packets && event.fate.is_end() {
-                let (from, to) = (event.from.0 as usize, event.to.0 as usize);
-                let (sequence, sent, at, size, fate) = (event.sequence, event.sent, event.at, event.size, event.fate);
-                observer.on_packet(&PacketRow { from, to, sequence, sent, at, size, fate })?;
+                observer.on_packet(&event.record)?;
             }
         }
         Ok(())
@@ -357,7 +355,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to)));
         pairs
             .filter(|(from, to)| from != to)
-            .filter_map(|(from, to)| self.network.link_stats(node(from), node(to)).map(|stats| LinkSummary { from, to, stats }))
+            .filter_map(|(from, to)| self.network.link_stats(NodeId::new(from), NodeId::new(to)).map(|stats| LinkSummary { from, to, stats }))
             .collect()
     }
 
@@ -365,7 +363,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         let lines = (0..self.members.len()).flat_map(|peer| [(peer, true), (peer, false)]);
         lines
             .filter_map(|(peer, uplink)| {
-                let line = if uplink { AccessLine::Uplink(node(peer)) } else { AccessLine::Downlink(node(peer)) };
+                let line = if uplink { AccessLine::Uplink(NodeId::new(peer)) } else { AccessLine::Downlink(NodeId::new(peer)) };
                 self.network.access_stats(line).map(|stats| AccessSummary { peer, uplink, stats })
             })
             .collect()
@@ -424,9 +422,9 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
 
 fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {
     let config = NetworkConfig { seed: scene.seed, nodes: scene.peers.iter().map(|peer| peer.name.clone()).collect(), general: plan.general_links };
-    let mut network = Network::new(config, |from, to| scene.links.between(from.0 as usize, to.0 as usize).clone());
+    let mut network = Network::new(config, |from, to| scene.links.between(from.index(), to.index()).clone());
     for (place, peer) in scene.peers.iter().enumerate() {
-        let lines = [(AccessLine::Uplink(node(place)), &peer.uplink), (AccessLine::Downlink(node(place)), &peer.downlink)];
+        let lines = [(AccessLine::Uplink(NodeId::new(place)), &peer.uplink), (AccessLine::Downlink(NodeId::new(place)), &peer.downlink)];
         for (line, config) in lines {
             if let Some(config) = config {
                 network = network.with_access_line(line, config.clone()).expect("the network has a node for every peer");
@@ -434,10 +432,6 @@ fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {
         }
     }
     network
-}
-
-fn node(place: usize) -> NodeId {
-    NodeId(u32::try_from(place).expect("a network has fewer than 2^32 nodes"))
 }
 
 fn row<const A: usize>(state: &State<A>, axes: usize) -> StateRow<'_> {

@@ -3,7 +3,7 @@
 use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_peer::{Device, Peer, ReceiveError, Reception, RestingDevice, Strategy};
 use cohaptic_units::Instant;
-use cohaptic_wan::{Damage, NetworkEvent};
+use cohaptic_wan::{Damage, PacketEvent, Path};
 
 use super::DeviceModel;
 use crate::datagrams::Handle;
@@ -30,7 +30,7 @@ pub(crate) trait Remote<const A: usize> {
     fn receive<S: Strategy<A>>(
         &mut self,
         now: Instant,
-        event: &NetworkEvent<Handle>,
+        event: &PacketEvent<Handle, Path>,
         sample: &Sample<A>,
         axes: usize,
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
@@ -70,7 +70,7 @@ impl<const A: usize> Remote<A> for NoRemote {
     fn receive<S: Strategy<A>>(
         &mut self,
         _now: Instant,
-        event: &NetworkEvent<Handle>,
+        event: &PacketEvent<Handle, Path>,
         sample: &Sample<A>,
         axes: usize,
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,

@@ -5,12 +5,13 @@ use std::net::SocketAddr;
 
 use cohaptic_realtime::udp::Ecn;
 use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
 
 /// Where a datagram comes in or goes out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Port {
     /// The port that stands for this program of a mesh.
-    Program(u32),
+    Program(NodeId),
     /// Where clients of a proxy send to.
     Listen,
     /// The port of its own that the client in this place has on the far side.

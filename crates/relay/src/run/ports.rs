@@ -10,6 +10,7 @@ use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
 use cohaptic_realtime::udp::{BindError, EndpointConfig, EndpointCounts, ReceiveBuffers, UdpEndpoint};
 use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock};
 use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
 use rustix::event::{Timespec, epoll};
 use rustix::io::Errno;
 
@@ -124,7 +125,7 @@ impl Ports {
     fn receive_at(&mut self, place: usize, engine: &mut Engine, clock: &MonotonicClock, heard: &mut Heard) -> io::Result<()> {
         let Some(Some(open)) = self.ports.get_mut(place) else { return Ok(()) };
         let port = match (&self.layout, u32::try_from(place).unwrap_or(u32::MAX)) {
-            (Layout::Mesh(_), place) => Port::Program(place),
+            (Layout::Mesh(_), _) => Port::Program(NodeId::new(place)),
             (Layout::Proxy { .. }, 0) => Port::Listen,
             (Layout::Proxy { .. }, place) => Port::Client(place - 1),
         };
@@ -188,7 +189,7 @@ impl Ports {
         for _ in 0..RELEASES {
             let Some(release) = engine.poll_release() else { return false };
             let place = match release.port {
-                Port::Program(place) => place as usize,
+                Port::Program(program) => program.index(),
                 Port::Listen => 0,
                 Port::Client(slot) => slot as usize + 1,
             };
@@ -325,7 +326,7 @@ mod tests {
     use std::sync::Arc;
     use std::time::Duration;
 
-    use cohaptic_scene::{LinkTable, link_from_keys};
+    use cohaptic_linkfile::{LinkTable, link_from_keys};
 
     use super::*;
     use crate::{Limits, Mesh, Program, Proxy};
@@ -368,7 +369,7 @@ mod tests {
             std::hint::spin_loop();
         }
         engine.handle_timeout(passed);
-        engine.handle_datagram(Arrival { at: Instant::ZERO, port: Port::Program(1), from: left, bytes: b"late", ecn: None });
+        engine.handle_datagram(Arrival { at: Instant::ZERO, port: Port::Program(NodeId(1)), from: left, bytes: b"late", ecn: None });
         assert!(!ports.take_releases(&mut engine));
         let mut lateness = Lateness::new();
         ports.send(&clock, &mut lateness);

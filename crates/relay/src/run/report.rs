@@ -118,7 +118,7 @@ impl View<'_> {
 
     /// Where a program is, if that is known; `None` for a proxy.
     #[must_use]
-    pub fn program_address(&self, program: u32) -> Option<SocketAddr> {
+    pub fn program_address(&self, program: NodeId) -> Option<SocketAddr> {
         self.engine.program_address(program)
     }
 }

@@ -8,8 +8,8 @@ mod proxy;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
+use cohaptic_linkfile::{LinkTable, link_from_keys};
 use cohaptic_relay::{Form, Limits, Mesh, Program, RelayConfig};
-use cohaptic_scene::{LinkTable, link_from_keys};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 

@@ -15,7 +15,7 @@ mod snapshot;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use cohaptic_scene::router_file::{Memory, RouterFile, Side, Target};
+use cohaptic_linkfile::router::{Memory, RouterFile, Side, Target};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::LinkModel;
 

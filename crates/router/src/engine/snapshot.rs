@@ -1,7 +1,7 @@
 //! What a router has counted.
 
+use cohaptic_linkfile::router::{Memory, Side};
 use cohaptic_realtime::LatenessSummary;
-use cohaptic_scene::router_file::{Memory, Side};
 use cohaptic_units::Bytes;
 use cohaptic_wan::LinkStats;
 

@@ -2,7 +2,7 @@
 
 use core::net::IpAddr;
 
-use cohaptic_scene::router_file::Protocol;
+use cohaptic_linkfile::router::Protocol;
 
 use super::Headers;
 

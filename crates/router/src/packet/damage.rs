@@ -1,6 +1,6 @@
 //! Bits that are flipped, with checksums that do not notice.
 
-use cohaptic_scene::router_file::Protocol;
+use cohaptic_linkfile::router::Protocol;
 use cohaptic_wan::Damage;
 
 use super::Headers;

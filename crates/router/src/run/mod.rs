@@ -6,8 +6,8 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use cohaptic_linkfile::router::{RouterFile, Side};
 use cohaptic_realtime::{Clock, Lateness, LatenessSummary, MonotonicClock, Pacer, Pacing};
-use cohaptic_scene::router_file::{RouterFile, Side};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 

@@ -6,7 +6,7 @@
 use std::io;
 use std::os::fd::{AsFd as _, AsRawFd as _, BorrowedFd, OwnedFd};
 
-use cohaptic_scene::router_file::InterfaceSpec;
+use cohaptic_linkfile::router::InterfaceSpec;
 use nix::errno::Errno;
 use nix::ifaddrs::getifaddrs;
 use nix::net::if_::InterfaceFlags;

@@ -8,7 +8,7 @@ mod tun;
 use std::io;
 use std::os::fd::BorrowedFd;
 
-use cohaptic_scene::router_file::{Attachment, Side};
+use cohaptic_linkfile::router::{Attachment, Side};
 
 use crate::packet::Framing;
 pub use interface::Interface;

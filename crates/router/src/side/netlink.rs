@@ -4,7 +4,7 @@ use core::net::IpAddr;
 use std::io;
 use std::os::fd::{AsRawFd as _, OwnedFd};
 
-use cohaptic_scene::router_file::Network;
+use cohaptic_linkfile::router::Network;
 use nix::sys::socket::{AddressFamily, MsgFlags, NetlinkAddr, SockFlag, SockProtocol, SockType, bind, recv, send, socket};
 
 /// A socket to the kernel. It speaks of the network namespace in which it was opened.

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use cohaptic_linkfile::router::Side;
+use cohaptic_linkfile::{link_from_keys, router::RouterFile};
 use cohaptic_router::{Counters, Departure, Engine, Framing, Packet};
-use cohaptic_scene::router_file::Side;
-use cohaptic_scene::{link_from_keys, router_file::RouterFile};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DropCause, Fate, Link, LinkName};
 use proptest::prelude::*;

@@ -2,8 +2,8 @@
 
 use std::net::IpAddr;
 
+use cohaptic_linkfile::router::Protocol;
 use cohaptic_router::{Content, Framing, Headers, Malformed, Packet};
-use cohaptic_scene::router_file::Protocol;
 use cohaptic_units::Bytes;
 use etherparse::{IpFragOffset, IpHeaders, IpNumber, Ipv4Header, Ipv6FragmentHeader, NetSlice, PacketBuilder, SlicedPacket, TransportSlice};
 use proptest::prelude::*;

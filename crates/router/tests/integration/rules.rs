@@ -1,7 +1,7 @@
 //! Rules against a table of packets.
 
+use cohaptic_linkfile::router::{Side, Target};
 use cohaptic_router::{Decided, Framing, Headers, Packet, Rules};
-use cohaptic_scene::router_file::{Side, Target};
 use etherparse::{IpNumber, PacketBuilder};
 
 use crate::support::{file, udp_bytes};

@@ -9,10 +9,10 @@ use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use cohaptic_linkfile::link_from_keys;
+use cohaptic_linkfile::router::Side;
 use cohaptic_realtime::{Clock, Pacing};
 use cohaptic_router::{Device, Framing, Router, RunError, Sent};
-use cohaptic_scene::link_from_keys;
-use cohaptic_scene::router_file::Side;
 use cohaptic_units::Instant;
 
 use crate::support::{file, udp_bytes};

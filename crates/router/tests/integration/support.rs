@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use cohaptic_linkfile::router::RouterFile;
 use cohaptic_router::{Framing, Packet};
-use cohaptic_scene::router_file::RouterFile;
 use etherparse::PacketBuilder;
 
 /// A router with these links, rules and default, between two TUN devices.

@@ -1,23 +1,13 @@
-//! The catalogue of keys: every key with its meaning, unit, default and form, for editors and for authors of scenes.
+//! The kinds of files and their catalogues of keys: see [`cohaptic_linkfile::schema`].
 //!
-//! The readers of this crate decide what a file means; this is the catalogue of what they read. A test reads files in which every table occurs, and
-//! compares the keys that the readers asked for with those that stand here: neither may have one more. Ranges and units of numbers are those of the
-//! readers themselves.
-//!
-//! [`json_schema`] is the catalogue as a JSON Schema. It is coarser than the readers: what depends on another key, such as a unit that fits, a peer that
-//! exists, or two keys that exclude each other, is left to them.
+//! A test reads files in which every table occurs, and compares the keys that the readers know with those of the catalogue: neither may have one more.
 
-mod form;
-mod json;
-mod link;
-mod relay;
-mod router;
 mod scene;
 #[cfg(test)]
 mod tests;
 
-pub use form::{Amount, Form, Key, Need, Table, Words};
-pub use json::json_schema;
+use cohaptic_linkfile::schema::{self, Table};
+use serde_json::Value;
 
 /// A kind of file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -39,12 +29,12 @@ impl FileSchema {
     pub const fn root(self) -> &'static Table {
         match self {
             Self::Scene => &scene::ROOT,
-            Self::Relay => &relay::ROOT,
-            Self::Router => &router::ROOT,
+            Self::Relay => &schema::RELAY,
+            Self::Router => &schema::ROUTER,
         }
     }
 
-    /// What such a file is called.
+    /// The title of such a file in its schema.
     #[must_use]
     pub const fn title(self) -> &'static str {
         match self {
@@ -53,7 +43,10 @@ impl FileSchema {
             Self::Router => "cohaptic router file",
         }
     }
-}
 
-#[cfg(test)]
-pub(crate) use tests::seen;
+    /// The catalogue as a JSON Schema of draft 7.
+    #[must_use]
+    pub fn json(self) -> Value {
+        schema::json_schema(self.root(), self.title())
+    }
+}

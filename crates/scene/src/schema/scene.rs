@@ -1,11 +1,16 @@
 //! The keys of a scene.
 
 use cohaptic_peer::Coordination;
+use cohaptic_peer::coordination::LawValues;
 use cohaptic_wan::DropCause;
 
-use super::form::{Amount, Form, Key, Table, Words, number, optional, required, somewhere, usual, vector};
-use super::link::{LINK, LINK_KIND, LINK_TABLE, MODULATOR};
-use crate::values::{
+use cohaptic_linkfile::schema::{
+    Form, Key, Table, joined,
+    link::{ALL_LINKS, LINK, LINK_ENTRY, LINK_TABLE, LINKS_BETWEEN, MODULATOR},
+    number, optional, required, somewhere, usual, vector,
+};
+
+use crate::quantities::{
     ADDED_MASS, ANGLE, DAMPING, DISTANCE, FORCE, FREQUENCY, MASS, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS, VELOCITY, WALL_STIFFNESS,
 };
 
@@ -21,7 +26,7 @@ pub(super) static ROOT: Table = Table::of(&[&[
     optional("peers", Form::List(&Form::Table(&PEERS)), "One peer each: its own keys are laid over those of [peer]"),
     optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
     optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
-    optional("links", Form::List(&Form::Table(&LINKS)), "One direction of one pair each: its own keys are laid over those of [link]"),
+    optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction of one pair each: its own keys are laid over those of [link]"),
     optional("timeline", Form::List(&Form::Table(&TIMELINE)), "What changes while the scene runs"),
     optional("expect", Form::Table(&EXPECT), "What must come out: makes the scene a test for cohaptic check"),
 ]]);
@@ -53,15 +58,81 @@ static ENCLOSURE: Table = Table::of(&[&[
     required("damping", number(DAMPING), "Damping of the walls"),
 ]]);
 
-static COORDINATION: Table = Table::of(&[&[
+static COORDINATION: Table = Table::of(&[&GAINS_OF_ALL, LAWS.split_at(LAWS_WITH_KEYS).0]);
+const GAINS_OF_ALL: [Key; 5] = [
     required("strategy", Form::Words(&STRATEGIES), "Where each copy is drawn to"),
     required("stiffness", number(STIFFNESS), "Gain on the difference of positions, K_T"),
     usual("damping", number(DAMPING), "0", "Gain on the difference of velocities, B_T"),
     required("update", Form::Duration, "How often each peer sends a sample; a whole multiple of every peer's tick"),
     usual("scaling", Form::Words(&SCALINGS), "\"none\"", "How both gains follow the number of peers"),
-]]);
-const STRATEGIES: [(&str, &str); 2] =
-    [(Coordination::AveragePosition.name(), "to the mean of the others"), (Coordination::ProportionalDerivative.name(), "to each of the others")];
+];
+const STRATEGIES: [(&str, &str); Coordination::ALL.len()] = {
+    let mut words = [("", ""); Coordination::ALL.len()];
+    let mut place = 0;
+    while place < words.len() {
+        words[place] = (Coordination::ALL[place].name(), Coordination::ALL[place].about());
+        place += 1;
+    }
+    words
+};
+
+/// The keys of each law's own parameters, by its place in the registry; the first ones of a row are used.
+static LAW_KEYS: [[Key; LawValues::MOST]; Coordination::ALL.len()] = {
+    let mut keys = [const { [const { optional("", Form::Duration, "") }; LawValues::MOST] }; Coordination::ALL.len()];
+    let mut law = 0;
+    while law < keys.len() {
+        let parameters = Coordination::ALL[law].parameters();
+        let mut place = 0;
+        while place < parameters.len() {
+            keys[law][place] = usual(parameters[place].key, Form::Duration, parameters[place].default, parameters[place].about);
+            place += 1;
+        }
+        law += 1;
+    }
+    keys
+};
+static LAW_GROUPS: [[&[Key]; 1]; Coordination::ALL.len()] = {
+    let mut groups: [[&[Key]; 1]; Coordination::ALL.len()] = [[&[]]; Coordination::ALL.len()];
+    let mut law = 0;
+    while law < groups.len() {
+        groups[law] = [LAW_KEYS[law].split_at(Coordination::ALL[law].parameters().len()).0];
+        law += 1;
+    }
+    groups
+};
+static LAW_TABLES: [Table; Coordination::ALL.len()] = {
+    let mut tables = [const { Table::of(&[]) }; Coordination::ALL.len()];
+    let mut law = 0;
+    while law < tables.len() {
+        tables[law] = Table::of(&LAW_GROUPS[law]);
+        law += 1;
+    }
+    tables
+};
+/// How many laws have parameters of their own.
+const LAWS_WITH_KEYS: usize = {
+    let (mut law, mut count) = (0, 0);
+    while law < Coordination::ALL.len() {
+        if !Coordination::ALL[law].parameters().is_empty() {
+            count += 1;
+        }
+        law += 1;
+    }
+    count
+};
+/// The tables of the laws that have parameters of their own, one after another.
+static LAWS: [Key; Coordination::ALL.len()] = {
+    let mut keys = [const { optional("", Form::Duration, "") }; Coordination::ALL.len()];
+    let (mut law, mut count) = (0, 0);
+    while law < Coordination::ALL.len() {
+        if !Coordination::ALL[law].parameters().is_empty() {
+            keys[count] = optional(Coordination::ALL[law].name(), Form::Table(&LAW_TABLES[law]), "Parameters that this strategy alone has");
+            count += 1;
+        }
+        law += 1;
+    }
+    keys
+};
 const SCALINGS: [(&str, &str); 2] = [("none", "as they are written"), ("inverse-n", "times 4(N-1)/N^2 among N peers; of a coupling times 2/N")];
 
 static SIMULATION: Table = Table::of(&[&[
@@ -112,8 +183,7 @@ static CLOCK: Table = Table::of(&[&[
     usual("offset", Form::Duration, "\"0s\"", "By how much its first tick is late"),
     usual("drift", DRIFT, "0", "How fast it runs: parts per million as text, or seconds gained in a second"),
 ]]);
-const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number(Amount(ANY))]);
-const ANY: crate::values::Quantity = ANGLE;
+const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number(ANGLE)]);
 static SILENCE: Table = Table::of(&[&[
     usual("after", Form::Duration, "\"100ms\"", "After how long a silence the pull fades"),
     usual("fade", Form::Duration, "\"250ms\"", "How long that takes"),
@@ -122,7 +192,7 @@ static FALCON: Table = Table::of(&[&[
     usual("device", Form::Like(&["first", "simulated"]), "\"first\"", "The first that no other peer has, one that is simulated, or a serial number"),
     usual("counts-per-newton-metre", number(POSITIVE_COUNTS), "10000", "Motor counts for a torque at the joint of an arm"),
     usual("force-limit", number(POSITIVE_FORCE), "4", "No greater force is sent to the motors"),
-    usual("origin", Form::Triple(Amount(POSITION)), "[0, 0, 0.125]", "The place in the device's coordinates that is the origin of the scene"),
+    usual("origin", Form::Triple(POSITION), "[0, 0, 0.125]", "The place in the device's coordinates that is the origin of the scene"),
 ]]);
 
 const HAND: Form = Form::AnyOf(&[Form::Words(&[("none", "nothing; takes away what [peer] says")]), Form::Table(&HAND_TABLE)]);
@@ -148,18 +218,6 @@ static FOLLOWS: Table = Table::of(&[&[
     optional("file", Form::File, "A recorded motion: a CSV with the header t,x (and y, z), in seconds and metres"),
 ]]);
 
-static LINKS: Table = Table::over(&[&ENDS, &LINK, &LINK_KIND]);
-/// The two ends of a link.
-pub(super) const ENDS: [Key; 2] =
-    [required("from", Form::Text, "The name of the one that sends"), required("to", Form::Text, "The name of the one that receives")];
-/// Entries `[\[links\]]`.
-pub(super) static LINK_ENTRY: &Table = &LINKS;
-
-const ALL: Words = &[("all", "every link")];
-static ENDS_TABLE: Table = Table::of(&[&ENDS]);
-/// Which links a change is of.
-pub(super) const LINKS_BETWEEN: Form = Form::AnyOf(&[Form::Words(ALL), Form::Table(&ENDS_TABLE)]);
-
 static TIMELINE: Table = Table::of(&[&[
     required("at", Form::Duration, "When, from the beginning of the scene"),
     optional("link", LINKS_BETWEEN, "Which links change: all, or one by its ends"),
@@ -168,7 +226,7 @@ static TIMELINE: Table = Table::of(&[&[
     optional("coordination", Form::Table(&GAINS), "In place of link or peer, and without set: new gains at every peer"),
 ]]);
 /// The key of a link or of a peer that is set: another key says which of the two.
-static SET: Table = Table::over(&[&LINK, &LINK_KIND, &SET_OF_PEER]);
+static SET: Table = Table::over(&joined::<15>(&[LINK.as_slice(), &[&SET_OF_PEER]]));
 const SET_OF_PEER: [Key; 2] = [
     optional("contact", Form::AnyOf(const { &[Form::Words(&CONTACTS), Form::Table(&PUSH)] }), "Of a peer: how the device touches the object"),
     optional("hand", HAND, "Of a peer: what the user does"),
@@ -196,7 +254,7 @@ static EXPECT_POSITION: Table = Table::of(&[&OF_PEER, &[required("at", Form::Dur
 static EXPECT_TRAVEL: Table = Table::of(&[&OF_PEER, &[required("distance", number(DISTANCE), "How far from where it began")], &TIME_BOUNDS]);
 const LINK_OR_LINE: [Key; 1] = [usual(
     "link",
-    Form::AnyOf(const { &[Form::Words(ALL), Form::Table(&SELECTOR)] }),
+    Form::AnyOf(const { &[Form::Words(ALL_LINKS), Form::Table(&SELECTOR)] }),
     "\"all\"",
     "Which link: all, one by its ends, or an access line",
 )];

@@ -2,23 +2,25 @@
 
 use core::time::Duration;
 
+use cohaptic_linkfile::LinkSelector;
+use cohaptic_linkfile::document::Node;
+use cohaptic_linkfile::mesh::{read_link_or_line, read_peer_name};
+use cohaptic_linkfile::reading::values::{self, Quantity, ReadNumber as _};
+use cohaptic_linkfile::reading::{Context, TableReader};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::DropCause;
 
-use super::selector::{read_axis, read_link_or_line, read_peer_name};
-use crate::context::Context;
-use crate::model::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectPosition, ExpectTravel, LinkSelector, PeerSpec};
-use crate::table_reader::TableReader;
-use crate::tree::Node;
-use crate::values::{self, DISTANCE, POSITION, Quantity};
+use crate::context::{SceneContext, read_axis};
+use crate::model::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectPosition, ExpectTravel, PeerSpec};
+use crate::quantities::{DISTANCE, POSITION};
 
 /// Reads the expectations. `duration` and `peers` are `None` where they were refused.
-pub(crate) fn read_expect(node: &Node, duration: Option<Duration>, peers: Option<&[PeerSpec]>, context: Context<'_>) -> Option<Expect> {
-    let mut table = TableReader::new(node, context, "a table such as [expect]")?;
+pub(crate) fn read_expect(node: &Node, duration: Option<Duration>, peers: Option<&[PeerSpec]>, context: SceneContext<'_>) -> Option<Expect> {
+    let mut table = TableReader::new(node, *context, "a table such as [expect]")?;
     let stable = table.maybe("stable", values::boolean);
     let discrepancy = table.maybe("discrepancy", read_discrepancy);
-    let positions = table.optional("position", Vec::new(), |node, context| each(node, context, |entry| read_position(entry, duration, context)));
-    let travel = table.optional("travel", Vec::new(), |node, context| each(node, context, |entry| read_travel(entry, context)));
+    let positions = table.optional("position", Vec::new(), |node, file| each(node, file, |entry| read_position(entry, duration, context)));
+    let travel = table.optional("travel", Vec::new(), |node, file| each(node, file, |entry| read_travel(entry, context)));
     let loss = table.optional("loss", Vec::new(), |node, context| each(node, context, |entry| read_loss(entry, peers, context)));
     let delay = table.optional("delay", Vec::new(), |node, context| each(node, context, |entry| read_delay(entry, peers, context)));
     table.finish();
@@ -38,8 +40,8 @@ fn read_discrepancy(node: &Node, context: Context<'_>) -> Option<Bounds> {
     bounds
 }
 
-fn read_position(node: &Node, duration: Option<Duration>, context: Context<'_>) -> Option<ExpectPosition> {
-    let mut table = TableReader::new(node, context, "a table such as { peer = \"left\", at = \"1s\", min = 0.1 }")?;
+fn read_position(node: &Node, duration: Option<Duration>, context: SceneContext<'_>) -> Option<ExpectPosition> {
+    let mut table = TableReader::new(node, *context, "a table such as { peer = \"left\", at = \"1s\", min = 0.1 }")?;
     let peer = table.required("peer", "the name of a peer", read_peer_name);
     let at = table.required("at", "a time such as \"1s\"", |node, context| {
         let at = values::instant(node, context)?;
@@ -50,18 +52,18 @@ fn read_position(node: &Node, duration: Option<Duration>, context: Context<'_>) 
         }
         Some(at)
     });
-    let axis = table.optional("axis", 0, read_axis);
-    let bounds = read_bounds(&mut table, node, context, POSITION);
+    let axis = table.optional("axis", 0, |node, _| read_axis(node, context));
+    let bounds = read_bounds(&mut table, node, *context, POSITION);
     table.finish();
     Some(ExpectPosition { peer: peer?, axis: axis?, at: at?, bounds: bounds? })
 }
 
-fn read_travel(node: &Node, context: Context<'_>) -> Option<ExpectTravel> {
-    let mut table = TableReader::new(node, context, "a table such as { peer = \"left\", distance = 0.1, max = \"1.2s\" }")?;
+fn read_travel(node: &Node, context: SceneContext<'_>) -> Option<ExpectTravel> {
+    let mut table = TableReader::new(node, *context, "a table such as { peer = \"left\", distance = 0.1, max = \"1.2s\" }")?;
     let peer = table.required("peer", "the name of a peer", read_peer_name);
     let distance = table.required("distance", &DISTANCE.expected(), |node, context| DISTANCE.read(node, context));
-    let axis = table.optional("axis", 0, read_axis);
-    let ends = read_ends(&mut table, node, context, values::duration);
+    let axis = table.optional("axis", 0, |node, _| read_axis(node, context));
+    let ends = read_ends(&mut table, node, *context, values::duration);
     table.finish();
     let (min, max) = ends?;
     let seconds = |end: Option<Duration>| end.map(|end| end.as_secs_f64());

@@ -1,18 +1,19 @@
 //! What a hand does: `hand` of a peer.
 
+use cohaptic_linkfile::document::{Node, quote};
+use cohaptic_linkfile::reading::values::{Quantity, ReadNumber as _};
+use cohaptic_linkfile::reading::{Context, TableReader, only_one};
 use cohaptic_peer::{ArmConfig, Hand, Signal};
 use cohaptic_units::Hertz;
 
 use super::motion_file::{Columns, read_motion_file};
-use crate::context::Context;
-use crate::table_reader::TableReader;
-use crate::tree::{Entry, Node, quote};
-use crate::values::{ADDED_MASS, ANGLE, DAMPING, FORCE, FREQUENCY, POSITION, Quantity, STIFFNESS, Spread};
+use crate::context::SceneContext;
+use crate::quantities::{ADDED_MASS, ANGLE, DAMPING, FORCE, FREQUENCY, POSITION, STIFFNESS, Spread, read_vector};
 
 const EXPECTED: &str = "\"none\", { force = … }, { sine = … }, { file = … } or { arm = …, follows = … }";
 
 /// A hand; `Some(None)` for "none".
-pub(crate) fn read_hand(node: &Node, context: Context<'_>) -> Option<Option<Hand>> {
+pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option<Hand>> {
     match node.as_text() {
         Some("none") => return Some(None),
         Some(other) => {
@@ -21,25 +22,25 @@ pub(crate) fn read_hand(node: &Node, context: Context<'_>) -> Option<Option<Hand
         }
         None => {}
     }
-    let mut table = TableReader::new(node, context, EXPECTED)?;
+    let mut table = TableReader::new(node, *context, EXPECTED)?;
     let force = table.entry("force");
     let sine = table.entry("sine");
     let file = table.entry("file");
     let arm = table.entry("arm");
     let follows = table.entry("follows");
     table.finish();
-    let chosen = only_one(node, context, &[force, sine, file, arm], EXPECTED)?;
+    let chosen = only_one(node, *context, &[force, sine, file, arm], EXPECTED)?;
     if let (Some(follows), None) = (follows, arm) {
         context.fault(follows.key, &follows.node.path, "only an arm follows a wanted motion: expected arm = { mass, damping, stiffness } beside it");
         return None;
     }
     let value = &*chosen.node;
     let signal = match chosen.name.as_str() {
-        "force" => Signal::Constant(FORCE.read_vector(value, context, Spread::Refused)?),
+        "force" => Signal::Constant(read_vector(FORCE, value, context, Spread::Refused)?),
         "sine" => read_sine(value, context, FORCE)?,
         "file" => Signal::Table(read_motion_file(value, context, Columns::Force)?),
         _ => {
-            let arm = read_arm(value, context);
+            let arm = read_arm(value, *context);
             let follows = match follows {
                 Some(entry) => read_follows(&entry.node, context),
                 None => Some(Signal::Constant([0.0; 3])),
@@ -59,43 +60,25 @@ fn read_arm(node: &Node, context: Context<'_>) -> Option<ArmConfig> {
     Some(ArmConfig { mass: mass?, damping: damping?, stiffness: stiffness? })
 }
 
-fn read_follows(node: &Node, context: Context<'_>) -> Option<Signal> {
+fn read_follows(node: &Node, context: SceneContext<'_>) -> Option<Signal> {
     const EXPECTED: &str = "{ position = … }, { sine = … } or { file = … }";
-    let mut table = TableReader::new(node, context, EXPECTED)?;
+    let mut table = TableReader::new(node, *context, EXPECTED)?;
     let choices = [table.entry("position"), table.entry("sine"), table.entry("file")];
     table.finish();
-    let chosen = only_one(node, context, &choices, EXPECTED)?;
+    let chosen = only_one(node, *context, &choices, EXPECTED)?;
     let value = &*chosen.node;
     match chosen.name.as_str() {
-        "position" => Some(Signal::Constant(POSITION.read_vector(value, context, Spread::Refused)?)),
+        "position" => Some(Signal::Constant(read_vector(POSITION, value, context, Spread::Refused)?)),
         "sine" => read_sine(value, context, POSITION),
         _ => Some(Signal::Table(read_motion_file(value, context, Columns::Position)?)),
     }
 }
 
-fn read_sine(node: &Node, context: Context<'_>, quantity: Quantity) -> Option<Signal> {
-    let mut table = TableReader::new(node, context, "a table such as { amplitude = 2.0, frequency = 0.7, phase = 0.0 }")?;
-    let amplitude = table.required("amplitude", &quantity.expected(), |node, context| quantity.read_vector(node, context, Spread::Refused));
+fn read_sine(node: &Node, context: SceneContext<'_>, quantity: Quantity) -> Option<Signal> {
+    let mut table = TableReader::new(node, *context, "a table such as { amplitude = 2.0, frequency = 0.7, phase = 0.0 }")?;
+    let amplitude = table.required("amplitude", &quantity.expected(), |node, _| read_vector(quantity, node, context, Spread::Refused));
     let frequency = table.required("frequency", &FREQUENCY.expected(), |node, context| FREQUENCY.read(node, context));
     let phase = table.optional("phase", 0.0, |node, context| ANGLE.read(node, context));
     table.finish();
     Some(Signal::Sine { amplitude: amplitude?, frequency: Hertz(frequency?), phase: phase? })
-}
-
-/// The one entry that is there. None, or more than one, is a fault.
-pub(crate) fn only_one<'a>(node: &Node, context: Context<'_>, entries: &[Option<&'a Entry>], expected: &str) -> Option<&'a Entry> {
-    let mut given: Vec<&Entry> = entries.iter().copied().flatten().collect();
-    given.sort_by_key(|entry| entry.key);
-    match given.as_slice() {
-        [only] => Some(only),
-        [] => {
-            context.fault_at(node, format!("nothing is given: expected {expected}"));
-            None
-        }
-        [first, second, ..] => {
-            let message = format!("\"{}\" is given already: expected only one of {expected}", first.name);
-            context.fault(second.key, &second.node.path, message);
-            None
-        }
-    }
 }

@@ -1,13 +1,13 @@
 //! Where a peer lives: `kind`, `silence` and `falcon` of a peer.
 
+use cohaptic_linkfile::document::{Node, quote};
+use cohaptic_linkfile::reading::values::ReadNumber as _;
+use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_peer::DeviceConfig;
 use cohaptic_units::print::Counted;
 
-use crate::context::Context;
 use crate::model::{FalconDevice, FalconSpec, PeerKind, Silence};
-use crate::table_reader::TableReader;
-use crate::tree::{Node, quote};
-use crate::values::{self, POSITIVE_COUNTS, POSITIVE_FORCE};
+use crate::quantities::{POSITION, POSITIVE_COUNTS, POSITIVE_FORCE};
 
 /// The model of a Falcon in Rakhsha & Constantinescu (2015), for virtual time.
 pub(crate) const FALCON_DEVICE: DeviceConfig = DeviceConfig { mass: 0.1, damping: 5.0 };
@@ -78,7 +78,7 @@ fn read_origin(node: &Node, context: Context<'_>) -> Option<[f64; 3]> {
         context.fault_at(node, format!("found a list of {}: expected {EXPECTED}", Counted(elements.len(), "number")));
         return None;
     };
-    let read = |node| values::POSITION.read(node, context);
+    let read = |node| POSITION.read(node, context);
     let (x, y, z) = (read(x), read(y), read(z));
     Some([x?, y?, z?])
 }

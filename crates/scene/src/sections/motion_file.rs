@@ -3,13 +3,13 @@
 use core::ops::Range;
 use std::sync::Arc;
 
+use cohaptic_linkfile::document::{Node, quote, shorten};
+use cohaptic_linkfile::reading::named_file::{Fault, file_path, read_file};
 use cohaptic_peer::{Table as MotionTable, TableError};
 use cohaptic_units::print::Counted;
 use cohaptic_units::{Instant, parse};
 
-use super::named_file::{Fault, file_path, read_file};
-use crate::context::Context;
-use crate::tree::{Node, quote, shorten};
+use crate::context::SceneContext;
 
 /// What the columns after the time hold.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -31,11 +31,11 @@ impl Columns {
 }
 
 /// Reads the file that `node` names, relative to the folder of the scene.
-pub(crate) fn read_motion_file(node: &Node, context: Context<'_>, columns: Columns) -> Option<Arc<MotionTable>> {
-    let path = file_path(node, context, "the name of a CSV file, relative to the folder of the scene")?;
+pub(crate) fn read_motion_file(node: &Node, context: SceneContext<'_>, columns: Columns) -> Option<Arc<MotionTable>> {
+    let path = file_path(node, *context, "the name of a CSV file, relative to the folder of the scene")?;
     let header = columns.header(context.axes?.count());
     // The same file with other columns is another matter, and is refused by its header.
-    read_file(node, context, &path, &header.join(","), |text| parse_rows(text, &header).map(Arc::new))
+    read_file(node, *context, &path, &header.join(","), |text| parse_rows(text, &header).map(Arc::new))
 }
 
 fn parse_rows(text: &str, header: &[&str]) -> Result<MotionTable, Fault> {
@@ -152,8 +152,9 @@ fn without_exponent(text: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_units::Excerpt;
+
     use super::*;
-    use crate::excerpt::Excerpt;
 
     fn nanos(text: &str) -> Option<u64> {
         seconds(text).ok().map(Instant::as_nanos)

@@ -1,41 +1,42 @@
 //! `[object]`: the shared virtual object.
 
+use cohaptic_linkfile::document::Node;
+use cohaptic_linkfile::reading::values::ReadNumber as _;
+use cohaptic_linkfile::reading::{TableReader, values};
 use cohaptic_peer::Enclosure;
 
-use crate::context::Context;
+use crate::context::SceneContext;
 use crate::model::ObjectSpec;
-use crate::table_reader::TableReader;
-use crate::tree::Node;
-use crate::values::{self, DAMPING, MASS, POSITION, Spread, VELOCITY, WALL_STIFFNESS};
+use crate::quantities::{DAMPING, MASS, POSITION, Spread, VELOCITY, WALL_STIFFNESS, read_vector};
 
-pub(crate) fn read_object(node: &Node, context: Context<'_>) -> Option<ObjectSpec> {
-    let mut table = TableReader::new(node, context, "a table such as [object]")?;
+pub(crate) fn read_object(node: &Node, context: SceneContext<'_>) -> Option<ObjectSpec> {
+    let mut table = TableReader::new(node, *context, "a table such as [object]")?;
     let mass = table.required("mass", &MASS.expected(), |node, context| MASS.read(node, context));
     let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
     let split_mass = table.optional("split-mass", true, values::boolean);
-    let position = table.optional("position", [0.0; 3], read_position);
-    let velocity = table.optional("velocity", [0.0; 3], read_velocity);
-    let enclosure = table.maybe("enclosure", read_enclosure);
+    let position = table.optional("position", [0.0; 3], |node, _| read_position(node, context));
+    let velocity = table.optional("velocity", [0.0; 3], |node, _| read_velocity(node, context));
+    let enclosure = table.maybe("enclosure", |node, _| read_enclosure(node, context));
     table.finish();
     Some(ObjectSpec { mass: mass?, damping: damping?, split_mass: split_mass?, position: position?, velocity: velocity?, enclosure: enclosure? })
 }
 
 /// Where something begins.
-pub(crate) fn read_position(node: &Node, context: Context<'_>) -> Option<[f64; 3]> {
-    POSITION.read_vector(node, context, Spread::EveryAxis)
+pub(crate) fn read_position(node: &Node, context: SceneContext<'_>) -> Option<[f64; 3]> {
+    read_vector(POSITION, node, context, Spread::EveryAxis)
 }
 
 /// With which velocity something begins.
-pub(crate) fn read_velocity(node: &Node, context: Context<'_>) -> Option<[f64; 3]> {
-    VELOCITY.read_vector(node, context, Spread::EveryAxis)
+pub(crate) fn read_velocity(node: &Node, context: SceneContext<'_>) -> Option<[f64; 3]> {
+    read_vector(VELOCITY, node, context, Spread::EveryAxis)
 }
 
-fn read_enclosure(node: &Node, context: Context<'_>) -> Option<Enclosure> {
-    let mut table = TableReader::new(node, context, "a table such as { min = -0.1, max = 0.1, stiffness = 1000.0, damping = 5.0 }")?;
+fn read_enclosure(node: &Node, context: SceneContext<'_>) -> Option<Enclosure> {
+    let mut table = TableReader::new(node, *context, "a table such as { min = -0.1, max = 0.1, stiffness = 1000.0, damping = 5.0 }")?;
     let ends = "a number [m], or a list of one for each axis";
-    let min = table.required("min", ends, read_position);
+    let min = table.required("min", ends, |node, _| read_position(node, context));
     let max_node = table.get("max");
-    let max = table.required("max", ends, read_position);
+    let max = table.required("max", ends, |node, _| read_position(node, context));
     let stiffness = table.required("stiffness", &WALL_STIFFNESS.expected(), |node, context| WALL_STIFFNESS.read(node, context));
     let damping = table.required("damping", &DAMPING.expected(), |node, context| DAMPING.read(node, context));
     table.finish();

@@ -2,6 +2,10 @@
 
 use core::time::Duration;
 
+use cohaptic_linkfile::document::{Node, Value, quote};
+use cohaptic_linkfile::link::read_link;
+use cohaptic_linkfile::reading::values::ReadNumber as _;
+use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_peer::{Clock, Contact, DeviceConfig, Direction, Drift, Gains, Hand};
 use cohaptic_units::print::Span;
 use cohaptic_wan::LinkModel;
@@ -9,14 +13,10 @@ use cohaptic_wan::LinkModel;
 use super::hand::read_hand;
 use super::header::read_scaling;
 use super::kind::{FALCON_DEVICE, STILL_DEVICE, read_kind};
-use super::link::read_link;
 use super::object::{read_position, read_velocity};
-use super::selector::check_axis;
-use crate::context::Context;
+use crate::context::{SceneContext, check_axis};
 use crate::model::{PeerKind, Scaling};
-use crate::table_reader::TableReader;
-use crate::tree::{Node, Value, quote};
-use crate::values::{self, DAMPING, MASS, STIFFNESS};
+use crate::quantities::{DAMPING, MASS, STIFFNESS};
 
 /// The keys whose tables are laid over each other key by key; every other key replaces the one below.
 pub(crate) const NESTED: [&str; 7] = ["silence", "falcon", "device", "coupling", "clock", "uplink", "downlink"];
@@ -41,13 +41,13 @@ pub(crate) struct PeerKeys {
 }
 
 /// Reads the keys of a peer. `beside`: keys of the same table that somebody else reads. `update`: the period of sending and where it is written.
-pub(crate) fn read_peer(node: &Node, context: Context<'_>, beside: &[&'static str], update: Option<(Duration, &Node)>) -> Option<PeerKeys> {
+pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, beside: &[&'static str], update: Option<(Duration, &Node)>) -> Option<PeerKeys> {
     const DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }";
     const UDP_DEVICE: &str = "a table such as { mass = 0.1, damping = 5.0 }, from which this peer of kind \"udp\", another process, can be simulated; \
         `cohaptic live` runs the scene without it, with the process itself";
-    let mut table = TableReader::new(node, context, "a table of keys of a peer")?;
+    let mut table = TableReader::new(node, *context, "a table of keys of a peer")?;
     table.know(beside);
-    let kind = read_kind(&mut table, context);
+    let kind = read_kind(&mut table, *context);
     let elsewhere = matches!(kind, Some(PeerKind::Udp(_)));
     let tick_node = table.get("tick");
     let tick = table.optional("tick", Duration::from_millis(1), values::positive_duration);
@@ -56,7 +56,7 @@ pub(crate) fn read_peer(node: &Node, context: Context<'_>, beside: &[&'static st
     let phase = table.optional("phase", 0, |node, context| {
         values::integer(node, context, 0..=i64::MAX.unsigned_abs(), "a number of ticks, an integer from 0 to below coordination.update / tick")
     });
-    let contact = table.optional("contact", Contact::Grasp, read_contact);
+    let contact = table.optional("contact", Contact::Grasp, |node, _| read_contact(node, context));
     let device = table.maybe("device", |node, context| read_device(node, context, DEVICE));
     let absent = match &kind {
         None => None,
@@ -79,10 +79,10 @@ pub(crate) fn read_peer(node: &Node, context: Context<'_>, beside: &[&'static st
     if table.get("coupling").is_none() && needs_coupling {
         table.miss("coupling", COUPLING);
     }
-    let hand = table.optional("hand", None, read_hand);
+    let hand = table.optional("hand", None, |node, _| read_hand(node, context));
     let clock = table.optional("clock", (Duration::ZERO, Drift::default()), read_clock);
-    let position = table.maybe("position", read_position);
-    let velocity = table.maybe("velocity", read_velocity);
+    let position = table.maybe("position", |node, _| read_position(node, context));
+    let velocity = table.maybe("velocity", |node, _| read_velocity(node, context));
     let uplink = table.maybe("uplink", |node, context| read_link(node, context, &[]));
     let downlink = table.maybe("downlink", |node, context| read_link(node, context, &[]));
     table.finish();
@@ -127,7 +127,7 @@ fn whole_multiple(whole: Duration, part: Duration) -> Option<u64> {
 }
 
 /// A contact.
-pub(crate) fn read_contact(node: &Node, context: Context<'_>) -> Option<Contact> {
+pub(crate) fn read_contact(node: &Node, context: SceneContext<'_>) -> Option<Contact> {
     const EXPECTED: &str = "\"grasp\", \"none\" or { push = \"+x\" }";
     if let Some(text) = node.as_text() {
         return match text {
@@ -139,13 +139,13 @@ pub(crate) fn read_contact(node: &Node, context: Context<'_>) -> Option<Contact>
             }
         };
     }
-    let mut table = TableReader::new(node, context, EXPECTED)?;
-    let direction = table.required("push", "a direction such as \"+x\"", read_direction);
+    let mut table = TableReader::new(node, *context, EXPECTED)?;
+    let direction = table.required("push", "a direction such as \"+x\"", |node, _| read_direction(node, context));
     table.finish();
     direction.map(Contact::Push)
 }
 
-fn read_direction(node: &Node, context: Context<'_>) -> Option<Direction> {
+fn read_direction(node: &Node, context: SceneContext<'_>) -> Option<Direction> {
     let along = |axis, positive| Direction { axis, positive };
     let directions = [
         ("+x", along(0, true)),
@@ -155,7 +155,7 @@ fn read_direction(node: &Node, context: Context<'_>) -> Option<Direction> {
         ("+z", along(2, true)),
         ("-z", along(2, false)),
     ];
-    let direction = values::choice(node, context, &directions)?;
+    let direction = values::choice(node, *context, &directions)?;
     check_axis(node, context, direction.axis)?;
     Some(direction)
 }

@@ -3,16 +3,14 @@
 use core::time::Duration;
 use std::collections::BTreeMap;
 
+use cohaptic_linkfile::document::{BEGINNING, Entry, Node, join, quote};
+use cohaptic_linkfile::reading::{Context, Names, one_of, values};
 use cohaptic_peer::Gains;
 use cohaptic_units::print::Counted;
 
 use super::peer::{NESTED, PeerKeys, read_peer};
-use crate::context::Context;
+use crate::context::SceneContext;
 use crate::model::{ObjectSpec, PeerSpec, Scaling};
-use crate::names::{Names, one_of};
-use crate::source::BEGINNING;
-use crate::tree::{Entry, Node, join, quote};
-use crate::values;
 
 /// The names of the peers; `None` where they are not known for certain. `count`: as given under `[scene]`.
 pub(crate) fn read_names(peers: Option<&Node>, count: Option<u64>, context: Context<'_>) -> Option<Names> {
@@ -87,15 +85,15 @@ pub(crate) struct PeerSources<'a> {
 }
 
 /// Every peer, in the order of the names. `None` where one was refused.
-pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, context: Context<'_>) -> Option<Vec<PeerSpec>> {
+pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, context: SceneContext<'_>) -> Option<Vec<PeerSpec>> {
     if let Some(node) = sources.defaults {
         // On their own, so that a fault in a default that every peer replaces is found too.
-        read_peer(node, Context { partial: true, ..context }, &[], None);
+        read_peer(node, context.of_part(), &[], None);
     }
     let nothing = Node::empty_table(sources.count.map_or(BEGINNING, |entry| entry.key), "peer".to_owned());
     let base = sources.defaults.filter(|node| node.as_table().is_some()).unwrap_or(&nothing);
     let entries = match sources.entries {
-        Some(node) => values::list(node, context, "entries [[peers]]")?,
+        Some(node) => values::list(node, *context, "entries [[peers]]")?,
         None => Vec::new(),
     };
     let own: Vec<Option<PeerKeys>> = entries.iter().map(|entry| read_entry(entry, base, sources.update, context)).collect();
@@ -111,7 +109,7 @@ pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, 
     named.map(|(place, name)| Some(spec(name, keys.remove(&place).or_else(|| shared.clone())?, object?))).collect()
 }
 
-fn read_entry(entry: &Node, base: &Node, update: Option<(Duration, &Node)>, context: Context<'_>) -> Option<PeerKeys> {
+fn read_entry(entry: &Node, base: &Node, update: Option<(Duration, &Node)>, context: SceneContext<'_>) -> Option<PeerKeys> {
     if entry.as_table().is_some_and(|table| table.get("name").is_none()) {
         context.fault(entry.place, &join(&entry.path, "name"), "missing key: expected the name of the peer");
     }

@@ -2,19 +2,20 @@
 
 use core::time::Duration;
 
+use cohaptic_linkfile::LinkSelector;
+use cohaptic_linkfile::document::Node;
+use cohaptic_linkfile::link::is_empty;
+use cohaptic_linkfile::mesh::{LinkClasses, OnLinks, read_key_changes, read_links_between, read_peer_name};
+use cohaptic_linkfile::reading::values::ReadNumber as _;
+use cohaptic_linkfile::reading::{Context, TableReader, only_one, values};
 use cohaptic_peer::{Contact, Gains, Hand};
 use cohaptic_units::Instant;
 
-use super::hand::{only_one, read_hand};
-use super::link::{is_empty, read_link};
-use super::links::LinkClasses;
+use super::hand::read_hand;
 use super::peer::read_contact;
-use super::selector::{read_links_between, read_peer_name};
-use crate::context::Context;
-use crate::model::{Change, ChangeKind, LinkSelector, PeerSpec};
-use crate::table_reader::TableReader;
-use crate::tree::Node;
-use crate::values::{self, DAMPING, STIFFNESS};
+use crate::context::SceneContext;
+use crate::model::{Change, ChangeKind, PeerSpec};
+use crate::quantities::{DAMPING, STIFFNESS};
 
 /// An entry, before it is known what stands before it in time.
 #[derive(Debug)]
@@ -37,10 +38,11 @@ pub(crate) fn read_timeline(
     links: Option<&LinkClasses>,
     peers: Option<&[PeerSpec]>,
     gains: Option<Gains>,
-    context: Context<'_>,
+    on_links: OnLinks<'_>,
+    context: SceneContext<'_>,
 ) -> Option<Vec<Change>> {
     let Some(node) = node else { return Some(Vec::new()) };
-    let entries = values::list(node, context, "entries [[timeline]]")?;
+    let entries = values::list(node, *context, "entries [[timeline]]")?;
     let planned: Vec<_> = entries.iter().map(|entry| read_entry(entry, duration, context)).collect();
     let mut planned: Vec<Planned<'_>> = planned.into_iter().collect::<Option<_>>()?;
     // Stable: equal instants stay in the order of the file.
@@ -53,16 +55,17 @@ pub(crate) fn read_timeline(
         match what {
             PlannedKind::Links { selector, set } => {
                 let what = if let LinkSelector::Between { from, to } = selector {
-                    ChangeKind::Link(links.change((from, to), set, context)?)
+                    ChangeKind::Link(links.change((from, to), set, *context)?)
                 } else {
-                    ChangeKind::AllLinks(links.change_all(set, context)?)
+                    ChangeKind::AllLinks(links.change_all(set, *context)?)
                 };
+                on_links(at, selector, &links);
                 changes.push(Change { at, what });
             }
             PlannedKind::Peer { peer, contact, hand } => {
                 let spec = peers?.get(peer)?;
-                complete &= contact.is_none_or(|(contact, node)| contact_is_possible(spec, contact, node, context));
-                complete &= hand.as_ref().is_none_or(|(hand, node)| hand_is_possible(spec, hand.as_ref(), node, context));
+                complete &= contact.is_none_or(|(contact, node)| contact_is_possible(spec, contact, node, *context));
+                complete &= hand.as_ref().is_none_or(|(hand, node)| hand_is_possible(spec, hand.as_ref(), node, *context));
                 changes.extend(contact.map(|(contact, _)| Change { at, what: ChangeKind::Contact { peer, contact } }));
                 changes.extend(hand.map(|(hand, _)| Change { at, what: ChangeKind::Hand { peer, hand } }));
             }
@@ -75,9 +78,9 @@ pub(crate) fn read_timeline(
     complete.then_some(changes)
 }
 
-fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: Context<'a>) -> Option<Planned<'a>> {
+fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: SceneContext<'a>) -> Option<Planned<'a>> {
     const TARGETS: &str = "link, peer or coordination";
-    let mut table = TableReader::new(node, context, "a table with at, set and one of link and peer, or with at and coordination")?;
+    let mut table = TableReader::new(node, *context, "a table with at, set and one of link and peer, or with at and coordination")?;
     let at = table.required("at", "a time such as \"3s\"", |node, context| {
         let at = values::instant(node, context)?;
         let last = Instant::ZERO.saturating_add(duration?);
@@ -93,27 +96,22 @@ fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: Context<'
         table.miss("set", "a table of the keys that change");
     }
     table.finish();
-    let target = only_one(node, context, &[link, peer, coordination], TARGETS)?;
+    let target = only_one(node, *context, &[link, peer, coordination], TARGETS)?;
     if target.name == "coordination" {
         if let Some(set) = set {
             context.fault(set.key, &set.node.path, "coordination holds its own keys: expected no key set beside it");
             return None;
         }
-        let what = read_gains(&target.node, context);
+        let what = read_gains(&target.node, *context);
         return Some(Planned { at: at?, what: what? });
     }
     let what = if target.name == "link" {
-        let selector = read_links_between(&target.node, context);
+        let selector = read_links_between(&target.node, *context);
         let set = &*set?.node;
-        // On its own, so that a fault is found even where it is not known which links are meant.
-        read_link(set, Context { partial: true, ..context }, &[]);
-        if is_empty(set) {
-            context.fault_at(set, "nothing changes: expected keys of a link");
-            return None;
-        }
+        read_key_changes(set, *context)?;
         PlannedKind::Links { selector: selector?, set }
     } else {
-        let peer = read_peer_name(&target.node, context);
+        let peer = read_peer_name(&target.node, *context);
         let (contact, hand) = read_peer_changes(&set?.node, context)?;
         PlannedKind::Peer { peer: peer?, contact, hand }
     };
@@ -133,10 +131,10 @@ fn read_gains<'a>(node: &'a Node, context: Context<'a>) -> Option<PlannedKind<'a
 }
 
 #[expect(clippy::type_complexity, reason = "used once, above")]
-fn read_peer_changes<'a>(node: &'a Node, context: Context<'a>) -> Option<(Option<(Contact, &'a Node)>, Option<(Option<Hand>, &'a Node)>)> {
-    let mut table = TableReader::new(node, context, "a table with contact, hand or both")?;
-    let contact = table.maybe("contact", |node, context| read_contact(node, context).map(|contact| (contact, node)));
-    let hand = table.maybe("hand", |node, context| read_hand(node, context).map(|hand| (hand, node)));
+fn read_peer_changes<'a>(node: &'a Node, context: SceneContext<'a>) -> Option<(Option<(Contact, &'a Node)>, Option<(Option<Hand>, &'a Node)>)> {
+    let mut table = TableReader::new(node, *context, "a table with contact, hand or both")?;
+    let contact = table.maybe("contact", |node, _| read_contact(node, context).map(|contact| (contact, node)));
+    let hand = table.maybe("hand", |node, _| read_hand(node, context).map(|hand| (hand, node)));
     table.finish();
     if is_empty(node) {
         context.fault_at(node, "nothing changes: expected contact, hand or both");

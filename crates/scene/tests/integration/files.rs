@@ -96,6 +96,6 @@ fn a_folder_means_every_scene_below_it_in_order() {
 fn a_folder_without_scenes_and_a_path_to_nothing_are_errors() {
     let folder = Folder::new("empty");
     let error = scene_files(&folder.0).unwrap_err();
-    assert!(matches!(error, SceneError::NoScene { .. }) && !error.is_io());
+    assert!(matches!(error, SceneError::NoFile { .. }) && !error.is_io());
     assert!(scene_files(&folder.0.join("nothing")).unwrap_err().is_io());
 }

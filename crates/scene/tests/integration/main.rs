@@ -8,6 +8,4 @@ mod link_keys;
 mod manual;
 mod many_peers;
 mod mutations;
-mod relay_file;
-mod router_file;
 mod sweep;

@@ -3,7 +3,8 @@
 use std::panic::catch_unwind;
 use std::path::Path;
 
-use cohaptic_scene::{RelayFile, Scene, link_from_keys, scene_content};
+use cohaptic_linkfile::{RelayFile, link_from_keys};
+use cohaptic_scene::{Scene, scene_content};
 
 use crate::every_key::path;
 

@@ -1,6 +1,6 @@
 //! A key of a scene that is left open, and between which values.
 
-use cohaptic_scene::{number_and_unit, text_of_quantity};
+use cohaptic_linkfile::{number_and_unit, text_of_quantity};
 
 /// A key of a scene, and the values that it takes.
 #[derive(Clone, PartialEq, Debug)]

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "files")]
 mod documents;
+#[cfg(feature = "scenes")]
+mod scene;
 
 use std::collections::BTreeMap;
 use std::io;
@@ -15,7 +17,7 @@ use crate::words::{self, WordsError};
 
 /// Hosts and the links between them, read from a file.
 ///
-/// A file that ends in `.toml` is a relay file, whose programs are the hosts, or a scene file, whose peers are (feature `files`): its links are as it says, also
+/// A file that ends in `.toml` is a relay file, whose programs are the hosts (feature `files`), or a scene file, whose peers are (feature `scenes`): its links are as it says, also
 /// those that change while the run goes on, and its seed is that of the run. What is said of devices, objects and expectations means nothing here.
 ///
 /// Any other file is of plain words, a line each:
@@ -76,7 +78,7 @@ pub enum LinkFileError {
         error: WordsError,
     },
     /// It is a scene file or a relay file, and this crate was built without them.
-    #[error("{}: a scene file or a relay file is read with the feature `files` of cohaptic-testkit only; expected it, or a file of plain words", path.display())]
+    #[error("{}: a relay file is read with the feature `files` of cohaptic-testkit only, a scene file with `scenes`; expected it, or a file of plain words", path.display())]
     NoDocuments {
         /// The file.
         path: PathBuf,
@@ -84,7 +86,7 @@ pub enum LinkFileError {
     /// It makes no sense as a scene file or a relay file.
     #[cfg(feature = "files")]
     #[error(transparent)]
-    Document(#[from] cohaptic_scene::SceneError),
+    Document(#[from] cohaptic_linkfile::FileError),
     /// A scene has what links between hosts cannot stand for.
     #[error("{}: {what}", path.display())]
     NotLinks {

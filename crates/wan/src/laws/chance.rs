@@ -1,5 +1,8 @@
 //! Events that happen to a packet with a probability, each alone or in runs.
 
+use crate::parameters::{CORRELATION, Form, Key, Table, number, optional, usual};
+use alloc::format;
+use alloc::string::String;
 use cohaptic_units::Probability;
 
 /// A yes or no for every packet: the probability of yes, and how much it depends on the answer before.
@@ -100,6 +103,30 @@ impl ChanceStage {
         self.before = Some(happens);
         happens
     }
+}
+
+/// The parameter of copies.
+pub(crate) const KEYS: [Key; 1] = [usual("duplicate", CHANCE, "0", "Probability that a packet is sent twice")];
+/// An event that happens to packets with a probability.
+pub(crate) const CHANCE: Form = Form::AnyOf(&[Form::Probability, Form::Table(&CHANCE_TABLE)]);
+static CHANCE_TABLE: Table = Table::of(&[&CHANCES]);
+/// The keys of a chance in a table that has others too.
+pub(crate) const CHANCES: [Key; 2] = [
+    optional("probability", Form::Probability, "The fraction of packets that it happens to"),
+    usual("correlation", number(CORRELATION), "0", "Correlation of what happens to a packet with what happened to the one before"),
+];
+
+impl Chance {
+    /// How often it happens: `1%`, or with the correlation from one packet to the next.
+    pub(crate) fn words(self) -> String {
+        let often = percent(self.probability.get());
+        if self.correlation == 0.0 { often } else { format!("{often} (correlation {})", self.correlation) }
+    }
+}
+
+/// A fraction as a percentage, to six places.
+pub(crate) fn percent(fraction: f64) -> String {
+    format!("{}%", libm::round(fraction * 1e8) / 1e6)
 }
 
 #[cfg(test)]

@@ -1,7 +1,11 @@
 //! How long something stays as it is.
 
+use alloc::format;
+use alloc::string::String;
+use cohaptic_units::print::Span;
 use core::time::Duration;
 
+use crate::parameters::{Form, Table, optional, required};
 use crate::random::unit;
 
 /// The law of a span of time.
@@ -52,6 +56,32 @@ impl Sojourn {
         };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative; saturates beyond 584 years")]
         Duration::from_nanos((libm::rint(drawn) as u64).max(1))
+    }
+}
+
+/// How long something lasts.
+pub(crate) const SOJOURN: Form = Form::AnyOf(&[Form::Duration, Form::Table(&SOJOURN_TABLE)]);
+static SOJOURN_TABLE: Table = Table::of(&[&[
+    optional("exponential", Form::Duration, "By chance without memory, with this mean; a plain duration means the same"),
+    optional("fixed", Form::Duration, "Always so long"),
+    optional("uniform", Form::Pair(&Form::Duration), "The shortest and the longest span, and all between as likely"),
+    optional("erlang", Form::Table(&ERLANG), "The sum of several exponential stages"),
+]]);
+static ERLANG: Table = Table::of(&[&[
+    required("mean", Form::Duration, "The mean of all stages together"),
+    required("stages", Form::Integer(1, 1000), "How many stages"),
+]]);
+
+impl Sojourn {
+    /// The law and the mean in words.
+    pub(crate) fn words(self) -> String {
+        let law = match self {
+            Self::Fixed(_) => "always",
+            Self::Exponential(_) => "exponential,",
+            Self::Uniform(..) => "uniform,",
+            Self::Erlang(..) => "Erlang,",
+        };
+        format!("{law} {}", Span(self.mean()))
     }
 }
 

@@ -1,12 +1,19 @@
 //! What kind of link it is.
 
+use crate::laws::sojourn::Sojourn;
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use cohaptic_units::print::Counted;
 use core::time::Duration;
 
 use crate::fates::log::FateLog;
-use crate::netem::kernel::{Qdisc, QdiscError, Table};
+use crate::netem::kernel::{self, Qdisc, QdiscError};
 use crate::netem::{Netem, TableName};
+use crate::parameters::{Form, Key, NONE, Table, required, usual};
+use crate::stages::config::LINK_PARAMETERS;
 use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::modulation::Modulated;
 
@@ -29,7 +36,7 @@ pub enum LinkModel {
 #[derive(Clone, PartialEq, Debug)]
 pub struct KernelNetem {
     words: Netem,
-    tables: Arc<[(TableName, Table)]>,
+    tables: Arc<[(TableName, kernel::Table)]>,
 }
 
 impl KernelNetem {
@@ -38,7 +45,7 @@ impl KernelNetem {
     /// # Errors
     ///
     /// [`QdiscError`] if options contradict each other, a delay is beyond what `tc` counts, or a table is missing.
-    pub fn new(words: Netem, tables: Vec<(TableName, Table)>) -> Result<Self, QdiscError> {
+    pub fn new(words: Netem, tables: Vec<(TableName, kernel::Table)>) -> Result<Self, QdiscError> {
         let checked = Self { words, tables: tables.into() };
         checked.build::<()>(0)?;
         Ok(checked)
@@ -148,6 +155,51 @@ impl LinkModel {
         match self {
             Self::Fixed(config) => config.is_direct(),
             Self::Modulated(_) | Self::Replay(_) | Self::Kernel(_) => false,
+        }
+    }
+}
+
+/// The parameters that say which kind of link it is, which cannot change with the state of a modulator.
+pub const LINK_KIND_PARAMETERS: [Key; 4] = [
+    usual(
+        "modulated",
+        Form::AnyOf(const { &[Form::Table(&MODULATED), NONE] }),
+        "\"none\"",
+        "Keys that hold while a modulator is in one of its states",
+    ),
+    usual(
+        "replay",
+        Form::File,
+        "\"none\"",
+        "A log of fates: the n-th packet meets the fate of the n-th of the log. Takes away all other keys; \"none\" takes it away",
+    ),
+    usual("netem", NETEM, "\"none\"", "The link in the words of tc-netem. Takes away all other keys; \"none\" takes it away"),
+    usual("netem-profile", Form::Words(&PROFILES), "\"exact\"", "The meaning of the words of netem"),
+];
+static MODULATED: Table = Table::with_others(
+    &[&[required("by", Form::Text, "The name of a modulator; beside it keys of the link under the names of its states")]],
+    &Form::Table(&STATE),
+);
+/// Keys that hold in a state of a modulator.
+static STATE: Table = Table::over(&LINK_PARAMETERS);
+const PROFILES: [(&str, &str); 2] = [("exact", "what the words say"), ("kernel-6.6", "what Linux 6.6 does when it is told so")];
+const NETEM: Form = Form::Like(&["delay 20ms 5ms 25% distribution normal loss gemodel 1% 10%", "none"]);
+
+impl LinkModel {
+    /// The link in words: each stage that is configured, with its numbers.
+    #[must_use]
+    pub fn words(&self) -> String {
+        match self {
+            Self::Fixed(config) => config.words(),
+            Self::Modulated(modulated) => {
+                let states = modulated.modulator().states().iter().zip(modulated.configs()).enumerate().map(|(place, (state, config))| {
+                    let lasts = state.sojourn.map_or_else(|| "for ever".to_owned(), Sojourn::words);
+                    format!("state {} ({lasts}): {}", place + 1, config.words())
+                });
+                format!("as \"{}\" goes; {}", modulated.modulator().name(), states.collect::<Vec<_>>().join("; "))
+            }
+            Self::Replay(log) => format!("a replay of {}, and nothing after it", Counted(log.packets(), "packet")),
+            Self::Kernel(netem) => format!("netem of Linux 6.6, to the bit: {}", netem.words()),
         }
     }
 }

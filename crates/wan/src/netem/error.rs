@@ -4,6 +4,8 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use core::ops::Range;
 
+use cohaptic_units::Spot;
+
 use super::Contradiction;
 
 /// Why the words are no netem, and which of them is to blame.
@@ -65,14 +67,11 @@ impl NetemError {
     /// `input` is the text that was read; with another one the mark stands elsewhere, or at the end.
     #[must_use]
     pub fn excerpt(&self, input: &str) -> String {
-        let start = floor_boundary(input, self.span.start);
-        let end = floor_boundary(input, self.span.end).max(start);
-        let line_start = input[..start].rfind('\n').map_or(0, |newline| newline + 1);
-        let line_end = input[start..].find('\n').map_or(input.len(), |newline| start + newline);
-        let line = input[line_start..line_end].trim_end_matches('\r');
+        let Spot { line, marked } = Spot::of(input, self.span.clone());
         // A tab stays a tab, so that the caret stands below its word whatever the width of tabs.
-        let indent: String = input[line_start..start].chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
-        let carets = "^".repeat(input[start..end.min(line_end)].chars().count().max(1));
+        let indent: String = input[line.start..marked.start].chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
+        let carets = "^".repeat(input[marked].chars().count().max(1));
+        let line = input[line].trim_end_matches('\r');
         format!("{line}\n{indent}{carets} {}", self.advice())
     }
 
@@ -84,9 +83,4 @@ impl NetemError {
             NetemErrorKind::UnknownWord { .. } | NetemErrorKind::Repeated { .. } | NetemErrorKind::Contradiction(_) => self.kind.to_string(),
         }
     }
-}
-
-/// The last character boundary at or before `index`.
-fn floor_boundary(text: &str, index: usize) -> usize {
-    (0..=index.min(text.len())).rev().find(|&index| text.is_char_boundary(index)).unwrap_or(0)
 }

@@ -1,8 +1,14 @@
 //! What a link does to its packets.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
 use cohaptic_units::Bytes;
+use cohaptic_units::print::{Counted, Span};
 
+use crate::laws::chance;
 use crate::laws::chance::Chance;
+use crate::parameters::{Form, Key, UNLIMITED, usual};
 use crate::stages::corruption::Corruption;
 use crate::stages::delay::Delay;
 use crate::stages::loss::Loss;
@@ -10,8 +16,10 @@ use crate::stages::order::Order;
 use crate::stages::outage::Outages;
 use crate::stages::path_trace::PathTrace;
 use crate::stages::queue::{Bottleneck, Discipline, TokenBucket};
+use crate::stages::queue::{bottleneck, token_bucket};
 use crate::stages::reorder::Reorder;
 use crate::stages::slots::Slots;
+use crate::stages::{corruption, delay, loss, order, outage, path_trace, reorder, slots};
 
 /// The configuration of one directed link: which impairments it has, each checked when it was made.
 ///
@@ -92,5 +100,56 @@ impl LinkConfig {
         // In both layouts these follow each other in the same order.
         let Self { layout, outages, loss, delay, order, .. } = self.clone();
         *self == Self { layout, outages, loss, delay, order, ..Self::default() }
+    }
+}
+
+/// The parameters of the largest packet.
+const MTU: [Key; 1] = [usual("mtu", Form::AnyOf(&[Form::Size, UNLIMITED]), "\"unlimited\"", "Larger packets are dropped")];
+/// The parameters of how many packets may be inside.
+const LIMIT: [Key; 1] =
+    [usual("limit", Form::Like(&["1000 packets", "unlimited"]), "\"unlimited\"", "How many packets may be inside, waiting and propagating together")];
+
+/// The parameters of a link, stage by stage, in the order in which they are explained.
+pub const LINK_PARAMETERS: [&[Key]; 13] = [
+    &delay::KEYS,
+    &order::KEYS,
+    &loss::KEYS,
+    &chance::KEYS,
+    &corruption::KEYS,
+    &reorder::KEYS,
+    &bottleneck::KEYS,
+    &token_bucket::KEYS,
+    &slots::KEYS,
+    &MTU,
+    &LIMIT,
+    &outage::KEYS,
+    &path_trace::KEYS,
+];
+
+impl LinkConfig {
+    /// The stages in words with their numbers, in the order in which packets pass them.
+    pub(crate) fn words(&self) -> String {
+        let Self { mtu, outages, loss, marks_instead_of_loss, duplication, corruption, limit, token_bucket, .. } = self;
+        let mut stages = Vec::new();
+        stages.extend(mtu.map(|mtu| format!("packets of at most {mtu}")));
+        stages.extend(outages.words());
+        stages.extend(loss.words().map(|loss| if *marks_instead_of_loss { format!("{loss} (marked, not lost)") } else { loss }));
+        stages.extend((!duplication.is_never()).then(|| format!("{} sent twice", duplication.words())));
+        stages.extend(corruption.as_ref().map(Corruption::words));
+        stages.extend(limit.map(|limit| format!("at most {} inside", Counted(limit, "packet"))));
+        stages.extend(token_bucket.as_ref().map(TokenBucket::words));
+        stages.extend(self.bottleneck.as_ref().map(Bottleneck::words));
+        stages.extend(self.slots.as_ref().map(Slots::words));
+        stages.extend(self.reorder.as_ref().map(Reorder::words));
+        stages.extend(self.trace.as_ref().map(|trace| format!("a recorded delay of at least {}, and its loss", Span(trace.least()))));
+        stages.push(format!("delay {}", self.delay.words()));
+        if self.order == Order::InOrder {
+            stages.push("in order".into());
+        }
+        let text = stages.join(", then ");
+        match self.layout {
+            Layout::Netem => format!("{text} (rate and slots behind the delay, as in netem)"),
+            Layout::Physical => text,
+        }
     }
 }

@@ -1,14 +1,19 @@
 //! Bits that are flipped on the way.
 
 use alloc::collections::BTreeSet;
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
+use cohaptic_units::print::Counted;
 use core::ops::Range;
 
 use cohaptic_units::Probability;
 
+use crate::laws::chance::CHANCES;
 use crate::laws::chance::{Chance, ChanceStage};
 use crate::packet::PacketInfo;
 use crate::packet::damage::Damage;
+use crate::parameters::{Form, Key, MOST_OF_32_BITS, Table, optional, usual};
 use crate::random::{PacketDraws, Purpose, unit};
 
 /// Which bits of which packets are flipped, and who notices.
@@ -132,6 +137,37 @@ fn each_with(count: u64, rate: Probability, packet: PacketDraws) -> Vec<u64> {
         }
         chosen.push(next);
         next += 1;
+    }
+}
+
+/// The parameter of flipped bits.
+pub(crate) const KEYS: [Key; 1] =
+    [usual("corrupt", CORRUPT, "0", "Probability that a bit of a packet is flipped, or a table that says which bits and what the receiver does")];
+const CORRUPT: Form = Form::AnyOf(&[Form::Probability, Form::Table(&CORRUPT_TABLE)]);
+static CORRUPT_TABLE: Table = Table::of(&[
+    &CHANCES,
+    &[
+        usual("bits", Form::Integer(1, MOST_OF_32_BITS), "1", "How many different bits of such a packet are flipped"),
+        optional("bit-error-rate", Form::Probability, "In place of probability and bits: each bit by itself"),
+        optional("bytes", Form::Like(&["8-15"]), "The first and the last byte that may be hit, counted from 0"),
+        usual("checksum", Form::Words(&CHECKSUMS), "\"discards\"", "What the receiver does with a damaged packet"),
+    ],
+]);
+const CHECKSUMS: [(&str, &str); 2] = [("discards", "it is dropped when it arrives"), ("passes", "it is taken, and the peer's own checks decide")];
+
+impl Corruption {
+    /// The flipped bits in words.
+    pub(crate) fn words(&self) -> String {
+        let bits = match self.bits {
+            Flips::Bits { packets, count } => format!("{} flipped in {}", Counted(count, "bit"), packets.words()),
+            Flips::Rate(rate) => format!("each bit flipped with {:e}", rate.get()),
+        };
+        let within = self.within.as_ref().map_or_else(String::new, |range| format!(", bytes {} to {}", range.start, range.end - 1));
+        let checksum = match self.checksum {
+            Checksum::Discards => "discarded on arrival",
+            Checksum::Passes => "handed over",
+        };
+        format!("{bits}{within} ({checksum})")
     }
 }
 

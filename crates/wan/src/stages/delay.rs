@@ -1,6 +1,9 @@
 //! Propagation delay with jitter.
 
 use alloc::boxed::Box;
+use alloc::format;
+use alloc::string::String;
+use alloc::string::ToString as _;
 use alloc::sync::Arc;
 use core::time::Duration;
 
@@ -9,6 +12,7 @@ use cohaptic_units::print::Span;
 
 use crate::laws::delay::{Distribution, Law, LawError};
 use crate::laws::normal::{in_the_core, outside_the_core, standard_normal};
+use crate::parameters::{CORRELATION, Form, Key, Table, number, optional, usual};
 use crate::random::{PacketDraws, Purpose};
 
 /// Random variation of the delay around its mean.
@@ -323,6 +327,49 @@ fn nearest(number: f64) -> i64 {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "laws are not below their floor; saturates beyond 584 years")]
 fn count(nanos: f64) -> u64 {
     libm::rint(nanos) as u64
+}
+
+/// The parameters of the delay and of its jitter.
+pub(crate) const KEYS: [Key; 2] = [
+    usual("delay", Form::Duration, "\"0s\"", "One-way propagation delay; the mean if there is jitter"),
+    optional("jitter", JITTER, "Standard deviation of the delay, with a normal law, or a table that also names law, floor and memory"),
+];
+pub(crate) const JITTER: Form = Form::AnyOf(&[Form::Duration, Form::Table(&JITTER_TABLE)]);
+static JITTER_TABLE: Table = Table::of(&[&[
+    optional("sd", Form::Duration, "Standard deviation. Must be given, but for measured delays: theirs then"),
+    usual("distribution", Form::AnyOf(const { &[Form::Words(&LAWS), Form::Table(&LAW_FILE)] }), "\"normal\"", "The law of the delay"),
+    usual("floor", Form::Duration, "\"0s\"", "No packet is faster"),
+    usual("correlation", number(CORRELATION), "0", "Correlation of a packet's delay with that of the one before"),
+    optional("correlation-time", Form::Duration, "In place of correlation: the time over which delays forget, whatever is sent"),
+]]);
+const LAWS: [(&str, &str); 8] = [
+    ("normal", "Gaussian, cut off at the floor"),
+    ("uniform", "equally likely between two ends"),
+    ("pareto", "a heavy tail above"),
+    ("paretonormal", "the mixture of tc-netem"),
+    ("lognormal", "above the floor, with a long tail"),
+    ("gamma", "above the floor, as many small delays add up"),
+    ("weibull", "above the floor"),
+    ("laplace", "two exponentials, back to back"),
+];
+static LAW_FILE: Table = Table::of(&[&[
+    optional("table", Form::File, "A .dist table as tc reads it"),
+    optional("empirical", Form::File, "A CSV file of measured delays with the header delay, in seconds"),
+]]);
+
+impl Delay {
+    /// The mean and the jitter in words.
+    pub(crate) fn words(&self) -> String {
+        let mean = Span(self.mean());
+        let Some(Jitter { sd, distribution, floor, correlation }) = self.jitter() else { return mean.to_string() };
+        let floor = if *floor == Duration::ZERO { String::new() } else { format!(", never below {}", Span(*floor)) };
+        let memory = match correlation {
+            Correlation::None => String::new(),
+            Correlation::PerPacket(correlation) => format!(", correlation {correlation} from packet to packet"),
+            Correlation::InTime(time) => format!(", correlated over {}", Span(*time)),
+        };
+        format!("{mean}, {} jitter of {}{floor}{memory}", distribution.words(), Span(*sd))
+    }
 }
 
 #[cfg(test)]

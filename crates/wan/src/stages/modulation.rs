@@ -9,7 +9,9 @@ use alloc::vec::Vec;
 
 use cohaptic_units::Instant;
 
+use crate::laws::sojourn::SOJOURN;
 use crate::laws::sojourn::Sojourn;
+use crate::parameters::{Form, Table, WEIGHT, number, optional, required};
 use crate::random::{Purpose, Stream, unit};
 use crate::stages::config::LinkConfig;
 
@@ -224,6 +226,22 @@ impl ModulationStage {
         begin.saturating_add(sojourn.draw(|| more.next_word()))
     }
 }
+
+/// The parameters of a modulator.
+pub static MODULATOR: Table = Table::of(&[&[
+    required("name", Form::Text, "What links call it, without space or dot"),
+    required("states", Form::List(&Form::Table(&MODULATOR_STATE)), "Its states; the first is the one in the beginning"),
+]]);
+static MODULATOR_STATE: Table = Table::of(&[&[
+    required("name", Form::Text, "The name of the state, without space or dot, and not by"),
+    optional("sojourn", SOJOURN, "How long it lasts; without it for ever"),
+    optional(
+        "next",
+        Form::AnyOf(const { &[Form::Text, Form::Table(&WEIGHTS)] }),
+        "Which state follows: a name, or names with weights; without it each other one alike",
+    ),
+]]);
+static WEIGHTS: Table = Table::with_others(&[], &number(WEIGHT));
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,6 @@
 //! Whether a packet may overtake another.
 
+use crate::parameters::{Form, Key, usual};
 use cohaptic_units::Instant;
 
 /// The order policy of a link. It is the last stage: it sees arrival instants and may only put them off.
@@ -39,3 +40,9 @@ impl OrderStage {
         }
     }
 }
+
+/// The parameter of the order of packets.
+pub(crate) const KEYS: [Key; 1] =
+    [usual("order", Form::Words(&ORDERS), "\"allow-reordering\"", "Whether a packet with a shorter delay overtakes those before it")];
+const ORDERS: [(&str, &str); 2] =
+    [("allow-reordering", "a packet with a shorter delay overtakes"), ("in-order", "a packet with a shorter delay waits for those before it")];

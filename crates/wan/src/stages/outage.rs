@@ -1,11 +1,17 @@
 //! Outages: spans during which a link takes no packet. Scheduled, random, or when nobody uses it.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::string::ToString as _;
 use alloc::vec::Vec;
+use cohaptic_units::print::{Counted, Span};
 use core::time::Duration;
 
 use cohaptic_units::Instant;
 
+use crate::laws::sojourn::SOJOURN;
 use crate::laws::sojourn::Sojourn;
+use crate::parameters::{Form, Key, Table, optional, required, usual};
 use crate::random::{Purpose, Stream};
 
 /// One outage: packets offered at `from` or later, but before `to`, are dropped.
@@ -212,6 +218,39 @@ impl OutageStage {
 fn drawn(law: Sojourn, draws: Stream, span: u64) -> Duration {
     let mut draws = draws.packet(span).draws(Purpose::Outage);
     law.draw(|| draws.next_word())
+}
+
+/// The parameter of outages.
+pub(crate) const KEYS: [Key; 1] = [usual("outage", OUTAGE, "[]", "When the link is down: a list of spans, or a table")];
+/// A span of time.
+pub(crate) static SPAN: Table = Table::of(&[&[
+    required("from", Form::Duration, "When it begins, from the beginning of the scene"),
+    required("to", Form::Duration, "When it ends, from the beginning of the scene"),
+]]);
+const OUTAGE: Form = Form::AnyOf(&[Form::List(&Form::Table(&SPAN)), Form::Table(&OUTAGE_TABLE)]);
+static OUTAGE_TABLE: Table = Table::of(&[&[
+    usual("scheduled", Form::List(&Form::Table(&SPAN)), "[]", "Spans in order, none within another"),
+    optional("random", Form::Table(&RANDOM_OUTAGE), "By chance, beginning up"),
+    optional("idle", Form::Table(&IDLE_OUTAGE), "When nothing was sent for some time"),
+]]);
+static RANDOM_OUTAGE: Table =
+    Table::of(&[&[required("up", SOJOURN, "How long the link is up"), required("down", SOJOURN, "How long the link is down")]]);
+static IDLE_OUTAGE: Table = Table::of(&[&[
+    required("after", Form::Duration, "For how long nothing was sent"),
+    required("down", Form::Duration, "For how long the link is down then"),
+]]);
+
+impl Outages {
+    /// The kinds of outages in words; `None` if there are none.
+    pub(crate) fn words(&self) -> Option<String> {
+        let mut kinds = Vec::new();
+        if !self.scheduled.is_empty() {
+            kinds.push(Counted(self.scheduled.len(), "outage").to_string());
+        }
+        kinds.extend(self.random.map(|random| format!("random outages (up {}, down {})", random.up.words(), random.down.words())));
+        kinds.extend(self.idle.map(|idle| format!("an outage of {} after {} without a packet", Span(idle.down), Span(idle.after))));
+        (!kinds.is_empty()).then(|| kinds.join(" and "))
+    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
+use crate::parameters::{Form, Key, Table, required, usual};
 use cohaptic_units::{Instant, Probability};
 
 /// Delay and loss over time, as measured: a CSV of `t,delay,loss`, times in seconds.
@@ -174,6 +175,21 @@ fn row(line: usize, values: &[&str], above: Option<&Row>) -> Result<Row, PathTra
     };
     Ok(Row { at, delay_nanos: seconds("delay", values[1])?, loss })
 }
+
+/// The parameter of recorded lines and paths.
+pub(crate) const KEYS: [Key; 1] = [usual(
+    "trace",
+    Form::AnyOf(const { &[Form::File, Form::Table(&TRACE)] }),
+    "\"none\"",
+    "A recorded line or path, from a file; \"none\" takes it away",
+)];
+static TRACE: Table = Table::of(&[&[
+    required("file", Form::File, "Instants of delivery in milliseconds, one a line (mahimahi), or a CSV with t,delay or t,delay,loss in seconds"),
+    usual("bytes", Form::Size, "\"1504B\"", "What leaves at each instant of delivery"),
+    usual("between", Form::Words(&BETWEEN), "\"steps\"", "What holds between two rows of a recorded path"),
+    usual("repeat", Form::Boolean, "false", "Whether a recorded path begins anew after its end"),
+]]);
+const BETWEEN: [(&str, &str); 2] = [("steps", "the earlier row"), ("lines", "a delay on the line between both")];
 
 #[cfg(test)]
 mod tests {

@@ -1,14 +1,19 @@
 //! Packets that are put out of order on purpose.
 
 use alloc::collections::VecDeque;
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
+use cohaptic_units::print::Span;
 use core::num::NonZeroU32;
 use core::time::Duration;
 
 use cohaptic_units::Instant;
 
+use crate::laws::chance::CHANCES;
 use crate::laws::chance::{Chance, ChanceStage};
 use crate::packet::Carried;
+use crate::parameters::{Form, Key, MOST_OF_32_BITS, Table, optional, usual};
 
 /// Which packets leave their place, and how.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -150,6 +155,33 @@ impl<T> ReorderStage<T> {
             } else {
                 place += 1;
             }
+        }
+    }
+}
+
+/// The parameter of reordering on purpose.
+pub(crate) const KEYS: [Key; 1] =
+    [usual("reorder", REORDER, "0", "Probability that a packet jumps ahead of those before it, or a table that says how packets leave their place")];
+const REORDER: Form = Form::AnyOf(&[Form::Probability, Form::Table(&REORDER_TABLE)]);
+static REORDER_TABLE: Table = Table::of(&[
+    &CHANCES,
+    &[
+        usual("gap", Form::Integer(1, MOST_OF_32_BITS), "1", "Such a packet jumps ahead, at most one in this number of packets"),
+        optional("behind", Form::Integer(1, MOST_OF_32_BITS), "Such a packet is held until this number of others has passed it; needs at-most"),
+        optional("at-most", Form::Duration, "How long a packet is held behind others at most"),
+        optional("later", Form::Duration, "Such a packet takes so much longer"),
+    ],
+]);
+
+impl Reorder {
+    /// The displacement in words.
+    pub(crate) fn words(&self) -> String {
+        let packets = self.packets.words();
+        match self.how {
+            Displacement::Jump { gap } if gap.get() == 1 => format!("{packets} jump ahead"),
+            Displacement::Jump { gap } => format!("{packets} of every {gap}th packet jump ahead"),
+            Displacement::Behind { packets: count, at_most } => format!("{packets} held until {count} have passed, at most {}", Span(at_most)),
+            Displacement::Later { by } => format!("{packets} later by {}", Span(by)),
         }
     }
 }

@@ -1,13 +1,20 @@
 //! Slots: a line that sends only now and then, and then all that has gathered (Wi-Fi aggregation, a modem's grants; netem's `slot`).
 
 use alloc::collections::VecDeque;
+use alloc::format;
+use alloc::string::String;
+use alloc::string::ToString as _;
+use alloc::vec::Vec;
+use cohaptic_units::print::{Counted, Span};
 use core::num::NonZeroU64;
 use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
 
 use crate::packet::Carried;
+use crate::parameters::{Form, Key, MOST, NONE, Table, optional, usual};
 use crate::random::{Purpose, Stream, unit};
+use crate::stages::delay::JITTER;
 use crate::stages::delay::{Delay, DelayStage};
 
 /// When slots open and what they take.
@@ -164,6 +171,37 @@ impl<T> SlotStage<T> {
         self.opens = now.saturating_add(gap);
         self.packets_left = self.config.packets.map_or(u64::MAX, NonZeroU64::get);
         self.bytes_left = self.config.bytes.map_or(Bytes::new(u64::MAX).get(), NonZeroU64::get);
+    }
+}
+
+/// The parameter of slots.
+pub(crate) const KEYS: [Key; 1] = [usual(
+    "slots",
+    Form::AnyOf(const { &[Form::Table(&SLOTS), NONE] }),
+    "\"none\"",
+    "The line sends only now and then, all that has gathered or so much of it",
+)];
+static SLOTS: Table = Table::of(&[&[
+    optional("min", Form::Duration, "The shortest time from slot to slot"),
+    optional("max", Form::Duration, "The longest time from slot to slot; without it min"),
+    optional("delay", Form::Duration, "In place of min and max: the mean time from slot to slot"),
+    optional("jitter", JITTER, "Beside delay: how the time from slot to slot varies"),
+    optional("packets", Form::Integer(1, MOST), "How many packets leave in a slot at most"),
+    optional("bytes", Form::Size, "How many bytes leave in a slot at most"),
+]]);
+
+impl Slots {
+    /// The slots in words.
+    pub(crate) fn words(&self) -> String {
+        let gap = match self.gap() {
+            SlotGap::Between { min, max } if min == max => format!("every {}", Span(*min)),
+            SlotGap::Between { min, max } => format!("every {} to {}", Span(*min), Span(*max)),
+            SlotGap::Drawn(gap) => format!("every {}", gap.words()),
+        };
+        let packets = self.packets.map(|packets| Counted(packets.get(), "packet").to_string());
+        let bytes = self.bytes.map(|bytes| Counted(bytes.get(), "byte").to_string());
+        let share: Vec<String> = [packets, bytes].into_iter().flatten().collect();
+        format!("slots {gap}{}", if share.is_empty() { String::new() } else { format!(" for {}", share.join(" or ")) })
     }
 }
 

@@ -6,8 +6,8 @@ use std::process::Command;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use cohaptic_linkfile::router::{RouterFile, Side};
 use cohaptic_router::{OpenError, Router};
-use cohaptic_scene::router_file::{RouterFile, Side};
 
 use super::hosts::{Host, PATIENCE, Running};
 use super::sandbox::inside;

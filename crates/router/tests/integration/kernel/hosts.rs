@@ -8,9 +8,9 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use cohaptic_linkfile::router::{RouterFile, Side};
 use cohaptic_realtime::{Pacing, Wishes, prepare_thread};
 use cohaptic_router::{Report, Router};
-use cohaptic_scene::router_file::{RouterFile, Side};
 use nix::sched::{CloneFlags, unshare};
 use nix::unistd::gettid;
 

@@ -6,8 +6,8 @@ use std::net::{IpAddr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use cohaptic_scene::link_from_keys;
-use cohaptic_scene::router_file::Side;
+use cohaptic_linkfile::link_from_keys;
+use cohaptic_linkfile::router::Side;
 use cohaptic_units::Bytes;
 use cohaptic_wan::{DropCause, Fate, Link, LinkName};
 use socket2::{Domain, Protocol, Socket, Type};

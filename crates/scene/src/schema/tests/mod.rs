@@ -2,27 +2,18 @@
 
 mod samples;
 
-use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use cohaptic_linkfile::reading::testing::take_seen;
+use cohaptic_linkfile::schema::{Form, Need, Table};
 use serde_json::{Map, Value, json};
 use toml::de::{DeTable, DeValue};
 
 use samples::{SCENES, Sample, read, root, samples};
 
-use super::{FileSchema, Form, Need, Table, json_schema};
+use super::FileSchema;
 use crate::Scene;
-
-thread_local! {
-    /// What readers of tables have asked for on this thread: the path of the table, and the keys.
-    static SEEN: RefCell<Vec<(String, Vec<&'static str>)>> = const { RefCell::new(Vec::new()) };
-}
-
-/// Takes down what a reader of a table knows.
-pub(crate) fn seen(path: &str, known: &[&'static str]) {
-    SEEN.with_borrow_mut(|seen| seen.push((path.to_owned(), known.to_vec())));
-}
 
 /// The tables of the catalogue that a path leads to. An element of a list may have several names in a path: a link between two ends has two.
 fn tables_at(form: &'static Form, path: &[&str], names: usize) -> Vec<&'static Table> {
@@ -94,9 +85,9 @@ type Visits = BTreeMap<*const Table, (BTreeSet<&'static str>, Vec<(usize, String
 fn visits(samples: &[Sample]) -> Visits {
     let mut visits = Visits::new();
     for (number, sample) in samples.iter().enumerate() {
-        SEEN.take();
+        let _ = take_seen();
         read(sample, &[]).unwrap_or_else(|error| panic!("{}: {error}", sample.path.display()));
-        for (path, known) in SEEN.take() {
+        for (path, known) in take_seen() {
             let found = within(sample.kind.root(), &split(&path));
             assert!(!found.is_empty(), "the catalogue has no table {path}, which the reader reads in {}", sample.path.display());
             for table in found {
@@ -193,7 +184,7 @@ fn json_of(text: &str) -> Value {
 fn the_json_schemas_are_sound_and_take_every_sample() {
     let samples = samples();
     for kind in FileSchema::ALL {
-        let schema = json_schema(kind);
+        let schema = kind.json();
         assert!(jsonschema::draft7::meta::is_valid(&schema), "{kind:?}");
         let validator = jsonschema::draft7::new(&schema).unwrap();
         for sample in samples.iter().filter(|sample| sample.kind == kind) {
@@ -208,7 +199,7 @@ fn the_json_schemas_are_sound_and_take_every_sample() {
 fn the_json_schemas_refuse_what_the_readers_refuse_wherever_it_stands() {
     let samples = samples();
     for sample in &samples {
-        let validator = jsonschema::draft7::new(&json_schema(sample.kind)).unwrap();
+        let validator = jsonschema::draft7::new(&sample.kind.json()).unwrap();
         let whole = json_of(&sample.text);
         for (pointer, count) in objects(&whole) {
             let mut spoilt = whole.clone();
@@ -217,7 +208,7 @@ fn the_json_schemas_refuse_what_the_readers_refuse_wherever_it_stands() {
             assert!(!validator.is_valid(&spoilt), "{}: an unknown key in {pointer}, which has {count}", sample.path.display());
         }
     }
-    let validator = jsonschema::draft7::new(&json_schema(FileSchema::Scene)).unwrap();
+    let validator = jsonschema::draft7::new(&FileSchema::Scene.json()).unwrap();
     for (of, by) in [
         ("mass = 1, enclosure", "mass = -1, enclosure"),
         ("mass = 1, enclosure", "mass = \"1kg\", enclosure"),
@@ -258,7 +249,7 @@ fn every_property_is_described() {
             assert!(key.about.len() >= 6 && !key.about.ends_with('.') && key.about.starts_with(char::is_uppercase), "{way}.{}", key.name);
         }
     }
-    let schema = json_schema(FileSchema::Scene);
+    let schema = FileSchema::Scene.json();
     let stiffness = &schema["properties"]["coordination"]["properties"]["stiffness"];
     assert_eq!(stiffness["description"], "Gain on the difference of positions, K_T [N/m]. Must be given.");
     assert_eq!(stiffness["minimum"], 0);

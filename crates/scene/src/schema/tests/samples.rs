@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::router_file::RouterFile;
+use cohaptic_linkfile::RelayFile;
+use cohaptic_linkfile::router::RouterFile;
+
 use crate::schema::FileSchema;
-use crate::{RelayFile, Scene, SceneError, scene_files};
+use crate::{Scene, SceneError, scene_files};
 
 /// Every table and every key that the shipped scenes leave out, in three scenes.
 pub(super) const SCENES: [&str; 3] = [

@@ -53,6 +53,25 @@ mod pareto_normal;
 mod special;
 mod standard;
 mod tail;
+
+impl Distribution {
+    /// The law in a word.
+    pub(crate) fn words(&self) -> &'static str {
+        match self {
+            Self::Normal => "normal",
+            Self::Uniform => "uniform",
+            Self::Pareto => "Pareto",
+            Self::ParetoNormal => "Pareto-normal",
+            Self::LogNormal => "lognormal",
+            Self::Gamma => "gamma",
+            Self::Weibull => "Weibull",
+            Self::Laplace => "Laplace",
+            Self::Empirical(_) => "measured",
+            Self::Table(_) => "tabulated",
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests;
 

@@ -5,8 +5,15 @@ mod gilbert_elliott;
 mod in_time;
 mod pattern;
 
+use crate::laws::chance::percent;
 use alloc::boxed::Box;
+use alloc::format;
+use alloc::string::String;
+use cohaptic_units::print::Span;
 
+use crate::laws::chance::CHANCE;
+use crate::parameters::{Form, Key, MOST, PACKETS, Table, number, optional, required, usual};
+use crate::stages::outage::SPAN;
 use cohaptic_units::{Instant, Probability};
 
 pub use four_state::{Bursts, FourState, FourStateError};
@@ -151,5 +158,69 @@ impl Remembering {
             Self::FourState(chain, state) => chain.loses(state, unit(word)),
             Self::Pattern(pattern) => pattern.covers(number, now),
         }
+    }
+}
+
+/// The parameters of losses.
+pub(crate) const KEYS: [Key; 2] = [
+    usual("loss", LOSS, "0", "Probability that a packet is lost, or a model of bursts, or chosen packets"),
+    usual("mark-instead-of-loss", Form::Boolean, "false", "What would be lost is marked instead (ECN)"),
+];
+const LOSS: Form = Form::AnyOf(&[Form::Probability, Form::Table(&LOSS_TABLE)]);
+static LOSS_TABLE: Table = Table::of(&[&[
+    optional("gilbert-elliott", Form::Table(&GILBERT_ELLIOTT), "Bursts: a good and a bad state, for each packet or in time"),
+    optional("states", Form::Table(&FOUR_STATES), "Bursts: the four states of tc-netem"),
+    optional("bursts", Form::Table(&BURSTS), "Bursts by their fraction and length"),
+    optional("correlated", CHANCE, "Each packet with a correlation to the one before"),
+    optional("packets", Form::List(&Form::AnyOf(const { &[Form::Integer(0, MOST), Form::Like(&["10-19"])] })), "Those packets, counted from 0"),
+    optional("times", Form::List(&Form::Table(&SPAN)), "Whatever is sent then"),
+    optional(
+        "every",
+        Form::AnyOf(&[Form::Integer(1, MOST), Form::Duration]),
+        "Beside packets or times: the pattern repeats after this number of packets, or after this time",
+    ),
+]]);
+static GILBERT_ELLIOTT: Table = Table::of(&[&[
+    optional("p", Form::Probability, "Probability of going from good to bad at each packet"),
+    optional("r", Form::Probability, "Probability of going back; without it 1 - p"),
+    optional("mean-good", Form::Duration, "In place of p: the mean time in the good state"),
+    optional("mean-bad", Form::Duration, "In place of r: the mean time in the bad state"),
+    usual("h", Form::Probability, "0", "Probability of getting through in the bad state"),
+    usual("k", Form::Probability, "1", "Probability of getting through in the good state"),
+]]);
+static FOUR_STATES: Table = Table::of(&[&[
+    required("p13", Form::Probability, "From receiving to a burst of loss"),
+    optional("p31", Form::Probability, "From a burst of loss to receiving; without it 1 - p13"),
+    usual("p32", Form::Probability, "0", "From a burst of loss to receiving within a burst"),
+    usual("p23", Form::Probability, "1", "From receiving within a burst to loss"),
+    usual("p14", Form::Probability, "0", "From receiving to a single loss"),
+]]);
+static BURSTS: Table = Table::of(&[&[
+    required("loss", Form::Probability, "The mean fraction lost"),
+    required("length", number(PACKETS), "The mean length of a burst"),
+    usual("density", Form::Probability, "1", "The fraction lost within bursts"),
+    usual("isolated", Form::Probability, "0", "The fraction lost outside of bursts"),
+    usual("good-run", number(PACKETS), "1", "The mean number received in a row within a burst"),
+]]);
+
+impl Loss {
+    /// The model in words; `None` if there is none.
+    pub(crate) fn words(&self) -> Option<String> {
+        let mean = self.mean().map_or_else(String::new, |mean| format!(", {} on average", percent(mean)));
+        Some(match self {
+            Self::None => return None,
+            Self::Independent(probability) => format!("independent loss {}", percent(probability.get())),
+            Self::Correlated(packets) => format!("loss of {}", packets.words()),
+            Self::GilbertElliott(_) => format!("Gilbert-Elliott loss{mean}"),
+            Self::GilbertElliottInTime(chain) => {
+                let (good, bad) = chain.mean_times();
+                format!("Gilbert-Elliott loss in time (good {}, bad {}){mean}", Span(good), Span(bad))
+            }
+            Self::FourState(_) => format!("four-state loss{mean}"),
+            Self::Pattern(pattern) => match pattern.counts() {
+                Counts::Packets => format!("loss of chosen packets{mean}"),
+                Counts::Nanoseconds => format!("loss at chosen times{mean}"),
+            },
+        })
     }
 }

@@ -8,17 +8,24 @@
 //! What leaves in any window t is at most R·t plus one packet, because the service time is rounded up. A departure at an instant makes room for
 //! a packet that is offered at the same instant. A change of rate in the middle of a packet integrates the bits: what is already on the wire stays sent.
 
+use super::limit::words_of_limit;
 use alloc::collections::VecDeque;
+use alloc::format;
+use alloc::string::String;
+use alloc::string::ToString as _;
+use cohaptic_units::print::Span;
 use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
 
-use super::codel::{self, CoDelState};
-use super::limit::Waiting;
-use super::red::{self, RedState};
+use super::codel::{self, CODEL, CoDelState};
+use super::framing::{CELLS, SIGNED_SIZE};
+use super::limit::{LIMIT, Waiting};
+use super::red::{self, RED, RedState};
 use super::{CoDel, DeliveryTrace, Framing, QueueLimit, Red};
 use crate::fates::fate::DropCause;
 use crate::packet::{Carried, Exit, Output, Outputs};
+use crate::parameters::{Form, Key, NONE, Table, UNLIMITED, optional, required, usual};
 
 /// A serialiser and the queue before it.
 #[derive(Clone, PartialEq, Debug)]
@@ -288,6 +295,45 @@ impl<T> BottleneckStage<T> {
 
 fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, packet: Carried<T>) {
     outputs.push(Output { packet, exit: Exit::Dropped(now, cause) });
+}
+
+/// The parameters of the line and of the queue before it.
+pub(crate) const KEYS: [Key; 4] = [
+    usual("rate", Form::AnyOf(&[Form::Rate, UNLIMITED]), "\"unlimited\"", "How fast packets are sent, in bits per second"),
+    optional("queue", Form::Table(&QUEUE), "How much may wait for the line, and which packets are dropped. Needs rate or a recorded line"),
+    usual("overhead", SIGNED_SIZE, "\"0B\"", "What each packet costs beyond its own size. Needs rate or a recorded line"),
+    usual("cells", Form::AnyOf(const { &[Form::Table(&CELLS), NONE] }), "\"none\"", "Packets travel in whole cells. Needs rate or a recorded line"),
+];
+static QUEUE: Table = Table::of(&[&[
+    required("limit", LIMIT, "How much may wait"),
+    usual("discipline", Form::AnyOf(const { &[Form::Words(&DISCIPLINES), Form::Table(&DISCIPLINE)] }), "\"tail-drop\"", "Which packets are dropped"),
+]]);
+const DISCIPLINES: [(&str, &str); 4] = [
+    ("tail-drop", "the newest when the queue is full"),
+    ("head-drop", "the oldest when the queue is full"),
+    ("codel", "the oldest when they wait too long for too long"),
+    ("red", "some of the newest, the more the longer the queue is on average; needs a limit in bytes"),
+];
+static DISCIPLINE: Table = Table::of(&[&[
+    optional("codel", Form::Table(&CODEL), "The oldest when they wait more than the target for an interval"),
+    optional("red", Form::Table(&RED), "Some of the newest when the average queue is above min, all above max"),
+]]);
+
+impl Bottleneck {
+    /// The queue and the line in words.
+    pub(crate) fn words(&self) -> String {
+        let discipline = match self.discipline {
+            Discipline::TailDrop => String::new(),
+            Discipline::HeadDrop => ", head-drop".into(),
+            Discipline::Red(_) => ", RED".into(),
+            Discipline::CoDel(codel) => format!(", CoDel {} in {}", Span(codel.target), Span(codel.interval)),
+        };
+        let service = match &self.service {
+            Service::Rate(rate) => rate.to_string(),
+            Service::Recorded(trace) => format!("a recorded line of {:.3} Mbit/s on average", trace.mean_rate() / 1e6),
+        };
+        format!("queue ({}{discipline}) before {service}{}", words_of_limit(self.limit), self.framing.words())
+    }
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 
 use core::time::Duration;
 
+use crate::parameters::{Form, Table, usual};
 use cohaptic_units::{Bytes, Instant};
 
 /// The parameters of CoDel.
@@ -132,6 +133,14 @@ impl CoDelState {
 fn control_law(t: Instant, interval: Duration, count: u64) -> Instant {
     t.saturating_add(Duration::from_nanos(libm::rint(interval.as_nanos() as f64 / libm::sqrt(count as f64)) as u64))
 }
+
+/// The parameters of the discipline.
+pub(crate) static CODEL: Table = Table::of(&[&[
+    usual("target", Form::Duration, "\"5ms\"", "How long packets may wait"),
+    usual("interval", Form::Duration, "\"100ms\"", "For how long they may wait longer"),
+    usual("mtu", Form::Size, "\"1500B\"", "Nothing is dropped with so much or less waiting"),
+    usual("ecn", Form::Boolean, "false", "Packets are marked where they would be dropped"),
+]]);
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,8 @@
 //! What a packet costs on the line beyond its own bytes.
 
+use crate::parameters::{Form, Table, required, usual};
+use alloc::format;
+use alloc::string::String;
 use cohaptic_units::Bytes;
 
 /// How a packet is framed on the line. The default adds nothing.
@@ -32,6 +35,21 @@ impl Framing {
                 packet.div_ceil(cell).saturating_mul(cell + u64::from(overhead))
             }
         })
+    }
+}
+
+/// The packets of a link in cells.
+pub(crate) static CELLS: Table =
+    Table::of(&[&[required("payload", Form::Size, "What a cell carries"), usual("overhead", Form::Size, "\"0B\"", "What a cell costs beyond that")]]);
+/// A size that may be negative.
+pub(crate) const SIGNED_SIZE: Form = Form::Like(&["28B", "-14B"]);
+
+impl Framing {
+    /// The cost of a packet beyond its size in words, behind a comma; empty if there is none.
+    pub(crate) fn words(self) -> String {
+        let overhead = if self.overhead == 0 { String::new() } else { format!(", {:+} bytes a packet", self.overhead) };
+        let cells = self.cells.map_or_else(String::new, |cells| format!(", in cells of {}+{} bytes", cells.payload, cells.overhead));
+        overhead + &cells
     }
 }
 

@@ -1,7 +1,11 @@
 //! How much may wait.
 
+use alloc::string::String;
+use alloc::string::ToString as _;
+use cohaptic_units::print::{Counted, Span};
 use core::time::Duration;
 
+use crate::parameters::Form;
 use cohaptic_units::Bytes;
 
 /// How much may wait in a queue. What is being sent does not count.
@@ -33,5 +37,18 @@ impl QueueLimit {
             Self::Bytes(limit) => waiting.bytes + u128::from(size.get()) <= u128::from(limit.get()),
             Self::Time(limit) => waiting.time <= limit,
         }
+    }
+}
+
+/// How much may wait.
+pub(crate) const LIMIT: Form = Form::Like(&["100 packets", "64kB", "50ms", "unlimited"]);
+
+/// A limit in words.
+pub(super) fn words_of_limit(limit: Option<QueueLimit>) -> String {
+    match limit {
+        None => "unlimited".into(),
+        Some(QueueLimit::Packets(packets)) => Counted(packets, "packet").to_string(),
+        Some(QueueLimit::Bytes(bytes)) => bytes.to_string(),
+        Some(QueueLimit::Time(wait)) => Span(wait).to_string(),
     }
 }

@@ -1,12 +1,12 @@
 //! Where packets wait: the bottleneck with its queue, and the token bucket.
 
-mod bottleneck;
+pub(crate) mod bottleneck;
 mod codel;
 mod delivery_trace;
 mod framing;
 mod limit;
 mod red;
-mod token_bucket;
+pub(crate) mod token_bucket;
 
 pub use bottleneck::{Bottleneck, Discipline, Service};
 pub use codel::CoDel;

@@ -1,5 +1,6 @@
 //! Random early detection (Floyd & Jacobson, *Random Early Detection Gateways for Congestion Avoidance*, IEEE/ACM ToN 1(4), 1993).
 
+use crate::parameters::{FRACTION, Form, Table, number, required, usual};
 use cohaptic_units::{Bytes, Probability};
 
 /// The parameters of RED. The average queue decides about a packet that is offered: below `min` it passes, above `max` it is dropped, and in between it is
@@ -105,6 +106,16 @@ impl RedState {
         if red.ecn && ecn_capable { Verdict::Mark } else { Verdict::Drop }
     }
 }
+
+/// The parameters of the discipline.
+pub(crate) static RED: Table = Table::of(&[&[
+    required("min", Form::Size, "The average queue at which dropping begins"),
+    required("max", Form::Size, "The average queue at which everything is dropped"),
+    usual("max-probability", Form::Probability, "\"10%\"", "Probability of a drop just below max"),
+    usual("weight", number(FRACTION), "0.002", "Weight of the newest length in the average"),
+    usual("mean-packet", Form::Size, "\"500B\"", "Size of a packet, for the time when the line is idle"),
+    usual("ecn", Form::Boolean, "false", "Packets are marked where they would be dropped"),
+]]);
 
 #[cfg(test)]
 mod tests {

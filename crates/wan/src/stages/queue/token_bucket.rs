@@ -5,15 +5,20 @@
 //!
 //! Unlike a serialiser, a bucket lets a packet pass at once while it has credit: it limits how much, not how fast.
 
+use super::limit::words_of_limit;
 use alloc::collections::VecDeque;
+use alloc::format;
+use alloc::string::String;
 use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
 
-use super::limit::Waiting;
+use super::framing::SIGNED_SIZE;
+use super::limit::{LIMIT, Waiting};
 use super::{Framing, QueueLimit};
 use crate::fates::fate::DropCause;
 use crate::packet::{Carried, Exit, Output, Outputs};
+use crate::parameters::{Form, Key, NONE, Table, optional, required, usual};
 
 /// A token bucket and the queue before it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -209,6 +214,28 @@ impl<T> TokenBucketStage<T> {
             }
         }
         turn
+    }
+}
+
+/// The parameter of the bucket.
+pub(crate) const KEYS: [Key; 1] =
+    [usual("token-bucket", Form::AnyOf(const { &[Form::Table(&TOKEN_BUCKET), NONE] }), "\"none\"", "How much may leave in bursts")];
+static TOKEN_BUCKET: Table = Table::of(&[&[
+    required("rate", Form::Rate, "How fast the bucket fills"),
+    required("burst", Form::Size, "What the bucket holds"),
+    optional("peak", Form::Table(&PEAK), "A second, smaller bucket, which limits how fast a burst leaves"),
+    usual("limit", LIMIT, "\"unlimited\"", "How much may wait for tokens"),
+    usual("overhead", SIGNED_SIZE, "\"0B\"", "What each packet costs beyond its own size"),
+]]);
+static PEAK: Table =
+    Table::of(&[&[required("rate", Form::Rate, "How fast a burst leaves"), required("burst", Form::Size, "At least the largest packet")]]);
+
+impl TokenBucket {
+    /// The bucket in words.
+    pub(crate) fn words(&self) -> String {
+        let peak = self.peak.map_or_else(String::new, |peak| format!(", peak {} in bursts of {}", peak.rate, peak.burst));
+        let framing = self.framing.words();
+        format!("queue ({}) before a token bucket of {} at {}{peak}{framing}", words_of_limit(self.limit), self.burst, self.rate)
     }
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cohaptic_units::Instant;
 use cohaptic_wan::random::{Purpose, Stream};
-use cohaptic_wan::{LinkEvent, Modulator, PacketInfo, Sojourn};
+use cohaptic_wan::{Modulator, PacketEvent, PacketInfo, Sojourn};
 use proptest::prelude::*;
 
 use crate::any_link::{all_events, any_link, modulated, packets};
@@ -77,7 +77,7 @@ proptest! {
         }
         offer_until(&mut subject, u64::MAX);
         subject.handle_timeout(Instant::MAX).unwrap();
-        let sorted = |mut events: Vec<LinkEvent<u64>>| {
+        let sorted = |mut events: Vec<PacketEvent<u64>>| {
             events.sort_by_key(|event| (event.sequence, event.copy, event.fate.is_end(), event.at));
             events
         };

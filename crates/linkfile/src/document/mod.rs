@@ -1,0 +1,14 @@
+//! The text of a file as a tree of values, each with its place, and the faults that point at places.
+
+mod error;
+mod source;
+mod text;
+mod toml_text;
+mod tree;
+
+pub(crate) use error::Origin;
+pub use error::{Diagnostic, FileError};
+pub use source::{BEGINNING, Place, Sources};
+pub use text::{quote, shorten};
+pub use toml_text::{key_text, value_text};
+pub use tree::{Entry, Node, Table, TooDeep, Value, join};

@@ -1,0 +1,224 @@
+//! The document as a tree of values, each with the place where it is written and the path of its key.
+
+use std::sync::Arc;
+
+use toml::de::{DeTable, DeValue};
+
+use super::source::{BEGINNING, Place};
+use super::text::{quote, shorten};
+
+/// No file needs more; it keeps the walk over the tree from using up the stack.
+const DEEPEST: usize = 16;
+
+/// One value.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// The value itself.
+    pub value: Value,
+    /// Where it is written; for a table its header.
+    pub place: Place,
+    /// The dotted path of its key.
+    pub path: String,
+}
+
+/// A value. Numbers stay as they are written until it is known what they mean.
+#[derive(Clone, Debug)]
+pub enum Value {
+    /// A text, without its quotes.
+    Text(String),
+    /// An integer; `None`: beyond 128 bits.
+    Integer(Option<i128>),
+    /// A floating-point number.
+    Float(String),
+    /// `true` or `false`.
+    Boolean(bool),
+    /// A date or a time, which no key takes.
+    Date,
+    /// A list.
+    List(Vec<Arc<Node>>),
+    /// A table.
+    Table(Table),
+}
+
+/// Keys and values, in the order in which they are written.
+#[derive(Clone, Debug, Default)]
+pub struct Table(pub Vec<Entry>);
+
+/// A key and its value.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// The key.
+    pub name: String,
+    /// Where the key is written.
+    pub key: Place,
+    /// The value.
+    pub node: Arc<Node>,
+}
+
+/// The document is nested too deeply at this place.
+#[derive(Clone, Copy, Debug)]
+pub struct TooDeep(pub Place);
+
+impl Node {
+    /// The root of a document.
+    ///
+    /// # Errors
+    ///
+    /// [`TooDeep`] beyond 16 levels.
+    pub fn document(table: &DeTable<'_>) -> Result<Self, TooDeep> {
+        let value = Value::Table(Table::convert(table, "", 0, 0, 0)?);
+        Ok(Self { value, place: BEGINNING, path: String::new() })
+    }
+
+    /// A value in the source with that number, whose text begins at byte `offset` of it.
+    ///
+    /// # Errors
+    ///
+    /// [`TooDeep`] beyond 16 levels.
+    pub fn value(value: &toml::Spanned<DeValue<'_>>, path: String, source: usize, offset: usize) -> Result<Self, TooDeep> {
+        Self::convert(value, path, source, offset, 1)
+    }
+
+    fn convert(spanned: &toml::Spanned<DeValue<'_>>, path: String, source: usize, offset: usize, depth: usize) -> Result<Self, TooDeep> {
+        let span = spanned.span();
+        let place = Place::new(source, span.start + offset..span.end + offset);
+        if depth > DEEPEST {
+            return Err(TooDeep(place));
+        }
+        let value = match spanned.get_ref() {
+            DeValue::String(text) => Value::Text(text.to_string()),
+            DeValue::Integer(integer) => Value::Integer(i128::from_str_radix(integer.as_str(), integer.radix()).ok()),
+            DeValue::Float(float) => Value::Float(float.as_str().to_owned()),
+            DeValue::Boolean(boolean) => Value::Boolean(*boolean),
+            DeValue::Datetime(_) => Value::Date,
+            DeValue::Array(array) => {
+                let element = |(index, element): (usize, &toml::Spanned<DeValue<'_>>)| {
+                    let path = join(&path, &element_name(&path, index, element.get_ref()));
+                    Self::convert(element, path, source, offset, depth + 1).map(Arc::new)
+                };
+                Value::List(array.iter().enumerate().map(element).collect::<Result<_, _>>()?)
+            }
+            DeValue::Table(table) => Value::Table(Table::convert(table, &path, source, offset, depth)?),
+        };
+        Ok(Self { value, place, path })
+    }
+
+    /// The table, if it is one.
+    #[must_use]
+    pub fn as_table(&self) -> Option<&Table> {
+        match &self.value {
+            Value::Table(table) => Some(table),
+            Value::Text(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date | Value::List(_) => None,
+        }
+    }
+
+    /// The text, if it is one.
+    #[must_use]
+    pub fn as_text(&self) -> Option<&str> {
+        match &self.value {
+            Value::Text(text) => Some(text),
+            Value::Table(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date | Value::List(_) => None,
+        }
+    }
+
+    /// The value in words: `the text "8ms"`.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        match &self.value {
+            Value::Text(text) => format!("the text {}", quote(text)),
+            Value::Integer(Some(integer)) => format!("the integer {integer}"),
+            Value::Integer(None) => "an integer beyond 128 bits".to_owned(),
+            Value::Float(float) => format!("the number {}", shorten(float)),
+            Value::Boolean(boolean) => boolean.to_string(),
+            Value::Date => "a date or time".to_owned(),
+            Value::List(_) => "a list".to_owned(),
+            Value::Table(_) => "a table".to_owned(),
+        }
+    }
+
+    /// This table laid over another one, key by key; tables under the keys `nested` are laid over each other in the same way.
+    #[must_use]
+    pub fn over(&self, base: &Self, nested: &[&str]) -> Self {
+        let (Some(own), Some(below)) = (self.as_table(), base.as_table()) else { return self.clone() };
+        let mut entries: Vec<Entry> = below.0.iter().filter(|entry| own.get(&entry.name).is_none()).cloned().collect();
+        for entry in &own.0 {
+            let mut entry = entry.clone();
+            if nested.contains(&entry.name.as_str())
+                && let Some(base) = below.get(&entry.name)
+            {
+                entry.node = Arc::new(entry.node.over(&base.node, &[]));
+            }
+            entries.push(entry);
+        }
+        Self { value: Value::Table(Table(entries)), place: self.place, path: self.path.clone() }
+    }
+
+    /// This table without those keys.
+    #[must_use]
+    pub fn without(&self, keys: &[&str]) -> Self {
+        let mut node = self.clone();
+        if let Value::Table(table) = &mut node.value {
+            table.0.retain(|entry| !keys.contains(&entry.name.as_str()));
+        }
+        node
+    }
+
+    /// A table without keys.
+    #[must_use]
+    pub fn empty_table(place: Place, path: String) -> Self {
+        Self { value: Value::Table(Table::default()), place, path }
+    }
+}
+
+impl Table {
+    fn convert(table: &DeTable<'_>, path: &str, source: usize, offset: usize, depth: usize) -> Result<Self, TooDeep> {
+        let mut entries = Vec::with_capacity(table.len());
+        for (key, value) in table {
+            let span = key.span();
+            let node = Node::convert(value, join(path, key.get_ref()), source, offset, depth + 1)?;
+            let key_place = Place::new(source, span.start + offset..span.end + offset);
+            entries.push(Entry { name: key.get_ref().to_string(), key: key_place, node: Arc::new(node) });
+        }
+        entries.sort_by_key(|entry| entry.key);
+        Ok(Self(entries))
+    }
+
+    /// The entry with that key.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<&Entry> {
+        self.0.iter().find(|entry| entry.name == name)
+    }
+
+    /// The value under a key, made if it is not there.
+    pub fn get_or_insert(&mut self, name: &str, key: Place, make: impl FnOnce() -> Node) -> &mut Node {
+        let index = self.0.iter().position(|entry| entry.name == name).unwrap_or_else(|| {
+            self.0.push(Entry { name: name.to_owned(), key, node: Arc::new(make()) });
+            self.0.len() - 1
+        });
+        Arc::make_mut(&mut self.0[index].node)
+    }
+
+    /// Sets the value under a key.
+    pub fn insert(&mut self, name: &str, key: Place, node: Node) {
+        self.0.retain(|entry| entry.name != name);
+        self.0.push(Entry { name: name.to_owned(), key, node: Arc::new(node) });
+    }
+}
+
+/// How an element of a list is called in a path: peers, programs, modulators and their states by name, links by both ends, others by their place from 0.
+fn element_name(list: &str, index: usize, element: &DeValue<'_>) -> String {
+    let text = |key: &str| element.as_table().and_then(|table| table.get(key)).and_then(|value| value.get_ref().as_str());
+    match list {
+        "peers" | "programs" | "modulators" => text("name").map(str::to_owned),
+        list if list.starts_with("modulators.") && list.ends_with(".states") => text("name").map(str::to_owned),
+        "links" => text("from").zip(text("to")).map(|(from, to)| format!("{from}.{to}")),
+        _ => None,
+    }
+    .unwrap_or_else(|| index.to_string())
+}
+
+/// The path of a key in a table.
+#[must_use]
+pub fn join(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+}

@@ -1,0 +1,39 @@
+//! Link, relay and router files: from TOML text to checked links.
+//!
+//! A link is a table of keys, such as `{ delay = "24ms", loss = "1%" }`. This crate reads the keys of a link, the links between named ends, the file of a
+//! relay ([`RelayFile`]) and the file of a router ([`router::RouterFile`]). Every refusal is a [`FileError`] that names file, line, column and key, shows
+//! the line, and says what was expected.
+//!
+//! It knows nothing of haptics. `cohaptic-scene` stands on it: a scene is read by the same [`reading::TableReader`] from the same
+//! [`document::Node`]s, and its links by [`mesh::read_links`].
+//!
+//! Read [`RelayFile::parse`] first, then [`link::read_link`].
+//!
+//! ```
+//! use cohaptic_linkfile::link_from_keys;
+//!
+//! let link = link_from_keys(&["delay=24ms".to_owned(), "loss=1%".to_owned()])?;
+//! assert_eq!(link.mean_delay().as_millis(), 24);
+//!
+//! let error = link_from_keys(&["delay=24 parsecs".to_owned()]).unwrap_err();
+//! assert!(error.to_string().starts_with("--set link.delay=24 parsecs: link.delay: unknown unit \"parsecs\""));
+//! # Ok::<(), cohaptic_linkfile::FileError>(())
+//! ```
+
+mod address;
+pub mod document;
+mod fingerprint;
+pub mod link;
+pub mod mesh;
+mod quantity_text;
+pub mod reading;
+mod relay;
+pub mod router;
+pub mod schema;
+
+pub use address::{AddressError, address};
+pub use document::{Diagnostic, FileError};
+pub use fingerprint::{Fingerprint, FingerprintError};
+pub use mesh::{KeysOfLinks, LinkChange, LinkKeys, LinkSelector, LinkTable, link_from_keys};
+pub use quantity_text::{number_and_unit, text_of_quantity};
+pub use relay::{RelayChange, RelayFile, RelayLimits, RelayProgram, relay_link_keys, relay_link_keys_of_text};

@@ -1,0 +1,64 @@
+//! `corrupt`: bits that are flipped.
+
+use cohaptic_wan::{Chance, Checksum, Corruption, Flips};
+
+use super::chance::read_chance_in;
+use super::loss_pattern::read_range;
+use crate::document::{Node, quote};
+use crate::reading::{Context, TableReader, values};
+
+/// `"1%"` (one bit of such a packet), `{ probability, correlation, bits }` or `{ bit-error-rate }`, the tables also with `bytes` and `checksum`.
+pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Option<Corruption>> {
+    if node.as_table().is_none() {
+        let probability = values::probability(node, context)?;
+        return Some(flipping(Flips::Bits { packets: Chance::independent(probability), count: 1 }));
+    }
+    let mut table =
+        TableReader::new(node, context, "a probability or a table such as { probability = \"1%\", bits = 3 } or { bit-error-rate = 1e-6 }")?;
+    let bytes = table.maybe("bytes", |node, context| {
+        const EXPECTED: &str = "the first and the last byte that may be hit, counted from 0, such as \"8-15\"";
+        let text = values::text(node, context, EXPECTED)?;
+        let range = read_range(text);
+        if range.is_none() {
+            context.fault_at(node, format!("{} is no row of bytes: expected {EXPECTED}", quote(text)));
+        }
+        range
+    });
+    let checksums = [("discards", Checksum::Discards), ("passes", Checksum::Passes)];
+    let checksum = table.optional("checksum", Checksum::Discards, |node, context| values::choice(node, context, &checksums));
+    let rate = table.maybe("bit-error-rate", values::probability);
+    let bits = match table.entry("bit-error-rate") {
+        Some(rate_entry) => {
+            let others = ["probability", "correlation", "bits"].map(|key| table.entry(key));
+            table.finish();
+            if let Some(other) = others.into_iter().flatten().next() {
+                let (first, last) = if other.key < rate_entry.key { (other, rate_entry) } else { (rate_entry, other) };
+                let message = format!("{} beside {}: expected either a bit-error-rate, or a probability for each packet", last.name, first.name);
+                context.fault(last.key, &last.node.path, message);
+                return None;
+            }
+            rate?.map(Flips::Rate)
+        }
+        None => {
+            let packets = read_chance_in(&mut table, node, context);
+            let count = table.optional("bits", 1, |node, context| {
+                let most = u64::from(u32::MAX);
+                values::integer(node, context, 1..=most, "a number of bits of at least 1").and_then(|bits| u32::try_from(bits).ok())
+            });
+            table.finish();
+            Some(Flips::Bits { packets: packets?, count: count? })
+        }
+    };
+    let corruption = flipping(bits?);
+    let (within, checksum) = (bytes?, checksum?);
+    Some(corruption.map(|corruption| Corruption { within, checksum, ..corruption }))
+}
+
+/// `None` if no bit is ever flipped.
+fn flipping(bits: Flips) -> Option<Corruption> {
+    let never = match bits {
+        Flips::Bits { packets, .. } => packets.is_never(),
+        Flips::Rate(rate) => rate == cohaptic_units::Probability::ZERO,
+    };
+    (!never).then_some(Corruption { bits, within: None, checksum: Checksum::Discards })
+}

@@ -1,0 +1,73 @@
+//! `delay` and `jitter`.
+
+use core::time::Duration;
+
+use cohaptic_wan::{Correlation, Delay, Distribution, Jitter};
+
+use super::distribution::read_distribution;
+use crate::document::Node;
+use crate::reading::values::{self, CORRELATION, ReadNumber as _};
+use crate::reading::{Context, TableReader, only_one};
+
+/// The delay of a link with its jitter.
+pub(super) fn read_delay(table: &mut TableReader<'_>, keys: &Node, context: Context<'_>) -> Option<Delay> {
+    let (delay_node, jitter_node) = (table.get("delay"), table.get("jitter"));
+    let mean = table.maybe("delay", values::duration);
+    let jitter = table.maybe("jitter", read_jitter);
+    let (mean, jitter) = (mean?, jitter?);
+    let Some(Read { jitter, own_mean }) = jitter else { return Some(Delay::constant(mean.unwrap_or_default())) };
+    // Of a change alone it is not known which delay it will be laid over.
+    if context.partial && mean.is_none() {
+        return Some(Delay::default());
+    }
+    let mean = mean.or(own_mean).unwrap_or_default();
+    Delay::with_jitter(mean, jitter).map_err(|error| values::refuse(context, &[delay_node, jitter_node], keys, &error)).ok()
+}
+
+struct Read {
+    jitter: Jitter,
+    /// The mean of a file of delays, which holds where no other one is said.
+    own_mean: Option<Duration>,
+}
+
+fn read_jitter(node: &Node, context: Context<'_>) -> Option<Read> {
+    if node.as_table().is_none() {
+        return Some(Read { jitter: Jitter::new(values::duration(node, context)?, Distribution::Normal), own_mean: None });
+    }
+    let mut table = TableReader::new(node, context, "a duration or a table such as { sd = \"2ms\", distribution = \"gamma\" }")?;
+    let sd = table.maybe("sd", values::duration);
+    let distribution = table.optional("distribution", Distribution::Normal, read_distribution);
+    let floor = table.optional("floor", Duration::ZERO, values::duration);
+    let correlation = read_correlation(&mut table, node, context);
+    let own = match &distribution {
+        Some(Distribution::Empirical(delays)) => Some((nanos(delays.mean()), nanos(delays.sd()))),
+        Some(_) | None => None,
+    };
+    if distribution.is_some() && own.is_none() && sd == Some(None) {
+        table.miss("sd", "the standard deviation, a duration such as \"2ms\"");
+    }
+    table.finish();
+    let sd = sd?.or_else(|| own.map(|(_, sd)| sd));
+    let jitter = Jitter { floor: floor?, correlation: correlation?, ..Jitter::new(sd.unwrap_or_default(), distribution?) };
+    Some(Read { jitter, own_mean: own.map(|(mean, _)| mean) })
+}
+
+/// `correlation` or `correlation-time`.
+fn read_correlation(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Correlation> {
+    let (per_packet, in_time) = (table.entry("correlation"), table.entry("correlation-time"));
+    if per_packet.is_none() && in_time.is_none() {
+        return Some(Correlation::None);
+    }
+    let chosen = only_one(node, context, &[per_packet, in_time], "correlation and correlation-time")?;
+    if chosen.name == "correlation" {
+        let correlation = CORRELATION.read(&chosen.node, context)?;
+        return Some(if correlation == 0.0 { Correlation::None } else { Correlation::PerPacket(correlation) });
+    }
+    values::positive_duration(&chosen.node, context).map(Correlation::InTime)
+}
+
+/// Values of a file are nanoseconds from 0 to 9·10¹⁸.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "moments of numbers from 0 to 9e18")]
+fn nanos(value: f64) -> Duration {
+    Duration::from_nanos(value.round() as u64)
+}

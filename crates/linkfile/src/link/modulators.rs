@@ -1,0 +1,129 @@
+//! `[\[modulators\]]`: chains of states that links follow, named so that several links can follow the same one.
+
+use std::sync::Arc;
+
+use cohaptic_wan::{Modulator, ModulatorState};
+
+use super::sojourn::{SOJOURN, read_sojourn};
+use crate::document::{Node, Value, quote};
+use crate::reading::values::{self, ReadNumber as _, WEIGHT};
+use crate::reading::{Context, Modulators, TableReader, one_of};
+
+/// Reads the list. `None` where something was refused.
+pub fn read_modulators(node: Option<&Node>, context: Context<'_>) -> Option<Arc<Modulators>> {
+    let Some(node) = node else { return Some(Arc::default()) };
+    let entries = values::list(node, context, "entries [[modulators]]")?;
+    let mut modulators = Modulators::new();
+    let mut complete = true;
+    for entry in entries {
+        let Some((name, name_node, read)) = read_modulator(entry, context) else {
+            complete = false;
+            continue;
+        };
+        if modulators.insert(name.clone(), read).is_some() {
+            context.fault_at(name_node, format!("there is a modulator {} already: expected another name", quote(&name)));
+            complete = false;
+        }
+    }
+    complete.then(|| Arc::new(modulators))
+}
+
+type Read = (Modulator, Vec<String>);
+
+fn read_modulator<'a>(node: &'a Node, context: Context<'a>) -> Option<(String, &'a Node, Read)> {
+    let mut table = TableReader::new(node, context, "a table with name and states")?;
+    let name = table.required("name", "a name that links refer to", |node, context| read_name(node, context).map(|name| (name, node)));
+    let states =
+        table.required("states", "a list such as [{ name = \"good\", sojourn = \"2s\" }, { name = \"bad\", sojourn = \"1s\" }]", |node, context| {
+            read_states(node, context).map(|states| (states, node))
+        });
+    table.finish();
+    let ((name, name_node), ((names, states), states_node)) = (name?, states?);
+    match Modulator::new(&name, states) {
+        Ok(modulator) => Some((name, name_node, (modulator, names))),
+        Err(error) => {
+            values::refuse(context, &[], states_node, &error);
+            None
+        }
+    }
+}
+
+/// The name of a modulator or of a state. `by` is a key beside the states of a link.
+fn read_name(node: &Node, context: Context<'_>) -> Option<String> {
+    const EXPECTED: &str = "a name without space or dot, and not \"by\"";
+    let name = values::text(node, context, EXPECTED)?;
+    if name.is_empty() || name == "by" || name.contains(|c: char| c.is_whitespace() || c.is_control() || c == '.') {
+        context.fault_at(node, format!("{} cannot be this name: expected {EXPECTED}", quote(name)));
+        return None;
+    }
+    Some(name.to_owned())
+}
+
+fn read_states(node: &Node, context: Context<'_>) -> Option<(Vec<String>, Vec<ModulatorState>)> {
+    let entries = values::list(node, context, "a list of states such as [{ name = \"good\", sojourn = \"2s\" }]")?;
+    let mut names: Vec<String> = Vec::new();
+    let mut tables = Vec::new();
+    for entry in entries {
+        let mut table = TableReader::new(entry, context, "a table with name, sojourn and next")?;
+        let name_node = table.get("name");
+        let name = table.required("name", "the name of the state", read_name);
+        let sojourn = table.maybe("sojourn", read_sojourn);
+        let next = table.get("next");
+        table.finish();
+        let name = name?;
+        if names.contains(&name) {
+            context.fault_at(name_node.unwrap_or(entry), format!("there is a state {} already: expected another name", quote(&name)));
+            return None;
+        }
+        names.push(name);
+        tables.push((entry, sojourn?, next));
+    }
+    let mut states = Vec::with_capacity(tables.len());
+    for (place, (entry, sojourn, next)) in tables.into_iter().enumerate() {
+        let next = match next {
+            Some(next) => read_next(next, context, &names)?,
+            // Each of the others is as likely.
+            None => (0..names.len()).map(|other| if other == place { 0.0 } else { 1.0 }).collect(),
+        };
+        let weight_of_itself = next.get(place).copied().unwrap_or(0.0);
+        if weight_of_itself != 0.0 || (sojourn.is_some() && next.iter().all(|weight| *weight == 0.0)) {
+            let message =
+                format!("the state {} ends, and no other one follows: expected another state under next, or no sojourn", quote(&names[place]));
+            context.fault_at(entry, message);
+            return None;
+        }
+        states.push(ModulatorState { sojourn, next });
+    }
+    if states.is_empty() {
+        context.fault_at(node, format!("no state: expected at least one, each with a name and a sojourn, {SOJOURN}"));
+        return None;
+    }
+    Some((names, states))
+}
+
+/// How likely each state comes next: a name, or names with weights.
+fn read_next(node: &Node, context: Context<'_>, names: &[String]) -> Option<Vec<f64>> {
+    let mut weights = vec![0.0; names.len()];
+    let place = |name: &str, at: &dyn Fn(String)| {
+        let found = names.iter().position(|known| known == name);
+        if found.is_none() {
+            at(format!("there is no state {}: expected {}", quote(name), one_of(names.iter().map(String::as_str), name)));
+        }
+        found
+    };
+    match &node.value {
+        Value::Text(name) => weights[place(name, &|message| context.fault_at(node, message))?] = 1.0,
+        Value::Table(table) => {
+            for entry in &table.0 {
+                let place = place(&entry.name, &|message| context.fault(entry.key, &entry.node.path, message));
+                let weight = WEIGHT.read(&entry.node, context);
+                weights[place?] = weight?;
+            }
+        }
+        Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date | Value::List(_) => {
+            context.fault_at(node, format!("found {}: expected the name of a state, or a table such as {{ bad = 1, worse = 2 }}", node.describe()));
+            return None;
+        }
+    }
+    Some(weights)
+}

@@ -1,0 +1,128 @@
+//! `netem`: a link in the words of `tc`.
+
+use core::ops::Range;
+use std::sync::Arc;
+
+use cohaptic_wan::netem::kernel::Table;
+use cohaptic_wan::netem::{Distribution, Netem, SlotGap, TableName};
+use cohaptic_wan::{KernelNetem, LinkModel};
+
+use super::distribution::{dist_fault, dist_table};
+use super::is_none;
+use crate::document::{Node, Place};
+use crate::reading::named_file::{Fault, beside_document, read_file};
+use crate::reading::{Context, TableReader, values};
+
+/// What is made of the words.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Profile {
+    /// What they say, with the laws of this program.
+    Exact,
+    /// What Linux 6.6 does when it is told so.
+    Kernel,
+}
+
+/// The link, if there are words.
+pub(super) fn read_netem(table: &mut TableReader<'_>, context: Context<'_>) -> Option<Option<LinkModel>> {
+    let profiles = [("exact", Profile::Exact), ("kernel-6.6", Profile::Kernel)];
+    let profile_entry = table.entry("netem-profile");
+    let profile = table.optional("netem-profile", Profile::Exact, |node, context| values::choice(node, context, &profiles));
+    let Some(node) = table.get("netem").filter(|node| !is_none(node)) else {
+        // A profile that was inherited means nothing without the words, and harms nobody; one beside no words is a slip.
+        if let Some(entry) = profile_entry.filter(|_| !context.partial && table.get("netem").is_none()) {
+            context.fault(entry.key, &entry.node.path, "netem-profile means nothing without words: expected a key netem beside it");
+            return None;
+        }
+        return profile.map(|_| None);
+    };
+    let words = values::text(node, context, "the words of tc-netem such as \"delay 20ms 5ms loss 1%\"")?;
+    let netem = match Netem::parse(words) {
+        Ok(netem) => netem,
+        Err(error) => {
+            let message = with_expectation(error.to_string());
+            context.fault(place_of_word(node, words, &error.span, context), &node.path, message);
+            return None;
+        }
+    };
+    match profile? {
+        Profile::Exact => read_exact(node, words, &netem, context),
+        Profile::Kernel => read_kernel(node, netem, context),
+    }
+    .map(Some)
+}
+
+/// Where a word stands in the text of the scene; the whole value if it is written with escapes.
+fn place_of_word(node: &Node, words: &str, span: &Range<usize>, context: Context<'_>) -> Place {
+    let source = context.sources.text_of(node.place);
+    let written = source.get(node.place.start..node.place.end).unwrap_or_default();
+    match written.find(words) {
+        Some(offset) => {
+            let start = node.place.start + offset;
+            Place::new(node.place.source, start + span.start..start + span.end)
+        }
+        None => node.place,
+    }
+}
+
+fn read_exact(node: &Node, words: &str, netem: &Netem, context: Context<'_>) -> Option<LinkModel> {
+    let mut complete = true;
+    let config = netem.to_link_config(&mut |name: &TableName| {
+        let table = read_table(node, name, "dist", context, dist_table);
+        complete &= table.is_some();
+        table
+    });
+    match config {
+        Ok(config) => complete.then_some(LinkModel::Fixed(config)),
+        Err(error) => {
+            let message = with_expectation(error.to_string());
+            let place = option_span(words, error.option()).map_or(node.place, |span| place_of_word(node, words, &span, context));
+            // A table that is missing or wrong was named where it stands.
+            if complete {
+                context.fault(place, &node.path, message);
+            }
+            None
+        }
+    }
+}
+
+/// Where an option stands in the words, which may shorten it.
+fn option_span(words: &str, option: &str) -> Option<Range<usize>> {
+    let mut end = 0;
+    words.split_whitespace().find_map(|word| {
+        let start = end + words.get(end..)?.find(word)?;
+        end = start + word.len();
+        option.starts_with(word).then_some(start..end)
+    })
+}
+
+fn with_expectation(message: String) -> String {
+    if message.contains("expected") { message } else { format!("{message}: expected words of tc-netem that can be meant together") }
+}
+
+fn read_kernel(node: &Node, netem: Netem, context: Context<'_>) -> Option<LinkModel> {
+    let delay = netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()).and_then(|jitter| jitter.distribution.as_ref());
+    let slot = netem.slot.as_ref().and_then(|slot| match &slot.gap {
+        SlotGap::Drawn { distribution, .. } => Some(distribution),
+        SlotGap::Range { .. } => None,
+    });
+    let mut tables = Vec::new();
+    for distribution in [delay, slot].into_iter().flatten() {
+        if let Distribution::Table(name) = distribution {
+            let table = read_table(node, name, "kernel", context, |text| Table::parse(text).map(Arc::new).map_err(|error| dist_fault(text, &error)))?;
+            tables.push((name.clone(), (*table).clone()));
+        }
+    }
+    KernelNetem::new(netem, tables).map(LinkModel::Kernel).map_err(|error| values::refuse(context, &[], node, &error)).ok()
+}
+
+/// The file `NAME.dist` in the folder of the scene.
+fn read_table<T: Clone + 'static>(
+    node: &Node,
+    name: &TableName,
+    form: &str,
+    context: Context<'_>,
+    parse: impl FnOnce(&str) -> Result<T, Fault>,
+) -> Option<T> {
+    let path = beside_document(context, &format!("{}.dist", name.as_str()));
+    read_file(node, context, &path, form, parse)
+}

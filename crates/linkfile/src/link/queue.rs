@@ -1,0 +1,131 @@
+//! `queue` and limits: how much may wait, and which packets are dropped.
+
+use cohaptic_units::{Bytes, Probability};
+use cohaptic_wan::{CoDel, Discipline, QueueLimit, Red};
+
+use super::is_unlimited;
+use crate::document::{Node, quote};
+use crate::reading::values::{self, FRACTION, ReadNumber as _};
+use crate::reading::{Context, TableReader, only_one};
+
+/// What a queue is, apart from what it stands before.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Queue {
+    pub(super) limit: Option<QueueLimit>,
+    pub(super) discipline: Discipline,
+}
+
+const DISCIPLINES: &str = "one of tail-drop, head-drop, codel, red, { codel = … } or { red = … }";
+const LIMIT: &str = "a limit such as \"100 packets\", \"64kB\" or \"50ms\"";
+
+pub(super) fn read_queue(node: &Node, context: Context<'_>) -> Option<Queue> {
+    let mut table = TableReader::new(node, context, "a table such as { limit = \"100 packets\" }")?;
+    let limit = table.required("limit", LIMIT, read_limit);
+    let discipline = table.optional("discipline", Discipline::TailDrop, |node, context| read_discipline(node, context, limit.flatten()));
+    table.finish();
+    Some(Queue { limit: limit?, discipline: discipline? })
+}
+
+/// How much may wait; `None` for "unlimited".
+pub(super) fn read_limit(node: &Node, context: Context<'_>) -> Option<Option<QueueLimit>> {
+    if is_unlimited(node) {
+        return Some(None);
+    }
+    let text = values::text(node, context, LIMIT)?;
+    let packets = || values::packets(text).map(QueueLimit::Packets);
+    let bytes = || cohaptic_units::parse::size(text).ok().map(QueueLimit::Bytes);
+    let time = || cohaptic_units::parse::duration(text).ok().map(QueueLimit::Time);
+    let limit = packets().or_else(bytes).or_else(time);
+    if limit.is_none() {
+        context.fault_at(node, format!("{} is no limit of a queue: expected {LIMIT}", quote(text)));
+    }
+    limit.map(Some)
+}
+
+/// A number of packets: `limit` of a link. `None` for "unlimited".
+pub(super) fn read_packets(node: &Node, context: Context<'_>) -> Option<Option<u64>> {
+    const EXPECTED: &str = "a number of packets such as \"1000 packets\"";
+    if is_unlimited(node) {
+        return Some(None);
+    }
+    let text = values::text(node, context, EXPECTED)?;
+    let packets = values::packets(text);
+    if packets.is_none() {
+        context.fault_at(node, format!("{} is no number of packets: expected {EXPECTED}", quote(text)));
+    }
+    packets.map(Some)
+}
+
+fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>) -> Option<Discipline> {
+    if let Some(name) = node.as_text() {
+        return match name {
+            "tail-drop" => Some(Discipline::TailDrop),
+            "head-drop" => Some(Discipline::HeadDrop),
+            "codel" => Some(Discipline::CoDel(CoDel::default())),
+            "red" => read_plain_red(node, context, limit),
+            other => {
+                context.fault_at(node, format!("unknown name {}: expected {DISCIPLINES}", quote(other)));
+                None
+            }
+        };
+    }
+    let mut table = TableReader::new(node, context, DISCIPLINES)?;
+    let entries = [table.entry("codel"), table.entry("red")];
+    table.finish();
+    let chosen = only_one(node, context, &entries, DISCIPLINES)?;
+    if chosen.name == "codel" {
+        read_codel(&chosen.node, context).map(Discipline::CoDel)
+    } else {
+        read_red(&chosen.node, context).map(Discipline::Red)
+    }
+}
+
+fn read_codel(node: &Node, context: Context<'_>) -> Option<CoDel> {
+    let custom = CoDel::default();
+    let mut table = TableReader::new(node, context, "a table such as { target = \"5ms\", interval = \"100ms\" }")?;
+    let target = table.optional("target", custom.target, values::positive_duration);
+    let interval = table.optional("interval", custom.interval, values::positive_duration);
+    let mtu = table.optional("mtu", custom.mtu, values::size);
+    let ecn = table.optional("ecn", custom.ecn, values::boolean);
+    table.finish();
+    Some(CoDel { target: target?, interval: interval?, mtu: mtu?, ecn: ecn? })
+}
+
+/// Floyd's advice: thresholds a factor of three apart, a tenth dropped at the upper one. The queue's limit is twice that, so that the limit is met seldom.
+fn read_plain_red(node: &Node, context: Context<'_>, limit: Option<QueueLimit>) -> Option<Discipline> {
+    const EXPECTED: &str = "a limit in bytes of at least 6B beside it, or { red = { min, max } }";
+    let Some(QueueLimit::Bytes(limit)) = limit else {
+        context.fault_at(node, format!("red takes its thresholds from the limit: expected {EXPECTED}"));
+        return None;
+    };
+    let (min, max) = (Bytes::new(limit.get() / 6), Bytes::new(limit.get() / 2));
+    let red = Red::new(min, max, Probability::new(CUSTOM_PROBABILITY).ok()?, CUSTOM_WEIGHT, CUSTOM_PACKET, false);
+    red.map(Discipline::Red).map_err(|error| values::refuse(context, &[], node, &error)).ok()
+}
+
+const CUSTOM_PROBABILITY: f64 = 0.1;
+const CUSTOM_WEIGHT: f64 = 0.002;
+const CUSTOM_PACKET: Bytes = Bytes::new(500);
+
+fn read_red(node: &Node, context: Context<'_>) -> Option<Red> {
+    let mut table = TableReader::new(node, context, "a table such as { min = \"5kB\", max = \"15kB\" }")?;
+    let nodes = [table.get("min"), table.get("max")];
+    let (weight_node, packet_node) = (table.get("weight"), table.get("mean-packet"));
+    let min = table.required("min", "the average queue at which dropping begins, a size such as \"5kB\"", values::size);
+    let max = table.required("max", "the average queue at which everything is dropped, a size such as \"15kB\"", values::size);
+    let probability = table.optional("max-probability", Probability::new(CUSTOM_PROBABILITY).ok()?, values::probability);
+    let weight = table.optional("weight", CUSTOM_WEIGHT, |node, context| FRACTION.read(node, context));
+    let packet = table.optional("mean-packet", CUSTOM_PACKET, values::size);
+    let ecn = table.optional("ecn", false, values::boolean);
+    table.finish();
+    let red = Red::new(min?, max?, probability?, weight?, packet?, ecn?);
+    red.map_err(|error| {
+        let nodes: &[Option<&Node>] = match error {
+            cohaptic_wan::RedError::Weight(_) => &[weight_node],
+            cohaptic_wan::RedError::MeanPacket => &[packet_node],
+            cohaptic_wan::RedError::Thresholds { .. } => &nodes,
+        };
+        values::refuse(context, nodes, node, &error);
+    })
+    .ok()
+}

@@ -1,0 +1,51 @@
+//! `reorder`: packets that leave their place on purpose.
+
+use core::num::NonZeroU32;
+
+use cohaptic_wan::{Chance, Displacement, Reorder};
+
+use super::chance::read_chance_in;
+use crate::document::Node;
+use crate::reading::{Context, TableReader, only_one, values};
+
+/// `"25%"` (jumps ahead), or `{ probability, correlation }` with `gap`, with `behind` and `at-most`, or with `later`.
+pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<Reorder>> {
+    let any = Displacement::Jump { gap: NonZeroU32::MIN };
+    if node.as_table().is_none() {
+        let packets = Chance::independent(values::probability(node, context)?);
+        return Some((!packets.is_never()).then_some(Reorder { packets, how: any }));
+    }
+    let mut table = TableReader::new(node, context, "a probability or a table such as { probability = \"25%\", gap = 5 }")?;
+    let packets = read_chance_in(&mut table, node, context);
+    let how = [table.entry("gap"), table.entry("behind"), table.entry("later")];
+    let at_most_entry = table.entry("at-most");
+    let at_most = table.maybe("at-most", values::duration);
+    if how[1].is_some() && at_most_entry.is_none() {
+        table.miss("at-most", "how long a packet is held at most, a duration such as \"50ms\"");
+    }
+    table.finish();
+    let how = if how.iter().all(Option::is_none) { None } else { Some(only_one(node, context, &how, "gap, behind and later")?) };
+    if let Some(at_most) = at_most_entry.filter(|_| how.is_none_or(|how| how.name != "behind")) {
+        context.fault(at_most.key, &at_most.node.path, "at-most says how long a packet is held: expected it beside behind");
+        return None;
+    }
+    let count = |node: &Node| {
+        let most = u64::from(u32::MAX);
+        let count = values::integer(node, context, 1..=most, "a number of packets of at least 1")?;
+        NonZeroU32::new(u32::try_from(count).ok()?)
+    };
+    let how = match how {
+        None => any,
+        Some(how) if how.name == "gap" => Displacement::Jump { gap: count(&how.node)? },
+        Some(how) if how.name == "behind" => {
+            let packets = count(&how.node);
+            let at_most = at_most?;
+            // What is missing was said above, and in a part of a scene nothing is.
+            let at_most = if context.partial { at_most.unwrap_or_default() } else { at_most? };
+            Displacement::Behind { packets: packets?, at_most }
+        }
+        Some(how) => Displacement::Later { by: values::duration(&how.node, context)? },
+    };
+    let packets = packets?;
+    Some((!packets.is_never()).then_some(Reorder { packets, how }))
+}

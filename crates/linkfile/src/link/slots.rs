@@ -1,0 +1,54 @@
+//! `slots`: a line that sends only now and then.
+
+use core::num::NonZeroU64;
+
+use cohaptic_wan::Slots;
+
+use super::delay::read_delay;
+use super::is_none;
+use crate::document::Node;
+use crate::reading::{Context, TableReader, values};
+
+/// `None` for "none".
+pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Option<Slots>> {
+    if is_none(node) {
+        return Some(None);
+    }
+    let mut table = TableReader::new(node, context, "\"none\" or a table such as { min = \"10ms\", max = \"20ms\" }")?;
+    let ends = [table.entry("min"), table.entry("max")];
+    let law = [table.entry("delay"), table.entry("jitter")];
+    let slots = match (ends.into_iter().flatten().next(), law.into_iter().flatten().next()) {
+        (Some(end), Some(law)) => {
+            let (first, last) = if end.key < law.key { (end, law) } else { (law, end) };
+            let message = format!("{} beside {}: expected either min and max, or delay and jitter", last.name, first.name);
+            context.fault(last.key, &last.node.path, message);
+            None
+        }
+        (None, Some(_)) => read_delay(&mut table, node, context).map(Slots::drawn),
+        (_, None) => read_ends(&mut table, node, context),
+    };
+    let packets = table.maybe("packets", |node, context| {
+        let most = i64::MAX.unsigned_abs();
+        values::integer(node, context, 1..=most, "a number of packets of at least 1").and_then(NonZeroU64::new)
+    });
+    let bytes = table.maybe("bytes", |node, context| {
+        let bytes = NonZeroU64::new(values::size(node, context)?.get());
+        if bytes.is_none() {
+            context.fault_at(node, "zero is out of range: expected a size above zero such as \"1500B\"");
+        }
+        bytes
+    });
+    table.finish();
+    let mut slots = slots?;
+    (slots.packets, slots.bytes) = (packets?, bytes?);
+    Some(Some(slots))
+}
+
+/// Gaps that are uniform between two spans.
+fn read_ends(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Slots> {
+    let nodes = [table.get("min"), table.get("max")];
+    let min = table.required("min", "the shortest time from slot to slot, a duration such as \"10ms\"", values::duration);
+    let max = table.maybe("max", values::duration);
+    let (min, max) = (min?, max?);
+    Slots::new(min, max.unwrap_or(min)).map_err(|error| values::refuse(context, &nodes, node, &error)).ok()
+}

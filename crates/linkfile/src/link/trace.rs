@@ -1,0 +1,105 @@
+//! `trace`: a recorded line, or a recorded path.
+
+use cohaptic_units::Bytes;
+use cohaptic_wan::{Between, DeliveryTrace, DeliveryTraceError, MAHIMAHI_BYTES, PathTrace, PathTraceError};
+
+use super::is_none;
+use crate::document::Node;
+use crate::reading::named_file::{Fault, file_path, read_file};
+use crate::reading::{Context, TableReader, values};
+
+/// What a file has recorded.
+#[derive(Clone, Debug)]
+pub(super) enum Trace {
+    /// When a line can deliver: mahimahi's format.
+    Delivery(DeliveryTrace),
+    /// Which delay and loss a path had: a CSV.
+    Path(PathTrace),
+}
+
+const FILE: &str = "the name of a recording, relative to the folder of the scene";
+
+/// `None` for "none".
+pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Trace>> {
+    if is_none(node) {
+        return Some(None);
+    }
+    if node.as_table().is_none() {
+        return load(node, context, MAHIMAHI_BYTES, Between::Steps, false).map(Some);
+    }
+    let mut table = TableReader::new(node, context, "the name of a recording, or a table such as { file = \"path.csv\", repeat = true }")?;
+    let (bytes_entry, of_path) = (table.entry("bytes"), [table.entry("between"), table.entry("repeat")]);
+    let bytes = table.optional("bytes", MAHIMAHI_BYTES, |node, context| {
+        let bytes = values::size(node, context)?;
+        if bytes == Bytes::ZERO {
+            context.fault_at(node, "zero is out of range: expected a size above zero such as \"1504B\"");
+            return None;
+        }
+        Some(bytes)
+    });
+    let ways = [("steps", Between::Steps), ("lines", Between::Lines)];
+    let between = table.optional("between", Between::Steps, |node, context| values::choice(node, context, &ways));
+    let repeat = table.optional("repeat", false, values::boolean);
+    let file = table.get("file");
+    if file.is_none() {
+        table.miss("file", FILE);
+    }
+    table.finish();
+    let (bytes, between, repeat) = (bytes?, between?, repeat?);
+    let Some(file) = file else {
+        // What is missing was said above, and in a part of a scene nothing is.
+        return context.partial.then_some(None);
+    };
+    let trace = load(file, context, bytes, between, repeat)?;
+    let misplaced = match &trace {
+        Trace::Delivery(_) => of_path.into_iter().flatten().next(),
+        Trace::Path(_) => bytes_entry,
+    };
+    if let Some(entry) = misplaced {
+        let message = match &trace {
+            Trace::Delivery(_) => "is for a recorded path: expected only bytes beside instants of delivery, which always repeat",
+            Trace::Path(_) => "is for instants of delivery: expected between and repeat beside a recorded path",
+        };
+        context.fault(entry.key, &entry.node.path, format!("{} {message}", entry.name));
+        return None;
+    }
+    Some(Some(trace))
+}
+
+fn load(node: &Node, context: Context<'_>, bytes: Bytes, between: Between, repeat: bool) -> Option<Trace> {
+    let path = file_path(node, context, FILE)?;
+    let form = format!("trace {bytes} {between:?} {repeat}");
+    read_file(node, context, &path, &form, |text| parse(text, bytes, between, repeat))
+}
+
+/// A file whose first line is a number has instants of delivery; any other one is a CSV.
+fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Trace, Fault> {
+    let first = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
+    if first.parse::<f64>().is_ok() {
+        return DeliveryTrace::parse(text, bytes).map(Trace::Delivery).map_err(|error| {
+            let line = match &error {
+                DeliveryTraceError::Number { line } | DeliveryTraceError::Order { line, .. } => Some(*line),
+                DeliveryTraceError::NoLength | DeliveryTraceError::Empty | DeliveryTraceError::NoBytes => None,
+            };
+            Fault::in_line(text, line, &error)
+        });
+    }
+    PathTrace::parse(text, between, repeat).map(Trace::Path).map_err(|error| {
+        let line = match &error {
+            PathTraceError::Header => {
+                let message = "no recording: expected the columns t,delay or t,delay,loss, or a whole number of milliseconds on each line".to_owned();
+                return Fault { span: header_span(text), message };
+            }
+            PathTraceError::Columns { line, .. } | PathTraceError::Value { line, .. } | PathTraceError::Order { line } => Some(*line),
+            PathTraceError::Empty | PathTraceError::NoLength => None,
+        };
+        Fault::in_line(text, line, &error)
+    })
+}
+
+/// The first line that says anything.
+fn header_span(text: &str) -> core::ops::Range<usize> {
+    let content = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
+    let line = text.lines().position(content).map_or(1, |place| place + 1);
+    crate::reading::named_file::line_span(text, line)
+}

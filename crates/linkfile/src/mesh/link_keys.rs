@@ -1,0 +1,177 @@
+//! Links by their keys: one by itself, and those of a file, to be shown and changed.
+
+use core::fmt;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use cohaptic_wan::LinkModel;
+use toml::de::{DeTable, DeValue};
+
+use crate::document::{BEGINNING, FileError, Node, Sources, Table, Value, key_text, value_text};
+use crate::link::read_link;
+use crate::reading::{Modulators, parse};
+
+/// The link of these keys: texts `KEY=VALUE`, such as `delay=24ms` and `loss={ gilbert-elliott = { p = 0.01, r = 0.1 } }`, as in `[link]` of a scene.
+/// Files that they name are looked for in the current folder.
+///
+/// # Errors
+///
+/// [`FileError`], whose [`override_text`](crate::Diagnostic::override_text) is `link.` and the text with the fault.
+pub fn link_from_keys(keys: &[String]) -> Result<LinkModel, FileError> {
+    let overrides: Vec<String> = keys.iter().map(|key| format!("link.{key}")).collect();
+    read_overrides(&overrides, Path::new("link.toml"), &Arc::default())
+}
+
+/// The link that overrides of the keys of `link` make.
+fn read_overrides(overrides: &[String], file: &Path, modulators: &Arc<Modulators>) -> Result<LinkModel, FileError> {
+    let parsed = parse(Sources { file, text: "", overrides }, |document, context| {
+        let context = context.with_modulators(Some(modulators));
+        let nothing = Node::empty_table(BEGINNING, "link".to_owned());
+        let link = document.as_table().and_then(|table| table.get("link")).map_or(&nothing, |entry| &*entry.node);
+        read_link(link, context, &[])
+    })?;
+    Ok(parsed.whole)
+}
+
+/// The keys of one directed link and their values as TOML, in the order in which they were laid over each other: of two that exclude each other the later
+/// one holds. Keys that are not there have their defaults.
+///
+/// Its display form is an inline table, `{ delay = "24ms", loss = 0.01 }`, which [`LinkKeys::read`] takes.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct LinkKeys {
+    keys: Vec<(String, String)>,
+    modulators: Arc<Modulators>,
+}
+
+impl LinkKeys {
+    /// The keys of a table, in a file with these modulators.
+    #[must_use]
+    pub fn of_table(table: &Table, modulators: &Arc<Modulators>) -> Self {
+        Self { keys: keys_of(table), modulators: Arc::clone(modulators) }
+    }
+
+    /// Each key with its value as TOML.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.keys.iter().map(|(key, value)| (key.as_str(), value.as_str()))
+    }
+
+    /// The value of a key, as TOML; `None` if it is not there.
+    #[must_use]
+    pub fn get(&self, key: &str) -> Option<&str> {
+        self.iter().find(|(name, _)| *name == key).map(|(_, value)| value)
+    }
+
+    /// These keys with one laid over them. What is not TOML is taken as text, as in `--set`: `8ms` needs no quotes. [`LinkKeys::model`] tells whether
+    /// key and value make sense.
+    #[must_use]
+    pub fn with(&self, key: &str, value: &str) -> Self {
+        let mut keys: Vec<_> = self.keys.iter().filter(|(name, _)| name != key).cloned().collect();
+        keys.push((key.to_owned(), value.trim().to_owned()));
+        Self { keys, modulators: Arc::clone(&self.modulators) }
+    }
+
+    /// The link that these keys make. `folder` is where files that they name are looked for: that of the file with the keys.
+    ///
+    /// # Errors
+    ///
+    /// [`FileError`], whose [`override_text`](crate::Diagnostic::override_text) is `link.KEY=VALUE` of the key with the fault.
+    pub fn model(&self, folder: &Path) -> Result<LinkModel, FileError> {
+        let overrides: Vec<String> = self.iter().map(|(key, value)| format!("link.{key}={value}")).collect();
+        read_overrides(&overrides, &folder.join("link.toml"), &self.modulators)
+    }
+
+    /// The keys in the display form of others, in the scene of these. `None` if the text is no table of keys and values; whether they make sense is told
+    /// by [`LinkKeys::model`].
+    #[must_use]
+    pub fn read(&self, table: &str) -> Option<Self> {
+        let text = format!("link = {table}");
+        let document = Node::document(DeTable::parse(&text).ok()?.get_ref()).ok()?;
+        let [only] = document.as_table()?.0.as_slice() else { return None };
+        Some(Self { keys: keys_of(only.node.as_table()?), modulators: Arc::clone(&self.modulators) })
+    }
+}
+
+impl fmt::Display for LinkKeys {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.keys.is_empty() {
+            return f.write_str("{}");
+        }
+        let mut before = "{";
+        for (key, value) in &self.keys {
+            // A text without quotes is given them: the display form is TOML.
+            let value = if is_toml(value) { value.clone() } else { value_text(&text_node(value)) };
+            write!(f, "{before} {} = {value}", key_text(key))?;
+            before = ",";
+        }
+        f.write_str(" }")
+    }
+}
+
+/// The keys of directed links, by the places of sender and receiver.
+pub type KeysOfLinks = BTreeMap<(usize, usize), LinkKeys>;
+
+fn keys_of(table: &Table) -> Vec<(String, String)> {
+    table.0.iter().map(|entry| (entry.name.clone(), value_text(&entry.node))).collect()
+}
+
+fn is_toml(value: &str) -> bool {
+    DeValue::parse(value).is_ok()
+}
+
+fn text_node(text: &str) -> Node {
+    Node { value: Value::Text(text.to_owned()), place: BEGINNING, path: String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use cohaptic_units::Probability;
+    use cohaptic_wan::{Delay, Distribution, Jitter, LinkConfig, Loss};
+
+    use super::*;
+
+    fn link(keys: &[&str]) -> Result<LinkModel, FileError> {
+        link_from_keys(&keys.iter().map(|key| (*key).to_owned()).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn keys_make_a_link() {
+        let delay = Delay::with_jitter(Duration::from_millis(24), Jitter::new(Duration::from_millis(2), Distribution::Normal)).unwrap();
+        let expected = LinkConfig { delay, loss: Loss::Independent(Probability::new(0.01).unwrap()), ..LinkConfig::default() };
+        assert_eq!(link(&["delay=24ms", "jitter={ sd = \"2ms\" }", "loss=1%"]).unwrap(), expected.into());
+        assert_eq!(link(&[]).unwrap(), LinkModel::default());
+    }
+
+    #[test]
+    fn a_fault_names_the_text_that_has_it() {
+        for (keys, text) in [
+            (["delay=24ms", "los=1%"], "link.los=1%"),
+            (["delay=24 parsecs", "loss=1%"], "link.delay=24 parsecs"),
+            (["delay", "loss=1%"], "link.delay"),
+        ] {
+            let error = link(&keys).unwrap_err();
+            let diagnostic = error.diagnostic().unwrap();
+            assert_eq!(diagnostic.override_text(), Some(text), "{error}");
+            assert!(diagnostic.message().contains("expected"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_key_is_replaced_or_added_and_a_fault_in_it_is_named() {
+        let keys = LinkKeys::default().with("delay", "8ms").with("loss", "0.1").with("delay", "\"9ms\"");
+        assert_eq!(keys.to_string(), "{ loss = 0.1, delay = \"9ms\" }");
+        let folder = Path::new("");
+        assert_eq!(keys.model(folder).unwrap(), link(&["loss=0.1", "delay=9ms"]).unwrap());
+        let text = keys.with("delay", "4 \"µs\"\n");
+        assert_eq!(LinkKeys::default().read(&text.to_string()).unwrap().get("delay"), Some(r#""4 \"µs\"""#));
+        let error = keys.with("delay", "4 parsecs").model(folder).unwrap_err();
+        assert_eq!(error.diagnostic().unwrap().override_text(), Some("link.delay=4 parsecs"));
+        assert!(keys.with("from", "left").model(folder).is_err());
+        assert!(keys.with("scene", "1").with("", "1").model(folder).is_err());
+        for text in ["", "{", "{ a = 1 } b", "7", "{}\nscene = 3", "{ a = 1 }\n[b]"] {
+            assert_eq!(keys.read(text), None, "{text}");
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! `[link]` and `[\[links\]]`: what lies between the peers.
+//!
+//! A full mesh of N peers has N·(N−1) links, nearly all of them alike. Links are therefore sorted into *classes*: one for `[link]` and one for each
+//! entry that says something else. Only classes are read, and only links that have an entry are written down; a change in the timeline makes new classes.
+
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use cohaptic_units::Instant;
+use cohaptic_wan::LinkModel;
+
+use super::link_keys::{KeysOfLinks, LinkKeys};
+use super::link_table::{LinkChange, LinkTable, first_left, pairs};
+use super::selector::{LinkSelector, read_ends};
+use crate::document::{BEGINNING, Node};
+use crate::link::{LINK_KEYS, is_empty, read_link};
+use crate::reading::{Context, Modulators, TableReader, values};
+
+/// The classes of links as they stand at some time.
+#[derive(Clone, Debug)]
+pub struct LinkClasses {
+    classes: Vec<Class>,
+    peers: usize,
+    /// The class of the links that have none of their own.
+    usual: usize,
+    /// The classes of the others, by sender and receiver.
+    own: BTreeMap<(usize, usize), usize>,
+    /// Those of the file, which go with the keys.
+    modulators: Arc<Modulators>,
+}
+
+/// Is told the links of a file: once as the file begins, and then after each change of its timeline, with the links that change.
+pub type OnLinks<'a> = &'a mut dyn FnMut(Instant, LinkSelector, &LinkClasses);
+
+/// The keys of a class as written, and what they say.
+#[derive(Clone, Debug)]
+struct Class {
+    keys: Node,
+    config: Arc<LinkModel>,
+}
+
+/// Reads `[link]` and `[\[links\]]`. `None` where something was refused.
+pub fn read_links(defaults: Option<&Node>, entries: Option<&Node>, context: Context<'_>) -> Option<LinkClasses> {
+    let nothing = Node::empty_table(BEGINNING, "link".to_owned());
+    let defaults = defaults.unwrap_or(&nothing);
+    let base = read_link(defaults, context, &[]);
+    let entries = match entries {
+        Some(node) => values::list(node, context, "entries [[links]]")?,
+        None => Vec::new(),
+    };
+    let below = if defaults.as_table().is_some() { defaults } else { &nothing };
+    let mut seen = BTreeSet::new();
+    let own: Vec<_> = entries.iter().map(|entry| read_entry(entry, below, &mut seen, context)).collect();
+
+    let base = Class { keys: defaults.clone(), config: Arc::new(base?) };
+    let mut links = LinkClasses {
+        classes: vec![base],
+        peers: context.names?.len(),
+        usual: 0,
+        own: BTreeMap::new(),
+        modulators: context.modulators.map_or_else(Arc::default, Arc::clone),
+    };
+    for entry in own {
+        let (ends, class) = entry?;
+        if let Some((keys, config)) = class {
+            let class = links.add(keys, config);
+            links.own.insert(ends, class);
+        }
+    }
+    Some(links)
+}
+
+/// Checks the keys that a change of links sets, without the link that they are laid over, so that a fault is found even where it is not known which links
+/// are meant. `None` only if there are none.
+pub fn read_key_changes(set: &Node, context: Context<'_>) -> Option<()> {
+    read_link(set, context.of_part(), &[]);
+    if is_empty(set) {
+        context.fault_at(set, "nothing changes: expected keys of a link");
+        return None;
+    }
+    Some(())
+}
+
+/// The ends of an entry and, if it says anything else, its keys laid over those of `[link]`.
+#[expect(clippy::type_complexity, reason = "used once, above")]
+fn read_entry(
+    entry: &Node,
+    below: &Node,
+    seen: &mut BTreeSet<(usize, usize)>,
+    context: Context<'_>,
+) -> Option<((usize, usize), Option<(Node, LinkModel)>)> {
+    let mut table = TableReader::new(entry, context, "a table with from, to and link keys")?;
+    let ends = read_ends(&mut table, context);
+    let to = table.get("to");
+    // Its other keys, known and unknown, are looked at below; what is missing is said here.
+    if entry.as_table().is_some_and(|table| table.get("from").is_none() || table.get("to").is_none()) {
+        let rest = entry.as_table()?.0.iter().filter(|entry| !matches!(entry.name.as_str(), "from" | "to"));
+        if rest.clone().all(|entry| LINK_KEYS.contains(&entry.name.as_str())) {
+            table.know(&LINK_KEYS);
+            table.finish();
+        }
+    }
+    let own = entry.without(&["from", "to"]);
+    let class = if is_empty(&own) {
+        Some(None)
+    } else {
+        let keys = own.over(below, &[]);
+        read_link(&keys, context, &["from", "to"]).map(|config| Some((keys, config)))
+    };
+    let ends = ends?;
+    if !seen.insert(ends) {
+        context.fault_at(to?, "there is an entry for this link already: expected one entry for each pair of peers");
+        return None;
+    }
+    Some((ends, class?))
+}
+
+impl LinkClasses {
+    /// The table of configurations. `None` for fewer than two peers, which have no links; that is refused elsewhere.
+    pub fn table(&self) -> Option<LinkTable> {
+        let config = |class: usize| Arc::clone(&self.classes[class].config);
+        (self.peers >= 2).then(|| LinkTable::new(self.peers, config(self.usual), self.own.iter().map(|(ends, class)| (*ends, config(*class)))))
+    }
+
+    /// The keys of the links that `selector` means, as they were laid over each other. Access lines have none here.
+    #[must_use]
+    pub fn keys(&self, selector: LinkSelector) -> KeysOfLinks {
+        let keys =
+            |class: usize| self.classes[class].keys.as_table().map_or_else(LinkKeys::default, |table| LinkKeys::of_table(table, &self.modulators));
+        let class = |pair: (usize, usize)| self.own.get(&pair).copied().unwrap_or(self.usual);
+        match selector {
+            LinkSelector::All => {
+                let of_class: Vec<LinkKeys> = (0..self.classes.len()).map(keys).collect();
+                pairs(self.peers).map(|pair| (pair, of_class[class(pair)].clone())).collect()
+            }
+            LinkSelector::Between { from, to } => BTreeMap::from([((from, to), keys(class((from, to))))]),
+            LinkSelector::Uplink(_) | LinkSelector::Downlink(_) => KeysOfLinks::new(),
+        }
+    }
+
+    /// Lays keys over those of one link, and answers what it is now. `None` where something was refused.
+    pub fn change(&mut self, (from, to): (usize, usize), keys: &Node, context: Context<'_>) -> Option<LinkChange> {
+        let old = self.own.get(&(from, to)).copied().unwrap_or(self.usual);
+        let class = self.lay_over(old, keys, context)?;
+        self.own.insert((from, to), class);
+        Some(LinkChange { from, to, config: Arc::clone(&self.classes[class].config) })
+    }
+
+    /// Lays keys over those of all links, and answers what they are now. `None` where something was refused.
+    pub fn change_all(&mut self, keys: &Node, context: Context<'_>) -> Option<LinkTable> {
+        let mut new_class = BTreeMap::new();
+        for old in self.in_order_of_use() {
+            if let Entry::Vacant(place) = new_class.entry(old) {
+                place.insert(self.lay_over(old, keys, context)?);
+            }
+        }
+        let renewed = |old: &usize| new_class.get(old).copied().unwrap_or(*old);
+        self.usual = renewed(&self.usual);
+        self.own.values_mut().for_each(|class| *class = renewed(class));
+        self.table()
+    }
+
+    /// The classes that links have, by sender and then by receiver, so that of several faults the same one is found first. Some come more than once.
+    fn in_order_of_use(&self) -> Vec<usize> {
+        let first = first_left(self.peers, self.own.keys().copied());
+        let before = self.own.iter().take_while(|(ends, _)| first.is_none_or(|first| **ends < first));
+        let after = self.own.iter().skip_while(|(ends, _)| first.is_none_or(|first| **ends < first));
+        let class = |(_, class): (&(usize, usize), &usize)| *class;
+        before.map(class).chain(first.map(|_| self.usual)).chain(after.map(class)).collect()
+    }
+
+    /// The class of links of an old class over which keys are laid.
+    fn lay_over(&mut self, old: usize, keys: &Node, context: Context<'_>) -> Option<usize> {
+        let merged = keys.over(&self.classes.get(old)?.keys, &[]);
+        let config = read_link(&merged, context, &[])?;
+        Some(self.add(merged, config))
+    }
+
+    fn add(&mut self, keys: Node, config: LinkModel) -> usize {
+        self.classes.push(Class { keys, config: Arc::new(config) });
+        self.classes.len() - 1
+    }
+}

@@ -1,0 +1,96 @@
+//! Which peer, and which links: references from one part of a file to another.
+
+use crate::document::{Node, quote};
+use crate::reading::{Context, Names, TableReader, one_of, only_one, values};
+
+/// Which links are meant, by the places of peers in the file.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum LinkSelector {
+    /// All links between peers.
+    All,
+    /// One directed link.
+    Between {
+        /// The sender.
+        from: usize,
+        /// The receiver.
+        to: usize,
+    },
+    /// The line that a peer sends through.
+    Uplink(usize),
+    /// The line that a peer receives through.
+    Downlink(usize),
+}
+
+/// The peer of that name, by its place.
+pub fn read_peer_name(node: &Node, context: Context<'_>) -> Option<usize> {
+    let expected = format!("the name of a {}", context.names.map_or("peer", Names::noun));
+    let name = values::text(node, context, &expected)?;
+    // Without the list of names, the fault is there.
+    let names = context.names?;
+    let index = names.index(name);
+    if index.is_none() {
+        context.fault_with(node, || {
+            let expected = one_of(names.as_slice().iter().map(String::as_str), name);
+            format!("there is no {} {}: expected {expected}", names.noun(), quote(name))
+        });
+    }
+    index
+}
+
+/// The two ends of a link, which differ: `from` and `to` of a table that may have other keys.
+pub fn read_ends(table: &mut TableReader<'_>, context: Context<'_>) -> Option<(usize, usize)> {
+    let to_node = table.get("to");
+    let noun = context.names.map_or("peer", Names::noun);
+    let from = table.required("from", &format!("the name of the {noun} that sends"), read_peer_name);
+    let to = table.required("to", &format!("the name of the {noun} that receives"), read_peer_name);
+    let (from, to) = (from?, to?);
+    if from == to {
+        context.fault_at(to_node?, format!("a {noun} has no link to itself: expected the name of another {noun}"));
+        return None;
+    }
+    Some((from, to))
+}
+
+/// Links between peers: "all", or one of them.
+pub fn read_links_between(node: &Node, context: Context<'_>) -> Option<LinkSelector> {
+    const EXPECTED: &str = "\"all\" or a table such as { from = \"left\", to = \"right\" }";
+    if is_all(node, context, EXPECTED)? {
+        return Some(LinkSelector::All);
+    }
+    let mut table = TableReader::new(node, context, EXPECTED)?;
+    let ends = read_ends(&mut table, context);
+    table.finish();
+    ends.map(|(from, to)| LinkSelector::Between { from, to })
+}
+
+/// Links between peers, or an access line.
+pub fn read_link_or_line(node: &Node, context: Context<'_>) -> Option<LinkSelector> {
+    const EXPECTED: &str = "\"all\", { from = …, to = … }, { uplink = … } or { downlink = … }";
+    if is_all(node, context, EXPECTED)? {
+        return Some(LinkSelector::All);
+    }
+    let mut table = TableReader::new(node, context, EXPECTED)?;
+    let (uplink, downlink) = (table.entry("uplink"), table.entry("downlink"));
+    if uplink.is_none() && downlink.is_none() {
+        let ends = read_ends(&mut table, context);
+        table.finish();
+        return ends.map(|(from, to)| LinkSelector::Between { from, to });
+    }
+    let (from, to) = (table.entry("from"), table.entry("to"));
+    table.finish();
+    let chosen = only_one(node, context, &[uplink, downlink, from, to], EXPECTED)?;
+    let peer = read_peer_name(&chosen.node, context)?;
+    Some(if uplink.is_some() { LinkSelector::Uplink(peer) } else { LinkSelector::Downlink(peer) })
+}
+
+/// Whether the value is "all"; any other text is a fault.
+fn is_all(node: &Node, context: Context<'_>, expected: &str) -> Option<bool> {
+    match node.as_text() {
+        None => Some(false),
+        Some("all") => Some(true),
+        Some(other) => {
+            context.fault_at(node, format!("unknown links {}: expected {expected}", quote(other)));
+            None
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! The state of a reader: the texts, the names that are known so far, and the faults.
+
+use core::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use cohaptic_wan::Modulator;
+
+use super::files::Files;
+use super::names::Names;
+use crate::document::{Diagnostic, FileError, Node, Place, Sources};
+
+/// The first fault in the order of the texts. Readers go on after a fault, so that a later part of the walk can find one that stands earlier.
+#[derive(Debug, Default)]
+pub(crate) struct Faults(RefCell<Option<(Place, FileError)>>);
+
+impl Faults {
+    /// Keeps the fault if none stands before it. Of several at one place the first one reported stays.
+    fn report(&self, place: Place, error: impl FnOnce() -> FileError) {
+        let mut first = self.0.borrow_mut();
+        if first.as_ref().is_none_or(|(earlier, _)| place < *earlier) {
+            *first = Some((place, error()));
+        }
+    }
+
+    /// The fault that stands first, if there is one.
+    pub(super) fn into_first(self) -> Option<FileError> {
+        self.0.into_inner().map(|(_, error)| error)
+    }
+}
+
+/// The modulators of a file by name, each with the names of its states.
+pub type Modulators = BTreeMap<String, (Modulator, Vec<String>)>;
+
+/// The state of a reader, which the readers of parts are given.
+#[derive(Clone, Copy, Debug)]
+pub struct Context<'a> {
+    /// The file and the overrides.
+    pub sources: Sources<'a>,
+    /// Where faults are reported.
+    pub(crate) faults: &'a Faults,
+    /// The contents of the files that the document names.
+    pub(crate) files: &'a Files,
+    /// The names of the ends of links. `None`: not known, because the list was refused.
+    pub names: Option<&'a Names>,
+    /// `None`: not known, because the list was refused.
+    pub modulators: Option<&'a Arc<Modulators>>,
+    /// Whether a table is read without the table below it: then no key is missing.
+    pub partial: bool,
+}
+
+impl<'a> Context<'a> {
+    /// This state with the names of the ends.
+    #[must_use]
+    pub const fn with_names(self, names: Option<&'a Names>) -> Self {
+        Self { names, ..self }
+    }
+
+    /// This state with the modulators of the file.
+    #[must_use]
+    pub const fn with_modulators(self, modulators: Option<&'a Arc<Modulators>>) -> Self {
+        Self { modulators, ..self }
+    }
+
+    /// This state for a table that is read without the table below it.
+    #[must_use]
+    pub const fn of_part(self) -> Self {
+        Self { partial: true, ..self }
+    }
+
+    /// Reports what is wrong at a place.
+    pub fn fault(&self, place: Place, key: &str, message: impl Into<String>) {
+        self.faults.report(place, || FileError::Invalid(Box::new(self.sources.diagnostic(place, key.to_owned(), message.into()))));
+    }
+
+    /// Reports what is wrong with a value.
+    pub fn fault_at(&self, node: &Node, message: impl Into<String>) {
+        self.fault(node.place, &node.path, message);
+    }
+
+    /// Reports what is wrong with a value, with a message that is made only if it is kept: one that lists the names of all peers takes long.
+    pub fn fault_with(&self, node: &Node, message: impl FnOnce() -> String) {
+        self.faults.report(node.place, || FileError::Invalid(Box::new(self.sources.diagnostic(node.place, node.path.clone(), message()))));
+    }
+
+    /// Reports that the file which `node` names cannot be read.
+    pub(super) fn unreadable(&self, node: &Node, path: PathBuf, source: std::io::Error) {
+        let message = format!("cannot read {}: {source}: expected a file, relative to the folder of the scene", path.display());
+        self.faults.report(node.place, || {
+            let place = self.sources.diagnostic(node.place, node.path.clone(), message);
+            FileError::Read { path, source, place: Some(Box::new(place)) }
+        });
+    }
+
+    /// Reports a fault in the file that `node` names.
+    pub(super) fn fault_in_file(&self, node: &Node, diagnostic: Diagnostic) {
+        let note = format!("this file is named at {}, by the key {}", self.sources.describe(node.place), node.path);
+        self.faults.report(node.place, || FileError::Invalid(Box::new(Diagnostic { note: Some(note), ..diagnostic })));
+    }
+}

@@ -1,0 +1,20 @@
+//! How a document is read: key by key, with every fault reported where it stands.
+//!
+//! A reader is a function from a [`Node`](crate::document::Node) and a [`Context`] to an `Option`. It answers `None` exactly where it has reported a
+//! fault, and it goes on after a fault, so that of several faults the one that stands first in the text is found.
+
+mod context;
+mod files;
+pub mod named_file;
+mod names;
+mod overrides;
+mod parse;
+mod table_reader;
+#[cfg(feature = "testing")]
+pub mod testing;
+pub mod values;
+
+pub use context::{Context, Modulators};
+pub use names::{Names, one_of};
+pub use parse::{Parsed, default_title, file_text, parse, text_of, with_text};
+pub use table_reader::{TableReader, only_one};

@@ -1,0 +1,248 @@
+//! Readers of single values. Each answers `None` after it has reported what is wrong.
+
+use core::time::Duration;
+
+use cohaptic_units::{Bytes, Instant, ParseError, Probability, Rate, parse};
+
+pub use cohaptic_wan::parameters::{CORRELATION, FRACTION, PACKETS, Quantity, WEIGHT};
+
+use super::context::Context;
+use super::names::one_of;
+use crate::document::{Node, Value, quote, shorten};
+
+/// Reads a number in its range.
+pub trait ReadNumber {
+    /// The number; `None` after a fault.
+    fn read(self, node: &Node, context: Context<'_>) -> Option<f64>;
+}
+
+impl ReadNumber for Quantity {
+    fn read(self, node: &Node, context: Context<'_>) -> Option<f64> {
+        let value = number(node, context, &self.expected())?;
+        if !self.contains(value) {
+            context.fault_at(node, format!("{} is out of range: expected {}", written(node), self.expected()));
+            return None;
+        }
+        // A negative zero becomes an ordinary one.
+        Some(value + 0.0)
+    }
+}
+
+/// A finite number.
+pub fn number(node: &Node, context: Context<'_>, expected: &str) -> Option<f64> {
+    let value = match &node.value {
+        Value::Integer(integer) => {
+            let exact = integer.and_then(exact_f64);
+            if exact.is_none() {
+                context.fault_at(node, format!("{} has no exact 64-bit floating-point value: expected {expected}", node.describe()));
+            }
+            exact?
+        }
+        // The text of a TOML float is one that Rust reads; what is not becomes a NaN, which is refused.
+        Value::Float(text) => text.parse().unwrap_or(f64::NAN),
+        Value::Text(_) | Value::Boolean(_) | Value::Date | Value::List(_) | Value::Table(_) => {
+            context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
+            return None;
+        }
+    };
+    if !value.is_finite() {
+        context.fault_at(node, format!("{} is not finite: expected {expected}", written(node)));
+        return None;
+    }
+    Some(value)
+}
+
+/// The number as a double, if it is one exactly.
+fn exact_f64(integer: i128) -> Option<f64> {
+    let decimal = integer.to_string();
+    let value: f64 = decimal.parse().ok()?;
+    (format!("{value:.0}") == decimal).then_some(value)
+}
+
+/// A number as it is written.
+#[must_use]
+pub fn written(node: &Node) -> String {
+    match &node.value {
+        Value::Integer(Some(integer)) => integer.to_string(),
+        Value::Float(text) => shorten(text),
+        Value::Integer(None) | Value::Text(_) | Value::Boolean(_) | Value::Date | Value::List(_) | Value::Table(_) => node.describe(),
+    }
+}
+
+/// An integer in a range, both ends included.
+pub fn integer(node: &Node, context: Context<'_>, range: core::ops::RangeInclusive<u64>, expected: &str) -> Option<u64> {
+    let Value::Integer(integer) = &node.value else {
+        context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
+        return None;
+    };
+    let value = integer.and_then(|integer| u64::try_from(integer).ok()).filter(|value| range.contains(value));
+    if value.is_none() {
+        context.fault_at(node, format!("{} is out of range: expected {expected}", written(node)));
+    }
+    value
+}
+
+/// `true` or `false`.
+pub fn boolean(node: &Node, context: Context<'_>) -> Option<bool> {
+    let Value::Boolean(value) = node.value else {
+        context.fault_at(node, format!("found {}: expected true or false", node.describe()));
+        return None;
+    };
+    Some(value)
+}
+
+/// A text.
+pub fn text<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<&'a str> {
+    let text = node.as_text();
+    if text.is_none() {
+        context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
+    }
+    text
+}
+
+/// One of a few words.
+pub fn choice<T: Copy>(node: &Node, context: Context<'_>, choices: &[(&str, T)]) -> Option<T> {
+    let words = || choices.iter().map(|(word, _)| *word);
+    let given = text(node, context, &one_of(words(), ""))?;
+    let chosen = choices.iter().find(|(word, _)| *word == given).map(|(_, value)| *value);
+    if chosen.is_none() {
+        context.fault_at(node, format!("unknown name {}: expected {}", quote(given), one_of(words(), given)));
+    }
+    chosen
+}
+
+/// A list, as its elements.
+pub fn list<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<Vec<&'a Node>> {
+    let Value::List(elements) = &node.value else {
+        context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
+        return None;
+    };
+    Some(elements.iter().map(|element| &**element).collect())
+}
+
+/// A duration such as "8ms".
+pub fn duration(node: &Node, context: Context<'_>) -> Option<Duration> {
+    quantity(node, context, parse::duration)
+}
+
+/// A duration above zero.
+pub fn positive_duration(node: &Node, context: Context<'_>) -> Option<Duration> {
+    let value = duration(node, context)?;
+    if value.is_zero() {
+        context.fault_at(node, "zero is out of range: expected a duration above zero such as \"8ms\"");
+        return None;
+    }
+    Some(value)
+}
+
+/// An instant, as the time since the scene began.
+pub fn instant(node: &Node, context: Context<'_>) -> Option<Instant> {
+    let since_beginning = duration(node, context)?;
+    let instant = Instant::ZERO.checked_add(since_beginning);
+    if instant.is_none() {
+        context.fault_at(node, "beyond 584 years: expected a duration such as \"8ms\"");
+    }
+    instant
+}
+
+/// A rate such as "10Mbit".
+pub fn rate(node: &Node, context: Context<'_>) -> Option<Rate> {
+    quantity(node, context, parse::rate)
+}
+
+/// A size such as "1500B".
+pub fn size(node: &Node, context: Context<'_>) -> Option<Bytes> {
+    quantity(node, context, parse::size)
+}
+
+/// A size that may be taken away, such as "28B" or "-14B".
+pub fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
+    const EXPECTED: &str = "a size such as \"28B\", or \"-14B\" for bytes that are not sent";
+    let text = text(node, context, EXPECTED)?;
+    let (negative, plain) = match text.trim_start().strip_prefix('-') {
+        Some(rest) => (true, rest),
+        None => (false, text),
+    };
+    let size = match parse::size(plain) {
+        Ok(size) => i64::try_from(size.get()).unwrap_or(i64::MAX),
+        Err(error) => {
+            let error = parse::size(&shorten(plain)).err().unwrap_or(error);
+            context.fault_at(node, error.to_string());
+            return None;
+        }
+    };
+    let size = i32::try_from(if negative { -size } else { size }).ok();
+    if size.is_none() {
+        context.fault_at(node, format!("{} is out of range: expected {EXPECTED}", quote(text)));
+    }
+    size
+}
+
+/// A number of packets such as "100 packets"; `None` if the text is none.
+#[must_use]
+pub fn packets(text: &str) -> Option<u64> {
+    let number = text.trim().strip_suffix("packets").or_else(|| text.trim().strip_suffix("packet"))?.trim();
+    let plain = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+    plain.then(|| number.parse().ok()).flatten()
+}
+
+/// Reports why the emulator refuses something, at the value that was written last of those that do not fit together.
+pub fn refuse(context: Context<'_>, nodes: &[Option<&Node>], fallback: &Node, error: &dyn core::fmt::Display) {
+    let last = nodes.iter().copied().flatten().max_by_key(|node| node.place);
+    let error = error.to_string();
+    let message = if error.contains("expected") { error } else { format!("{error}: expected another value") };
+    context.fault_at(last.unwrap_or(fallback), message);
+}
+
+/// A probability: a number from 0 to 1, or a text such as "1.5%".
+pub fn probability(node: &Node, context: Context<'_>) -> Option<Probability> {
+    const EXPECTED: &str = "a probability: a number from 0 to 1 or a text such as \"1.5%\"";
+    if node.as_text().is_some() {
+        return quantity(node, context, parse::probability);
+    }
+    let value = number(node, context, EXPECTED)? + 0.0;
+    let probability = Probability::new(value).ok();
+    if probability.is_none() {
+        context.fault_at(node, format!("{} is out of range: expected {EXPECTED}", written(node)));
+    }
+    probability
+}
+
+/// A text that one of the parsers of `cohaptic-units` reads.
+fn quantity<T>(node: &Node, context: Context<'_>, parse: fn(&str) -> Result<T, ParseError>) -> Option<T> {
+    let Some(text) = node.as_text() else {
+        let expected = parse("").err().map_or("", |error| expected(&error));
+        context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
+        return None;
+    };
+    match parse(text) {
+        Ok(value) => Some(value),
+        Err(error) => {
+            // The beginning of a text that is too long to be shown is wrong too: it ends in an ellipsis, which no unit does.
+            let error = parse(&shorten(text)).err().unwrap_or(error);
+            context.fault_at(node, error.to_string());
+            None
+        }
+    }
+}
+
+fn expected(error: &ParseError) -> &'static str {
+    match error {
+        ParseError::Number { expected, .. } | ParseError::Unit { expected, .. } | ParseError::Range { expected, .. } => expected,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_become_doubles_only_where_that_is_exact() {
+        assert_eq!(exact_f64(-3), Some(-3.0));
+        assert_eq!(exact_f64(0), Some(0.0));
+        assert_eq!(exact_f64(1 << 53), Some(9_007_199_254_740_992.0));
+        assert_eq!(exact_f64((1 << 53) + 1), None);
+        assert_eq!(exact_f64((1 << 53) + 2), Some(9_007_199_254_740_994.0));
+        assert_eq!(exact_f64(i128::MAX), None);
+    }
+}

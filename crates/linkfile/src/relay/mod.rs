@@ -1,0 +1,206 @@
+//! Relay files: who talks to whom through which link in real time, and through which ports.
+
+mod programs;
+mod timeline;
+
+use core::time::Duration;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+
+use cohaptic_units::{Bytes, Instant};
+
+use crate::document::{FileError, Node, Sources};
+use crate::link::read_modulators;
+use crate::mesh::{KeysOfLinks, LinkChange, LinkClasses, LinkSelector, LinkTable, read_links};
+use crate::reading::{Context, TableReader, default_title, parse, values, with_text};
+
+/// What `cohaptic relay FILE` does. Every number in it has been checked.
+///
+/// ```
+/// use std::path::Path;
+/// use cohaptic_linkfile::RelayFile;
+///
+/// let text = r#"
+///     programs = [
+///         { name = "left",  port = "127.0.0.1:7001", address = "127.0.0.1:9001" },
+///         { name = "right", port = "127.0.0.1:7002" },
+///     ]
+///     link  = { delay = "24ms", loss = "1%" }
+///     links = [{ from = "right", to = "left", delay = "40ms" }]
+/// "#;
+/// let file = RelayFile::parse(text, Path::new("pair.toml"), &[])?;
+/// assert_eq!(file.programs[1].port, "127.0.0.1:7002".parse().unwrap());
+/// assert_eq!(file.links.between(1, 0).mean_delay().as_millis(), 40);
+///
+/// let error = RelayFile::parse(&text.replace("127.0.0.1:7002", "192.0.2.1:7002"), Path::new("pair.toml"), &[]).unwrap_err();
+/// assert!(error.to_string().contains("allow-remote"));
+/// # Ok::<(), cohaptic_linkfile::FileError>(())
+/// ```
+#[derive(Clone, PartialEq, Debug)]
+pub struct RelayFile {
+    /// The file it was read from, for messages.
+    pub file: PathBuf,
+    /// A line for people.
+    pub title: String,
+    /// The seed of every random stream.
+    pub seed: u64,
+    /// The programs, at least two, in the order of the file. Their names and ports differ.
+    pub programs: Vec<RelayProgram>,
+    /// The directed links between the programs.
+    pub links: LinkTable,
+    /// Changes of links, in order of time; equal instants in the order of the file.
+    pub timeline: Vec<RelayChange>,
+    /// What it may take, and how late it may be.
+    pub limits: RelayLimits,
+}
+
+/// A program that takes part.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct RelayProgram {
+    /// Its name, which names its links too.
+    pub name: String,
+    /// The port that stands for it: whoever sends there speaks to it. Port 0 is a free one.
+    pub port: SocketAddr,
+    /// Where it sends from and listens; `None`: learnt from the first datagram that it sends.
+    pub address: Option<SocketAddr>,
+}
+
+/// A link that becomes another one while the relay runs.
+#[derive(Clone, PartialEq, Debug)]
+pub struct RelayChange {
+    /// When, counted from the beginning.
+    pub at: Instant,
+    /// Which, by the places of programs in [`RelayFile::programs`], and into what.
+    pub link: LinkChange,
+}
+
+/// What a relay may take, and how late it may be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct RelayLimits {
+    /// So many datagrams may be on their way at once; what comes beyond is dropped.
+    pub packets: u64,
+    /// So many bytes of them.
+    pub bytes: Bytes,
+    /// An address that was learnt, or a client, is forgotten when it has been silent for so long.
+    pub forget_after: Duration,
+    /// Later than this is late: more than one late in a thousand, and the run was not valid.
+    pub tolerance: Duration,
+}
+
+impl Default for RelayLimits {
+    /// 262,144 datagrams, 64 MB, 30 s, 1 ms.
+    fn default() -> Self {
+        Self { packets: 262_144, bytes: Bytes::new(64_000_000), forget_after: Duration::from_secs(30), tolerance: Duration::from_millis(1) }
+    }
+}
+
+impl RelayFile {
+    /// Reads a relay file. `overrides` are texts `KEY=VALUE` that replace values of the file, in this order.
+    ///
+    /// # Errors
+    ///
+    /// [`FileError::Read`] if the file, or one that it names, cannot be read; [`FileError::Invalid`] for anything else.
+    pub fn read(path: &Path, overrides: &[String]) -> Result<Self, FileError> {
+        with_text(path, |text| Self::parse(text, path, overrides))
+    }
+
+    /// Reads a text. `file` stands in messages, and its folder is where files that it names are looked for.
+    ///
+    /// # Errors
+    ///
+    /// As [`RelayFile::read`]. Of several faults, the one that stands first in the text; faults in overrides come after those in the text.
+    pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, FileError> {
+        parse(Sources { file, text, overrides }, read_document).map(|parsed| parsed.whole.0)
+    }
+}
+
+/// The keys of every directed link of a relay file as it begins, by the places of its programs: an entry `[[links]]` is laid over `[link]`.
+///
+/// # Errors
+///
+/// As [`RelayFile::read`].
+pub fn relay_link_keys(path: &Path, overrides: &[String]) -> Result<KeysOfLinks, FileError> {
+    with_text(path, |text| relay_link_keys_of_text(text, path, overrides))
+}
+
+/// [`relay_link_keys`] of a relay file that is a text.
+///
+/// # Errors
+///
+/// As [`RelayFile::parse`].
+pub fn relay_link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<KeysOfLinks, FileError> {
+    parse(Sources { file, text, overrides }, read_document).map(|parsed| parsed.whole.1.keys(LinkSelector::All))
+}
+
+/// `[relay]`. A field is `None` where it was refused.
+#[derive(Debug, Default)]
+struct Header {
+    /// `Some(None)`: not given.
+    title: Option<Option<String>>,
+    seed: Option<u64>,
+    allow_remote: Option<bool>,
+    limits: Option<RelayLimits>,
+}
+
+fn read_document(document: &Node, context: Context<'_>) -> Option<(RelayFile, LinkClasses)> {
+    let mut root = TableReader::new(document, context, "a table")?;
+    root.know(&["relay", "programs", "modulators", "link", "links", "timeline"]);
+    let defaults = Header { title: Some(None), seed: Some(0), allow_remote: Some(false), limits: Some(RelayLimits::default()) };
+    let header = root.optional("relay", defaults, read_header).unwrap_or_default();
+    let programs_node = root.get("programs");
+    let programs = root.required("programs", "at least two entries [[programs]], each with a name and a port", |node, context| {
+        programs::read_programs(node, header.allow_remote, context)
+    });
+    let (names, programs) = programs.unzip();
+    let context = context.with_names(names.as_ref());
+    let modulators = read_modulators(root.get("modulators"), context);
+    let context = context.with_modulators(modulators.as_ref());
+    let links = read_links(root.get("link"), root.get("links"), context);
+    let timeline = timeline::read_timeline(root.get("timeline"), links.as_ref(), context);
+    root.finish();
+    if let (Some(names), Some(node)) = (&names, programs_node) {
+        programs::check_enough(names, node, context);
+    }
+    let links = links?;
+    let relay = RelayFile {
+        file: context.sources.file.to_path_buf(),
+        title: header.title?.unwrap_or_else(|| default_title(context.sources.file)),
+        seed: header.seed?,
+        programs: programs?,
+        links: links.table()?,
+        timeline: timeline?,
+        limits: header.limits?,
+    };
+    Some((relay, links))
+}
+
+fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
+    let default = RelayLimits::default();
+    let mut table = TableReader::new(node, context, "a table such as [relay]")?;
+    let title = table.maybe("title", |node, context| values::text(node, context, "a text").map(str::to_owned));
+    let seed = table
+        .optional("seed", 0, |node, context| values::integer(node, context, 0..=i64::MAX.unsigned_abs(), "an integer from 0 to 9223372036854775807"));
+    let allow_remote = table.optional("allow-remote", false, values::boolean);
+    let packets = table.optional("most-packets", default.packets, |node, context| {
+        values::integer(node, context, 1..=MOST_PACKETS, "a number of datagrams, an integer from 1 to 16777216")
+    });
+    let bytes = table.optional("most-bytes", default.bytes, |node, context| {
+        let size = values::size(node, context)?;
+        if size.get() < LEAST_BYTES {
+            context.fault_at(node, "out of range: expected at least \"65535B\", one datagram");
+            return None;
+        }
+        Some(size)
+    });
+    let forget_after = table.optional("forget-after", default.forget_after, values::positive_duration);
+    let tolerance = table.optional("tolerance", default.tolerance, values::positive_duration);
+    table.finish();
+    let limits = packets.zip(bytes).zip(forget_after).zip(tolerance);
+    let limits = limits.map(|(((packets, bytes), forget_after), tolerance)| RelayLimits { packets, bytes, forget_after, tolerance });
+    Some(Header { title, seed, allow_remote, limits })
+}
+
+/// Each takes at least a hundred bytes.
+const MOST_PACKETS: u64 = 1 << 24;
+
+const LEAST_BYTES: u64 = 65_535;

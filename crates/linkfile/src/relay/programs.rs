@@ -1,0 +1,134 @@
+//! `[\[programs\]]`: who takes part, and where.
+
+use std::net::SocketAddr;
+
+use cohaptic_units::print::Counted;
+
+use super::RelayProgram;
+use crate::document::{Node, quote};
+use crate::reading::{Context, Names, TableReader, values};
+
+/// Each has a socket, and each pair two links.
+const MOST_PROGRAMS: usize = 256;
+
+/// What is written of a program, with the nodes that faults point at.
+#[derive(Debug)]
+struct Written<'a> {
+    program: RelayProgram,
+    port: &'a Node,
+    address: Option<&'a Node>,
+}
+
+/// The programs and their names, in the order of the file. `None` where something was refused.
+pub(super) fn read_programs(node: &Node, allow_remote: Option<bool>, context: Context<'_>) -> Option<(Names, Vec<RelayProgram>)> {
+    let entries = values::list(node, context, "entries [[programs]]")?;
+    if entries.len() > MOST_PROGRAMS {
+        context.fault_at(node, format!("{} programs: expected at most {MOST_PROGRAMS}", entries.len()));
+        return None;
+    }
+    let mut names = Names::of("program");
+    let written: Vec<Option<Written<'_>>> = entries.iter().map(|entry| read_program(entry, allow_remote, &mut names, context)).collect();
+    let written: Vec<Written<'_>> = written.into_iter().collect::<Option<_>>()?;
+    let distinct = check_distinct(&written, context);
+    let families = check_families(&written, context);
+    (distinct && families).then(|| (names, written.into_iter().map(|written| written.program).collect()))
+}
+
+/// Reports a file with fewer than two programs.
+pub(super) fn check_enough(names: &Names, node: &Node, context: Context<'_>) {
+    if names.len() < 2 {
+        context.fault_at(node, format!("a relay with {}: expected at least two entries [[programs]]", Counted(names.len(), "program")));
+    }
+}
+
+fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Names, context: Context<'a>) -> Option<Written<'a>> {
+    let mut table = TableReader::new(entry, context, "a table with name and port")?;
+    let (port_node, address_node) = (table.get("port"), table.get("address"));
+    let name = table.required("name", "the name of the program", |node, context| read_name(node, names, context));
+    let port = table.required("port", "the address that stands for it, such as \"127.0.0.1:7001\"", |node, context| {
+        read_address(node, "an address with a port, such as \"127.0.0.1:7001\", \"[::1]:7001\" or \"localhost:7001\"", allow_remote, context)
+    });
+    let address = table.maybe("address", |node, context| {
+        const EXPECTED: &str = "an address with a port above zero, such as \"127.0.0.1:9001\"; without this key it is learnt";
+        let address = read_address(node, EXPECTED, allow_remote, context)?;
+        if address.port() == 0 || address.ip().is_unspecified() {
+            context.fault_at(node, format!("nobody can be reached at {address}: expected {EXPECTED}"));
+            return None;
+        }
+        Some(address)
+    });
+    table.finish();
+    Some(Written { program: RelayProgram { name: name?, port: port?, address: address? }, port: port_node?, address: address_node })
+}
+
+/// The rule for names is that of peers, so that links of both are named alike.
+fn read_name(node: &Node, names: &mut Names, context: Context<'_>) -> Option<String> {
+    const EXPECTED: &str = "a name, without space and none of . > / , \" and not \"all\"";
+    let text = values::text(node, context, EXPECTED)?;
+    let unfit = |c: char| c.is_whitespace() || c.is_control() || matches!(c, '.' | '>' | '/' | ',' | '"');
+    if text.is_empty() || text == "all" || text.contains(unfit) {
+        context.fault_at(node, format!("{} cannot be the name of a program: expected {EXPECTED}", quote(text)));
+        return None;
+    }
+    if !names.push(text) {
+        context.fault_at(node, format!("there is a program {} already: expected another name", quote(text)));
+        return None;
+    }
+    Some(text.to_owned())
+}
+
+fn read_address(node: &Node, expected: &str, allow_remote: Option<bool>, context: Context<'_>) -> Option<SocketAddr> {
+    let text = values::text(node, context, expected)?;
+    let address = match crate::address(text) {
+        Ok(address) => address,
+        Err(error) => {
+            context.fault_at(node, format!("{} {error}: expected {expected}", quote(text)));
+            return None;
+        }
+    };
+    if !allow_remote? && !address.ip().is_loopback() {
+        let message =
+            format!("{address} is not on this machine: expected a loopback address such as 127.0.0.1 or [::1], or allow-remote = true under [relay]");
+        context.fault_at(node, message);
+        return None;
+    }
+    Some(address)
+}
+
+/// No two ports and no two addresses are the same; a port of 0 is always another one.
+fn check_distinct(written: &[Written<'_>], context: Context<'_>) -> bool {
+    let mut distinct = true;
+    for (place, one) in written.iter().enumerate() {
+        for other in &written[..place] {
+            if one.program.port == other.program.port && one.program.port.port() != 0 {
+                let message = format!("{} stands for program {} already: expected another port", one.program.port, quote(&other.program.name));
+                context.fault_at(one.port, message);
+                distinct = false;
+            }
+            if let (Some(address), Some(node)) = (one.program.address, one.address)
+                && other.program.address == Some(address)
+            {
+                let message = format!("{address} is the address of program {} already: expected another one", quote(&other.program.name));
+                context.fault_at(node, message);
+                distinct = false;
+            }
+        }
+    }
+    distinct
+}
+
+/// What reaches a program leaves from the ports of the others: an IPv4 socket reaches no IPv6 address.
+fn check_families(written: &[Written<'_>], context: Context<'_>) -> bool {
+    let mut fit = true;
+    for (place, one) in written.iter().enumerate() {
+        let (Some(address), Some(node)) = (one.program.address, one.address) else { continue };
+        let others = written.iter().enumerate().filter(|(other, _)| *other != place);
+        if let Some((_, other)) = others.into_iter().find(|(_, other)| other.program.port.is_ipv4() != address.is_ipv4()) {
+            let (port, name) = (other.program.port, quote(&other.program.name));
+            let message = format!("{address} cannot be reached from {port}, the port of program {name}: expected IPv4 for both, or IPv6");
+            context.fault_at(node, message);
+            fit = false;
+        }
+    }
+    fit
+}

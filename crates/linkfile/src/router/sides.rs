@@ -1,0 +1,90 @@
+//! `left` and `right`: what the router stands between.
+
+use super::{Attachment, InterfaceSpec, Network, TunSpec};
+use crate::document::{Node, quote};
+use crate::reading::{Context, TableReader, values};
+
+/// One side.
+pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment> {
+    let mut table = TableReader::new(node, context, "a table with a tun or an interface")?;
+    let interface = table.get("interface");
+    let namespace = table.maybe("namespace", read_namespace);
+    if let Some(interface) = interface {
+        if let Some(tun) = table.get("tun") {
+            values::refuse(context, &[Some(tun), Some(interface)], node, &"a side is a tun or an interface: expected only one of them");
+            return None;
+        }
+        let name = read_device(interface, context);
+        table.finish();
+        return Some(Attachment::Interface(InterfaceSpec { name: name?, namespace: namespace? }));
+    }
+    let name = table.required("tun", "tun = \"NAME\" for a device of the router, or interface = \"NAME\" for one that is there", read_device);
+    let existing = table.optional("existing", false, values::boolean);
+    let (addresses_node, mtu_node) = (table.get("addresses"), table.get("mtu"));
+    let addresses = table.optional("addresses", Vec::new(), read_addresses);
+    let mtu = table.maybe("mtu", |node, context| {
+        let mtu = values::integer(node, context, 68..=65_535, "a number of bytes, an integer from 68 to 65535")?;
+        u16::try_from(mtu).ok()
+    });
+    table.finish();
+    if existing == Some(true)
+        && let Some(given) = addresses_node.or(mtu_node)
+    {
+        context.fault_at(given, "an existing device is left as it is: expected no such key beside existing = true");
+        return None;
+    }
+    Some(Attachment::Tun(TunSpec { name: name?, existing: existing?, addresses: addresses?, mtu: mtu?, namespace: namespace? }))
+}
+
+/// What cannot be said of one side alone.
+pub(super) fn check_sides(left: &Attachment, right: &Attachment, right_node: &Node, context: Context<'_>) -> Option<()> {
+    let message = match (left, right) {
+        (Attachment::Tun(_), Attachment::Interface(_)) | (Attachment::Interface(_), Attachment::Tun(_)) => {
+            "one side is a tun, which carries packets, and the other an interface, which carries frames: expected two of a kind"
+        }
+        _ if left.device() == right.device() && left.namespace() == right.namespace() => "both sides are the same device: expected two",
+        (Attachment::Tun(_), Attachment::Tun(_)) | (Attachment::Interface(_), Attachment::Interface(_)) => return Some(()),
+    };
+    context.fault_at(right_node, message);
+    None
+}
+
+/// The name of a network device: Linux allows 15 bytes, and neither slash, colon nor space.
+fn read_device(node: &Node, context: Context<'_>) -> Option<String> {
+    const EXPECTED: &str = "the name of a network device, 1 to 15 letters, digits and other signs, but no /, : and space";
+    let name = values::text(node, context, EXPECTED)?;
+    // A percent sign would let the kernel choose a number.
+    let is_sign = |byte: u8| byte.is_ascii_graphic() && !matches!(byte, b'/' | b':' | b'%');
+    if !(1..=15).contains(&name.len()) || !name.bytes().all(is_sign) || matches!(name, "." | "..") {
+        context.fault_at(node, format!("{} cannot be this name: expected {EXPECTED}", quote(name)));
+        return None;
+    }
+    Some(name.to_owned())
+}
+
+fn read_namespace(node: &Node, context: Context<'_>) -> Option<String> {
+    const EXPECTED: &str = "a network namespace: its name, or a path such as \"/proc/4711/ns/net\"";
+    let name = values::text(node, context, EXPECTED)?;
+    if name.is_empty() || matches!(name, "." | "..") || name.contains(char::is_control) {
+        context.fault_at(node, format!("{} is no namespace: expected {EXPECTED}", quote(name)));
+        return None;
+    }
+    Some(name.to_owned())
+}
+
+fn read_addresses(node: &Node, context: Context<'_>) -> Option<Vec<Network>> {
+    let elements = values::list(node, context, "a list of addresses such as [\"10.1.0.1/24\", \"fd00::1/64\"]")?;
+    let read =
+        elements.into_iter().map(|element| read_network(element, context, "an address with a prefix such as \"10.1.0.1/24\" or \"fd00::1/64\""));
+    read.collect::<Vec<_>>().into_iter().collect()
+}
+
+/// An address, alone or with the length of a prefix.
+pub(super) fn read_network(node: &Node, context: Context<'_>, expected: &str) -> Option<Network> {
+    let text = values::text(node, context, expected)?;
+    let network = text.parse().ok();
+    if network.is_none() {
+        context.fault_at(node, format!("{} is no address: expected {expected}", quote(text)));
+    }
+    network
+}

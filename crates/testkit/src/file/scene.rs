@@ -1,0 +1,38 @@
+//! Scene files as hosts and links.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use cohaptic_linkfile::mesh::pairs;
+use cohaptic_scene::{ChangeKind, Scene};
+
+use super::{LinkChange, LinkFile, LinkFileError};
+
+/// Whether a text is a relay file. What is no TOML at all is refused as a scene, with the place.
+pub(super) fn is_relay(text: &str) -> bool {
+    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("programs") || table.contains_key("relay"))
+}
+
+impl LinkFile {
+    pub(super) fn of_scene(scene: Scene, path: &Path) -> Result<Self, LinkFileError> {
+        let refused = |what: String| Err(LinkFileError::NotLinks { path: path.to_path_buf(), what });
+        if let Some(peer) = scene.peers.iter().find(|peer| peer.uplink.is_some() || peer.downlink.is_some()) {
+            return refused(format!("peer `{}` has an access line, which a test bed's hosts have not; expected links alone", peer.name));
+        }
+        let mut changes = Vec::new();
+        for change in scene.timeline {
+            let at = change.at;
+            match change.what {
+                ChangeKind::Link(link) => changes.push(LinkChange { at, from: link.from, to: link.to, link: Arc::unwrap_or_clone(link.config) }),
+                ChangeKind::AllLinks(table) => changes.extend(pairs(table.peers()).map(|(from, to)| {
+                    let link = table.between(from, to).clone();
+                    LinkChange { at, from, to, link }
+                })),
+                // They change what is at the ends of the links.
+                ChangeKind::Contact { .. } | ChangeKind::Hand { .. } | ChangeKind::Coordination(_) => {}
+            }
+        }
+        let hosts = scene.peers.into_iter().map(|peer| peer.name).collect();
+        Ok(Self::of_table(hosts, &scene.links, changes, scene.seed))
+    }
+}
