@@ -1,4 +1,4 @@
-//! What kinds of JSON documents there are. Each says of which kind and version it is, before all else.
+//! The kinds of JSON documents, each of which says of which kind and version it is, before all else; and how a document is made.
 
 use serde::Serialize;
 
@@ -46,3 +46,15 @@ pub(crate) struct Versioned<'a, D: Serialize> {
     #[serde(flatten)]
     document: &'a D,
 }
+
+/// A JSON document, or a part of one: keys and values, in this order. Attributes are those of serde; a part that may be absent is a flattened `Option`.
+macro_rules! document {
+    ($($(#[$attribute:meta])* $key:ident: $value:expr),* $(,)?) => {{
+        #[derive(serde::Serialize)]
+        struct Document<$($key),*> {
+            $($(#[$attribute])* $key: $key),*
+        }
+        Document { $($key: $value),* }
+    }};
+}
+pub(crate) use document;

@@ -9,15 +9,7 @@ use cohaptic_scene::Scene;
 use cohaptic_wan::{DropCause, LinkStats};
 use serde::Serialize;
 
-/// A peer at the end of a run.
-#[derive(Serialize)]
-pub(crate) struct PeerDocument {
-    name: String,
-    position_m: Components,
-    velocity_m_s: Components,
-    stale_samples: u64,
-    refused_samples: u64,
-}
+use crate::document_schema::document;
 
 /// A number in a scene of one axis, a list with more.
 #[derive(Serialize)]
@@ -34,15 +26,6 @@ pub(crate) struct LinkDocument {
     pub(crate) to: String,
     #[serde(flatten)]
     pub(crate) counters: Counters,
-}
-
-/// An access line at the end of a run.
-#[derive(Serialize)]
-pub(crate) struct AccessDocument {
-    peer: String,
-    line: &'static str,
-    #[serde(flatten)]
-    counters: Counters,
 }
 
 /// What a link or an access line did.
@@ -68,15 +51,14 @@ pub(crate) struct LatenessDocument {
     max: f64,
 }
 
-impl PeerDocument {
-    pub(crate) fn new(peer: &PeerSummary) -> Self {
-        Self {
-            name: peer.name.clone(),
-            position_m: Components::new(&peer.position),
-            velocity_m_s: Components::new(&peer.velocity),
-            stale_samples: peer.stale_samples,
-            refused_samples: peer.refused_samples,
-        }
+/// A peer at the end of a run.
+pub(crate) fn peer(peer: &PeerSummary) -> impl Serialize {
+    document! {
+        name: peer.name.as_str(),
+        position_m: Components::new(&peer.position),
+        velocity_m_s: Components::new(&peer.velocity),
+        stale_samples: peer.stale_samples,
+        refused_samples: peer.refused_samples,
     }
 }
 
@@ -96,10 +78,13 @@ impl LinkDocument {
     }
 }
 
-impl AccessDocument {
-    pub(crate) fn new(scene: &Scene, line: &AccessSummary) -> Self {
-        let name = if line.uplink { "uplink" } else { "downlink" };
-        Self { peer: scene.peers[line.peer].name.clone(), line: name, counters: Counters::new(&line.stats) }
+/// An access line at the end of a run.
+pub(crate) fn access_line(scene: &Scene, line: &AccessSummary) -> impl Serialize + use<> {
+    document! {
+        peer: scene.peers[line.peer].name.clone(),
+        line: if line.uplink { "uplink" } else { "downlink" },
+        #[serde(flatten)]
+        counters: Counters::new(&line.stats),
     }
 }
 

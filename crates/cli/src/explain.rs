@@ -8,40 +8,9 @@ use cohaptic_scene::Scene;
 use serde::Serialize;
 
 use crate::arguments::ExplainArguments;
-use crate::document_schema::DocumentSchema;
+use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 use crate::{input, output};
-
-#[derive(Serialize)]
-struct ExplainDocument<'a> {
-    title: &'a str,
-    models: Vec<Model<'a>>,
-    left_out: &'a [String],
-    dimensions: Dimensions,
-    cost: Cost,
-}
-
-#[derive(Serialize)]
-struct Model<'a> {
-    part: &'a str,
-    model: &'a str,
-    reason: &'a str,
-}
-
-#[derive(Serialize)]
-struct Dimensions {
-    plant: u64,
-    held: u64,
-    in_flight: u64,
-}
-
-#[derive(Serialize)]
-struct Cost {
-    peer_ticks_per_s: f64,
-    packets_per_s: f64,
-    realtime_factor: f64,
-    record_bytes_per_s: f64,
-}
 
 /// Says what a scene makes the program model.
 pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure> {
@@ -57,14 +26,14 @@ pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure>
     Ok(ExitCode::SUCCESS)
 }
 
-fn document<'a>(scene: &'a Scene, explanation: &'a Explanation) -> ExplainDocument<'a> {
+fn document(scene: &Scene, explanation: &Explanation) -> impl Serialize {
     let Explanation { models, left_out, dimensions, cost } = explanation;
-    ExplainDocument {
-        title: &scene.title,
-        models: models.iter().map(|row| Model { part: &row.part, model: &row.model, reason: &row.reason }).collect(),
-        left_out,
-        dimensions: Dimensions { plant: dimensions.plant, held: dimensions.held, in_flight: dimensions.in_flight },
-        cost: Cost {
+    document! {
+        title: scene.title.as_str(),
+        models: models.iter().map(|row| document! { part: &*row.part, model: &*row.model, reason: &*row.reason }).collect::<Vec<_>>(),
+        left_out: left_out.as_slice(),
+        dimensions: document! { plant: dimensions.plant, held: dimensions.held, in_flight: dimensions.in_flight },
+        cost: document! {
             peer_ticks_per_s: cost.peer_ticks_per_s,
             packets_per_s: cost.packets_per_s,
             realtime_factor: cost.realtime_factor,

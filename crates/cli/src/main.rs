@@ -4,6 +4,7 @@
 //! This is the only crate that prints. Results go to standard output, everything else to standard error. Exit status: 0 done, 1 an expectation
 //! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, 141 standard
 //! output was closed.
+#![expect(non_camel_case_types, reason = "`document!` makes a type parameter of each key")]
 
 mod accuracy;
 mod admittance;

@@ -9,38 +9,11 @@ use cohaptic_paper::{Options, PaperError, Reproduction, Watch, page, reproduce, 
 use serde::Serialize;
 
 use crate::arguments::PaperArguments;
-use crate::document_schema::DocumentSchema;
+use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 use crate::file::write_file;
 use crate::progress::Progress;
 use crate::{interrupt, output};
-
-#[derive(Serialize)]
-struct PaperDocument<'a> {
-    claims: Vec<Claim<'a>>,
-    figures: Vec<Figure<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    wall_s: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct Claim<'a> {
-    id: &'a str,
-    claim: &'a str,
-    paper: &'a str,
-    ours: &'a str,
-    verdict: String,
-    scene: Option<&'a str>,
-    how: Option<&'a str>,
-}
-
-#[derive(Serialize)]
-struct Figure<'a> {
-    id: &'a str,
-    /// In the folder of `--out`; `null` without one.
-    file: Option<String>,
-    title: &'a str,
-}
 
 struct Bar(Progress);
 
@@ -76,33 +49,38 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
     if let Some(folder) = &arguments.out {
         write_files(folder, &reproduction)?;
     }
-    let document = document(&reproduction, arguments.out.is_some());
     output::answer(
         arguments.json,
         DocumentSchema::PAPER,
-        &PaperDocument { wall_s: Some(wall_s), ..document },
+        &document(&reproduction, arguments.out.is_some(), Some(wall_s)),
         || describe(&reproduction),
         arguments.out.as_ref().map(|folder| folder.join("index.html")),
     )?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn document(reproduction: &Reproduction, has_files: bool) -> PaperDocument<'_> {
-    let claims = reproduction.claims.iter().map(|claim| Claim {
-        id: claim.id,
-        claim: claim.claim,
-        paper: claim.paper,
-        ours: &claim.ours,
-        verdict: claim.verdict.to_string(),
-        scene: claim.scene.as_deref(),
-        how: claim.how.as_deref(),
+fn document(reproduction: &Reproduction, has_files: bool, wall_s: Option<f64>) -> impl Serialize {
+    let claims = reproduction.claims.iter().map(|claim| {
+        document! {
+            id: claim.id,
+            claim: claim.claim,
+            paper: claim.paper,
+            ours: claim.ours.as_str(),
+            verdict: claim.verdict.to_string(),
+            scene: claim.scene.as_deref(),
+            how: claim.how.as_deref(),
+        }
     });
-    let figures = reproduction.figures.iter().map(|figure| Figure {
-        id: &figure.id,
-        file: has_files.then(|| format!("{}.svg", figure.id)),
-        title: &figure.title,
+    let figures = reproduction.figures.iter().map(|figure| {
+        // The file lies in the folder of `--out`; `null` without one.
+        document! { id: figure.id.as_str(), file: has_files.then(|| format!("{}.svg", figure.id)), title: figure.title.as_str() }
     });
-    PaperDocument { claims: claims.collect(), figures: figures.collect(), wall_s: None }
+    document! {
+        claims: claims.collect::<Vec<_>>(),
+        figures: figures.collect::<Vec<_>>(),
+        #[serde(flatten)]
+        wall: wall_s.map(|wall_s| document! { wall_s: wall_s }),
+    }
 }
 
 fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure> {
@@ -116,7 +94,7 @@ fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure
         }
     }
     // Without the time that it took: the same bytes every time.
-    let mut claims = serde_json::to_vec_pretty(&DocumentSchema::PAPER.of(&document(reproduction, true))).unwrap_or_default();
+    let mut claims = serde_json::to_vec_pretty(&DocumentSchema::PAPER.of(&document(reproduction, true, None))).unwrap_or_default();
     claims.push(b'\n');
     write_file(&folder.join("claims.json"), &claims)?;
     write_file(&folder.join("index.html"), page::html(reproduction).as_bytes())

@@ -11,7 +11,7 @@ use cohaptic_scene::Diagnostic;
 use cohaptic_units::{Visible, visible_lines};
 use serde::Serialize;
 
-use crate::document_schema::DocumentSchema;
+use crate::document_schema::{DocumentSchema, document};
 use crate::failure::{BAD_INPUT, CLOSED, Failure, INTERRUPTED};
 use crate::output;
 
@@ -66,57 +66,36 @@ pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
     error
 }
 
-#[derive(Serialize)]
-struct ErrorDocument<'a> {
-    /// The exit status.
-    status: u8,
-    /// As on standard error, without `error:`.
-    message: &'a str,
-    /// Where it is; `null` where no text is meant.
-    place: Option<FaultLocation<'a>>,
-}
-
-#[derive(Serialize)]
-struct FaultLocation<'a> {
-    /// `null` for an option.
-    file: Option<String>,
-    /// What was given on the command line; `null` for a file.
-    argument: Option<String>,
-    /// From 1.
-    line: usize,
-    /// From 1, in characters.
-    column: usize,
-    /// The dotted path; `null` if the text could not be read that far.
-    key: Option<&'a str>,
-    /// The fault at that place and the expectation, in one line.
-    fault: &'a str,
-}
-
-/// Prints the document of a failure.
+/// Prints the document of a failure. `message`: as on standard error, without `error:`.
 fn print(failure: &Failure, message: &str, status: u8) -> Result<(), Failure> {
-    let place = failure.scene_error().and_then(|error| error.diagnostic()).map(|diagnostic| place(failure, diagnostic));
-    output::json(DocumentSchema::ERROR, &ErrorDocument { status, message, place })
+    let location = failure.scene_error().and_then(|error| error.diagnostic()).map(|diagnostic| location(failure, diagnostic));
+    // The place is `null` where no text is meant.
+    output::json(DocumentSchema::ERROR, &document! { status: status, message: message, place: location })
 }
 
 /// Prints the document of arguments that make no sense.
 fn print_usage(message: &str, status: u8) -> Result<(), Failure> {
     let message = message.strip_prefix("error: ").unwrap_or(message).trim_end();
-    output::json(DocumentSchema::ERROR, &ErrorDocument { status, message, place: None })
+    output::json(DocumentSchema::ERROR, &document! { status: status, message: message, place: None::<()> })
 }
 
-fn place<'a>(failure: &Failure, diagnostic: &'a Diagnostic) -> FaultLocation<'a> {
+fn location(failure: &Failure, diagnostic: &Diagnostic) -> impl Serialize {
     let argument = diagnostic.override_text().map(|text| {
         // Keys of a link are words of their own, and no override.
         let is_word = matches!(failure, Failure::LinkKeys(_));
         if is_word { text.strip_prefix("link.").unwrap_or(text).to_owned() } else { format!("{} {text}", failure.option()) }
     });
-    let key = diagnostic.key();
-    FaultLocation {
+    document! {
+        // `null` for an option.
         file: diagnostic.file().map(output::path),
-        argument,
+        // The text on the command line; `null` for a file.
+        argument: argument,
+        // Lines and columns, in characters, count from 1.
         line: diagnostic.line(),
         column: diagnostic.column(),
-        key: (!key.is_empty()).then_some(key),
+        // The dotted path; `null` if the text could not be read that far.
+        key: Some(diagnostic.key()).filter(|key| !key.is_empty()),
+        // The fault at that place and the expectation, in one line.
         fault: diagnostic.message(),
     }
 }

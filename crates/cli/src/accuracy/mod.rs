@@ -16,32 +16,10 @@ use serde::Serialize;
 use cohaptic_units::print::Counted;
 
 use crate::arguments::AccuracyArguments;
-use crate::document_schema::DocumentSchema;
+use crate::document_schema::{DocumentSchema, document};
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
 use crate::{interrupt, output};
-
-#[derive(Serialize)]
-struct AccuracyDocument<'a> {
-    rows: Vec<RowDocument<'a>>,
-    /// Whether the rows are only those that were measured until Ctrl-C, or until a fault.
-    interrupted: bool,
-    wall_s: f64,
-}
-
-#[derive(Serialize)]
-struct RowDocument<'a> {
-    subject: &'a str,
-    case: &'a str,
-    method: &'a str,
-    setting: &'a str,
-    cost: Option<f64>,
-    cost_unit: &'a str,
-    error: Option<f64>,
-    error_unit: &'a str,
-    reference: &'a str,
-    note: &'a str,
-}
 
 /// Shows how far the work is, and keeps every row, so that none is lost if the work is ended early.
 struct Keeper {
@@ -116,7 +94,8 @@ impl Conclusion {
         if *json {
             output::json(
                 DocumentSchema::ACCURACY,
-                &AccuracyDocument { rows: rows.iter().map(document).collect(), interrupted: about.partial, wall_s: *wall_s },
+                // Interrupted: the rows are only those that were measured until Ctrl-C, or until a fault.
+                &document! { rows: rows.iter().map(document).collect::<Vec<_>>(), interrupted: about.partial, wall_s: *wall_s },
             )?;
         } else {
             let mut shown = text(rows);
@@ -130,7 +109,17 @@ impl Conclusion {
     }
 }
 
-fn document(row: &Row) -> RowDocument<'_> {
-    let Row { subject, case, method, setting, cost, cost_unit, error, error_unit, reference, note } = row;
-    RowDocument { subject: subject.name(), case, method, setting, cost: *cost, cost_unit, error: *error, error_unit, reference, note }
+fn document(row: &Row) -> impl Serialize {
+    document! {
+        subject: row.subject.name(),
+        case: row.case.as_str(),
+        method: row.method.as_str(),
+        setting: row.setting.as_str(),
+        cost: row.cost,
+        cost_unit: row.cost_unit,
+        error: row.error,
+        error_unit: row.error_unit,
+        reference: row.reference,
+        note: row.note.as_str(),
+    }
 }

@@ -10,7 +10,6 @@ mod words;
 use std::process::ExitCode;
 
 use curve::Curve;
-use document::AdmittanceDocument;
 
 use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::AdmittanceArguments;
@@ -46,7 +45,7 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     output::answer(
         arguments.scene.json,
         DocumentSchema::ADMITTANCE,
-        &AdmittanceDocument::new(&arguments.peer, &curves, &files, is_interrupted),
+        &document::of(&arguments.peer, &curves, &files, is_interrupted),
         || words::describe(&arguments.peer, &curves),
         &files,
     )?;

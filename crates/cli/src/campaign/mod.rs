@@ -18,7 +18,6 @@ use crate::arguments::{CampaignArguments, TableFormat};
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::{input, output};
-use document::CampaignDocument;
 use judge::ByAnalysis;
 use picture::Drawn;
 use watch::Shown;
@@ -61,7 +60,7 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     output::answer(
         arguments.scene.json,
         DocumentSchema::CAMPAIGN,
-        &CampaignDocument::new(&finished, &arguments.out),
+        &document::of(&finished, &arguments.out),
         || words::describe(&finished),
         &finished.files,
     )?;

@@ -26,7 +26,6 @@ use crate::progress::Progress;
 use crate::realtime::{KeyedLinks, LiveControl};
 use crate::{failure, input, interrupt, output};
 use conductor::SessionConductor;
-use document::LiveDocument;
 use prepare::ready_falcons;
 use timeline::{Elapsed, Planned, TimedLinks};
 
@@ -78,7 +77,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let host = SessionConductor::new(control.look(), wanted, pairs, elapsed, scene.axes.count());
     let report = conduct(&scene, session, host, &control)?;
     if arguments.json {
-        output::json(DocumentSchema::LIVE, &LiveDocument::new(&scene, &report))?;
+        output::json(DocumentSchema::LIVE, &document::of(&scene, &report))?;
     } else {
         let mut text = words::describe(&scene, &report);
         if let Some(folder) = &arguments.out {

@@ -24,7 +24,6 @@ use crate::failure::{Failure, INTERRUPTED};
 use crate::file::write_file;
 use crate::progress::Progress;
 use crate::{failure, input, interrupt, output};
-use document::RunDocument;
 use words::describe;
 
 /// Runs a scene, or a scene and a variant of it, and says what happened.
@@ -64,10 +63,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         _ => None,
     };
     if arguments.scene.json {
-        let mut document = RunDocument::new(&scene, &first);
-        document.replayed_otherwise = replayed_otherwise.unwrap_or_default();
-        document.against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| Box::new(RunDocument::new(variant, run)));
-        output::json(DocumentSchema::RUN, &document)?;
+        let against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| document::of(variant, run, &[], None::<()>));
+        output::json(DocumentSchema::RUN, &document::of(&scene, &first, &replayed_otherwise.unwrap_or_default(), against))?;
     } else {
         let mut text = format!("{}\n{}", scene.title, describe(&scene, &first));
         if let Some((variant, run)) = variant.as_ref().zip(second.as_ref()) {

@@ -19,7 +19,6 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::{input, interrupt, output};
-use document::BoundaryDocument;
 
 /// The file in which values looked at are kept.
 const ROWS: &str = "boundary.rows.partial";
@@ -65,7 +64,7 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_BOUNDARY,
-        &BoundaryDocument::new(&order, &found, &written),
+        &document::of(&order, &found, &written),
         || words::describe(&order, &found),
         &written,
     )?;

@@ -19,7 +19,6 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::variants::Variant;
 use crate::{input, output};
-use document::MapDocument;
 use filling::Filled;
 
 /// Everything that is asked for, checked: nothing is written before there is one.
@@ -46,6 +45,20 @@ struct VariantMap {
     file: Option<String>,
 }
 
+/// How fast the maps were filled.
+#[derive(Clone, Copy)]
+struct Speed {
+    wall_s: f64,
+    /// Cells computed now.
+    cells: usize,
+}
+
+impl Speed {
+    fn cells_per_s(self) -> f64 {
+        share(self.cells, 1) / self.wall_s
+    }
+}
+
 /// Fills the maps and shows or writes them.
 pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let order = Order::new(arguments)?;
@@ -57,18 +70,17 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         Ok(VariantMap { name: name.clone(), overrides: overrides.clone(), criterion: order.families[number].criterion(), map, verdicts, file: None })
     });
     let mut maps = named.collect::<Result<Vec<VariantMap>, Failure>>()?;
-    let wall_s = start.elapsed().as_secs_f64();
+    let speed = Speed { wall_s: start.elapsed().as_secs_f64(), cells };
     let mut files = Vec::new();
     if let Some(folder) = &arguments.out {
         files = files::write(folder, &order, &mut maps, arguments.pictures.size())?;
         rows.map_or(Ok(()), super::rows_file::RowsFile::remove)?;
     }
-    let document = MapDocument::new(&order, &maps, wall_s, cells, &files);
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_MAP,
-        &document,
-        || words::describe(&order, &maps, &document, arguments.out.is_none()),
+        &document::of(&order, &maps, speed, &files),
+        || words::describe(&order, &maps, speed, arguments.out.is_none()),
         &files,
     )?;
     Ok(ExitCode::SUCCESS)

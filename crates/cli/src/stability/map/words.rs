@@ -6,8 +6,8 @@ use cohaptic_stability::{Criterion, Verdict};
 
 use cohaptic_units::print::Counted;
 
-use super::document::{MapDocument, notes};
-use super::{Order, VariantMap, glance};
+use super::document::notes;
+use super::{Order, Speed, VariantMap, glance};
 use crate::output::{are, figure};
 use crate::stability::quantity::label;
 use crate::stability::source;
@@ -15,7 +15,7 @@ use crate::stability::source;
 /// More pictures than this do not fit on a screen.
 const MOST_PICTURES: usize = 4;
 
-pub(super) fn describe(order: &Order, maps: &[VariantMap], document: &MapDocument<'_>, pictures: bool) -> String {
+pub(super) fn describe(order: &Order, maps: &[VariantMap], speed: Speed, pictures: bool) -> String {
     let mut text = format!("{}\n", order.title);
     for (number, map) in maps.iter().enumerate() {
         // Writing to a string does not fail.
@@ -37,8 +37,7 @@ pub(super) fn describe(order: &Order, maps: &[VariantMap], document: &MapDocumen
             least(order, map)
         );
     }
-    let _ =
-        writeln!(text, "\n{} computed in {:.3} s: {:.0} a second", Counted(document.cells_computed, "cell"), document.wall_s, document.cells_per_s);
+    let _ = writeln!(text, "\n{} computed in {:.3} s: {:.0} a second", Counted(speed.cells, "cell"), speed.wall_s, speed.cells_per_s());
     for note in notes(maps) {
         let _ = writeln!(text, "note: {note}");
     }

@@ -16,7 +16,6 @@ use crate::arguments::PointArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, not_analysed};
 use crate::{input, output};
-use document::PointDocument;
 
 /// The user asked for the end.
 fn ended() -> Failure {
@@ -40,7 +39,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_POINT,
-        &PointDocument::new(&scene, &judgement, worst.as_ref()),
+        &document::of(&scene, &judgement, worst.as_ref()),
         || words::describe(&scene, &judgement, worst.as_ref()),
         output::NO_FILES,
     )?;

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::ended;
 use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::{LinksName, PointArguments};
+use crate::document_schema::document;
 use crate::failure::Failure;
 
 /// The worst case, if it is asked for.
@@ -41,41 +42,25 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
     })
 }
 
-#[derive(Serialize)]
-pub(super) struct WorstDocument<'a> {
-    verdict: &'static str,
-    lower: f64,
-    upper: f64,
-    /// The rate that quadratic certificates prove.
-    certificate: Option<f64>,
-    links: &'static str,
-    step_s: f64,
-    /// The pattern that attains the lower bound.
-    sequence: &'a str,
-    period: usize,
-    dimension: usize,
-    products: u64,
-    notes: &'a [String],
-}
-
-impl<'a> WorstDocument<'a> {
-    pub(super) fn new(worst: &'a SceneWorstCase) -> Self {
-        let part = worst.worst();
-        Self {
-            verdict: worst.verdict().word(),
-            lower: worst.lower,
-            upper: worst.upper,
-            certificate: worst.certificate,
-            links: match worst.links {
-                Links::Together => "together",
-                Links::Each => "each",
-            },
-            step_s: worst.step.as_secs_f64(),
-            sequence: &part.sequence,
-            period: part.period,
-            dimension: part.dimension,
-            products: worst.products(),
-            notes: &worst.notes,
-        }
+/// Its part of the JSON document.
+pub(super) fn document(worst: &SceneWorstCase) -> impl Serialize {
+    let part = worst.worst();
+    document! {
+        verdict: worst.verdict().word(),
+        lower: worst.lower,
+        upper: worst.upper,
+        // The rate that quadratic certificates prove.
+        certificate: worst.certificate,
+        links: match worst.links {
+            Links::Together => "together",
+            Links::Each => "each",
+        },
+        step_s: worst.step.as_secs_f64(),
+        // The pattern that attains the lower bound.
+        sequence: part.sequence.as_str(),
+        period: part.period,
+        dimension: part.dimension,
+        products: worst.products(),
+        notes: worst.notes.as_slice(),
     }
 }
