@@ -148,11 +148,8 @@ impl LinearLaw {
             (forms.force(&seen, &mut memory), memory)
         };
         let (force, memory) = come_out(None);
-        let mut law = Self {
-            force: LawRow::of(&force)?,
-            memory: memory.iter().map(LawRow::of).collect::<Option<_>>()?,
-            horizon: Law::<f64>::horizon(law),
-        };
+        let mut law =
+            Self { force: LawRow::of(&force)?, memory: memory.iter().map(LawRow::of).collect::<Option<_>>()?, horizon: Law::<f64>::horizon(law) };
         for unknown in 0..remembered {
             let (force, memory) = come_out(Some(unknown));
             for (row, form) in law.rows_mut().zip(std::iter::once(&force).chain(&memory)) {

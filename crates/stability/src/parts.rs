@@ -6,7 +6,7 @@ use cohaptic_peer::{Plant, StepMap};
 use cohaptic_scene::Scene;
 
 use crate::cost::eigenvalue_operations;
-use crate::lifted::{Autonomous, Lifted, Node};
+use crate::lifted::{Autonomous, Lifted};
 use crate::spectrum::bounded_radius;
 use crate::structure::{Structure, arm, device_plant};
 use crate::{AnalysisError, Matrix, Method, Radius, Watch};

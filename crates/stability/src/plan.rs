@@ -153,8 +153,7 @@ impl Plan {
         let loose = |class: usize| (!self.structure.touching[class]).then(|| loose_device(&self.structure, scene, class).0);
         if scratch.nodes.len() != classes {
             scratch.nodes = self.structure.nodes(scene);
-            let bodies =
-                |class: usize| Bodies {
+            let bodies = |class: usize| Bodies {
                 object: object_plant(scene),
                 device: device_plant(self.representative(scene, class)),
                 law: scene.law(self.structure.classes[class][0]),

@@ -157,7 +157,14 @@ impl Structure {
 
     /// The system of the classes' averages.
     pub(crate) fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
-        Lifted { nodes, weights: &self.weights, timetable: &self.timetable, sampling: Sampling::of(nodes), time: self.time(scene, nodes), tied: self.tied }
+        Lifted {
+            nodes,
+            weights: &self.weights,
+            timetable: &self.timetable,
+            sampling: Sampling::of(nodes),
+            time: self.time(scene, nodes),
+            tied: self.tied,
+        }
     }
 }
 

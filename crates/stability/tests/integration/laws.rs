@@ -44,7 +44,7 @@ fn the_mean_squares_of_laws_come_out() {
     let entries = entries("mean_square");
     assert!(entries.len() >= 20, "{}", entries.len());
     for entry in entries {
-        let (name, found) = mean_square::compare(&entry);
+        let (name, found) = mean_square::compare(&entry, 1e-6);
         // Of a force with a lag a held sample is felt as without it; a sample that is extrapolated moves on by its velocity and is felt whole.
         match name.as_str() {
             "smoothed-held-sample" => assert_eq!(found.radius.value.to_bits(), found.held.value.to_bits(), "{found:?}"),
@@ -59,18 +59,4 @@ fn the_admittances_of_laws_are_those_of_long_arithmetic() {
     let entries = entries("admittance");
     assert!(entries.len() >= 30, "{}", entries.len());
     admittance::compare(&entries);
-}
-
-#[test]
-fn tmp_print() {
-    for case in cases() {
-        for method in [Method::Reduced, Method::Full, Method::Determinant] {
-            if case.scene.peers.len() < 9 || method != Method::Full {
-                println!("{} {method:?} {:?}", case.name, analyse(&case.scene, method).unwrap().radius);
-            }
-        }
-    }
-    for case in crate::reference::cases_of(&serde_json::from_str::<Vec<Value>>(include_str!("../reference/radii.json")).unwrap()) {
-        println!("{} {:?}", case.name, analyse(&case.scene, Method::Reduced).unwrap().radius);
-    }
 }

@@ -162,7 +162,7 @@ impl<P: Parcel> Wire<P> {
                     return Some(Arrival { packet, at, parcel, marked, is_cut });
                 }
                 Fate::Dropped(cause) => self.recording.note(event.at, Happening::Lost { packet, why: Lost::Link(cause) }),
-                Fate::Duplicated | _ => self.recording.note(event.at, Happening::Copied { packet }),
+                Fate::Duplicated => self.recording.note(event.at, Happening::Copied { packet }),
             }
         }
     }

@@ -32,6 +32,7 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
     found.map(Some).map_err(|error| match error {
         SceneWorstCaseError::Analysis(AnalysisError::Stopped) => ended(),
         error @ (SceneWorstCaseError::Analysis(_)
+        | SceneWorstCaseError::Ages { .. }
         | SceneWorstCaseError::Automaton(_)
         | SceneWorstCaseError::Delays { .. }
         | SceneWorstCaseError::Overtaking { .. }

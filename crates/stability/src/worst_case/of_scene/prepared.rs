@@ -7,7 +7,7 @@ use super::super::pattern::Pattern;
 use super::channel::{Channel, Link, Way};
 use super::frames::Block;
 use super::{Links, Patterns, SceneWorstCaseError};
-use crate::lifted::{Lifted, Node};
+use crate::lifted::Lifted;
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::alone;
 use crate::structure::{Contacts, Structure, clocks, links};
