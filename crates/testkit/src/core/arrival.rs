@@ -3,7 +3,7 @@
 use bytes::Bytes;
 use cohaptic_wan::{NodeId, Path};
 
-use super::{Core, Datagram, Kind, Parcel, SocketId};
+use super::{Addresses, Core, Datagram, Kind, Parcel, SocketId};
 use crate::trace::Lost;
 use crate::wire::Arrival;
 
@@ -28,22 +28,22 @@ impl Core {
         if state.is_down {
             return Err(Lost::HostDown);
         }
-        let ip = parcel.to.ip();
+        let ip = parcel.addresses.to.ip();
         let is_for_all = ip == std::net::IpAddr::V4(std::net::Ipv4Addr::BROADCAST);
         if !(is_for_all || ip.is_loopback() || self.plan.of(host).has(ip)) {
             return Err(Lost::NoSuchAddress);
         }
         let Some(id) = self.socket_for(host, &parcel) else {
-            if parcel.kind == Kind::Datagram && !is_for_all {
+            if parcel.addresses.kind == Kind::Datagram && !is_for_all {
                 self.tell_unreachable(host, from, &parcel);
             }
             return Err(Lost::NoSocket);
         };
         let socket = self.sockets.get_mut(id);
-        match parcel.kind {
+        match parcel.addresses.kind {
             // Only a connected socket is told, as with Linux: another one could not know of whom it speaks.
             Kind::Unreachable => {
-                if socket.peer == Some(parcel.from) {
+                if socket.peer == Some(parcel.addresses.from) {
                     socket.refused = true;
                     socket.wake_readers(&mut self.woken);
                 }
@@ -53,7 +53,14 @@ impl Core {
                     return Err(Lost::BufferFull);
                 }
                 socket.held += parcel.bytes.len();
-                socket.inbox.push_back(Datagram { from: parcel.from, bytes: parcel.bytes, at, ecn_capable: parcel.ecn_capable, marked, to: ip });
+                socket.inbox.push_back(Datagram {
+                    from: parcel.addresses.from,
+                    bytes: parcel.bytes,
+                    at,
+                    ecn_capable: parcel.ecn_capable,
+                    marked,
+                    to: ip,
+                });
                 socket.wake_readers(&mut self.woken);
             }
         }
@@ -63,12 +70,12 @@ impl Core {
     /// The socket of a host for which a packet is: one that is connected to its sender before one that is not, one that is bound to its address before one that
     /// is bound to all.
     fn socket_for(&self, host: NodeId, parcel: &Parcel) -> Option<SocketId> {
-        let bound = self.hosts[host.index()].ports.get(&(parcel.to.is_ipv6(), parcel.to.port()))?;
+        let bound = self.hosts[host.index()].ports.get(&(parcel.addresses.to.is_ipv6(), parcel.addresses.to.port()))?;
         let rank = |id: &&SocketId| {
             let socket = self.sockets.get(**id);
-            let at_address = socket.local.ip() == parcel.to.ip();
+            let at_address = socket.local.ip() == parcel.addresses.to.ip();
             let fits = at_address || socket.local.ip().is_unspecified();
-            let hears = socket.peer.is_none_or(|peer| peer == parcel.from);
+            let hears = socket.peer.is_none_or(|peer| peer == parcel.addresses.from);
             (fits && hears).then_some((socket.peer.is_some(), at_address))
         };
         bound.iter().filter(|id| rank(id).is_some()).max_by_key(rank).copied()
@@ -78,7 +85,8 @@ impl Core {
     fn tell_unreachable(&mut self, host: NodeId, sender: NodeId, parcel: &Parcel) {
         // As long as that of ICMP (RFC 792): its header, and the header and the first eight bytes of what could not be delivered. The addresses say all that is
         // needed here.
-        let answer = Parcel { from: parcel.to, to: parcel.from, bytes: Bytes::from_static(&[0; 36]), ecn_capable: false, kind: Kind::Unreachable };
+        let addresses = Addresses { from: parcel.addresses.to, to: parcel.addresses.from, kind: Kind::Unreachable };
+        let answer = Parcel { addresses, bytes: Bytes::from_static(&[0; 36]), ecn_capable: false };
         if host == sender { self.hand_over(host, answer) } else { self.offer(Path { from: host, to: sender }, answer) }
     }
 }

@@ -11,7 +11,6 @@ mod timers;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 
-use bytes::Bytes;
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 use cohaptic_wan::{LinkModel, NodeId, Path};
@@ -22,7 +21,7 @@ pub(crate) use timers::TimerId;
 
 use crate::address::AddressPlan;
 use crate::file::LinkChange;
-use crate::wire::{Settings, Wire};
+use crate::wire::{self, Settings, Wire};
 use hosts::HostState;
 use sockets::Sockets;
 use timers::Timers;
@@ -30,7 +29,7 @@ use timers::Timers;
 pub(crate) struct Core {
     pub(crate) plan: AddressPlan,
     pub(crate) settings: Settings,
-    pub(crate) wire: Wire<Parcel>,
+    pub(crate) wire: Wire<Addresses>,
     pub(crate) timers: Timers,
     #[cfg(feature = "quinn")]
     pub(crate) entropy: entropy::Entropy,
@@ -45,14 +44,13 @@ pub(crate) struct Core {
     polled: u64,
 }
 
-/// What travels.
-#[derive(Clone, Debug)]
-pub(crate) struct Parcel {
+pub(crate) type Parcel = wire::Parcel<Addresses>;
+
+/// The two ends of a packet, and its kind.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Addresses {
     from: std::net::SocketAddr,
     to: std::net::SocketAddr,
-    bytes: Bytes,
-    /// Whether its sender understands marks.
-    ecn_capable: bool,
     kind: Kind,
 }
 
@@ -62,16 +60,6 @@ enum Kind {
     Datagram,
     /// "There is no socket at that port", which IP tells a sender.
     Unreachable,
-}
-
-impl crate::wire::Parcel for Parcel {
-    fn bytes(&self) -> &Bytes {
-        &self.bytes
-    }
-
-    fn bytes_mut(&mut self) -> &mut Bytes {
-        &mut self.bytes
-    }
 }
 
 impl Core {

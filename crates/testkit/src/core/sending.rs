@@ -6,7 +6,7 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use bytes::Bytes;
 use cohaptic_wan::{NodeId, Path};
 
-use super::{Core, Kind, Parcel, SocketId};
+use super::{Addresses, Core, Kind, Parcel, SocketId};
 
 /// The longest datagram over IPv4 and over IPv6 \[bytes\].
 const LONGEST: [usize; 2] = [65_507, 65_527];
@@ -56,7 +56,8 @@ impl Core {
             to.set_ip(loopback);
         }
         let from = SocketAddr::new(self.source(host, local.ip(), to.ip())?, local.port());
-        let parcel = Parcel { from, to, bytes: outgoing.bytes, ecn_capable: outgoing.ecn_capable, kind: Kind::Datagram };
+        let addresses = Addresses { from, to, kind: Kind::Datagram };
+        let parcel = Parcel { addresses, bytes: outgoing.bytes, ecn_capable: outgoing.ecn_capable };
         if to.ip() == IpAddr::V4(Ipv4Addr::BROADCAST) {
             if !may_broadcast {
                 return refuse(io::ErrorKind::PermissionDenied, "this socket may not broadcast; `set_broadcast(true)` allows it".into());
@@ -97,8 +98,7 @@ impl Core {
 
     /// Hands a packet to its link.
     pub(super) fn offer(&mut self, path: Path, parcel: Parcel) {
-        let ecn_capable = parcel.ecn_capable;
-        if self.wire.offer(path, parcel, ecn_capable).is_ok() {
+        if self.wire.offer(path, parcel).is_ok() {
             self.take_arrivals();
         }
     }

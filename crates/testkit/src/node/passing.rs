@@ -5,10 +5,10 @@ use cohaptic_units::print::Seconds;
 use cohaptic_wan::{NodeId, Path};
 
 use super::address::{addresses, place_of};
-use super::run::Parcel;
+use super::run::Ports;
 use super::{NodeRun, Packet, Transmit};
 use crate::trace::{Happening, Lost};
-use crate::wire::Arrival;
+use crate::wire::{Arrival, Parcel};
 
 /// What a node does that keeps time from passing.
 #[derive(Clone, Copy, Debug)]
@@ -72,13 +72,14 @@ impl NodeRun {
             }
             return;
         };
-        let parcel = Parcel { from_port, to_port: address.port(), is_six: address.is_ipv6(), bytes };
+        let addresses = Ports { from: from_port, to: address.port(), is_six: address.is_ipv6() };
+        let parcel = Parcel { addresses, bytes, ecn_capable };
         let path = Path { from, to };
         if to == from {
             // It does not leave the node, and so meets no link.
             return self.arrive(path, parcel, false);
         }
-        match self.wire.offer(path, parcel, ecn_capable) {
+        match self.wire.offer(path, parcel) {
             Ok(()) => self.take_arrivals(),
             Err(_) => self.counts[from.index()].cut += 1,
         }
@@ -101,14 +102,14 @@ impl NodeRun {
         }
     }
 
-    fn arrive(&mut self, Path { from, to }: Path, parcel: Parcel, marked: bool) {
-        let Parcel { from_port, to_port, is_six, bytes } = parcel;
+    fn arrive(&mut self, Path { from, to }: Path, parcel: Parcel<Ports>, marked: bool) {
+        let Parcel { addresses: ports, bytes, .. } = parcel;
         let address = |node: NodeId, port: u16| {
             let addresses = addresses(node.index());
-            let ip = if is_six { addresses.v6.into() } else { addresses.v4.into() };
+            let ip = if ports.is_six { addresses.v6.into() } else { addresses.v4.into() };
             std::net::SocketAddr::new(ip, port)
         };
-        self.arrived.push_back((to, Packet { from: address(from, from_port), to: address(to, to_port), bytes, marked }));
+        self.arrived.push_back((to, Packet { from: address(from, ports.from), to: address(to, ports.to), bytes, marked }));
     }
 
     /// Hands over what has arrived, in its order, and what arrives at once because of it.

@@ -5,7 +5,6 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::time::Duration;
 
-use bytes::Bytes;
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 use cohaptic_wan::{LinkModel, LinkStats, NodeId};
@@ -29,7 +28,7 @@ pub struct NodeRun {
     /// `None`: crashed, or being asked.
     pub(super) nodes: Vec<Option<Box<dyn Node>>>,
     pub(super) up: Vec<bool>,
-    pub(super) wire: Wire<Parcel>,
+    pub(super) wire: Wire<Ports>,
     pub(super) deadlines: Deadlines,
     pub(super) counts: Vec<NodeCounts>,
     /// What has arrived and is not handed over yet.
@@ -44,24 +43,13 @@ pub struct NodeRun {
     artefacts: Artefacts,
 }
 
-/// What travels.
-#[derive(Clone, Debug)]
-pub(super) struct Parcel {
-    pub(super) from_port: u16,
-    pub(super) to_port: u16,
-    /// Whether it is of version 6.
+/// The ports of a packet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ports {
+    pub(super) from: u16,
+    pub(super) to: u16,
+    /// Whether it is of version 6 of IP.
     pub(super) is_six: bool,
-    pub(super) bytes: Bytes,
-}
-
-impl crate::wire::Parcel for Parcel {
-    fn bytes(&self) -> &Bytes {
-        &self.bytes
-    }
-
-    fn bytes_mut(&mut self) -> &mut Bytes {
-        &mut self.bytes
-    }
 }
 
 /// What a node has sent and got.

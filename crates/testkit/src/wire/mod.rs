@@ -32,29 +32,32 @@ pub(crate) struct Settings {
     pub(crate) patience: u64,
 }
 
-/// What travels: bytes, and what its owner put around them.
-pub(crate) trait Parcel: Clone {
-    fn bytes(&self) -> &Bytes;
-    fn bytes_mut(&mut self) -> &mut Bytes;
+/// What travels: bytes, and the addresses that their owner writes on them.
+#[derive(Clone, Debug)]
+pub(crate) struct Parcel<A> {
+    pub(crate) addresses: A,
+    pub(crate) bytes: Bytes,
+    /// Whether its sender understands marks.
+    pub(crate) ecn_capable: bool,
 }
 
 /// A packet that its link has delivered.
 #[derive(Debug)]
-pub(crate) struct Arrival<P> {
+pub(crate) struct Arrival<A> {
     pub(crate) packet: PacketName,
     pub(crate) at: Instant,
     /// With the damage that the link did to it.
-    pub(crate) parcel: P,
+    pub(crate) parcel: Parcel<A>,
     /// Whether an active queue marked it.
     pub(crate) marked: bool,
     /// Whether the way of the packet is cut, so that it is lost here.
     pub(crate) is_cut: bool,
 }
 
-pub(crate) struct Wire<P> {
+pub(crate) struct Wire<A> {
     now: Instant,
     hosts: usize,
-    network: Network<P>,
+    network: Network<Parcel<A>>,
     /// Links that become other ones, in order of time.
     changes: VecDeque<LinkChange>,
     /// By sender, then receiver: whether the way is cut.
@@ -64,7 +67,7 @@ pub(crate) struct Wire<P> {
     recording: Recording,
 }
 
-impl<P: Parcel> Wire<P> {
+impl<A: Clone> Wire<A> {
     pub(crate) fn new(
         names: &[String],
         seed: u64,
@@ -123,7 +126,7 @@ impl<P: Parcel> Wire<P> {
     }
 
     /// Hands a packet to its link. Fails with the packet's name if the way is cut.
-    pub(crate) fn offer(&mut self, path: Path, parcel: P, ecn_capable: bool) -> Result<(), Lost> {
+    pub(crate) fn offer(&mut self, path: Path, parcel: Parcel<A>) -> Result<(), Lost> {
         let pair = self.pair(path);
         let packet = PacketName { path, sequence: self.offered[pair], copy: 0 };
         if self.cut[pair] {
@@ -131,33 +134,33 @@ impl<P: Parcel> Wire<P> {
             self.note(Happening::Lost { packet, why: Lost::Cut });
             return Err(Lost::Cut);
         }
-        let len = parcel.bytes().len();
+        let len = parcel.bytes.len();
         if self.recording.traces {
-            let digest = if self.recording.digests { hash(parcel.bytes()) } else { 0 };
+            let digest = if self.recording.digests { hash(&parcel.bytes) } else { 0 };
             self.note(Happening::Sent { packet, len, digest });
         }
         self.offered[pair] += 1;
-        let info = PacketInfo { size: cohaptic_units::Bytes::new(len as u64), ecn_capable };
+        let info = PacketInfo { size: cohaptic_units::Bytes::new(len as u64), ecn_capable: parcel.ecn_capable };
         let offered = self.network.handle_packet(self.now, path.from, path.to, info, parcel);
         debug_assert_eq!(offered, Ok(()), "hosts are checked, and time does not go back");
         Ok(())
     }
 
     /// The next packet that has arrived. What becomes of it is told by [`Wire::ends`].
-    pub(crate) fn poll(&mut self) -> Option<Arrival<P>> {
+    pub(crate) fn poll(&mut self) -> Option<Arrival<A>> {
         loop {
             let event = self.network.poll_event()?;
             let packet = PacketName { path: event.path, sequence: event.sequence, copy: event.copy >> 1 };
-            self.recording.keep(&event, |parcel| parcel.bytes().clone());
+            self.recording.keep(&event);
             match event.fate {
                 Fate::Delivered(at) => {
                     let (marked, is_cut) = (event.marked, self.cut[self.pair(event.path)]);
                     let mut parcel = event.payload;
                     if let Some(damage) = &event.damage {
                         // A copy of it may be on its way still, undamaged.
-                        let mut bytes = Vec::from(std::mem::take(parcel.bytes_mut()));
+                        let mut bytes = Vec::from(parcel.bytes);
                         damage.apply(&mut bytes);
-                        *parcel.bytes_mut() = bytes.into();
+                        parcel.bytes = bytes.into();
                     }
                     return Some(Arrival { packet, at, parcel, marked, is_cut });
                 }
@@ -212,7 +215,7 @@ impl<P: Parcel> Wire<P> {
 
     /// What was recorded so far. Packets that are on their way are followed to their end, in the fates alone, as if nothing more were sent.
     pub(crate) fn recorded(&self) -> Recorded {
-        self.recording.followed_through(&self.network, self.now, |parcel| parcel.bytes().clone())
+        self.recording.followed_through(&self.network, self.now)
     }
 
     const fn pair(&self, path: Path) -> usize {

@@ -4,7 +4,7 @@ use bytes::Bytes;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Network, PacketEvent, PacketRecord, Path};
 
-use super::Settings;
+use super::{Parcel, Settings};
 use crate::trace::{Happening, Trace};
 
 /// What is recorded of a run, as far as it is asked for.
@@ -40,9 +40,9 @@ impl Recording {
     }
 
     #[inline]
-    pub(super) fn keep<P>(&mut self, event: &PacketEvent<P, Path>, bytes: impl Fn(&P) -> Bytes) {
+    pub(super) fn keep<A>(&mut self, event: &PacketEvent<Parcel<A>, Path>) {
         if self.keeps_packets {
-            self.packets.push(seen(event, bytes));
+            self.packets.push(seen(event));
         }
     }
 
@@ -52,12 +52,12 @@ impl Recording {
     }
 
     /// What has been recorded until `now`, and the ends of the packets that are in this network.
-    pub(super) fn followed_through<P: Clone>(&self, network: &Network<P>, now: Instant, bytes: impl Fn(&P) -> Bytes) -> Recorded {
+    pub(super) fn followed_through<A: Clone>(&self, network: &Network<Parcel<A>>, now: Instant) -> Recorded {
         let mut packets = self.packets.clone();
         let mut network = self.keeps_packets.then(|| network.clone());
         for _ in 0..MOST_EVENTS {
             let Some(network) = &mut network else { break };
-            packets.extend(std::iter::from_fn(|| network.poll_event()).map(|event| seen(&event, &bytes)));
+            packets.extend(std::iter::from_fn(|| network.poll_event()).map(|event| seen(&event)));
             let Some(next) = network.poll_timeout() else { break };
             if network.handle_timeout(next).is_err() {
                 break;
@@ -68,7 +68,7 @@ impl Recording {
 }
 
 /// What a link says of a packet, as the row of its log. Without access lines the only copy is that of the link, whose number in a network is 2.
-fn seen<P>(event: &PacketEvent<P, Path>, bytes: impl Fn(&P) -> Bytes) -> Seen {
+fn seen<A>(event: &PacketEvent<Parcel<A>, Path>) -> Seen {
     let record = PacketRecord { copy: event.copy >> 1, ..event.record };
-    PacketEvent { record, payload: bytes(&event.payload), damage: event.damage.clone() }
+    PacketEvent { record, payload: event.payload.bytes.clone(), damage: event.damage.clone() }
 }

@@ -143,19 +143,13 @@ impl LinkModel {
 
     /// Whether this link draws random numbers for loss or for jitter as soon as a packet is offered.
     pub(crate) fn is_random(&self) -> bool {
-        match self {
-            Self::Fixed(config) => config.is_random(),
-            Self::Modulated(_) | Self::Replay(_) | Self::Kernel(_) => false,
-        }
+        self.as_fixed().is_some_and(LinkConfig::is_random)
     }
 
     /// Whether what becomes of a packet is known as soon as it is offered, and nothing is copied: what [`crate::DirectLinks`] takes.
     #[must_use]
     pub fn is_direct(&self) -> bool {
-        match self {
-            Self::Fixed(config) => config.is_direct(),
-            Self::Modulated(_) | Self::Replay(_) | Self::Kernel(_) => false,
-        }
+        self.as_fixed().is_some_and(LinkConfig::is_direct)
     }
 }
 
