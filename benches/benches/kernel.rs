@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use cohaptic_benches::by_hand::{self, Eight, Numbers, Tick};
 use cohaptic_benches::kernel;
-use cohaptic_peer::coordination::{AveragePosition, BuiltIn, LawParameters};
+use cohaptic_peer::coordination::{AveragePosition, BuiltIn, LawParameters, LawValues};
 use cohaptic_peer::{Coordination, Gains, Integrator, Plant};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 
@@ -51,7 +51,12 @@ fn group<N: Clone>(criterion: &mut Criterion, name: &str, numbers: &Numbers<N>, 
 fn kernels(criterion: &mut Criterion) {
     let tick = tick();
     let law = AveragePosition { gains: tick.coordination };
-    let registered = Coordination::AveragePosition.law(&LawParameters { gains: tick.coordination, peers: 3 });
+    let registered = Coordination::AveragePosition.law(&LawParameters {
+        gains: tick.coordination,
+        peers: 3,
+        tick: Duration::from_millis(1),
+        own: LawValues::default(),
+    });
     group(
         criterion,
         "one peer",

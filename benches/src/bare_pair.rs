@@ -76,7 +76,7 @@ impl BarePair {
         radius_small(&mut together).max(radius_small(&mut [xh, vh, x, v, sent]))
     }
 
-    /// Both blocks as loops with a delay, for samples that take so many frames, at least 1.
+    /// Both blocks as loops with a delay, for samples that take a number of frames, at least 1.
     ///
     /// # Panics
     ///

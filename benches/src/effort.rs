@@ -65,7 +65,7 @@ impl Effort {
         command
     }
 
-    /// The first lines of a page: its title, what is measured, the command that writes it, and where and when that was done.
+    /// The first lines of a page: its title, its subject, the command that writes it, and where and when that was done.
     #[must_use]
     pub fn head(self, title: &str, what: &str, program: &str, page: &str) -> String {
         let (command, machine) = (self.command(program), machine::line());

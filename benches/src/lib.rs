@@ -4,7 +4,7 @@
     clippy::cast_sign_loss,
     clippy::cast_precision_loss,
     clippy::float_cmp,
-    reason = "a bare loop does what is shortest; every number here is small"
+    reason = "a bare loop is written for speed; every number here is small"
 )]
 
 pub mod bare;
@@ -42,7 +42,7 @@ pub const COPY_DAMPING: f64 = 0.0;
 /// The force of the first peer's hand \[N\].
 pub const HAND_FORCE: f64 = 1.5;
 
-/// One cell of the table: so many peers, with or without jitter and loss.
+/// One cell of the table: a number of peers, with or without jitter and loss.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Mesh {
     /// The number of peers.
@@ -62,7 +62,7 @@ impl Mesh {
         Self { peers: 50, impaired: true },
     ];
 
-    /// The scene, of that many simulated seconds.
+    /// The scene, of a duration \[s\].
     #[must_use]
     pub fn scene(self, seconds: u64) -> Scene {
         self.scene_with_seed(seconds, 1)

@@ -80,7 +80,7 @@ pub fn peak_memory() -> String {
     field("/proc/self/status", "VmHWM").unwrap_or_else(|| "not told by this system".into())
 }
 
-/// The median processor time of each work in so many rounds, in which all take turns: a noisy moment hits all of them, and no row of a table alone.
+/// The median processor time of each work in a number of rounds, in which all take turns: a noisy moment hits all of them, and no row of a table alone.
 #[must_use]
 pub fn medians_in_turn<T>(works: &[impl Fn() -> T], rounds: usize) -> Vec<Duration> {
     let mut times = vec![Vec::new(); works.len()];

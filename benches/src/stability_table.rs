@@ -24,7 +24,7 @@ struct Work {
     worth: f64,
     /// Cells along each axis of a map.
     cells: usize,
-    /// Samples that take so many frames.
+    /// Samples that take this number of frames.
     frames: &'static [u32],
     /// The largest number of equal peers.
     most_peers: usize,
@@ -42,7 +42,7 @@ impl Work {
         }
     }
 
-    /// Time of each subject once, medians of alternating rounds of so many repetitions.
+    /// Time of each subject once, medians of alternating rounds of this number of repetitions.
     fn medians(self, subjects: &mut [(u32, Subject<'_>)]) -> Vec<Duration> {
         let mut rounds = vec![Vec::new(); subjects.len()];
         for _ in 0..self.rounds {

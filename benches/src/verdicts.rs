@@ -12,7 +12,7 @@ const PAPER: &str = r#"
     link         = { delay = "8ms" }
 "#;
 
-/// That many equal peers, with those changes.
+/// A number of equal peers, with those changes.
 ///
 /// # Panics
 ///
@@ -23,7 +23,7 @@ pub fn equal(peers: usize, changes: &[String]) -> Scene {
     Scene::parse(PAPER, "paper.toml".as_ref(), &overrides).expect("a scene")
 }
 
-/// That many equal peers with KT from 0 to 6000 N/m and KC from 100 to 6000 N/m, with those changes.
+/// A number of equal peers with KT from 0 to 6000 N/m and KC from 100 to 6000 N/m, with those changes.
 ///
 /// # Panics
 ///
@@ -47,7 +47,7 @@ pub fn figure_3(loss: u32) -> Vec<Family> {
     (2..=5).map(|peers| curve("proportional-derivative", peers)).chain((2..=8).map(|peers| curve("average-position", peers))).collect()
 }
 
-/// Eight peers no two of which are equal, over links of that many milliseconds.
+/// Eight peers no two of which are equal, over links of a delay \[ms\].
 ///
 /// # Panics
 ///

@@ -162,7 +162,7 @@ fn a_tick_as_long_as_time_happens_once() {
 /// each; 1 bit/s and 2³¹ − 1 B of overhead, 545 years, are not: the second waits for the first, and leaves when time ends.
 #[test]
 fn a_bit_a_second_takes_until_the_end_of_time_and_no_longer() {
-    let quarters = |log: &Log| log.packets.iter().filter(|row| row.from == 0).map(|row| row.at.as_nanos()).collect::<Vec<_>>();
+    let quarters = |log: &Log| log.packets.iter().filter(|row| row.path.from.index() == 0).map(|row| row.at.as_nanos()).collect::<Vec<_>>();
     let log = either(&scene("4611686018427387904ns", "rate = \"1bit\"", ""));
     assert_eq!(quarters(&log), [0, 1, 2, 3].map(|k| k * QUARTER + 512_000_000_000));
     let log = either(&scene("4611686018427387904ns", "rate = \"1bit\", overhead = \"2147483647B\"", ""));
@@ -177,7 +177,7 @@ fn an_outage_until_the_end_and_a_change_at_the_end() {
     let outage = "outage = [{ from = \"4611686018427387905ns\", to = \"18446744073709551615ns\" }]";
     let change = "[[timeline]]\nat = \"18446744073709551614ns\"\nlink = \"all\"\nset = { delay = \"1ns\" }\n";
     let log = either(&scene("4611686018427387904ns", outage, change));
-    let fates: Vec<Fate> = log.packets.iter().filter(|row| row.from == 0).map(|row| row.fate).collect();
+    let fates: Vec<Fate> = log.packets.iter().filter(|row| row.path.from.index() == 0).map(|row| row.fate).collect();
     let at = |nanos| Fate::Delivered(Instant::from_nanos(nanos));
     assert_eq!(fates, [at(0), at(QUARTER), Fate::Dropped(DropCause::Outage), Fate::Dropped(DropCause::Outage)]);
 }

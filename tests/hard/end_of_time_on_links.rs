@@ -153,7 +153,7 @@ fn instants() -> impl Strategy<Value = Vec<Instant>> {
 /// Takes all events out of a link; each happens at or after it was offered.
 fn drained(link: &mut Link<u8>) -> usize {
     let events = std::iter::from_fn(|| link.poll_event());
-    events.map(|event| assert!(event.at >= event.sent && event.fate.is_end() | (event.fate == Fate::Duplicated))).count()
+    events.map(|event| assert!(event.at >= event.offered && event.fate.is_end() | (event.fate == Fate::Duplicated))).count()
 }
 
 fn is_conserved(link: &Link<u8>) -> bool {
@@ -203,7 +203,7 @@ proptest! {
     fn a_network_at_the_edges_is_the_same_by_either_path(configs in vec(config(), 2), instants in instants(), sizes in vec(size(), 25)) {
         let fates = |general: bool| {
             let names = ["a", "b"].map(str::to_owned).to_vec();
-            let mut network = Network::new(NetworkConfig { seed: 3, nodes: names, general }, |from, _| configs[from.0 as usize].clone());
+            let mut network = Network::new(NetworkConfig { seed: 3, nodes: names, general }, |from, _| configs[from.index()].clone());
             let mut fates = Vec::new();
             for (now, size) in instants.iter().zip(&sizes) {
                 let size = bounded(*size, &[&configs[0], &configs[1]]);

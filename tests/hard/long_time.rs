@@ -79,9 +79,9 @@ fn an_hour_in_lockstep_sends_and_arrives_on_the_nanosecond() {
             ticks[row.peer] += 1;
         }),
         OnPacket(|row: &cohaptic_harness::PacketRow| {
-            let count = &mut arrived[3 * row.from + row.to];
-            assert_eq!((row.sequence, row.sent.as_nanos()), (*count, *count * 8_000_000));
-            assert_eq!(row.fate, Fate::Delivered(row.sent + Duration::from_millis(24)));
+            let count = &mut arrived[3 * row.path.from.index() + row.path.to.index()];
+            assert_eq!((row.sequence, row.offered.as_nanos()), (*count, *count * 8_000_000));
+            assert_eq!(row.fate, Fate::Delivered(row.offered + Duration::from_millis(24)));
             *count += 1;
         }),
     ));

@@ -7,6 +7,7 @@
 use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_peer::{Held, State};
 use cohaptic_tests::{Draft, same_cases};
+use cohaptic_units::Instant;
 use proptest::prelude::*;
 
 use crate::ROUNDING;
@@ -102,8 +103,8 @@ fn the_order_of_arrival_changes_no_bit() {
         let mut held = Held::new((0..OTHERS).map(|_| State::<1>::REST));
         for turn in 0..OTHERS {
             // An older sample that comes later changes nothing.
-            assert!(held.accept(order(turn), 1, at(value(order(turn)))));
-            assert!(!held.accept(order(turn), 0, at(1e300)));
+            assert!(held.accept(order(turn), 1, Instant::ZERO, at(value(order(turn)))));
+            assert!(!held.accept(order(turn), 0, Instant::ZERO, at(1e300)));
         }
         held.refresh();
         assert_eq!(held.mean().position[0].to_bits(), expected.position[0].to_bits());

@@ -10,7 +10,7 @@ use cohaptic_harness::{Model, Simulation, TickRow};
 use cohaptic_tests::Draft;
 use cohaptic_units::{Bytes, Instant, Probability, Rate};
 use cohaptic_wan::{
-    Bottleneck, Chance, Delay, Distribution, Fate, Jitter, Link, LinkConfig, LinkEvent, LinkName, Loss, Network, NetworkConfig, NodeId,
+    Bottleneck, Chance, Delay, Distribution, Fate, Jitter, Link, LinkConfig, LinkName, Loss, Network, NetworkConfig, NodeId, PacketEvent,
 };
 
 use crate::watch::OnTick;
@@ -42,7 +42,7 @@ fn offer_all(link: &mut Link<u64>) -> u64 {
 }
 
 /// All events, in order, drained by a driver that comes so much later than the link announces.
-fn drain(link: &mut Link<u64>, late: Duration) -> Vec<LinkEvent<u64>> {
+fn drain(link: &mut Link<u64>, late: Duration) -> Vec<PacketEvent<u64>> {
     let mut events = Vec::new();
     loop {
         while let Some(event) = link.poll_event() {
@@ -63,12 +63,12 @@ fn a_million_packets_of_one_delay_arrive_in_order_each_on_its_nanosecond() {
     let mut link = link(LinkConfig { delay: Delay::constant(delay), ..LinkConfig::default() });
     let memory = offer_all(&mut link);
     assert_eq!((link.stats().in_flight(), link.stats().delivered()), (COUNT, 0));
-    assert!(memory <= 3 * COUNT * size_of::<LinkEvent<u64>>() as u64, "{} B a packet", memory / COUNT);
+    assert!(memory <= 3 * COUNT * size_of::<PacketEvent<u64>>() as u64, "{} B a packet", memory / COUNT);
     let events = drain(&mut link, Duration::ZERO);
     assert_eq!(events.len() as u64, COUNT);
     for (number, event) in events.iter().enumerate() {
         let sent = nanos(1000 * number as u64);
-        assert_eq!((event.sequence, event.payload, event.sent, event.fate), (number as u64, number as u64, sent, Fate::Delivered(sent + delay)));
+        assert_eq!((event.sequence, event.payload, event.offered, event.fate), (number as u64, number as u64, sent, Fate::Delivered(sent + delay)));
     }
     assert_eq!((link.stats().in_flight(), link.stats().delivered(), link.stats().mean_delay()), (0, COUNT, Some(delay)));
 }
@@ -81,7 +81,7 @@ fn a_million_packets_with_jitter_arrive_in_the_order_of_their_arrivals_each_once
     let mut link = link(LinkConfig { delay: jittered(), ..LinkConfig::default() });
     let memory = offer_all(&mut link);
     assert_eq!(link.stats().in_flight(), COUNT);
-    assert!(memory <= 3 * COUNT * (size_of::<LinkEvent<u64>>() as u64 + 3 * 16), "{} B a packet", memory / COUNT);
+    assert!(memory <= 3 * COUNT * (size_of::<PacketEvent<u64>>() as u64 + 3 * 16), "{} B a packet", memory / COUNT);
     let events = drain(&mut link, Duration::ZERO);
     let mut seen = vec![false; COUNT as usize];
     for pair in events.windows(2) {
@@ -89,7 +89,7 @@ fn a_million_packets_with_jitter_arrive_in_the_order_of_their_arrivals_each_once
     }
     for event in &events {
         assert!(!std::mem::replace(&mut seen[event.sequence as usize], true));
-        assert_eq!((event.fate, event.sent), (Fate::Delivered(event.at), nanos(1000 * event.sequence)));
+        assert_eq!((event.fate, event.offered), (Fate::Delivered(event.at), nanos(1000 * event.sequence)));
     }
     assert_eq!((events.len() as u64, link.stats().in_flight()), (COUNT, 0));
     let mean = link.stats().mean_delay().unwrap().as_secs_f64();
@@ -112,7 +112,7 @@ fn a_million_packets_lost_copied_and_delayed_have_the_same_fates_however_they_ar
         offer_all(&mut link);
         let stats = link.stats();
         assert_eq!(stats.offered() + stats.duplicated(), stats.dropped_in_all() + stats.in_flight());
-        (drain(&mut link, late), *link.stats())
+        (drain(&mut link, late), link.stats())
     });
     assert_eq!(soon.1, late.1);
     assert!(soon.0 == late.0);
@@ -152,7 +152,7 @@ fn a_million_packets_in_a_queue_leave_one_a_microsecond() {
 /// come in the order of (arrival, sender, receiver, sequence); a tenth of them, by the direct and by the general path.
 #[test]
 fn a_million_packets_over_a_thousand_links_have_the_fates_of_single_links() {
-    let (nodes, each) = (32_u32, 1009_u64);
+    let (nodes, each) = (32_u16, 1009_u64);
     let config = LinkConfig { loss: Loss::Independent(Probability::new(0.01).unwrap()), delay: jittered(), ..LinkConfig::default() };
     let names: Vec<String> = (0..nodes).map(|node| format!("n{node}")).collect();
     let sent = |number: u64| nanos(number * 900_001);
@@ -164,13 +164,13 @@ fn a_million_packets_over_a_thousand_links_have_the_fates_of_single_links() {
                 network.handle_broadcast(sent(number), NodeId(from), SIZE, ()).unwrap();
             }
             while let Some(event) = network.poll_event() {
-                fates.push((event.at, event.from.0, event.to.0, event.sequence, event.fate));
+                fates.push((event.at, event.path.from.0, event.path.to.0, event.sequence, event.fate));
             }
         }
         network.handle_timeout(Instant::MAX).unwrap();
         let arrivals = fates.len();
         while let Some(event) = network.poll_event() {
-            fates.push((event.at, event.from.0, event.to.0, event.sequence, event.fate));
+            fates.push((event.at, event.path.from.0, event.path.to.0, event.sequence, event.fate));
         }
         assert!(fates[arrivals..].windows(2).all(|pair| key(&pair[0]) < key(&pair[1])));
         // What was dropped at once came out before; all others were in flight together.
@@ -180,7 +180,7 @@ fn a_million_packets_over_a_thousand_links_have_the_fates_of_single_links() {
     assert!(through_network(false, 101) == through_network(true, 101));
     let mut expected = Vec::new();
     for (from, to) in (0..nodes).flat_map(|from| (0..nodes).map(move |to| (from, to))).filter(|(from, to)| from != to) {
-        let mut link = Link::new(7, &LinkName::between(&names[from as usize], &names[to as usize]), config.clone());
+        let mut link = Link::new(7, &LinkName::between(&names[usize::from(from)], &names[usize::from(to)]), config.clone());
         for number in 0..each {
             link.handle_packet(sent(number), SIZE, ()).unwrap();
         }
@@ -196,7 +196,7 @@ fn a_million_packets_over_a_thousand_links_have_the_fates_of_single_links() {
     assert!(fates == expected);
 }
 
-fn key(fate: &(Instant, u32, u32, u64, Fate)) -> (Instant, u32, u32, u64) {
+fn key(fate: &(Instant, u16, u16, u64, Fate)) -> (Instant, u16, u16, u64) {
     (fate.0, fate.1, fate.2, fate.3)
 }
 

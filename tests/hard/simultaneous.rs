@@ -20,9 +20,9 @@ fn just_in_time(now: Instant) -> LinkConfig {
 /// order of (sender, receiver, sequence), whichever path they took through the program and in whatever order they were sent.
 #[test]
 fn twelve_thousand_packets_at_one_nanosecond_come_by_sender_receiver_and_number() {
-    let nodes = 64_u32;
+    let nodes = 64_u16;
     let names: Vec<String> = (0..nodes).map(|node| format!("n{node}")).collect();
-    let pairs: Vec<(u32, u32)> = (0..nodes).flat_map(|from| (0..nodes).map(move |to| (from, to))).filter(|(from, to)| from != to).collect();
+    let pairs: Vec<(u16, u16)> = (0..nodes).flat_map(|from| (0..nodes).map(move |to| (from, to))).filter(|(from, to)| from != to).collect();
     for (general, stride) in [(false, 1), (true, 1), (false, 1009), (true, 2017)] {
         let mut network = Network::new(NetworkConfig { seed: 1, nodes: names.clone(), general }, |_, _| just_in_time(Instant::ZERO));
         for round in 0..3_u64 {
@@ -36,13 +36,13 @@ fn twelve_thousand_packets_at_one_nanosecond_come_by_sender_receiver_and_number(
         }
         assert_eq!((network.poll_timeout(), network.poll_event()), (Some(AT), None));
         network.handle_timeout(AT).unwrap();
-        let came: Vec<(u32, u32, u64)> = std::iter::from_fn(|| network.poll_event())
+        let came: Vec<(u16, u16, u64)> = std::iter::from_fn(|| network.poll_event())
             .map(|event| {
-                assert_eq!((event.fate, event.payload), (Fate::Delivered(AT), (event.from.0, event.to.0, event.sequence)));
+                assert_eq!((event.fate, event.payload), (Fate::Delivered(AT), (event.path.from.0, event.path.to.0, event.sequence)));
                 event.payload
             })
             .collect();
-        let expected: Vec<(u32, u32, u64)> = pairs.iter().flat_map(|(from, to)| (0..3).map(move |round| (*from, *to, round))).collect();
+        let expected: Vec<(u16, u16, u64)> = pairs.iter().flat_map(|(from, to)| (0..3).map(move |round| (*from, *to, round))).collect();
         assert!(came == expected, "general {general}, stride {stride}");
     }
 }
@@ -107,8 +107,12 @@ fn peers_whose_clocks_meet_tick_in_their_places_and_are_served_before() {
     // 50·49 samples leave at each meeting, and arrive, in their order, at the next.
     let order = |from: usize, to: usize, sequence: u64| (from, to, sequence);
     for meeting in 1..=8_u64 {
-        let arrived: Vec<_> =
-            least.packets.iter().filter(|row| row.at.as_nanos() == meeting * 30_000_000).map(|row| order(row.from, row.to, row.sequence)).collect();
+        let arrived: Vec<_> = least
+            .packets
+            .iter()
+            .filter(|row| row.at.as_nanos() == meeting * 30_000_000)
+            .map(|row| order(row.path.from.index(), row.path.to.index(), row.sequence))
+            .collect();
         let expected =
             (0..50).flat_map(|from| (0..50).map(move |to| (from, to))).filter(|(from, to)| from != to).map(|(from, to)| order(from, to, meeting - 1));
         assert!(arrived.into_iter().eq(expected), "at {} ms", 30 * meeting);
@@ -130,7 +134,7 @@ fn a_thousand_changes_at_one_instant_are_made_in_their_order_before_the_tick() {
     let last = Duration::from_micros((999 * 7919) % 1000 + 1);
     let log = run(&draft.scene(), Model::Least);
     for row in &log.packets {
-        let expected = if row.sent < Instant::from_nanos(10_000_000) { row.sent } else { row.sent + last };
+        let expected = if row.offered < Instant::from_nanos(10_000_000) { row.offered } else { row.offered + last };
         assert_eq!(row.fate, Fate::Delivered(expected));
     }
     assert_eq!(log.packets.len(), 2 * 20);

@@ -58,7 +58,7 @@ fn while_all_is_lost_each_holds_the_last_sample_and_then_what_is_sent_after() {
         assert_eq!((stats.delivered(), stats.in_flight()), (348, 2));
     }
     let dropped = log.packets.iter().filter(|packet| packet.fate == Fate::Dropped(DropCause::Loss));
-    assert!(dropped.clone().all(|packet| packet.at == packet.sent && lost(packet.sent.as_nanos() / 1_000_000)));
+    assert!(dropped.clone().all(|packet| packet.at == packet.offered && lost(packet.offered.as_nanos() / 1_000_000)));
     assert_eq!(dropped.count(), 300);
 }
 

@@ -27,7 +27,7 @@ fn over_links_without_delay_each_tick_acts_on_the_states_of_that_tick() {
             }
         }
         for packet in &log.packets {
-            assert_eq!(packet.fate, Fate::Delivered(packet.sent));
+            assert_eq!(packet.fate, Fate::Delivered(packet.offered));
         }
     }
 }
@@ -108,8 +108,8 @@ fn a_network_serves_any_number_of_hops_at_one_instant() {
             assert_eq!(network.poll_timeout(), Some(now));
             let event = network.poll_event().unwrap();
             assert_eq!((event.payload, event.at, event.sequence, event.fate), (hop, now, hop / 3, Fate::Delivered(now)));
-            let to = NodeId((event.to.0 + 1) % 3);
-            network.handle_packet(now, event.to, to, Bytes::new(1), hop + 1).unwrap();
+            let to = NodeId((event.path.to.0 + 1) % 3);
+            network.handle_packet(now, event.path.to, to, Bytes::new(1), hop + 1).unwrap();
         }
     }
 }

@@ -1,5 +1,8 @@
 //! Scenes at random.
 
+use std::time::Duration;
+
+use cohaptic_peer::coordination::LawSettings;
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
 use proptest::collection::vec;
 use proptest::option;
@@ -8,22 +11,36 @@ use proptest::sample::select;
 
 use crate::{Draft, DraftHand, DraftLink, DraftPeer, Place, contact_to_toml};
 
+/// The laws of the paper.
+const PAPER: &[Coordination] = &[Coordination::AveragePosition, Coordination::ProportionalDerivative];
+
 /// Anything that a scene can hold: 2 to 5 peers, every kind of link, contact, hand and clock, up to three axes, changes on the way. It may be unstable.
 pub fn anything() -> impl Strategy<Value = Draft> {
     anything_among(2..=5_usize)
+}
+
+/// A law with values for the parameters that it has of its own, up to 40 ms.
+fn law() -> impl Strategy<Value = (Coordination, LawSettings)> {
+    (select(Coordination::ALL), 0..40_000_u64).prop_map(|(law, micros)| {
+        let mut settings = LawSettings::default();
+        for place in 0..law.parameters().len() {
+            settings.of_mut(law).set(place, Duration::from_micros(micros));
+        }
+        (law, settings)
+    })
 }
 
 /// [`anything`] with that many peers.
 pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Value = Draft> {
     (peers, 1..=3_usize).prop_flat_map(|(count, axes)| {
         let header = (30..200_u64, any::<u32>(), 0.05..2.0, 0.0..2.0, any::<bool>(), option::weighted(0.3, walls()));
-        let bodies = (place(0.02), place(0.2), select(Coordination::ALL), gains(2000.0, 20.0), prop_oneof![Just(2000_u64), Just(8000)]);
+        let bodies = (place(0.02), place(0.2), law(), gains(2000.0, 20.0), prop_oneof![Just(2000_u64), Just(8000)]);
         let peers = (vec(any_peer(axes), count), any_clocks(count));
         let network = (link(), vec((0..count, 1..count, link()), 0..3), vec(option::weighted(0.2, link()), 2 * count));
         let rest = (integrator(), vec((1..30_u64, change(count, axes)), 0..4));
         (header, bodies, peers, network, rest).prop_map(move |(header, bodies, (mut peers, clocks), network, (integrator, changes))| {
             let (duration, seed, mass, damping, split_mass, enclosure) = header;
-            let (position, velocity, strategy, gains, update) = bodies;
+            let (position, velocity, (strategy, settings), gains, update) = bodies;
             let (link, links, mut lines) = network;
             for (number, (peer, clock)) in peers.iter_mut().zip(clocks).enumerate() {
                 peer.name = format!("p{number}");
@@ -53,6 +70,7 @@ pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Valu
                 enclosure,
                 strategy,
                 gains,
+                settings,
                 update,
                 integrator,
                 peers,
@@ -110,7 +128,7 @@ pub fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<
 pub fn well_behaved(peers: impl Strategy<Value = usize>, link: impl Strategy<Value = String> + Clone) -> impl Strategy<Value = Draft> {
     peers.prop_flat_map(move |count| {
         let peer = (any::<bool>(), any::<bool>(), 0..2_u64, 0.1..0.3, 1.0..5.0, gains(1500.0, 8.0), -1.0..1.0, -0.01..0.01);
-        let header = (any::<u32>(), 0.5..1.0, 0.5..2.0, select(Coordination::ALL), 50.0..300.0, 5.0..15.0, 1..=4_u64);
+        let header = (any::<u32>(), 0.5..1.0, 0.5..2.0, select(PAPER), 50.0..300.0, 5.0..15.0, 1..=4_u64);
         (header, vec(peer, count), link.clone()).prop_map(move |(header, peers, link)| {
             let (seed, mass, damping, strategy, stiffness, gain, multiple) = header;
             let mut draft = Draft { seed, mass, damping, split_mass: false, strategy, link, update: multiple * 2000, ..Draft::calm(count) };

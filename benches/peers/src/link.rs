@@ -66,7 +66,7 @@ pub enum Kind {
     UniformLossAndRate,
 }
 
-/// Who has the link.
+/// The program that has the link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum By {
     /// This project.
@@ -163,7 +163,7 @@ impl By {
         }
     }
 
-    /// Sends so many packets, a microsecond apart, and gives how many are out by the last.
+    /// Sends a number of packets, a microsecond apart, and gives how many are out by the last.
     #[must_use]
     pub fn drive(self, kind: Kind, packets: u64) -> u64 {
         match (self, kind) {
@@ -174,7 +174,7 @@ impl By {
         }
     }
 
-    /// The same, with a look at the delay of each packet that is out.
+    /// Sends the packets too, with a look at the delay of each packet that is out.
     #[must_use]
     pub fn watch(self, kind: Kind, packets: u64) -> Seen {
         let mut seen = Seen::default();

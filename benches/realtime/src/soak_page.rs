@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use cohaptic_benches_realtime::machine;
-use cohaptic_benches_realtime::soak::{HEADER, Judgement, Outcome, Plan, Verdict, judge, run};
+use cohaptic_benches_realtime::soak::{HEADER, Judgement, Outcome, SoakPlan, Verdict, judge, run};
 use cohaptic_units::parse;
 
 const USAGE: &str = "expected: soak [DURATION] [--every SPAN] [--out FILE.md], with spans such as 90s, 10min or 1h";
@@ -28,7 +28,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         }
     })?;
     println!("{HEADER}");
-    let plan = Plan::new(duration, every);
+    let plan = SoakPlan::new(duration, every);
     let outcome = run(&plan, &interrupted, |row| {
         println!("{row}");
         // Somebody may read it in a file while it grows.
@@ -83,7 +83,7 @@ fn verdicts(judgements: &[Judgement]) -> impl Iterator<Item = String> {
     })
 }
 
-fn page(plan: &Plan, outcome: &Outcome, judgements: &[Judgement], command: &str) -> Result<String, std::fmt::Error> {
+fn page(plan: &SoakPlan, outcome: &Outcome, judgements: &[Judgement], command: &str) -> Result<String, std::fmt::Error> {
     let mut page = String::new();
     let span = |span: Duration| cohaptic_units::print::Span(span).to_string();
     writeln!(page, "# A soak\n")?;
@@ -133,7 +133,7 @@ fn today() -> String {
     date(SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs() / 86_400)
 }
 
-/// The date so many days after the beginning of 1970, as in 2025-03-01: by the rule of the calendar, a leap year every four years but for three of four centuries.
+/// The date a number of days after the beginning of 1970, as in 2025-03-01: by the rule of the calendar, a leap year every four years but for three of four centuries.
 fn date(days: u64) -> String {
     // Counted from the first of March of year 0, so that the leap day is the last of its year.
     let days = days + 719_468;

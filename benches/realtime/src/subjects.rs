@@ -1,4 +1,4 @@
-//! What is measured: the relay, a forwarder with a task a packet, and bare threads.
+//! The subjects: the relay, a forwarder with a task a packet, and bare threads.
 
 use std::error::Error;
 use std::net::{SocketAddr, UdpSocket};
@@ -7,7 +7,7 @@ use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use cohaptic_realtime::udp::DoorConfig;
+use cohaptic_realtime::udp::EndpointConfig;
 use cohaptic_realtime::{Clock as _, Lateness, LatenessSummary, MonotonicClock, Pacer, Pacing, Wishes, prepare_thread};
 use cohaptic_relay::{Form, Limits, Mesh, Program, Relay, RelayConfig, RunOptions};
 use cohaptic_scene::LinkTable;
@@ -64,7 +64,7 @@ fn measure(
 ) -> Done {
     let (memory, start) = (machine::memory(), machine::process_time());
     let sent = generate(source, to, rate, span);
-    // What is on its way arrives.
+    // Datagrams on their way arrive.
     std::thread::sleep(DELAY + Duration::from_millis(200));
     let after = machine::memory();
     let Said { error, sent: forwarded, at_socket, overload, clamped, refused } = end(&sent)?;
@@ -84,7 +84,7 @@ pub(crate) fn relay(pacing: Pacing, rate: u64, span: Duration) -> Done {
     let link = LinkConfig { delay: Delay::constant(DELAY), ..LinkConfig::default() };
     let form = Form::Mesh(Mesh { programs, links: LinkTable::uniform(2, link) });
     let config = RelayConfig { seed: 1, form, limits: Limits::default(), changes: Vec::new() };
-    let relay = Relay::bind(config, DoorConfig::default())?;
+    let relay = Relay::bind(config, EndpointConfig::default())?;
     let to = relay.ports().nth(1).map(|(_, address)| address).ok_or("no port")?;
     let stop = Arc::new(AtomicBool::new(false));
     let is_over = Arc::clone(&stop);

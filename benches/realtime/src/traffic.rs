@@ -1,4 +1,4 @@
-//! Who sends through what is measured, and who receives behind it: both in this process, as the forwarder is.
+//! The sender before the measured program, and the receiver behind it: both in this process, as the forwarder is.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::sync::Arc;

@@ -13,7 +13,7 @@ use cohaptic_live::client::{Client, ClientConfig, Heard};
 use cohaptic_live::{EntropyError, MAX_DATAGRAM, Place, SessionKey, SystemEntropy};
 use cohaptic_peer::State;
 use cohaptic_peer::wire::{MAX_LEN, Sample};
-use cohaptic_realtime::udp::{BindError, DoorConfig, ReceiveBuffers, UdpDoor};
+use cohaptic_realtime::udp::{BindError, EndpointConfig, ReceiveBuffers, UdpEndpoint};
 use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Pacing, Wishes, prepare_thread};
 use cohaptic_units::Instant;
 
@@ -72,7 +72,6 @@ pub struct Visitor {
 
 /// Why there are no more visits.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum Failure {
     /// A socket.
     #[error(transparent)]
@@ -130,9 +129,9 @@ struct Visiting {
     clock: MonotonicClock,
     client: Client,
     sequence: u64,
-    present: UdpDoor,
+    present: UdpEndpoint,
     /// The socket of the visit before stays open during the next one: what the door sent in the moment at which it was left is still counted.
-    former: UdpDoor,
+    former: UdpEndpoint,
     buffers: ReceiveBuffers,
     /// What closed sockets did, and what was made of what came.
     visits: Visits,
@@ -235,6 +234,9 @@ fn client(invitation: &Invitation, now: Instant) -> Client {
     Client::new(ClientConfig::Keyed { session: invitation.session, place: Place(invitation.place), key: invitation.key.clone() }, now)
 }
 
-fn socket() -> Result<UdpDoor, BindError> {
-    UdpDoor::bind(SocketAddr::from(([127, 0, 0, 1], 0)), DoorConfig { receive_buffer: 1 << 20, largest: MAX_DATAGRAM, ..DoorConfig::default() })
+fn socket() -> Result<UdpEndpoint, BindError> {
+    UdpEndpoint::bind(
+        SocketAddr::from(([127, 0, 0, 1], 0)),
+        EndpointConfig { receive_buffer: 1 << 20, largest: MAX_DATAGRAM, ..EndpointConfig::default() },
+    )
 }

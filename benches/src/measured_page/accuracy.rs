@@ -8,8 +8,7 @@ use cohaptic_accuracy::short;
 use cohaptic_benches::effort::Effort;
 use serde::Deserialize;
 
-use crate::programs::Programs;
-use crate::steps::Measured;
+use crate::programs::{Measured, Programs};
 
 /// Where everything that the command writes lies.
 const FOLDER: &str = "out/measured/accuracy";
@@ -46,7 +45,7 @@ const PLOTS: [(&str, &str, &str); 12] = [
 
 /// What `cohaptic accuracy --json` prints.
 #[derive(Debug, Deserialize)]
-struct Document {
+struct AccuracyDocument {
     rows: Vec<Row>,
     interrupted: bool,
 }
@@ -72,7 +71,8 @@ pub(crate) fn words(effort: Effort) -> String {
 
 pub(crate) fn measure(programs: &Programs) -> Result<Measured, String> {
     let printed = programs.cohaptic(&words(programs.effort))?;
-    let document: Document = serde_json::from_str(&printed).map_err(|error| format!("what cohaptic printed is no document of accuracy: {error}"))?;
+    let document: AccuracyDocument =
+        serde_json::from_str(&printed).map_err(|error| format!("what cohaptic printed is no document of accuracy: {error}"))?;
     if document.interrupted {
         return Err("cohaptic accuracy was interrupted".to_owned());
     }
@@ -201,7 +201,7 @@ mod tests {
     fn a_document_is_read() {
         let text = r#"{"rows": [{"subject": "time", "case": "c", "method": "m", "setting": "", "cost": null, "cost_unit": "ns", "error": 0.5,
             "error_unit": "e", "reference": "r", "note": ""}], "interrupted": false, "wall_s": 1.0}"#;
-        let document: Document = serde_json::from_str(text).unwrap();
+        let document: AccuracyDocument = serde_json::from_str(text).unwrap();
         assert_eq!((document.rows.len(), document.interrupted, document.rows[0].cost), (1, false, None));
     }
 }

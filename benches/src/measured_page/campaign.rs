@@ -6,10 +6,9 @@ use std::path::PathBuf;
 use cohaptic_benches::effort::Effort;
 use serde::Deserialize;
 
-use crate::programs::Programs;
-use crate::steps::Measured;
+use crate::programs::{Measured, Programs};
 
-/// What is run: two scenes that go side by side, and one that goes event by event.
+/// The scenes: two that go side by side, and one that goes event by event.
 const SCENES: [&str; 3] = ["paper/5-1-ap-2100", "network/loss-independent", "network/queue-codel"];
 
 /// How many, the option, and the name of the folder.
@@ -17,7 +16,7 @@ const THREADS: [(&str, &str, &str); 2] = [("1", " --threads 1", "one-thread"), (
 
 /// What `cohaptic campaign --json` says.
 #[derive(Debug, Deserialize)]
-struct Document {
+struct CampaignDocument {
     title: String,
     runs: u64,
     runs_computed: u64,
@@ -53,7 +52,7 @@ pub(crate) fn commands(effort: Effort) -> Vec<String> {
 
 pub(crate) fn measure(programs: &Programs) -> Result<Measured, String> {
     let cases = cases(programs.effort);
-    let mut rounds: Vec<Vec<Document>> = cases.iter().map(|_| Vec::new()).collect();
+    let mut rounds: Vec<Vec<CampaignDocument>> = cases.iter().map(|_| Vec::new()).collect();
     for _ in 0..programs.effort.of(3, 3, 1) {
         for (case, documents) in cases.iter().zip(&mut rounds) {
             documents.push(case.run(programs)?);
@@ -78,11 +77,11 @@ pub(crate) fn measure(programs: &Programs) -> Result<Measured, String> {
 }
 
 impl Case {
-    fn run(&self, programs: &Programs) -> Result<Document, String> {
+    fn run(&self, programs: &Programs) -> Result<CampaignDocument, String> {
         // A campaign that is there already would be left as it is.
         self.remove()?;
         let printed = programs.cohaptic(&self.words)?;
-        let document: Document =
+        let document: CampaignDocument =
             serde_json::from_str(&printed).map_err(|error| format!("what cohaptic printed is no document of a campaign: {error}"))?;
         if document.runs_computed != document.runs {
             return Err(format!("{} of {} runs were computed in an empty folder", document.runs_computed, document.runs));
@@ -90,8 +89,8 @@ impl Case {
         Ok(document)
     }
 
-    fn row(&self, document: &Document, bytes: usize) -> String {
-        let Document { title, runs, wall_s, runs_per_s, .. } = document;
+    fn row(&self, document: &CampaignDocument, bytes: usize) -> String {
+        let CampaignDocument { title, runs, wall_s, runs_per_s, .. } = document;
         let Self { scene, threads, .. } = self;
         format!("| {title} (`{scene}`) | {threads} | {runs} | {wall_s:.2} | {runs_per_s:.0} | {} |\n", bytes.div_ceil(1000))
     }
@@ -120,7 +119,7 @@ mod tests {
     #[test]
     fn a_document_becomes_a_row_and_every_scene_is_shipped() {
         let text = r#"{"title": "Two", "runs": 20, "runs_computed": 20, "wall_s": 0.504, "runs_per_s": 39.7, "out": "x", "diverged": 0}"#;
-        let document: Document = serde_json::from_str(text).unwrap();
+        let document: CampaignDocument = serde_json::from_str(text).unwrap();
         let cases = cases(Effort::Smoke);
         assert_eq!(cases[2].row(&document, 1001), "| Two (`network/loss-independent`) | 1 | 20 | 0.50 | 40 | 2 |\n");
         assert!(cases.iter().all(|case| Programs::root().join(format!("scenarios/{}.toml", case.scene)).is_file()));

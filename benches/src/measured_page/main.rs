@@ -1,4 +1,4 @@
-//! Writes `docs/measured.md` and the pages that have a program of their own: `benches/measure`, which builds what is needed first.
+//! Writes `docs/measured.md` and the pages that have a program of their own: `benches/measure`, which builds the programs first.
 #![allow(clippy::print_stderr, reason = "a line for each step is what people look at while it runs")]
 
 mod accuracy;
@@ -7,18 +7,18 @@ mod campaign;
 mod page;
 mod programs;
 mod steps;
-mod whole_file;
 
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use arguments::Arguments;
 use clap::Parser as _;
+use cohaptic_files::write_whole;
 use page::Page;
-use programs::Programs;
-use steps::Measured;
+use programs::{Measured, Programs};
 
 fn main() -> ExitCode {
     match measure(&Arguments::parse()) {
@@ -58,13 +58,19 @@ fn measure(arguments: &Arguments) -> Result<Vec<&'static str>, String> {
             }
         };
         for (path, content) in &measured.files {
-            whole_file::write(&docs.join(path), content)?;
+            write(&docs.join(path), content)?;
         }
         page.set(step, step.section(&programs, &measured.body));
-        whole_file::write(&file, &page.text())?;
+        write(&file, &page.text())?;
         eprintln!("      done in {:.1} s", start.elapsed().as_secs_f64());
     }
     Ok(failed)
+}
+
+/// Writes a file, and makes the folder for it.
+fn write(path: &Path, content: &str) -> Result<(), String> {
+    let written = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| write_whole(path, |file| file.write_all(content.as_bytes())));
+    written.map_err(|error| format!("cannot write {}: {error}", path.display()))
 }
 
 fn read(file: &Path) -> Result<Page, String> {

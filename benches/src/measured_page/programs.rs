@@ -53,3 +53,19 @@ impl Programs {
         String::from_utf8(output.stdout).map_err(|_| format!("{name} printed what is not UTF-8"))
     }
 }
+
+/// What came of a step.
+#[derive(Debug)]
+pub(crate) struct Measured {
+    /// What stands below the commands.
+    pub(crate) body: String,
+    /// Files in `docs/`, and their content.
+    pub(crate) files: Vec<(PathBuf, String)>,
+}
+
+impl Measured {
+    /// The note on a step that could not be done here.
+    pub(crate) fn nothing(why: &str) -> Self {
+        Self { body: format!("**Not measured then:** {why}. The page linked above, if it is there, is from an earlier day.\n"), files: Vec::new() }
+    }
+}

@@ -1,12 +1,10 @@
 //! The sections: what each asks, the commands that answer, and how the answer gets onto the page.
 
-use std::path::PathBuf;
-
 use clap::ValueEnum;
 use cohaptic_benches::effort::Effort;
 use cohaptic_benches::{machine, pages};
 
-use crate::programs::Programs;
+use crate::programs::{Measured, Programs};
 use crate::{accuracy, campaign};
 
 /// A section, in the order of the page.
@@ -28,22 +26,6 @@ pub(crate) enum Step {
     Testkit,
     /// Also writes peers-speed.md; needs the crates of others, and measures ns-3, SimPy and numpy where they are installed
     Peers,
-}
-
-/// What came of a step.
-#[derive(Debug)]
-pub(crate) struct Measured {
-    /// What stands below the commands.
-    pub(crate) body: String,
-    /// Files in `docs/`, and what is in them.
-    pub(crate) files: Vec<(PathBuf, String)>,
-}
-
-impl Measured {
-    /// What is said of a step that could not be done here.
-    pub(crate) fn nothing(why: &str) -> Self {
-        Self { body: format!("**Not measured then:** {why}. The page linked above, if it is there, is from an earlier day.\n"), files: Vec::new() }
-    }
 }
 
 /// A page of its own, from which tables are taken.
@@ -113,7 +95,7 @@ impl Step {
             Self::Samplers => "## Random delays",
             Self::Stability => "## Verdicts on stability",
             Self::Testkit => "## The test kit",
-            Self::Peers => "## Beside others",
+            Self::Peers => "## Comparison others",
         }
     }
 
@@ -194,7 +176,7 @@ one link alone, a stability map, and what each of the others does not model: [pe
         }
     }
 
-    /// The first lines of the section: what is asked, and the commands.
+    /// The first lines of the section: the question, and the commands.
     pub(crate) fn head(self, effort: Effort) -> String {
         let commands: String = self.commands(effort).iter().map(|command| format!("    {command}\n")).collect();
         format!("{}\n\n{}\n\n{commands}", self.heading(), self.question())

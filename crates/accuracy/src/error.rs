@@ -6,7 +6,6 @@ use cohaptic_wan::{NetworkError, TimeWentBack};
 
 /// Why a measurement came to no end.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum AccuracyError {
     /// Whoever watches asked for it.
     #[error("stopped")]

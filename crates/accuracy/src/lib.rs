@@ -11,7 +11,6 @@
 pub mod analysis;
 mod cost;
 mod csv;
-mod done;
 mod error;
 mod groups;
 mod html;
@@ -23,6 +22,7 @@ mod plots;
 pub mod real_time;
 mod rounds;
 mod row;
+mod row_sink;
 mod subject;
 mod text;
 pub mod time;
@@ -43,6 +43,12 @@ pub use watch::{Unwatched, Watch};
 pub struct Options {
     /// Fewer settings and less work a row: under a minute for everything, instead of under ten.
     pub quick: bool,
+}
+
+impl Options {
+    fn of<T>(self, full: T, quick: T) -> T {
+        if self.quick { quick } else { full }
+    }
 }
 
 /// Measures those subjects, in the order of [`Subject::ALL`].

@@ -15,7 +15,7 @@ pub struct Plot {
     pub id: String,
     /// What it shows.
     pub title: String,
-    /// What is not drawn, or drawn elsewhere; may be empty.
+    /// The methods that are not drawn, or drawn in another place; may be empty.
     pub caption: String,
     /// The drawing, an SVG document with a ground of its own, light or dark as its reader prefers.
     pub svg: String,

@@ -1,4 +1,4 @@
-//! Costs side by side: what is compared takes turns, so that what else the machine does hits all of it.
+//! Costs side by side: the subjects take turns, so that other work of the machine hits all of them.
 
 use std::time::Duration;
 

@@ -26,3 +26,11 @@ pub struct Row {
     /// What a reader should know of this row; empty if nothing.
     pub note: String,
 }
+
+impl Row {
+    /// A row that has no error yet.
+    pub(crate) fn of(subject: Subject, case: &str, method: &str, setting: String, (cost, cost_unit): (f64, &'static str)) -> Self {
+        let (case, method) = (case.to_owned(), method.to_owned());
+        Self { subject, case, method, setting, cost: Some(cost), cost_unit, error: None, error_unit: "", reference: "", note: String::new() }
+    }
+}

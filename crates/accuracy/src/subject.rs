@@ -1,4 +1,4 @@
-//! What is looked at.
+//! The subjects of the measurement.
 
 use crate::{AccuracyError, Options, Row, Watch, analysis, least, motion, network, real_time, time};
 
@@ -40,10 +40,10 @@ impl Subject {
         match self {
             Self::Motion => motion::rows(options, watch),
             Self::Time => time::rows(options, watch),
-            Self::Network => network::rows(options, watch),
-            Self::Analysis => analysis::rows(options, watch),
-            Self::RealTime => real_time::rows(options, watch),
-            Self::LeastModel => least::rows(options, watch),
+            Self::Network => network::rows(options.of(network::Effort::FULL, network::Effort::QUICK), watch),
+            Self::Analysis => analysis::rows(options.of(analysis::Effort::FULL, analysis::Effort::QUICK), watch),
+            Self::RealTime => real_time::rows(options.of(real_time::Effort::FULL, real_time::Effort::QUICK), watch),
+            Self::LeastModel => least::rows(options.of(least::Effort::FULL, least::Effort::QUICK), watch),
         }
     }
 }

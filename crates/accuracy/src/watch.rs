@@ -1,4 +1,4 @@
-//! Who watches the work.
+//! The watcher of the work.
 
 use crate::Row;
 

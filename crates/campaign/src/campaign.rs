@@ -4,9 +4,11 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
+use cohaptic_files::write_whole;
+
 use crate::error::CampaignError;
-use crate::folder::{Folder, Manifest, write_whole};
-use crate::plan::{Parts, Plan};
+use crate::folder::{Folder, Manifest};
+use crate::plan::{CampaignPlan, Parts};
 use crate::report::{Report, Tally};
 use crate::table::{Column, Head, Row, TableError, columns};
 use crate::verdicts::{Journal, Judge, Judgement, judge, read_whole, write_all};
@@ -16,7 +18,7 @@ use crate::work::Work;
 /// A campaign in its folder, which no other process works on as long as this value lives.
 #[derive(Debug)]
 pub struct Campaign {
-    plan: Plan,
+    plan: CampaignPlan,
     manifest: Manifest,
     parts: Parts,
     columns: Vec<Column>,
@@ -45,7 +47,7 @@ impl Campaign {
     ///
     /// [`CampaignError`] if a combination is refused, if the folder is no folder, has other files or another campaign in it, if another process works on it,
     /// or if it cannot be read or written.
-    pub fn open(plan: Plan, folder: &Path, watch: &dyn Watch) -> Result<Self, CampaignError> {
+    pub fn open(plan: CampaignPlan, folder: &Path, watch: &dyn Watch) -> Result<Self, CampaignError> {
         let begun = Folder::has_campaign(folder)?;
         let new = if begun { None } else { Some(Self::new_manifest(&plan, watch)?) };
         let folder = Folder::take(folder)?;
@@ -66,14 +68,14 @@ impl Campaign {
         Ok(Self { plan, manifest, parts, columns, folder, judgements: Arc::from([]) })
     }
 
-    fn new_manifest(plan: &Plan, watch: &dyn Watch) -> Result<Manifest, CampaignError> {
+    fn new_manifest(plan: &CampaignPlan, watch: &dyn Watch) -> Result<Manifest, CampaignError> {
         let checked = plan.check(watch)?;
         let parts = Parts::of(plan, &checked, columns(plan.variations(), plan.has_verdicts(), &checked.roster).len())?;
         Ok(Manifest::new(plan, plan.fingerprint_of(&checked.numbers), checked.roster, parts))
     }
 
     /// The manifest in the folder, which must be that of this plan.
-    fn same_manifest(plan: &Plan, folder: &Folder) -> Result<Manifest, CampaignError> {
+    fn same_manifest(plan: &CampaignPlan, folder: &Folder) -> Result<Manifest, CampaignError> {
         let manifest = Manifest::read(&folder.manifest())?;
         let mut differences = manifest.differences(plan);
         if differences.is_empty() && !manifest.has_fingerprint(plan.fingerprint()?) {
@@ -84,7 +86,7 @@ impl Campaign {
 
     /// The plan.
     #[must_use]
-    pub const fn plan(&self) -> &Plan {
+    pub const fn plan(&self) -> &CampaignPlan {
         &self.plan
     }
 

@@ -9,7 +9,6 @@ use crate::vary::VaryError;
 
 /// Why there is no campaign, or why it ended.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum CampaignError {
     /// A text does not vary a key.
     #[error(transparent)]
@@ -50,7 +49,7 @@ pub enum CampaignError {
     /// There is something else than a folder.
     #[error("{} is no folder: expected one for the campaign, which need not exist yet", path.display())]
     NoFolder {
-        /// What is there.
+        /// The name of the thing found there.
         path: PathBuf,
     },
     /// The folder holds files and no campaign.
@@ -66,7 +65,7 @@ pub enum CampaignError {
     Other {
         /// The folder.
         path: PathBuf,
-        /// What is different, in words.
+        /// The differences, in words.
         differences: Vec<String>,
     },
     /// What the folder holds is not as it was written.
@@ -74,7 +73,7 @@ pub enum CampaignError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         message: String,
         /// What helps.
         way_out: &'static str,
@@ -85,7 +84,7 @@ pub enum CampaignError {
         /// The folder.
         path: PathBuf,
     },
-    /// A file cannot be read or written. What is finished is kept.
+    /// A file cannot be read or written. Finished parts are kept.
     #[error("cannot {verb} {}: {error}", path.display())]
     File {
         /// What cannot be done to it.

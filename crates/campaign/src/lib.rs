@@ -1,7 +1,7 @@
 //! Many runs of one scene: keys varied over ranges and lists, seeds counted up, on all threads, kept in parts so that a campaign can be stopped anywhere and
 //! continued, and put together as one table.
 //!
-//! A [`Plan`] is what is asked for: a scene, keys that are [varied](Variation), and how many runs there are of each combination. [`Campaign::open`] checks all
+//! A [`CampaignPlan`] is a scene, keys that are [varied](Variation), and how many runs there are of each combination. [`Campaign::open`] checks all
 //! of it before anything is written, and binds it to a folder; [`Campaign::run`] does the runs that are missing. The table is the same to the last byte
 //! whatever the number of threads and however often it was interrupted, by Ctrl-C, a full disk or the loss of power.
 //!
@@ -12,7 +12,7 @@
 //! Nothing here is printed and no clock is read.
 //!
 //! ```
-//! use cohaptic_campaign::{Asked, Campaign, Format, NoWatch, Outcome, Plan, Variation};
+//! use cohaptic_campaign::{PlanSpec, Campaign, Format, NoWatch, Outcome, CampaignPlan, Variation};
 //!
 //! let text = r#"
 //!     scene = { duration = "100ms", count = 2 }
@@ -23,8 +23,8 @@
 //! "#;
 //! let folder = tempfile::tempdir()?;
 //! let variations = vec![Variation::parse("coordination.stiffness=500..1500/3")?];
-//! let asked = Asked { text, file: "two.toml".as_ref(), set: &[], variations, runs: 10, format: Format::Csv, part: None, program: "an example" };
-//! let mut campaign = Campaign::open(Plan::new(asked)?, &folder.path().join("out"), &NoWatch)?;
+//! let spec = PlanSpec { text, file: "two.toml".as_ref(), set: &[], variations, runs: 10, format: Format::Csv, part: None, program: "an example" };
+//! let mut campaign = Campaign::open(CampaignPlan::new(spec)?, &folder.path().join("out"), &NoWatch)?;
 //! let Outcome::Finished(report) = campaign.run(&NoWatch)? else { unreachable!() };
 //! assert_eq!((report.combinations.len(), report.runs), (3, 30));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -44,7 +44,7 @@ mod work;
 
 pub use campaign::{Campaign, Outcome};
 pub use error::CampaignError;
-pub use plan::{Asked, MOST_COMBINATIONS, MOST_RUNS, Plan};
+pub use plan::{CampaignPlan, MOST_COMBINATIONS, MOST_RUNS, PlanSpec};
 pub use quantiles::{MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Quantiles};
 pub use report::{CombinationReport, Report};
 pub use table::{Column, Format, Kind, Value};

@@ -1,8 +1,8 @@
-//! Who looks on.
+//! The watcher of a campaign.
 
 /// Is told how far a campaign has come, and can end it. Called from many threads.
 pub trait Watch: Sync {
-    /// Whether to go on. Asked before every few combinations that are checked, before each that is judged, and before every few runs.
+    /// Whether to go on. PlanSpec before every few combinations that are checked, before each that is judged, and before every few runs.
     fn keep_going(&self) -> bool {
         true
     }

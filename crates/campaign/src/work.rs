@@ -11,8 +11,8 @@ use cohaptic_harness::run_side_by_side;
 use cohaptic_scene::Scene;
 
 use crate::error::CampaignError;
-use crate::plan::{CHUNK, Parts, Plan};
-use crate::table::{Place, Roster, Row, row};
+use crate::plan::{CHUNK, CampaignPlan, Parts};
+use crate::table::{Roster, Row, RunId, row};
 use crate::verdicts::Judgement;
 use crate::watch::Watch;
 
@@ -21,7 +21,7 @@ pub(crate) type Keep<'a> = dyn Fn(u64, &[Row]) -> Result<(), CampaignError> + Sy
 
 /// The work of a campaign.
 pub(crate) struct Work<'a> {
-    pub(crate) plan: &'a Plan,
+    pub(crate) plan: &'a CampaignPlan,
     pub(crate) roster: &'a Roster,
     /// One for each combination; none if none are asked for.
     pub(crate) judgements: &'a [Judgement],
@@ -97,7 +97,7 @@ impl Work<'_> {
         let summaries = run_side_by_side(&scenes);
         let rows = runs.zip(scenes.iter().zip(&summaries)).map(|(run, (scene, summary))| {
             let combination = run / self.plan.runs_of_each();
-            let place = Place { run, combination, seed: scene.seed };
+            let place = RunId { run, combination, seed: scene.seed };
             let judgement = usize::try_from(combination).ok().and_then(|place| self.judgements.get(place));
             row(place, self.plan.values(combination), judgement, summary, self.roster)
         });
@@ -134,10 +134,10 @@ impl Work<'_> {
 }
 
 impl Scenes {
-    /// At most so many are kept.
+    /// The most that are kept.
     const MOST: usize = 64;
 
-    fn get(&self, combination: u64, plan: &Plan) -> Result<Arc<Scene>, CampaignError> {
+    fn get(&self, combination: u64, plan: &CampaignPlan) -> Result<Arc<Scene>, CampaignError> {
         if let Some(scene) = lock(&self.0).get(&combination) {
             return Ok(scene.clone());
         }

@@ -21,7 +21,7 @@ pub(crate) struct Interruptible;
 
 impl Watch for Interruptible {
     fn stops(&self) -> bool {
-        interrupt::asked()
+        interrupt::requested()
     }
 }
 
@@ -80,7 +80,7 @@ impl Watch for AnalysisWatch {
     }
 
     fn stops(&self) -> bool {
-        interrupt::asked()
+        interrupt::requested()
     }
 }
 

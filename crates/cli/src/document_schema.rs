@@ -2,62 +2,39 @@
 
 use serde::Serialize;
 
-/// A kind of JSON document.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum DocumentSchema {
-    Run,
-    Check,
-    Explain,
-    Campaign,
-    StabilityPoint,
-    StabilityMap,
-    StabilityBoundary,
-    Admittance,
-    Live,
-    Relay,
-    Router,
-    FalconProbe,
-    FalconHome,
-    FalconWatch,
-    FalconSimulate,
-    Link,
-    Fit,
-    Paper,
-    Accuracy,
-    Error,
+/// A kind of JSON document: its name, which never changes, and its version, which counts up where a key vanishes or changes its meaning; new keys do not
+/// change it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DocumentSchema {
+    name: &'static str,
+    version: u32,
 }
 
 impl DocumentSchema {
-    /// Its name, which never changes, and its version, which counts up where a key vanishes or changes its meaning; new keys do not change it.
-    const fn name_and_version(self) -> (&'static str, u32) {
-        match self {
-            Self::Run => ("cohaptic/run", 1),
-            Self::Check => ("cohaptic/check", 1),
-            Self::Explain => ("cohaptic/explain", 1),
-            Self::Campaign => ("cohaptic/campaign", 1),
-            Self::StabilityPoint => ("cohaptic/stability-point", 1),
-            Self::StabilityMap => ("cohaptic/stability-map", 1),
-            Self::StabilityBoundary => ("cohaptic/stability-boundary", 1),
-            Self::Admittance => ("cohaptic/admittance", 1),
-            Self::Live => ("cohaptic/live", 1),
-            Self::Relay => ("cohaptic/relay", 1),
-            Self::Router => ("cohaptic/router", 1),
-            Self::FalconProbe => ("cohaptic/falcon-probe", 1),
-            Self::FalconHome => ("cohaptic/falcon-home", 1),
-            Self::FalconWatch => ("cohaptic/falcon-watch", 1),
-            Self::FalconSimulate => ("cohaptic/falcon-simulate", 1),
-            Self::Link => ("cohaptic/link", 1),
-            Self::Fit => ("cohaptic/fit", 1),
-            Self::Paper => ("cohaptic/paper", 1),
-            Self::Accuracy => ("cohaptic/accuracy", 1),
-            Self::Error => ("cohaptic/error", 1),
-        }
-    }
+    pub(crate) const RUN: Self = Self { name: "cohaptic/run", version: 1 };
+    pub(crate) const CHECK: Self = Self { name: "cohaptic/check", version: 1 };
+    pub(crate) const EXPLAIN: Self = Self { name: "cohaptic/explain", version: 1 };
+    pub(crate) const CAMPAIGN: Self = Self { name: "cohaptic/campaign", version: 1 };
+    pub(crate) const STABILITY_POINT: Self = Self { name: "cohaptic/stability-point", version: 1 };
+    pub(crate) const STABILITY_MAP: Self = Self { name: "cohaptic/stability-map", version: 1 };
+    pub(crate) const STABILITY_BOUNDARY: Self = Self { name: "cohaptic/stability-boundary", version: 1 };
+    pub(crate) const ADMITTANCE: Self = Self { name: "cohaptic/admittance", version: 1 };
+    pub(crate) const LIVE: Self = Self { name: "cohaptic/live", version: 1 };
+    pub(crate) const RELAY: Self = Self { name: "cohaptic/relay", version: 1 };
+    pub(crate) const ROUTER: Self = Self { name: "cohaptic/router", version: 1 };
+    pub(crate) const FALCON_PROBE: Self = Self { name: "cohaptic/falcon-probe", version: 1 };
+    pub(crate) const FALCON_HOME: Self = Self { name: "cohaptic/falcon-home", version: 1 };
+    pub(crate) const FALCON_WATCH: Self = Self { name: "cohaptic/falcon-watch", version: 1 };
+    pub(crate) const FALCON_SIMULATE: Self = Self { name: "cohaptic/falcon-simulate", version: 1 };
+    pub(crate) const LINK: Self = Self { name: "cohaptic/link", version: 1 };
+    pub(crate) const FIT: Self = Self { name: "cohaptic/fit", version: 1 };
+    pub(crate) const PAPER: Self = Self { name: "cohaptic/paper", version: 1 };
+    pub(crate) const ACCURACY: Self = Self { name: "cohaptic/accuracy", version: 1 };
+    pub(crate) const ERROR: Self = Self { name: "cohaptic/error", version: 1 };
 
     /// The document with its kind and version in front.
     pub(crate) const fn of<D: Serialize>(self, document: &D) -> Versioned<'_, D> {
-        let (schema, version) = self.name_and_version();
-        Versioned { schema, version, document }
+        Versioned { schema: self.name, version: self.version, document }
     }
 }
 

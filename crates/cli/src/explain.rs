@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::{input, output};
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct ExplainDocument<'a> {
     title: &'a str,
     models: Vec<Model<'a>>,
     left_out: &'a [String],
@@ -47,17 +47,19 @@ struct Cost {
 pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure> {
     let scene = input::with(&arguments.scene.scene, |text, file| Scene::parse(text, file, &arguments.scene.overrides.set))?;
     let explanation = harness::explain(&scene);
-    if arguments.scene.json {
-        output::json(DocumentSchema::Explain, &document(&scene, &explanation))?;
-    } else {
-        output::text(&describe(&scene, &explanation))?;
-    }
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::EXPLAIN,
+        &document(&scene, &explanation),
+        || describe(&scene, &explanation),
+        output::NO_FILES,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn document<'a>(scene: &'a Scene, explanation: &'a Explanation) -> Document<'a> {
+fn document<'a>(scene: &'a Scene, explanation: &'a Explanation) -> ExplainDocument<'a> {
     let Explanation { models, left_out, dimensions, cost } = explanation;
-    Document {
+    ExplainDocument {
         title: &scene.title,
         models: models.iter().map(|row| Model { part: &row.part, model: &row.model, reason: &row.reason }).collect(),
         left_out,

@@ -1,20 +1,12 @@
 //! Why a command ended without its result, and with which exit status.
 
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
-use anstream::{AutoStream, ColorChoice};
-use anstyle::{AnsiColor, Style};
-use clap::builder::StyledStr;
-use clap::error::{ContextKind, ContextValue};
 use cohaptic_harness::record::RecordError;
 use cohaptic_scene::{Diagnostic, Scene, SceneError, at_peer};
-use cohaptic_units::{Visible, visible_lines};
 
-use crate::{input, output};
-
-mod document;
+use crate::input;
 
 /// An expectation failed.
 pub(crate) const EXPECTATION: u8 = 1;
@@ -25,7 +17,7 @@ pub(crate) const INPUT_OUTPUT: u8 = 3;
 /// Interrupted, as shells say it: 128 and the number of SIGINT.
 pub(crate) const INTERRUPTED: u8 = 130;
 /// Nobody reads standard output any more, as shells say it: 128 and the number of SIGPIPE.
-const CLOSED: u8 = 141;
+pub(crate) const CLOSED: u8 = 141;
 
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -63,27 +55,7 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// Says on standard error what went wrong, under `--json` in a document on standard output too, and gives the exit status.
-    pub(crate) fn report(&self) -> ExitCode {
-        let status = self.status();
-        // Whoever closes a pipe has read enough: that is no error, and there is nothing to be said.
-        if status == CLOSED {
-            return ExitCode::from(status);
-        }
-        let message = self.message();
-        let (kind, colour) = if status == INTERRUPTED { ("interrupted", AnsiColor::Yellow) } else { ("error", AnsiColor::Red) };
-        let style = if AutoStream::choice(&io::stderr()) == ColorChoice::Never { Style::new() } else { colour.on_default().bold() };
-        // If standard error cannot be written to either, the exit status is all that is left to say it with.
-        let _ = io::stderr().write_all(
-            visible_lines(&format!("{kind}: {message}\n")).replacen(&format!("{kind}:"), &format!("{style}{kind}:{style:#}"), 1).as_bytes(),
-        );
-        if output::wants_json_error() {
-            let _ = document::print(self, &message, status);
-        }
-        ExitCode::from(status)
-    }
-
-    fn status(&self) -> u8 {
+    pub(crate) fn status(&self) -> u8 {
         match self {
             Self::Scene(error) | Self::Override { error, .. } | Self::LinkKeys(error) => scene_status(error),
             Self::Combination { error, .. } => scene_status(error),
@@ -94,7 +66,7 @@ impl Failure {
         }
     }
 
-    fn message(&self) -> String {
+    pub(crate) fn message(&self) -> String {
         match self {
             Self::Scene(error) | Self::Override { error, .. } | Self::LinkKeys(error) => self.in_words_of_options(error.to_string()),
             Self::Combination { error, combination, .. } => self.in_words_of_options(error.to_string()) + combination,
@@ -118,7 +90,7 @@ impl Failure {
     }
 
     /// The option that a fault in an override was given with.
-    const fn option(&self) -> &'static str {
+    pub(crate) const fn option(&self) -> &'static str {
         match self {
             Self::Override { option, .. } => option,
             Self::Combination { is_varied: true, .. } => "--vary",
@@ -135,7 +107,7 @@ impl Failure {
     }
 
     /// Why the scene is refused, if it is.
-    fn scene_error(&self) -> Option<&SceneError> {
+    pub(crate) fn scene_error(&self) -> Option<&SceneError> {
         match self {
             Self::Scene(error) | Self::Override { error, .. } | Self::LinkKeys(error) => Some(error),
             Self::Combination { error, .. } => Some(error),
@@ -144,42 +116,10 @@ impl Failure {
     }
 }
 
-/// Reports arguments that make no sense as clap does, under `--json` in a document too, and gives the exit status. Help and version are no errors.
-pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
-    // As clap itself does it: what cannot be printed is not said.
-    let _ = error.print();
-    let status = u8::try_from(error.exit_code()).unwrap_or(BAD_INPUT);
-    if error.use_stderr() && output::wants_json_error() {
-        let _ = document::print_usage(&error.render().to_string(), status);
-    }
-    ExitCode::from(status)
-}
-
-/// Why the variant of a scene that can be read cannot be had, where an option other than `--set` said what is different.
+/// Why the variant of a scene that can be read cannot be had, where an option other than `--set` gave the difference.
 pub(crate) fn of_variant(error: SceneError, option: &'static str, overrides: &[String]) -> Failure {
     let text = error.diagnostic().and_then(Diagnostic::override_text);
     if text.is_some_and(|text| overrides.iter().any(|given| given == text)) { Failure::Override { option, error } } else { Failure::Scene(error) }
-}
-
-/// The refusal of an argument, in which nothing that was typed disturbs a terminal.
-pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
-    let shown = |text: &String| Visible(text).to_string();
-    let texts: Vec<(ContextKind, ContextValue)> = error
-        .context()
-        .filter_map(|(kind, value)| match value {
-            ContextValue::String(text) => Some((kind, ContextValue::String(shown(text)))),
-            ContextValue::Strings(texts) => Some((kind, ContextValue::Strings(texts.iter().map(shown).collect()))),
-            // Advice repeats what was typed; it loses its colours.
-            ContextValue::StyledStrs(texts) => {
-                Some((kind, ContextValue::StyledStrs(texts.iter().map(|text| StyledStr::from(shown(&text.to_string()))).collect())))
-            }
-            ContextValue::None | ContextValue::Bool(_) | ContextValue::StyledStr(_) | ContextValue::Number(_) | _ => None,
-        })
-        .collect();
-    for (kind, value) in texts {
-        error.insert(kind, value);
-    }
-    error
 }
 
 /// Why a scene that makes sense is not simulated, at the place where there are too many peers; `None` if it can be.
@@ -192,7 +132,7 @@ pub(crate) fn too_large(scene: &Scene, overrides: &[String]) -> Option<SceneErro
 
 /// Why a scene that makes sense cannot be analysed.
 pub(crate) fn not_analysed(scene: &Path, error: &impl std::fmt::Display) -> Failure {
-    Failure::Input(format!("{}: {error}", output::path(input::named(scene))))
+    Failure::Input(format!("{}: {error}", input::named(scene).display()))
 }
 
 /// The exit status for a scene that could not be had.

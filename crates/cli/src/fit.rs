@@ -1,7 +1,5 @@
 //! `cohaptic fit`.
 
-use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -14,12 +12,12 @@ use serde::Serialize;
 use crate::arguments::FitArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::output_file::OutputFile;
-use crate::{output, text_file};
+use crate::file::write_file;
+use crate::{file, output};
 
 /// What `cohaptic fit --json` prints.
 #[derive(Serialize)]
-struct Document<'a> {
+struct FitDocument<'a> {
     #[serde(flatten)]
     fitted: &'a Fitted,
     /// The keys of a scene.
@@ -51,16 +49,15 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     let fitted = fit::fit(&measurements).map_err(|error| named(&error))?;
     let scene = fitted.link.to_scene_toml();
     if let Some(path) = &arguments.out {
-        let (file, mut to) = OutputFile::create(path)?;
-        let written = to.write_all(scene.as_bytes()).and_then(|()| to.flush()).map(|()| to);
-        file.finish(written)?;
+        write_file(path, &scene)?;
     }
-    if arguments.json {
-        output::json(DocumentSchema::Fit, &Document { fitted: &fitted, scene: &scene, skew, matched })?;
-    } else {
-        output::text(&describe(&fitted, &scene, skew, matched))?;
-        output::wrote(&arguments.out);
-    }
+    output::answer(
+        arguments.json,
+        DocumentSchema::FIT,
+        &FitDocument { fitted: &fitted, scene: &scene, skew, matched },
+        || describe(&fitted, &scene, skew, matched),
+        &arguments.out,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -80,7 +77,7 @@ fn read(arguments: &FitArguments) -> Result<(Measurements, Option<Matched>), Fai
               (of what `cohaptic link` did, give the file of --fates instead)",
         ));
     }
-    let text = text_file::of_bytes(bytes, path)?;
+    let text = file::text_of(bytes, path)?;
     if text.trim_start_matches('\u{feff}').starts_with(FateRow::HEADER) {
         return Ok((Measurements::from_fates(&FateLog::parse(&text).map_err(|error| named(&error))?), None));
     }
@@ -98,10 +95,7 @@ fn unreadable(path: &Path, error: std::io::Error) -> Failure {
 fn describe(fitted: &Fitted, scene: &str, skew: Option<Skew>, matched: Option<Matched>) -> String {
     let goodness = &fitted.goodness;
     let mut text = format!("{scene}\n");
-    // Writing to a string does not fail.
-    let mut line = |line: String| {
-        let _ = writeln!(text, "{line}");
-    };
+    let mut line = |line: String| text.push_str(&format!("{line}\n"));
     let spaced = if goodness.evenly_spaced { "evenly" } else { "unevenly" };
     line(format!(
         "{}, {} arrived, one every {} ({spaced}); they say as much as {:.0} independent ones",
@@ -167,7 +161,6 @@ fn model(loss: &LossFit) -> String {
         LossModel::Independent { .. } => "independent".to_owned(),
         LossModel::GilbertElliott { p, r, h, k } => format!("Gilbert-Elliott p {p:.5} r {r:.5} h {h:.3} k {k:.5}"),
         LossModel::GilbertElliottInTime { mean_good_s, mean_bad_s } => format!("in time, good {mean_good_s:.4} s bad {mean_bad_s:.4} s"),
-        _ => String::new(),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A computation that asks often enough ends by itself. One that cannot ask, such as the eigenvalues of a large matrix, is ended when its time is over: nothing is lost
 //! that is whole, because files are written under another name until they are ([`crate::output_file`]), and a command that has whole results before its
-//! end leaves word of what is to be done with them ([`keep`]).
+//! end leaves word of what to do with them ([`keep`]).
 
 use std::io::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -67,7 +67,7 @@ pub(crate) fn kept() {
 }
 
 /// Whether the user has asked for the end.
-pub(crate) fn asked() -> bool {
+pub(crate) fn requested() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 

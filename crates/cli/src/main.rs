@@ -11,13 +11,13 @@ mod analysis_watch;
 mod arguments;
 mod campaign;
 mod check;
-mod completions;
 mod document_schema;
 mod documents;
 mod expectations;
 mod explain;
 mod failure;
 mod falcon;
+mod file;
 mod fit;
 mod init;
 mod input;
@@ -26,17 +26,16 @@ mod link;
 mod live;
 mod man;
 mod output;
-mod output_file;
 mod paper;
 mod progress;
 mod realtime;
 mod relay;
+mod report;
 mod router;
 mod run;
 mod schema;
 mod stability;
 mod terminal_plot;
-mod text_file;
 mod variants;
 
 use std::process::ExitCode;
@@ -51,7 +50,7 @@ fn main() -> ExitCode {
     }
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => return failure::wrong_usage(&failure::visible(error)),
+        Err(error) => return report::wrong_usage(&report::visible(error)),
     };
     interrupt::listen();
     let done = match arguments.command {
@@ -71,13 +70,13 @@ fn main() -> ExitCode {
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::Init(arguments) => init::init(&arguments),
         Command::Schema(arguments) => schema::schema(&arguments),
-        Command::Completions(arguments) => completions::completions(&arguments),
+        Command::Completions(arguments) => man::completions(&arguments),
         Command::Man(arguments) => man::man(&arguments),
     };
     match done {
         // What was asked to end has ended, whatever came of it.
-        Ok(_) if interrupt::asked() => ExitCode::from(failure::INTERRUPTED),
+        Ok(_) if interrupt::requested() => ExitCode::from(failure::INTERRUPTED),
         Ok(code) => code,
-        Err(failure) => failure.report(),
+        Err(failure) => report::report(&failure),
     }
 }

@@ -1,4 +1,4 @@
-//! `cohaptic man`.
+//! Texts made of the arguments themselves: manual pages (`cohaptic man`) and completions of shells (`cohaptic completions`).
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -6,10 +6,10 @@ use std::process::ExitCode;
 use clap::{Command, CommandFactory as _};
 use clap_mangen::Man;
 
-use crate::arguments::{Arguments, ManArguments};
+use crate::arguments::{Arguments, CompletionsArguments, ManArguments};
 use crate::failure::Failure;
+use crate::file::write_file;
 use crate::output;
-use crate::output_file::write_file;
 
 /// Prints the page of a command, or writes all pages into a folder.
 pub(crate) fn man(arguments: &ManArguments) -> Result<ExitCode, Failure> {
@@ -48,4 +48,12 @@ fn page(command: &Command) -> Result<Vec<u8>, Failure> {
     let mut page = Vec::new();
     Man::new(command.clone()).render(&mut page).map_err(Failure::StandardOutput)?;
     Ok(page)
+}
+
+/// Prints what a shell needs to complete commands and options.
+pub(crate) fn completions(arguments: &CompletionsArguments) -> Result<ExitCode, Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Arguments::command(), "cohaptic", &mut script);
+    output::raw(&script)?;
+    Ok(ExitCode::SUCCESS)
 }

@@ -40,6 +40,25 @@ pub(crate) fn json(schema: DocumentSchema, document: &impl Serialize) -> Result<
     raw(&text)
 }
 
+/// Answers with a JSON document, or with text and the names of the files that were written.
+pub(crate) fn answer(
+    json_wanted: bool,
+    schema: DocumentSchema,
+    document: &impl Serialize,
+    words: impl FnOnce() -> String,
+    files: impl IntoIterator<Item = impl AsRef<Path>>,
+) -> Result<(), Failure> {
+    if json_wanted {
+        return json(schema, document);
+    }
+    text(&words())?;
+    wrote(files);
+    Ok(())
+}
+
+/// Of an answer without files.
+pub(crate) const NO_FILES: [&str; 0] = [];
+
 /// Prints a file as it is: a scene, a schema, a page for another program.
 pub(crate) fn raw(content: &[u8]) -> Result<(), Failure> {
     ANSWERED.store(true, Ordering::Relaxed);
@@ -56,7 +75,7 @@ pub(crate) fn wrote(files: impl IntoIterator<Item = impl AsRef<Path>>) {
     }
 }
 
-/// A path as text. What is not Unicode in it is replaced: JSON cannot hold it.
+/// A path as text. Bytes that are not Unicode are replaced: JSON cannot hold it.
 pub(crate) fn path(path: &Path) -> String {
     path.to_string_lossy().into_owned()
 }

@@ -11,12 +11,12 @@ use serde::Serialize;
 use crate::arguments::PaperArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::output_file::write_file;
+use crate::file::write_file;
 use crate::progress::Progress;
 use crate::{interrupt, output};
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct PaperDocument<'a> {
     claims: Vec<Claim<'a>>,
     figures: Vec<Figure<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -50,7 +50,7 @@ impl Watch for Bar {
     }
 
     fn stops(&self) -> bool {
-        interrupt::asked()
+        interrupt::requested()
     }
 }
 
@@ -77,16 +77,17 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
         write_files(folder, &reproduction)?;
     }
     let document = document(&reproduction, arguments.out.is_some());
-    if arguments.json {
-        output::json(DocumentSchema::Paper, &Document { wall_s: Some(wall_s), ..document })?;
-    } else {
-        output::text(&describe(&reproduction))?;
-        output::wrote(arguments.out.as_ref().map(|folder| folder.join("index.html")));
-    }
+    output::answer(
+        arguments.json,
+        DocumentSchema::PAPER,
+        &PaperDocument { wall_s: Some(wall_s), ..document },
+        || describe(&reproduction),
+        arguments.out.as_ref().map(|folder| folder.join("index.html")),
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn document(reproduction: &Reproduction, has_files: bool) -> Document<'_> {
+fn document(reproduction: &Reproduction, has_files: bool) -> PaperDocument<'_> {
     let claims = reproduction.claims.iter().map(|claim| Claim {
         id: claim.id,
         claim: claim.claim,
@@ -101,7 +102,7 @@ fn document(reproduction: &Reproduction, has_files: bool) -> Document<'_> {
         file: has_files.then(|| format!("{}.svg", figure.id)),
         title: &figure.title,
     });
-    Document { claims: claims.collect(), figures: figures.collect(), wall_s: None }
+    PaperDocument { claims: claims.collect(), figures: figures.collect(), wall_s: None }
 }
 
 fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure> {
@@ -115,7 +116,7 @@ fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure
         }
     }
     // Without the time that it took: the same bytes every time.
-    let mut claims = serde_json::to_vec_pretty(&DocumentSchema::Paper.of(&document(reproduction, true))).unwrap_or_default();
+    let mut claims = serde_json::to_vec_pretty(&DocumentSchema::PAPER.of(&document(reproduction, true))).unwrap_or_default();
     claims.push(b'\n');
     write_file(&folder.join("claims.json"), &claims)?;
     write_file(&folder.join("index.html"), page::html(reproduction).as_bytes())

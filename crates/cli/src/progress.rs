@@ -9,83 +9,73 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 pub(crate) struct Progress(ProgressBar);
 
 impl Progress {
+    fn new(length: u64, template: &str) -> Self {
+        let target = if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        Self(ProgressBar::with_draw_target(Some(length), target).with_style(style))
+    }
+
+    fn titled(self, title: &str) -> Self {
+        Self(self.0.with_prefix(Visible(title).to_string()))
+    }
+
     /// Progress through a scene, in simulated time.
     pub(crate) fn through_scene(title: &str, duration: Duration) -> Self {
-        let bar = bar(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX));
-        bar.set_style(style("{prefix} {bar:30} {percent:>3} %  {elapsed} passed, {eta} left{msg}"));
-        bar.set_prefix(Visible(title).to_string());
-        Self(bar)
+        let length = u64::try_from(duration.as_millis()).unwrap_or(u64::MAX);
+        Self::new(length, "{prefix} {bar:30} {percent:>3} %  {elapsed} passed, {eta} left{msg}").titled(title)
     }
 
     /// Progress through a number of scenes.
     pub(crate) fn through_scenes(count: usize) -> Self {
-        let bar = bar(count as u64);
-        bar.set_style(style("checking scenes {bar:30} {pos}/{len}"));
-        Self(bar)
+        Self::new(count as u64, "checking scenes {bar:30} {pos}/{len}")
     }
 
     /// Progress through a number of packets.
     pub(crate) fn through_packets(count: u64) -> Self {
-        let bar = bar(count);
-        bar.set_style(style("{bar:30} {percent:>3} %  {pos}/{len} packets, {eta} left"));
-        Self(bar)
+        Self::new(count, "{bar:30} {percent:>3} %  {pos}/{len} packets, {eta} left")
     }
 
     /// Progress through the rows of maps.
     pub(crate) fn through_rows(count: usize) -> Self {
-        let bar = bar(count as u64);
-        bar.set_style(style("{bar:30} {percent:>3} %  {pos}/{len} rows, {eta} left{msg}"));
-        Self(bar)
+        Self::new(count as u64, "{bar:30} {percent:>3} %  {pos}/{len} rows, {eta} left{msg}")
     }
 
     /// Progress through the combinations of a campaign that are checked.
     pub(crate) fn through_combinations(count: u64) -> Self {
-        let bar = bar(count);
-        bar.set_style(style("checking combinations {bar:30} {pos}/{len}, {eta} left"));
-        Self(bar)
+        Self::new(count, "checking combinations {bar:30} {pos}/{len}, {eta} left")
     }
 
     /// Progress through the combinations of a campaign that are judged.
     pub(crate) fn through_verdicts(count: u64) -> Self {
-        let bar = bar(count);
-        bar.set_style(style("judging combinations {bar:30} {pos}/{len}, {eta} left"));
-        Self(bar)
+        Self::new(count, "judging combinations {bar:30} {pos}/{len}, {eta} left")
     }
 
     /// Progress through the runs of a campaign, some of which are done already.
     pub(crate) fn through_runs(count: u64, done: u64) -> Self {
-        let bar = bar(count).with_position(done);
-        bar.set_style(style("{bar:30} {percent:>3} %  {pos}/{len} runs, {per_sec}, {eta} left"));
-        bar.reset_eta();
-        Self(bar)
+        let progress = Self::new(count, "{bar:30} {percent:>3} %  {pos}/{len} runs, {per_sec}, {eta} left");
+        progress.reach_number(done);
+        progress.0.reset_eta();
+        progress
     }
 
     /// Progress through values of which nobody knows how many there will be.
     pub(crate) fn through_values() -> Self {
-        let bar = bar(0);
-        bar.set_style(style("{spinner} {pos} values looked at, {elapsed} passed{msg}"));
-        Self(bar)
+        Self::new(0, "{spinner} {pos} values looked at, {elapsed} passed{msg}")
     }
 
     /// Progress through measurements of which nobody knows how many there will be.
     pub(crate) fn through_measurements() -> Self {
-        let bar = bar(0);
-        bar.set_style(style("{spinner} {pos} rows measured, {elapsed} passed: {msg}"));
-        Self(bar)
+        Self::new(0, "{spinner} {pos} rows measured, {elapsed} passed: {msg}")
     }
 
     /// Progress through a number of steps.
     pub(crate) fn through_steps(count: usize) -> Self {
-        let bar = bar(count as u64);
-        bar.set_style(style("{bar:30} {percent:>3} %  {elapsed} passed, {eta} left"));
-        Self(bar)
+        Self::new(count as u64, "{bar:30} {percent:>3} %  {elapsed} passed, {eta} left")
     }
 
     /// Progress through operations of a computation whose estimate comes on the way; nothing is shown of one that takes seconds.
     pub(crate) fn through_operations() -> Self {
-        let bar = bar(0);
-        bar.set_style(style("{bar:30} {percent:>3} %  {elapsed} passed, {msg}"));
-        Self(bar)
+        Self::new(0, "{bar:30} {percent:>3} %  {elapsed} passed, {msg}")
     }
 
     /// Shows the elapsed time anew, for work that cannot say how far it is.
@@ -100,14 +90,7 @@ impl Progress {
 
     /// One line about a run that goes on until it is stopped.
     pub(crate) fn of_traffic(title: &str) -> Self {
-        let bar = bar(0);
-        bar.set_style(style("{prefix}: {msg}, {elapsed} passed"));
-        bar.set_prefix(Visible(title).to_string());
-        Self(bar)
-    }
-
-    pub(crate) fn say(&self, line: String) {
-        self.0.set_message(line);
+        Self::new(0, "{prefix}: {msg}, {elapsed} passed").titled(title)
     }
 
     pub(crate) fn reach_number(&self, number: u64) {
@@ -134,13 +117,4 @@ impl Progress {
     pub(crate) fn clear(&self) {
         self.0.finish_and_clear();
     }
-}
-
-fn bar(length: u64) -> ProgressBar {
-    let target = if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-    ProgressBar::with_draw_target(Some(length), target)
-}
-
-fn style(template: &str) -> ProgressStyle {
-    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

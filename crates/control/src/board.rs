@@ -29,7 +29,7 @@ impl Board {
         Self { description, latest: Mutex::default() }
     }
 
-    /// What is run.
+    /// The run.
     #[must_use]
     pub const fn description(&self) -> &Description {
         &self.description

@@ -2,12 +2,12 @@
 
 use serde::Serialize;
 
-/// What is run, in names. The numbers of a [`Snapshot`](crate::Snapshot) stand in the same order.
+/// The run, in names. The numbers of a [`Snapshot`](crate::Snapshot) stand in the same order.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Description {
     /// Which command runs.
     pub kind: Kind,
-    /// What is run, for people: the name of a scene, or an address.
+    /// The title of the run: the name of a scene, or an address.
     pub title: String,
     /// The links. Their places are the numbers by which they are asked for.
     pub links: Vec<LinkName>,

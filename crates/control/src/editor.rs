@@ -5,7 +5,7 @@
 /// The implementor reads and checks what it is given and hands the change to the real-time side, which takes it up at an instant of its own.
 /// Calls should take milliseconds at most: until they return nobody else is answered.
 pub trait LinkEditor: Send {
-    /// The keys that this link was told, each once, in any order, with their values as TOML text: `("delay", "\"40ms\"")`. What is at its default
+    /// The keys that this link was told, each once, in any order, with their values as TOML text: `("delay", "\"40ms\"")`. A key at its default
     /// may be left out. The number is below that of the links in the [`Description`](crate::Description).
     fn keys(&self, link: usize) -> Vec<(String, String)>;
 

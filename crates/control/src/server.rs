@@ -19,7 +19,7 @@ pub struct ServerConfig {
     pub address: SocketAddr,
     /// The secret that every request must show; `None`: a random one.
     pub token: Option<Token>,
-    /// Whether an address may be given that other machines reach. What is sent, the token too, can then be read on the way.
+    /// Whether an address may be given that other machines reach. All traffic, the token too, can then be read on the way.
     pub allow_remote: bool,
     /// Names by which the server may be asked for, beside `localhost` and addresses, such as `"lab-pc.example"`. Other names are refused, so that
     /// no page of another site reaches the server by a name that it points here (DNS rebinding).
@@ -36,7 +36,6 @@ impl ServerConfig {
 
 /// Why there is no server.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum ServeError {
     /// Other machines would reach it.
     #[error(
@@ -103,7 +102,7 @@ pub fn serve(config: ServerConfig, board: Arc<Board>, editor: Box<dyn LinkEditor
             // An error means that the server was dropped, which is the same.
             let _: Result<(), oneshot::error::RecvError> = stopped.await;
         });
-        // What is still being answered, such as events, ends with the runtime.
+        // Open answers, such as events, end with the runtime.
         runtime.shutdown_background();
     };
     let thread = std::thread::Builder::new().name("live-control".to_owned()).spawn(run).map_err(ServeError::Thread)?;

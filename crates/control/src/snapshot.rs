@@ -91,7 +91,7 @@ pub enum Presence {
     Here,
     /// It runs elsewhere and was heard of late.
     Present,
-    /// It runs elsewhere and was not heard for too long: what is known of it is old.
+    /// It runs elsewhere and was not heard for too long: its figures are old.
     Stale,
     /// It was never heard.
     #[default]

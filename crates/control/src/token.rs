@@ -19,7 +19,6 @@ pub struct Token(String);
 
 /// Why there is no token.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
-#[non_exhaustive]
 pub enum TokenError {
     /// Too short to be secret, or too long to be carried.
     #[error("a token of {found} characters: expected {SHORTEST} to {LONGEST}, random ones; leave it out to get one")]
@@ -50,13 +49,13 @@ impl Token {
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
     }
 
-    /// The token in clear, to be shown to the one who may have it.
+    /// The token in clear, to be shown to its owner.
     #[must_use]
     pub fn secret(&self) -> &str {
         &self.0
     }
 
-    /// Whether this is it. How long that takes depends on the length of what is offered alone.
+    /// Whether this is it. How long that takes depends on the length of the offered text alone.
     pub(crate) fn is(&self, offered: &[u8]) -> bool {
         self.0.as_bytes().ct_eq(offered).into()
     }

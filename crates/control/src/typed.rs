@@ -1,6 +1,6 @@
 //! Values between JSON, what people type, and TOML text.
 //!
-//! Text follows the rule of `--set KEY=VALUE`: it is TOML, and what is not TOML is taken as text. So `40ms`, `0.01` and `{ packets = [3] }` are
+//! Text follows the rule of `--set KEY=VALUE`: it is TOML, and a value that is not TOML is taken as text. So `40ms`, `0.01` and `{ packets = [3] }` are
 //! all typed without quotes.
 
 use serde_json::Value as Json;

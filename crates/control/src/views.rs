@@ -86,7 +86,7 @@ fn peers(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
     description.peers.iter().enumerate().map(peer).collect()
 }
 
-/// What is not known, because nothing was seen, is `null`.
+/// Unknown figures are `null`.
 fn quantiles(quantiles: &Quantiles) -> Value {
     let seconds = |span: Duration| (quantiles.count > 0).then_some(span.as_secs_f64());
     json!({

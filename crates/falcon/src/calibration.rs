@@ -1,4 +1,4 @@
-//! What is known of a device only roughly, as numbers that a laboratory may replace.
+//! Properties of a device that are known only roughly, as numbers that a laboratory may replace.
 
 use core::ops::RangeInclusive;
 
@@ -63,7 +63,6 @@ impl Default for Calibration {
 
 /// A number of a calibration makes no sense.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
-#[non_exhaustive]
 pub enum CalibrationError {
     /// Counts per N·m are far from those of any Falcon.
     #[error("{0} counts per N·m are not within 100 to 100000: 10000 is libnifalcon's value, 2200 to 5400 fits Novint's own packets")]

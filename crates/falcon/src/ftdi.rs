@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use crate::transport::{Transport, TransportError};
+use crate::transport::{Request, Transport, TransportError};
 
 /// Vendor of the chip.
 pub const VENDOR: u16 = 0x0403;
@@ -20,38 +20,6 @@ pub const PACKET: usize = 64;
 pub const STATUS: usize = 2;
 /// Payload of a full packet \[bytes\].
 pub const PAYLOAD: usize = PACKET - STATUS;
-
-/// Requests of the chip that are used here.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Request {
-    /// Purges a buffer: see [`PURGE_RX`] and [`PURGE_TX`].
-    Reset,
-    /// Sets the lines RTS and DTR.
-    ModemControl,
-    /// Sets the flow control.
-    FlowControl,
-    /// Sets the speed, as a divisor.
-    BaudRate,
-    /// Sets bits, parity and stop bits.
-    DataFormat,
-    /// Sets after how many milliseconds the chip sends what it has.
-    LatencyTimer,
-}
-
-impl Request {
-    /// Its number on the wire.
-    #[must_use]
-    pub const fn number(self) -> u8 {
-        match self {
-            Self::Reset => 0,
-            Self::ModemControl => 1,
-            Self::FlowControl => 2,
-            Self::BaudRate => 3,
-            Self::DataFormat => 4,
-            Self::LatencyTimer => 9,
-        }
-    }
-}
 
 /// Forgets what came from the device.
 pub const PURGE_RX: u16 = 1;

@@ -19,7 +19,7 @@
 //! Safe by construction: only a [`safety::ForceGate`] makes motor counts. It lets nothing through before the device is homed and the user has switched forces
 //! on, nothing that is no number, nothing old, nothing too large or too sudden, and nothing after a stop.
 //!
-//! Nothing here was ever tried on hardware. What is known of the device comes from published drivers and captures; what is not is a parameter.
+//! Nothing here was ever tried on hardware. All knowledge of the device comes from published drivers and captures; every unknown is a parameter.
 //!
 //! ```
 //! use std::time::Duration;

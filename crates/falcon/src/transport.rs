@@ -1,12 +1,9 @@
 //! What the driver needs of the way to a device, be it USB or simulated.
 
-use core::fmt;
 use core::time::Duration;
 
 use cohaptic_units::Instant;
 use thiserror::Error;
-
-use crate::ftdi::Request;
 
 /// Bytes to and from a device behind an FT232R, and a clock.
 pub trait Transport {
@@ -39,57 +36,74 @@ pub trait Transport {
     fn read(&mut self, into: &mut [u8], patience: Duration) -> Result<usize, TransportError>;
 }
 
-/// What was being done.
+/// Requests of the chip that are used here.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Operation {
-    /// A control transfer.
-    Control,
-    /// A bulk transfer out.
-    Write,
-    /// A bulk transfer in.
-    Read,
+pub enum Request {
+    /// Purges a buffer: see [`PURGE_RX`](crate::ftdi::PURGE_RX) and [`PURGE_TX`](crate::ftdi::PURGE_TX).
+    Reset,
+    /// Sets the lines RTS and DTR.
+    ModemControl,
+    /// Sets the flow control.
+    FlowControl,
+    /// Sets the speed, as a divisor.
+    BaudRate,
+    /// Sets bits, parity and stop bits.
+    DataFormat,
+    /// Sets after how many milliseconds the chip sends what it has.
+    LatencyTimer,
 }
 
-impl fmt::Display for Operation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Control => "setting up the serial chip",
-            Self::Write => "writing to the device",
-            Self::Read => "reading from the device",
-        })
-    }
-}
-
-/// What a transfer failed of.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Fault {
-    /// It took too long.
-    TimedOut,
-    /// The endpoint stalled.
-    Stalled,
-    /// A fault of the wire or of the protocol.
-    Wire,
-    /// The operating system refused the request.
-    Refused,
-    /// Another error, with the operating system's number.
-    Other(u32),
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Request {
+    /// Its number on the wire.
+    #[must_use]
+    pub const fn number(self) -> u8 {
         match self {
-            Self::TimedOut => f.write_str("it took too long"),
-            Self::Stalled => f.write_str("the endpoint stalled"),
-            Self::Wire => f.write_str("a fault of the wire or of the protocol"),
-            Self::Refused => f.write_str("the operating system refused it"),
-            Self::Other(code) => write!(f, "error {code} of the operating system"),
+            Self::Reset => 0,
+            Self::ModemControl => 1,
+            Self::FlowControl => 2,
+            Self::BaudRate => 3,
+            Self::DataFormat => 4,
+            Self::LatencyTimer => 9,
         }
     }
 }
 
+/// The transfer that failed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+pub enum Operation {
+    /// A control transfer.
+    #[error("setting up the serial chip")]
+    Control,
+    /// A bulk transfer out.
+    #[error("writing to the device")]
+    Write,
+    /// A bulk transfer in.
+    #[error("reading from the device")]
+    Read,
+}
+
+/// What a transfer failed of.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+pub enum Fault {
+    /// The deadline passed.
+    #[error("it took too long")]
+    TimedOut,
+    /// The endpoint stalled.
+    #[error("the endpoint stalled")]
+    Stalled,
+    /// A fault of the wire or of the protocol.
+    #[error("a fault of the wire or of the protocol")]
+    Wire,
+    /// The operating system refused the request.
+    #[error("the operating system refused it")]
+    Refused,
+    /// Another error, with the operating system's number.
+    #[error("error {0} of the operating system")]
+    Other(u32),
+}
+
 /// A transfer that failed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
-#[non_exhaustive]
 pub enum TransportError {
     /// The device is gone, and will not come back on this transport.
     #[error("the device was unplugged; plug it in again and start anew")]

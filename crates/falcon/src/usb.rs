@@ -11,8 +11,8 @@ use nusb::{DeviceInfo, Endpoint, Interface, MaybeFuture};
 use thiserror::Error;
 
 use crate::clock::WallClock;
-use crate::ftdi::{ENDPOINT_IN, ENDPOINT_OUT, INTERFACE, PACKET, PAYLOAD, PRODUCT, Request, VENDOR, strip_status};
-use crate::transport::{Fault, Operation, Transport, TransportError};
+use crate::ftdi::{ENDPOINT_IN, ENDPOINT_OUT, INTERFACE, PACKET, PAYLOAD, PRODUCT, VENDOR, strip_status};
+use crate::transport::{Fault, Operation, Request, Transport, TransportError};
 
 /// A control transfer that takes longer has failed.
 const CONTROL_PATIENCE: Duration = Duration::from_millis(500);
@@ -26,7 +26,7 @@ const CANCEL_PATIENCE: Duration = Duration::from_secs(1);
 pub struct Listed {
     /// Its serial number, if the system tells.
     pub serial: Option<String>,
-    /// What it calls itself: `FALCON HAPTIC`, by what is known.
+    /// What it calls itself: `FALCON HAPTIC`, by published drivers.
     pub product: Option<String>,
     /// The bus it is on, as the system names it.
     pub bus: String,
@@ -204,7 +204,6 @@ fn transport_error(during: Operation, error: TransferError) -> TransportError {
 
 /// No device could be opened.
 #[derive(Clone, Debug, Error)]
-#[non_exhaustive]
 pub enum UsbError {
     /// None is plugged in.
     #[error("no Novint Falcon (USB 0403:cb48) is plugged in: check the cable and the power supply")]

@@ -1,10 +1,15 @@
-//! Files that are read: up to a limit, whatever they are.
+//! Files: read up to a limit, and written as a whole.
 //!
-//! A regular file that is longer is refused before it is read. A pipe or a device has no length and is read up to the limit.
+//! A regular file that is longer than the limit is refused before it is read. A pipe or a device has no length and is read up to the limit. A file that is
+//! written has its name only when it is whole ([`WholeFile`]).
+
+mod whole;
 
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+
+pub use whole::{PARTIAL, WholeFile, partial_name, write_whole};
 
 /// The most bytes of a file that is read as a whole, 256 MiB: a scene, a trace, a replay, recorded motion, a table of a distribution, inputs,
 /// measurements, weights.

@@ -8,7 +8,7 @@ use cohaptic_peer::wire::{DecodeError, MAX_LEN, Sample};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Handle(NonZeroU32);
 
-/// Stores datagrams until their last copy has arrived or was dropped. Its memory is bounded by what is on the way at once.
+/// Stores datagrams until their last copy has arrived or was dropped. Its memory is bounded by the datagrams on the way at once.
 ///
 /// All receivers get the same bytes, so those are decoded once: with 10 peers that took a tenth off a packet.
 #[derive(Clone, Debug, Default)]
@@ -25,7 +25,7 @@ struct Slot<const A: usize> {
 }
 
 impl<const A: usize> Datagrams<A> {
-    /// Stores a datagram of that many axes which `write` writes, for that many receivers (at least one). Gives its length too.
+    /// Stores a datagram of `axes` axes which `write` writes, for `receivers` receivers (at least one). Gives its length too.
     ///
     /// # Errors
     ///

@@ -1,8 +1,9 @@
 //! Runs a scene: compiles it to the least it needs, owns the clock and the order of events, and records what happens.
 //!
-//! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that really send their datagrams through a [`cohaptic_wan::Network`]. An
-//! [`Observer`] sees every tick and every packet; [`record`] has observers that write CSV files and plots while the scene runs. [`check`] compares a
-//! run with the scene's expectations, [`mod@explain`] says what a scene makes the program model. [`live`] runs a scene some of whose peers live elsewhere.
+//! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that write each sample as a datagram and send it through a
+//! [`cohaptic_wan::Network`]; the datagram is read once for all its receivers. A scene that needs no events and has no observer runs in arrays, which hold
+//! numbers alone: no peers, no datagrams, no packets. An [`Observer`] sees every tick and every packet; [`record`] has observers that write CSV files and plots while the scene runs. [`check`] compares a
+//! run with the scene's expectations, [`mod@explain`] says what a scene makes the program model. [`live`] runs a scene some of whose peers are remote.
 //!
 //! Nothing here reads a clock: the same scene and seed give the same bytes, whatever the machine.
 //!

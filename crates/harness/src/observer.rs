@@ -1,9 +1,12 @@
-//! Who watches a run.
+//! The observer of a run.
 
-use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::Fate;
+use cohaptic_units::Instant;
+use cohaptic_wan::{PacketRecord, Path};
 
 use crate::live::InputRow;
+
+/// Instants, or ticks in arrays, between two calls of [`Observer::keep_going`].
+pub(crate) const INSTANTS_BETWEEN_QUESTIONS: u32 = 1024;
 
 /// Sees what happens in a run, while it happens, in the order in which it happens.
 ///
@@ -41,7 +44,7 @@ pub trait Observer {
         Ok(())
     }
 
-    /// Something has come into a [live session](crate::live) from outside: what is seen here, in this order, is what a replay needs.
+    /// Something has come into a [live session](crate::live) from outside: a replay needs the rows seen here, in this order.
     ///
     /// # Errors
     ///
@@ -84,24 +87,8 @@ pub struct TickRow<'a> {
     pub coordination_force: &'a [f64],
 }
 
-/// What became of one packet, or of one copy of it.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct PacketRow {
-    /// The sender.
-    pub from: usize,
-    /// The receiver.
-    pub to: usize,
-    /// The number of the packet on its path, from 0; a copy has that of its packet.
-    pub sequence: u64,
-    /// When it was sent.
-    pub sent: Instant,
-    /// When it arrived or was dropped.
-    pub at: Instant,
-    /// Its size.
-    pub size: Bytes,
-    /// What became of it.
-    pub fate: Fate,
-}
+/// What became of one packet between two peers, whose places are those of the nodes, or of one copy of it.
+pub type PacketRow = PacketRecord<Path>;
 
 /// Sees nothing, and costs nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]

@@ -6,10 +6,10 @@ use cohaptic_scene::{Axes, FromScene, Scene, Strategies};
 
 use crate::arrays::{Arrays, Shape};
 use crate::disturbance::Disturbance;
-use crate::observer::Observer;
+use crate::observer::{INSTANTS_BETWEEN_QUESTIONS, Observer};
 use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
-use crate::world::{Elsewhere, Nobody, Step, Watch, World};
+use crate::world::{NoRemote, Remote, Step, Watch, World};
 
 /// The most peers that a simulation takes: it makes every one of their N·(N−1) links. A scene may have more, for what does not simulate.
 pub const MOST_PEERS: usize = 4096;
@@ -24,13 +24,10 @@ pub fn too_large(scene: &Scene) -> Option<String> {
     })
 }
 
-/// How many instants pass between two calls of [`Observer::keep_going`].
-pub(crate) const BREATH: u32 = 1024;
-
 /// A scene in virtual time, as fast as the processor goes.
 ///
 /// At one instant, in this order: changes of the timeline; peers that tick sample and send; packets that have arrived are applied; forces are
-/// computed; everybody who ticks moves to the next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
+/// computed; each peer that ticks moves to the next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
 #[derive(Debug)]
 pub struct Simulation<'a, S = FromScene> {
     scene: &'a Scene,
@@ -80,9 +77,9 @@ impl<'a, S: Strategies> Simulation<'a, S> {
             return Ok(summary);
         }
         match plan.axes {
-            Axes::One => run_to_end(self.world::<1, _>(&plan, Nobody), observer),
-            Axes::Two => run_to_end(self.world::<2, _>(&plan, Nobody), observer),
-            Axes::Three => run_to_end(self.world::<3, _>(&plan, Nobody), observer),
+            Axes::One => run_to_end(self.world::<1, _>(&plan, NoRemote), observer),
+            Axes::Two => run_to_end(self.world::<2, _>(&plan, NoRemote), observer),
+            Axes::Three => run_to_end(self.world::<3, _>(&plan, NoRemote), observer),
         }
     }
 
@@ -92,15 +89,15 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         if is_unseen { Shape::of(self.scene, plan, &self.strategies) } else { None }
     }
 
-    pub(crate) fn world<const A: usize, E: Elsewhere<A>>(&self, plan: &Plan, elsewhere: E) -> World<A, S::Strategy<A>, E> {
-        World::new(self.scene, plan, self.disturbance, elsewhere, |peer| self.strategies.strategy(self.scene, peer))
+    pub(crate) fn world<const A: usize, E: Remote<A>>(&self, plan: &Plan, remote: E) -> World<A, S::Strategy<A>, E> {
+        World::new(self.scene, plan, self.disturbance, remote, |peer| self.strategies.strategy(self.scene, peer))
     }
 }
 
 fn run_to_end<const A: usize, S: Strategy<A>, O: Observer>(mut world: World<A, S>, observer: &mut O) -> Result<Summary, O::Error> {
     let watch = Watch::of(observer);
     loop {
-        for _ in 0..BREATH {
+        for _ in 0..INSTANTS_BETWEEN_QUESTIONS {
             if let Step::Ended(ending) = world.step(observer, watch)? {
                 return Ok(world.summary(ending));
             }

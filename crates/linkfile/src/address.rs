@@ -4,7 +4,6 @@ use std::net::{Ipv4Addr, SocketAddr};
 
 /// A text is no address.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum AddressError {
     /// An address or a name without a port.
     #[error("has no port")]

@@ -4,20 +4,20 @@
 //! output and reads no clock; whoever drives it owns the sockets. [`client`] is the other side of it, for programs in Rust, and [`handshake`] the
 //! datagrams that both exchange. The protocol is written byte by byte in `docs/live-protocol.md`.
 //!
-//! It does not encrypt: a [`SessionKey`] keeps others from speaking, not from listening. Read [`Door`] first.
+//! It does not encrypt: a [`SessionKey`] keeps others from speaking, not from listening. Read [`AdmissionControl`] first.
 //!
 //! ```
 //! use std::time::Duration;
 //!
 //! use cohaptic_live::client::Joining;
-//! use cohaptic_live::{Admission, Door, DoorConfig, Place, Seat, SessionKey, SystemEntropy};
+//! use cohaptic_live::{Admission, AdmissionControl, AdmissionConfig, Place, Seat, SessionKey, SystemEntropy};
 //! use cohaptic_peer::{State, wire};
 //! use cohaptic_units::Instant;
 //!
 //! let key = SessionKey::from_bytes([7; 32]);
 //! let seats = vec![Seat { place: Place(1), name: "right".to_owned(), tick: Duration::from_millis(1) }];
-//! let config = DoorConfig { key: Some(key.clone()), ..DoorConfig::new(42, 1, 2, Duration::from_millis(8), seats) };
-//! let mut door = Door::new(config, &mut SystemEntropy)?;
+//! let config = AdmissionConfig { key: Some(key.clone()), ..AdmissionConfig::new(42, 1, 2, Duration::from_millis(8), seats) };
+//! let mut door = AdmissionControl::new(config, &mut SystemEntropy)?;
 //!
 //! // The other program asks, and is told what the session is like.
 //! let from = "127.0.0.1:9000".parse().expect("an address");
@@ -36,8 +36,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod admission;
 pub mod client;
-pub mod door;
 mod entropy;
 pub mod falcons;
 pub mod handshake;
@@ -45,7 +45,7 @@ mod key;
 mod seal;
 pub mod session;
 
-pub use door::{Admission, Admitted, Door, DoorConfig, DoorError, DoorStats, Limits, Place, Refusal, Seat};
+pub use admission::{Admission, AdmissionConfig, AdmissionConfigError, AdmissionControl, AdmissionStats, Admitted, Limits, Place, Refusal, Seat};
 pub use entropy::{Entropy, EntropyError, SystemEntropy};
 pub use key::{KeyFileError, SessionKey};
 pub use seal::{MAX_DATAGRAM, NONCE_LEN, Nonce, SEAL_LEN, TAG_LEN};

@@ -11,7 +11,6 @@ use crate::series::count_u64;
 
 /// The figures that the laws of a link have, of one packet of a steady stream. What does not follow from a law is left out.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
-#[non_exhaustive]
 pub struct Asked {
     /// The mean of the propagation delay \[s\], that of a cut law included.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -90,15 +89,13 @@ impl Asked {
             && !traced
             && listed.is_none();
         let in_order = config.order == Order::InOrder && varied;
-        let damaged = config.corruption.as_ref().and_then(|corruption| match corruption.bits {
-            Flips::Bits { packets, .. } => Some(packets.probability().get()),
+        let damaged = config.corruption.as_ref().map(|corruption| match corruption.bits {
+            Flips::Bits { packets, .. } => packets.probability().get(),
             Flips::Rate(rate) => {
                 let end = corruption.within.as_ref().map_or_else(|| size.get(), |within| size.get().min(within.end));
                 let begin = corruption.within.as_ref().map_or(0, |within| within.start);
-                Some(-libm::expm1(8.0 * count_u64(end.saturating_sub(begin)) * libm::log1p(-rate.get())))
+                -libm::expm1(8.0 * count_u64(end.saturating_sub(begin)) * libm::log1p(-rate.get()))
             }
-            // A way of choosing bits that is not known here.
-            _ => None,
         });
         Self {
             mean_s: (!traced).then(|| {
@@ -123,7 +120,7 @@ impl Asked {
             damaged,
             rate_bit_s: config.bottleneck.as_ref().and_then(|bottleneck| match &bottleneck.service {
                 Service::Rate(rate) => Some(count_u64(rate.as_bits_per_sec())),
-                Service::Recorded(_) | _ => None,
+                Service::Recorded(_) => None,
             }),
             stages: Stages {
                 delay: (alone && !in_order).then(|| config.delay.clone()),
@@ -140,8 +137,6 @@ fn autocorrelation(config: &LinkConfig, every: Duration) -> Vec<f64> {
         Correlation::None => 0.0,
         Correlation::PerPacket(rho) => law.gaussian_correlation(rho).unwrap_or(0.0),
         Correlation::InTime(tau) => libm::exp(-every.as_secs_f64() / tau.as_secs_f64()),
-        // A kind of correlation that is not known here.
-        _ => return Vec::new(),
     };
     if phi == 0.0 {
         return (1..=LAGS).map(|_| 0.0).collect();

@@ -47,7 +47,6 @@ impl<W: Write> FateWriter<W> {
 
 /// Why a file is not read as a fate log.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ReadError {
     /// The file cannot be read, or is not UTF-8.
     #[error("cannot be read: {0}")]
@@ -78,6 +77,7 @@ mod tests {
     #[test]
     fn what_was_written_is_read_back_whatever_the_order() {
         let record = |sequence, at, fate| PacketRecord {
+            path: (),
             sequence,
             copy: 0,
             offered: Instant::from_nanos(sequence),

@@ -35,9 +35,9 @@
 pub mod achieved;
 pub mod asked;
 mod batches;
-pub mod beside;
 #[cfg(test)]
 mod calibration;
+pub mod comparison;
 pub mod fates;
 pub mod fit;
 pub mod pcapng;

@@ -38,7 +38,7 @@ impl SteadyStream {
     ) -> Result<u64, E> {
         let mut drain = |link: &mut Link<()>| {
             while let Some(event) = link.poll_event() {
-                on_record(&event.record())?;
+                on_record(&event.record)?;
             }
             Ok(())
         };

@@ -2,7 +2,7 @@
 
 use core::convert::Infallible;
 
-use rand_core::TryRng;
+use rand::TryRng;
 use rand_distr::{Distribution, StandardNormal};
 
 pub(crate) struct TestRng(u64);

@@ -86,7 +86,7 @@ pub(crate) fn is_unstable(case: &Case) -> Result<bool, PaperError> {
     Ok(radius.verdict() == Verdict::Unstable && radius.value > 1.0 + MARGIN)
 }
 
-/// The same case with one peer more, who touches if all do.
+/// The case with one peer more, which touches if all do.
 pub(crate) const fn one_more_peer(case: &Case) -> Case {
     let touching = if case.touching == case.peers { case.peers + 1 } else { case.touching };
     Case { peers: case.peers + 1, touching, ..*case }

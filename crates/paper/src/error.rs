@@ -5,7 +5,6 @@ use cohaptic_stability::{AdmittanceError, AnalysisError, FamilyError, KeyRangeEr
 
 /// Why there is no reproduction.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum PaperError {
     /// The watcher asked for an end.
     #[error("given up before the end")]

@@ -13,7 +13,7 @@ use crate::PaperError;
 use crate::case::Strategy;
 use crate::watch::Watch;
 
-/// What is recorded of one peer: one entry for each time.
+/// The record of one peer: one entry for each time.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct PeerTrace {
     /// [m]
@@ -139,7 +139,7 @@ pub(crate) fn travels(watch: &dyn Watch) -> Result<Vec<Travel>, PaperError> {
     Ok(travels)
 }
 
-/// What is known while the object touches no wall and one-sided contacts are closed.
+/// The closed form while the object touches no wall and one-sided contacts are closed.
 fn away_from_walls(scene: &Scene) -> Result<Analysis, PaperError> {
     let mut scene = scene.clone();
     scene.object.enclosure = None;
@@ -151,7 +151,7 @@ fn away_from_walls(scene: &Scene) -> Result<Analysis, PaperError> {
     Ok(analyse(&scene, Method::Reduced)?)
 }
 
-/// Every so many ticks are kept: every 4 ms.
+/// One tick of this number is kept: every 4 ms.
 const KEPT: u64 = 4;
 
 /// Simulates a scene of equal ticks of 1 ms, and says when the first peer's copy has gone a distance [m].

@@ -1,4 +1,4 @@
-//! Who watches the work.
+//! The watcher of the work.
 
 /// Sees how far the work is, and may end it.
 pub trait Watch: Sync {

@@ -110,7 +110,7 @@ impl<const A: usize> Ages<A> {
             return;
         }
         for aged in &self.aged {
-            held.replace_state(aged.place, aged.held(own));
+            held.replace_state(aged.place, aged.held(own), aged.newest.velocity.map(|velocity| aged.age.weight * aged.age.share * velocity));
         }
         self.fading = self.aged.iter().any(|aged| !aged.age.is_whole());
         if self.fading {

@@ -11,7 +11,6 @@ pub struct Drift(i64);
 /// Why a drift is refused.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 #[error("a clock drift of {fraction} is out of range: expected at most 0.1 either way, 10 %")]
-#[non_exhaustive]
 pub struct DriftError {
     /// The drift asked for.
     pub fraction: f64,

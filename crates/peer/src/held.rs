@@ -2,6 +2,8 @@
 
 use alloc::vec::Vec;
 
+use cohaptic_units::Instant;
+
 use crate::State;
 
 /// What a peer knows of the others: per sender, the sample with the highest sequence number that has arrived.
@@ -11,6 +13,8 @@ use crate::State;
 pub struct Held<const A: usize> {
     samples: Vec<HeldSample<A>>,
     mean: State<A>,
+    /// How each sample moves on while it is held, if anybody asks for it.
+    motions: Option<Vec<Extrapolation<A>>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -20,14 +24,35 @@ struct HeldSample<const A: usize> {
     next: u64,
 }
 
+/// How a sample moves on while it is held.
+#[derive(Clone, Copy, Debug)]
+struct Extrapolation<const A: usize> {
+    /// When it was sampled, on the sender's clock.
+    sent: Instant,
+    velocity: [f64; A],
+}
+
+/// The age of a sample \[s\]: what the receiver's own clock shows less the send time on the sender's clock, and not below zero.
+#[must_use]
+#[inline]
+pub fn age(now: Instant, sent: Instant) -> f64 {
+    now.saturating_duration_since(sent).as_secs_f64()
+}
+
 impl<const A: usize> Held<A> {
     /// Holds the initial state of each other peer, in the order of the peers with the holder left out.
     #[must_use]
     pub fn new(initial: impl IntoIterator<Item = State<A>>) -> Self {
         let samples = initial.into_iter().map(|state| HeldSample { state, next: 0 }).collect();
-        let mut held = Self { samples, mean: State::REST };
+        let mut held = Self { samples, mean: State::REST, motions: None };
         held.refresh();
         held
+    }
+
+    /// Keeps from now on what [`Held::lead`] needs: what is held so far counts as sampled at the instant 0 of its sender's clock.
+    pub fn keep_ages(&mut self) {
+        let motion = |sample: &HeldSample<A>| Extrapolation { sent: Instant::ZERO, velocity: sample.state.velocity };
+        self.motions = Some(self.samples.iter().map(motion).collect());
     }
 
     /// How many other peers there are.
@@ -54,7 +79,27 @@ impl<const A: usize> Held<A> {
         &self.mean
     }
 
-    /// Takes in a sample if it is newer than the one held, and says whether it was: a late or repeated sample changes nothing.
+    /// By how much the samples held have moved on since they were sent, on average \[m\]: the mean of min(age, `horizon`)·velocity, with ages \[s\] at
+    /// `now` on the holder's own clock. Zero unless [`Held::keep_ages`] was called.
+    ///
+    /// Four partial sums, as in [`Held::refresh`].
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
+    pub fn lead(&self, now: Instant, horizon: f64) -> [f64; A] {
+        let mut sums = [[0.0; A]; 4];
+        let Some(motions) = self.motions.as_ref().filter(|motions| !motions.is_empty()) else { return [0.0; A] };
+        for (place, motion) in motions.iter().enumerate() {
+            let age = age(now, motion.sent).min(horizon);
+            for axis in 0..A {
+                sums[place % 4][axis] += age * motion.velocity[axis];
+            }
+        }
+        let [a, b, c, d] = sums;
+        core::array::from_fn(|axis| ((a[axis] + b[axis]) + (c[axis] + d[axis])) / motions.len() as f64)
+    }
+
+    /// Takes in a sample that was sent at `sent` on its sender's clock if it is newer than the one held, and says whether it was: a late or repeated sample
+    /// changes nothing.
     ///
     /// Call [`Held::refresh`] before the mean is used again.
     ///
@@ -62,28 +107,37 @@ impl<const A: usize> Held<A> {
     ///
     /// If there is no sender in that place.
     #[inline]
-    pub fn accept(&mut self, place: usize, sequence: u64, state: State<A>) -> bool {
+    pub fn accept(&mut self, place: usize, sequence: u64, sent: Instant, state: State<A>) -> bool {
         let held = &mut self.samples[place];
         let newer = sequence >= held.next;
         if newer {
             // A sequence number of 2^64 − 1 is the last there can be: nothing is newer.
             *held = HeldSample { state, next: sequence.saturating_add(1) };
+            if let Some(motions) = &mut self.motions {
+                motions[place] = Extrapolation { sent, velocity: state.velocity };
+            }
         }
         newer
     }
 
-    /// Holds that state from that sender, as if nothing had ever arrived from it: any sample is newer.
+    /// Holds that state, sampled at `sent` on the sender's clock, from that sender, as if nothing had ever arrived from it: any sample is newer.
     ///
     /// # Panics
     ///
     /// If there is no sender in that place.
-    pub fn hold(&mut self, place: usize, state: State<A>) {
+    pub fn hold(&mut self, place: usize, sent: Instant, state: State<A>) {
         self.samples[place] = HeldSample { state, next: 0 };
+        if let Some(motions) = &mut self.motions {
+            motions[place] = Extrapolation { sent, velocity: state.velocity };
+        }
     }
 
-    /// Replaces the state held from a sender, whose newest sample stays as new as it was.
-    pub(crate) fn replace_state(&mut self, place: usize, state: State<A>) {
+    /// Replaces the state held from a sender, whose newest sample stays as new as it was, and the velocity with which it moves on.
+    pub(crate) fn replace_state(&mut self, place: usize, state: State<A>, velocity: [f64; A]) {
         self.samples[place].state = state;
+        if let Some(motions) = &mut self.motions {
+            motions[place].velocity = velocity;
+        }
     }
 
     /// [`Held::refresh`] for a mean of the differences from the holder's own state, so that senders that are held exactly there leave exactly that.
@@ -148,11 +202,12 @@ mod tests {
     #[test]
     fn a_late_or_repeated_sample_never_replaces_a_newer_one() {
         let mut held = Held::new([at(0.0), at(0.0)]);
-        assert!(held.accept(1, 5, at(5.0)));
-        assert!(!held.accept(1, 4, at(4.0)));
-        assert!(!held.accept(1, 5, at(99.0)));
-        assert!(held.accept(1, 6, at(6.0)));
-        assert!(held.accept(0, 0, at(1.0)));
+        let mut accept = |place, sequence, x| held.accept(place, sequence, Instant::ZERO, at(x));
+        assert!(accept(1, 5, 5.0));
+        assert!(!accept(1, 4, 4.0));
+        assert!(!accept(1, 5, 99.0));
+        assert!(accept(1, 6, 6.0));
+        assert!(accept(0, 0, 1.0));
         held.refresh();
         assert_eq!(*held.mean(), at(3.5));
     }
@@ -160,8 +215,26 @@ mod tests {
     #[test]
     fn the_last_sequence_number_of_all_is_still_accepted_once() {
         let mut held = Held::new([at(0.0)]);
-        assert!(held.accept(0, u64::MAX - 1, at(1.0)));
-        assert!(held.accept(0, u64::MAX, at(2.0)));
+        assert!(held.accept(0, u64::MAX - 1, Instant::ZERO, at(1.0)));
+        assert!(held.accept(0, u64::MAX, Instant::ZERO, at(2.0)));
+    }
+
+    /// Ages 30 ms and, beyond the horizon, 25 ms: (0.030·(−1) + 0.025·(−2))/2; none below zero.
+    #[test]
+    fn samples_move_on_up_to_the_horizon() {
+        let at_ms = |ms: u64| Instant::from_nanos(ms * 1_000_000);
+        let mut held = Held::new([at(0.0), at(0.0)]);
+        assert_eq!(held.lead(at_ms(10), 1.0), [0.0]);
+        held.keep_ages();
+        held.accept(0, 0, at_ms(10), at(1.0));
+        held.hold(1, at_ms(5), at(2.0));
+        let expected = (0.030_f64.min(0.033) * -1.0 + 0.033 * -2.0) / 2.0;
+        assert_eq!(held.lead(at_ms(40), 0.033), [expected]);
+        assert_eq!(held.lead(at_ms(1), 0.033), [0.0]);
+        assert!(!held.accept(0, 0, at_ms(39), at(7.0)));
+        assert_eq!(held.lead(at_ms(40), 0.033), [expected]);
+        held.replace_state(1, at(3.0), [0.0]);
+        assert_eq!(held.lead(at_ms(40), 0.033), [-0.015]);
     }
 
     #[test]

@@ -48,7 +48,7 @@ pub use config::{ArmConfig, Contact, CopyConfig, DeviceConfig, Direction, Gains,
 pub use coordination::{Command, Context, Coordination, Strategy};
 pub use device::{Device, HandForce, RestingDevice, SimulatedDevice};
 pub use enclosure::Enclosure;
-pub use held::Held;
+pub use held::{Held, age};
 pub use motion::Motion;
 pub use number::Number;
 pub use object::ObjectCopy;

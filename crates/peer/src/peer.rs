@@ -21,6 +21,8 @@ pub struct PeerConfig {
     pub contact: Contact,
     /// KC and BC.
     pub coupling: Gains,
+    /// The period of the tick on the peer's own clock, which shows 0 at the first one.
+    pub tick: Duration,
     /// Whether forces are applied one tick after they were computed.
     pub compute_delay: bool,
     /// The walls around the object, if there are any.
@@ -47,6 +49,8 @@ pub struct Peer<const A: usize, D, S> {
     /// Whether a sample has changed since the mean was computed.
     stale_mean: bool,
     next_sequence: u64,
+    /// What the peer's own clock shows.
+    local_time: Instant,
     computed: Acting<A>,
     applied: Acting<A>,
 }
@@ -82,7 +86,6 @@ pub enum Reception {
 
 /// Why a datagram was refused. Nothing changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ReceiveError {
     /// It is no sample.
     #[error(transparent)]
@@ -104,9 +107,13 @@ pub enum ReceiveError {
 impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// A peer that holds the initial states of the others.
     #[must_use]
-    pub fn new(config: PeerConfig, device: D, object: ObjectCopy<A>, strategy: S, held: Held<A>) -> Self {
+    pub fn new(config: PeerConfig, device: D, object: ObjectCopy<A>, strategy: S, mut held: Held<A>) -> Self {
         let none = Acting { coupling: [0.0; A], on_object: [0.0; A] };
-        Self { config, device, object, strategy, held, stale_mean: false, next_sequence: 0, computed: none, applied: none }
+        if strategy.needs_ages() {
+            held.keep_ages();
+        }
+        let local_time = Instant::ZERO;
+        Self { config, device, object, strategy, held, stale_mean: false, next_sequence: 0, local_time, computed: none, applied: none }
     }
 
     /// Step 1: writes the sample that this peer sends now into `datagram` and gives its length. `local_time` is what the peer's own clock shows.
@@ -139,7 +146,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             return Err(ReceiveError::Session { found: sample.session });
         }
         let Some(place) = self.place_of(sample.sender) else { return Err(ReceiveError::Sender { sender: sample.sender }) };
-        if self.held.accept(place, sample.sequence, sample.state) {
+        if self.held.accept(place, sample.sequence, sample.sent, sample.state) {
             self.stale_mean = true;
             Ok(Reception::Newest)
         } else {
@@ -156,7 +163,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         }
         let own = self.object.state();
         let coupling = self.coupling_force(own);
-        let command = self.strategy.command(&Context { now, own, held: &self.held });
+        let command = self.strategy.command(&Context { now, local_time: self.local_time, own, held: &self.held });
         let mut on_object: [f64; A] = core::array::from_fn(|axis| on_object(coupling[axis], command.force[axis]));
         if let Some(enclosure) = &self.config.enclosure {
             let walls = enclosure.force(own);
@@ -178,6 +185,18 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     pub fn advance(&mut self, now: Instant, span: Duration) {
         self.device.advance(now, span, self.applied.coupling);
         self.object.advance(span, self.applied.on_object);
+        self.local_time = self.local_time.saturating_add(self.config.tick);
+    }
+
+    /// What the peer's own clock shows: 0 at its first tick, and a tick more at each one after it.
+    #[must_use]
+    pub const fn local_time(&self) -> Instant {
+        self.local_time
+    }
+
+    /// Sets the peer's own clock.
+    pub const fn set_local_time(&mut self, local_time: Instant) {
+        self.local_time = local_time;
     }
 
     /// The device.
@@ -203,13 +222,13 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         &mut self.object
     }
 
-    /// Holds that state from another peer (see [`Held::hold`]); the others count in order, with this peer left out.
+    /// Holds that state, sampled at `sent` on the sender's clock, from another peer (see [`Held::hold`]); the others count in order, with this peer left out.
     ///
     /// # Panics
     ///
     /// If there is no such peer.
-    pub fn hold(&mut self, other: usize, state: State<A>) {
-        self.held.hold(other, state);
+    pub fn hold(&mut self, other: usize, sent: Instant, state: State<A>) {
+        self.held.hold(other, sent, state);
         self.stale_mean = true;
     }
 

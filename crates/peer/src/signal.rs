@@ -73,7 +73,6 @@ pub struct Table {
 
 /// Why rows are no table.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum TableError {
     /// There is no row.
     #[error("there is no row")]

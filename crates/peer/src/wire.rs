@@ -15,7 +15,7 @@
 //!     48    16  position \[m\] and velocity [m/s] on the first axis, then on the others
 //! ```
 //!
-//! The send time is for those who record or measure; a receiver goes by the sequence number alone.
+//! Which sample is the newest follows from the sequence number alone. The send time is for laws that need the age of a sample, and for those who record or measure.
 //!
 //! A datagram is taken only if every byte of it has a meaning: whatever decodes encodes to the same bytes again. The zeros are room for what a
 //! later version may send (the energy of a passivity controller, for instance).
@@ -57,7 +57,6 @@ pub struct Sample<const A: usize> {
 
 /// Why a datagram is no sample.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum DecodeError {
     /// It is shorter than a header.
     #[error("{len} bytes are too short for a sample")]

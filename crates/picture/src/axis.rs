@@ -1,15 +1,8 @@
 //! An axis: its name, symbol and unit, its scale and range.
 
+use crate::extent::{Extent, Scale, count};
 use crate::text::Text;
-use crate::ticks::{Step, Ticks};
-
-/// How values lie along an axis.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Scale {
-    Linear,
-    /// Values of zero and below have no place.
-    Logarithmic,
-}
+use crate::ticks::Ticks;
 
 /// One axis of a panel.
 ///
@@ -81,7 +74,7 @@ impl Axis {
     #[must_use]
     pub fn categories<T: Into<Text>>(self, names: impl IntoIterator<Item = T>) -> Self {
         let categories: Vec<Text> = names.into_iter().map(Into::into).collect();
-        let axis = self.range(-0.5, crate::content::count(categories.len().max(1)) - 0.5);
+        let axis = self.range(-0.5, count(categories.len().max(1)) - 0.5);
         Self { categories, ..axis }
     }
 
@@ -155,58 +148,6 @@ impl Axis {
     /// Ticks, of which there are about `most` at most.
     pub(crate) fn ticks(&self, extent: Extent, most: usize) -> Ticks {
         if self.categories.is_empty() { Ticks::of(extent, most, self.multiples) } else { Ticks::named(&self.categories) }
-    }
-}
-
-/// The range of an axis, and how values lie in it.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Extent {
-    pub(crate) scale: Scale,
-    pub(crate) low: f64,
-    pub(crate) high: f64,
-}
-
-impl Extent {
-    fn new(scale: Scale, low: f64, high: f64, margins: (f64, f64)) -> Self {
-        match scale {
-            Scale::Linear => {
-                let least = 1e-9 * low.abs().max(high.abs()).max(1e-290);
-                let (low, high) = if high - low < least { (low - 0.05 * low.abs() - 1e-12, high + 0.05 * high.abs() + 1e-12) } else { (low, high) };
-                let span = high - low;
-                Self { scale, low: low - margins.0 * span, high: high + margins.1 * span }
-            }
-            Scale::Logarithmic => {
-                let (low, high) = (low.max(1e-300), high.max(1e-300));
-                let (low, high) = if high / low < 1.000_001 { (low / 2.0, high * 2.0) } else { (low, high) };
-                let ratio = libm::log10(high) - libm::log10(low);
-                let (below, above) = (libm::pow(10.0, -margins.0 * ratio), libm::pow(10.0, margins.1 * ratio));
-                Self { scale, low: (low * below).max(1e-306), high: (high * above).min(1e306) }
-            }
-        }
-    }
-
-    fn widened_to_ticks(self, multiples: Option<u32>) -> Self {
-        const ABOUT: usize = 7;
-        match self.scale {
-            Scale::Linear => {
-                let (first, last, unit) = Step::of(self, ABOUT, multiples).around(self);
-                Self { low: first * unit, high: last.max(first + 1.0) * unit, ..self }
-            }
-            Scale::Logarithmic => {
-                // A power of ten but for rounding is one.
-                let (first, last) = ((libm::log10(self.low) + 1e-9).floor(), (libm::log10(self.high) - 1e-9).ceil());
-                Self { low: libm::pow(10.0, first), high: libm::pow(10.0, last.max(first + 1.0)), ..self }
-            }
-        }
-    }
-
-    /// Where a value lies: 0 at the low end, 1 at the high one. Not finite if it has no place.
-    pub(crate) fn place(self, value: f64) -> f64 {
-        match self.scale {
-            Scale::Linear => (value - self.low) / (self.high - self.low),
-            Scale::Logarithmic if value > 0.0 => (libm::log10(value) - libm::log10(self.low)) / (libm::log10(self.high) - libm::log10(self.low)),
-            Scale::Logarithmic => f64::NAN,
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a panel shows: lines, bands, regions, heat maps, marks.
 
-use crate::axis::Scale;
+use crate::extent::{Extent, Scale, count};
 use crate::look::{Fill, Look, Marker};
 use crate::text::Text;
 
@@ -219,7 +219,7 @@ impl HeatMap {
     }
 
     /// The lowest and highest value.
-    pub(crate) fn extent(&self) -> crate::axis::Extent {
+    pub(crate) fn extent(&self) -> Extent {
         let logarithmic = self.axis.scale == Scale::Logarithmic;
         let finite = self.values.iter().flatten().copied().filter(|value| value.is_finite() && (!logarithmic || *value > 0.0));
         self.axis.clone().tight().shown(span(finite))
@@ -250,7 +250,6 @@ impl Rug {
 
 /// Anything that a panel can show.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum Content {
     /// A line or marks.
     Line(Line),
@@ -322,11 +321,6 @@ pub fn cell_edges(values: &[f64], logarithmic: bool) -> Vec<f64> {
         [only] if logarithmic => vec![only / 2.0, only * 2.0],
         _ => edges(values),
     }
-}
-
-/// How many, as a number to compute with.
-pub(crate) fn count(number: usize) -> f64 {
-    f64::from(u32::try_from(number).unwrap_or(u32::MAX))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The layout as a document.
 
-use crate::axis::{Extent, Scale};
 use crate::content::{Band, Content, HeatMap, Line, Region, Rug};
+use crate::extent::{Extent, Scale, count, whole};
 use crate::layout::{AFTER_TICK, AxisLayout, BAR, Layout, PanelLayout, TICK, TITLE};
 use crate::legend::{draw_marker, stroke};
 use crate::look::{PATTERNS, style};
@@ -15,7 +15,15 @@ use crate::xml::{Anchor, Xml, coordinate, escape};
 /// From the middle of letters to the line they stand on \[sizes of the font\].
 const MIDDLE: f64 = 0.35;
 
-pub(crate) fn document(picture: &Picture, layout: &Layout) -> String {
+impl Picture {
+    /// The document: valid as a file and as a part of a page of HTML.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        document(self, &Layout::of(self))
+    }
+}
+
+fn document(picture: &Picture, layout: &Layout) -> String {
     let mut xml = Xml::default();
     let (width, height) = (coordinate(layout.width), coordinate(layout.height));
     let millimetres = |pixels: f64| format!("{}mm", coordinate(pixels / MILLIMETRE));
@@ -29,9 +37,7 @@ pub(crate) fn document(picture: &Picture, layout: &Layout) -> String {
     ));
     xml.text.push_str(&format!("<style>\n{}</style>\n", style()));
     xml.text.push_str(PATTERNS);
-    if picture.ground {
-        xml.element("rect", &[("class", "paper"), ("width", &width), ("height", &height)]);
-    }
+    xml.element("rect", &[("class", "paper"), ("width", &width), ("height", &height)]);
     let font = picture.size.font;
     let mut y = layout.margin;
     for (lines, size, class) in [(&layout.title, TITLE * font, "ink"), (&layout.notes, font, "quiet")] {
@@ -132,7 +138,7 @@ impl Sheet<'_> {
         }
         self.xml.element("path", &[("class", "frame"), ("stroke-width", "0.9"), ("d", &path)]);
 
-        let mut base = frame.top - 0.75 * font - LEADING * font * crate::content::count(self.placed.title.len()) + ASCENT * font;
+        let mut base = frame.top - 0.75 * font - LEADING * font * count(self.placed.title.len()) + ASCENT * font;
         for line in &self.placed.title {
             self.xml.line_of_text(line, (frame.left, base), font, "ink", Anchor::Start);
             base += LEADING * font;
@@ -268,9 +274,9 @@ impl Sheet<'_> {
         let (frame, font, extent) = (self.frame(), self.font, map.extent());
         let (left, right) = (frame.right + 0.8 * font, frame.right + (0.8 + BAR) * font);
         let at = |share: f64| frame.bottom - frame.height() * share;
-        let shades = crate::content::count(SHADES);
+        let shades = count(SHADES);
         for place in 0..SHADES {
-            let (low, high) = (at(crate::content::count(place) / shades), at(crate::content::count(place + 1) / shades));
+            let (low, high) = (at(count(place) / shades), at(count(place + 1) / shades));
             let outline = vec![(left, low), (right, low), (right, high), (left, high)];
             self.xml.element("path", &[("class", "cells"), ("fill", &colour(place)), ("d", &data(&[outline], true))]);
         }
@@ -299,7 +305,7 @@ impl Sheet<'_> {
                 (frame.right + 1.3 * font, middle),
             ];
             stroke(self.xml, label.look.solid().thin(), &data(&[leader], false));
-            let lines = crate::content::count(label.lines.len());
+            let lines = count(label.lines.len());
             let mut base = middle - 0.5 * LEADING * font * lines + (0.5 * LEADING + MIDDLE) * font;
             for line in &label.lines {
                 self.xml.line_of_text(line, (frame.right + 1.5 * font, base), font, "ink", Anchor::Start);
@@ -322,7 +328,7 @@ const SHADES: usize = 64;
 
 fn shade(extent: Extent, value: f64) -> Option<usize> {
     let share = extent.place(value);
-    (value.is_finite() && share.is_finite()).then(|| crate::layout::whole(share.clamp(0.0, 1.0) * crate::content::count(SHADES)).min(SHADES - 1))
+    (value.is_finite() && share.is_finite()).then(|| whole(share.clamp(0.0, 1.0) * count(SHADES)).min(SHADES - 1))
 }
 
 fn colour(shade: usize) -> String {

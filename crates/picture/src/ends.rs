@@ -1,6 +1,7 @@
 //! Names of lines where they end at the right, moved apart so that none lies on another.
 
-use crate::content::{Content, Line, count};
+use crate::content::{Content, Line};
+use crate::extent::count;
 use crate::look::Look;
 use crate::panel::{Extents, Panel};
 use crate::text::{LEADING, Text};

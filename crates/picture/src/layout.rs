@@ -3,8 +3,9 @@
 //! Ticks, wrapped titles and labels depend on the size of the plots, and the size of the plots depends on all of these; so a height is assumed, all is measured, and
 //! where a given height of the picture leaves less, all is measured again with less.
 
-use crate::content::{Content, HeatMap, count};
+use crate::content::{Content, HeatMap};
 use crate::ends::EndLabel;
+use crate::extent::{Extent, count, whole};
 use crate::legend::{Legend, LegendPlace, Sample, entry};
 use crate::panel::{Extents, Panel};
 use crate::path::Frame;
@@ -227,7 +228,7 @@ fn entries(panels: &[Panel], at_ends: &[bool]) -> Vec<(Sample, Text)> {
 }
 
 /// An axis that runs upwards, with as many ticks as labels do not touch.
-fn upright(axis: &crate::Axis, extent: crate::axis::Extent, font: f64, height: f64, labelled: bool) -> AxisLayout {
+fn upright(axis: &crate::Axis, extent: Extent, font: f64, height: f64, labelled: bool) -> AxisLayout {
     let ticks = thinned(axis, extent, whole(height / (2.0 * font)).clamp(2, 7), |ticks| {
         let places: Vec<f64> = ticks.marks.iter().map(|(value, _)| height * extent.place(*value)).collect();
         places.windows(2).any(|pair| (pair[1] - pair[0]).abs() < LEADING * font)
@@ -238,7 +239,7 @@ fn upright(axis: &crate::Axis, extent: crate::axis::Extent, font: f64, height: f
 }
 
 /// An axis that runs to the right.
-fn level(axis: &crate::Axis, extent: crate::axis::Extent, font: f64, width: f64, labelled: bool) -> AxisLayout {
+fn level(axis: &crate::Axis, extent: Extent, font: f64, width: f64, labelled: bool) -> AxisLayout {
     let ticks = thinned(axis, extent, whole(width / (3.0 * font)).clamp(2, 9), |ticks| {
         let spans: Vec<(f64, f64)> = ticks.marks.iter().map(|(value, label)| (width * extent.place(*value), 0.5 * label.width(font))).collect();
         spans.windows(2).any(|pair| pair[1].0 - pair[1].1 < pair[0].0 + pair[0].1 + 0.6 * font)
@@ -248,7 +249,7 @@ fn level(axis: &crate::Axis, extent: crate::axis::Extent, font: f64, width: f64,
 }
 
 /// As many ticks as labels do not touch, `most` of them at most; one where even two labels touch.
-fn thinned(axis: &crate::Axis, extent: crate::axis::Extent, mut most: usize, crowded: impl Fn(&Ticks) -> bool) -> Ticks {
+fn thinned(axis: &crate::Axis, extent: Extent, mut most: usize, crowded: impl Fn(&Ticks) -> bool) -> Ticks {
     let mut ticks = axis.ticks(extent, most);
     while most > 1 && crowded(&ticks) {
         most -= 1;
@@ -258,11 +259,6 @@ fn thinned(axis: &crate::Axis, extent: crate::axis::Extent, mut most: usize, cro
         ticks.marks.truncate(1);
     }
     ticks
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lengths on a page are small and not below zero")]
-pub(crate) fn whole(value: f64) -> usize {
-    value.max(0.0) as usize
 }
 
 impl Panel {

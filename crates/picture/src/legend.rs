@@ -1,6 +1,7 @@
 //! The legend: a sample and a name for each line and area, in rows that break like text.
 
 use crate::content::Content;
+use crate::extent::count;
 use crate::look::{Fill, Look, Marker};
 use crate::text::{ASCENT, LEADING, Text};
 use crate::xml::{Anchor, Xml, coordinate};
@@ -69,7 +70,7 @@ impl Legend {
         for (sample, name) in entries {
             let lines = name.wrapped(font, (width - before).max(2.0 * font), 4);
             let own = before + lines.iter().map(|line| line.width(font)).fold(0.0, f64::max);
-            let height = LEADING * font * crate::content::count(lines.len());
+            let height = LEADING * font * count(lines.len());
             if x > 0.0 && (narrow || x + own > width) {
                 (x, y, row) = (0.0, y + row, 0.0);
             }

@@ -30,6 +30,7 @@ mod axis;
 mod content;
 mod draw;
 mod ends;
+mod extent;
 mod gauge;
 mod layout;
 mod legend;

@@ -1,7 +1,8 @@
 //! A panel: two axes and what lies between them.
 
-use crate::axis::{Axis, Extent};
+use crate::axis::Axis;
 use crate::content::{Content, Reach};
+use crate::extent::Extent;
 use crate::text::Text;
 
 /// One plot of a picture.

@@ -1,9 +1,7 @@
-//! A whole picture: title, panels in a grid, legend; and the document it becomes.
+//! A whole picture: title, panels in a grid, legend.
 
-use crate::axis::Scale;
 use crate::content::Reach;
-use crate::draw;
-use crate::layout::{Layout, whole};
+use crate::extent::{Scale, whole};
 use crate::legend::LegendPlace;
 use crate::panel::{Extents, Panel};
 use crate::size::Size;
@@ -24,7 +22,6 @@ pub struct Picture {
     pub(crate) shared_y: bool,
     pub(crate) legend: LegendPlace,
     pub(crate) aspect: f64,
-    pub(crate) ground: bool,
 }
 
 impl Picture {
@@ -42,7 +39,6 @@ impl Picture {
             shared_y: false,
             legend: LegendPlace::default(),
             aspect: 0.6,
-            ground: true,
         }
     }
 
@@ -113,18 +109,6 @@ impl Picture {
     #[must_use]
     pub fn aspect(self, aspect: f64) -> Self {
         Self { aspect: if aspect.is_finite() { aspect.clamp(0.1, 3.0) } else { self.aspect }, ..self }
-    }
-
-    /// Without a ground of its own, for a page that has one.
-    #[must_use]
-    pub fn without_ground(self) -> Self {
-        Self { ground: false, ..self }
-    }
-
-    /// The document: valid as a file and as a part of a page of HTML.
-    #[must_use]
-    pub fn svg(&self) -> String {
-        draw::document(self, &Layout::of(self))
     }
 
     /// Columns that have room for a plot with its labels.

@@ -1,6 +1,6 @@
 //! Where the ticks of an axis are, and what they say: round numbers, with a power of ten for all of them where they would be long.
 
-use crate::axis::{Extent, Scale};
+use crate::extent::{Extent, Scale, count};
 use crate::text::Text;
 
 /// The distance of ticks on a linear axis: a whole number times a power of ten.
@@ -66,7 +66,7 @@ impl Ticks {
 
     /// Each name at its number.
     pub(crate) fn named(names: &[Text]) -> Self {
-        let marks = names.iter().enumerate().map(|(place, name)| (crate::content::count(place), name.clone())).collect();
+        let marks = names.iter().enumerate().map(|(place, name)| (count(place), name.clone())).collect();
         Self { marks, between: Vec::new(), exponent: 0 }
     }
 
@@ -127,6 +127,24 @@ fn written(number: i64, power: i32) -> String {
     let digits = format!("{digits:0>width$}", width = places + 1);
     let (whole, part) = digits.split_at(digits.len() - places);
     format!("{sign}{whole}.{part}")
+}
+
+impl Extent {
+    /// Ends at ticks, about seven.
+    pub(crate) fn widened_to_ticks(self, multiples: Option<u32>) -> Self {
+        const ABOUT: usize = 7;
+        match self.scale {
+            Scale::Linear => {
+                let (first, last, unit) = Step::of(self, ABOUT, multiples).around(self);
+                Self { low: first * unit, high: last.max(first + 1.0) * unit, ..self }
+            }
+            Scale::Logarithmic => {
+                // A power of ten but for rounding is one.
+                let (first, last) = ((libm::log10(self.low) + 1e-9).floor(), (libm::log10(self.high) - 1e-9).ceil());
+                Self { low: libm::pow(10.0, first), high: libm::pow(10.0, last.max(first + 1.0)), ..self }
+            }
+        }
+    }
 }
 
 #[cfg(test)]

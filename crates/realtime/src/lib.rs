@@ -12,7 +12,7 @@
 //! ```
 //!
 //! [`prepare_thread`] asks the system for what helps: no timer slack, `SCHED_FIFO`, locked memory; each is granted or refused with a plain message.
-//! [`udp`] has sockets that know when each datagram came in. Linux only. This crate knows nothing of links, peers, or what is in a datagram.
+//! [`udp`] has sockets that know when each datagram came in. Linux only. This crate knows nothing of links, peers, or the content of a datagram.
 //!
 //! ```
 //! use std::time::Duration;

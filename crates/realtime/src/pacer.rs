@@ -12,7 +12,7 @@ use crate::Clock;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Pacing {
     /// Leave the processor until the system wakes the thread, which it is asked for as much before the deadline as it is usually late. When it is earlier
-    /// than usual, look at the clock for what is left: half of all deadlines are met to the microsecond, for some microseconds of processor time each.
+    /// than usual, look at the clock for the rest: half of all deadlines are met to the microsecond, for some microseconds of processor time each.
     #[default]
     Sleep,
     /// The same until `margin` before the deadline, then look at the clock again and again: well below a microsecond late as long as the thread is not
@@ -85,7 +85,7 @@ impl Pacer {
         Ok(woken)
     }
 
-    /// The same, but comes back with [`Woken::Deadline`] as soon as the deadline is no further away than the [`Pacer::margin`]. What is left is the
+    /// Waits like [`wait`](Self::wait), but comes back with [`Woken::Deadline`] as soon as the deadline is no further away than the [`Pacer::margin`]. The rest is the
     /// caller's, to look at the clock, and to make ready what happens at the deadline.
     ///
     /// # Errors
@@ -127,7 +127,7 @@ struct UsualLateness {
 
 impl UsualLateness {
     const STEP: u64 = 500;
-    /// What is looked at the clock for at most, whatever the system does.
+    /// The longest span for which the clock is looked at, whatever the system does.
     const MOST: u64 = 100_000;
 
     #[inline]

@@ -26,7 +26,7 @@ pub enum Validity {
     NotValid {
         /// So many things were late,
         late: u64,
-        /// of so many,
+        /// of this number,
         of: u64,
         /// by more than this.
         limit: Duration,

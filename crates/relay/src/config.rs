@@ -12,7 +12,7 @@ use cohaptic_wan::{LinkModel, NodeId};
 pub struct RelayConfig {
     /// The seed of every random stream.
     pub seed: u64,
-    /// Who talks to whom.
+    /// The topology: which programs talk to each other.
     pub form: Form,
     /// What it may take.
     pub limits: Limits,
@@ -20,7 +20,7 @@ pub struct RelayConfig {
     pub changes: Vec<Change>,
 }
 
-/// Who talks to whom.
+/// The topology: which programs talk to each other.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one")]
 pub enum Form {
@@ -91,7 +91,6 @@ pub struct Change {
 
 /// Why there is no such relay.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ConfigError {
     /// Fewer than two programs, or a table of links for another number of them.
     #[error("{programs} programs and links between {links}: expected at least two programs, and links between as many")]
@@ -129,7 +128,7 @@ impl From<RelayFile> for RelayConfig {
         let programs = file.programs.into_iter().map(|program| Program { name: program.name, port: program.port, address: program.address });
         let changes = file.timeline.into_iter().map(|change| {
             let link = change.link;
-            Change { at: change.at, from: node(link.from), to: node(link.to), model: (*link.config).clone() }
+            Change { at: change.at, from: NodeId::new(link.from), to: NodeId::new(link.to), model: (*link.config).clone() }
         });
         Self {
             seed: file.seed,
@@ -157,7 +156,7 @@ impl RelayConfig {
     /// The link from one node to another.
     pub(crate) fn link(&self, from: NodeId, to: NodeId) -> LinkModel {
         match &self.form {
-            Form::Mesh(mesh) => mesh.links.between(from.0 as usize, to.0 as usize).clone(),
+            Form::Mesh(mesh) => mesh.links.between(from.index(), to.index()).clone(),
             Form::Proxy(proxy) => if from.0 == 0 { &proxy.forth } else { &proxy.back }.clone(),
         }
     }
@@ -170,14 +169,10 @@ impl RelayConfig {
             Form::Mesh(mesh) => mesh.programs.len(),
             Form::Proxy(_) => 2,
         };
-        let is_link = |from: NodeId, to: NodeId| from != to && (from.0 as usize) < nodes && (to.0 as usize) < nodes;
+        let is_link = |from: NodeId, to: NodeId| from != to && (from.index()) < nodes && (to.index()) < nodes;
         match self.changes.iter().find(|change| !is_link(change.from, change.to)) {
             Some(Change { from, to, .. }) => Err(ConfigError::NoLink { from: *from, to: *to }),
             None => Ok(()),
         }
     }
-}
-
-pub(crate) fn node(place: usize) -> NodeId {
-    NodeId(u32::try_from(place).unwrap_or(u32::MAX))
 }

@@ -15,7 +15,7 @@
 //! time. [`Relay`] gives it both. Time is *logical*: a datagram came in when the kernel saw it, and leaves when the link says; how much later than that the
 //! program got round to sending it is the *release error*, which is recorded and does not add up.
 //!
-//! Memory is bounded: beyond so many datagrams or bytes on their way, what comes in is dropped and counted as overload; strangers are dropped and counted.
+//! Memory is bounded: beyond a number of datagrams or bytes on their way, arrivals are dropped and counted as overload; strangers are dropped and counted.
 //!
 //! Read [`RelayConfig`] first, then [`Relay::bind`].
 

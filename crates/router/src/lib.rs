@@ -10,7 +10,7 @@
 //!                        instant
 //! ```
 //!
-//! It does not answer, fragment or route packets, and does not count hops: hosts see a wire. What is no IP (ARP) crosses at once. Linux only. Nothing here
+//! It does not answer, fragment or route packets, and does not count hops: hosts see a wire. Other frames (ARP) cross at once. Linux only. Nothing here
 //! prints.
 //!
 //! Read [`Engine`] first, then [`Router`]. The file is [`cohaptic_linkfile::router::RouterFile`].

@@ -19,6 +19,7 @@ impl Scene {
             axes: self.axes.count(),
             contact: spec.contact,
             coupling: spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers.len())),
+            tick: spec.clock.tick,
             compute_delay: spec.compute_delay,
             enclosure: self.object.enclosure,
         }

@@ -4,7 +4,8 @@
 //! This crate reads it, fills in every default, and refuses whatever makes no sense: a [`Scene`] that exists can be run. Every refusal is a
 //! [`SceneError`] that names file, line, column and key, shows the line, and says what was expected.
 //!
-//! It does not run a scene, and it does not apply the scaling of gains: what is in a [`Scene`] is what was written. Nothing here is printed.
+//! It does not run a scene. The fields of a [`Scene`] have gains as written; [`Scene::peer_config`] gives the parts of a peer with every scaling applied. Nothing
+//! here is printed.
 //!
 //! Read [`Scene::parse`] first, then [`Scene`]. The document, its faults and the links are those of `cohaptic-linkfile`.
 //!

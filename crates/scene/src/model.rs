@@ -3,6 +3,7 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
+use cohaptic_peer::coordination::LawSettings;
 use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::{DropCause, LinkModel};
@@ -98,6 +99,8 @@ pub struct CoordinationSpec {
     pub scaling: Scaling,
     /// KT and BT as written, before scaling.
     pub gains: Gains,
+    /// The parameters that strategies have of their own, of every strategy.
+    pub settings: LawSettings,
     /// The period of sending, Tn; a whole multiple of every peer's tick, on its own clock.
     pub update: Duration,
 }
@@ -138,7 +141,6 @@ pub struct PeerSpec {
 
 /// Where a peer lives. In virtual time every peer is simulated, whatever its kind; a live session (`cohaptic live`) goes by it.
 #[derive(Clone, PartialEq, Debug, Default)]
-#[non_exhaustive]
 pub enum PeerKind {
     /// In this program: device, hand and copy are simulated.
     #[default]
@@ -228,7 +230,6 @@ pub struct Change {
 
 /// What changes.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum ChangeKind {
     /// A link takes a new configuration; what is on the way keeps its delay.
     Link(LinkChange),

@@ -3,7 +3,7 @@
 use cohaptic_peer::Strategy;
 use cohaptic_peer::coordination::{BuiltIn, LawParameters, LawStrategy};
 
-use crate::Scene;
+use crate::{CoordinationSpec, Scene};
 
 /// Makes the coordination strategy of each peer, for as many axes as are simulated.
 ///
@@ -15,8 +15,9 @@ pub trait Strategies {
     /// Makes the strategy of the peer in that place of [`Scene::peers`].
     fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> Self::Strategy<A>;
 
-    /// The law of every peer, if these strategies are one of the registry: it gives their forces to the bit, so a run can do without the strategies.
-    fn law(&self, _scene: &Scene) -> Option<BuiltIn> {
+    /// The law of the peer in that place of [`Scene::peers`], if these strategies are one of the registry: it gives their forces to the bit, so a run can do
+    /// without the strategies.
+    fn law(&self, _scene: &Scene, _peer: usize) -> Option<BuiltIn> {
         None
     }
 }
@@ -28,25 +29,35 @@ pub struct FromScene;
 impl Strategies for FromScene {
     type Strategy<const A: usize> = LawStrategy<A>;
 
-    fn strategy<const A: usize>(&self, scene: &Scene, _peer: usize) -> LawStrategy<A> {
-        LawStrategy::new(scene.coordination.strategy, scene.law_parameters())
+    fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> LawStrategy<A> {
+        LawStrategy::new(scene.coordination.strategy, scene.law_parameters(peer))
     }
 
-    fn law(&self, scene: &Scene) -> Option<BuiltIn> {
-        Some(scene.law())
+    fn law(&self, scene: &Scene, peer: usize) -> Option<BuiltIn> {
+        Some(scene.law(peer))
     }
 }
 
 impl Scene {
-    /// The coordination law of every peer.
+    /// The coordination law of a peer.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
     #[must_use]
-    pub fn law(&self) -> BuiltIn {
-        self.coordination.strategy.law(&self.law_parameters())
+    pub fn law(&self, peer: usize) -> BuiltIn {
+        self.coordination.strategy.law(&self.law_parameters(peer))
     }
 
-    /// What the law is made from: the gains scaled by the number of peers.
-    fn law_parameters(&self) -> LawParameters {
+    /// What the law of a peer is made from: the gains scaled by the number of peers, its tick, and the parameters of the law itself.
+    fn law_parameters(&self, peer: usize) -> LawParameters {
         let peers = self.peers.len();
-        LawParameters { gains: self.coordination.gains.scaled(self.coordination.scaling.coordination_factor(peers)), peers }
+        let CoordinationSpec { strategy, scaling, gains, settings, .. } = &self.coordination;
+        LawParameters {
+            gains: gains.scaled(scaling.coordination_factor(peers)),
+            peers,
+            tick: self.peers[peer].clock.tick,
+            own: *settings.of(*strategy),
+        }
     }
 }

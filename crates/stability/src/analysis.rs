@@ -10,7 +10,7 @@ use crate::full::{Trust, full};
 use crate::network::NominalNetwork;
 use crate::parts::{Part, radius_of, reduced};
 use crate::spectrum::bounded_radius;
-use crate::structure::{Contacts, Structure, pull};
+use crate::structure::{Contacts, Structure, linear_law};
 use crate::{AnalysisError, Radius, Unwatched, Verdict, Watch};
 
 /// How a verdict is reached.
@@ -95,7 +95,7 @@ pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError>
 ///
 /// As for [`analyse`], and [`AnalysisError::Stopped`] if whoever watches ends it.
 pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
-    let equivalent = pull(scene).is_some();
+    let equivalent = (0..scene.peers.len()).all(|peer| linear_law(scene, peer).is_some());
     match method {
         // A strategy that cannot be taken apart goes the way of a user's own.
         _ if !equivalent => push_through(scene, &combinations(scene)?, Trust::Nothing, &FromScene, watch),

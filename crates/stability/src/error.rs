@@ -6,7 +6,6 @@ use cohaptic_units::print::Span;
 
 /// Why a scene cannot be analysed.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum AnalysisError {
     /// Its clocks never come back to where they were.
     #[error("the clocks of this scene have no common period: expected ticks, updates and drifts whose multiples meet within 584 years")]
@@ -37,9 +36,17 @@ pub enum AnalysisError {
         /// How many are looked at at most.
         most: u128,
     },
-    /// The strategy is not average-position coordination in another form.
+    /// The strategy has no linear form.
     #[error("{strategy} coordination cannot be taken apart by equal peers: only the general path follows it")]
     OtherStrategy {
+        /// Its name.
+        strategy: &'static str,
+    },
+    /// Ages of samples between clocks that differ.
+    #[error(
+        "{strategy} coordination uses the ages of samples, which do not repeat where clocks differ: expected one tick, offset and drift for all peers"
+    )]
+    AgesByClocks {
         /// Its name.
         strategy: &'static str,
     },

@@ -13,8 +13,8 @@ use crate::cost::{full_operations, pushed_operations};
 use crate::lifted::majorant::error_of;
 use crate::lifted::{Body, Lifted, Node, closer_of};
 use crate::network::{LinkTiming, NominalNetwork};
-use crate::structure::{Contacts, Structure, arm, common_time, count, device_plant, pull};
-use crate::timetable::{Event, NodeClock, Timetable};
+use crate::structure::{Contacts, Structure, arm, common_time, count, device_plant, linear_law};
+use crate::timetable::{Event, Instants, NodeClock, Timetable};
 use crate::{AnalysisError, Matrix, StateKind, StateName, Watch};
 
 /// What the general path finds: the matrix of one frame in relative coordinates.
@@ -36,7 +36,7 @@ pub(crate) struct FullMap {
 /// What is known about a strategy before anything is pushed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Trust {
-    /// One of this workspace: linear, without memory, by its tests. Looking again would push a quarter as many vectors more.
+    /// One of this workspace: linear by its tests. Looking again would push a quarter as many vectors more.
     Linear,
     /// Nothing: it is looked at.
     Nothing,
@@ -56,7 +56,7 @@ pub(crate) fn full<const A: usize, S: Strategy<A>>(
         pusher.check()?;
     }
     let mut map = pusher.map(watch).ok_or(AnalysisError::Stopped)?;
-    if trust == Trust::Linear && pull(scene).is_some() {
+    if trust == Trust::Linear && linear_law(scene, 0).is_some_and(|law| law.pull().is_some()) {
         let nodes = Structure::of_each(scene, network, contacts)?;
         map.error = closer_of(map.error, || error_of_known(scene, &nodes, map.time));
     }
@@ -85,6 +85,9 @@ fn compliance(scene: &Scene, peer: usize, time: f64) -> f64 {
     time * scene.peers[peer].clock.tick.as_secs_f64() / scene.copy_mass()
 }
 
+/// What all clocks show when a frame begins, so that samples of the frames before were sent at instants too.
+const EARLIER: Instant = Instant::from_nanos(1 << 60);
+
 type Member<const A: usize, S> = Peer<A, SimulatedDevice<A>, S>;
 
 /// The peers, and where their states stand in a vector.
@@ -92,6 +95,7 @@ struct Pusher<const A: usize, S> {
     members: Vec<Member<A, S>>,
     names: Vec<String>,
     timetable: Timetable,
+    instants: Instants,
     layout: Layout,
     /// What velocities \[s\] and forces [m/N] are multiplied by.
     time: f64,
@@ -140,10 +144,11 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let tied = silent || (0..peers).any(|place| contacts.touching[place] && arm(&scene.peers[place]).stiffness > 0.0);
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);
         let touching = contacts.touching.iter().copied().enumerate();
-        let time = common_time(scene, timetable.frame, pull(scene).unwrap_or(scene.coordination.gains), touching, false);
+        let time = common_time(scene, timetable.frame, linear_law(scene, 0).map_or(scene.coordination.gains, |law| law.force.own), touching, false);
         let compliance = (0..peers).map(|peer| compliance(scene, peer, time)).collect();
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
-        Ok(Self { samples: vec![Vec::new(); peers], members, names, timetable, layout, time, compliance, growth: 1.0 })
+        let instants = Instants::of(&timetable, peers);
+        Ok(Self { samples: vec![Vec::new(); peers], instants, members, names, timetable, layout, time, compliance, growth: 1.0 })
     }
 
     /// The matrix, vector by vector; `None` if whoever watches ends it.
@@ -257,14 +262,14 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
 
     /// The same, written over what is in `reached`.
     fn push(&mut self, z: &[f64], begin: Instant, reached: &mut [f64]) {
-        self.restore(z);
+        let begin_local = EARLIER.saturating_add(begin - Instant::ZERO);
+        self.restore(z, begin_local);
         let peers = self.members.len();
         for event in 0..self.timetable.events.len() {
             match self.timetable.events[event] {
                 Event::Sample { node } => self.samples[node].push(*self.members[node].object().state()),
                 Event::Deliver { from, to, sample } => {
-                    let state = *self.sample(from, sample);
-                    self.members[to].hold(if from < to { from } else { from - 1 }, state);
+                    self.hold(to, from, sample, begin_local);
                 }
                 Event::Tick { node, at, span } => {
                     let now = begin.saturating_add_nanos(at);
@@ -284,16 +289,26 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
     }
 
+    /// A peer holds a sample of another.
+    fn hold(&mut self, to: usize, from: usize, sample: i64, begin_local: Instant) {
+        let state = *self.sample(from, sample);
+        let after = self.instants.sent_at(from, sample, self.timetable.frame);
+        let sent = Instant::from_nanos(begin_local.as_nanos().saturating_add_signed(after));
+        self.members[to].hold(if from < to { from } else { from - 1 }, sent, state);
+    }
+
     /// The sample with that number: from 0 if it is of this frame.
     fn sample(&self, from: usize, number: i64) -> &State<A> {
         let place = i64::try_from(self.timetable.depth[from]).unwrap_or(0) + number;
         &self.samples[from][usize::try_from(place).unwrap_or(0)]
     }
 
-    fn restore(&mut self, z: &[f64]) {
+    fn restore(&mut self, z: &[f64], begin_local: Instant) {
         let layout = &self.layout;
         for (place, member) in self.members.iter_mut().enumerate() {
             let first = layout.first[place];
+            let first_tick = self.instants.ticks[place].first().copied().unwrap_or(0);
+            member.set_local_time(begin_local.saturating_add_nanos(first_tick));
             member.device_mut().set_state(state(&z[first..], self.time));
             member.object_mut().set_state(state(&z[first + 2 * A..], self.time));
             let mut next = first + 4 * A;
@@ -311,8 +326,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
         for held in 0..self.timetable.held.len() {
             let (to, from, sample) = self.timetable.held[held];
-            let state = *self.sample(from, sample);
-            self.members[to].hold(if from < to { from } else { from - 1 }, state);
+            self.hold(to, from, sample, begin_local);
         }
     }
 

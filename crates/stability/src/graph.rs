@@ -5,7 +5,7 @@
 //! scaled, and hears λ times its own samples: the scene is as many systems of one node. λ = 1 is there once for each connected part, which can be
 //! displaced as a whole.
 
-use cohaptic_peer::Coordination;
+use cohaptic_peer::coordination::Pull;
 use cohaptic_scene::Scene;
 
 use crate::analysis::{Analysis, combinations, combine};
@@ -30,7 +30,6 @@ pub enum Graph {
 
 /// Why peers cannot be analysed on a graph.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum GraphError {
     /// The scene cannot be analysed at all.
     #[error(transparent)]
@@ -96,13 +95,13 @@ pub fn analyse_on_watched(scene: &Scene, graph: &Graph, watch: &dyn Watch) -> Re
     };
     let peers = scene.peers.len();
     let (spectrum, degree) = graph.spectrum(scene)?;
-    // What the strategy multiplies its gains by among N peers, replaced by what it does among as many as are heard.
-    let coordination = match (scene.coordination.strategy, degree) {
-        (Coordination::ProportionalDerivative, Some(degree)) => structure.coordination(scene).scaled(degree / count(peers - 1)),
-        (Coordination::ProportionalDerivative, None) => return Err(GraphError::Irregular),
-        _ => structure.coordination(scene),
-    };
-    let node = [structure.node(scene, 0)];
+    let mut node = [structure.node(scene, 0)];
+    match (scene.coordination.strategy.pull(), degree) {
+        (Pull::Mean, _) => {}
+        // The sum over as many as are heard, in place of that over all others.
+        (Pull::Sum, Some(degree)) => node[0].law = node[0].law.scaled(degree / count(peers - 1)),
+        (Pull::Sum, None) => return Err(GraphError::Irregular),
+    }
     let quotient = structure.quotient(scene, &node);
     let mut parts = Vec::new();
     let mut rigid_modes = 0;
@@ -114,7 +113,7 @@ pub fn analyse_on_watched(scene: &Scene, graph: &Graph, watch: &dyn Watch) -> Re
             rigid_modes += copies;
         }
         let kind = if together { PartKind::Together } else { PartKind::Mode { weight: eigenvalue.value() } };
-        let lifted = Lifted { weights: &weight, timetable, coordination, tied, ..quotient };
+        let lifted = Lifted { weights: &weight, timetable, tied, ..quotient };
         parts.push(lifted_part(&lifted, kind, copies * combination.axes, Method::Reduced, watch)?);
     }
     let mut dimension = peers * (node[0].states() + 2 * structure.timetable.depth[0]);

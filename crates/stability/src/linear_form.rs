@@ -1,12 +1,12 @@
-//! The linear form of a coordination law: the law computed in linear forms of what it sees.
+//! The linear form of a coordination law: the law computed in linear forms of what it sees and remembers.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
 use cohaptic_peer::coordination::{BuiltIn, Law, Observation};
 use cohaptic_peer::{Gains, Motion, Number};
 
-/// Own position and velocity, and those of the mean of the samples held.
-const UNKNOWNS: usize = 4;
+/// Own position and velocity, those of the mean of the samples held, by how much these have moved on, and one number that the law remembers.
+const UNKNOWNS: usize = 6;
 
 /// A constant plus a multiple of each unknown; or the knowledge that it is no such sum.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -89,34 +89,125 @@ impl Mul for Form {
     }
 }
 
-/// KT and BT of a law that pulls the copy towards the mean of the samples held and remembers nothing: FT = KT·(x − x̄) + BT·(v − v̄). `None` for any other
-/// law.
+/// What comes out of a law in linear form: FT \[N\], or a number that the law remembers from now on.
 ///
-/// The gains are those that the law multiplies with, to the bit: every other factor on the way is 1 or 0.
-#[expect(clippy::float_cmp, reason = "a pull has equal gains for both ends to the bit")]
-pub(crate) fn pull_towards_mean(law: &BuiltIn) -> Option<Gains> {
-    if Law::<f64>::memory(law) > 0 {
-        return None;
+/// own·(x, v) − heard·(x̄, v̄) − ahead·lead + Σ memory·m, with x̄, v̄ and the lead of an [`Observation`].
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct LawRow {
+    pub(crate) own: Gains,
+    pub(crate) heard: Gains,
+    pub(crate) ahead: f64,
+    /// What each number that the law remembered is multiplied by.
+    pub(crate) memory: Vec<f64>,
+}
+
+/// A coordination law in linear form.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct LinearLaw {
+    pub(crate) force: LawRow,
+    pub(crate) memory: Vec<LawRow>,
+    /// Up to which age \[s\] samples are extrapolated; `None` if they are taken as they are.
+    pub(crate) horizon: Option<f64>,
+}
+
+impl LawRow {
+    /// Of the parts of `form` that do not depend on what the law remembers; `None` if it is no such sum, or changes where everything is moved alike.
+    #[expect(clippy::float_cmp, reason = "what moves with everything has equal gains for both ends to the bit")]
+    fn of(form: &Form) -> Option<Self> {
+        let Form { constant, by: [stiffness, damping, mean_position, mean_velocity, lead, _], is_linear } = *form;
+        let fits = is_linear && constant == 0.0 && mean_position == -stiffness;
+        let negative = |value: f64| if value == 0.0 { 0.0 } else { -value };
+        fits.then(|| Self {
+            own: Gains { stiffness, damping },
+            heard: Gains { stiffness: negative(mean_position), damping: negative(mean_velocity) },
+            ahead: negative(lead),
+            memory: Vec::new(),
+        })
     }
-    let seen = Observation { own: Form::motion(0), mean: Form::motion(1) };
-    let Form { constant, by: [stiffness, damping, mean_position, mean_velocity], is_linear } =
-        law.map(|number| Form::of(*number)).force(&seen, &mut []);
-    let is_pull = is_linear && constant == 0.0 && mean_position == -stiffness && mean_velocity == -damping;
-    is_pull.then_some(Gains { stiffness, damping })
+
+    /// With everything that is seen multiplied by a factor.
+    fn scaled(&self, factor: f64) -> Self {
+        Self { own: self.own.scaled(factor), heard: self.heard.scaled(factor), ahead: self.ahead * factor, memory: self.memory.clone() }
+    }
+}
+
+impl LinearLaw {
+    /// The linear form of a law; `None` if it has none, or if its forces change where everything is moved alike.
+    ///
+    /// The coefficients are those that the law multiplies with, to the bit, where every other factor on the way is 1 or 0.
+    pub(crate) fn of(law: &BuiltIn) -> Option<Self> {
+        let remembered = Law::<f64>::memory(law);
+        let seen = Observation { own: Form::motion(0), mean: Form::motion(1), lead: Form::unknown(4) };
+        let forms = law.map(|number| Form::of(*number));
+        // FT and what is remembered, where one of the numbers remembered is an unknown and the others are zero.
+        let come_out = |unknown: Option<usize>| {
+            let mut memory = vec![Form::of(0.0); remembered];
+            if let Some(unknown) = unknown {
+                memory[unknown] = Form::unknown(5);
+            }
+            let force = forms.force(&seen, &mut memory);
+            std::iter::once(force).chain(memory).collect::<Vec<Form>>()
+        };
+        let mut rows = come_out(None).iter().map(LawRow::of).collect::<Option<Vec<LawRow>>>()?;
+        for unknown in 0..remembered {
+            for (row, form) in rows.iter_mut().zip(come_out(Some(unknown))) {
+                LawRow::of(&form)?;
+                row.memory.push(form.by[5]);
+            }
+        }
+        let mut rows = rows.into_iter();
+        let force = rows.next()?;
+        let horizon = Law::<f64>::horizon(law);
+        let mut law = Self { force, memory: rows.collect(), horizon };
+        if horizon.is_none() {
+            // Without a horizon the lead is zero.
+            std::iter::once(&mut law.force).chain(&mut law.memory).for_each(|row| row.ahead = 0.0);
+        }
+        Some(law)
+    }
+
+    /// No force at all.
+    pub(crate) const fn none() -> Self {
+        let none = Gains { stiffness: 0.0, damping: 0.0 };
+        Self { force: LawRow { own: none, heard: none, ahead: 0.0, memory: Vec::new() }, memory: Vec::new(), horizon: None }
+    }
+
+    /// FT, and then what the law remembers.
+    pub(crate) fn rows(&self) -> impl Iterator<Item = &LawRow> {
+        std::iter::once(&self.force).chain(&self.memory)
+    }
+
+    /// KT and BT of a law that pulls the copy towards the mean of the samples held and remembers nothing: FT = KT·(x − x̄) + BT·(v − v̄). `None` for any
+    /// other law.
+    pub(crate) fn pull(&self) -> Option<Gains> {
+        let LawRow { own, heard, ahead, .. } = &self.force;
+        (self.memory.is_empty() && own == heard && *ahead == 0.0).then_some(*own)
+    }
+
+    /// The law with everything that it sees multiplied by a factor.
+    pub(crate) fn scaled(&self, factor: f64) -> Self {
+        Self { force: self.force.scaled(factor), memory: self.memory.iter().map(|row| row.scaled(factor)).collect(), horizon: self.horizon }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use cohaptic_peer::Coordination;
-    use cohaptic_peer::coordination::LawParameters;
+    use std::time::Duration;
+
+    use cohaptic_peer::coordination::{LawParameters, LawValues};
 
     use super::*;
+
+    fn parameters(gains: Gains) -> LawParameters {
+        LawParameters { gains, peers: 3, tick: Duration::from_millis(1), own: LawValues::default() }
+    }
 
     /// Equation (10), and equation (2) as the sum of two pulls: KT·(x − x₁) + KT·(x − x₂) with x₁ + x₂ = 2·x̄.
     #[test]
     fn the_gains_of_both_laws_come_out_to_the_bit() {
         let gains = Gains { stiffness: 1234.567, damping: 0.1 };
-        let pull = |coordination: Coordination| pull_towards_mean(&coordination.law(&LawParameters { gains, peers: 3 }));
+        let pull = |coordination: Coordination| LinearLaw::of(&coordination.law(&parameters(gains))).unwrap().pull();
         assert_eq!(pull(Coordination::AveragePosition), Some(gains));
         assert_eq!(pull(Coordination::ProportionalDerivative), Some(Gains { stiffness: 2.0 * 1234.567, damping: 0.2 }));
     }
@@ -124,8 +215,8 @@ mod tests {
     #[test]
     fn gains_beyond_all_numbers_are_still_a_pull() {
         let gains = Gains { stiffness: f64::MAX, damping: 0.0 };
-        let law = Coordination::ProportionalDerivative.law(&LawParameters { gains, peers: 3 });
-        assert_eq!(pull_towards_mean(&law), Some(Gains { stiffness: f64::INFINITY, damping: 0.0 }));
+        let law = Coordination::ProportionalDerivative.law(&parameters(gains));
+        assert_eq!(LinearLaw::of(&law).unwrap().pull(), Some(Gains { stiffness: f64::INFINITY, damping: 0.0 }));
     }
 
     #[test]
@@ -135,6 +226,6 @@ mod tests {
         assert!(!(two - x * y).is_linear);
         assert!(!(x * x * Form::of(0.0)).is_linear);
         let form = two * (x - y) * two + -two;
-        assert_eq!(form, Form { constant: -2.0, by: [4.0, -4.0, 0.0, 0.0], is_linear: true });
+        assert_eq!(form, Form { constant: -2.0, by: [4.0, -4.0, 0.0, 0.0, 0.0, 0.0], is_linear: true });
     }
 }

@@ -41,7 +41,6 @@ pub struct StateName {
 
 /// What a state is. `axis` is 0 for x, 1 for y, 2 for z.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 #[expect(missing_docs, reason = "axis is said above")]
 pub enum StateKind {
     /// Where the device is.

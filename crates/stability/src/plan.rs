@@ -122,14 +122,14 @@ impl Plan {
         let Ok(Followed::Equal { frame, held }) = &self.followed else {
             return matches!(self.followed, Ok(Followed::Certain)).then(|| square(self, scratch));
         };
-        let gains = self.structure.coordination(scene);
-        if gains.stiffness + gains.damping <= 0.0 {
+        self.refresh(scene, scratch);
+        let PlanScratch { nodes, bodies, equal, .. } = &mut *scratch;
+        let quotient = self.quotient(scene, nodes);
+        if quotient.sampling.is_silent(quotient.time) {
             // Nothing is done with what arrives.
             return Some(square(self, scratch).max(*held));
         }
-        self.refresh(scene, scratch);
-        let PlanScratch { nodes, bodies, equal, .. } = scratch;
-        let found = frame.radius(&self.quotient(scene, nodes), equal)?.max(*held);
+        let found = frame.radius(&quotient, equal)?.max(*held);
         Some(bodies.iter().filter_map(|bodies| bodies.loose).fold(found, |found, loose| found.max(loose.value.powi(2))))
     }
 
@@ -138,7 +138,7 @@ impl Plan {
         let structure = &self.structure;
         let armed = |class: usize| structure.touching[class] && arm(self.representative(scene, class)).stiffness > 0.0;
         let tied = self.tied || (0..nodes.len()).any(armed);
-        Lifted { coordination: structure.coordination(scene), tied, ..structure.quotient(scene, nodes) }
+        Lifted { tied, ..structure.quotient(scene, nodes) }
     }
 
     fn representative<'a>(&self, scene: &'a Scene, class: usize) -> &'a cohaptic_scene::PeerSpec {
@@ -171,6 +171,7 @@ impl Plan {
                 node.device = node.device.map(|_| Body::new(device, scene.integrator, &spec.clock));
             }
             node.coupling = self.structure.coupling(spec);
+            node.law = self.structure.law(scene, class);
             node.wall = node.wall.and(scene.object.enclosure).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping });
         }
     }
@@ -192,12 +193,8 @@ fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
 
 /// The radius of a lifted system.
 fn part<const BOUND: bool>(small: Option<&SmallFrame>, lifted: &Lifted<'_>, matrix: &mut Matrix, workspace: &mut Workspace) -> Radius {
-    let error = match (small, lifted.nodes) {
-        (Some(small), [node]) if SmallFrame::fits(node, lifted.coordination) => {
-            let weight = lifted.weights[(0, 0)];
-            let small_node = SmallNode { node, weight, coordination: lifted.coordination, time: lifted.time, tied: lifted.tied };
-            small.monodromy::<BOUND>(small_node, matrix, || lifted.error())
-        }
+    let error = match (small, SmallNode::of(lifted)) {
+        (Some(small), Some(node)) => small.monodromy::<BOUND>(node, matrix, || lifted.error()),
         _ => {
             let frame = lifted.frame(&mut Autonomous);
             *matrix = frame.monodromy();

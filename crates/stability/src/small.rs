@@ -8,7 +8,7 @@ use std::time::Duration;
 use cohaptic_peer::Gains;
 
 use crate::Matrix;
-use crate::lifted::{Body, Node, Rounding};
+use crate::lifted::{Body, Lifted, Node, Rounding};
 use crate::timetable::{Event, Timetable};
 
 /// More samples of earlier frames than this, or more sent in one frame, are left to the general path.
@@ -42,11 +42,20 @@ pub(crate) struct SmallNode<'a> {
     pub(crate) node: &'a Node,
     /// How its own samples come back.
     pub(crate) weight: f64,
-    /// KT and BT of average-position coordination; not both zero.
+    /// KT and BT of the law; not both zero.
     pub(crate) coordination: Gains,
     /// What velocities are multiplied by \[s\].
     pub(crate) time: f64,
     pub(crate) tied: bool,
+}
+
+impl<'a> SmallNode<'a> {
+    /// The only node of a system that this path is for: without a delay of the forces, with a law that is a pull towards the mean, and with something to hear.
+    pub(crate) fn of(lifted: &Lifted<'a>) -> Option<Self> {
+        let [node] = lifted.nodes else { return None };
+        let coordination = node.law.pull().filter(|gains| !node.compute_delay && gains.stiffness + gains.damping > 0.0)?;
+        Some(Self { node, weight: lifted.weights[(0, 0)], coordination, time: lifted.time, tied: lifted.tied })
+    }
 }
 
 impl SmallFrame {
@@ -76,11 +85,6 @@ impl SmallFrame {
         let steps: Vec<Step> = steps.collect::<Option<_>>()?;
         let held = timetable.held.first().and_then(|(_, _, sample)| place(*sample));
         Some(Self { held, sent: *sent, depth: *depth, steps, used })
-    }
-
-    /// Whether this path is for such a node: without a delay of the forces, and with something to hear.
-    pub(crate) fn fits(node: &Node, coordination: Gains) -> bool {
-        !node.compute_delay && coordination.stiffness + coordination.damping > 0.0
     }
 
     /// Writes the monodromy matrix into `matrix` and answers a bound of the error of its entries, in the largest sum of sizes of a row; zero without
@@ -123,7 +127,7 @@ impl SmallFrame {
         let mut aim = self.held.map_or([0.0; C], |held| aim_at(&store[held]));
         let mut next_sent = self.used.len();
         let scale = crate::lifted::node::Scale { time, compliance: node.compliance(time) };
-        let mut rounding = Rounding::new(if BOUND { node.step_norm(coordination, scale).max(1.0) } else { 1.0 });
+        let mut rounding = Rounding::new(if BOUND { node.step_norm(scale).max(1.0) } else { 1.0 });
         let mut maps: Option<(Duration, Map, Map)> = None;
         for step in &self.steps {
             match *step {

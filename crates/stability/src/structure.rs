@@ -10,8 +10,8 @@ use std::time::Duration;
 use cohaptic_peer::{ArmConfig, Gains, Hand, Plant};
 use cohaptic_scene::{PeerSpec, Scene};
 
-use crate::lifted::{Body, Lifted, Node};
-use crate::linear_form::pull_towards_mean;
+use crate::lifted::{Body, Lifted, Node, Sampling};
+use crate::linear_form::LinearLaw;
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::timetable::{NodeClock, Timetable};
 use crate::{AnalysisError, Matrix};
@@ -54,8 +54,8 @@ impl Structure {
     pub(crate) fn with_alone(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, alone: Option<usize>) -> Result<Self, AnalysisError> {
         let scene = scenes[0];
         let peers = scene.peers.len();
-        if scenes.iter().any(|scene| pull(scene).is_none()) {
-            return Err(AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() });
+        for scene in scenes {
+            check_laws(scene)?;
         }
         let mut classes: Vec<Vec<usize>> = Vec::new();
         for place in 0..peers {
@@ -78,9 +78,7 @@ impl Structure {
 
     /// Every peer by itself, whether or not it is like another.
     pub(crate) fn of_each(scene: &Scene, network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
-        if pull(scene).is_none() {
-            return Err(AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() });
-        }
+        check_laws(scene)?;
         Self::of_classes(scene, (0..scene.peers.len()).map(|peer| vec![peer]).collect(), network, contacts)
     }
 
@@ -106,10 +104,20 @@ impl Structure {
         Ok(Self { classes, touching, at_wall: contacts.at_wall, timetable, apart, weights, tied, peers })
     }
 
-    /// KT and BT of the average-position strategy that is the same as the scene's.
-    #[expect(clippy::unused_self, reason = "only a scene that has a structure has them for certain")]
-    pub(crate) fn coordination(&self, scene: &Scene) -> Gains {
-        pull(scene).expect("a structure is made only of scenes whose strategy is one")
+    /// The linear form of the law of a class.
+    pub(crate) fn law(&self, scene: &Scene, class: usize) -> LinearLaw {
+        linear_law(scene, self.classes[class][0]).expect("a structure is made only of scenes whose laws have one")
+    }
+
+    /// Which numbers of a sample the laws of all classes use.
+    pub(crate) fn sampling(&self, scene: &Scene) -> Sampling {
+        let nodes: Vec<Node> = (0..self.classes.len()).map(|class| self.node(scene, class)).collect();
+        Sampling::of(&nodes)
+    }
+
+    /// Whether the laws of all classes hear nothing.
+    pub(crate) fn is_silent(&self, scene: &Scene) -> bool {
+        self.sampling(scene).is_silent(self.time(scene))
     }
 
     /// The node that stands for a class.
@@ -120,6 +128,7 @@ impl Structure {
             device: self.touching[class].then(|| Body::new(device_plant(spec), scene.integrator, &spec.clock)),
             object: Body::new(object, scene.integrator, &spec.clock),
             coupling: self.coupling(spec),
+            law: self.law(scene, class),
             wall: scene.object.enclosure.filter(|_| self.at_wall).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping }),
             compute_delay: spec.compute_delay,
         }
@@ -138,25 +147,33 @@ impl Structure {
     /// The common time of the classes \[s\].
     pub(crate) fn time(&self, scene: &Scene) -> f64 {
         let peers = self.classes.iter().zip(&self.touching).map(|(class, touching)| (class[0], *touching));
-        common_time(scene, self.timetable.frame, self.coordination(scene), peers, self.at_wall)
+        common_time(scene, self.timetable.frame, self.law(scene, 0).force.own, peers, self.at_wall)
     }
 
     /// The system of the classes' averages.
     pub(crate) fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
-        Lifted {
-            nodes,
-            weights: &self.weights,
-            timetable: &self.timetable,
-            coordination: self.coordination(scene),
-            time: self.time(scene),
-            tied: self.tied,
-        }
+        Lifted { nodes, weights: &self.weights, timetable: &self.timetable, sampling: Sampling::of(nodes), time: self.time(scene), tied: self.tied }
     }
 }
 
-/// KT and BT of the pull towards the mean that the scene's law is; `None` if it is another law.
-pub(crate) fn pull(scene: &Scene) -> Option<Gains> {
-    pull_towards_mean(&scene.law())
+/// The linear form of the law of a peer; `None` if it has none.
+pub(crate) fn linear_law(scene: &Scene, peer: usize) -> Option<LinearLaw> {
+    LinearLaw::of(&scene.law(peer))
+}
+
+/// Refuses laws that have no linear form, and laws that use the ages of samples between clocks that differ: ages then do not repeat from frame to frame.
+fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
+    let strategy = scene.coordination.strategy.name();
+    let (first, peers) = (&scene.peers[0], scene.peers.len());
+    // Of equal ticks the laws are equal.
+    let other = (1..peers).filter(|peer| scene.peers[*peer].clock.tick != first.clock.tick);
+    for peer in std::iter::once(0).chain(other) {
+        let law = linear_law(scene, peer).ok_or(AnalysisError::OtherStrategy { strategy })?;
+        if law.horizon.is_some() && scene.peers.iter().any(|spec| spec.clock != first.clock) {
+            return Err(AnalysisError::AgesByClocks { strategy });
+        }
+    }
+    Ok(())
 }
 
 /// What velocities are multiplied by to be lengths like positions \[s\]: the time in which the stiffest of the bodies swings by a radian, from a tick to

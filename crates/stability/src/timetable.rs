@@ -112,6 +112,12 @@ pub(crate) struct Timetable {
 }
 
 impl Timetable {
+    /// No sample that is used in the frame is older \[s\].
+    pub(crate) fn oldest(&self) -> f64 {
+        let frames = self.depth.iter().zip(&self.sent).map(|(depth, sent)| depth.div_ceil((*sent).max(1)) + 1).max().unwrap_or(1);
+        self.frame.as_secs_f64() * crate::structure::count(frames)
+    }
+
     /// The frame of nodes that send to each other over those links: (from, to, timing).
     pub(crate) fn new(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)]) -> Result<Self, AnalysisError> {
         let frame = frame(clocks, links)?;
@@ -162,6 +168,49 @@ impl Timetable {
         events.sort_unstable_by_key(|(at, step, node, to, sample, _)| (*at, *step, *node, *to, *sample));
         let events = events.into_iter().map(|(.., event)| event).collect();
         Ok(Self { frame: Duration::from_nanos(u64::try_from(frame).map_err(|_| AnalysisError::NoFrame)?), events, sent, depth, held })
+    }
+}
+
+/// When each node samples and ticks in a frame \[ns\].
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Instants {
+    pub(crate) sends: Vec<Vec<u64>>,
+    pub(crate) ticks: Vec<Vec<u64>>,
+}
+
+impl Instants {
+    pub(crate) fn of(timetable: &Timetable, nodes: usize) -> Self {
+        let (mut sends, mut ticks) = (vec![Vec::new(); nodes], vec![Vec::new(); nodes]);
+        let mut sampled = vec![false; nodes];
+        for event in &timetable.events {
+            match *event {
+                Event::Sample { node } => sampled[node] = true,
+                Event::Deliver { .. } => {}
+                Event::Tick { node, at, .. } => {
+                    // A node samples at a tick of its own.
+                    if std::mem::take(&mut sampled[node]) {
+                        sends[node].push(at);
+                    }
+                    ticks[node].push(at);
+                }
+            }
+        }
+        Self { sends, ticks }
+    }
+
+    /// The age of a sample at an instant of the frame \[s\].
+    #[expect(clippy::cast_precision_loss, reason = "a span of at most some frames is far below 2^53 ns")]
+    pub(crate) fn age(&self, node: usize, sample: i64, at: u64, frame: Duration) -> f64 {
+        i64::try_from(at).unwrap_or(i64::MAX).saturating_sub(self.sent_at(node, sample, frame)).max(0) as f64 * 1e-9
+    }
+
+    /// When a sample of a node was sent, before the beginning of the frame too \[ns\]: from 0 if it is of this frame, −1 is the last one of the frame before.
+    pub(crate) fn sent_at(&self, node: usize, sample: i64, frame: Duration) -> i64 {
+        let whole = |number: u128| i64::try_from(number).unwrap_or(i64::MAX);
+        let sends = &self.sends[node];
+        let count = i64::try_from(sends.len()).unwrap_or(1).max(1);
+        let place = usize::try_from(sample.rem_euclid(count)).unwrap_or(0);
+        sends.get(place).map_or(0, |at| whole(u128::from(*at))) + sample.div_euclid(count) * whole(frame.as_nanos())
     }
 }
 

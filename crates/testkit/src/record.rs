@@ -1,9 +1,9 @@
 //! What was recorded of a run, as a test gets it.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{FateLog, FateLogError, PacketRecord};
+use cohaptic_wan::{FateLog, FateLogError, NodeId, PacketRecord, Path};
 
 use crate::bed::place;
 use crate::core::Seen;
@@ -50,23 +50,23 @@ impl Record {
     /// If there is no such host.
     #[must_use]
     pub fn fates(&self, from: &str, to: &str) -> FateLog {
-        let pair = (place(self.trace.hosts(), from), place(self.trace.hosts(), to));
-        complete(self.packets_of(pair).map(|seen| seen.record).collect())
+        let [from, to] = [from, to].map(|host| NodeId::new(place(self.trace.hosts(), host)));
+        self.fates_of(Path { from, to })
     }
 
-    /// Every pair (sender, receiver) with a packet on its link.
-    pub(crate) fn pairs(&self) -> Vec<(usize, usize)> {
-        let pairs: BTreeMap<(usize, usize), ()> = self.packets.iter().map(|seen| ((seen.from, seen.to), ())).collect();
-        pairs.into_keys().collect()
+    /// Every path with a packet on its link.
+    pub(crate) fn paths(&self) -> Vec<Path> {
+        let paths: BTreeSet<Path> = self.packets.iter().map(|seen| seen.path).collect();
+        paths.into_iter().collect()
     }
 
-    pub(crate) fn packets_of(&self, pair: (usize, usize)) -> impl Iterator<Item = &Seen> {
-        self.packets.iter().filter(move |seen| (seen.from, seen.to) == pair)
+    pub(crate) fn packets_of(&self, path: Path) -> impl Iterator<Item = &Seen> {
+        self.packets.iter().filter(move |seen| seen.path == path)
     }
 
-    /// What became of the packets of a pair, by places.
-    pub(crate) fn fates_of(&self, pair: (usize, usize)) -> FateLog {
-        complete(self.packets_of(pair).map(|seen| seen.record).collect())
+    /// What became of the packets of a path.
+    pub(crate) fn fates_of(&self, path: Path) -> FateLog {
+        complete(self.packets_of(path).map(|seen| seen.without_path()).collect())
     }
 }
 
@@ -92,6 +92,7 @@ mod tests {
     #[test]
     fn a_log_ends_before_the_first_packet_without_an_end() {
         let record = |sequence, fate| PacketRecord {
+            path: (),
             sequence,
             copy: 0,
             offered: Instant::ZERO,

@@ -16,7 +16,7 @@ impl Instant {
     /// The last instant that can be counted, 584.5 years after the beginning.
     pub const MAX: Self = Self(u64::MAX);
 
-    /// The instant that many nanoseconds after the beginning.
+    /// The instant a number of nanoseconds after the beginning.
     #[must_use]
     #[inline]
     pub const fn from_nanos(nanos: u64) -> Self {
@@ -53,7 +53,7 @@ impl Instant {
         self.checked_add(span).unwrap_or(Self::MAX)
     }
 
-    /// The instant so many nanoseconds later, or [`Instant::MAX`] if that cannot be counted.
+    /// The instant a number of nanoseconds later, or [`Instant::MAX`] if that cannot be counted.
     #[must_use]
     #[inline]
     pub const fn saturating_add_nanos(self, nanos: u64) -> Self {

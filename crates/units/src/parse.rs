@@ -9,7 +9,6 @@ use crate::{Bytes, Probability, Rate, Visible};
 
 /// Why a text is not the quantity that was expected.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ParseError {
     /// The text does not begin with a decimal number, or has a sign or an exponent.
     #[error("\"{}\" does not begin with a plain decimal number: expected {expected}", Visible(text))]

@@ -1,5 +1,8 @@
 //! How quantities are printed: exactly, and so that [`crate::parse`] reads the same value back.
 
+use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::String;
 use core::fmt;
 use core::time::Duration;
 
@@ -68,6 +71,18 @@ impl fmt::Display for Number {
     }
 }
 
+/// A field of a file of comma-separated values, quoted where it must be (RFC 4180).
+#[must_use]
+pub fn csv_field(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) { csv_quoted(text) } else { text.to_owned() }
+}
+
+/// A field of a file of comma-separated values, in quotes (RFC 4180).
+#[must_use]
+pub fn csv_quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
 fn decimal(f: &mut fmt::Formatter<'_>, whole: u64, mut rest: u64, mut digits: usize) -> fmt::Result {
     write!(f, "{whole}")?;
     if rest == 0 {
@@ -83,7 +98,12 @@ fn decimal(f: &mut fmt::Formatter<'_>, whole: u64, mut rest: u64, mut digits: us
 #[cfg(test)]
 mod tests {
     use super::*;
-    use alloc::format;
+
+    #[test]
+    fn fields_are_quoted_where_they_must_be() {
+        let quoted = ["plain", "", "a,b", "say \"a\"", "two\nlines"].map(csv_field);
+        assert_eq!(quoted, ["plain", "", "\"a,b\"", "\"say \"\"a\"\"\"", "\"two\nlines\""]);
+    }
 
     #[test]
     fn what_is_counted_is_one_or_many() {

@@ -9,7 +9,6 @@ pub struct Probability(f64);
 /// Why a number is no probability.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 #[error("{value} is not a probability: expected a number from 0 to 1")]
-#[non_exhaustive]
 pub struct ProbabilityError {
     /// The number that was given.
     pub value: f64,

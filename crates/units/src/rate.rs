@@ -11,7 +11,7 @@ use crate::Bytes;
 pub struct Rate(NonZeroU64);
 
 impl Rate {
-    /// The rate of that many bits per second; `None` for zero, which is not a rate.
+    /// The rate of a number of bits per second; `None` for zero, which is not a rate.
     #[must_use]
     pub const fn bits_per_sec(bits: u64) -> Option<Self> {
         match NonZeroU64::new(bits) {
@@ -33,7 +33,7 @@ impl Rate {
         self.transmission_time(u128::from(size.get()) * 8 * 1_000_000_000)
     }
 
-    /// How long it takes to send what is left of a packet, given in bit·ns/s (bits times 10⁹), rounded up to a nanosecond.
+    /// How long it takes to send the rest of a packet, given in bit·ns/s (bits times 10⁹), rounded up to a nanosecond.
     ///
     /// The odd unit keeps a change of rate in the middle of a packet exact: see [`Rate::bits_sent`].
     #[must_use]

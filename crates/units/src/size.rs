@@ -11,7 +11,7 @@ impl Bytes {
     /// No bytes.
     pub const ZERO: Self = Self(0);
 
-    /// That many bytes.
+    /// A number of bytes.
     #[must_use]
     #[inline]
     pub const fn new(bytes: u64) -> Self {

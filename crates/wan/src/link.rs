@@ -8,15 +8,15 @@ use core::fmt;
 use cohaptic_units::{Bytes, Instant};
 
 use crate::event_queue::{Event, EventQueue};
-use crate::fates::fate::PacketRecord;
 use crate::fates::fate::{DropCause, Fate};
+use crate::fates::record::{PacketEvent, PacketRecord};
 use crate::fates::stats::LinkStats;
 use crate::line::filter::{Filter, Offered};
 use crate::line::model::LinkModel;
 use crate::line::name::LinkName;
-use crate::line::pipeline::{Outcome, Pipeline, TimeWentBack, check_time};
-use crate::packet::damage::Damage;
-use crate::packet::{Exit, Marks, Outputs, Packet, PacketInfo};
+use crate::line::pipeline::{Outcome, TimeWentBack, check_time};
+use crate::line::{Line, Sink};
+use crate::packet::{Marks, Outputs, PacketInfo};
 
 /// A directed link as a state machine: packets in with [`Link::handle_packet`], packets and their fates out with [`Link::poll_event`].
 ///
@@ -30,89 +30,17 @@ pub struct Link<P> {
     seed: u64,
     name: LinkName,
     now: Instant,
-    filter: Option<Filter<P>>,
-    pipeline: Pipeline<InLink<P>>,
-    pending: EventQueue<Pending<P>>,
-    /// Events that have happened and were not polled yet.
-    happened: VecDeque<LinkEvent<P>>,
-    stats: LinkStats,
+    line: Line<P, InLink<P>>,
+    traffic: Traffic<P>,
     outputs: Outputs<InLink<P>>,
 }
 
-/// What became of one packet, or that a copy of it was made.
-#[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub struct LinkEvent<P> {
-    /// The number of the packet on this link, from 0.
-    pub sequence: u64,
-    /// 0 for the packet itself, 1 for a copy that the link made. With [`Fate::Duplicated`] it is the number of the new copy.
-    pub copy: u8,
-    /// When it was offered.
-    pub sent: Instant,
-    /// When it arrived or was dropped, or when the copy was made.
-    pub at: Instant,
-    /// Its size.
-    pub size: Bytes,
-    /// What it carries, as it was offered: see `damage`.
-    pub payload: P,
-    /// What became of it.
-    pub fate: Fate,
-    /// Whether an active queue marked it: congestion experienced.
-    pub marked: bool,
-    /// The bits that were flipped. [`Damage::apply`] flips them.
-    pub damage: Option<Damage>,
-}
-
-impl<P> LinkEvent<P> {
-    /// The event as a row of a fate log.
-    #[must_use]
-    pub const fn record(&self) -> PacketRecord {
-        PacketRecord {
-            sequence: self.sequence,
-            copy: self.copy,
-            offered: self.sent,
-            at: self.at,
-            size: self.size,
-            fate: self.fate,
-            marked: self.marked,
-            damaged: self.damage.is_some(),
-        }
-    }
-}
-
-#[derive(Clone, Debug)]
-struct InLink<P> {
-    sequence: u64,
-    sent: Instant,
-    size: Bytes,
-    payload: P,
-}
-
-#[derive(Clone, Debug)]
-struct Pending<P> {
-    at: Instant,
-    arrival: Arrival<P>,
-}
-
-#[derive(Clone, Debug)]
-struct Arrival<P> {
-    packet: InLink<P>,
-    copy: u8,
-    marks: Option<Box<Marks>>,
-}
-
-impl<P> Event for Pending<P> {
-    type Key = (Instant, u64, u8);
-
-    #[inline]
-    fn at(&self) -> Instant {
-        self.at
-    }
-
-    #[inline]
-    fn key(&self) -> Self::Key {
-        (self.at, self.arrival.packet.sequence, self.arrival.copy)
-    }
+/// The packets behind the line.
+#[derive(Clone)]
+struct Traffic<P> {
+    pending: EventQueue<Pending<P>>,
+    /// Events that have happened and were not polled yet.
+    happened: VecDeque<PacketEvent<P>>,
 }
 
 impl<P: Clone> Link<P> {
@@ -123,11 +51,8 @@ impl<P: Clone> Link<P> {
             seed,
             name: name.clone(),
             now: Instant::ZERO,
-            filter: None,
-            pipeline: Pipeline::new(seed, name, model.into(), false),
-            pending: EventQueue::new(),
-            happened: VecDeque::new(),
-            stats: LinkStats::default(),
+            line: Line::new(seed, name, model.into(), false),
+            traffic: Traffic { pending: EventQueue::new(), happened: VecDeque::new() },
             outputs: Vec::new(),
         }
     }
@@ -135,7 +60,7 @@ impl<P: Clone> Link<P> {
     /// Drops every packet of which the filter says so, before anything else happens to it. The filter sees the packet and its payload.
     #[must_use]
     pub fn with_filter(mut self, drops: impl Fn(&Offered<'_, P>) -> bool + Send + Sync + 'static) -> Self {
-        self.filter = Some(Filter::new(drops));
+        self.line.set_filter(Filter::new(drops));
         self
     }
 
@@ -147,22 +72,20 @@ impl<P: Clone> Link<P> {
     #[inline]
     pub fn handle_packet(&mut self, now: Instant, info: impl Into<PacketInfo>, payload: P) -> Result<(), TimeWentBack> {
         check_time(&mut self.now, now)?;
-        if self.pipeline.engine().is_some() {
+        if self.line.has_engine() {
             self.let_happen(now);
         }
         let info = info.into();
-        let sequence = self.stats.flow.offered;
-        self.stats.flow.offered += 1;
-        let filtered = self.filter.as_ref().is_some_and(|filter| filter.drops(&Offered { sequence, now, info, payload: &payload }));
-        let packet = InLink { sequence, sent: now, size: info.size, payload };
-        if filtered {
-            self.drop(now, DropCause::Filter, packet, 0, Marks::default());
+        let sequence = self.line.offered();
+        if self.line.filters(&Offered { sequence, now, info, payload: &payload }) {
+            self.drop(now, DropCause::Filter, InLink { sequence, offered: now, size: info.size, payload });
             return Ok(());
         }
-        match self.pipeline.offer(now, sequence, self.pipeline.words(sequence)) {
-            Outcome::Arrives(at) => self.pending.push(Pending { at, arrival: Arrival { packet, copy: 0, marks: None } }),
-            Outcome::Dropped(cause) => self.drop(now, cause, packet, 0, Marks::default()),
-            Outcome::Enters => self.enter(now, info, packet),
+        let packet = InLink { sequence, offered: now, size: info.size, payload };
+        match self.line.offer(now, self.line.words()) {
+            Outcome::Arrives(at) => self.traffic.pending.push(Pending { at, packet, copy: 0, marks: None }),
+            Outcome::Dropped(cause) => self.drop(now, cause, packet),
+            Outcome::Enters => self.line.enter(now, info, Marks::default(), packet, &mut self.outputs, &mut self.traffic),
         }
         Ok(())
     }
@@ -182,8 +105,7 @@ impl<P: Clone> Link<P> {
     /// When [`Link::handle_timeout`] must be called next; `None` if nothing is on the way. Never before the last instant given. After a live change it may name an instant at which nothing happens.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let wake = self.pipeline.next_wake();
-        let next = self.pending.next_at().map_or(wake, |arrival| Some(wake.map_or(arrival, |wake| wake.min(arrival))))?;
+        let next = self.line.next_wake().into_iter().chain(self.traffic.pending.next_at()).min()?;
         // What has arrived and was not polled yet is there now.
         Some(next.max(self.now))
     }
@@ -191,13 +113,13 @@ impl<P: Clone> Link<P> {
     /// The next packet that has arrived or was dropped, or a copy that was made; `None` when all have been polled.
     #[must_use]
     #[inline]
-    pub fn poll_event(&mut self) -> Option<LinkEvent<P>> {
-        if let Some(event) = self.happened.pop_front() {
+    pub fn poll_event(&mut self) -> Option<PacketEvent<P>> {
+        if let Some(event) = self.traffic.happened.pop_front() {
             return Some(event);
         }
         // Without an engine arrivals wait here: nothing that comes meanwhile depends on them.
-        let Pending { at, arrival } = self.pending.pop_due(self.now)?;
-        Some(self.arrive(at, arrival))
+        let pending = self.traffic.pending.pop_due(self.now)?;
+        Some(self.arrive(pending))
     }
 
     /// Changes the model from `now` on. Packets that propagate keep their delay; one that is being serialised keeps the bits already sent; those that wait
@@ -208,28 +130,14 @@ impl<P: Clone> Link<P> {
     /// [`TimeWentBack`] if an earlier call had a later instant; nothing was changed.
     pub fn set_model(&mut self, now: Instant, model: impl Into<LinkModel>) -> Result<(), TimeWentBack> {
         self.handle_timeout(now)?;
-        let mut outputs = core::mem::take(&mut self.outputs);
-        self.pipeline.reconfigure(now, self.seed, &self.name, model.into(), &mut outputs);
-        self.come_out(outputs);
+        self.line.reconfigure(now, self.seed, &self.name, model.into(), &mut self.outputs, &mut self.traffic);
         Ok(())
     }
 
     /// What the link did so far. A packet counts as delivered when its arrival is polled, or when time is let pass beyond it.
     #[must_use]
-    pub const fn stats(&self) -> &LinkStats {
-        &self.stats
-    }
-
-    /// Hands a packet to the engine.
-    fn enter(&mut self, now: Instant, info: PacketInfo, packet: InLink<P>) {
-        // The packet itself is counted already.
-        let inside = self.stats.in_flight() - 1;
-        let mut outputs = core::mem::take(&mut self.outputs);
-        if let Some(engine) = self.pipeline.engine() {
-            let carried = Packet::new(packet.sequence, info, Marks::default(), packet);
-            engine.offer(now, carried, inside, &mut outputs);
-        }
-        self.come_out(outputs);
+    pub fn stats(&self) -> LinkStats {
+        self.line.stats()
     }
 
     /// Lets all that is due happen, and keeps the events until they are polled.
@@ -237,80 +145,98 @@ impl<P: Clone> Link<P> {
     fn let_happen(&mut self, now: Instant) {
         loop {
             // The engine is woken before anything arrives at the same instant.
-            if let Some(wake) = self.pipeline.next_wake().filter(|wake| *wake <= now)
-                && self.pending.next_at().is_none_or(|arrival| wake <= arrival)
+            if let Some(wake) = self.line.next_wake().filter(|wake| *wake <= now)
+                && self.traffic.pending.next_at().is_none_or(|arrival| wake <= arrival)
             {
-                self.wake(wake);
+                self.line.wake(wake, &mut self.outputs, &mut self.traffic);
                 continue;
             }
-            let Some(Pending { at, arrival }) = self.pending.pop_due(now) else { return };
-            let event = self.arrive(at, arrival);
-            self.happened.push_back(event);
+            let Some(pending) = self.traffic.pending.pop_due(now) else { return };
+            let event = self.arrive(pending);
+            self.traffic.happened.push_back(event);
         }
     }
 
     #[inline(always)]
-    fn arrive(&mut self, at: Instant, arrival: Arrival<P>) -> LinkEvent<P> {
-        let Arrival { packet, copy, marks } = arrival;
+    fn arrive(&mut self, pending: Pending<P>) -> PacketEvent<P> {
+        let Pending { at, packet, copy, marks } = pending;
         let marks = marks.map_or_else(Marks::default, |marks| *marks);
         if marks.discarded_on_arrival {
-            self.stats.seldom.dropped[DropCause::Checksum.index()] += 1;
+            self.line.discard();
             return packet.event(at, Fate::Dropped(DropCause::Checksum), copy, marks);
         }
-        self.stats.flow.delivered += 1;
-        self.stats.flow.delay_nanos += u128::from(at.as_nanos() - packet.sent.as_nanos());
+        self.line.deliver(packet.offered, at);
         packet.event(at, Fate::Delivered(at), copy, marks)
     }
 
-    fn wake(&mut self, at: Instant) {
-        let mut outputs = core::mem::take(&mut self.outputs);
-        if let Some(engine) = self.pipeline.engine() {
-            engine.pass(at, &mut outputs);
-        }
-        self.come_out(outputs);
-    }
-
-    /// Deals with what has come out of the engine.
-    fn come_out(&mut self, mut outputs: Outputs<InLink<P>>) {
-        for output in outputs.drain(..) {
-            let Packet { copy, marks, item, .. } = *output.packet;
-            match output.exit {
-                Exit::Arrives(at) => {
-                    self.stats.seldom.marked += u64::from(marks.congestion);
-                    self.stats.seldom.damaged += u64::from(marks.damage.is_some());
-                    let marks = (marks != Marks::default()).then(|| Box::new(marks));
-                    self.pending.push(Pending { at, arrival: Arrival { packet: item, copy, marks } });
-                }
-                Exit::Dropped(at, cause) => self.drop(at, cause, item, copy, marks),
-                Exit::Copied(at) => {
-                    self.stats.seldom.duplicated += 1;
-                    self.happened.push_back(item.event(at, Fate::Duplicated, copy, marks));
-                }
-            }
-        }
-        self.outputs = outputs;
-    }
-
-    fn drop(&mut self, now: Instant, cause: DropCause, packet: InLink<P>, copy: u8, marks: Marks) {
-        if self.pipeline.engine().is_none() {
+    /// The packet was dropped when it was offered.
+    fn drop(&mut self, now: Instant, cause: DropCause, packet: InLink<P>) {
+        if !self.line.has_engine() {
             // Arrivals that wait to be polled came before this drop.
             self.let_happen(now);
         }
-        self.stats.seldom.dropped[cause.index()] += 1;
-        self.happened.push_back(packet.event(now, Fate::Dropped(cause), copy, marks));
+        self.traffic.happened(now, Fate::Dropped(cause), packet, 0, Marks::default());
     }
+}
+
+impl<P> Sink<InLink<P>> for Traffic<P> {
+    #[inline]
+    fn arrives(&mut self, at: Instant, packet: InLink<P>, copy: u8, marks: Marks) {
+        let marks = (marks != Marks::default()).then(|| Box::new(marks));
+        self.pending.push(Pending { at, packet, copy, marks });
+    }
+
+    #[inline]
+    fn happened(&mut self, at: Instant, fate: Fate, packet: InLink<P>, copy: u8, marks: Marks) {
+        self.happened.push_back(packet.event(at, fate, copy, marks));
+    }
+}
+
+/// A packet in the link.
+#[derive(Clone, Debug)]
+struct InLink<P> {
+    sequence: u64,
+    offered: Instant,
+    size: Bytes,
+    payload: P,
 }
 
 impl<P> InLink<P> {
     #[inline]
-    fn event(self, at: Instant, fate: Fate, copy: u8, marks: Marks) -> LinkEvent<P> {
-        let Self { sequence, sent, size, payload } = self;
-        LinkEvent { sequence, copy, sent, at, size, payload, fate, marked: marks.congestion, damage: marks.damage }
+    fn event(self, at: Instant, fate: Fate, copy: u8, marks: Marks) -> PacketEvent<P> {
+        let Self { sequence, offered, size, payload } = self;
+        let Marks { congestion: marked, damage, .. } = marks;
+        let record = PacketRecord { path: (), sequence, copy, offered, at, size, fate, marked, damaged: damage.is_some() };
+        PacketEvent { record, payload, damage }
+    }
+}
+
+/// A packet that propagates, until it arrives.
+#[derive(Clone, Debug)]
+struct Pending<P> {
+    at: Instant,
+    packet: InLink<P>,
+    copy: u8,
+    /// In a box, since few packets have any.
+    marks: Option<Box<Marks>>,
+}
+
+impl<P> Event for Pending<P> {
+    type Key = (Instant, u64, u8);
+
+    #[inline]
+    fn at(&self) -> Instant {
+        self.at
+    }
+
+    #[inline]
+    fn key(&self) -> Self::Key {
+        (self.at, self.packet.sequence, self.copy)
     }
 }
 
 impl<P> fmt::Debug for Link<P> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Link").field("name", &self.name).field("now", &self.now).field("stats", &self.stats).finish_non_exhaustive()
+        f.debug_struct("Link").field("name", &self.name).field("now", &self.now).field("stats", &self.line.stats()).finish_non_exhaustive()
     }
 }

@@ -12,11 +12,10 @@
 
 use core::convert::Infallible;
 
-use rand_core::TryRng;
+use rand::TryRng;
 
 /// What a random number is drawn for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum Purpose {
     /// Whether a packet is lost.
     Loss,

@@ -7,9 +7,9 @@ use cohaptic_wan::Fate;
 /// at 0: nothing has moved before.
 pub(crate) fn held_since(log: &Log, from: usize, to: usize) -> Vec<u64> {
     let mut arrivals: Vec<(u64, u64, u64)> = Vec::new();
-    for packet in log.packets.iter().filter(|packet| (packet.from, packet.to) == (from, to)) {
+    for packet in log.packets.iter().filter(|packet| (packet.path.from.index(), packet.path.to.index()) == (from, to)) {
         if let Fate::Delivered(at) = packet.fate {
-            arrivals.push((at.as_nanos(), packet.sequence, packet.sent.as_nanos()));
+            arrivals.push((at.as_nanos(), packet.sequence, packet.offered.as_nanos()));
         }
     }
     arrivals.sort_unstable();

@@ -12,6 +12,7 @@
 //! with E the kinetic energy, and ½·Kᵢⱼ and ½·KC times the squared distances; d and dH are what a copy and a device move in a tick.
 
 use cohaptic_harness::Model;
+use cohaptic_peer::coordination::Pull;
 use cohaptic_peer::{Contact, Coordination, Direction, Gains, Hand};
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Effort, Links, Method, Patterns, Verdict, WorstVerdict, analyse, worst_case};
@@ -28,9 +29,9 @@ const SHARE: f64 = 0.75;
 
 /// How many times KT and BT hold one copy to all others together: once to their mean, or once to each of the others.
 pub(crate) fn pulls(strategy: Coordination, peers: usize) -> f64 {
-    match strategy {
-        Coordination::AveragePosition => 1.0,
-        Coordination::ProportionalDerivative => (peers - 1) as f64,
+    match strategy.pull() {
+        Pull::Mean => 1.0,
+        Pull::Sum => (peers - 1) as f64,
     }
 }
 

@@ -72,8 +72,8 @@ proptest! {
         draft.duration = ((first + frames) * ticks + 1) as u64;
         let log = run(&draft.scene(), Model::Least);
         // Healed is healed: whatever is sent from then on takes the delay, and nothing else happens to it.
-        for packet in log.packets.iter().filter(|packet| packet.sent.as_nanos() >= HEALED * 1_000_000) {
-            prop_assert_eq!(packet.fate, Fate::Delivered(packet.sent.saturating_add(Duration::from_micros(delay))));
+        for packet in log.packets.iter().filter(|packet| packet.offered.as_nanos() >= HEALED * 1_000_000) {
+            prop_assert_eq!(packet.fate, Fate::Delivered(packet.offered.saturating_add(Duration::from_micros(delay))));
         }
         let motions = motions(&log, draft.peers.len());
         let size = settling.size(&draft, &motions, first);

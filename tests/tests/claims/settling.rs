@@ -81,8 +81,7 @@ impl Settling {
             | StateKind::ObjectVelocity { .. }
             | StateKind::PendingCoupling { .. }
             | StateKind::PendingForce { .. }
-            | StateKind::Memory { .. }
-            | _ => 0,
+            | StateKind::Memory { .. } => 0,
         };
         self.monodromy.states.iter().map(|state| age(state.kind)).max().unwrap_or(0)
     }
@@ -107,7 +106,7 @@ impl Settling {
             StateKind::ObjectVelocity { .. } => motions[peer][start].object.1 * time,
             StateKind::SamplePosition { age, .. } => sample(peer, age).0 - reference,
             StateKind::SampleVelocity { age, .. } => sample(peer, age).1 * time,
-            StateKind::PendingCoupling { .. } | StateKind::PendingForce { .. } | StateKind::Memory { .. } | _ => {
+            StateKind::PendingCoupling { .. } | StateKind::PendingForce { .. } | StateKind::Memory { .. } => {
                 unreachable!("no computation delay, nothing remembered")
             }
         };

@@ -15,7 +15,7 @@ fn fates(draft: &Draft) -> Fates {
     let mut fates = Fates::new();
     for row in run(&draft.scene(), Model::Least).packets {
         let name = |peer: usize| draft.peers[peer].name.clone();
-        let again = fates.entry((name(row.from), name(row.to))).or_default().insert(row.sequence, (row.sent, row.fate));
+        let again = fates.entry((name(row.path.from.index()), name(row.path.to.index()))).or_default().insert(row.sequence, (row.offered, row.fate));
         assert!(again.is_none(), "two fates of one packet: {row:?}");
     }
     fates

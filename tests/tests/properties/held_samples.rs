@@ -47,10 +47,10 @@ fn check(draft: &Draft, log: &Log) -> Result<(), TestCaseError> {
     };
     let mut arrivals: BTreeMap<(usize, usize), Vec<(Instant, u64)>> = BTreeMap::new();
     for packet in &log.packets {
-        prop_assert_eq!(packet.sent, sampled(packet.from, packet.sequence).at, "{:?}", packet);
+        prop_assert_eq!(packet.offered, sampled(packet.path.from.index(), packet.sequence).at, "{:?}", packet);
         if let Fate::Delivered(at) = packet.fate {
-            prop_assert!(at >= packet.sent);
-            arrivals.entry((packet.from, packet.to)).or_default().push((at, packet.sequence));
+            prop_assert!(at >= packet.offered);
+            arrivals.entry((packet.path.from.index(), packet.path.to.index())).or_default().push((at, packet.sequence));
         }
     }
     for receiver in places.clone() {

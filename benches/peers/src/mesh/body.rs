@@ -119,7 +119,7 @@ impl Body {
         self.delivered
     }
 
-    /// Holds what a packet brings if it is newer than what is held.
+    /// Holds what a packet brings if it is newer than the held sample.
     #[inline]
     pub fn receive(&mut self, packet: &Packet) {
         self.delivered += 1;
@@ -131,7 +131,7 @@ impl Body {
         }
     }
 
-    /// One control tick: forces from what is held now, then motion to the next tick.
+    /// One control tick: forces from the held samples, then motion to the next tick.
     #[inline]
     pub fn tick(&mut self) {
         if self.stale {

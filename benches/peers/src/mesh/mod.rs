@@ -1,7 +1,7 @@
 //! The scenes of the comparison: a full mesh of N peers at 1 kHz, 125 samples a second to each other one, 24 ms one way.
 //!
-//! Every program but this project's own has the same arithmetic ([`body`]) and the same draws ([`draws`]), and differs in what it is written on: who keeps
-//! the time, and who brings a sample from one peer to another. So all end in the same state, to the bit, and a test holds them to it.
+//! Every program but this project's own has the same arithmetic ([`body`]) and the same draws ([`draws`]), and differs in what it is written on: which keeps
+//! the time, and which brings a sample from one peer to another. So all end in the same state, to the bit, and a test holds them to it.
 
 pub mod body;
 pub mod draws;
@@ -39,7 +39,7 @@ pub const GAINS: Gains = Gains { stiffness: 200.0, damping: 5.0 };
 /// The force of the first peer's hand \[N\].
 pub const HAND_FORCE: f64 = 1.5;
 
-/// One cell of the table: so many peers, with or without jitter and loss.
+/// One cell of the table: a number of peers, with or without jitter and loss.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Mesh {
     /// The number of peers, 2 at least.
@@ -65,7 +65,7 @@ impl Mesh {
         if self.impaired { "24 ms ± 2 ms normal, 1 % loss" } else { "24 ms" }
     }
 
-    /// The packets offered to links in so many ticks.
+    /// The packets offered to links in a number of ticks.
     #[must_use]
     pub const fn offered(self, ticks: u64) -> u64 {
         (self.peers * (self.peers - 1)) as u64 * ticks.div_ceil(TICKS_A_FRAME)
@@ -86,7 +86,7 @@ pub struct Outcome {
 /// A sample on its way.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Packet {
-    /// Who sent it.
+    /// The sender.
     pub from: usize,
     /// Its number, from 0.
     pub sequence: u64,

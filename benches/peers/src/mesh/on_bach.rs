@@ -31,7 +31,7 @@ impl Latency<Packet> for Drawn {
 
 type Inbox = Arc<Mutex<latent::Queue<Packet, vec_deque::Queue<(Instant, Packet)>, Drawn>>>;
 
-/// Runs the mesh for that many ticks.
+/// Runs the mesh for a number of ticks.
 #[must_use]
 pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
     let inboxes: Vec<Inbox> = (0..mesh.peers).map(|_| Arc::new(vec_deque::Queue::default().latent(Drawn).mutex())).collect();

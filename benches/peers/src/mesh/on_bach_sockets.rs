@@ -45,7 +45,7 @@ pub(super) fn decode(datagram: &[u8]) -> Packet {
     Packet { from: word(0) as usize, sequence: word(1), arrival: word(2), x: f64::from_bits(word(3)), v: f64::from_bits(word(4)) }
 }
 
-/// Runs the mesh for that many ticks.
+/// Runs the mesh for a number of ticks.
 ///
 /// # Panics
 ///
@@ -57,7 +57,7 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
     let net = Fixed::default().with_net_latency(Duration::from_nanos(DELAY_NANOS - BEHIND));
     Runtime::new().with_net_queues(Some(Box::new(net))).run(|| {
         if mesh.impaired {
-            // What is drawn stands in the datagram; a sample that is lost has no arrival.
+            // The draws stand in the datagram; a sample that is lost has no arrival.
             monitor::on_packet_sent(|packet| {
                 let payload = packet.transport.payload();
                 let arrival = payload.get(16..24).map_or(0, |bytes| bytes.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte)));
@@ -105,7 +105,7 @@ async fn peer(mesh: Mesh, me: usize, ticks: u64, body: Rc<RefCell<Body>>, worst:
     }
 }
 
-/// A task of its own: a socket of bach gives nothing to who does not wait for it.
+/// A task of its own: a socket of bach gives nothing to a task that does not wait for it.
 async fn receive(socket: Rc<UdpSocket>, body: Rc<RefCell<Body>>, worst: Rc<RefCell<u64>>) {
     let mut buffer = [0; SIZE];
     while socket.recv_from(&mut buffer).await.is_ok() {

@@ -7,7 +7,7 @@ use cohaptic_scene::Scene;
 
 use super::{COUPLING, DEVICE, GAINS, HAND_FORCE, Mesh, OBJECT_MASS, Outcome, SEED};
 
-/// The scene, of so many ticks.
+/// The scene, of a number of ticks.
 ///
 /// # Panics
 ///
@@ -62,7 +62,7 @@ pub fn run(scene: &Scene) -> Outcome {
     outcome(&summary)
 }
 
-/// Runs it with somebody who watches every packet, so that it runs event by event.
+/// Runs it with an observer of every packet, so that it runs event by event.
 #[must_use]
 pub fn run_watched(scene: &Scene) -> Outcome {
     let mut watcher = Watcher(0);

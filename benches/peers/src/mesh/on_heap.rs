@@ -49,7 +49,7 @@ impl Ord for Event {
     }
 }
 
-/// Runs the mesh for that many ticks.
+/// Runs the mesh for a number of ticks.
 #[must_use]
 pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
     let n = mesh.peers;

@@ -1,4 +1,4 @@
-//! A bare loop over ticks: no event queue at all, since everything that matters happens at ticks. What is written for one scene, once.
+//! A bare loop over ticks: no event queue at all, since everything that matters happens at ticks. Written for one scene, once.
 
 use std::collections::VecDeque;
 
@@ -9,7 +9,7 @@ use super::{DELAY_NANOS, Mesh, Outcome, Packet, TICK_NANOS, TICKS_A_FRAME};
 /// More ticks than a packet is ever on its way.
 const WHEEL: u64 = 64;
 
-/// Runs the mesh for that many ticks.
+/// Runs the mesh for a number of ticks.
 #[must_use]
 pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
     let n = mesh.peers;

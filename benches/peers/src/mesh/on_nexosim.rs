@@ -141,7 +141,7 @@ impl Seat {
     }
 }
 
-/// Runs the mesh for that many ticks, on one thread: more would cost more processor time.
+/// Runs the mesh for a number of ticks, on one thread: more would cost more processor time.
 ///
 /// # Panics
 ///

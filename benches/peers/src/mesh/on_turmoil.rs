@@ -1,7 +1,7 @@
 //! turmoil: a host with a UDP socket for each peer, stepped by milliseconds.
 //!
 //! Its links have one latency, or one between two bounds by an exponential law, in whole milliseconds, and fail in both directions for a while instead of
-//! losing a packet. So with jitter and loss a sender does not send what is lost, links take what no packet falls below, and the receiver keeps a packet
+//! losing a packet. So with jitter and loss a sender does not send lost samples, links take what no packet falls below, and the receiver keeps a packet
 //! until the tick by which it should have arrived.
 
 use std::cell::RefCell;
@@ -25,7 +25,7 @@ const WHEEL: u64 = 64;
 /// When the first tick is: all have bound their sockets then.
 const BEGIN: Duration = Duration::from_millis(1);
 
-/// Runs the mesh for that many ticks.
+/// Runs the mesh for a number of ticks.
 ///
 /// # Panics
 ///

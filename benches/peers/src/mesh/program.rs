@@ -9,7 +9,7 @@ use super::{Mesh, Outcome, on_bach, on_bach_sockets, on_cohaptic, on_heap, on_lo
 pub enum Program {
     /// This project, as it runs a scene that nobody watches.
     Cohaptic,
-    /// This project with somebody who watches every packet: event by event.
+    /// This project with an observer of every packet: event by event.
     CohapticWatched,
     /// No event queue at all.
     Loop,
@@ -70,7 +70,7 @@ impl Program {
         }
     }
 
-    /// Runs the mesh for that many ticks.
+    /// Runs the mesh for a number of ticks.
     #[must_use]
     pub fn run(self, mesh: Mesh, ticks: u64) -> Outcome {
         match self {
@@ -104,7 +104,7 @@ mod tests {
                 for (peer, (actual, expected)) in outcome.positions.iter().zip(&expected.positions).enumerate() {
                     assert_eq!(actual.to_bits(), expected.to_bits(), "{program:?}, {mesh:?}, peer {peer}: {actual} is not {expected}");
                 }
-                // Who has a packet at its instant, and who at the next tick.
+                // Which programs have a packet at its instant, and which at the next tick.
                 let late = if outcome.arrival_error_nanos == 0 { 0 } else { TICK_NANOS };
                 assert!(outcome.arrival_error_nanos <= late, "{program:?}, {mesh:?}: {outcome:?}");
                 assert!(mesh.impaired || outcome.arrival_error_nanos == 0, "{program:?}, {mesh:?}: constant delays end at ticks");

@@ -32,7 +32,7 @@ fn main() {
 }
 
 fn head() {
-    println!("# Beside others: speed\n");
+    println!("# Comparison others: speed\n");
     println!("The same scenes on this project and on what others wrote, in one run. This page is written by\n");
     println!("    cd benches/peers && (cargo run --release --bin mesh-table && others/run) > ../../docs/peers-speed.md\n");
     println!("and measured on: {}. Processor time on one core, the median of {ROUNDS} rounds in which", machine());
@@ -118,7 +118,7 @@ fn cell(mesh: Mesh) {
     }
 }
 
-/// The ticks that are worth so many times those compared.
+/// The ticks that are worth this multiple of those compared.
 fn length(times: f64) -> u64 {
     ((COMPARED as f64 * times) as u64).clamp(1_000, 20_000_000).next_multiple_of(8)
 }

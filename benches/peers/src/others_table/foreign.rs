@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use crate::scene_file;
 
-    /// What is not installed is skipped here too, with the message of its script.
+    /// A program that is not installed is skipped here too, with the message of its script.
     #[test]
     fn those_that_are_installed_end_in_the_same_state() {
         let folder = std::env::temp_dir().join(format!("cohaptic-others-test-{}", std::process::id()));

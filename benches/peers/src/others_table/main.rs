@@ -68,7 +68,7 @@ fn cell(mesh: Mesh, folder: &Path, missing: &mut Vec<(Foreign, String)>, lacks: 
     let path = folder.join("compared");
     scene_file::write(&path, mesh, COMPARED);
     let expected = on_cohaptic::run(&on_cohaptic::scene(mesh, COMPARED)).positions;
-    // Who ran, how many ticks are worth its while, and how its end compares.
+    // Which program ran, how many ticks are worth its while, and how its end compares.
     let mut there = Vec::new();
     for foreign in Foreign::ALL {
         if missing.iter().any(|(other, _)| *other == foreign) {
@@ -131,7 +131,7 @@ fn compare(actual: &[f64], expected: &[f64]) -> f64 {
     actual.iter().zip(expected).map(|(actual, expected)| (actual - expected).abs()).fold(0.0, f64::max)
 }
 
-/// The ticks that are worth so many times those compared; not so many that their delays fill a disk.
+/// The ticks that are worth this multiple of those compared; few enough that their delays do not fill a disk.
 fn length(times: f64) -> u64 {
     ((COMPARED as f64 * times) as u64).clamp(1_000, 10_000_000).next_multiple_of(8)
 }

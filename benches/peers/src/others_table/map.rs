@@ -18,7 +18,7 @@ const DAMPING: [f64; 2] = [0.0, 60.0];
 /// Eigenvalues are exact to rounding times their condition; what differs by more is another matrix.
 const SAME: f64 = 1e-6;
 
-/// A map: so many peers, so many values of each key.
+/// A map: the number of peers, and of values of each key.
 const MAPS: [(usize, [usize; 2]); 2] = [(3, [100, 75]), (10, [40, 30])];
 
 /// What `stability_map.py` says.

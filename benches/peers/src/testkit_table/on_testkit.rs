@@ -70,7 +70,7 @@ impl Runtime for OfTokio {
     }
 }
 
-/// Runs it on so many hosts, each sending that to each other one.
+/// Runs it on a number of hosts, each sending that to each other one.
 ///
 /// # Panics
 ///
@@ -126,7 +126,7 @@ pub fn seldom(kind: Kind, wait: Duration, count: u32) {
     });
 }
 
-/// Sends so many datagrams of 64 bytes from one socket to another, one every 10 µs, over a link of 24 ms; gives how many arrived.
+/// Sends a number of datagrams of 64 bytes from one socket to another, one every 10 µs, over a link of 24 ms; gives how many arrived.
 ///
 /// # Panics
 ///

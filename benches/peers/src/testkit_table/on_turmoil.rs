@@ -41,7 +41,7 @@ impl Runtime for OfHost {
     }
 }
 
-/// Runs it on so many hosts, each sending that to each other one, stepped by such ticks. Gives the errors, and how long turmoil says it was.
+/// Runs it on a number of hosts, each sending that to each other one, stepped by such ticks. Gives the errors, and how long turmoil says it was.
 ///
 /// # Panics
 ///

@@ -2,8 +2,8 @@
 //! argument replaces the ten of each run.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 
+mod admission;
 mod bare;
-mod door;
 mod session;
 
 use std::error::Error;
@@ -102,13 +102,13 @@ fn at_the_door() -> Result<(), Box<dyn Error>> {
     println!("## The door\n");
     println!(
         "What it costs to decide about one datagram, and to make one ready: the median of {} rounds of {} on one thread, in processor time.",
-        door::ROUNDS,
-        door::COUNT
+        admission::ROUNDS,
+        admission::COUNT
     );
     println!("No sockets: the [door](live-protocol.md) alone. Samples of three axes, 96 bytes without a seal and 128 with one.\n");
     println!("| datagram | what becomes of it | ns |");
     println!("| --- | --- | ---: |");
-    for cost in door::costs()? {
+    for cost in admission::costs()? {
         println!("| {} | {} | {} |", cost.datagram, cost.fate, cost.each.as_nanos());
     }
     Ok(())

@@ -42,7 +42,7 @@ jitter = "2ms"
 loss = "1%"
 "#;
 
-/// Runs a session of so many peers, the last of them in another program, to the end of its scene.
+/// Runs a session of a number of peers, the last of them in another program, to the end of its scene.
 pub(crate) fn run(peers: usize, pacing: Pacing, wishes: Wishes, span: Duration) -> Result<Loop, Box<dyn Error>> {
     let scene = scene(peers, span)?;
     let key = SessionKey::generate(&mut SystemEntropy)?;

@@ -78,7 +78,7 @@ pub(super) struct Live {
     thread: JoinHandle<Result<LiveEnd, SessionError>>,
 }
 
-/// Who looks on.
+/// The onlooker.
 struct Host {
     clock: MonotonicClock,
     earliest: Instant,
@@ -157,7 +157,7 @@ pub(super) fn accounts(status: &Status) -> Vec<Account> {
     let ticks = status.elapsed.as_nanos().div_ceil(TICK.as_nanos());
     // What happened before the first instant that is open: every tick, once.
     accounts.push(Account::of("ticks made and ticks of logical time", status.ticks.count, u64::try_from(ticks).unwrap_or(u64::MAX)));
-    if let (Some(door), Some(seat)) = (&status.door, status.peers.get(visitor).and_then(|peer| peer.seat)) {
+    if let (Some(door), Some(seat)) = (&status.admission, status.peers.get(visitor).and_then(|peer| peer.seat)) {
         let settled = door.admitted + door.welcomed + door.refused_in_all();
         accounts.push(Account::of("datagrams at the door, and admitted, welcomed and refused", door.handled, settled));
         accounts.push(Account::of(
@@ -184,7 +184,7 @@ pub(super) fn accounts(status: &Status) -> Vec<Account> {
 
 /// What must be equal at the end, when nobody sends any more.
 pub(super) fn last_accounts(end: &LiveEnd, visits: &Visits) -> Vec<Account> {
-    let Some((door, socket)) = &end.report.door else { return Vec::new() };
+    let Some((door, socket)) = &end.report.admission else { return Vec::new() };
     let counts = socket.counts;
     let made_ready = door.sent + door.welcomed;
     vec![

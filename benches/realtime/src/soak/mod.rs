@@ -29,7 +29,7 @@ use stream::{Stream, StreamLook};
 
 /// What to do.
 #[derive(Clone, Copy, Debug)]
-pub struct Plan {
+pub struct SoakPlan {
     /// For how long.
     pub duration: Duration,
     /// How often to look.
@@ -42,7 +42,7 @@ pub struct Plan {
     pub wishes: Wishes,
 }
 
-impl Plan {
+impl SoakPlan {
     /// A look every so often; the visitor stays for three minutes and is away for 20 s, or less in a short run, so that it comes at least three times.
     #[must_use]
     pub fn new(duration: Duration, every: Duration) -> Self {
@@ -88,7 +88,7 @@ const SETTLING: Duration = Duration::from_secs(20);
 /// # Errors
 ///
 /// If something cannot be had or has to give up: a socket, random bytes, a thread.
-pub fn run(plan: &Plan, interrupted: &AtomicBool, mut show: impl FnMut(&Row)) -> Result<Outcome, Box<dyn Error>> {
+pub fn run(plan: &SoakPlan, interrupted: &AtomicBool, mut show: impl FnMut(&Row)) -> Result<Outcome, Box<dyn Error>> {
     let scene = scene::scene(plan.duration * 2 + Duration::from_secs(3600))?;
     let key = SessionKey::generate(&mut SystemEntropy)?;
     let (live, stream) = (Live::start(&scene, key.clone(), plan.wishes)?, Stream::start(scene.links.between(0, 1), plan.wishes)?);
@@ -151,7 +151,7 @@ fn settle(clock: &MonotonicClock, live: &Live, stream: &Stream, visitor: &Visito
         pacer.wait(clock, Some(clock.now() + Duration::from_millis(200)), &[])?;
         let (sent, visited) = (stream.sent(), visitor.sent());
         let relayed = stream.probe.ask().is_some_and(|look| look.intake.offered >= sent && look.held == 0);
-        let heard = live.probe.ask().is_some_and(|look| look.status.door.is_some_and(|door| door.handled >= visited));
+        let heard = live.probe.ask().is_some_and(|look| look.status.admission.is_some_and(|door| door.handled >= visited));
         if (relayed && heard && sent == stream.sent() && visited == visitor.sent()) || clock.now() >= until {
             return Ok(());
         }

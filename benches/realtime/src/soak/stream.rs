@@ -10,7 +10,7 @@ use std::sync::mpsc::channel;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use cohaptic_realtime::udp::{DoorConfig, ReceiveBuffers, UdpDoor};
+use cohaptic_realtime::udp::{EndpointConfig, ReceiveBuffers, UdpEndpoint};
 use cohaptic_realtime::{Clock as _, LatenessSummary, MonotonicClock, Pacer, Pacing, Wishes, prepare_thread};
 use cohaptic_relay::{Form, IntakeCounts, Limits, Proxy, Relay, RelayConfig, RelayError, Report, RunOptions, View};
 use cohaptic_wan::LinkModel;
@@ -83,10 +83,10 @@ impl<T: Send + 'static> Worker<T> {
 impl Stream {
     pub(super) fn start(link: &LinkModel, wishes: Wishes) -> Result<Self, Box<dyn Error>> {
         let any = SocketAddr::from(([127, 0, 0, 1], 0));
-        let behind = UdpDoor::bind(any, DoorConfig::default())?;
+        let behind = UdpEndpoint::bind(any, EndpointConfig::default())?;
         let proxy = Proxy { listen: any, to: behind.local_address(), forth: link.clone(), back: link.clone(), most_clients: Proxy::MOST_CLIENTS };
         let config = RelayConfig { seed: 12, form: Form::Proxy(proxy), limits: Limits::default(), changes: Vec::new() };
-        let relay = Relay::bind(config, DoorConfig::default())?;
+        let relay = Relay::bind(config, EndpointConfig::default())?;
         let to = relay.ports().next().map(|(_, address)| address).ok_or("the relay has no port")?;
         let source = Arc::new(UdpSocket::bind(any)?);
         let stop = Arc::new(AtomicBool::new(false));
@@ -153,7 +153,7 @@ fn generate(socket: &UdpSocket, to: SocketAddr, count: &AtomicU64, end: &AtomicB
 }
 
 /// Receives until it is told to end, and then what has come until then; counts it and what the kernel dropped.
-fn drain(mut socket: UdpDoor, end: &AtomicBool) -> io::Result<(u64, Option<u64>)> {
+fn drain(mut socket: UdpEndpoint, end: &AtomicBool) -> io::Result<(u64, Option<u64>)> {
     let (clock, mut pacer, mut buffers) = (MonotonicClock::start(), Pacer::new(Pacing::Sleep), ReceiveBuffers::new());
     loop {
         let is_over = end.load(Ordering::Acquire);
@@ -168,7 +168,7 @@ fn drain(mut socket: UdpDoor, end: &AtomicBool) -> io::Result<(u64, Option<u64>)
 /// What must be equal in a relay at any moment.
 pub(super) fn accounts(look: &StreamLook) -> Vec<Account> {
     let inside = look.intake.offered.saturating_sub(look.delivered + look.dropped);
-    // Of more than it sends at once, some have left their link and wait for their turn. That many only gather when the machine pauses for a second.
+    // Of more than it sends at once, some have left their link and wait for their turn. As many only gather when the machine pauses for a second.
     let open = (look.held > AT_ONCE).then_some("some wait to be sent after a pause of the machine");
     vec![Account { open, ..Account::of("packets that the relay holds, and those inside its links", look.held, inside) }]
 }

@@ -7,7 +7,7 @@ use super::{Outcome, Row};
 /// So much more memory may be held in the last quarter than in the first \[kB\].
 ///
 /// Nothing may grow with time; what may still be touched for the first time after a quarter is bounded: pages of at most six histograms of 190 kB, when something
-/// is as late as nothing was before, and of the rooms of four sockets for 32 datagrams, when so many come at once, of which small datagrams touch a page each
+/// is as late as nothing was before, and of the rooms of four sockets for 32 datagrams, when that number comes at once, of which small datagrams touch a page each
 /// (512 kB). The rest, 400 kB, is for the table of the soak itself and for the allocator. In an hour more than six million packets pass between the middle of the
 /// first quarter and that of the last: to keep a byte of each would be three times this.
 pub const MEMORY_BOUND: u64 = 2048;

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use cohaptic_benches_realtime::soak::{Judgement, Outcome, Plan, Verdict, judge, run};
+use cohaptic_benches_realtime::soak::{Judgement, Outcome, SoakPlan, Verdict, judge, run};
 use cohaptic_realtime::Wishes;
 
 /// For a few seconds, in which buffers are touched for the first time \[kB\].
@@ -21,7 +21,7 @@ fn find<'a>(judgements: &'a [Judgement], rule: &str) -> &'a Judgement {
 fn eight_seconds_lose_nothing_and_keep_nothing() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     // Without priority: a test does not push others aside.
-    let plan = Plan { wishes: Wishes::NONE, ..Plan::new(Duration::from_secs(8), Duration::from_millis(500)) };
+    let plan = SoakPlan { wishes: Wishes::NONE, ..SoakPlan::new(Duration::from_secs(8), Duration::from_millis(500)) };
     let mut shown = 0;
     let outcome: Outcome = run(&plan, &AtomicBool::new(false), |_| shown += 1).unwrap();
     let judgements = judge(&outcome);
@@ -55,7 +55,7 @@ fn eight_seconds_lose_nothing_and_keep_nothing() {
 #[test]
 fn it_ends_when_it_is_asked_to() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let plan = Plan { wishes: Wishes::NONE, ..Plan::new(Duration::from_secs(3600), Duration::from_secs(60)) };
+    let plan = SoakPlan { wishes: Wishes::NONE, ..SoakPlan::new(Duration::from_secs(3600), Duration::from_secs(60)) };
     let outcome = run(&plan, &AtomicBool::new(true), |_| ()).unwrap();
     assert!(outcome.interrupted);
     assert_eq!(outcome.rows.len(), 1, "that at the end");

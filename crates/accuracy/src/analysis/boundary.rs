@@ -13,7 +13,7 @@ use super::growth::growth_over;
 use super::references::on_the_edge;
 use super::{Effort, row};
 use crate::cost::processor_time;
-use crate::done::Done;
+use crate::row_sink::RowSink;
 use crate::{AccuracyError, Row};
 
 const CASE: &str = "boundary of KT, three peers at 24 ms";
@@ -26,7 +26,7 @@ const ALL: u32 = 52;
 /// Halvings down to half a µN/m: finer than the longest simulation here tells.
 const SIMULATED: u32 = 31;
 
-pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let (edge, text) = on_the_edge();
     let exact = edge.scene.coordination.gains.stiffness;
     let key = KeyRange::parse("coordination.stiffness=1000..2600").expect("a range");
@@ -110,7 +110,7 @@ fn grows(mut scene: Scene, seconds: u64) -> bool {
         Stability::Stable => false,
         Stability::Undecided { ratio } => ratio > 1.0,
         // Nothing interrupts; and what else there may be is no sign of stability.
-        Stability::Unstable | Stability::Interrupted | _ => true,
+        Stability::Unstable | Stability::Interrupted => true,
     }
 }
 

@@ -10,14 +10,14 @@ use crate::AccuracyError;
 
 /// How probable a loss is.
 pub(super) const LOSS: f64 = 0.2;
-/// Further apart than this is what is asked about \[m\].
+/// The event is that objects are further apart than this \[m\].
 pub(super) const LIMIT: f64 = 0.0125;
 /// Samples of each link that arrive before the end.
 const SAMPLES: u32 = 7;
 
-/// Two peers who begin to move apart, over links of 16 ms that lose every fifth sample: 64 ms of it.
+/// Two peers that begin to move apart, over links of 16 ms that lose every fifth sample: 64 ms of it.
 ///
-/// Seven samples of each link, sent at 0, 8, … 48 ms, arrive until the end; what is sent later arrives after it and cannot count.
+/// Seven samples of each link, sent at 0, 8, … 48 ms, arrive until the end; a sample sent later arrives after it and cannot count.
 const SCENE: &str = r#"
     scene        = { duration = "64ms", count = 2 }
     object       = { mass = 0.45 }

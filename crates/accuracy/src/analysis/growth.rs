@@ -13,7 +13,7 @@ pub fn growth(scene: &Scene) -> Option<f64> {
     growth_over(scene, 200)
 }
 
-/// The estimate of the radius from so many frames, as anyone would get it without the matrix: everybody begins displaced, and the largest relative
+/// The estimate of the radius from a number of frames, as anyone would get it without the matrix: everybody begins displaced, and the largest relative
 /// displacement from three tenths to half of the time is compared with that half of the time later. `None` if it cannot be told: the disturbance has died
 /// out below all numbers, or grown beyond them.
 #[must_use]

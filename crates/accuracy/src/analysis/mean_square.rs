@@ -10,23 +10,23 @@ use cohaptic_stability::mean_square;
 use super::references::{Reference, mean_square_reference};
 use super::{Effort, row};
 use crate::cost::{median_time, processor_time};
-use crate::done::Done;
+use crate::row_sink::RowSink;
 use crate::{AccuracyError, Row};
 
 const UNIT: &str = "mean-square radius [1]";
 const COST: &str = "ms a verdict";
 const REFERENCE: &str = "12 digits, by an independent computation";
 
-/// Frames whose squares are added up, and compared with those of as many frames after them: so many that the phase of what swings counts little, so late
+/// Frames whose squares are added up, and compared with those of as many frames after them: enough that the phase of an oscillation counts little, so late
 /// that what dies out sooner is gone, so early that few runs do not decide alone.
 const WINDOW: u32 = 24;
 /// The first of them.
 const BEGIN: u32 = 12;
 
-/// Runs are taken together in so many batches, whose spread tells the uncertainty.
+/// The batches in which runs are taken together, whose spread tells the uncertainty.
 const BATCHES: u32 = 10;
 
-pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let Reference { name, scene, radius, .. } = mean_square_reference();
     let case = format!("mean square, {name}");
     let found = mean_square(&scene)?;
@@ -53,7 +53,7 @@ struct Estimate {
     spread: f64,
 }
 
-fn estimate(scene: &Scene, runs: u32, done: &Done<'_>) -> Result<Estimate, AccuracyError> {
+fn estimate(scene: &Scene, runs: u32, done: &RowSink<'_>) -> Result<Estimate, AccuracyError> {
     let mut scene = scene.clone();
     scene.duration = scene.coordination.update * (BEGIN + 2 * WINDOW);
     // Two copies apart, which no hand moves.

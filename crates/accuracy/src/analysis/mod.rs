@@ -1,5 +1,5 @@
 //! Whether a scene is stable: what a verdict costs by each method, and how far it is from numbers of fifty digits; and by runs that are left to chance,
-//! how much so many of them tell.
+//! how much a number of them tells.
 
 mod boundary;
 mod every_pattern;
@@ -9,8 +9,8 @@ mod monte_carlo;
 mod radius;
 pub mod references;
 
-use crate::done::Done;
-use crate::{AccuracyError, Options, Row, Subject, Watch};
+use crate::row_sink::RowSink;
+use crate::{AccuracyError, Row, Subject, Watch};
 
 /// How much work there is in the rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -32,12 +32,6 @@ impl Effort {
     /// About a minute.
     pub const FULL: Self =
         Self { rounds: 15, growth_frames: &[50, 200, 800, 3200], boundary_seconds: &[1, 4, 16, 64, 256], runs: &[100, 1000, 10_000, 100_000] };
-
-    /// The one of these options.
-    #[must_use]
-    pub const fn of(options: Options) -> Self {
-        if options.quick { Self::QUICK } else { Self::FULL }
-    }
 }
 
 /// The rows of this subject.
@@ -45,17 +39,8 @@ impl Effort {
 /// # Errors
 ///
 /// As [`crate::measure`].
-pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    rows_with(Effort::of(options), watch)
-}
-
-/// The same with another effort.
-///
-/// # Errors
-///
-/// As [`crate::measure`].
-pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    let mut done = Done { rows: Vec::new(), watch };
+pub fn rows(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    let mut done = RowSink { rows: Vec::new(), watch };
     radius::measure(effort, &mut done)?;
     boundary::measure(effort, &mut done)?;
     mean_square::measure(effort, &mut done)?;
@@ -64,17 +49,6 @@ pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, Accuracy
 }
 
 /// A row of this subject that has no error yet.
-fn row(case: &str, method: &str, setting: String, (cost, cost_unit): (f64, &'static str), reference: &'static str) -> Row {
-    Row {
-        subject: Subject::Analysis,
-        case: case.to_owned(),
-        method: method.to_owned(),
-        setting,
-        cost: Some(cost),
-        cost_unit,
-        error: None,
-        error_unit: "",
-        reference,
-        note: String::new(),
-    }
+fn row(case: &str, method: &str, setting: String, cost: (f64, &'static str), reference: &'static str) -> Row {
+    Row { reference, ..Row::of(Subject::Analysis, case, method, setting, cost) }
 }

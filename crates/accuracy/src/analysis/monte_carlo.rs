@@ -1,18 +1,18 @@
-//! The probability of an event, from runs: how far it is from the exact one, and how wide the interval is that so many runs leave.
+//! The probability of an event, from runs: how far it is from the exact one, and how wide the interval is that a number of runs leaves.
 
 use super::every_pattern::{LIMIT, exact, happens, scene};
 use super::{Effort, row};
 use crate::cost::processor_time;
-use crate::done::Done;
+use crate::row_sink::RowSink;
 use crate::{AccuracyError, Row};
 
 const COST: &str = "s a verdict";
 const REFERENCE: &str = "every pattern of losses, weighed";
 
-/// 97.5 % of a normal law lie below so many deviations.
+/// 97.5 % of a normal law lie below this number of deviations.
 const Z: f64 = 1.959_963_984_540_054;
 
-pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let mut scene = scene()?;
     let case = format!("probability of more than {:.1} mm apart", 1e3 * LIMIT);
     let start = processor_time();

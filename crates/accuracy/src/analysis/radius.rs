@@ -8,14 +8,14 @@ use super::growth::growth_over;
 use super::references::{Reference, references};
 use super::{Effort, row};
 use crate::cost::{median_time, processor_time};
-use crate::done::Done;
+use crate::row_sink::RowSink;
 use crate::{AccuracyError, Row};
 
 const UNIT: &str = "spectral radius [1]";
 const COST: &str = "µs a verdict";
 const REFERENCE: &str = "50 digits";
 
-pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     for reference in references() {
         done.check()?;
         of_scene(&reference, effort, done)?;
@@ -23,7 +23,7 @@ pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), Accurac
     Ok(())
 }
 
-fn of_scene(reference: &Reference, effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+fn of_scene(reference: &Reference, effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let Reference { name, scene, radius, frames } = reference;
     let case = format!("radius, {name}");
     // The whole matrix of a thousand frames or of 4096 peers takes more than a minute, and so does their simulation.

@@ -44,7 +44,7 @@ pub fn references() -> Vec<Reference> {
     NAMES.into_iter().map(find).collect()
 }
 
-/// Two peers who lose a tenth of all samples; the radius is that of the second moment.
+/// Two peers that lose a tenth of all samples; the radius is that of the second moment.
 ///
 /// # Panics
 ///

@@ -76,8 +76,8 @@ impl Observer for CsvSink {
     }
 
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), Infallible> {
-        let [from, to] = [row.from, row.to].map(|peer| self.names[peer].clone());
-        self.text(format_args!("{from}->{to},{},{},", row.sequence, row.sent.as_nanos()));
+        let [from, to] = [row.path.from.index(), row.path.to.index()].map(|peer| self.names[peer].clone());
+        self.text(format_args!("{from}->{to},{},{},", row.sequence, row.offered.as_nanos()));
         if let Fate::Delivered(at) = row.fate {
             self.text(at.as_nanos());
         }

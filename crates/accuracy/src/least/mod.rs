@@ -19,7 +19,8 @@ use self::csv::CsvSink;
 use self::scenes::{Recorded, Variant};
 use crate::cost::nanos;
 use crate::rounds::{Rounds, Work};
-use crate::{AccuracyError, Options, Row, Subject, Watch};
+use crate::row_sink::RowSink;
+use crate::{AccuracyError, Row, Subject, Watch};
 
 /// How much work there is in the rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -38,12 +39,6 @@ impl Effort {
 
     /// Half a minute.
     pub const FULL: Self = Self { simulated_millis: 5000, rounds: 41, round_millis: 10 };
-
-    /// The one of these options.
-    #[must_use]
-    pub const fn of(options: Options) -> Self {
-        if options.quick { Self::QUICK } else { Self::FULL }
-    }
 }
 
 /// The rows of this subject.
@@ -51,27 +46,14 @@ impl Effort {
 /// # Errors
 ///
 /// As [`crate::measure`].
-pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    rows_with(Effort::of(options), watch)
-}
-
-/// The same with another effort.
-///
-/// # Errors
-///
-/// As [`crate::measure`].
-pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    let mut rows = Vec::new();
+pub fn rows(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    let mut sink = RowSink { rows: Vec::new(), watch };
     let base = scenes::base(effort.simulated_millis)?;
     for variant in scenes::VARIANTS {
-        if watch.stops() {
-            return Err(AccuracyError::Stopped);
-        }
-        let row = variant_row(variant, &base, effort)?;
-        watch.row(&row);
-        rows.push(row);
+        sink.check()?;
+        sink.push(variant_row(variant, &base, effort)?)?;
     }
-    Ok(rows)
+    Ok(sink.rows)
 }
 
 fn variant_row(variant: Variant, base: &Scene, effort: Effort) -> Result<Row, AccuracyError> {
@@ -85,17 +67,13 @@ fn variant_row(variant: Variant, base: &Scene, effort: Effort) -> Result<Row, Ac
     // Half up, and never "-0.0".
     let tenths = ((more - alone) * 10.0 + 0.5).floor() / 10.0;
     let note = format!("{:.2} times the base, {tenths:+.1} ns; {simulated:.0} s simulated in a second{}", more / alone, variant.words());
+    let row = Row::of(Subject::LeastModel, "three peers, constant delay, and", variant.name, String::new(), (more, "ns a peer's tick"));
     Ok(Row {
-        subject: Subject::LeastModel,
-        case: "three peers, constant delay, and".to_owned(),
-        method: variant.name.to_owned(),
-        setting: String::new(),
-        cost: Some(more),
-        cost_unit: "ns a peer's tick",
         error: Some(positions::largest_difference(&scene)),
         error_unit: "largest difference of positions [m]",
         reference: "the same scene in the general model",
         note,
+        ..row
     })
 }
 

@@ -12,7 +12,7 @@ pub(super) fn largest_difference(scene: &Scene) -> f64 {
     if least.len() != general.len() {
         return f64::INFINITY;
     }
-    // Bits, so that what is no number counts as equal to itself alone.
+    // Bits, so that a NaN counts as equal to itself alone.
     let apart = |(one, other): (&f64, &f64)| if one.to_bits() == other.to_bits() { 0.0 } else { (one - other).abs() };
     let differences = least.iter().zip(&general).map(apart).map(|apart| if apart.is_nan() { f64::INFINITY } else { apart });
     differences.fold(0.0, f64::max)

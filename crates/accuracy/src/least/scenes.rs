@@ -14,13 +14,13 @@ pub(super) struct Variant {
     pub(super) axes: usize,
     /// The keys that it takes, over those of the base.
     pub(super) overrides: &'static [&'static str],
-    /// What is watched of it.
+    /// The part of a run that is watched.
     pub(super) recorded: Recorded,
     /// What simulates it.
     pub(super) model: Model,
 }
 
-/// What is watched of a run.
+/// The part of a run that is watched.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Recorded {
     /// Nothing.
@@ -90,7 +90,7 @@ pub(super) const VARIANTS: [Variant; 27] = [
     general("the general model, with jitter and loss", &["link.jitter=2ms", "link.loss=1%"]),
 ];
 
-/// Three who hold one object over links of 24 ms; the first one moves it.
+/// Three peers hold one object over links of 24 ms; the first one moves it.
 const BASE: &str = r#"
     scene        = { duration = "1s", count = 3, seed = 7 }
     object       = { mass = 0.45, damping = 0.5 }

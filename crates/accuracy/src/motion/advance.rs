@@ -43,7 +43,7 @@ pub(crate) struct Stepped {
 }
 
 impl Stepped {
-    /// That many sub-steps in a tick of that length \[s\].
+    /// A number of sub-steps in a tick of a length \[s\].
     pub(crate) fn new(plant: &Plant, tick: f64, steps: u32) -> Self {
         Self { inverse_mass: 1.0 / plant.mass, damping: plant.damping, stiffness: plant.stiffness, h: tick / f64::from(steps), steps }
     }

@@ -8,7 +8,7 @@
 //! det(M(K) − λ·I) = 0,   λ = (1 − t² + 2t·i)/(1 + t²)
 //! ```
 //!
-//! in the two unknowns K and t = tan(θ/2), by Newton's method with 100 bits, so that what is left of an error is the integrator's and not the solver's.
+//! in the two unknowns K and t = tan(θ/2), by Newton's method with 100 bits, so that the rest of an error is the integrator's and not the solver's.
 //! Where it is a real one that reaches the circle, λ is 1 or −1, and K the only unknown.
 
 use cohaptic_peer::{Motion, Number as _, StepMap};
@@ -115,7 +115,7 @@ const REAL: f64 = 1e-6;
 /// The steps that Newton's method takes at most, and the relative step after which it has ended.
 const STEPS: u32 = 20;
 const ENOUGH: f64 = 1e-26;
-/// Slopes are differences over this share, and have as many right digits: so each step adds about that many.
+/// Slopes are differences over this share, and have as many right digits: so each step adds about as many.
 const SHARE: f64 = 1e-15;
 
 /// Where a function of K is zero.

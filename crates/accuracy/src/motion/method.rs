@@ -14,9 +14,9 @@ use crate::Options;
 pub(crate) enum Method {
     /// The program's matrix exponential, as one map.
     Exact,
-    /// Semi-implicit Euler in so many steps a tick.
+    /// Semi-implicit Euler, with the steps of a tick.
     Euler(u32),
-    /// Runge and Kutta's in so many steps a tick.
+    /// Runge and Kutta's, with the steps of a tick.
     RungeKutta(u32),
     /// The steps of semi-implicit Euler multiplied out beforehand into one map: the program's `integrator = "semi-implicit-euler"`.
     EulerMap(u32),

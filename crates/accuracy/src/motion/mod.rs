@@ -13,14 +13,14 @@ mod scenes;
 mod tests;
 mod world;
 
-use std::path::Path;
 use std::time::Duration;
 
 use cohaptic_peer::{Motion, Number as _, StepMap};
-use cohaptic_stability::{Boundary, BoundaryOptions, Family, KeyRange};
+use cohaptic_stability::{Boundary, BoundaryOptions, KeyRange};
 use qd::Quad;
 
 use crate::cost::median_time;
+use crate::row_sink::RowSink;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
 use method::Method;
 use number::{Number as _, absolute};
@@ -40,27 +40,19 @@ const ROOT: &str = "root of the characteristic equation with 100 bits and the ex
 ///
 /// As [`crate::measure`].
 pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    let mut rows = Vec::new();
+    let mut sink = RowSink { rows: Vec::new(), watch };
     for motion in &SCENES {
         let work = Work::prepare(motion, options)?;
         for method in Method::all(options) {
-            if watch.stops() {
-                return Err(AccuracyError::Stopped);
-            }
-            for row in work.rows(motion, method) {
-                watch.row(&row);
-                rows.push(row);
-            }
+            sink.check()?;
+            work.rows(motion, method).into_iter().try_for_each(|row| sink.push(row))?;
         }
-        if let Some(row) = work.second_witness(motion)? {
-            watch.row(&row);
-            rows.push(row);
-        }
+        work.second_witness(motion)?.map_or(Ok(()), |row| sink.push(row))?;
     }
-    Ok(rows)
+    Ok(sink.rows)
 }
 
-/// A scene, and what is right.
+/// A scene, and its reference.
 pub(crate) struct Work {
     pub(crate) pair: Pair,
     /// The bodies after every tick.
@@ -86,16 +78,11 @@ impl Work {
         let cost = nanos(median_time(self.rounds, work)) / f64_of(self.pair.hands.len());
         let (position, energy) = self.errors(method);
         let row = |error: Option<f64>, error_unit, reference, note: &str| Row {
-            subject: Subject::Motion,
-            case: motion.name.to_owned(),
-            method: method.name().to_owned(),
-            setting: method.setting(),
-            cost: Some(cost),
-            cost_unit: COST,
             error,
             error_unit,
             reference,
             note: note.to_owned(),
+            ..Row::of(Subject::Motion, motion.name, method.name(), method.setting(), (cost, COST))
         };
         let note = |error: Option<f64>| if error.is_none() { "diverged: not a finite number within the run" } else { "" };
         let mut rows = vec![row(position, POSITION, LOOP, note(position)), row(energy, ENERGY, LOOP, note(energy))];
@@ -129,17 +116,13 @@ impl Work {
         let start = crate::cost::processor_time();
         let Some(found) = program_boundary(motion, (along.key(), low, high))? else { return Ok(None) };
         let cost = crate::cost::processor_time() - start;
+        let cost = (nanos(cost) / 1e6, "ms a boundary");
         Ok(Some(Row {
-            subject: Subject::Motion,
-            case: motion.name.to_owned(),
-            method: "stability boundary of the program".to_owned(),
-            setting: String::new(),
-            cost: Some(nanos(cost) / 1e6),
-            cost_unit: "ms a boundary",
             error: Some(absolute(Quad::of(found) - right).rounded()),
             error_unit: STIFFNESS,
             reference: ROOT,
             note: "a second witness: another matrix by other code, halved until a radius cannot be told from 1".to_owned(),
+            ..Row::of(Subject::Motion, motion.name, "stability boundary of the program", String::new(), cost)
         }))
     }
 }
@@ -148,12 +131,12 @@ impl Work {
 pub(crate) fn program_boundary(motion: &MotionScene, (key, low, high): (&str, f64, f64)) -> Result<Option<f64>, AccuracyError> {
     let range = KeyRange { key: key.to_owned(), low, high, unit: String::new() };
     let options = BoundaryOptions { tolerance: 1e-9, ..BoundaryOptions::of(&range) };
-    let family = Family::new(motion.text, Path::new("motion.toml"), &[], vec![range])?;
+    let family = motion.family(range)?;
     let boundary = Boundary::find(&family, options, &[], |_| (), || false)?;
     Ok(boundary.crossings.first().map(|crossing| crossing.value))
 }
 
-/// The larger one; what is no number is worse than any.
+/// The larger one; a NaN is worse than any.
 fn worse(before: f64, now: f64) -> f64 {
     if now.is_nan() { f64::INFINITY } else { before.max(now) }
 }

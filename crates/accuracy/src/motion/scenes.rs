@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use cohaptic_scene::Scene;
+use cohaptic_stability::{Family, FamilyError, KeyRange};
 
 use crate::AccuracyError;
 
@@ -29,11 +30,34 @@ impl Along {
     }
 }
 
-/// A scene as a file, and what the file says in words that the loop need not parse.
+/// Two peers, one on the right and one on the left, that hold one object; each scene says what differs from this one.
+const PAIR: &str = r#"
+[scene]
+duration = "4s"
+[object]
+mass = 0.3
+[coordination]
+strategy = "average-position"
+stiffness = 500.0
+damping = 5.0
+update = "8ms"
+[peer]
+device = { mass = 0.1, damping = 5.0 }
+coupling = { stiffness = 2000.0, damping = 5.0 }
+[[peers]]
+name = "left"
+[[peers]]
+name = "right"
+[link]
+delay = "4ms"
+"#;
+
+/// One of the scenes, and facts of it that the loop need not read from the text.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MotionScene {
     pub(crate) name: &'static str,
-    pub(crate) text: &'static str,
+    /// The difference from [`PAIR`], as texts `KEY=VALUE`.
+    overrides: &'static [&'static str],
     /// How many ticks there are between two samples.
     pub(crate) update: usize,
     /// How many ticks a sample takes.
@@ -45,96 +69,50 @@ pub(crate) struct MotionScene {
 
 impl MotionScene {
     pub(crate) fn scene(&self) -> Result<Scene, AccuracyError> {
-        Ok(Scene::parse(self.text, Path::new("motion.toml"), &[])?)
+        Ok(Scene::parse(PAIR, Path::new(FILE), &self.overrides())?)
+    }
+
+    /// The scene with a key left open.
+    pub(crate) fn family(&self, range: KeyRange) -> Result<Family, FamilyError> {
+        Family::new(PAIR, Path::new(FILE), &self.overrides(), vec![range])
+    }
+
+    fn overrides(&self) -> Vec<String> {
+        self.overrides.iter().map(|&text| text.to_owned()).collect()
     }
 }
+
+const FILE: &str = "motion.toml";
 
 /// A device that touches nothing, pushed by a constant force: it nears its last velocity in some time constants of 20 ms.
 pub(crate) const FREE: MotionScene = MotionScene {
     name: "free device",
-    text: r#"
-[scene]
-duration = "4s"
-[object]
-mass = 0.3
-[coordination]
-strategy = "average-position"
-stiffness = 1000.0
-damping = 5.0
-update = "8ms"
-[peer]
-contact = "none"
-device = { mass = 0.1, damping = 5.0 }
-[[peers]]
-name = "left"
-hand = { force = 1.0 }
-[[peers]]
-name = "right"
-[link]
-delay = "8ms"
-"#,
+    overrides: &["coordination.stiffness=1000.0", "peer.contact=none", "peers.left.hand.force=1.0", "link.delay=8ms"],
     update: 8,
     delay: 8,
     boundary: None,
 };
 
-/// Two who hold the object, one of them with an arm that stays where it is, the other pushing with 1 N.
+/// Two peers hold the object, one of them with an arm that stays where it is, the other pushing with 1 N.
 pub(crate) const COUPLED: MotionScene = MotionScene {
     name: "coupled peers",
-    text: r#"
-[scene]
-duration = "4s"
-[object]
-mass = 0.3
-damping = 1.0
-[coordination]
-strategy = "average-position"
-stiffness = 500.0
-damping = 5.0
-update = "8ms"
-[peer]
-device = { mass = 0.1, damping = 5.0 }
-coupling = { stiffness = 2000.0, damping = 5.0 }
-[[peers]]
-name = "left"
-hand = { arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } }
-[[peers]]
-name = "right"
-hand = { force = 1.0 }
-[link]
-delay = "4ms"
-"#,
+    overrides: &["object.damping=1.0", "peers.left.hand.arm={ mass = 0.3, damping = 10.0, stiffness = 100.0 }", "peers.right.hand.force=1.0"],
     update: 8,
     delay: 4,
     boundary: Some((Along::Coordination, 100.0, 20_000.0)),
 };
 
-/// The same two, a sample every tick and light copies, with a coupling so stiff that a little more is unstable.
+/// These two, a sample every tick and light copies, with a coupling so stiff that a little more is unstable.
 pub(crate) const STIFF: MotionScene = MotionScene {
     name: "stiff coupling",
-    text: r#"
-[scene]
-duration = "4s"
-[object]
-mass = 0.3
-damping = 1.0
-[coordination]
-strategy = "average-position"
-stiffness = 500.0
-damping = 5.0
-update = "1ms"
-[peer]
-device = { mass = 0.1, damping = 5.0 }
-coupling = { stiffness = 15400.0, damping = 5.0 }
-[[peers]]
-name = "left"
-hand = { arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } }
-[[peers]]
-name = "right"
-hand = { force = 1.0 }
-[link]
-delay = "2ms"
-"#,
+    overrides: &[
+        "object.damping=1.0",
+        "coordination.update=1ms",
+        "peer.coupling.stiffness=15400.0",
+        "peers.left.hand.arm={ mass = 0.3, damping = 10.0, stiffness = 100.0 }",
+        "peers.right.hand.force=1.0",
+        "link.delay=2ms",
+    ],
     update: 1,
     delay: 2,
     boundary: Some((Along::Coupling, 100.0, 1_000_000.0)),
@@ -143,31 +121,12 @@ delay = "2ms"
 /// Each can push the object towards the other and cannot pull it, and both swing to and fro: contact is made and lost again and again.
 pub(crate) const PUSH: MotionScene = MotionScene {
     name: "one-sided contact",
-    text: r#"
-[scene]
-duration = "4s"
-[object]
-mass = 0.3
-damping = 2.0
-[coordination]
-strategy = "average-position"
-stiffness = 500.0
-damping = 5.0
-update = "8ms"
-[peer]
-device = { mass = 0.1, damping = 5.0 }
-coupling = { stiffness = 2000.0, damping = 5.0 }
-[[peers]]
-name = "left"
-contact = { push = "+x" }
-hand = { sine = { amplitude = 1.5, frequency = 2.0 } }
-[[peers]]
-name = "right"
-contact = { push = "-x" }
-hand = { sine = { amplitude = 1.5, frequency = 2.0 } }
-[link]
-delay = "4ms"
-"#,
+    overrides: &[
+        "object.damping=2.0",
+        "peers.left.contact={ push = \"+x\" }",
+        "peers.right.contact={ push = \"-x\" }",
+        "peer.hand.sine={ amplitude = 1.5, frequency = 2.0 }",
+    ],
     update: 8,
     delay: 4,
     boundary: None,

@@ -34,7 +34,7 @@ pub(crate) struct Pair {
 }
 
 impl Pair {
-    /// What the scene says, for that many ticks.
+    /// The pair of a scene, for a number of ticks.
     pub(crate) fn of(motion: &MotionScene, scene: &Scene, ticks: usize) -> Self {
         let device = |peer: usize| scene.peers[peer].device.plant(scene.peers[peer].hand.as_ref());
         let copy = scene.copy_config().plant();
@@ -91,7 +91,7 @@ pub(crate) struct Loop<T> {
     pub(crate) delay: usize,
 }
 
-/// The two peers and what is on the way between them.
+/// The two peers and the samples on the way between them.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct World<T> {
     /// Two devices, then two copies.
@@ -124,7 +124,7 @@ impl<T: Number> World<T> {
         }
         let law = AveragePosition { gains: gains.coordination };
         for peer in 0..2 {
-            let seen = Observation { own: self.bodies[2 + peer], mean: self.held[peer] };
+            let seen = Observation { own: self.bodies[2 + peer], mean: self.held[peer], lead: T::of(0.0) };
             let touch = |apart: Motion<T>| coupling_force(gains.touch[peer], &gains.coupling, apart);
             let (coupling, on_object) = forces(self.bodies[peer], touch, &seen, &law, &mut []);
             movers[peer].advance(&mut self.bodies[peer], on_device(hands[peer], coupling));

@@ -1,4 +1,4 @@
-//! What theory says of a Markov chain's averages: their long-run variance, hence the error to expect of so many packets.
+//! What theory says of a Markov chain's averages: their long-run variance, hence the error to expect of a number of packets.
 
 /// A chain of loss: which state a packet is in, and in which states packets are lost.
 #[derive(Clone, PartialEq, Debug)]
@@ -10,7 +10,7 @@ pub(super) struct LossChain {
     pub(super) lost: Vec<bool>,
 }
 
-/// What so many packets show on average, and how far off the average of one run is.
+/// What a number of packets show on average, and how far off the average of one run is.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Expected {
     /// The fraction lost.

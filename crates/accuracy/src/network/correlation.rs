@@ -6,7 +6,7 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Correlation, Delay, Distribution, Fate, Jitter, Link, LinkConfig, LinkModel, LinkName};
 
 use super::losses::kernel;
-use super::{Done, Effort, real, row};
+use super::{Effort, RowSink, real, row};
 use crate::cost::{nanos, processor_time};
 use crate::{AccuracyError, Row};
 
@@ -17,7 +17,7 @@ const SD: Duration = Duration::from_millis(2);
 /// The figures are the average of links with these seeds.
 const SEEDS: [u64; 4] = [1, 2, 3, 4];
 
-pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     for (name, distribution, words) in [
         ("normal", Distribution::Normal, Some("delay 24ms 2ms 75% distribution normal")),
         // Half the width of netem's uniform law is √3 deviations.
@@ -44,7 +44,7 @@ fn ours(distribution: Distribution) -> LinkModel {
     LinkConfig { delay, ..LinkConfig::default() }.into()
 }
 
-fn of_model(case: &str, method: &str, model: &LinkModel, what: &str, effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+fn of_model(case: &str, method: &str, model: &LinkModel, what: &str, effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let packets = effort.correlated_packets / SEEDS.len();
     let (mut at_lag_one, mut variance) = (0.0, 0.0);
     let start = processor_time();
@@ -84,7 +84,7 @@ fn delays(model: &LinkModel, seed: u64, packets: usize) -> Vec<f64> {
     let mut note = |link: &mut Link<usize>| {
         while let Some(event) = link.poll_event() {
             if let Fate::Delivered(at) = event.fate {
-                delays[event.payload] = at.saturating_duration_since(event.sent).as_secs_f64();
+                delays[event.payload] = at.saturating_duration_since(event.offered).as_secs_f64();
             }
         }
     };

@@ -10,7 +10,7 @@ use cohaptic_wan::random::unit;
 use super::errors::{Look, probability};
 use super::other_ways::{KernelTable, samplers};
 use super::ways::{Fine, MEAN, Netem, SD, draw, further_laws, laws, next_word};
-use super::{Done, Effort, real, row};
+use super::{Effort, RowSink, real, row};
 use crate::cost::nanos;
 use crate::rounds::Work;
 use crate::{AccuracyError, Row};
@@ -29,7 +29,7 @@ struct Wrong {
     note: String,
 }
 
-pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let laws: Vec<(&'static str, Law)> = laws().into_iter().chain(further_laws()).collect();
     let normal = laws[0].1.clone();
     for (name, law) in &laws {
@@ -38,7 +38,7 @@ pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), Accurac
     of_table(effort, done)
 }
 
-fn of_law(name: &'static str, law: &Law, normal: &Law, effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+fn of_law(name: &'static str, law: &Law, normal: &Law, effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let look = effort.look;
     let (netem, fine) = (Netem::new(law), Fine::new(law));
     done.check()?;
@@ -88,7 +88,7 @@ fn of_law(name: &'static str, law: &Law, normal: &Law, effort: Effort, done: &mu
 }
 
 /// The law that a table is: what it should deliver is what it says.
-fn of_table(effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+fn of_table(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let table = Table::normal();
     let text: Vec<String> = table.entries().iter().map(ToString::to_string).collect();
     let table = DistTable::parse(&text.join(" ")).expect("the kernel's table is one");
@@ -117,7 +117,7 @@ fn push(
     ways: Vec<(&'static str, Work<'_>, Wrong)>,
     reference: &'static str,
     effort: Effort,
-    done: &mut Done<'_>,
+    done: &mut RowSink<'_>,
 ) -> Result<(), AccuracyError> {
     let case = format!("delay, {name}");
     let (mut works, mut names) = (Vec::new(), Vec::new());
@@ -155,7 +155,7 @@ fn tail_error(law: &Law, look: Look, found: f64) -> f64 {
     ((found - exact) / (exact - MEAN)).abs()
 }
 
-/// Of so many draws. Perfect ones are about 0.87/√n away too, on average: √(π/2)·ln 2 (Kolmogorov).
+/// Of n draws. Perfect ones are about 0.87/√n away too, on average: √(π/2)·ln 2 (Kolmogorov).
 fn sampled(law: &Law, look: Look, count: usize, sampler: &mut impl FnMut() -> f64) -> Wrong {
     let mut delays: Vec<f64> = (0..count).map(|_| sampler()).collect();
     delays.sort_by(f64::total_cmp);

@@ -29,9 +29,9 @@ pub struct Errors {
 pub struct Look {
     /// The probability below the quantile whose error is told: 0.9999 for the delay exceeded once in ten thousand.
     pub quantile: f64,
-    /// In so many places of each cell between two entries of a table with straight lines between.
+    /// The places in each cell between two entries of a table with straight lines between.
     pub places_a_cell: u32,
-    /// In so many places on either side of the middle of a law, from 0 to 8 standard normal deviations.
+    /// The places on either side of the middle of a law, from 0 to 8 standard normal deviations.
     pub places_a_side: i32,
 }
 

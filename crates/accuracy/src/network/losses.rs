@@ -5,14 +5,14 @@ use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{Bursts, Chance, Fate, FourState, GilbertElliott, KernelNetem, Link, LinkConfig, LinkModel, LinkName, Loss};
 
 use super::chain::{Expected, LossChain};
-use super::{Done, Effort, real, row};
+use super::{Effort, RowSink, real, row};
 use crate::cost::{nanos, processor_time};
 use crate::{AccuracyError, Row};
 
 const MEAN: &str = "mean loss [relative]";
 const RUN: &str = "mean run of losses [relative]";
 
-/// A model and who else has it.
+/// A model and the other programs that have it.
 struct Case {
     name: &'static str,
     ours: Loss,
@@ -65,7 +65,7 @@ fn cases() -> [Case; 4] {
     ]
 }
 
-pub(super) fn measure(effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     for case in cases() {
         let expected = case.chain.expected();
         let ours = LinkModel::from(LinkConfig { loss: case.ours, ..LinkConfig::default() });
@@ -85,7 +85,7 @@ pub(super) fn kernel(words: &str) -> LinkModel {
     KernelNetem::new(netem, Vec::new()).expect("a netem that Linux takes").into()
 }
 
-fn of_model(case: &str, method: &str, model: &LinkModel, expected: Expected, effort: Effort, done: &mut Done<'_>) -> Result<(), AccuracyError> {
+fn of_model(case: &str, method: &str, model: &LinkModel, expected: Expected, effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let mut seed = 0;
     for (packets, runs) in effort.loss_runs {
         let (mut of_mean, mut of_run) = (0.0, 0.0);

@@ -1,8 +1,8 @@
-//! Laws of delay and models of loss: what a draw costs, and how far what is drawn is from what was asked.
+//! Laws of delay and models of loss: what a draw costs, and how far the draws are from the law asked for.
 //!
 //! - [`ways`] to draw a delay: tables as netem has them and finer ones, the inverse of the law, what the program draws, and others' samplers;
 //! - [`errors`] of a way: computed from its table or its function, so that they are the same every time. What can only be drawn is drawn often, and
-//!   the row says how much of its error is that of so many draws.
+//!   the row says how much of its error is that of the number of draws.
 //! - loss models: how many packets it takes until the mean loss and the mean run of losses are known to some error, beside what theory says;
 //! - jitter that hangs together from packet to packet: what was asked for, and what comes out.
 
@@ -16,10 +16,10 @@ pub mod ways;
 
 use std::time::Duration;
 
-use crate::done::Done;
 use crate::network::errors::Look;
 use crate::rounds::Rounds;
-use crate::{AccuracyError, Options, Row, Subject, Watch};
+use crate::row_sink::RowSink;
+use crate::{AccuracyError, Row, Subject, Watch};
 
 /// How much work there is in the rows.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -32,7 +32,7 @@ pub struct Effort {
     pub rounds: usize,
     /// How many packets are sent for the correlation of jitter.
     pub correlated_packets: usize,
-    /// For each number of packets through a loss model, how many runs of so many there are.
+    /// For each number of packets through a loss model, the number of runs.
     pub loss_runs: &'static [(usize, usize)],
 }
 
@@ -55,12 +55,6 @@ impl Effort {
         loss_runs: &[(1000, 400), (10_000, 200), (100_000, 50), (1_000_000, 10)],
     };
 
-    /// The one of these options.
-    #[must_use]
-    pub const fn of(options: Options) -> Self {
-        if options.quick { Self::QUICK } else { Self::FULL }
-    }
-
     pub(crate) const fn rounds(self) -> Rounds {
         Rounds { count: self.rounds, span: Duration::from_micros(200) }
     }
@@ -71,17 +65,8 @@ impl Effort {
 /// # Errors
 ///
 /// As [`crate::measure`].
-pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    rows_with(Effort::of(options), watch)
-}
-
-/// The same with another effort.
-///
-/// # Errors
-///
-/// As [`crate::measure`].
-pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    let mut done = Done { rows: Vec::new(), watch };
+pub fn rows(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+    let mut done = RowSink { rows: Vec::new(), watch };
     delays::measure(effort, &mut done)?;
     losses::measure(effort, &mut done)?;
     correlation::measure(effort, &mut done)?;
@@ -89,19 +74,8 @@ pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, Accuracy
 }
 
 /// A row of this subject without its case, method and errors.
-fn row(case: &str, method: &str, setting: String, (cost, cost_unit): (f64, &'static str)) -> Row {
-    Row {
-        subject: Subject::Network,
-        case: case.to_owned(),
-        method: method.to_owned(),
-        setting,
-        cost: Some(cost),
-        cost_unit,
-        error: None,
-        error_unit: "",
-        reference: "",
-        note: String::new(),
-    }
+fn row(case: &str, method: &str, setting: String, cost: (f64, &'static str)) -> Row {
+    Row::of(Subject::Network, case, method, setting, cost)
 }
 
 /// A count as a number.

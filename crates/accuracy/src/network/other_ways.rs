@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use cohaptic_wan::netem::kernel::{Prng, Table};
 use cohaptic_wan::random::unit;
-use rand_core::TryRng;
+use rand::TryRng;
 
 use super::ways::{MEAN, SD, next_word};
 
@@ -64,7 +64,7 @@ fn box_muller() -> impl FnMut() -> f64 {
     }
 }
 
-/// The shape of the Weibull law whose deviation is so many times its mean: halving, as Γ(1 + 2/k)/Γ(1 + 1/k)² falls with k.
+/// The shape of the Weibull law whose deviation is this multiple of its mean: halving, as Γ(1 + 2/k)/Γ(1 + 1/k)² falls with k.
 fn weibull_shape(variation: f64) -> f64 {
     let (mut low, mut high) = (0.5, 50.0);
     for _ in 0..100 {

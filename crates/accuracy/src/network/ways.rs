@@ -3,7 +3,7 @@
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "a way does what is shortest; every number here is small"
+    reason = "written for speed; every number here is small"
 )]
 
 use cohaptic_wan::law::{Distribution, Law};

@@ -8,7 +8,8 @@ mod release;
 use std::time::Duration;
 
 use self::release::{Releases, Way};
-use crate::{AccuracyError, Options, Row, Subject, Watch};
+use crate::row_sink::RowSink;
+use crate::{AccuracyError, Row, Subject, Watch};
 
 /// How much work there is in the rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -25,12 +26,6 @@ impl Effort {
 
     /// A minute.
     pub const FULL: Self = Self { rounds: 6, turn_millis: 1000 };
-
-    /// The one of these options.
-    #[must_use]
-    pub const fn of(options: Options) -> Self {
-        if options.quick { Self::QUICK } else { Self::FULL }
-    }
 }
 
 /// The rows of this subject.
@@ -38,16 +33,7 @@ impl Effort {
 /// # Errors
 ///
 /// As [`crate::measure`].
-pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    rows_with(Effort::of(options), watch)
-}
-
-/// The same with another effort.
-///
-/// # Errors
-///
-/// As [`crate::measure`].
-pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
+pub fn rows(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
     let mut all: Vec<Releases> = Way::ALL.into_iter().map(Releases::new).collect();
     for round in 0..effort.rounds {
         for releases in &mut all {
@@ -57,29 +43,23 @@ pub fn rows_with(effort: Effort, watch: &dyn Watch) -> Result<Vec<Row>, Accuracy
             releases.turn(u64::from(round), Duration::from_millis(effort.turn_millis))?;
         }
     }
-    let mut rows = Vec::new();
-    for row in all.iter().flat_map(rows_of) {
-        watch.row(&row);
-        rows.push(row);
-    }
-    Ok(rows)
+    let mut sink = RowSink { rows: Vec::new(), watch };
+    all.iter().flat_map(rows_of).try_for_each(|row| sink.push(row))?;
+    Ok(sink.rows)
 }
 
 fn rows_of(releases: &Releases) -> [Row; 2] {
     let summary = releases.lateness.summary();
     let note =
         format!("measured over {} packets, one a millisecond; the latest {:.0} µs; {}", summary.count, micros(summary.max), releases.way.words());
+    let cost = micros(releases.processor) / f64::from(u32::try_from(summary.count.max(1)).unwrap_or(u32::MAX));
+    let cost = (cost, "µs of processor time a packet");
     let row = |error: Duration, error_unit| Row {
-        subject: Subject::RealTime,
-        case: "release of 24 packets under way".to_owned(),
-        method: releases.way.name().to_owned(),
-        setting: releases.way.setting(),
-        cost: Some(micros(releases.processor) / f64::from(u32::try_from(summary.count.max(1)).unwrap_or(u32::MAX))),
-        cost_unit: "µs of processor time a packet",
         error: Some(micros(error)),
         error_unit,
         reference: "the instant at which the link lets it go",
         note: note.clone(),
+        ..Row::of(Subject::RealTime, "release of 24 packets under way", releases.way.name(), releases.way.setting(), cost)
     };
     [row(summary.p50, "lateness, median [µs]"), row(summary.p99, "lateness, 99 % [µs]")]
 }

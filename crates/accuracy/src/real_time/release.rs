@@ -14,7 +14,7 @@ use crate::cost::processor_time;
 pub(super) enum Way {
     /// Look every millisecond, as a timer wheel does.
     Wheel,
-    /// `std::thread::sleep` for what is left.
+    /// `std::thread::sleep` for the rest.
     Sleep,
     /// `clock_nanosleep` until then.
     Until,

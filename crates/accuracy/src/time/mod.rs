@@ -16,6 +16,7 @@ use std::time::Duration;
 use cohaptic_stability::Method;
 
 use crate::cost::median_time;
+use crate::row_sink::RowSink;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
 use steps::Rounding;
 use traffic::{Errors, Traffic};
@@ -53,20 +54,15 @@ const STEPS: [u64; 4] = [1_000_000, 100_000, 10_000, 1_000];
 ///
 /// As [`crate::measure`].
 pub fn rows(options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-    let mut rows = Vec::new();
+    let mut sink = RowSink { rows: Vec::new(), watch };
     for clocks in CLOCKS {
         let work = Work::new(clocks, options, watch)?;
         for way in Way::all() {
-            if watch.stops() {
-                return Err(AccuracyError::Stopped);
-            }
-            for row in work.rows(way, watch)? {
-                watch.row(&row);
-                rows.push(row);
-            }
+            sink.check()?;
+            work.rows(way, watch)?.into_iter().try_for_each(|row| sink.push(row))?;
         }
     }
-    Ok(rows)
+    Ok(sink.rows)
 }
 
 /// How time goes.
@@ -146,17 +142,13 @@ impl Work {
         if let Some(failure) = failure {
             return Err(failure);
         }
+        let cost = (cost.as_secs_f64() * 1e9 / traffic.packets(), COST);
         let row = |error, error_unit, reference, note: String| Row {
-            subject: Subject::Time,
-            case: self.clocks.name.to_owned(),
-            method: way.name().to_owned(),
-            setting: way.setting(),
-            cost: Some(cost.as_secs_f64() * 1e9 / traffic.packets()),
-            cost_unit: COST,
             error: Some(error),
             error_unit,
             reference,
             note,
+            ..Row::of(Subject::Time, self.clocks.name, way.name(), way.setting(), cost)
         };
         let mut rows = vec![row(errors.of_mean(), MEAN, DELAYS, String::new()), row(errors.worst(), WORST, DELAYS, String::new())];
         let (share, note) = self.wrong(way, watch)?;

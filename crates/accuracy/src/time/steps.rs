@@ -6,7 +6,7 @@ use cohaptic_units::Instant;
 
 use super::traffic::{Arrival, NODES, Traffic};
 
-/// What is done with a time that lies between two steps.
+/// The treatment of a time that lies between two steps.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Rounding {
     /// To the next step.

@@ -1,4 +1,4 @@
-//! The traffic that both ways carry: who sends when, and how long each link takes, in whole nanoseconds.
+//! The traffic that both ways carry: when each peer sends, and how long each link takes, in whole nanoseconds.
 
 use std::time::Duration;
 

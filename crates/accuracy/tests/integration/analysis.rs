@@ -1,14 +1,14 @@
 use std::sync::LazyLock;
 
 use cohaptic_accuracy::analysis::references::{on_the_edge, references};
-use cohaptic_accuracy::analysis::{Effort, rows_with};
+use cohaptic_accuracy::analysis::{Effort, rows};
 use cohaptic_accuracy::{Row, Unwatched};
 
 use crate::rows::assert_sound;
 
 const EFFORT: Effort = Effort { rounds: 1, growth_frames: &[50, 200, 800], boundary_seconds: &[1, 4], runs: &[100, 1000, 10_000] };
 
-static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| rows_with(EFFORT, &Unwatched).unwrap());
+static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| rows(EFFORT, &Unwatched).unwrap());
 
 fn of(case: &str, methods: &[&str]) -> Vec<&'static Row> {
     ROWS.iter().filter(|row| row.case.starts_with(case) && methods.contains(&row.method.as_str())).collect()

@@ -1,13 +1,13 @@
 use std::sync::LazyLock;
 
-use cohaptic_accuracy::least::{Effort, rows_with};
+use cohaptic_accuracy::least::{Effort, rows};
 use cohaptic_accuracy::{AccuracyError, Row, Unwatched, Watch};
 
 use crate::rows::assert_sound;
 
 const EFFORT: Effort = Effort { simulated_millis: 400, rounds: 1, round_millis: 1 };
 
-static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| rows_with(EFFORT, &Unwatched).unwrap());
+static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| rows(EFFORT, &Unwatched).unwrap());
 
 #[test]
 fn every_row_is_sound() {
@@ -56,11 +56,11 @@ impl Watch for Until {
 #[test]
 fn who_watches_can_end_it() {
     let stopped = |found| matches!(found, Err(AccuracyError::Stopped));
-    assert!(stopped(rows_with(EFFORT, &Until(2.into()))));
+    assert!(stopped(rows(EFFORT, &Until(2.into()))));
     let network = cohaptic_accuracy::network::Effort::QUICK;
-    assert!(stopped(cohaptic_accuracy::network::rows_with(network, &Until(1.into()))));
+    assert!(stopped(cohaptic_accuracy::network::rows(network, &Until(1.into()))));
     let analysis = cohaptic_accuracy::analysis::Effort::QUICK;
-    assert!(stopped(cohaptic_accuracy::analysis::rows_with(analysis, &Until(1.into()))));
+    assert!(stopped(cohaptic_accuracy::analysis::rows(analysis, &Until(1.into()))));
     let real_time = cohaptic_accuracy::real_time::Effort::QUICK;
-    assert!(stopped(cohaptic_accuracy::real_time::rows_with(real_time, &Until(0.into()))));
+    assert!(stopped(cohaptic_accuracy::real_time::rows(real_time, &Until(0.into()))));
 }

@@ -2,7 +2,7 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use cohaptic_accuracy::network::errors::Look;
-use cohaptic_accuracy::network::{Effort, rows_with};
+use cohaptic_accuracy::network::{Effort, rows};
 use cohaptic_accuracy::{Row, Unwatched};
 
 use crate::rows::assert_sound;
@@ -16,7 +16,7 @@ const EFFORT: Effort = Effort {
     loss_runs: &[(1000, 100), (10_000, 40)],
 };
 
-static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| rows_with(EFFORT, &Unwatched).unwrap());
+static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| rows(EFFORT, &Unwatched).unwrap());
 
 fn of<'a>(case: &'a str, method: &'a str) -> impl Iterator<Item = &'a Row> {
     ROWS.iter().filter(move |row| row.case.starts_with(case) && row.method == method)

@@ -1,5 +1,5 @@
 use cohaptic_accuracy::Unwatched;
-use cohaptic_accuracy::real_time::{Effort, rows_with};
+use cohaptic_accuracy::real_time::{Effort, rows};
 
 use crate::rows::assert_sound;
 
@@ -7,7 +7,7 @@ use crate::rows::assert_sound;
 /// is not above the 99 %, and that each way has both rows.
 #[test]
 fn every_way_releases_packets() {
-    let rows = rows_with(Effort { rounds: 2, turn_millis: 60 }, &Unwatched).unwrap();
+    let rows = rows(Effort { rounds: 2, turn_millis: 60 }, &Unwatched).unwrap();
     assert_sound(&rows);
     assert_eq!(rows.len(), 18);
     for pair in rows.chunks(2) {
@@ -21,7 +21,7 @@ fn every_way_releases_packets() {
 /// Instants are those of the link, whoever waits: all ways release the same packets.
 #[test]
 fn all_ways_release_the_same_packets() {
-    let rows = rows_with(Effort { rounds: 1, turn_millis: 50 }, &Unwatched).unwrap();
+    let rows = rows(Effort { rounds: 1, turn_millis: 50 }, &Unwatched).unwrap();
     let packets = |note: &str| note.split_once(" packets").unwrap().0.to_owned();
     let first = packets(&rows[0].note);
     assert!(rows.iter().all(|row| packets(&row.note) == first), "{rows:?}");

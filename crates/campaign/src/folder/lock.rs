@@ -24,7 +24,7 @@ impl Lock {
                 Err(rustix::io::Errno::WOULDBLOCK) => return Ok(None),
                 Err(error) => return Err(error.into()),
             }
-            // Whoever had it may have removed the file in between: what is locked then is no lock for anybody.
+            // Whoever had it may have removed the file in between: the locked file is then no lock for anybody.
             if is_at(&file, path)? {
                 return Ok(Some(Self { path: path.to_path_buf(), _file: file }));
             }

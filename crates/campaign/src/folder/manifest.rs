@@ -1,12 +1,13 @@
 //! What a campaign is, as a file in its folder: the same command goes on, another one is refused.
 
+use std::io::Write as _;
 use std::path::Path;
 
+use cohaptic_files::write_whole;
 use serde::{Deserialize, Serialize};
 
-use super::write_whole;
 use crate::error::CampaignError;
-use crate::plan::{Parts, Plan};
+use crate::plan::{CampaignPlan, Parts};
 use crate::table::Roster;
 
 /// How files of a campaign are laid out. Another layout is another number.
@@ -40,7 +41,7 @@ pub(crate) struct Manifest {
 
 impl Manifest {
     /// Of a plan that was checked.
-    pub(crate) fn new(plan: &Plan, fingerprint: u64, roster: Roster, parts: Parts) -> Self {
+    pub(crate) fn new(plan: &CampaignPlan, fingerprint: u64, roster: Roster, parts: Parts) -> Self {
         Self {
             layout: LAYOUT,
             program: plan.program().to_owned(),
@@ -74,7 +75,7 @@ impl Manifest {
 
     pub(crate) fn write(&self, path: &Path) -> Result<(), CampaignError> {
         let text = self.text();
-        let written = write_whole(path, |mut file| std::io::Write::write_all(&mut file, text.as_bytes()));
+        let written = write_whole(path, |file| file.write_all(text.as_bytes()));
         written.map_err(|error| CampaignError::File { verb: "write", path: path.to_path_buf(), error })
     }
 
@@ -86,13 +87,13 @@ impl Manifest {
         text
     }
 
-    /// The parts that a campaign of that many runs is cut into.
+    /// The parts that a campaign of a number of runs is cut into.
     pub(crate) const fn parts(&self, runs: u64) -> Parts {
         Parts { runs, size: self.part_runs }
     }
 
     /// What this campaign, which is there, has that the plan has not, in words; nothing if it is the same one. Files that scenes name are not compared.
-    pub(crate) fn differences(&self, plan: &Plan) -> Vec<String> {
+    pub(crate) fn differences(&self, plan: &CampaignPlan) -> Vec<String> {
         let mut differences = Vec::new();
         let mut compare = |what: &str, there: String, here: String| {
             if there != here {

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use cohaptic_scene::Scene;
 use rayon::prelude::*;
 
-use super::Plan;
+use super::CampaignPlan;
 use crate::error::CampaignError;
 use crate::table::Roster;
 use crate::watch::Watch;
@@ -24,7 +24,7 @@ pub(crate) struct Checked {
     pub(crate) numbers: BTreeMap<u64, u64>,
 }
 
-impl Plan {
+impl CampaignPlan {
     /// Checks every combination, on all threads of the pool that it is called in.
     ///
     /// # Errors

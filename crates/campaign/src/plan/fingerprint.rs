@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use cohaptic_scene::Fingerprint;
 use rayon::prelude::*;
 
-use super::Plan;
+use super::CampaignPlan;
 use crate::error::CampaignError;
 
-impl Plan {
+impl CampaignPlan {
     /// A number for all that the scenes say. Looked at are those scenes in which every value of every key appears once: whatever file a value names is
     /// among them.
     ///

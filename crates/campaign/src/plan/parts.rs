@@ -2,14 +2,14 @@
 
 use core::ops::Range;
 
-use super::Plan;
+use super::CampaignPlan;
 use super::check::Checked;
 use crate::error::CampaignError;
 
 /// How many runs are handed over at once: as many as [`cohaptic_harness::run_side_by_side`] runs at the same time, and few enough that all threads are busy
 /// until the end.
 pub(crate) const CHUNK: u64 = 8;
-/// A part takes about so many events: some seconds of one thread.
+/// The events of a part, about: some seconds of one thread.
 const EVENTS: u64 = 200_000_000;
 /// The most runs of a part whose size is not asked for, for their number of events.
 const MOST_FOR_EVENTS: u64 = 16_384;
@@ -17,11 +17,11 @@ const MOST_FOR_EVENTS: u64 = 16_384;
 const MOST: u64 = 65_536;
 /// The most values of such a part: about 200 MB while it is collected.
 const MOST_VALUES: u64 = 8_000_000;
-/// A campaign has about so many parts at most: what a kill can cost is a thousandth of it.
+/// The most parts of a campaign, about: what a kill can cost is a thousandth of it.
 const USUAL_PARTS: u64 = 1000;
-/// And its table so many stretches of columns: each costs some hundred bytes at the end of a Parquet file.
+/// The most stretches of columns of its table: each costs some hundred bytes at the end of a Parquet file.
 const USUAL_STRETCHES: u64 = 100_000;
-/// A folder has so many parts at most.
+/// The most parts in a folder.
 const MOST_PARTS: u64 = 100_000;
 
 /// The runs of a campaign, cut into parts.
@@ -34,8 +34,8 @@ pub(crate) struct Parts {
 }
 
 impl Parts {
-    /// Follows from what is asked for, and from nothing of the machine.
-    pub(crate) fn of(plan: &Plan, checked: &Checked, columns: usize) -> Result<Self, CampaignError> {
+    /// Follows from the specification alone, and from nothing of the machine.
+    pub(crate) fn of(plan: &CampaignPlan, checked: &Checked, columns: usize) -> Result<Self, CampaignError> {
         let runs = plan.runs();
         if let Some(size) = plan.part() {
             let parts = runs.div_ceil(size);

@@ -5,9 +5,9 @@ use super::check::Checked;
 use super::*;
 use crate::table::Roster;
 
-fn plan(vary: &[&str], runs: u64, part: Option<u64>) -> Plan {
+fn plan(vary: &[&str], runs: u64, part: Option<u64>) -> CampaignPlan {
     let variations = vary.iter().map(|text| Variation::parse(text).unwrap()).collect();
-    Plan::new(Asked { text: "", file: Path::new(""), set: &[], variations, runs, format: Format::Csv, part, program: "" }).unwrap()
+    CampaignPlan::new(PlanSpec { text: "", file: Path::new(""), set: &[], variations, runs, format: Format::Csv, part, program: "" }).unwrap()
 }
 
 #[test]
@@ -43,7 +43,7 @@ fn a_part_takes_some_seconds_and_there_are_about_a_thousand_at_most() {
     // A table of 4000 columns has 25 parts rather than a thousand, but none that would fill the memory.
     assert_eq!(parts(10_000, u64::MAX, 4000, None).size, 400);
     assert_eq!(parts(1_000_000, u64::MAX, 4000, None).size, 2000);
-    // Asked for, it is what was asked for.
+    // PlanSpec for, it is what was asked for.
     assert_eq!(parts(100, 1, 40, Some(7)), Parts { runs: 100, size: 7 });
     for parts in [parts(100, 1, 40, Some(7)), parts(1000, 50_000_000, 40, None), parts(8, u64::MAX, 40, None), parts(1, 1, 1, None)] {
         let ranges: Vec<u64> = (0..parts.count()).flat_map(|part| parts.range(part)).collect();
@@ -79,8 +79,8 @@ fn a_seed_that_is_written_is_a_seed_that_is_read() {
 fn the_fingerprint_is_that_of_what_the_scenes_say_and_not_of_where_they_are() {
     let number = |text: &str, file: &str, vary: &str| {
         let variations = vec![Variation::parse(vary).unwrap()];
-        let asked = Asked { text, file: Path::new(file), set: &[], variations, runs: 2, format: Format::Csv, part: None, program: "" };
-        Plan::new(asked).unwrap().fingerprint().unwrap()
+        let asked = PlanSpec { text, file: Path::new(file), set: &[], variations, runs: 2, format: Format::Csv, part: None, program: "" };
+        CampaignPlan::new(asked).unwrap().fingerprint().unwrap()
     };
     let text = SCENE;
     let first = number(text, "a.toml", "object.mass=1,2");
@@ -95,8 +95,8 @@ fn the_fingerprint_is_that_of_what_the_scenes_say_and_not_of_where_they_are() {
 fn the_fingerprint_of_the_check_is_that_of_the_scenes() {
     for vary in [&[][..], &["object.mass=1..2/70"], &["object.mass=1,2,3", "link.delay=20ms,24ms", "coordination.stiffness=500..1000/13"]] {
         let variations = vary.iter().map(|text| Variation::parse(text).unwrap()).collect();
-        let asked = Asked { text: SCENE, file: Path::new("a.toml"), set: &[], variations, runs: 2, format: Format::Csv, part: None, program: "" };
-        let plan = Plan::new(asked).unwrap();
+        let asked = PlanSpec { text: SCENE, file: Path::new("a.toml"), set: &[], variations, runs: 2, format: Format::Csv, part: None, program: "" };
+        let plan = CampaignPlan::new(asked).unwrap();
         let checked = plan.check(&crate::NoWatch).unwrap();
         assert_eq!(checked.numbers.len(), 1 + plan.variations().iter().map(|vary| vary.count() - 1).sum::<usize>());
         assert_eq!(plan.fingerprint_of(&checked.numbers), plan.fingerprint().unwrap());

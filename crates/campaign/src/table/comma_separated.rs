@@ -1,19 +1,21 @@
 //! Comma-separated values.
 
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Read as _, Seek as _, SeekFrom, Write as _};
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::Path;
 
-use super::format::{GIST, rows_missing};
-use super::{Column, Gist, Gists, Row, TableError, Value};
+use cohaptic_files::WholeFile;
 
-pub(super) fn write(file: &File, columns: &[Column], rows: &[Row]) -> io::Result<()> {
-    let mut to = csv::Writer::from_writer(BufWriter::new(file));
+use super::file::{GIST, Gist, Gists, TableError, rows_missing};
+use super::{Column, Row, Value};
+
+pub(super) fn write(file: &mut WholeFile, columns: &[Column], rows: &[Row]) -> io::Result<()> {
+    let mut to = csv::Writer::from_writer(file);
     to.write_record(columns.iter().map(|column| &column.name)).map_err(unwritten)?;
     for row in rows {
         to.write_record(row.iter().map(text)).map_err(unwritten)?;
     }
-    to.into_inner().map_err(|error| io::Error::other(error.to_string()))?.flush()
+    to.flush()
 }
 
 /// A value as it stands in a table of text.
@@ -44,10 +46,9 @@ fn unwritten(error: csv::Error) -> io::Error {
     }
 }
 
-pub(super) fn merge<'a>(file: &File, columns: &[Column], parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
+pub(super) fn merge<'a>(to: &mut WholeFile, columns: &[Column], parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
     let mut header = Vec::new();
     csv::Writer::from_writer(&mut header).write_record(columns.iter().map(|column| &column.name)).map_err(unwritten)?;
-    let mut to = BufWriter::new(file);
     to.write_all(&header)?;
     let mut buffer = vec![0; 1 << 16];
     for (path, expected) in parts {
@@ -61,7 +62,7 @@ pub(super) fn merge<'a>(file: &File, columns: &[Column], parts: impl Iterator<It
             to.write_all(&buffer[..read])?;
         }
     }
-    Ok(to.flush()?)
+    Ok(())
 }
 
 /// A part that is as it was written, behind its header.

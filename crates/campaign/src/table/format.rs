@@ -1,10 +1,12 @@
 //! As what the table is written.
 
 use std::fs::File;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::{Column, Row, comma_separated, parquet_file};
+use cohaptic_files::WholeFile;
+
+use super::file::{Gists, Head, TableError};
+use super::{Row, comma_separated, parquet_file};
 
 /// As what the table is written.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -14,48 +16,6 @@ pub enum Format {
     Parquet,
     /// Comma-separated values with a header (RFC 4180, lines end in a line feed), numbers with the fewest digits that read back as the same `f64`.
     Csv,
-}
-
-/// What goes into every file of a table.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Head<'a> {
-    pub(crate) columns: &'a [Column],
-    /// What the table belongs to, for formats that have room for it.
-    pub(crate) about: &'a str,
-    /// The program that writes it.
-    pub(crate) program: &'a str,
-}
-
-/// What is looked at to sum a run up.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Gist {
-    pub(crate) diverged: bool,
-    pub(crate) max_discrepancy: f64,
-}
-
-/// The names of the columns that a [`Gist`] comes from.
-pub(super) const GIST: [&str; 2] = ["ending", "max_discrepancy_m"];
-
-/// Takes the gist of each row, in order.
-pub(crate) type Gists<'a> = &'a mut dyn FnMut(Gist);
-
-/// Why a table cannot be written or read.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum TableError {
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// What is in a file is not what was written there.
-    #[error("{0}")]
-    Content(String),
-    /// Of the parts that are put together, this one cannot be read.
-    #[error("{}: {error}", path.display())]
-    Part { path: PathBuf, error: Box<Self> },
-}
-
-impl TableError {
-    pub(super) fn of_part(path: &Path) -> impl Fn(Self) -> Self + Copy {
-        |error| Self::Part { path: path.to_path_buf(), error: Box::new(error) }
-    }
 }
 
 impl Format {
@@ -69,7 +29,7 @@ impl Format {
     }
 
     /// A file of its own with these rows.
-    pub(crate) fn write(self, file: &File, head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
+    pub(crate) fn write(self, file: &mut WholeFile, head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
         match self {
             Self::Parquet => parquet_file::write(file, head, rows),
             Self::Csv => Ok(comma_separated::write(file, head.columns, rows)?),
@@ -77,7 +37,7 @@ impl Format {
     }
 
     /// One file with the rows of all parts, one after the other. Each is given with how many rows it must have.
-    pub(crate) fn merge<'a>(self, file: &File, head: Head<'_>, parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
+    pub(crate) fn merge<'a>(self, file: &mut WholeFile, head: Head<'_>, parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
         match self {
             Self::Parquet => parquet_file::merge(file, head, parts),
             Self::Csv => comma_separated::merge(file, head.columns, parts),
@@ -91,9 +51,4 @@ impl Format {
             Self::Csv => comma_separated::read_gists(file, each),
         }
     }
-}
-
-/// What to say of a file with another number of rows than were written.
-pub(super) fn rows_missing(found: u64, expected: u64) -> TableError {
-    TableError::Content(format!("{found} rows: expected {expected}"))
 }

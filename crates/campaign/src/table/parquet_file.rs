@@ -1,4 +1,4 @@
-//! Apache Parquet. What is written depends on the rows alone: no times, no random names. Nothing is compressed: most of a table is numbers whose last digits
+//! Apache Parquet. The file depends on the rows alone: no times, no random names. Nothing is compressed: most of a table is numbers whose last digits
 //! look random, and what repeats is stored as a dictionary anyway.
 
 use std::fs::File;
@@ -6,6 +6,7 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
+use cohaptic_files::WholeFile;
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::column::reader::ColumnReader;
 use parquet::column::writer::{ColumnCloseResult, ColumnWriter};
@@ -17,13 +18,13 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 
-use super::format::{GIST, Head, rows_missing};
-use super::{Column, Gist, Gists, Kind, Row, TableError, Value};
+use super::file::{GIST, Gist, Gists, Head, TableError, rows_missing};
+use super::{Column, Kind, Row, Value};
 
 /// Under which key a file says what it belongs to.
 const ABOUT: &str = "cohaptic.campaign";
 
-pub(super) fn write(file: &File, head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
+pub(super) fn write(file: &mut WholeFile, head: Head<'_>, rows: &[Row]) -> Result<(), TableError> {
     let mut writer = begin(file, head)?;
     let mut group = writer.next_row_group()?;
     for place in 0..head.columns.len() {
@@ -36,7 +37,7 @@ pub(super) fn write(file: &File, head: Head<'_>, rows: &[Row]) -> Result<(), Tab
     Ok(())
 }
 
-fn begin<'a>(file: &'a File, head: Head<'_>) -> Result<SerializedFileWriter<&'a File>, TableError> {
+fn begin<'a>(file: &'a mut WholeFile, head: Head<'_>) -> Result<SerializedFileWriter<&'a mut WholeFile>, TableError> {
     let properties = WriterProperties::builder()
         .set_created_by(head.program.to_owned())
         .set_key_value_metadata(Some(vec![KeyValue::new(ABOUT.to_owned(), head.about.to_owned())]))
@@ -88,7 +89,7 @@ fn write_column<'a>(writer: &mut ColumnWriter<'_>, column: &Column, values: impl
 }
 
 /// Puts the parts into one file as they are, a row group each: nothing is decoded.
-pub(super) fn merge<'a>(file: &File, head: Head<'_>, parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
+pub(super) fn merge<'a>(file: &mut WholeFile, head: Head<'_>, parts: impl Iterator<Item = (&'a Path, u64)>) -> Result<(), TableError> {
     let mut writer = begin(file, head)?;
     for (path, expected) in parts {
         let of_part = TableError::of_part(path);
@@ -115,7 +116,7 @@ fn groups(part: &File, columns: &[Column], expected: u64) -> Result<Vec<RowGroup
     if found == expected { Ok(metadata.row_groups().to_vec()) } else { Err(rows_missing(found, expected)) }
 }
 
-fn append(to: &mut SerializedRowGroupWriter<'_, &File>, part: &File, group: &RowGroupMetaData) -> Result<(), ParquetError> {
+fn append(to: &mut SerializedRowGroupWriter<'_, &mut WholeFile>, part: &File, group: &RowGroupMetaData) -> Result<(), ParquetError> {
     for column in group.columns() {
         let close = ColumnCloseResult {
             bytes_written: u64::try_from(column.compressed_size()).unwrap_or_default(),

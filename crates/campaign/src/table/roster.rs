@@ -1,11 +1,11 @@
-//! Who and what there is in the runs of a campaign, which decides about the columns.
+//! The peers, axes and lines in the runs of a campaign, which decide about the columns.
 
 use std::collections::BTreeSet;
 
 use cohaptic_scene::Scene;
 use serde::{Deserialize, Serialize};
 
-/// Everybody who takes part in any run. Runs need not have the same peers: who is missing in a run has nothing in its columns.
+/// Everybody who takes part in any run. Runs need not have the same peers: a peer that is missing in a run has nothing in its columns.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Roster {

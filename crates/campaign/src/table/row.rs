@@ -12,7 +12,7 @@ use crate::verdicts::Judgement;
 
 /// Which run it is.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct RunId {
     pub(crate) run: u64,
     pub(crate) combination: u64,
     pub(crate) seed: u64,
@@ -20,7 +20,7 @@ pub(crate) struct Place {
 
 /// A value for each of [`columns`](super::columns()).
 pub(crate) fn row<'a>(
-    place: Place,
+    place: RunId,
     varied: impl Iterator<Item = &'a Varied>,
     judgement: Option<&Judgement>,
     summary: &Summary,

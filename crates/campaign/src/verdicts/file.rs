@@ -1,13 +1,14 @@
 //! Judgements as files: a journal that grows by a line for each combination that is judged, and one table of all of them.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Seek as _, SeekFrom, Write as _};
+use std::io::{self, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
+
+use cohaptic_files::write_whole;
 
 use super::{Judgement, Verdict, Words};
 use crate::error::CampaignError;
-use crate::folder::write_whole;
-use crate::plan::Plan;
+use crate::plan::CampaignPlan;
 use crate::table::{TableError, number_text, value_text};
 
 /// What helps where the table of judgements is not as it was written.
@@ -96,22 +97,21 @@ fn line(cells: impl Iterator<Item = String>) -> io::Result<Vec<u8>> {
 }
 
 /// Writes the table of all judgements: a row for each combination, with the values of its keys.
-pub(crate) fn write_all(path: &Path, plan: &Plan, judgements: &[Judgement]) -> Result<(), CampaignError> {
-    let written = write_whole(path, |file| -> io::Result<()> {
-        let mut to = BufWriter::new(file);
+pub(crate) fn write_all(path: &Path, plan: &CampaignPlan, judgements: &[Judgement]) -> Result<(), CampaignError> {
+    let written = write_whole(path, |to| -> io::Result<()> {
         let keys = plan.variations().iter().map(|vary| vary.column());
         to.write_all(&line(std::iter::once("combination".to_owned()).chain(keys).chain(COLUMNS.map(str::to_owned)))?)?;
         for (combination, judgement) in (0..).zip(judgements) {
             let values = plan.values(combination).map(|varied| value_text(&varied.value));
             to.write_all(&line(std::iter::once(combination.to_string()).chain(values).chain(cells(judgement)))?)?;
         }
-        to.flush()
+        Ok(())
     });
     written.map_err(|error| CampaignError::File { verb: "write", path: path.to_path_buf(), error })
 }
 
 /// The judgements of a table; `None` if there is no table.
-pub(crate) fn read_whole(path: &Path, plan: &Plan) -> Result<Option<Vec<Judgement>>, CampaignError> {
+pub(crate) fn read_whole(path: &Path, plan: &CampaignPlan) -> Result<Option<Vec<Judgement>>, CampaignError> {
     let file = match File::open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -126,7 +126,7 @@ pub(crate) fn read_whole(path: &Path, plan: &Plan) -> Result<Option<Vec<Judgemen
     read.map(Some)
 }
 
-fn read(file: File, plan: &Plan) -> Result<Vec<Judgement>, TableError> {
+fn read(file: File, plan: &CampaignPlan) -> Result<Vec<Judgement>, TableError> {
     let mut reader = csv::Reader::from_reader(io::BufReader::new(file));
     let (mut judgements, mut words, mut cells) = (Vec::new(), Words::default(), csv::StringRecord::new());
     let content =

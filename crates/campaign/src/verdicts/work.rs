@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::{Journal, Judge, Judgement, Words};
 use crate::error::CampaignError;
-use crate::plan::Plan;
+use crate::plan::CampaignPlan;
 use crate::watch::Watch;
 
 /// What the threads share.
@@ -19,7 +19,7 @@ struct Shared<'a> {
 /// Judges the combinations without a judgement, and writes each judgement into the journal as soon as it is known. Each has its place, so the number of threads changes nothing.
 /// Stops where the watch or the judge ends it; missing judgements are then `None`.
 pub(crate) fn judge(
-    plan: &Plan,
+    plan: &CampaignPlan,
     judge: &dyn Judge,
     watch: &dyn Watch,
     journal: &mut Journal,

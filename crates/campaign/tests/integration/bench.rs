@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use cohaptic_campaign::{Asked, Campaign, CampaignError, Format, NoWatch, Outcome, Plan, Report, Variation, Watch};
+use cohaptic_campaign::{Campaign, CampaignError, CampaignPlan, Format, NoWatch, Outcome, PlanSpec, Report, Variation, Watch};
 use tempfile::TempDir;
 
 /// Two users for 40 ticks over links that lose and delay at random.
@@ -71,11 +71,11 @@ impl Bench {
         files
     }
 
-    pub(crate) fn plan(&self) -> Result<Plan, CampaignError> {
+    pub(crate) fn plan(&self) -> Result<CampaignPlan, CampaignError> {
         let variations = self.vary.iter().map(|text| Variation::parse(text)).collect::<Result<_, _>>()?;
         let file = self.folder.path().join("scene.toml");
         let Self { text, set, runs, format, part, program, .. } = self;
-        Plan::new(Asked { text, file: &file, set, variations, runs: *runs, format: *format, part: *part, program })
+        CampaignPlan::new(PlanSpec { text, file: &file, set, variations, runs: *runs, format: *format, part: *part, program })
     }
 
     pub(crate) fn open(&self, folder: &str) -> Result<Campaign, CampaignError> {

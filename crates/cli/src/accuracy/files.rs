@@ -7,7 +7,7 @@ use cohaptic_accuracy::{About, Row, csv, html, plots};
 use cohaptic_picture::Size;
 
 use crate::failure::Failure;
-use crate::output_file::write_file;
+use crate::file::write_file;
 
 /// The rows of a whole measurement, and those of one that was interrupted: a script that reads the first never takes the second for it.
 const WHOLE: &str = "rows.csv";

@@ -22,7 +22,7 @@ use crate::progress::Progress;
 use crate::{interrupt, output};
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct AccuracyDocument<'a> {
     rows: Vec<RowDocument<'a>>,
     /// Whether the rows are only those that were measured until Ctrl-C, or until a fault.
     interrupted: bool,
@@ -57,7 +57,7 @@ impl Watch for Keeper {
     }
 
     fn stops(&self) -> bool {
-        interrupt::asked()
+        interrupt::requested()
     }
 }
 
@@ -115,8 +115,8 @@ impl Conclusion {
         let written = out.as_ref().map_or(Ok(()), |folder| files::write(folder, rows, about, *size));
         if *json {
             output::json(
-                DocumentSchema::Accuracy,
-                &Document { rows: rows.iter().map(document).collect(), interrupted: about.partial, wall_s: *wall_s },
+                DocumentSchema::ACCURACY,
+                &AccuracyDocument { rows: rows.iter().map(document).collect(), interrupted: about.partial, wall_s: *wall_s },
             )?;
         } else {
             let mut shown = text(rows);

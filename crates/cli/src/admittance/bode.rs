@@ -43,7 +43,7 @@ impl Response {
 /// Between two points of a line a frequency is this much higher at most: a resonance is round then, and a phase can be followed through its jumps.
 const FINEST: f64 = 1.02;
 
-/// The frequencies that were asked for, rising, with so many between them that no two are far apart.
+/// The frequencies that were asked for, rising, with enough between them that no two are far apart.
 fn filled(curve: &Curve) -> Vec<f64> {
     let mut asked: Vec<f64> = curve.response.points.iter().map(|point| point.hz).collect();
     asked.sort_by(f64::total_cmp);

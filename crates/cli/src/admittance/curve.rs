@@ -50,7 +50,7 @@ impl Subject {
         let ended = || Failure::Interrupted("the analysis was ended before its first point".to_owned());
         let admittance = Admittance::of_watched(&scene, peer, watch).map_err(|error| match error {
             AdmittanceError::Analysis(AnalysisError::Stopped) => ended(),
-            error @ (AdmittanceError::NoSuchPeer { .. } | AdmittanceError::Frequency { .. } | AdmittanceError::Analysis(_) | _) => {
+            error @ (AdmittanceError::NoSuchPeer { .. } | AdmittanceError::Frequency { .. } | AdmittanceError::Analysis(_)) => {
                 not_analysed(file, &error)
             }
         })?;

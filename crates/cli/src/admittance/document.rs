@@ -7,7 +7,7 @@ use super::curve::Curve;
 
 /// What `cohaptic admittance --json` prints.
 #[derive(Serialize)]
-pub(super) struct Document<'a> {
+pub(super) struct AdmittanceDocument<'a> {
     title: &'a str,
     peer: &'a str,
     #[serde(flatten)]
@@ -67,7 +67,7 @@ struct Point {
     ideal_db: f64,
 }
 
-impl<'a> Document<'a> {
+impl<'a> AdmittanceDocument<'a> {
     pub(super) fn new(peer: &'a str, curves: &'a [Curve], files: &'a [String], interrupted: bool) -> Self {
         let named = |curve: &'a Curve| Named { name: &curve.name, overrides: &curve.overrides, curve: CurveDocument::of(curve) };
         Self {

@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use cohaptic_picture::Size;
+use cohaptic_units::print::csv_field;
 
 use super::bode;
 use super::curve::Curve;
 use crate::failure::Failure;
+use crate::file::write_file;
 use crate::output;
-use crate::output_file::{field, write_file};
 
 /// Writes `admittance.csv` and `admittance.svg` into a folder, which is made if it is not there, and gives their paths.
 ///
@@ -33,7 +34,7 @@ pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve], is_whole: bool,
 fn table(curves: &[Curve]) -> String {
     let mut text = "curve,hz,magnitude_db,phase_deg,ideal_db\n".to_owned();
     for curve in curves {
-        let name = field(&curve.name);
+        let name = csv_field(&curve.name);
         for point in &curve.response.points {
             let (magnitude, phase, ideal) = (point.magnitude_db(), point.phase_deg(), curve.ideal_db(point.hz));
             text.push_str(&format!("{name},{:?},{magnitude:?},{phase:?},{ideal:?}\n", point.hz));

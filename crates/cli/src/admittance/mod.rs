@@ -10,7 +10,7 @@ mod words;
 use std::process::ExitCode;
 
 use curve::Curve;
-use document::Document;
+use document::AdmittanceDocument;
 
 use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::AdmittanceArguments;
@@ -43,12 +43,13 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
         Some(folder) => files::write(folder, &arguments.peer, &curves, !is_interrupted, arguments.pictures.size())?,
         None => Vec::new(),
     };
-    if arguments.scene.json {
-        output::json(DocumentSchema::Admittance, &Document::new(&arguments.peer, &curves, &files, is_interrupted))?;
-    } else {
-        output::text(&words::describe(&arguments.peer, &curves))?;
-        output::wrote(&files);
-    }
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::ADMITTANCE,
+        &AdmittanceDocument::new(&arguments.peer, &curves, &files, is_interrupted),
+        || words::describe(&arguments.peer, &curves),
+        &files,
+    )?;
     if is_interrupted {
         return Err(Failure::Interrupted(format!("these are the first {finished} of {wanted} points")));
     }

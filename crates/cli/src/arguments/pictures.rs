@@ -7,17 +7,17 @@ use cohaptic_picture::{Size, SizeError};
 pub(crate) struct PictureArguments {
     /// The size of pictures: one-column or two-columns of a paper, page, WIDTHxHEIGHT in pixels (960x400) or millimetres (85x60mm) [default: page]
     #[arg(long, value_name = "SIZE", requires = "out")]
-    size: Option<AskedSize>,
+    size: Option<NamedSize>,
 }
 
 /// A size with the word that named it.
 #[derive(Clone, Debug)]
-struct AskedSize {
+struct NamedSize {
     word: String,
     size: Size,
 }
 
-impl std::str::FromStr for AskedSize {
+impl std::str::FromStr for NamedSize {
     type Err = SizeError;
 
     fn from_str(word: &str) -> Result<Self, SizeError> {

@@ -10,7 +10,7 @@ use crate::output;
 
 /// What `cohaptic campaign --json` prints.
 #[derive(Serialize)]
-pub(super) struct Document<'a> {
+pub(super) struct CampaignDocument<'a> {
     title: String,
     runs: u64,
     runs_computed: u64,
@@ -60,7 +60,7 @@ impl<'a> JudgementDocument<'a> {
     }
 }
 
-impl<'a> Document<'a> {
+impl<'a> CampaignDocument<'a> {
     pub(super) fn new(finished: &'a Finished, out: &Path) -> Self {
         let report = &finished.report;
         let combination = |(number, combination): (usize, &CombinationReport)| Combination {

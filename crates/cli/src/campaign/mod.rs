@@ -12,13 +12,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_campaign::{Asked, Campaign, CampaignError, Format, Outcome, Plan, Report, Variation};
+use cohaptic_campaign::{Campaign, CampaignError, CampaignPlan, Format, Outcome, PlanSpec, Report, Variation};
 
 use crate::arguments::{CampaignArguments, TableFormat};
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::{input, output};
-use document::Document;
+use document::CampaignDocument;
 use judge::ByAnalysis;
 use picture::Drawn;
 use watch::Shown;
@@ -28,7 +28,7 @@ const PROGRAM: &str = concat!("cohaptic ", env!("CARGO_PKG_VERSION"));
 
 /// A campaign that is finished, and what it took.
 struct Finished {
-    plan: Plan,
+    plan: CampaignPlan,
     title: String,
     report: Report,
     /// Of this time.
@@ -58,16 +58,17 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
         finished.files.extend(files);
         finished.notes.extend(notes);
     }
-    if arguments.scene.json {
-        output::json(DocumentSchema::Campaign, &Document::new(&finished, &arguments.out))?;
-    } else {
-        output::text(&words::describe(&finished))?;
-        output::wrote(&finished.files);
-    }
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::CAMPAIGN,
+        &CampaignDocument::new(&finished, &arguments.out),
+        || words::describe(&finished),
+        &finished.files,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn plan(arguments: &CampaignArguments) -> Result<Plan, Failure> {
+fn plan(arguments: &CampaignArguments) -> Result<CampaignPlan, Failure> {
     let refused = |error: CampaignError| refusal::failure(error, arguments);
     let variations =
         arguments.vary.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<Variation>, _>>().map_err(|error| refused(error.into()))?;
@@ -78,11 +79,12 @@ fn plan(arguments: &CampaignArguments) -> Result<Plan, Failure> {
         TableFormat::Csv => Format::Csv,
     };
     let part = arguments.part.map(NonZeroU64::get);
-    let plan = Plan::new(Asked { text: &text, file, set, variations, runs: arguments.runs, format, part, program: PROGRAM }).map_err(refused)?;
+    let plan =
+        CampaignPlan::new(PlanSpec { text: &text, file, set, variations, runs: arguments.runs, format, part, program: PROGRAM }).map_err(refused)?;
     Ok(if arguments.verdicts { plan.with_verdicts() } else { plan })
 }
 
-fn execute(arguments: &CampaignArguments, plan: Plan) -> Result<Report, Failure> {
+fn execute(arguments: &CampaignArguments, plan: CampaignPlan) -> Result<Report, Failure> {
     let refused = |error: CampaignError| refusal::failure(error, arguments);
     let (runs, combinations) = (plan.runs(), plan.combinations());
     let checking = Shown::checking(combinations);

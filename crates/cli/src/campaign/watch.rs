@@ -28,7 +28,7 @@ impl Shown {
 
 impl Watch for Shown {
     fn keep_going(&self) -> bool {
-        !interrupt::asked()
+        !interrupt::requested()
     }
 
     fn checked(&self, combinations: u64) {

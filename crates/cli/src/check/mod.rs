@@ -20,12 +20,12 @@ use crate::arguments::CheckArguments;
 use crate::document_schema::DocumentSchema;
 use crate::expectations::OutcomeDocument;
 use crate::failure::{self, EXPECTATION, Failure, INTERRUPTED, scene_status};
-use crate::output_file::write_file;
+use crate::file::write_file;
 use crate::progress::Progress;
 use crate::{input, interrupt, output};
 
 #[derive(Serialize)]
-struct Document {
+struct CheckDocument {
     scenes: Vec<Checked>,
 }
 
@@ -96,7 +96,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     if !arguments.json {
         output::wrote(&arguments.page);
     }
-    if interrupt::asked() { Err(Failure::Interrupted(finished)) } else { Ok(ExitCode::from(status)) }
+    if interrupt::requested() { Err(Failure::Interrupted(finished)) } else { Ok(ExitCode::from(status)) }
 }
 
 /// How many scenes were checked before the end, in words.
@@ -106,7 +106,7 @@ fn finished(scenes: &[Checked]) -> String {
 }
 
 fn print(scenes: Vec<Checked>, json: bool) -> Result<(), Failure> {
-    if json { output::json(DocumentSchema::Check, &Document { scenes }) } else { output::text(&describe(&scenes)) }
+    if json { output::json(DocumentSchema::CHECK, &CheckDocument { scenes }) } else { output::text(&describe(&scenes)) }
 }
 
 /// The scenes that a path means; standard input means itself.
@@ -115,7 +115,7 @@ fn files_of(path: &Path) -> Result<Vec<PathBuf>, SceneError> {
 }
 
 fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
-    if interrupt::asked() {
+    if interrupt::requested() {
         return Checked::interrupted(file);
     }
     match input::with(file, |text, file| Scene::parse(text, file, overrides)) {
@@ -126,9 +126,9 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
             }
             let notes = RefCell::new(Vec::new());
             let judged = |scene: &Scene, stable: bool| judged(scene, stable, |note| notes.borrow_mut().push(note));
-            let checked = harness::check_with(&scene, model, judged, || !interrupt::asked());
+            let checked = harness::check_with(&scene, model, judged, || !interrupt::requested());
             let failures = checked.failures();
-            if !failures.is_empty() && interrupt::asked() {
+            if !failures.is_empty() && interrupt::requested() {
                 // What failed may have failed by the interruption alone.
                 return Checked { expects: scene.expect.is_some(), ..Checked::interrupted(file) };
             }

@@ -6,7 +6,7 @@ use cohaptic_falcon::driver::{Driver, DriverConfig, DriverError, Setpoint, Stati
 use cohaptic_falcon::kinematics::Triple;
 use cohaptic_units::Instant;
 
-use super::way::Way;
+use super::any_transport::AnyTransport;
 use crate::failure::Failure;
 use crate::interrupt;
 
@@ -16,7 +16,7 @@ const PERIOD: Duration = Duration::from_millis(1);
 /// A turn that is later than this is counted. The serial chip hands over what has come once a millisecond, by its own clock: somewhat less is no fault.
 const LATE: Duration = Duration::from_micros(100);
 
-/// What is done with a device.
+/// The work on a device.
 pub(super) trait Task {
     /// The force on the grip \[N\] that is wanted at `at`, counted from the first exchange; `None` wants none.
     fn wants(&mut self, at: Duration, status: &Status) -> Option<Triple>;
@@ -48,7 +48,7 @@ pub(super) enum End {
 /// A driver and how well its loop keeps its time.
 #[derive(Debug)]
 pub(super) struct Bench {
-    driver: Driver<Way>,
+    driver: Driver<AnyTransport>,
     begun: Instant,
     next: Instant,
     late: u64,
@@ -56,7 +56,7 @@ pub(super) struct Bench {
 }
 
 impl Bench {
-    pub(super) fn open(way: Way, config: DriverConfig) -> Result<Self, DriverError> {
+    pub(super) fn open(way: AnyTransport, config: DriverConfig) -> Result<Self, DriverError> {
         let driver = Driver::open(way, config)?;
         let now = driver.now();
         Ok(Self { driver, begun: now, next: now, late: 0, worst: Duration::ZERO })
@@ -72,7 +72,7 @@ impl Bench {
     fn exchanges(&mut self, most: Option<Duration>, task: &mut impl Task) -> Result<End, Failure> {
         loop {
             let now = self.driver.now();
-            if interrupt::asked() {
+            if interrupt::requested() {
                 return Ok(End::Interrupted);
             }
             if most.is_some_and(|most| self.passed() >= most) {

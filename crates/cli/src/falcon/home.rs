@@ -21,7 +21,7 @@ use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
 
 #[derive(Serialize)]
-struct Document {
+struct HomeDocument {
     #[serde(flatten)]
     identity: Identity,
     firmware: &'static str,
@@ -47,7 +47,7 @@ pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
     let end = bench.run(Some(arguments.length), &mut homing);
     homing.line.clear();
     let (end, traffic) = (end?, Traffic::of(&bench, homing.until));
-    let document = Document {
+    let document = HomeDocument {
         identity: Identity::of(&target),
         firmware: state.name(),
         is_homed: homing.last.reading.is_some(),
@@ -56,11 +56,7 @@ pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
         traffic,
         seen: Seen::of(&homing.last),
     };
-    if which.json {
-        output::json(DocumentSchema::FalconHome, &document)?;
-    } else {
-        output::text(&document.describe(&target.name(), state))?;
-    }
+    output::answer(which.json, DocumentSchema::FALCON_HOME, &document, || document.describe(&target.name(), state), output::NO_FILES)?;
     match end {
         End::Enough => Ok(ExitCode::SUCCESS),
         End::Interrupted => Ok(ExitCode::from(INTERRUPTED)),
@@ -73,7 +69,7 @@ pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
     }
 }
 
-impl Document {
+impl HomeDocument {
     fn describe(&self, name: &str, firmware: FirmwareState) -> String {
         let mut lines = Vec::new();
         if firmware == FirmwareState::Loaded {

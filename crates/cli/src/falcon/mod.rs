@@ -10,6 +10,7 @@
 //!             way                bytes and a clock, whichever it is
 //! ```
 
+mod any_transport;
 mod bench;
 mod document;
 mod home;
@@ -21,7 +22,6 @@ mod samples;
 mod simulate;
 mod truth;
 mod watch;
-mod way;
 mod words;
 
 use std::process::ExitCode;

@@ -22,7 +22,7 @@ use crate::{interrupt, output};
 pub(super) const WITHOUT_FORCE: DriverConfig = DriverConfig { limits: Limits { force: 0.0, ..Limits::DEFAULT }, ..DriverConfig::DEFAULT };
 
 #[derive(Serialize)]
-struct Document {
+struct ProbeDocument {
     falcons: Vec<Entry>,
 }
 
@@ -55,18 +55,20 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<ExitCode, Failure> {
     let targets = reach::targets(&arguments.which)?;
     let mut falcons = Vec::new();
     for target in &targets {
-        if !interrupt::asked() {
+        if !interrupt::requested() {
             falcons.push(Entry::of(target, firmware.as_ref(), arguments.length)?);
         }
     }
-    let document = Document { falcons };
-    if arguments.which.json {
-        output::json(DocumentSchema::FalconProbe, &document)?;
-    } else {
-        output::text(&document.falcons.iter().map(Entry::describe).collect::<String>())?;
-    }
+    let document = ProbeDocument { falcons };
+    output::answer(
+        arguments.which.json,
+        DocumentSchema::FALCON_PROBE,
+        &document,
+        || document.falcons.iter().map(Entry::describe).collect::<String>(),
+        output::NO_FILES,
+    )?;
     let is_whole = document.falcons.iter().all(|entry| entry.error.is_none());
-    Ok(ExitCode::from(if interrupt::asked() {
+    Ok(ExitCode::from(if interrupt::requested() {
         INTERRUPTED
     } else if is_whole {
         0

@@ -8,8 +8,8 @@ use cohaptic_falcon::boot::{self, BootOptions, Firmware, FirmwareError, Progress
 use cohaptic_falcon::simulator::{SimulatedTransport, Simulator, SimulatorConfig, Waypoints};
 use cohaptic_falcon::usb::{self, Listed, UsbError, UsbTransport};
 
+use super::any_transport::AnyTransport;
 use super::line::LoadingBar;
-use super::way::Way;
 use crate::arguments::WhichFalcon;
 use crate::failure::Failure;
 use crate::realtime::loading;
@@ -65,7 +65,7 @@ fn of_usb(error: &UsbError) -> Failure {
     let where_to_look = match error {
         UsbError::NoDevice => ". `lsusb -d 0403:cb48` shows whether the system sees it; docs/falcon.md says what else to look at",
         UsbError::System { .. } => ". `lsusb` shows whether this machine has USB at all",
-        UsbError::NoSuchSerial { .. } | UsbError::Several(_) | _ => "",
+        UsbError::NoSuchSerial { .. } | UsbError::Several(_) => "",
     };
     Failure::System(format!("{error}{where_to_look}"))
 }
@@ -88,16 +88,16 @@ impl Target {
     }
 
     /// Opens the way there.
-    pub(super) fn open(&self) -> Result<Way, UsbError> {
+    pub(super) fn open(&self) -> Result<AnyTransport, UsbError> {
         match self {
-            Self::Usb(listed) => UsbTransport::open(listed.serial.as_deref()).map(Way::new),
+            Self::Usb(listed) => UsbTransport::open(listed.serial.as_deref()).map(AnyTransport::new),
             Self::Simulated { in_virtual_time, switched_on } => {
                 let config = SimulatorConfig { running: !switched_on, seed: 1, ..SimulatorConfig::default() };
                 let hand = Waypoints::homing(Duration::ZERO).swaying(SWAY.0, SWAY.1);
                 let simulator = Simulator::new(config, hand);
                 let transport =
                     if *in_virtual_time { SimulatedTransport::in_virtual_time(simulator) } else { SimulatedTransport::in_real_time(simulator) };
-                Ok(Way::new(transport))
+                Ok(AnyTransport::new(transport))
             }
         }
     }
@@ -108,12 +108,12 @@ pub(super) fn read_firmware(path: Option<&Path>) -> Result<Option<Firmware>, Fai
     let Some(path) = path else { return Ok(None) };
     Firmware::read(path).map(Some).map_err(|error| match error {
         FirmwareError::Read { path, error } => Failure::File { verb: "read", path, error },
-        error @ (FirmwareError::Length { .. } | _) => Failure::Input(format!("{}: {error}", path.display())),
+        error @ FirmwareError::Length { .. } => Failure::Input(format!("{}: {error}", path.display())),
     })
 }
 
-/// Sees to it that firmware runs; what is in the way, in words.
-pub(super) fn make_ready(way: &mut Way, firmware: Option<&Firmware>) -> Result<FirmwareState, String> {
+/// Sees to it that firmware runs; the obstacle, in words.
+pub(super) fn make_ready(way: &mut AnyTransport, firmware: Option<&Firmware>) -> Result<FirmwareState, String> {
     let options = BootOptions::DEFAULT;
     let Some(firmware) = firmware else {
         let runs = boot::is_loaded(way, &options).map_err(|error| error.to_string())?;

@@ -1,18 +1,18 @@
 //! Exchanges as rows of a table.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write as _};
-use std::path::{Path, PathBuf};
+use std::io::{self, Write as _};
+use std::path::Path;
 use std::time::Duration;
 
 use cohaptic_falcon::driver::Status;
+use cohaptic_files::WholeFile;
 
 use super::document::buttons;
 use crate::failure::Failure;
+use crate::file::unwritten;
 use crate::output;
-use crate::output_file::OutputFile;
 
-/// The columns. What is not known is left empty.
+/// The columns. Unknown values are left empty.
 pub(super) const HEADER: &str = "t,phase,homed,encoder1,encoder2,encoder3,x,y,z,vx,vy,vz,fx,fy,fz,buttons";
 
 /// A row, without its line break.
@@ -33,27 +33,29 @@ pub(super) fn row(at: Duration, status: &Status) -> String {
 
 /// A file of them.
 pub(super) struct SamplesFile {
-    file: OutputFile,
-    to: BufWriter<File>,
-    path: PathBuf,
+    file: WholeFile,
 }
 
 impl SamplesFile {
     pub(super) fn create(path: &Path) -> Result<Self, Failure> {
-        let (file, mut to) = OutputFile::create(path)?;
-        writeln!(to, "{HEADER}").map_err(|error| file.failure(error))?;
-        Ok(Self { file, to, path: path.to_path_buf() })
+        let create = || {
+            let mut file = WholeFile::create(path)?;
+            writeln!(file, "{HEADER}")?;
+            Ok(Self { file })
+        };
+        create().map_err(unwritten(path))
     }
 
     pub(super) fn write(&mut self, row: &str) -> Result<(), Failure> {
-        writeln!(self.to, "{row}").map_err(|error| self.file.failure(error))
+        let written = writeln!(self.file, "{row}");
+        written.map_err(unwritten(self.file.path()))
     }
 
     /// Gives the file its name; says it.
-    pub(super) fn finish(mut self) -> Result<String, Failure> {
-        let flushed = self.to.flush();
-        self.file.finish(flushed.map(|()| self.to))?;
-        Ok(output::path(&self.path))
+    pub(super) fn finish(self) -> Result<String, Failure> {
+        let path = self.file.path().to_path_buf();
+        self.file.finish().map_err(unwritten(&path))?;
+        Ok(output::path(&path))
     }
 }
 

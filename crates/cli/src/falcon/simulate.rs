@@ -11,11 +11,11 @@ use cohaptic_falcon::simulator::{Faults, Hand, SharedSimulator, SimulatedTranspo
 use cohaptic_units::Probability;
 use serde::Serialize;
 
+use super::any_transport::AnyTransport;
 use super::bench::{Bench, End, Go, Task};
 use super::document::{Forces, Seen, Traffic, light};
 use super::reach::SWAY;
 use super::truth::{DeviceDocument, Truth};
-use super::way::Way;
 use super::words;
 use cohaptic_units::print::Counted;
 
@@ -28,7 +28,7 @@ use crate::output;
 const CHANGES: usize = 100;
 
 #[derive(Serialize)]
-struct Document {
+struct SimulateDocument {
     hand: String,
     seed: u64,
     asked_n: Option<[f64; 3]>,
@@ -66,7 +66,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failur
     let transport = SimulatedTransport::in_virtual_time(Simulator::new(config, HeldBy::of(arguments.hand)));
     let simulator = transport.simulator();
     let config = DriverConfig { limits: Limits { force: arguments.limit, ..Limits::DEFAULT }, ..DriverConfig::DEFAULT };
-    let mut bench = Bench::open(Way::new(transport), config).map_err(|error| Failure::System(error.to_string()))?;
+    let mut bench = Bench::open(AnyTransport::new(transport), config).map_err(|error| Failure::System(error.to_string()))?;
     let mut simulating = Simulating {
         simulator,
         force: arguments.force.map(|Force(force)| force),
@@ -82,16 +82,12 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failur
     };
     let end = bench.run(Some(arguments.length), &mut simulating)?;
     let document = simulating.document(&bench, arguments, end);
-    if arguments.json {
-        output::json(DocumentSchema::FalconSimulate, &document)?;
-    } else {
-        output::text(&document.describe())?;
-    }
+    output::answer(arguments.json, DocumentSchema::FALCON_SIMULATE, &document, || document.describe(), output::NO_FILES)?;
     // A driver that gives up has done what was to be seen.
     Ok(if end == End::Interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-impl Document {
+impl SimulateDocument {
     fn describe(&self) -> String {
         let mut lines: Vec<String> = self.changes.iter().map(|change| format!("{:7.3} s  {} ({})", change.t_s, change.phase, change.light)).collect();
         if self.more_changes > 0 {
@@ -174,13 +170,13 @@ impl Simulating {
         }
     }
 
-    fn document(mut self, bench: &Bench, arguments: &SimulateArguments, end: End) -> Document {
+    fn document(mut self, bench: &Bench, arguments: &SimulateArguments, end: End) -> SimulateDocument {
         // How it was left: the driver has said farewell, or cannot.
         self.change(bench.passed(), bench.status().phase);
         let motors = self.simulator.with(|device| (device.motor_force(), *device.observed()));
         (self.truth.motor_force, self.truth.observed) = motors;
         let Truth { position, motor_force, largest_motor_force, largest_error, observed } = self.truth;
-        Document {
+        SimulateDocument {
             hand: arguments.hand.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned()),
             seed: arguments.seed,
             asked_n: self.force,

@@ -25,7 +25,7 @@ use crate::output;
 const READABLE: Duration = Duration::from_millis(100);
 
 #[derive(Serialize)]
-struct Document {
+struct WatchDocument {
     #[serde(flatten)]
     identity: Identity,
     firmware: &'static str,
@@ -59,7 +59,7 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     // Whole rows up to the end, whatever that was.
     let files = watching.file.take().map(SamplesFile::finish).transpose()?.into_iter().collect();
     let end = end?;
-    let document = Document {
+    let document = WatchDocument {
         identity: Identity::of(&target),
         firmware: state.name(),
         ending: end.name(),
@@ -73,7 +73,7 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
         files,
     };
     if which.json {
-        output::json(DocumentSchema::FalconWatch, &document)?;
+        output::json(DocumentSchema::FALCON_WATCH, &document)?;
     } else if !watching.prints_rows {
         output::text(&document.describe(&target.name()))?;
     }
@@ -87,7 +87,7 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     }
 }
 
-impl Document {
+impl WatchDocument {
     fn describe(&self, name: &str) -> String {
         let mut lines = Vec::new();
         lines.extend(words::traffic(&self.traffic));

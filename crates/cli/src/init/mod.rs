@@ -12,7 +12,7 @@ use std::process::ExitCode;
 
 use crate::arguments::InitArguments;
 use crate::failure::Failure;
-use crate::output_file::write_file;
+use crate::file::write_file;
 use crate::{input, output};
 
 /// Writes a scene in which every key is explained.

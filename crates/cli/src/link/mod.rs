@@ -3,14 +3,15 @@
 mod spec;
 mod words;
 
-use std::fs::File;
-use std::io::BufWriter;
+use std::io;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
+use cohaptic_files::WholeFile;
 use cohaptic_measure::achieved::{Accumulator, Achieved, FateCounts};
 use cohaptic_measure::asked::Asked;
-use cohaptic_measure::beside::{Beside, Figure};
+use cohaptic_measure::comparison::{Comparison, Figure};
 use cohaptic_measure::fates::FateWriter;
 use cohaptic_measure::pcapng::CaptureWriter;
 use cohaptic_measure::steady::SteadyStream;
@@ -20,7 +21,7 @@ use serde::Serialize;
 use crate::arguments::LinkArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
-use crate::output_file::OutputFile;
+use crate::file::unwritten;
 use crate::progress::Progress;
 use crate::{interrupt, output};
 use spec::Spec;
@@ -31,7 +32,7 @@ const PACKETS: u64 = 100_000;
 
 /// What `cohaptic link --json` prints.
 #[derive(Serialize)]
-struct Document<'a> {
+struct LinkDocument<'a> {
     asked: AskedDocument<'a>,
     achieved: &'a Achieved,
     compared: &'a [Figure],
@@ -65,8 +66,8 @@ pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     let measured = drive(arguments, &spec)?;
     if arguments.json {
         output::json(
-            DocumentSchema::Link,
-            &Document {
+            DocumentSchema::LINK,
+            &LinkDocument {
                 asked: AskedDocument { spec: &spec.said, figures: &spec.asked },
                 achieved: &measured.achieved,
                 compared: &measured.figures,
@@ -94,7 +95,7 @@ fn drive(arguments: &LinkArguments, spec: &Spec) -> Result<Measured, Failure> {
     let mut link = Link::new(arguments.seed, &LinkName::between("sender", "receiver"), spec.model.clone());
     let mut sinks = Sinks::create(arguments)?;
     let mut accumulator = Accumulator::new();
-    let mut beside = Beside::default();
+    let mut beside = Comparison::default();
     let progress = Progress::through_packets(wanted);
     let start = Clock::now();
     let sent = stream.over(
@@ -107,7 +108,7 @@ fn drive(arguments: &LinkArguments, spec: &Spec) -> Result<Measured, Failure> {
         },
         |sent| {
             progress.reach_number(sent);
-            !interrupt::asked()
+            !interrupt::requested()
         },
     )?;
     let wall_s = start.elapsed().as_secs_f64();
@@ -121,45 +122,45 @@ fn drive(arguments: &LinkArguments, spec: &Spec) -> Result<Measured, Failure> {
 
 /// The files that are written.
 struct Sinks {
-    fates: Option<(OutputFile, FateWriter<BufWriter<File>>)>,
-    capture: Option<(OutputFile, CaptureWriter<BufWriter<File>>)>,
-    files: Vec<String>,
+    fates: Option<Sink<FateWriter<WholeFile>>>,
+    capture: Option<Sink<CaptureWriter<WholeFile>>>,
 }
+
+/// A file that is written, and its name.
+type Sink<W> = (PathBuf, W);
 
 impl Sinks {
     fn create(arguments: &LinkArguments) -> Result<Self, Failure> {
-        let mut sinks = Self { fates: None, capture: None, files: Vec::new() };
-        if let Some(path) = &arguments.fates {
-            let (file, to) = OutputFile::create(path)?;
-            let writer = FateWriter::new(to).map_err(|error| file.failure(error))?;
-            sinks.fates = Some((file, writer));
-        }
-        if let Some(path) = &arguments.pcapng {
-            let (file, to) = OutputFile::create(path)?;
-            let writer = CaptureWriter::new(to, "link").map_err(|error| file.failure(error))?;
-            sinks.capture = Some((file, writer));
-        }
-        sinks.files = [&arguments.fates, &arguments.pcapng].into_iter().flatten().map(|path| output::path(path)).collect();
-        Ok(sinks)
+        Ok(Self {
+            fates: begin(arguments.fates.as_ref(), FateWriter::new)?,
+            capture: begin(arguments.pcapng.as_ref(), |to| CaptureWriter::new(to, "link"))?,
+        })
     }
 
     fn write(&mut self, record: &PacketRecord) -> Result<(), Failure> {
-        if let Some((file, writer)) = &mut self.fates {
-            writer.write(record).map_err(|error| file.failure(error))?;
+        if let Some((path, writer)) = &mut self.fates {
+            writer.write(record).map_err(unwritten(path))?;
         }
-        if let Some((file, writer)) = &mut self.capture {
-            writer.write(record, &[]).map_err(|error| file.failure(error))?;
+        if let Some((path, writer)) = &mut self.capture {
+            writer.write(record, &[]).map_err(unwritten(path))?;
         }
         Ok(())
     }
 
     fn finish(self) -> Result<Vec<String>, Failure> {
-        if let Some((file, writer)) = self.fates {
-            file.finish(writer.finish())?;
+        let fates = self.fates.map(|(path, writer)| (path, writer.finish()));
+        let capture = self.capture.map(|(path, writer)| (path, writer.finish()));
+        let mut files = Vec::new();
+        for (path, file) in fates.into_iter().chain(capture) {
+            file.and_then(WholeFile::finish).map_err(unwritten(&path))?;
+            files.push(output::path(&path));
         }
-        if let Some((file, writer)) = self.capture {
-            file.finish(writer.finish())?;
-        }
-        Ok(self.files)
+        Ok(files)
     }
+}
+
+/// Begins a file, if it is asked for.
+fn begin<W>(path: Option<&PathBuf>, writer: impl FnOnce(WholeFile) -> io::Result<W>) -> Result<Option<Sink<W>>, Failure> {
+    let begun = path.map(|path| WholeFile::create(path).and_then(writer).map(|writer| (path.clone(), writer)).map_err(unwritten(path)));
+    begun.transpose()
 }

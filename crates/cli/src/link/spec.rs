@@ -14,7 +14,7 @@ use cohaptic_wan::{KernelNetem, LinkConfig, LinkModel};
 
 use crate::arguments::{LinkArguments, Profile};
 use crate::failure::Failure;
-use crate::{output, text_file};
+use crate::{file, output};
 
 /// A link, and what it is asked for.
 pub(super) struct Spec {
@@ -131,7 +131,7 @@ fn slot_distribution(netem: &Netem) -> Option<cohaptic_wan::netem::Distribution>
 /// The text of `NAME.dist` in the current folder; `None` if there is no such file.
 fn table(name: &TableName, fault: &mut Option<Failure>) -> Option<String> {
     let path = Path::new(name.as_str()).with_extension("dist");
-    match text_file::read(&path) {
+    match file::read_text(&path) {
         Ok(text) => Some(text),
         Err(Failure::File { error, .. }) if error.kind() == std::io::ErrorKind::NotFound => None,
         Err(failure) => {
@@ -159,10 +159,10 @@ fn below(said: &str, option: &str) -> String {
 
 fn replay(path: &Path) -> Result<Spec, Failure> {
     let unreadable = |error| Failure::File { verb: "read", path: path.to_path_buf(), error };
-    let text = text_file::read(path)?;
+    let text = file::read_text(path)?;
     let log = fates::read(text.as_bytes()).map_err(|error| match error {
         ReadError::Io(error) => unreadable(error),
-        other @ (ReadError::Log(_) | _) => Failure::Input(format!("{}: {other}", output::path(path))),
+        other @ ReadError::Log(_) => Failure::Input(format!("{}: {other}", output::path(path))),
     })?;
     let packets = u64::try_from(log.packets()).ok();
     let model = LinkModel::Replay(Arc::new(log));

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use cohaptic_measure::achieved::Achieved;
-use cohaptic_measure::beside::Figure;
+use cohaptic_measure::comparison::Figure;
 use cohaptic_units::print::Counted;
 
 use super::Measured;

@@ -1,4 +1,4 @@
-//! Between a session and those who look on: nothing here waits.
+//! Between a session and onlookers: nothing here waits.
 
 use std::sync::mpsc::Receiver;
 
@@ -11,7 +11,7 @@ use crate::interrupt;
 use crate::realtime::{Edit, Look};
 
 /// Publishes the session and hands in what live control changes.
-pub(super) struct Host {
+pub(super) struct SessionConductor {
     look: Option<Look>,
     wanted: Receiver<Edit>,
     /// The links in the order of the description.
@@ -21,15 +21,15 @@ pub(super) struct Host {
     axes: usize,
 }
 
-impl Host {
+impl SessionConductor {
     pub(super) const fn new(look: Option<Look>, wanted: Receiver<Edit>, pairs: Vec<(usize, usize)>, elapsed: Elapsed, axes: usize) -> Self {
         Self { look, wanted, pairs, elapsed, axes }
     }
 }
 
-impl Conductor for Host {
+impl Conductor for SessionConductor {
     fn keep_going(&mut self) -> bool {
-        !interrupt::asked()
+        !interrupt::requested()
     }
 
     fn next_change(&mut self) -> Option<LinkChange> {

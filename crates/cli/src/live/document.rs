@@ -15,7 +15,7 @@ use crate::output;
 
 /// What `cohaptic live --json` prints.
 #[derive(Serialize)]
-pub(super) struct Document {
+pub(super) struct LiveDocument {
     title: String,
     duration_s: f64,
     ending: &'static str,
@@ -30,7 +30,7 @@ pub(super) struct Document {
     access_lines: Vec<AccessDocument>,
     max_discrepancy_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    door: Option<DoorDocument>,
+    door: Option<AdmissionDocument>,
     granted: Vec<&'static str>,
     refused_wishes: Vec<String>,
     files: Vec<String>,
@@ -45,7 +45,7 @@ struct LivePeer {
     seat: Option<SeatDocument>,
 }
 
-/// What came in from a peer that lives elsewhere.
+/// What came in from a peer that is remote.
 #[derive(Serialize)]
 struct SeatDocument {
     taken: u64,
@@ -57,7 +57,7 @@ struct SeatDocument {
 }
 
 #[derive(Serialize)]
-struct DoorDocument {
+struct AdmissionDocument {
     address: String,
     handled: u64,
     admitted: u64,
@@ -71,7 +71,7 @@ struct DoorDocument {
     kernel_drops: Option<u64>,
 }
 
-impl Document {
+impl LiveDocument {
     pub(super) fn new(scene: &Scene, report: &Report) -> Self {
         let summary = &report.summary;
         let peer = |(place, peer): (usize, &PeerSummary)| LivePeer {
@@ -93,7 +93,7 @@ impl Document {
             links: summary.links.iter().map(|link| LinkDocument::new(scene, link)).collect(),
             access_lines: summary.access_lines.iter().map(|line| AccessDocument::new(scene, line)).collect(),
             max_discrepancy_m: summary.max_discrepancy,
-            door: report.door.as_ref().map(|(stats, socket)| DoorDocument::new(stats, socket)),
+            door: report.admission.as_ref().map(|(stats, socket)| AdmissionDocument::new(stats, socket)),
             granted: report.prepared.granted.iter().copied().map(Wish::name).collect(),
             refused_wishes: report.prepared.refused.iter().map(ToString::to_string).collect(),
             files: report.files.iter().map(|file| output::path(file)).collect(),
@@ -108,8 +108,8 @@ impl SeatDocument {
     }
 }
 
-impl DoorDocument {
-    fn new(stats: &cohaptic_live::DoorStats, socket: &SocketCounts) -> Self {
+impl AdmissionDocument {
+    fn new(stats: &cohaptic_live::AdmissionStats, socket: &SocketCounts) -> Self {
         Self {
             address: socket.address.to_string(),
             handled: stats.handled,

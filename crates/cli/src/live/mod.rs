@@ -25,8 +25,8 @@ use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
 use crate::realtime::{KeyedLinks, LiveControl};
 use crate::{failure, input, interrupt, output};
-use conductor::Host;
-use document::Document;
+use conductor::SessionConductor;
+use document::LiveDocument;
 use prepare::ready_falcons;
 use timeline::{Elapsed, Planned, TimedLinks};
 
@@ -50,7 +50,7 @@ fn make_key(file: &Path) -> Result<ExitCode, Failure> {
 fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let mut overrides = arguments.overrides.set.clone();
     if let Some(length) = arguments.length {
-        // What is expected of the whole scene, which may be longer, is not looked at in a session anyway.
+        // Expectations of the whole scene, which may be longer, are not looked at in a session anyway.
         overrides.extend([format!("scene.duration={}", Span(length)), "expect={}".to_owned()]);
     }
     let overrides = overrides.as_slice();
@@ -75,10 +75,10 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
     prepare::announce(&scene, session.address(), arguments.key_file.is_some());
     let control = LiveControl::open(&arguments.real_time, status::description(&scene, &pairs), Box::new(editor))?;
-    let host = Host::new(control.look(), wanted, pairs, elapsed, scene.axes.count());
+    let host = SessionConductor::new(control.look(), wanted, pairs, elapsed, scene.axes.count());
     let report = conduct(&scene, session, host, &control)?;
     if arguments.json {
-        output::json(DocumentSchema::Live, &Document::new(&scene, &report))?;
+        output::json(DocumentSchema::LIVE, &LiveDocument::new(&scene, &report))?;
     } else {
         let mut text = words::describe(&scene, &report);
         if let Some(folder) = &arguments.out {
@@ -88,7 +88,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
         output::text(&text)?;
         output::wrote(&report.files);
     }
-    Ok(if interrupt::asked() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    Ok(if interrupt::requested() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
 /// Everything that must be had before time begins; `None` if the user did not want to wait for it.
@@ -112,7 +112,7 @@ fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Resu
     Session::open(scene, config, |peer| falcons.take(peer)).map(Some).map_err(refused)
 }
 
-fn conduct(scene: &Scene, session: Session, mut host: Host, control: &LiveControl) -> Result<Report, Failure> {
+fn conduct(scene: &Scene, session: Session, mut host: SessionConductor, control: &LiveControl) -> Result<Report, Failure> {
     let progress = Progress::through_scene(&scene.title, scene.duration);
     let report = thread::scope(|scope| {
         let running = thread::Builder::new().name("live".to_owned()).spawn_scoped(scope, move || session.run(&mut host));

@@ -36,7 +36,7 @@ pub(super) fn ready_falcons(scene: &Scene, firmware: Option<&Path>, wishes: Wish
         say(&format!("homing the simulated Falcons of {}", simulated.join(", ")));
         let start = Clock::now();
         while !falcons.simulated_are_ready() {
-            if interrupt::asked() {
+            if interrupt::requested() {
                 return Ok(None);
             }
             if start.elapsed() > SIMULATED_HOMING {

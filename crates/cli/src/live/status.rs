@@ -40,14 +40,14 @@ pub(super) fn snapshot(status: &Status, axes: usize) -> Snapshot {
         lateness: vec![quantiles(&status.ticks), quantiles(&status.releases)],
         links: status.links.iter().map(link).collect(),
         peers: status.peers.iter().map(|peer| view(peer, axes, now)).collect(),
-        refused: status.door.map_or_else(Vec::new, |door| {
+        refused: status.admission.map_or_else(Vec::new, |door| {
             let refused = door.refusals().filter(|(_, count)| *count > 0);
             refused.map(|(cause, count): (Refusal, u64)| (cause.name(), count)).collect()
         }),
     }
 }
 
-/// What a terminal shows behind the progress: how late ticks are, and who is not there.
+/// What a terminal shows behind the progress: how late ticks are, and which peers are absent.
 pub(super) fn note(scene: &Scene, snapshot: &Snapshot) -> String {
     let late = snapshot.lateness.first().map_or_else(String::new, |ticks| format!("  ticks p99 {:.0} µs late", micros(ticks.p99)));
     let missing = snapshot.peers.iter().zip(&scene.peers).filter(|(peer, _)| matches!(peer.status, Shown::Absent | Shown::Stale));

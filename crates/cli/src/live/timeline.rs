@@ -13,7 +13,7 @@ use crate::realtime::KeyedLinks;
 /// Keys that links have from an instant on: the links by their numbers.
 pub(super) type Planned = VecDeque<(Instant, Vec<(usize, LinkKeys)>)>;
 
-/// How far a session is, for those who look on: shared between two threads, of which one writes.
+/// How far a session is, for onlookers: shared between two threads, of which one writes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Elapsed(Arc<AtomicU64>);
 

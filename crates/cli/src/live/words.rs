@@ -1,7 +1,5 @@
 //! A session in words.
 
-use std::fmt::Write as _;
-
 use cohaptic_harness::Ending;
 use cohaptic_harness::live::SeatStats;
 use cohaptic_live::Report;
@@ -14,10 +12,7 @@ use crate::run::words::{length, packets};
 
 pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     let mut text = format!("{}\n", scene.title);
-    // Writing to a string does not fail.
-    let mut line = |line: String| {
-        let _ = writeln!(text, "  {line}");
-    };
+    let mut line = |line: String| text.push_str(&format!("  {line}\n"));
     let summary = &report.summary;
     let lasted = Span(summary.duration);
     match summary.ending {
@@ -38,7 +33,7 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
         line(format!("{} ({}) ends at {}{seat}", peer.name, spec.kind.name(), position.join(", ")));
     }
     line(packets(summary));
-    if let Some((door, socket)) = &report.door {
+    if let Some((door, socket)) = &report.admission {
         line(format!("door at {}: {} let in, {} sent", socket.address, Counted(door.admitted, "sample"), door.sent));
         let refused: Vec<String> = door.refusals().filter(|(_, count)| *count > 0).map(|(cause, count)| format!("{count} {cause}")).collect();
         if !refused.is_empty() {

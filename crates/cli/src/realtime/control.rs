@@ -7,7 +7,7 @@ use cohaptic_control::{Board, Description, LinkEditor, ServeError, Server, Serve
 
 use crate::arguments::RealTimeArguments;
 use crate::failure::Failure;
-use crate::text_file;
+use crate::file;
 
 /// The board of a run, with a server before it if somebody asked for one.
 pub(crate) struct LiveControl {
@@ -23,7 +23,7 @@ impl LiveControl {
         let token = match &arguments.token_file {
             None => None,
             Some(path) => {
-                let text = text_file::read(path)?;
+                let text = file::read_text(path)?;
                 Some(text.trim().parse().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?)
             }
         };

@@ -1,6 +1,6 @@
 //! What the commands that run in real time share.
 
-mod asked;
+mod configured;
 mod control;
 mod editor;
 mod snapshot;
@@ -13,7 +13,7 @@ use cohaptic_realtime::{Pacing, Tolerance, Wishes};
 
 use crate::arguments::RealTimeArguments;
 
-pub(crate) use asked::AskedDelay;
+pub(crate) use configured::ConfiguredDelay;
 pub(crate) use control::{LiveControl, Look};
 pub(crate) use editor::{Edit, KeyedLinks};
 pub(crate) use snapshot::{counters, quantiles, quantiles_of};

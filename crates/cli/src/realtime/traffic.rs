@@ -9,7 +9,7 @@ use cohaptic_units::print::{Counted, Span};
 use cohaptic_units::visible_lines;
 use cohaptic_wan::{DropCause, LinkStats};
 
-use super::{AskedDelay, Look};
+use super::{ConfiguredDelay, Look};
 use crate::documents::micros;
 use crate::failure::Failure;
 
@@ -60,7 +60,7 @@ pub(crate) fn status(snapshot: &Snapshot) -> String {
 }
 
 /// `4000 offered, 3960 delivered, 40 dropped (loss), 8 on the way; mean delay 24.031 ms, asked 24.000 ms`. `beside` is what was dropped outside the link.
-pub(crate) fn carried(stats: &LinkStats, asked: &AskedDelay, beside: &[(&str, u64)]) -> String {
+pub(crate) fn carried(stats: &LinkStats, asked: &ConfiguredDelay, beside: &[(&str, u64)]) -> String {
     let mut text = format!("{} offered, {} delivered", stats.offered(), stats.delivered());
     let in_link = DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause)));
     for (cause, count) in in_link.chain(beside.iter().copied()).filter(|(_, count)| *count > 0) {

@@ -48,8 +48,8 @@ pub(super) fn conduct(
                 // Nobody can change anything.
                 Err(RecvTimeoutError::Disconnected) => thread::sleep(GLANCE),
             }
-            stop.store(interrupt::asked(), Ordering::Relaxed);
-            progress.say(realtime::status(&control.latest()));
+            stop.store(interrupt::requested(), Ordering::Relaxed);
+            progress.note(realtime::status(&control.latest()));
         }
         running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(failure)
     });

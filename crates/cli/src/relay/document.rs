@@ -8,11 +8,11 @@ use serde::Serialize;
 
 use super::setup::Setup;
 use crate::documents::{Counters, LatenessDocument, LinkDocument};
-use crate::realtime::AskedDelay;
+use crate::realtime::ConfiguredDelay;
 
 /// What `cohaptic relay --json` prints.
 #[derive(Serialize)]
-pub(super) struct Document {
+pub(super) struct RelayDocument {
     title: String,
     form: &'static str,
     duration_s: f64,
@@ -62,8 +62,8 @@ struct Held {
     bytes: u64,
 }
 
-impl Document {
-    pub(super) fn new(setup: &Setup, report: &Report, asked: &[AskedDelay], is_interrupted: bool) -> Self {
+impl RelayDocument {
+    pub(super) fn new(setup: &Setup, report: &Report, asked: &[ConfiguredDelay], is_interrupted: bool) -> Self {
         let totals = Totals::of(report);
         Self {
             title: setup.title.clone(),
@@ -91,7 +91,7 @@ impl Document {
 }
 
 impl RelayLink {
-    fn new(link: &LinkReport, asked: &AskedDelay) -> Self {
+    fn new(link: &LinkReport, asked: &ConfiguredDelay) -> Self {
         Self {
             link: LinkDocument { from: link.from.clone(), to: link.to.clone(), counters: Counters::new(&link.stats) },
             asked_mean_delay_s: asked.first.map(|delay| delay.as_secs_f64()),

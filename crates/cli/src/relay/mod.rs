@@ -9,7 +9,7 @@ mod words;
 use std::process::ExitCode;
 use std::sync::mpsc::channel;
 
-use cohaptic_realtime::udp::DoorConfig;
+use cohaptic_realtime::udp::EndpointConfig;
 use cohaptic_relay::{Relay, RelayError, RunOptions};
 
 use crate::arguments::RelayArguments;
@@ -17,14 +17,14 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::realtime::{KeyedLinks, LiveControl, say, some_length};
 use crate::{interrupt, output};
-use document::Document;
+use document::RelayDocument;
 use setup::Setup;
 
 /// Puts the emulator between programs, and says what it did.
 pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     let length = some_length(arguments.length)?;
     let mut setup = Setup::new(arguments)?;
-    let relay = Relay::bind(setup.config.clone(), DoorConfig::default()).map_err(failure)?;
+    let relay = Relay::bind(setup.config.clone(), EndpointConfig::default()).map_err(failure)?;
     setup.opened(relay.ports()).iter().for_each(|line| say(line));
     let (changes, wanted) = channel();
     let editor = KeyedLinks { keys: std::mem::take(&mut setup.keys), folder: setup.folder.clone(), changes };
@@ -38,9 +38,9 @@ pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     };
     let (report, edits) = conduct::conduct(relay, &setup, &options, &control, &wanted)?;
     let asked = setup.asked(&edits, report.elapsed);
-    let is_interrupted = interrupt::asked();
+    let is_interrupted = interrupt::requested();
     if arguments.json {
-        output::json(DocumentSchema::Relay, &Document::new(&setup, &report, &asked, is_interrupted))?;
+        output::json(DocumentSchema::RELAY, &RelayDocument::new(&setup, &report, &asked, is_interrupted))?;
     } else {
         output::text(&words::describe(&setup, &report, &asked))?;
     }

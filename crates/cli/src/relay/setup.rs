@@ -16,7 +16,7 @@ use crate::arguments::RelayArguments;
 use crate::failure::Failure;
 use crate::input;
 use crate::link::link_and_keys;
-use crate::realtime::AskedDelay;
+use crate::realtime::ConfiguredDelay;
 
 /// A relay, and what it is called.
 pub(super) struct Setup {
@@ -59,7 +59,7 @@ impl Setup {
             title: file.title.clone(),
             tolerance: Tolerance { limit: tolerance },
             nodes: file.programs.iter().map(|program| program.name.clone()).collect(),
-            pairs: keys.keys().map(|(from, to)| (node(*from), node(*to))).collect(),
+            pairs: keys.keys().map(|(from, to)| (NodeId::new(*from), NodeId::new(*to))).collect(),
             keys: keys.into_values().collect(),
             folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
             config: file.into(),
@@ -112,26 +112,22 @@ impl Setup {
 
     /// The name of a node.
     pub(super) fn name(&self, node: NodeId) -> &str {
-        self.nodes.get(node.0 as usize).map_or("", String::as_str)
+        self.nodes.get(node.index()).map_or("", String::as_str)
     }
 
     /// What each link was asked for, when a run is over in which each was changed so often from outside.
-    pub(super) fn asked(&self, edits: &[u64], lasted: Duration) -> Vec<AskedDelay> {
+    pub(super) fn asked(&self, edits: &[u64], lasted: Duration) -> Vec<ConfiguredDelay> {
         let end = Instant::ZERO.saturating_add(lasted);
         let asked = |((from, to), edits): (&(NodeId, NodeId), &u64)| {
             let begun = match &self.config.form {
-                Form::Mesh(mesh) => AskedDelay::of(mesh.links.between(from.0 as usize, to.0 as usize)),
-                Form::Proxy(proxy) => AskedDelay::of(if from.0 == 0 { &proxy.forth } else { &proxy.back }),
+                Form::Mesh(mesh) => ConfiguredDelay::of(mesh.links.between(from.index(), to.index())),
+                Form::Proxy(proxy) => ConfiguredDelay::of(if from.0 == 0 { &proxy.forth } else { &proxy.back }),
             };
             let planned = self.config.changes.iter().filter(|change| change.at <= end && (change.from, change.to) == (*from, *to)).count();
-            AskedDelay { changes: edits + planned as u64, ..begun }
+            ConfiguredDelay { changes: edits + planned as u64, ..begun }
         };
         self.pairs.iter().zip(edits).map(asked).collect()
     }
-}
-
-fn node(place: usize) -> NodeId {
-    NodeId(u32::try_from(place).unwrap_or(u32::MAX))
 }
 
 fn words(spec: &[OsString]) -> Result<Vec<String>, Failure> {

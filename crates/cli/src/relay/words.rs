@@ -7,7 +7,7 @@ use cohaptic_units::print::Counted;
 
 use super::document::{Totals, refused};
 use super::setup::Setup;
-use crate::realtime::{AskedDelay, carried, counts, lasted, late, notes};
+use crate::realtime::{ConfiguredDelay, carried, counts, lasted, late, notes};
 
 /// So many links are named.
 const MOST_LINKS: usize = 64;
@@ -15,7 +15,7 @@ const MOST_LINKS: usize = 64;
 /// So many of those over which nothing went.
 const MOST_IDLE: usize = 8;
 
-pub(super) fn describe(setup: &Setup, report: &Report, asked: &[AskedDelay]) -> String {
+pub(super) fn describe(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]) -> String {
     let mut text = format!("{}\n", setup.title);
     // Writing to a string does not fail.
     let mut line = |line: String| {
@@ -53,7 +53,7 @@ pub(super) fn describe(setup: &Setup, report: &Report, asked: &[AskedDelay]) -> 
     text
 }
 
-fn links(links: &[LinkReport], asked: &[AskedDelay], line: &mut impl FnMut(String)) {
+fn links(links: &[LinkReport], asked: &[ConfiguredDelay], line: &mut impl FnMut(String)) {
     let was_used = |link: &LinkReport| link.stats.offered() + link.counts.overload > 0;
     let (used, idle): (Vec<_>, Vec<_>) = links.iter().zip(asked).partition(|(link, _)| was_used(link));
     for (LinkReport { from, to, stats, counts }, asked) in used.iter().take(MOST_LINKS) {
@@ -89,7 +89,7 @@ fn at(port: &PortReport, line: &mut impl FnMut(String)) {
 /// What the system let wait at a port, where it is less than was asked for.
 fn small_buffer(ports: &[PortReport]) -> Option<String> {
     // The kernel grants twice what is asked for.
-    let wanted = 2 * cohaptic_realtime::udp::DoorConfig::default().receive_buffer;
+    let wanted = 2 * cohaptic_realtime::udp::EndpointConfig::default().receive_buffer;
     let least = ports.iter().map(|port| port.receive_buffer).filter(|granted| *granted > 0).min()?;
     (least < wanted).then(|| {
         format!(

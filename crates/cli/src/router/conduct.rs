@@ -15,15 +15,15 @@ use crate::arguments::RouterArguments;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::progress::Progress;
-use crate::realtime::{self, AskedDelay, Edit, LiveControl, Publisher};
+use crate::realtime::{self, ConfiguredDelay, Edit, LiveControl, Publisher};
 
 /// What a router did.
-pub(super) struct Ran {
+pub(super) struct RouterRun {
     pub(super) report: Report,
     pub(super) prepared: Prepared,
     pub(super) validity: Validity,
     /// What each link was asked for, from the left and then from the right.
-    pub(super) asked: Vec<AskedDelay>,
+    pub(super) asked: Vec<ConfiguredDelay>,
     pub(super) ending: Ending,
 }
 
@@ -44,7 +44,7 @@ pub(super) fn conduct(
     until: Option<Instant>,
     control: &LiveControl,
     wanted: Receiver<Edit>,
-) -> Result<Ran, Failure> {
+) -> Result<RouterRun, Failure> {
     const GLANCE: Duration = Duration::from_millis(50);
     let stop = AtomicBool::new(false);
     let progress = Progress::of_traffic(&crate::input::named(&arguments.file).display().to_string());
@@ -56,8 +56,8 @@ pub(super) fn conduct(
             .map_err(|error| Failure::System(format!("the router gets no thread: {error}")))?;
         while !running.is_finished() {
             thread::sleep(GLANCE);
-            stop.store(interrupt::asked(), Ordering::Relaxed);
-            progress.say(realtime::status(&control.latest()));
+            stop.store(interrupt::requested(), Ordering::Relaxed);
+            progress.note(realtime::status(&control.latest()));
         }
         Ok(running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     });
@@ -74,12 +74,12 @@ fn route(
     stop: &AtomicBool,
     wanted: Receiver<Edit>,
     mut publisher: Publisher,
-) -> Ran {
+) -> RouterRun {
     /// So soon is a change taken up.
     const LOOK: Duration = Duration::from_millis(20);
     let prepared = prepare_thread(&arguments.real_time.wishes());
     let tolerance = arguments.real_time.tolerance();
-    let mut asked: Vec<AskedDelay> = file.links.iter().flat_map(|link| [AskedDelay::of(&link.model); 2]).collect();
+    let mut asked: Vec<ConfiguredDelay> = file.links.iter().flat_map(|link| [ConfiguredDelay::of(&link.model); 2]).collect();
     let ended = router.run(stop, until, LOOK, |router| {
         for Edit { link: lane, model, .. } in wanted.try_iter() {
             let (Some(link), Some(asked)) = (file.links.get(lane / 2), asked.get_mut(lane)) else { continue };
@@ -93,8 +93,8 @@ fn route(
     });
     let ending = match ended {
         Err(error) => Ending::Failed(error),
-        Ok(()) if interrupt::asked() => Ending::Interrupted,
+        Ok(()) if interrupt::requested() => Ending::Interrupted,
         Ok(()) => Ending::Complete,
     };
-    Ran { report: router.report(), prepared, validity: tolerance.judge(router.lateness()), asked, ending }
+    RouterRun { report: router.report(), prepared, validity: tolerance.judge(router.lateness()), asked, ending }
 }

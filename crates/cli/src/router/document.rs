@@ -5,15 +5,15 @@ use cohaptic_realtime::Wish;
 use cohaptic_router::{Count, LaneSnapshot, Received, Written};
 use serde::Serialize;
 
-use super::conduct::{Ending, Ran};
+use super::conduct::{Ending, RouterRun};
 use super::status::elapsed;
 use crate::documents::{Counters, LatenessDocument, LinkDocument};
 use crate::output;
-use crate::realtime::AskedDelay;
+use crate::realtime::ConfiguredDelay;
 
 /// What `cohaptic router --json` prints.
 #[derive(Serialize)]
-pub(super) struct Document {
+pub(super) struct RouterDocument {
     title: String,
     duration_s: f64,
     ending: &'static str,
@@ -76,9 +76,9 @@ struct LaneDocument {
     changes: u64,
 }
 
-impl Document {
-    pub(super) fn new(file: &RouterFile, ran: &Ran) -> Self {
-        let Ran { report, prepared, validity, asked, ending } = ran;
+impl RouterDocument {
+    pub(super) fn new(file: &RouterFile, ran: &RouterRun) -> Self {
+        let RouterRun { report, prepared, validity, asked, ending } = ran;
         let counters = &report.counters;
         let side = |side: Side, device: &str| SideDocument {
             name: side.name(),
@@ -110,7 +110,7 @@ impl Document {
 }
 
 impl LaneDocument {
-    fn new(lane: &LaneSnapshot, asked: &AskedDelay) -> Self {
+    fn new(lane: &LaneSnapshot, asked: &ConfiguredDelay) -> Self {
         let (from, to) = (lane.from.name().to_owned(), lane.from.opposite().name().to_owned());
         Self {
             name: lane.link.clone(),

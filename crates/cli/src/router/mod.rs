@@ -18,8 +18,8 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::realtime::{KeyedLinks, LiveControl, say, some_length};
 use crate::{input, interrupt, output};
-use conduct::{Ending, Ran};
-use document::Document;
+use conduct::{Ending, RouterRun};
+use document::RouterDocument;
 
 /// Puts the emulator between two devices, and says what it did.
 pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
@@ -35,14 +35,14 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     let control = LiveControl::open(real_time, status::description(&file), Box::new(KeyedLinks { keys, folder, changes }))?;
     let ran = conduct::conduct(router, &file, arguments, until, &control, wanted)?;
     if arguments.json {
-        output::json(DocumentSchema::Router, &Document::new(&file, &ran))?;
+        output::json(DocumentSchema::ROUTER, &RouterDocument::new(&file, &ran))?;
     } else {
         output::text(&words::describe(&file, &ran))?;
     }
     match ran {
-        Ran { ending: Ending::Failed(error), .. } => Err(Failure::System(error.to_string())),
-        Ran { ending: Ending::Complete | Ending::Interrupted, .. } => {
-            Ok(if interrupt::asked() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+        RouterRun { ending: Ending::Failed(error), .. } => Err(Failure::System(error.to_string())),
+        RouterRun { ending: Ending::Complete | Ending::Interrupted, .. } => {
+            Ok(if interrupt::requested() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
         }
     }
 }

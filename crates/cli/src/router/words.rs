@@ -7,13 +7,13 @@ use cohaptic_router::{LaneSnapshot, Received, Written};
 use cohaptic_units::print::Counted;
 
 use super::attached;
-use super::conduct::{Ending, Ran};
+use super::conduct::{Ending, RouterRun};
 use super::status::elapsed;
 use crate::output;
-use crate::realtime::{AskedDelay, carried, counts, lasted, late, notes};
+use crate::realtime::{ConfiguredDelay, carried, counts, lasted, late, notes};
 
-pub(super) fn describe(file: &RouterFile, ran: &Ran) -> String {
-    let Ran { report, prepared, validity, asked, ending } = ran;
+pub(super) fn describe(file: &RouterFile, ran: &RouterRun) -> String {
+    let RouterRun { report, prepared, validity, asked, ending } = ran;
     let mut text = format!("{}\n", output::path(&file.file));
     // Writing to a string does not fail.
     let mut line = |line: String| {
@@ -54,7 +54,7 @@ fn side_in_words(received: &Received, written: &Written) -> String {
     text
 }
 
-fn lane_in_words(lane: &LaneSnapshot, asked: &AskedDelay) -> String {
+fn lane_in_words(lane: &LaneSnapshot, asked: &ConfiguredDelay) -> String {
     let (from, to) = (lane.from.name(), lane.from.opposite().name());
     format!("{}, {from} -> {to}: {}", lane.link, carried(&lane.stats, asked, &[("overload", lane.overload)]))
 }

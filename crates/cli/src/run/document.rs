@@ -9,7 +9,7 @@ use crate::output;
 
 /// What `cohaptic run --json` prints.
 #[derive(Serialize)]
-pub(super) struct Document {
+pub(super) struct RunDocument {
     title: String,
     duration_s: f64,
     ticks: u64,
@@ -28,7 +28,7 @@ pub(super) struct Document {
     pub(super) against: Option<Box<Self>>,
 }
 
-impl Document {
+impl RunDocument {
     pub(super) fn new(scene: &Scene, run: &Run) -> Self {
         let summary = &run.summary;
         let duration_s = summary.duration.as_secs_f64();

@@ -21,10 +21,10 @@ use cohaptic_units::Instant;
 use crate::arguments::RunArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
-use crate::output_file::write_file;
+use crate::file::write_file;
 use crate::progress::Progress;
 use crate::{failure, input, interrupt, output};
-use document::Document;
+use document::RunDocument;
 use words::describe;
 
 /// Runs a scene, or a scene and a variant of it, and says what happened.
@@ -57,17 +57,17 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let what = inputs.as_ref().map_or(What::Simulated, What::Replayed);
     let first = run_one(arguments, &scene, what, arguments.out.clone(), overrides)?;
     let second = match &variant {
-        Some(variant) if !interrupt::asked() => {
+        Some(variant) if !interrupt::requested() => {
             let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
             Some(run_one(arguments, variant, What::Simulated, arguments.out.as_ref().map(|out| out.join("against")), &both)?)
         }
         _ => None,
     };
     if arguments.scene.json {
-        let mut document = Document::new(&scene, &first);
+        let mut document = RunDocument::new(&scene, &first);
         document.replayed_otherwise = replayed_otherwise.unwrap_or_default();
-        document.against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| Box::new(Document::new(variant, run)));
-        output::json(DocumentSchema::Run, &document)?;
+        document.against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| Box::new(RunDocument::new(variant, run)));
+        output::json(DocumentSchema::RUN, &document)?;
     } else {
         let mut text = format!("{}\n{}", scene.title, describe(&scene, &first));
         if let Some((variant, run)) = variant.as_ref().zip(second.as_ref()) {
@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         output::text(&text)?;
         output::wrote([Some(&first), second.as_ref()].into_iter().flatten().flat_map(|run| &run.files));
     }
-    Ok(if interrupt::asked() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    Ok(if interrupt::requested() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
 /// The overrides of the scene: all `--set`, and then the seed.
@@ -168,6 +168,6 @@ impl Observer for &mut Watch<'_> {
 
     fn keep_going(&mut self, now: Instant) -> bool {
         self.progress.reach(now);
-        !interrupt::asked()
+        !interrupt::requested()
     }
 }

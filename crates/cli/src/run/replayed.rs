@@ -9,7 +9,7 @@ use cohaptic_units::visible_lines;
 
 use crate::arguments::RunArguments;
 use crate::failure::Failure;
-use crate::{input, output, text_file};
+use crate::{file, input, output};
 
 /// The most differences that are listed.
 const MOST: usize = 20;
@@ -17,7 +17,7 @@ const MOST: usize = 20;
 /// Reads `inputs.csv` of a session, and says in what the scene differs from that of the session; if it does, it is refused without `--force`.
 pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments, overrides: &[String]) -> Result<(Inputs, Vec<String>), Failure> {
     let path = &arguments.scene.scene;
-    let text = text_file::read(file)?;
+    let text = file::read_text(file)?;
     let unreadable = |error: InputsError| Failure::Input(format!("{}: {error}", output::path(file)));
     let of_the_session = RecordedScene::read(&text).map_err(unreadable)?;
     let differences: Vec<String> = match of_the_session {

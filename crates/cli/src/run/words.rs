@@ -1,7 +1,5 @@
 //! A run in words, with a plot.
 
-use std::fmt::Write as _;
-
 use cohaptic_harness::record::SANE_POSITION;
 use cohaptic_harness::{Ending, Summary};
 use cohaptic_scene::Scene;
@@ -15,10 +13,7 @@ use crate::terminal_plot;
 pub(super) fn describe(scene: &Scene, run: &Run) -> String {
     let mut text = String::new();
     let summary = &run.summary;
-    // Writing to a string does not fail.
-    let mut line = |line: String| {
-        let _ = writeln!(text, "{line}");
-    };
+    let mut line = |line: String| text.push_str(&format!("{line}\n"));
     if let Some(positions) = &run.positions {
         line(format!("position of each copy of the object{}", if scene.axes.count() > 1 { ", along x" } else { "" }));
         line(terminal_plot::draw(positions, 100.0, "cm").trim_end().to_owned());

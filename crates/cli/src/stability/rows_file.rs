@@ -32,7 +32,7 @@ impl RowsFile {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             Err(error) => return Err(Failure::File { verb: "read", path, error }),
         };
-        // What is not text is not whole either.
+        // Bytes that are not text are not whole either.
         let text = match std::str::from_utf8(&bytes) {
             Ok(text) => text,
             Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),

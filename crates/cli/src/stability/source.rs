@@ -39,8 +39,7 @@ impl Said<'_> {
             | FamilyError::Keys { .. }
             | FamilyError::Twice { .. }
             | FamilyError::Values { .. }
-            | FamilyError::Outside { .. }
-            | _) => {
+            | FamilyError::Outside { .. }) => {
                 let about =
                     |(option, range): &&(&'static str, KeyRange)| error.to_string().starts_with(&format!("{} ", range.key)).then_some(*option);
                 match self.ranges.iter().find_map(|range| about(&range)) {

@@ -22,6 +22,7 @@
 //! | `run: TEXT; for: TEXT` | the first in place of the second, for the same reason |
 //! | `needs: PROGRAM`, `needs: LINE` | where that program is not installed, or that line for `sh` fails, the block is not run |
 //! | `exit status: N N …` | of each `cohaptic` of the block in turn |
+//! | `source: PATH` | the block is that file of the project |
 //! | `figures vary` | of what is shown, numbers and units of time are not compared |
 //! | `figures vary: TEXT; TEXT` | the same, in lines that have one of these texts alone |
 //! | `lines vary: TEXT; TEXT` | of a line that has one of these texts nothing else is compared |
@@ -125,4 +126,23 @@ fn every_page_with_a_command_has_a_test() {
         }
     }
     assert!(missing.is_empty(), "pages with commands and without a test in crates/cli/tests/pages/main.rs: {missing:?}");
+}
+
+#[test]
+fn a_file_of_the_project_that_a_page_shows_is_that_file() {
+    let root = root();
+    let mut found = Vec::new();
+    markdown(&root, &mut found);
+    let mut shown = 0;
+    for page in found {
+        let text = fs::read_to_string(&page).unwrap();
+        for rest in text.split("<!-- source: ").skip(1) {
+            let (path, rest) = rest.split_once(" -->\n```").unwrap();
+            let (_, rest) = rest.split_once('\n').unwrap();
+            let (block, _) = rest.split_once("\n```").unwrap();
+            assert_eq!(block, fs::read_to_string(root.join(path)).unwrap().trim_end(), "{}: {path}", page.display());
+            shown += 1;
+        }
+    }
+    assert!(shown > 0, "no page shows a file");
 }

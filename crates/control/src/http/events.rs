@@ -15,7 +15,7 @@ use crate::views;
 
 /// How often it is looked whether there is something new.
 const EVERY: Duration = Duration::from_millis(100);
-/// After so many looks without anything new a comment says that the server is still there: 1 s.
+/// After this number of looks without anything new a comment says that the server is still there: 1 s.
 const QUIET: u32 = 10;
 
 struct Listener {

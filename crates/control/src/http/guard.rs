@@ -1,4 +1,4 @@
-//! Who is let in: requests that ask for this host and show the token; and what every answer says about itself.
+//! Which requests are let in: those that ask for this host and show the token; and what every answer says about itself.
 
 use std::net::{Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What is answered to whom.
+//! The routes and their answers.
 
 mod answer;
 mod change;

@@ -60,7 +60,7 @@ pub(super) async fn page() -> Response {
     PAGE.answer(StatusCode::OK)
 }
 
-/// For who has not shown the token: takes it from the tab, where the page left it, or asks for it.
+/// For a browser that has not shown the token: takes it from the tab, where the page left it, or asks for it.
 pub(super) fn door() -> Response {
     DOOR.answer(StatusCode::UNAUTHORIZED)
 }

@@ -1,4 +1,4 @@
-//! The routes without a socket: who is let in, what is answered, what reaches the editor.
+//! The routes without a socket: admission, answers, and what reaches the editor.
 
 use std::sync::{Arc, Mutex};
 

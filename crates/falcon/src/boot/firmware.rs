@@ -52,7 +52,6 @@ impl Firmware {
 
 /// A file that is no firmware.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum FirmwareError {
     /// It could not be read.
     #[error("the firmware {} cannot be read: {error}", path.display())]

@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::Firmware;
 use crate::ftdi::{self, PAYLOAD, STATUS};
 use crate::protocol::{Command, Framer, Leds, Report};
-use crate::transport::{Transport, TransportError};
+use crate::transport::{Request, Transport, TransportError};
 
 const HELLO: [u8; 3] = [0x0A, 0x43, 0x0D];
 const HELLO_ANSWER: [u8; 4] = [0x0A, 0x44, 0x2C, 0x0D];
@@ -47,9 +47,9 @@ impl Default for BootOptions {
 pub enum Progress {
     /// An attempt begins; counted from 1.
     Attempt(u32),
-    /// The boot loader is there, after so many greetings.
+    /// The boot loader is there, after this number of greetings.
     Greeted(u32),
-    /// So many bytes of so many are over and came back right.
+    /// `done` bytes of `of` are over and came back right.
     Loaded {
         /// Bytes that are over.
         done: usize,
@@ -64,7 +64,6 @@ pub enum Progress {
 
 /// Why the firmware did not get into the device.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
-#[non_exhaustive]
 pub enum BootError {
     /// The transport failed.
     #[error(transparent)]
@@ -207,8 +206,8 @@ fn greet<T: Transport + ?Sized>(transport: &mut T, options: &BootOptions) -> Res
                 break;
             }
         }
-        // What is left of a broken answer would spoil the next.
-        transport.control(ftdi::Request::Reset, ftdi::PURGE_RX)?;
+        // The rest of a broken answer would spoil the next.
+        transport.control(Request::Reset, ftdi::PURGE_RX)?;
     }
     Err(BootError::NoBootLoader { greetings: options.greetings.max(1) })
 }

@@ -71,7 +71,6 @@ impl<const A: usize> Axes<A> {
 
 /// Axes that cannot be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
-#[non_exhaustive]
 pub enum AxesError {
     /// One is named twice.
     #[error("the axis {0:?} is named twice: each axis of the device can be one of the peer's")]

@@ -1,7 +1,6 @@
 //! A device with a thread of its own.
 
 use core::cell::Cell;
-use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::io;
@@ -31,21 +30,14 @@ struct Shared {
 }
 
 /// How the thread ended.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Error)]
 pub enum Ended {
     /// It was told to stop, and did so in good order.
+    #[error("stopped")]
     Stopped,
     /// The driver could not go on.
+    #[error(transparent)]
     Failed(DriverError),
-}
-
-impl fmt::Display for Ended {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Stopped => f.write_str("stopped"),
-            Self::Failed(error) => error.fmt(f),
-        }
-    }
 }
 
 /// A Falcon that somebody's hand moves, driven by a thread.
@@ -186,7 +178,6 @@ fn run<T: Transport, const A: usize>(mut turns: Turns<T, A>, shared: &Shared) ->
 
 /// The device could not be started.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum StartError {
     /// A number of the configuration makes no sense.
     #[error(transparent)]

@@ -72,7 +72,6 @@ impl<const A: usize> DeviceConfig<A> {
 
 /// A configuration that makes no sense.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
-#[non_exhaustive]
 pub enum DeviceConfigError {
     /// No rate at which a Falcon can be driven.
     #[error("the period of the loop is {0:?}, not within 250 us to 20 ms: 1 ms is what USB gives")]

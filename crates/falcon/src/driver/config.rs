@@ -22,7 +22,7 @@ pub struct DriverConfig {
     pub velocity_bandwidth: f64,
     /// Reports in a row that must say that all encoders are homed until it is believed. One such report may be a bit that flipped on the wire.
     pub homing_confirmations: u32,
-    /// The fastest that an encoder can turn \[counts per ms\]; what is faster is taken for a byte that changed on the wire.
+    /// The fastest that an encoder can turn \[counts per ms\]; a faster one is taken for a byte that changed on the wire.
     pub fastest_encoder: u16,
     /// How far from the base the grip must be pulled \[m, frame of the device\] to switch forces on after homing; `None` switches them on at once.
     pub arm_beyond: Option<f64>,
@@ -77,7 +77,6 @@ impl Default for DriverConfig {
 
 /// A configuration that makes no sense.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
-#[non_exhaustive]
 pub enum DriverConfigError {
     /// A limit of force.
     #[error(transparent)]
@@ -89,7 +88,7 @@ pub enum DriverConfigError {
         name: &'static str,
         /// What was given.
         span: Duration,
-        /// What is allowed.
+        /// The allowed range.
         most: Duration,
     },
     /// The bandwidth of the velocity.

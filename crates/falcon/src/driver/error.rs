@@ -9,7 +9,6 @@ use crate::transport::TransportError;
 
 /// The driver cannot go on.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
-#[non_exhaustive]
 pub enum DriverError {
     /// A number of the configuration makes no sense.
     #[error(transparent)]

@@ -312,7 +312,7 @@ impl<T: Transport> Driver<T> {
         }
     }
 
-    /// What is known now.
+    /// The status of the device now.
     #[must_use]
     pub const fn status(&self) -> &Status {
         &self.status

@@ -1,4 +1,4 @@
-//! What is known of a device.
+//! The status of a device.
 
 use cohaptic_units::Instant;
 
@@ -66,7 +66,7 @@ pub struct Reading {
     pub velocity: Triple,
 }
 
-/// What is known after an exchange.
+/// The status after an exchange.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Status {
     /// Where the device stands.

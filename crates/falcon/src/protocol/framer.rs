@@ -79,7 +79,7 @@ impl Framer {
         self.count
     }
 
-    /// Throws away what is held, as garbage: after a purge nothing will complete it.
+    /// Throws the held bytes away, as garbage: after a purge nothing will complete it.
     pub fn reset(&mut self) {
         self.garbage += self.count as u64;
         self.count = 0;

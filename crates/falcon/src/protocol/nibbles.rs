@@ -1,6 +1,6 @@
 //! Sixteen-bit numbers as four letters.
 
-/// What is added to a nibble: 0 travels as `A`, 15 as `P`.
+/// The offset of a nibble: 0 travels as `A`, 15 as `P`.
 pub const BASE: u8 = b'A';
 
 /// Four letters for a number, least significant nibble first.

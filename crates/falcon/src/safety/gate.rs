@@ -6,7 +6,7 @@ use super::{Limits, LimitsError, MotorCounts};
 use crate::calibration::{Calibration, MOTOR_LIMIT};
 use crate::kinematics::{Jacobian, Triple};
 
-/// What is known at the moment at which a force is to go out.
+/// The state of the device at the moment at which a force is to go out.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moment {
     /// Now.

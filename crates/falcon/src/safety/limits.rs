@@ -59,7 +59,6 @@ impl Default for Limits {
 
 /// A limit that makes no sense.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
-#[non_exhaustive]
 pub enum LimitsError {
     /// Beyond any Falcon.
     #[error("the limit of force is {0} N, not within 0 to 20: the device is said to give 8")]

@@ -1,4 +1,4 @@
-//! What is not known of the device, and what a simulation is to be.
+//! The unknowns of the device, and the settings of a simulation.
 
 use core::time::Duration;
 

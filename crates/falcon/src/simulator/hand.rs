@@ -55,14 +55,6 @@ impl Waypoints {
         Self::new(path.map(|(ms, z)| (begin + Duration::from_millis(ms), [0.0, 0.0, z])))
     }
 
-    /// With another stiffness \[N/m\] and damping \[N·s/m\]; 600 and 15 otherwise.
-    #[must_use]
-    pub const fn with_grip(mut self, stiffness: f64, damping: f64) -> Self {
-        self.stiffness = stiffness;
-        self.damping = damping;
-        self
-    }
-
     /// Sways around the last point once it is there, with these amplitudes \[m\] and that frequency \[Hz\].
     #[must_use]
     pub const fn swaying(mut self, amplitude: Triple, frequency: f64) -> Self {

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! [`Simulator`] knows no clock: time is an argument. [`SimulatedTransport`] gives it one, virtual or that of the machine, and is what a driver is given.
-//! What is not known of the device is a number of [`SimulatorConfig`].
+//! Each unknown of the device is a number of [`SimulatorConfig`].
 
 mod chip;
 mod config;
@@ -29,9 +29,10 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
-use crate::ftdi::{BAUD_HANDSHAKE, BAUD_RUNNING, DTR_HIGH, DTR_LOW, PURGE_RX, PURGE_TX, Request};
+use crate::ftdi::{BAUD_HANDSHAKE, BAUD_RUNNING, DTR_HIGH, DTR_LOW, PURGE_RX, PURGE_TX};
 use crate::kinematics::Triple;
 use crate::protocol::{Buttons, Leds};
+use crate::transport::Request;
 use chip::Chip;
 use encoders::Encoders;
 use faults::Dice;

@@ -7,8 +7,8 @@ use cohaptic_units::Instant;
 
 use super::Simulator;
 use crate::clock::WallClock;
-use crate::ftdi::{PACKET, PAYLOAD, Request, strip_status};
-use crate::transport::{Transport, TransportError};
+use crate::ftdi::{PACKET, PAYLOAD, strip_status};
+use crate::transport::{Request, Transport, TransportError};
 
 /// How long any call takes in virtual time. A driver that never sleeps still gets on.
 const CALL: Duration = Duration::from_micros(20);

@@ -2,9 +2,10 @@
 
 use core::time::Duration;
 
-use cohaptic_falcon::ftdi::{self, PACKET, Request};
+use cohaptic_falcon::ftdi::{self, PACKET};
 use cohaptic_falcon::protocol::{Report, nibbles};
 use cohaptic_falcon::simulator::{Activity, Simulator, SimulatorConfig, StillHand, Waypoints};
+use cohaptic_falcon::transport::Request;
 use cohaptic_units::Instant;
 
 use crate::common::{running, seconds};

@@ -40,6 +40,10 @@ struct Block {
     object: Motions,
     /// The mean of the samples held.
     mean: Motions,
+    /// By how much those have moved on since they were sent.
+    lead: Eight,
+    /// What the law remembers: the numbers of one lane after those of another.
+    memory: Vec<f64>,
     hand: Eight,
     /// KC and BC.
     coupling: Gains<Eight>,
@@ -146,7 +150,7 @@ impl<const A: usize> Blocks<A> {
         let mut blocks = Vec::with_capacity(A * places.blocks());
         let mut late = Vec::with_capacity(A * places.blocks());
         for axis in 0..A {
-            blocks.extend((0..places.blocks()).map(|_| Block::empty(axis)));
+            blocks.extend((0..places.blocks()).map(|_| Block::empty(axis, Law::<f64>::memory(&laws[0]))));
             late.extend((0..places.blocks()).map(|_| Late { computed: Forces::NONE, is_late: Mask::NONE }));
             for (spot, peer, run) in places.all(axis) {
                 let (spec, config) = (&scenes[run].peers[peer], scenes[run].peer_config(peer));
@@ -205,6 +209,17 @@ impl<const A: usize> Blocks<A> {
             let mean = &mut self.blocks[block].mean;
             mean.position.0[lane..].fill(x[L - 1]);
             mean.velocity.0[lane..].fill(v[L - 1]);
+        }
+    }
+
+    /// Replaces by how much the samples that a peer holds have moved on, in all runs.
+    pub(super) fn set_lead<const L: usize>(&mut self, axis: usize, peer: usize, lead: [f64; L]) {
+        for run in 0..L {
+            let Spot { block, lane } = self.places.spot(axis, peer, run);
+            self.blocks[block].lead.0[lane] = lead[run];
+            if peer + 1 == self.places.peers && run + 1 == L {
+                self.blocks[block].lead.0[lane..].fill(lead[run]);
+            }
         }
     }
 
@@ -300,22 +315,25 @@ fn distances<const L: usize>(mut low: Eight, mut high: Eight) -> [f64; L] {
 
 /// [`Block::tick`]. By references of their own the compiler knows that nothing that is written is read in another lane.
 #[inline(always)]
-fn tick_of_lanes<const TIED: bool>(
+fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool>(
     devices: &mut Motions,
     objects: &mut Motions,
-    means: &Motions,
+    (means, leads): (&Motions, &Eight),
+    memory: &mut [f64],
     hands: &Eight,
     (coupling, grasps): (&Gains<Eight>, &Mask),
     device_map: &StepMap<Eight>,
     common: &Common,
 ) {
+    let remembered = memory.len() / WIDTH;
     for lane in 0..WIDTH {
         let (mut device, mut object) = (lane_of(devices, lane), lane_of(objects, lane));
         let gains = coupling.map(|gain| gain.0[lane]);
         let touch = |apart| grasps.keep(lane, grasp(&gains, apart));
-        let seen = Observation { own: object, mean: lane_of(means, lane) };
+        let seen = Observation { own: object, mean: lane_of(means, lane), lead: leads.0[lane] };
+        let memory = if REMEMBERS { &mut memory[lane * remembered..(lane + 1) * remembered] } else { &mut [] };
         let law = common.law.map(|coefficient| coefficient.0[lane]);
-        let (coupling, on_object) = forces(device, touch, &seen, &law, &mut []);
+        let (coupling, on_object) = forces(device, touch, &seen, &law, memory);
         let map = device_map.map(|coefficient| coefficient.0[lane]);
         if TIED {
             map.advance(&mut device, on_device(hands.0[lane], coupling));
@@ -329,13 +347,15 @@ fn tick_of_lanes<const TIED: bool>(
 }
 
 impl Block {
-    fn empty(axis: usize) -> Self {
+    fn empty(axis: usize, memory: usize) -> Self {
         let zero = Eight::ZERO;
         let rest = Motion { position: zero, velocity: zero };
         Self {
             device: rest,
             object: rest,
             mean: rest,
+            lead: zero,
+            memory: vec![0.0; memory * WIDTH],
             hand: zero,
             coupling: Gains { stiffness: zero, damping: zero },
             grasps: Mask::NONE,
@@ -365,17 +385,19 @@ impl Block {
     /// Forces and motion of a tick in one pass, where nothing but grasps and the law acts.
     #[inline(always)]
     fn tick(&mut self, common: &Common) {
-        let Self { device, object, mean, hand, coupling, grasps, device_map, .. } = self;
-        if self.is_tied {
-            tick_of_lanes::<true>(device, object, mean, hand, (coupling, grasps), device_map, common);
-        } else {
-            tick_of_lanes::<false>(device, object, mean, hand, (coupling, grasps), device_map, common);
+        let Self { device, object, mean, lead, memory, hand, coupling, grasps, device_map, .. } = self;
+        let (seen, touch) = ((&*mean, &*lead), (&*coupling, &*grasps));
+        match (self.is_tied, memory.is_empty()) {
+            (true, true) => tick_of_lanes::<true, false>(device, object, seen, memory, hand, touch, device_map, common),
+            (false, true) => tick_of_lanes::<false, false>(device, object, seen, memory, hand, touch, device_map, common),
+            (true, false) => tick_of_lanes::<true, true>(device, object, seen, memory, hand, touch, device_map, common),
+            (false, false) => tick_of_lanes::<false, true>(device, object, seen, memory, hand, touch, device_map, common),
         }
     }
 
     /// The forces of a tick without walls.
     #[inline(always)]
-    fn forces(&self, law: &BuiltIn<Eight>) -> Forces {
+    fn forces(&mut self, law: &BuiltIn<Eight>) -> Forces {
         let mut coupling = Eight::ZERO;
         for lane in 0..WIDTH {
             coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), self.apart(lane));
@@ -388,9 +410,11 @@ impl Block {
             }
         }
         let mut on_copy = Eight::ZERO;
+        let remembered = self.memory.len() / WIDTH;
         for lane in 0..WIDTH {
-            let seen = Observation { own: lane_of(&self.object, lane), mean: lane_of(&self.mean, lane) };
-            let coordination = law.map(|coefficient| coefficient.0[lane]).force(&seen, &mut []);
+            let seen = Observation { own: lane_of(&self.object, lane), mean: lane_of(&self.mean, lane), lead: self.lead.0[lane] };
+            let memory = &mut self.memory[lane * remembered..(lane + 1) * remembered];
+            let coordination = law.map(|coefficient| coefficient.0[lane]).force(&seen, memory);
             on_copy.0[lane] = on_object(coupling.0[lane], coordination);
         }
         Forces { coupling, on_object: on_copy }

@@ -9,18 +9,19 @@
 
 mod blocks;
 mod eight;
+mod lead;
 mod place;
 mod samples;
 mod shape;
 mod side_by_side;
 
-use cohaptic_peer::coordination::BuiltIn;
+use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkStats;
 use pulp::NullaryFnOnce;
 
-use crate::simulation::BREATH;
+use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
 use crate::summary::{Ending, LinkSummary, PeerSummary, Summary};
 use blocks::{Blocks, Moved};
 use place::Places;
@@ -35,6 +36,8 @@ pub(crate) struct Arrays<'a, const A: usize, const L: usize> {
     shape: Shape,
     blocks: Blocks<A>,
     samples: Samples<A, L>,
+    /// Up to which age samples are extrapolated in each run \[s\], if the law does that.
+    horizons: Option<[f64; L]>,
     /// The tick at which each peer sends next.
     next_send: Vec<u64>,
     earliest_send: u64,
@@ -62,6 +65,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         };
         Self {
             blocks: Blocks::new(places, &scenes, &laws),
+            horizons: Law::<f64>::horizon(&laws[0]).is_some().then(|| laws.map(|law| Law::<f64>::horizon(&law).unwrap_or(0.0))),
             scenes,
             samples,
             earliest_send: shape.phases.iter().copied().min().unwrap_or(u64::MAX),
@@ -80,7 +84,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         let mut tick = 0;
         loop {
             let now = Instant::from_nanos(tick * tick_nanos);
-            if tick > 0 && tick % u64::from(BREATH) == 0 {
+            if tick > 0 && tick % u64::from(INSTANTS_BETWEEN_QUESTIONS) == 0 {
                 let before = Instant::from_nanos((tick - 1) * tick_nanos);
                 if !keep_going(before) {
                     self.end_all(tick, |_| Ending::Interrupted(before));
@@ -115,6 +119,9 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             Samples::Single(samples) => samples.deliver(tick),
         }
         self.blocks.move_hands(now);
+        if let Some(horizons) = &self.horizons {
+            self.extrapolate(now, *horizons);
+        }
         let Moved { discrepancy, finite } = self.motion();
         for (largest, discrepancy) in self.max_discrepancy.iter_mut().zip(discrepancy) {
             *largest = largest.max(discrepancy);
@@ -128,6 +135,22 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         let motion = Motion { samples: &mut self.samples, blocks: &mut self.blocks };
         // With wide registers a run of three or ten peers over constant delays takes six tenths of the time.
         self.processor.dispatch(motion)
+    }
+
+    /// Leads of a tick.
+    #[inline(never)]
+    fn extrapolate(&mut self, now: Instant, horizons: [f64; L]) {
+        let Shape { tick, send_every, phases, .. } = &self.shape;
+        let sent = |sender: usize, sequence: u64| Instant::from_nanos((phases[sender] + sequence * send_every) * nanos(*tick));
+        for peer in 0..self.shape.peers {
+            for axis in 0..A {
+                let lead = std::array::from_fn(|run| match &self.samples {
+                    Samples::Broadcast(samples) => samples.lead((axis, peer, run), now, horizons[run], sent),
+                    Samples::Single(samples) => samples.lead((axis, peer, run), now, horizons[run], sent),
+                });
+                self.blocks.set_lead::<L>(axis, peer, lead);
+            }
+        }
     }
 
     fn send(&mut self, tick: u64, now: Instant) {

@@ -14,6 +14,8 @@ use crate::plan::{Plan, Ticking};
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Shape {
     pub(super) law: Coordination,
+    /// How many numbers it remembers along each axis.
+    pub(super) memory: usize,
     pub(super) peers: usize,
     pub(super) axes: usize,
     pub(super) tick: Duration,
@@ -31,9 +33,10 @@ const LONGEST: Duration = Duration::from_secs(365 * 86_400);
 
 impl Shape {
     /// The shape of a scene that can be run in arrays: everybody ticks together, nothing changes on the way, and over the links nothing waits. `None` for
-    /// any other, and for strategies that are no law of the registry without memory.
+    /// any other, and for strategies that are no law of the registry.
     pub(crate) fn of(scene: &Scene, plan: &Plan, strategies: &impl Strategies) -> Option<(Self, BuiltIn)> {
-        let law = strategies.law(scene).filter(|law| Law::<f64>::memory(law) == 0)?;
+        // All tick together, so that all have one law.
+        let law = strategies.law(scene, 0)?;
         let clock = scene.peers.first()?.clock;
         let fits = plan.ticking == Ticking::Lockstep
             && !plan.general_links
@@ -46,6 +49,7 @@ impl Shape {
         fits.then(|| {
             let shape = Self {
                 law: scene.coordination.strategy,
+                memory: Law::<f64>::memory(&law),
                 peers: scene.peers.len(),
                 axes: plan.axes.count(),
                 tick: clock.tick,

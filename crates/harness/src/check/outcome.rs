@@ -4,7 +4,6 @@ use cohaptic_scene::Bounds;
 
 /// What was expected, what came out, and whether that is as expected.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub struct Outcome {
     /// The section of `[expect]`: `stable`, `discrepancy`, `position`, `travel`, `loss` or `delay`.
     pub key: &'static str,

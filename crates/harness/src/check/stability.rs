@@ -18,11 +18,10 @@ use crate::disturbance::Disturbance;
 use crate::observer::NoObserver;
 use crate::plan::{Model, Plan};
 use crate::simulation::Simulation;
-use crate::world::{Nobody, Step, Watch, World};
+use crate::world::{NoRemote, Step, Watch, World};
 
 /// What a disturbance did.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum Stability {
     /// It died out.
     Stable,
@@ -77,7 +76,7 @@ pub fn stability(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) 
 
 fn pair<const A: usize>(scene: &Scene, model: Model, plan: &Plan) -> (World<A, LawStrategy<A>>, World<A, LawStrategy<A>>) {
     let disturbed = Simulation::disturbed(scene, model, Disturbance { size: SIZE });
-    (Simulation::new(scene, model).world(plan, Nobody), disturbed.world(plan, Nobody))
+    (Simulation::new(scene, model).world(plan, NoRemote), disturbed.world(plan, NoRemote))
 }
 
 /// Runs the two side by side.

@@ -73,7 +73,7 @@ impl<const A: usize> HandDevice<A> {
         self.read = state;
     }
 
-    /// What is felt until now is that from which the share counts.
+    /// The share counts from the force felt until now.
     pub(crate) fn keep(&mut self) {
         self.before = self.state();
     }

@@ -51,7 +51,7 @@ pub(crate) struct Fade {
 }
 
 impl Fade {
-    /// Of somebody who has never been heard.
+    /// Of a peer that has never been heard.
     pub(crate) const fn unheard(over: Duration) -> Self {
         Self { weight: Ramp::down(over), share: Ramp::up(over) }
     }
@@ -64,7 +64,7 @@ impl Fade {
         self.weight.turn(at, true);
     }
 
-    /// What is held has moved to another place: the way there begins now, unless nobody feels it.
+    /// The held sample has moved to another place: the way there begins now, unless nobody feels it.
     pub(crate) fn moved(&mut self, at: Instant) {
         if self.weight.value(at) > 0.0 {
             self.share.restart(at);

@@ -1,15 +1,14 @@
 //! What came into a session from outside.
 
-use std::path::Path;
-
 use cohaptic_peer::State;
-use cohaptic_scene::{LinkKeys, Scene};
+use cohaptic_scene::LinkKeys;
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
-use super::recorded::is_about_the_scene;
-use super::rows::{HEADER, read_row};
 use crate::observer::StateRow;
+
+/// The first line of a record of inputs.
+pub const HEADER: &str = "at_ns,input,peer,to,value";
 
 /// Something that came into a session, and when it counts.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +19,7 @@ pub struct InputRow<'a> {
     pub what: Input<'a>,
 }
 
-/// What came in. Peers are named by their place in [`Scene::peers`].
+/// What came in. Peers are named by their place in [`Scene::peers`](cohaptic_scene::Scene::peers).
 #[derive(Clone, Copy, Debug)]
 pub enum Input<'a> {
     /// A sample from the process of a peer, as it came.
@@ -67,7 +66,6 @@ pub(crate) enum Recorded {
 
 /// Why a text is no record of the inputs of a scene. Lines are counted from 1, the header being line 1.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum InputsError {
     /// The first line is not the header.
     #[error("line 1: found \"{found}\", expected the header \"{HEADER}\"")]
@@ -100,33 +98,6 @@ pub enum InputsError {
 }
 
 impl Inputs {
-    /// Reads what [`crate::record::InputRecorder`] wrote for the same scene. `keys`: those of any link of the scene, from [`cohaptic_scene::link_keys`].
-    ///
-    /// # Errors
-    ///
-    /// [`InputsError`] for anything else.
-    pub fn read(text: &str, scene: &Scene, keys: &LinkKeys) -> Result<Self, InputsError> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let mut lines = text.lines();
-        let header = lines.next().unwrap_or_default();
-        if header != HEADER {
-            return Err(InputsError::Header { found: shorten(header) });
-        }
-        let folder = scene.file.parent().unwrap_or_else(|| Path::new(""));
-        let mut rows: Vec<(Instant, Recorded)> = Vec::new();
-        // What they say of their scene is for [`RecordedScene`](super::RecordedScene).
-        for (line, row) in (2..).zip(lines).skip_while(|(_, row)| is_about_the_scene(row)) {
-            let (at, what) = read_row(line, row, scene, keys, folder)?;
-            if let Some((before, last)) = rows.last()
-                && (at < *before || *last == Recorded::End)
-            {
-                return Err(InputsError::Order { line, at, before: *before });
-            }
-            rows.push((at, what));
-        }
-        Ok(Self { rows })
-    }
-
     /// How many there are.
     #[must_use]
     pub fn len(&self) -> usize {

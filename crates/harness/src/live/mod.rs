@@ -1,4 +1,4 @@
-//! A scene some of whose peers live elsewhere: in other processes, or with their device in somebody's hand.
+//! A scene some of whose peers are remote: in other processes, or with their device in somebody's hand.
 //!
 //! [`LiveScene`] is a state machine. Whoever drives it hands in what comes from outside with the instant at which it came, lets time pass, and sends on what
 //! the network has delivered. It reads no clock and touches no socket: driven by the clock of the wall it is a live session, driven by the recorded
@@ -6,24 +6,24 @@
 //!
 //! What a peer's silence does to the others is written in `docs/model.md`.
 
-mod attendance;
 mod device;
 mod fade;
 mod inputs;
+mod presence;
 mod recorded;
 mod replay;
 mod rows;
 mod scene;
 mod seat;
 
-pub(crate) use attendance::Attendance;
 pub(crate) use device::{HandDevice, UnsimulatedDevice};
+pub(crate) use presence::RemotePeers;
 
-pub use attendance::{Datagram, Transmit};
 pub use device::LiveDevice;
-pub use inputs::{Input, InputRow, Inputs, InputsError};
+pub use inputs::{HEADER, Input, InputRow, Inputs, InputsError};
+pub use presence::{Datagram, Transmit};
 pub use recorded::{RecordedScene, SceneDifference};
 pub use replay::replay;
-pub use rows::{HEADER, InputLine};
+pub use rows::InputLine;
 pub use scene::{LiveScene, PeerState};
 pub use seat::{Presence, SampleError, SeatStats};

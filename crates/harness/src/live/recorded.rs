@@ -13,9 +13,9 @@ use core::fmt;
 use std::collections::BTreeMap;
 
 use cohaptic_scene::{Fingerprint, Scene, SceneContent};
+use cohaptic_units::print::csv_quoted;
 
-use super::inputs::{InputsError, shorten};
-use super::rows::HEADER;
+use super::inputs::{HEADER, InputsError, shorten};
 
 /// The scene with which inputs were recorded.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -29,7 +29,6 @@ pub struct RecordedScene {
 
 /// Something in which a scene differs from the one that was recorded. Values are TOML; `None`: it is not there.
 #[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum SceneDifference {
     /// A key.
     Key {
@@ -176,10 +175,7 @@ impl fmt::Display for RecordedScene {
         writeln!(f, "{HEADER}")?;
         writeln!(f, "0,program,,,{}", self.program)?;
         writeln!(f, "0,scene,,,{}", self.fingerprint)?;
-        let mut row = |kind: &str, name: &str, value: &str| {
-            let line = SceneContent::line(name, value).replace('"', "\"\"");
-            writeln!(f, "0,{kind},,,\"{line}\"")
-        };
+        let mut row = |kind: &str, name: &str, value: &str| writeln!(f, "0,{kind},,,{}", csv_quoted(&SceneContent::line(name, value)));
         for (name, bytes) in &self.content.files {
             row("file", name, &format!("\"{bytes}\""))?;
         }

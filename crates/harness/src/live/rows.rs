@@ -18,11 +18,10 @@ use std::path::Path;
 use cohaptic_peer::State;
 use cohaptic_scene::{LinkKeys, PeerKind, Scene};
 use cohaptic_units::Instant;
+use cohaptic_units::print::csv_quoted;
 
-use super::inputs::{Input, InputRow, InputsError, Recorded, shorten};
-
-/// The first line of a record of inputs.
-pub const HEADER: &str = "at_ns,input,peer,to,value";
+use super::inputs::{HEADER, Input, InputRow, Inputs, InputsError, Recorded, shorten};
+use super::recorded::is_about_the_scene;
 
 /// A row as a line, without the newline.
 #[derive(Clone, Copy, Debug)]
@@ -53,9 +52,38 @@ impl fmt::Display for InputLine<'_> {
                 }
                 Ok(())
             }
-            Input::Link { from, to, keys } => write!(f, "link,{},{},\"{}\"", name(*from), name(*to), keys.to_string().replace('"', "\"\"")),
+            Input::Link { from, to, keys } => write!(f, "link,{},{},{}", name(*from), name(*to), csv_quoted(&keys.to_string())),
             Input::End => f.write_str("end,,,"),
         }
+    }
+}
+
+impl Inputs {
+    /// Reads what [`crate::record::InputRecorder`] wrote for the same scene. `keys`: those of any link of the scene, from [`cohaptic_scene::link_keys`].
+    ///
+    /// # Errors
+    ///
+    /// [`InputsError`] for anything else.
+    pub fn read(text: &str, scene: &Scene, keys: &LinkKeys) -> Result<Self, InputsError> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let mut lines = text.lines();
+        let header = lines.next().unwrap_or_default();
+        if header != HEADER {
+            return Err(InputsError::Header { found: shorten(header) });
+        }
+        let folder = scene.file.parent().unwrap_or_else(|| Path::new(""));
+        let mut rows: Vec<(Instant, Recorded)> = Vec::new();
+        // What they say of their scene is for [`RecordedScene`](super::RecordedScene).
+        for (line, row) in (2..).zip(lines).skip_while(|(_, row)| is_about_the_scene(row)) {
+            let (at, what) = read_row(line, row, scene, keys, folder)?;
+            if let Some((before, last)) = rows.last()
+                && (at < *before || *last == Recorded::End)
+            {
+                return Err(InputsError::Order { line, at, before: *before });
+            }
+            rows.push((at, what));
+        }
+        Ok(Self { rows })
     }
 }
 
@@ -67,7 +95,7 @@ struct Cells<'a> {
 
 const COLUMNS: [&str; 5] = ["at_ns", "input", "peer", "to", "value"];
 
-pub(super) fn read_row(line: usize, row: &str, scene: &Scene, keys: &LinkKeys, folder: &Path) -> Result<(Instant, Recorded), InputsError> {
+fn read_row(line: usize, row: &str, scene: &Scene, keys: &LinkKeys, folder: &Path) -> Result<(Instant, Recorded), InputsError> {
     let mut cells = [""; 5];
     let mut rest = row.splitn(5, ',');
     for cell in &mut cells {

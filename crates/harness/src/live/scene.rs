@@ -9,9 +9,9 @@ use cohaptic_scene::{Axes, LinkKeys, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, LinkStats};
 
-use super::attendance::{Attendance, Transmit};
 use super::device::LiveDevice;
 use super::inputs::{Input, InputRow};
+use super::presence::{RemotePeers, Transmit};
 use super::seat::{Presence, SampleError, SeatStats};
 use crate::observer::Observer;
 use crate::plan::{Model, Plan};
@@ -21,7 +21,7 @@ use crate::world::{Step, Watch, World};
 
 const NANOSECOND: Duration = Duration::from_nanos(1);
 
-/// A scene in the middle of a session, some of whose peers may live elsewhere.
+/// A scene in the middle of a session, some of whose peers may be remote.
 ///
 /// The driver hands in samples with [`LiveScene::handle_sample`], each with the logical instant at which it came, asks with [`LiveScene::poll_timeout`] when to
 /// come back, calls [`LiveScene::handle_timeout`] then, and after every call drains [`LiveScene::poll_transmit`]. Being late costs nothing but lateness: what
@@ -40,9 +40,9 @@ pub struct LiveScene {
 
 /// A world with as many axes as the scene has.
 enum AnyWorld {
-    One(Box<World<1, LawStrategy<1>, Attendance<1>>>),
-    Two(Box<World<2, LawStrategy<2>, Attendance<2>>>),
-    Three(Box<World<3, LawStrategy<3>, Attendance<3>>>),
+    One(Box<World<1, LawStrategy<1>, RemotePeers<1>>>),
+    Two(Box<World<2, LawStrategy<2>, RemotePeers<2>>>),
+    Three(Box<World<3, LawStrategy<3>, RemotePeers<3>>>),
 }
 
 macro_rules! each {
@@ -77,13 +77,13 @@ impl LiveScene {
     #[must_use]
     pub fn new(scene: &Scene, devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
         assert!(too_large(scene).is_none(), "a scene with more peers than a simulation takes is not run");
-        // Who watches is not known yet, and may change.
+        // The observer is not known yet, and may change.
         let plan = Plan::new(scene, Model::Least, true);
         let simulation = Simulation::new(scene, Model::Least);
         let world = match plan.axes {
-            Axes::One => AnyWorld::One(Box::new(simulation.world(&plan, Attendance::new(scene)).seated(scene, devices))),
-            Axes::Two => AnyWorld::Two(Box::new(simulation.world(&plan, Attendance::new(scene)).seated(scene, devices))),
-            Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan, Attendance::new(scene)).seated(scene, devices))),
+            Axes::One => AnyWorld::One(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
+            Axes::Two => AnyWorld::Two(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
+            Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
         };
         // The session that peers of the scene have: see `Scene::peer_config`.
         Self { world, session: scene.seed, open: Instant::ZERO, ended: None }
@@ -92,12 +92,12 @@ impl LiveScene {
     /// Takes a sample of a peer of kind `udp`, which came at `at`, and sends it on over the links of that peer. Gives the instant at which it counts: `at`, or
     /// the first that is open.
     ///
-    /// The datagram is one of that peer for certain: whoever calls has made sure where it came from. It is checked all the same. What is refused is counted
+    /// The datagram is one of that peer for certain: whoever calls has made sure where it came from. It is checked all the same. A refused sample is counted
     /// and changes nothing. The peer's samples must have rising numbers; after a silence they may begin anew. For the others they are numbered on.
     ///
     /// # Errors
     ///
-    /// The outer error is that of the observer, which sees what is due before `at`, and the sample if it is taken; the inner one says why the sample was refused.
+    /// The outer error is that of the observer, which sees all that is due before `at`, and the sample if it is taken; the inner one says why the sample was refused.
     pub fn handle_sample<O: Observer>(
         &mut self,
         at: Instant,
@@ -120,11 +120,11 @@ impl LiveScene {
     }
 
     /// Changes a link from `at` on, or from the first instant that is open, which it gives; `None` if there is no such link or the session has ended. `model` is
-    /// that of `keys`: see [`LinkKeys::model`]. What is on the way keeps its delay.
+    /// that of `keys`: see [`LinkKeys::model`]. Packets on the way keep their delay.
     ///
     /// # Errors
     ///
-    /// That of the observer, which sees what is due before `at`, and the change.
+    /// That of the observer, which sees all that is due before `at`, and the change.
     pub fn set_link<O: Observer>(
         &mut self,
         at: Instant,
@@ -200,7 +200,7 @@ impl LiveScene {
         each!(&self.world, world => world.presence(peer, self.open))
     }
 
-    /// What came in at a peer that lives elsewhere; `None` for one that is simulated here.
+    /// What came in at a peer that is remote; `None` for one that is simulated here.
     #[must_use]
     pub fn seat_stats(&self, peer: usize) -> Option<SeatStats> {
         each!(&self.world, world => world.seat_stats(peer))

@@ -1,4 +1,4 @@
-//! The place of a peer that lives elsewhere, taken or not.
+//! The place of a peer that is remote, taken or not.
 
 use std::time::Duration;
 
@@ -24,7 +24,6 @@ pub enum Presence {
 
 /// Why a sample from outside was refused. Nothing changed but a counter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SampleError {
     /// The peer does not live in another process.
     #[error("peer {peer} is no peer of kind \"udp\" of this scene")]
@@ -71,7 +70,7 @@ pub struct SeatStats {
     pub most_late: Duration,
 }
 
-/// The place of a peer that lives elsewhere.
+/// The place of a peer that is remote.
 #[derive(Clone, Debug)]
 pub(crate) struct Seat {
     pub(crate) is_process: bool,

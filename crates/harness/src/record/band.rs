@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cohaptic_units::Instant;
 
-/// Curves over the whole of a scene, each as (lowest, highest) in every span. What a plot of that many pixels shows is exact.
+/// Curves over the whole of a scene, each as (lowest, highest) in every span. A plot with one pixel for each span is exact.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Bands {
     duration: Duration,
@@ -16,7 +16,7 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// That many curves over a scene of that duration, in that many spans (at least one each).
+    /// A number of curves over a scene of a duration, in a number of spans (at least one each).
     #[must_use]
     pub fn new(duration: Duration, spans: usize, curves: usize) -> Self {
         let spans = spans.max(1);
@@ -24,7 +24,7 @@ impl Bands {
         Self { duration, spans, width: u64::try_from(width).unwrap_or(u64::MAX), extremes: vec![vec![None; spans]; curves] }
     }
 
-    /// Adds a value to a curve. What is not finite or beyond the end is left out.
+    /// Adds a value to a curve. A value that is not finite or beyond the end is left out.
     ///
     /// # Panics
     ///

@@ -1,13 +1,14 @@
-//! A file that has its name only when it is whole.
+//! The files of records, and the failure to write one.
 
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::fs;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+
+use cohaptic_files::{WholeFile, partial_name};
 
 /// Why a record could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}: {source}", path.display())]
-#[non_exhaustive]
 pub struct RecordError {
     /// The file or folder.
     pub path: PathBuf,
@@ -15,26 +16,19 @@ pub struct RecordError {
     pub source: io::Error,
 }
 
-/// A file being written under the name `….partial`.
+/// A record on its way: a [`WholeFile`] whose errors are those of a record. If it cannot be written to its end, its beginning stays under the name `….partial`.
 #[derive(Debug)]
-pub struct PartialFile {
-    path: PathBuf,
-    partial: PathBuf,
-    writer: BufWriter<File>,
-}
+pub struct RecordFile(WholeFile);
 
-impl PartialFile {
+impl RecordFile {
     /// Begins a file of that name.
     ///
     /// # Errors
     ///
     /// [`RecordError`] if it cannot be made.
     pub fn create(path: PathBuf) -> Result<Self, RecordError> {
-        let mut name = path.file_name().unwrap_or_default().to_os_string();
-        name.push(".partial");
-        let partial = path.with_file_name(name);
-        let file = File::create(&partial).map_err(|source| RecordError { path: partial.clone(), source })?;
-        Ok(Self { path, partial, writer: BufWriter::with_capacity(1 << 16, file) })
+        let partial = partial_name(&path);
+        WholeFile::create(path).map(Self).map_err(|source| RecordError { path: partial.into(), source })
     }
 
     /// Adds to it.
@@ -43,17 +37,17 @@ impl PartialFile {
     ///
     /// [`RecordError`] if that cannot be written.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), RecordError> {
-        self.writer.write_all(bytes).map_err(|source| RecordError { path: self.partial.clone(), source })
+        self.0.write_all(bytes).map_err(|source| RecordError { path: partial_name(self.0.path()).into(), source })
     }
 
-    /// Writes what is left and gives the file its name.
+    /// Writes the rest and gives the file its name.
     ///
     /// # Errors
     ///
     /// [`RecordError`] if that cannot be done.
     pub fn finish(self) -> Result<PathBuf, RecordError> {
-        let Self { path, partial, mut writer } = self;
-        writer.flush().and_then(|()| fs::rename(&partial, &path)).map_err(|source| RecordError { path: partial, source })?;
+        let path = self.0.path().to_path_buf();
+        self.0.finish().map_err(|source| RecordError { path: partial_name(&path).into(), source })?;
         Ok(path)
     }
 }
@@ -63,7 +57,7 @@ pub(crate) fn create_folder(path: &Path) -> Result<(), RecordError> {
     fs::create_dir_all(path).map_err(|source| RecordError { path: path.to_path_buf(), source })
 }
 
-/// Adds a number with the fewest digits that read back as the same `f64`; `inf`, `-inf` and `NaN` for what is no number.
+/// Adds a number with the fewest digits that read back as the same `f64`; `inf`, `-inf` and `NaN` for values that are not finite.
 pub(crate) fn push_f64(line: &mut Vec<u8>, value: f64) {
     line.extend_from_slice(ryu::Buffer::new().format(value).as_bytes());
 }

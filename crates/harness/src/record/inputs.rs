@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use cohaptic_scene::{Scene, SceneContent};
 
-use super::file::{PartialFile, create_folder, push_display};
+use super::file::{RecordFile, create_folder, push_display};
 use crate::Observer;
 use crate::live::{InputLine, InputRow, RecordedScene};
 use crate::record::RecordError;
@@ -12,7 +12,7 @@ use crate::record::RecordError;
 /// Writes `inputs.csv`: what comes into a [live session](crate::live) from outside, one line each, from which it can be [replayed](crate::live::replay).
 #[derive(Debug)]
 pub struct InputRecorder {
-    file: PartialFile,
+    file: RecordFile,
     names: Vec<String>,
     line: Vec<u8>,
 }
@@ -26,12 +26,12 @@ impl InputRecorder {
     /// [`RecordError`] if the folder or the file cannot be made.
     pub fn create(folder: &Path, scene: &Scene, content: SceneContent) -> Result<Self, RecordError> {
         create_folder(folder)?;
-        let mut file = PartialFile::create(folder.join("inputs.csv"))?;
+        let mut file = RecordFile::create(folder.join("inputs.csv"))?;
         file.write(RecordedScene::of(scene, content).to_string().as_bytes())?;
         Ok(Self { file, names: scene.peers.iter().map(|peer| peer.name.clone()).collect(), line: Vec::new() })
     }
 
-    /// Writes what is left and gives the file its name.
+    /// Writes the rest and gives the file its name.
     ///
     /// # Errors
     ///

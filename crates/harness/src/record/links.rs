@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use cohaptic_wan::{DropCause, LinkName, LinkStats};
 
-use super::file::PartialFile;
+use super::file::RecordFile;
 use crate::Summary;
 use crate::record::RecordError;
 
 /// Writes one row a link and access line: what became of its packets, and the mean delay of those delivered (empty if there is none).
 pub(crate) fn write(folder: &Path, summary: &Summary) -> Result<PathBuf, RecordError> {
-    let mut file = PartialFile::create(folder.join("links.csv"))?;
+    let mut file = RecordFile::create(folder.join("links.csv"))?;
     let causes = DropCause::ALL.map(DropCause::name).join(",");
     file.write(format!("link,offered,duplicated,delivered,{causes},in-flight,mean-delay-s\n").as_bytes())?;
     let name = |peer: usize| &summary.peers[peer].name;

@@ -23,6 +23,6 @@ mod recorder;
 mod trajectory;
 
 pub use band::Bands;
-pub use file::{PartialFile, RecordError};
+pub use file::{RecordError, RecordFile};
 pub use inputs::InputRecorder;
 pub use recorder::{Recorder, SANE_POSITION};

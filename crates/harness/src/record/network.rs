@@ -61,17 +61,17 @@ impl Network {
     }
 
     pub(super) fn on_packet(&mut self, row: &PacketRow) {
-        let Some(place) = self.shown.iter().position(|link| (link.from, link.to) == (row.from, row.to)) else { return };
+        let Some(place) = self.shown.iter().position(|link| (link.from, link.to) == (row.path.from.index(), row.path.to.index())) else { return };
         let link = &mut self.shown[place];
         link.known += 1;
         if matches!(row.fate, Fate::Delivered(_)) {
-            let delay = row.at - row.sent;
-            self.delays.add(place, row.sent, delay.as_secs_f64());
+            let delay = row.at - row.offered;
+            self.delays.add(place, row.offered, delay.as_secs_f64());
             let steps = u64::try_from(delay.as_nanos()).unwrap_or(u64::MAX).saturating_add(STEP / 2) / STEP;
             *link.delays.entry(steps).or_default() += 1;
         } else {
             link.dropped += 1;
-            link.losses.extend(self.delays.span(row.sent));
+            link.losses.extend(self.delays.span(row.offered));
         }
     }
 
@@ -175,7 +175,7 @@ mod tests {
 
     use cohaptic_picture::testing::faults;
     use cohaptic_units::{Bytes, Instant};
-    use cohaptic_wan::{Correlation, Distribution, DropCause, Jitter};
+    use cohaptic_wan::{Correlation, Distribution, DropCause, Jitter, NodeId, Path};
 
     use super::*;
 
@@ -195,7 +195,17 @@ mod tests {
         for (sequence, (to, sent, delay)) in (0..).zip(packets) {
             let arrival = at(sent + delay.unwrap_or(0));
             let fate = if delay.is_some() { Fate::Delivered(arrival) } else { Fate::Dropped(DropCause::Loss) };
-            network.on_packet(&PacketRow { from: 0, to: *to, sequence, sent: at(*sent), at: arrival, size: Bytes::new(64), fate });
+            network.on_packet(&PacketRow {
+                path: Path { from: NodeId(0), to: NodeId::new(*to) },
+                sequence,
+                copy: 0,
+                offered: at(*sent),
+                at: arrival,
+                size: Bytes::new(64),
+                fate,
+                marked: false,
+                damaged: false,
+            });
         }
         let names: Vec<String> = (1..=peers).map(|peer| format!("p{peer}")).collect();
         let svg = network.picture("A test", &names).svg();

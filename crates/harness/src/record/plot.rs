@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use cohaptic_picture::{Axis, Line, Look, Picture};
 
 use super::band::Bands;
-use super::file::PartialFile;
+use super::file::RecordFile;
 use crate::record::RecordError;
 
 /// A plot: panels over one axis of time, below one another.
@@ -32,7 +32,7 @@ const MOST_NAMED: usize = 10;
 
 /// Writes a picture.
 pub(crate) fn write(path: PathBuf, svg: &str) -> Result<PathBuf, RecordError> {
-    let mut file = PartialFile::create(path)?;
+    let mut file = RecordFile::create(path)?;
     file.write(svg.as_bytes())?;
     file.finish()
 }

@@ -75,7 +75,7 @@ impl Recorder {
         Self { size, ..self }
     }
 
-    /// Writes what is left and gives every file its name; gives the files.
+    /// Writes the rest and gives every file its name; gives the files.
     ///
     /// # Errors
     ///

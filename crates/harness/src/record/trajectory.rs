@@ -5,21 +5,21 @@ use std::path::Path;
 use cohaptic_scene::Axes;
 use cohaptic_units::print::Seconds;
 
-use super::file::{PartialFile, push_display, push_f64};
+use super::file::{RecordFile, push_display, push_f64};
 use crate::TickRow;
 use crate::record::RecordError;
 
 /// Columns `t,peer,xh,vh,xo,vo,xd,vd,fc,ft`; with more axes, `yh,vyh,yo,vyo,yd,vyd,fcy,fty` and the same with z behind them.
 #[derive(Debug)]
 pub(crate) struct Trajectory {
-    file: PartialFile,
+    file: RecordFile,
     names: Vec<String>,
     line: Vec<u8>,
 }
 
 impl Trajectory {
     pub(crate) fn create(folder: &Path, names: Vec<String>, axes: Axes) -> Result<Self, RecordError> {
-        let mut file = PartialFile::create(folder.join("trajectory.csv"))?;
+        let mut file = RecordFile::create(folder.join("trajectory.csv"))?;
         file.write(b"t,peer,xh,vh,xo,vo,xd,vd,fc,ft")?;
         for axis in ["y", "z"].into_iter().take(axes.count() - 1) {
             file.write(format!(",{axis}h,v{axis}h,{axis}o,v{axis}o,{axis}d,v{axis}d,fc{axis},ft{axis}").as_bytes())?;

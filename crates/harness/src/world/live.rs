@@ -1,23 +1,23 @@
-//! A running scene some of whose peers live elsewhere.
+//! A running scene some of whose peers are remote.
 
 use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, State, Strategy};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{LinkModel, LinkStats, NetworkEvent, PacketInfo};
+use cohaptic_wan::{LinkModel, LinkStats, NodeId, PacketEvent, PacketInfo, Path};
 
-use super::elsewhere::{Elsewhere, datagram};
-use super::{DeviceModel, Step, Watch, World, node, row};
+use super::remote::{Remote, datagram};
+use super::{DeviceModel, Step, Watch, World, row};
 use crate::datagrams::Handle;
-use crate::live::{Attendance, Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, SampleError, SeatStats, Transmit, UnsimulatedDevice};
+use crate::live::{Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, RemotePeers, SampleError, SeatStats, Transmit, UnsimulatedDevice};
 use crate::observer::Observer;
 use crate::plan::ticking;
 use crate::schedule::Schedule;
 
-impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
-    /// The scene at its beginning, with nobody there yet of those who live elsewhere.
+impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
+    /// The scene at its beginning, with all remote peers absent.
     pub(crate) fn seated(mut self, scene: &Scene, mut devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
-        self.ticking.retain(|place| !self.elsewhere.is_process(*place));
+        self.ticking.retain(|place| !self.remote.is_process(*place));
         let here = |place: &usize| &scene.peers[*place];
         let clocks: Vec<(usize, &Clock)> = self.ticking.iter().map(|place| (*place, &here(place).clock)).collect();
         self.schedule = Schedule::new(ticking(self.ticking.iter().map(here)), clocks);
@@ -33,7 +33,6 @@ impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
                     *member.peer.device_mut() = DeviceModel::Unsimulated(UnsimulatedDevice::InHand(hand));
                 }
                 PeerKind::Simulated => {}
-                _ => unreachable!("every kind of peer of this workspace is listed"),
             }
         }
         self
@@ -44,16 +43,16 @@ impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
     /// Where all live here it is a tick, as in virtual time: what arrives in between waits for it anyway. A process is to have its packets when they arrive.
     pub(crate) fn next_instant(&self) -> Instant {
         let tick = self.schedule.next_instant().unwrap_or(self.end);
-        if !self.elsewhere.has_processes {
+        if !self.remote.has_processes {
             return tick.min(self.end);
         }
         let change = self.changes.last().map(|change| change.at);
-        [self.network.poll_timeout(), change, self.elsewhere.undrained].into_iter().flatten().fold(tick, Instant::min).min(self.end)
+        [self.network.poll_timeout(), change, self.remote.undrained].into_iter().flatten().fold(tick, Instant::min).min(self.end)
     }
 
     /// Everything that happens at [`World::next_instant`], which is `at`.
     pub(crate) fn happen<O: Observer>(&mut self, at: Instant, observer: &mut O, watch: Watch) -> Result<Step, O::Error> {
-        self.elsewhere.undrained = None;
+        self.remote.undrained = None;
         self.notice_silence(at);
         if at >= self.end {
             return self.finish(observer, watch).map(Step::Ended);
@@ -70,7 +69,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
     /// A sample has come from the process of a peer. Everything before `at` has happened, nothing at it.
     pub(crate) fn take_sample(&mut self, at: Instant, place: usize, datagram: &[u8], session: u64) -> Result<(), SampleError> {
         self.notice_silence(at);
-        let Some(seat) = self.elsewhere.seat_mut(place).filter(|seat| seat.is_process) else {
+        let Some(seat) = self.remote.seat_mut(place).filter(|seat| seat.is_process) else {
             return Err(SampleError::NoSeat { peer: place });
         };
         let read = read_sample::<A>(datagram, self.axes, session, place).inspect_err(|_| seat.stats.refused += 1);
@@ -82,8 +81,8 @@ impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
         seat.next_sequence += 1;
         if joins {
             for (to, member) in self.members.iter_mut().enumerate() {
-                if to != place && !self.elsewhere.is_process(to) {
-                    self.elsewhere.await_return(place, to, sample.sequence, &mut member.peer);
+                if to != place && !self.remote.is_process(to) {
+                    self.remote.await_return(place, to, sample.sequence, &mut member.peer);
                 }
             }
         }
@@ -94,8 +93,8 @@ impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
         let stored = self.datagrams.store(copies, self.axes, |bytes| sample.encode(self.axes, bytes));
         let (handle, len) = stored.expect("what was decoded can be decoded again");
         let info = PacketInfo { size: Bytes::new(len as u64), ecn_capable: true };
-        self.network.handle_broadcast(at, node(place), info, handle).expect("instants come in order");
-        self.elsewhere.undrained = Some(at);
+        self.network.handle_broadcast(at, NodeId::new(place), info, handle).expect("instants come in order");
+        self.remote.undrained = Some(at);
         Ok(())
     }
 
@@ -103,7 +102,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
     pub(crate) fn take_link(&mut self, at: Instant, from: usize, to: usize, link: &LinkModel) {
         self.change(at);
         self.set_link(at, from, to, link);
-        self.elsewhere.undrained = Some(at);
+        self.remote.undrained = Some(at);
     }
 
     /// Nobody feels a force of the session any more.
@@ -116,23 +115,23 @@ impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
     }
 
     pub(crate) fn next_transmit(&mut self) -> Option<Transmit> {
-        self.elsewhere.next_transmit()
+        self.remote.next_transmit()
     }
 
     pub(crate) fn presence(&self, place: usize, now: Instant) -> Option<Presence> {
-        (place < self.members.len()).then(|| self.elsewhere.seat(place).map_or(Presence::Here, |seat| seat.presence(now)))
+        (place < self.members.len()).then(|| self.remote.seat(place).map_or(Presence::Here, |seat| seat.presence(now)))
     }
 
     pub(crate) fn heard(&self, place: usize) -> Option<Instant> {
-        self.elsewhere.seat(place)?.heard
+        self.remote.seat(place)?.heard
     }
 
     pub(crate) fn seat_stats(&self, place: usize) -> Option<SeatStats> {
-        self.elsewhere.seat(place).map(|seat| seat.stats)
+        self.remote.seat(place).map(|seat| seat.stats)
     }
 
     pub(crate) fn note_late(&mut self, place: usize, by: std::time::Duration) {
-        if let Some(seat) = self.elsewhere.seat_mut(place) {
+        if let Some(seat) = self.remote.seat_mut(place) {
             seat.stats.late += 1;
             seat.stats.most_late = seat.stats.most_late.max(by);
         }
@@ -140,20 +139,20 @@ impl<const A: usize, S: Strategy<A>> World<A, S, Attendance<A>> {
 
     pub(crate) fn link_stats(&self, from: usize, to: usize) -> Option<LinkStats> {
         let is_there = |place: usize| place < self.members.len();
-        (is_there(from) && is_there(to)).then(|| self.network.link_stats(node(from), node(to))).flatten()
+        (is_there(from) && is_there(to)).then(|| self.network.link_stats(NodeId::new(from), NodeId::new(to))).flatten()
     }
 
     /// The device, if it is here, and the copy of a peer.
     pub(crate) fn states(&self, place: usize) -> Option<(Option<State<A>>, State<A>)> {
         let member = self.members.get(place)?;
-        let is_process = self.elsewhere.is_process(place);
+        let is_process = self.remote.is_process(place);
         Some(((!is_process).then(|| member.peer.device().state()), *member.peer.object().state()))
     }
 
     fn notice_silence(&mut self, now: Instant) {
         let (latest, members) = (&mut self.latest, &self.members);
         // A copy that nobody hears of is no measure of how far copies are apart.
-        self.elsewhere.notice_silence(now, |place| {
+        self.remote.notice_silence(now, |place| {
             if !matches!(members[place].peer.device(), DeviceModel::Unsimulated(UnsimulatedDevice::InHand(_))) {
                 latest[place] = [f64::NAN; A];
             }
@@ -167,10 +166,10 @@ impl<const A: usize> DeviceModel<A, UnsimulatedDevice<A>> {
     }
 }
 
-impl<const A: usize> Elsewhere<A> for Attendance<A> {
+impl<const A: usize> Remote<A> for RemotePeers<A> {
     type Device = UnsimulatedDevice<A>;
 
-    const IS_NOBODY: bool = false;
+    const IS_EMPTY: bool = false;
 
     fn lead(&self) -> usize {
         self.lead
@@ -183,12 +182,12 @@ impl<const A: usize> Elsewhere<A> for Attendance<A> {
     fn receive<S: Strategy<A>>(
         &mut self,
         now: Instant,
-        event: &NetworkEvent<Handle>,
+        event: &PacketEvent<Handle, Path>,
         sample: &Sample<A>,
         axes: usize,
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>> {
-        let ends = (event.from.0 as usize, event.to.0 as usize);
+        let ends = (event.path.from.index(), event.path.to.index());
         let mut buffer = [0; MAX_LEN];
         if self.is_process(ends.1) {
             let len = datagram(sample, axes, event.damage.as_ref(), &mut buffer).len();

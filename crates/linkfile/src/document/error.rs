@@ -10,7 +10,6 @@ use super::text::{escape, shorten};
 
 /// Why a file is refused.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum FileError {
     /// Something in the file, in an override, or in a file that it names makes no sense.
     #[error("{0}")]

@@ -59,7 +59,6 @@ fn flipping(bits: Flips) -> Option<Corruption> {
     let never = match bits {
         Flips::Bits { packets, .. } => packets.is_never(),
         Flips::Rate(rate) => rate == cohaptic_units::Probability::ZERO,
-        _ => false,
     };
     (!never).then_some(Corruption { bits, within: None, checksum: Checksum::Discards })
 }

@@ -46,7 +46,7 @@ pub(super) fn dist_table(text: &str) -> Result<Arc<DistTable>, Fault> {
 pub(super) fn dist_fault(text: &str, error: &DistTableError) -> Fault {
     let line = match error {
         DistTableError::NotAnInteger { line, .. } | DistTableError::OutOfRange { line, .. } | DistTableError::TooMany { line, .. } => Some(*line),
-        DistTableError::Empty | _ => None,
+        DistTableError::Empty => None,
     };
     Fault::in_line(text, line, error)
 }
@@ -72,7 +72,7 @@ fn empirical(text: &str) -> Result<Arc<Empirical>, Fault> {
     Empirical::new(delays).map(Arc::new).map_err(|error| {
         let message = match error {
             EmpiricalError::Constant { value } => format!("all delays are {} s: expected two different ones", value / 1e9),
-            EmpiricalError::Count { .. } | EmpiricalError::NotANumber { .. } | _ => error.to_string(),
+            EmpiricalError::Count { .. } | EmpiricalError::NotANumber { .. } => error.to_string(),
         };
         Fault { span: 0..0, message }
     })

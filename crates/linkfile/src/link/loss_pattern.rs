@@ -61,7 +61,6 @@ fn refuse(error: &PatternError, node: &Node, elements: &[&Node], every: Option<&
     let at = match error {
         PatternError::Empty { index } | PatternError::Order { index } => elements.get(*index).copied(),
         PatternError::Period { .. } => every,
-        _ => None,
     };
     values::refuse(context, &[at], node, error);
 }

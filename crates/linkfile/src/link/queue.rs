@@ -123,7 +123,7 @@ fn read_red(node: &Node, context: Context<'_>) -> Option<Red> {
         let nodes: &[Option<&Node>] = match error {
             cohaptic_wan::RedError::Weight(_) => &[weight_node],
             cohaptic_wan::RedError::MeanPacket => &[packet_node],
-            cohaptic_wan::RedError::Thresholds { .. } | _ => &nodes,
+            cohaptic_wan::RedError::Thresholds { .. } => &nodes,
         };
         values::refuse(context, nodes, node, &error);
     })

@@ -24,7 +24,7 @@ fn fault(text: &str, error: &FateLogError) -> Fault {
         | FateLogError::ImpossibleTime { line, .. }
         | FateLogError::Contradiction { line, .. }
         | FateLogError::TwoEnds { line, .. } => Some(*line),
-        FateLogError::NoEnd { .. } | FateLogError::CopyFromNowhere { .. } | _ => None,
+        FateLogError::NoEnd { .. } | FateLogError::CopyFromNowhere { .. } => None,
     };
     Fault::in_line(text, line.and_then(|line| usize::try_from(line).ok()), error)
 }

@@ -79,7 +79,7 @@ fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Tra
         return DeliveryTrace::parse(text, bytes).map(Trace::Delivery).map_err(|error| {
             let line = match &error {
                 DeliveryTraceError::Number { line } | DeliveryTraceError::Order { line, .. } => Some(*line),
-                DeliveryTraceError::NoLength | DeliveryTraceError::Empty | DeliveryTraceError::NoBytes | _ => None,
+                DeliveryTraceError::NoLength | DeliveryTraceError::Empty | DeliveryTraceError::NoBytes => None,
             };
             Fault::in_line(text, line, &error)
         });
@@ -91,7 +91,7 @@ fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Tra
                 return Fault { span: header_span(text), message };
             }
             PathTraceError::Columns { line, .. } | PathTraceError::Value { line, .. } | PathTraceError::Order { line } => Some(*line),
-            PathTraceError::Empty | PathTraceError::NoLength | _ => None,
+            PathTraceError::Empty | PathTraceError::NoLength => None,
         };
         Fault::in_line(text, line, &error)
     })

@@ -229,7 +229,6 @@ fn quantity<T>(node: &Node, context: Context<'_>, parse: fn(&str) -> Result<T, P
 fn expected(error: &ParseError) -> &'static str {
     match error {
         ParseError::Number { expected, .. } | ParseError::Unit { expected, .. } | ParseError::Range { expected, .. } => expected,
-        _ => "a number with a unit",
     }
 }
 

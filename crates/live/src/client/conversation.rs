@@ -15,7 +15,7 @@ pub const HELLO_EVERY: Duration = Duration::from_millis(250);
 /// Without anything new from anybody for so long, a client begins anew: the session may have been started again.
 pub const SILENCE: Duration = Duration::from_secs(1);
 
-/// Who a client is, and how it is to join.
+/// The identity of a client, and how it is to join.
 #[derive(Clone, Debug)]
 pub enum ClientConfig {
     /// In a session without a key, of which everything is known beforehand.
@@ -99,7 +99,7 @@ impl Client {
         Self { session, place, key, info, joined: None, joining: None, next_hello: now, heard: now, newest, joinings: 0 }
     }
 
-    /// What is known of the session; `None` before the first welcome.
+    /// The session's parameters; `None` before the first welcome.
     #[must_use]
     pub const fn info(&self) -> Option<&SessionInfo> {
         self.info.as_ref()
@@ -146,7 +146,7 @@ impl Client {
         if self.key.is_some() && self.joined.is_none() { self.next_hello } else { self.silent_from().max(self.next_hello) }
     }
 
-    /// Takes in a datagram from the door. Never panics; what is nothing for this client changes nothing.
+    /// Takes in a datagram from the door. Never panics; a datagram for somebody else changes nothing.
     pub fn handle_datagram(&mut self, now: Instant, datagram: &[u8]) -> Heard {
         if let Some(joining) = &self.joining
             && let Ok(joined) = joining.handle_welcome(datagram)

@@ -1,7 +1,7 @@
 //! The datagrams of one joining in a session with a key.
 //!
-//! [`Joining::hello`] → send, again every quarter of a second until → [`Joining::handle_welcome`] → [`Joined::seal`] what is sent, [`Joined::open`] what
-//! is received.
+//! [`Joining::hello`] → send, again every quarter of a second until → [`Joining::handle_welcome`] → [`Joined::seal`] each sample sent, [`Joined::open`]
+//! each datagram received.
 
 use cohaptic_peer::wire;
 
@@ -58,7 +58,6 @@ impl Joining {
 
 /// Why a datagram is no welcome for this joining.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum WelcomeError {
     /// It is no welcome at all, or not one made with the key.
     #[error(transparent)]
@@ -107,7 +106,6 @@ impl Joined {
 
 /// Why a datagram from the door cannot be opened.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum OpenError {
     /// It has another length than a sealed sample of this session.
     #[error("{found} bytes; expected {expected}")]

@@ -39,7 +39,6 @@ pub struct FalconFault {
 
 /// Why a Falcon cannot be had.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum FaultKind {
     /// It is not there, or may not be opened.
     #[error(transparent)]
@@ -201,7 +200,7 @@ fn attach<const A: usize, T: Transport + Send + 'static>(
 ) -> Result<Attached<A>, FaultKind> {
     let axes = Axes::new(axes).expect("no axis is named twice");
     let device = FalconDevice::start_with(transport, DeviceConfig { driver, ..DeviceConfig::new(axes) }, move || {
-        // What is refused here is refused to the session's thread too, which says so.
+        // A wish that is refused here is refused to the session's thread too, which says so.
         let _ = prepare_thread(&wishes);
     })?;
     Ok(Attached::new(device, beginning))

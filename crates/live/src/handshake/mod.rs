@@ -1,6 +1,6 @@
 //! The two datagrams before the samples, in sessions with a key: a [`Hello`] is answered by a [`Welcome`].
 //!
-//! Both are 88 bytes: an answer that is no longer than what it answers amplifies nothing for somebody who lies about where he is. They end
+//! Both are 88 bytes: an answer that is no longer than its request amplifies nothing for a sender with a false address. They end
 //! with a tag under the session key, and differ in their first four bytes, so that neither passes for the other. A hello alone changes nothing at the
 //! door.
 
@@ -20,9 +20,8 @@ pub const HANDSHAKE_LEN: usize = BODY_LEN + TAG_LEN;
 
 const BODY_LEN: usize = 72;
 
-/// What is wrong with a hello or a welcome.
+/// The fault of a hello or a welcome.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum HandshakeError {
     /// It begins with other bytes.
     #[error("it is no such datagram")]

@@ -14,7 +14,6 @@ const MAX_FILE_LEN: u16 = 1024;
 
 /// Why a key file was not read or written.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum KeyFileError {
     /// It cannot be opened or read.
     #[error("cannot read the key file {}: {source}", path.display())]

@@ -1,4 +1,4 @@
-//! The key of a session: 32 bytes that everybody who may speak in it has.
+//! The key of a session: 32 bytes that all its participants have.
 
 mod file;
 

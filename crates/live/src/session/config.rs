@@ -10,7 +10,7 @@ use cohaptic_realtime::udp::BindError;
 use cohaptic_realtime::{Pacing, Tolerance, Wishes};
 use cohaptic_scene::SceneContent;
 
-use crate::{DoorError, SessionKey};
+use crate::{AdmissionConfigError, SessionKey};
 
 /// How a session runs. What runs is the scene's business.
 #[derive(Clone, Debug)]
@@ -53,7 +53,6 @@ impl SessionConfig {
 
 /// Why a session cannot begin, or had to end.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SessionError {
     /// Strangers could join.
     #[error(
@@ -69,7 +68,7 @@ pub enum SessionError {
     Bind(#[from] BindError),
     /// The door.
     #[error("nobody can be let in: {0}")]
-    Door(#[from] DoorError),
+    AdmissionControl(#[from] AdmissionConfigError),
     /// The record.
     #[error(transparent)]
     Record(#[from] RecordError),

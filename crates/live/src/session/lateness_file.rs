@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use cohaptic_harness::record::{PartialFile, RecordError};
+use cohaptic_harness::record::{RecordError, RecordFile};
 use cohaptic_realtime::Lateness;
 
-/// Columns `of,late_us,count`: so many ticks, or releases, were so late, to three digits.
+/// Columns `of,late_us,count`: the number of ticks, or releases, of a lateness, to three digits.
 pub(super) fn write(folder: &Path, ticks: &Lateness, releases: &Lateness) -> Result<PathBuf, RecordError> {
-    let mut file = PartialFile::create(folder.join("lateness.csv"))?;
+    let mut file = RecordFile::create(folder.join("lateness.csv"))?;
     file.write(b"of,late_us,count\n")?;
     for (of, lateness) in [("tick", ticks), ("release", releases)] {
         for (late, count) in lateness.recorded() {

@@ -1,4 +1,4 @@
-//! The session itself: a [`LiveScene`] driven by the wall clock, with a socket behind its [`Door`](crate::Door).
+//! The session itself: a [`LiveScene`] driven by the wall clock, with a socket behind its [`AdmissionControl`](crate::AdmissionControl).
 //!
 //! One thread does everything that has to be on time. It sleeps until something is due or a datagram comes in, and tells the scene the logical instant of
 //! either: that at which it was due, or that at which the kernel saw it. Files, live control and the terminal have threads of their own.
@@ -27,7 +27,7 @@ use watch::Watch;
 pub use config::{SessionConfig, SessionError};
 pub use status::{LinkStatus, PeerStatus, Report, SocketCounts, Status};
 
-/// Who looks on while a session runs, changes links, and ends it. Called on the thread that has to be on time: calls must neither wait nor take long.
+/// The conductor of a session: looks on while it runs, changes links, and ends it. Called on the thread that has to be on time: calls must neither wait nor take long.
 pub trait Conductor {
     /// Whether to go on. Asked at least 50 times a second.
     fn keep_going(&mut self) -> bool;
@@ -119,7 +119,7 @@ impl Session {
             validity: self.validity(),
             behind,
             seats: (0..self.peers).map(|peer| self.live.seat_stats(peer)).collect(),
-            door: self.outside.as_ref().map(Outside::counts),
+            admission: self.outside.as_ref().map(Outside::counts),
             prepared,
             files,
             summary,
@@ -223,7 +223,7 @@ impl Session {
             validity: self.validity(),
             peers: places.clone().filter_map(peer).collect(),
             links: pairs.filter_map(link).collect(),
-            door: self.outside.as_ref().map(|outside| *outside.door_stats()),
+            admission: self.outside.as_ref().map(|outside| *outside.admission_stats()),
         }
     }
 }

@@ -5,7 +5,7 @@ use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use cohaptic_harness::live::Transmit;
-use cohaptic_realtime::udp::{self, ReceiveBuffers, UdpDoor};
+use cohaptic_realtime::udp::{self, ReceiveBuffers, UdpEndpoint};
 use cohaptic_realtime::{Clock as _, MonotonicClock};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::Instant;
@@ -13,14 +13,14 @@ use cohaptic_units::Instant;
 use super::releases::Release;
 use super::status::SocketCounts;
 use super::{SessionConfig, SessionError};
-use crate::{Admission, Door, DoorConfig, DoorStats, Limits, MAX_DATAGRAM, Place, Seat, SystemEntropy};
+use crate::{Admission, AdmissionConfig, AdmissionControl, AdmissionStats, Limits, MAX_DATAGRAM, Place, Seat, SystemEntropy};
 
 /// The way to peers in other programs.
 #[derive(Debug)]
 pub(super) struct Outside {
-    socket: UdpDoor,
+    socket: UdpEndpoint,
     buffers: ReceiveBuffers,
-    door: Door,
+    admission: AdmissionControl,
     sealed: [u8; MAX_DATAGRAM],
 }
 
@@ -51,14 +51,15 @@ impl Outside {
         }
         let peers = u32::try_from(scene.peers.len()).expect("a scene that runs has few peers");
         let seats = seats.into_iter().map(|(seat, _)| seat).collect();
-        let door = DoorConfig {
+        let admission = AdmissionConfig {
             stale_after,
             limits: Some(LIMITS),
-            ..DoorConfig::new(scene.seed, scene.axes.count(), peers, scene.coordination.update, seats)
+            ..AdmissionConfig::new(scene.seed, scene.axes.count(), peers, scene.coordination.update, seats)
         };
-        let door = Door::new(door.with_key(config.key.clone()), &mut SystemEntropy)?;
-        let socket = UdpDoor::bind(address, udp::DoorConfig { receive_buffer: RECEIVE_BUFFER, largest: LARGEST, ..udp::DoorConfig::default() })?;
-        Ok(Some(Self { socket, buffers: ReceiveBuffers::new(), door, sealed: [0; MAX_DATAGRAM] }))
+        let admission = AdmissionControl::new(admission.with_key(config.key.clone()), &mut SystemEntropy)?;
+        let socket =
+            UdpEndpoint::bind(address, udp::EndpointConfig { receive_buffer: RECEIVE_BUFFER, largest: LARGEST, ..udp::EndpointConfig::default() })?;
+        Ok(Some(Self { socket, buffers: ReceiveBuffers::new(), admission, sealed: [0; MAX_DATAGRAM] }))
     }
 
     pub(super) const fn address(&self) -> SocketAddr {
@@ -69,13 +70,13 @@ impl Outside {
         std::os::fd::AsFd::as_fd(&self.socket)
     }
 
-    /// Hands on the samples that have come in and may, with the instant at which the kernel saw them, and answers who asks to join.
+    /// Hands on the samples that have come in and may, with the instant at which the kernel saw them, and answers requests to join.
     pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<()> {
-        let Self { socket, buffers, door, .. } = self;
+        let Self { socket, buffers, admission, .. } = self;
         let mut replies = Vec::new();
-        // One batch: more than come in between two ticks of a session in order. What is beyond waits in the kernel until the next look, which is after the next
+        // One batch: more than come in between two ticks of a session in order. The rest waits in the kernel until the next look, which is after the next
         // tick if that is due, so that a flood cannot keep the loop from its ticks.
-        socket.receive(buffers, clock, |datagram| match door.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
+        socket.receive(buffers, clock, |datagram| match admission.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
             Admission::Sample { place, sample, .. } => take(datagram.at, place.0 as usize, sample.bytes()),
             Admission::Reply { to, bytes } => replies.push((to, bytes)),
             Admission::Refused(_) => {}
@@ -90,7 +91,7 @@ impl Outside {
     pub(super) fn queue(&mut self, clock: &MonotonicClock, transmit: &Transmit) -> Option<Release> {
         let place = Place(u32::try_from(transmit.to).ok()?);
         let now = clock.now();
-        let (to, len) = self.door.seal(now, place, &transmit.datagram, &mut self.sealed)?;
+        let (to, len) = self.admission.seal(now, place, &transmit.datagram, &mut self.sealed)?;
         self.socket.queue(to, &self.sealed[..len], None);
         Some(Release { to: transmit.to, due: transmit.at, late: now.saturating_duration_since(transmit.at) })
     }
@@ -99,12 +100,12 @@ impl Outside {
         self.socket.flush();
     }
 
-    pub(super) const fn door_stats(&self) -> &DoorStats {
-        self.door.stats()
+    pub(super) const fn admission_stats(&self) -> &AdmissionStats {
+        self.admission.stats()
     }
 
-    pub(super) fn counts(&self) -> (DoorStats, SocketCounts) {
+    pub(super) fn counts(&self) -> (AdmissionStats, SocketCounts) {
         let kernel_drops = self.socket.kernel_drops().ok().flatten();
-        (*self.door.stats(), SocketCounts { address: self.address(), counts: *self.socket.counts(), kernel_drops })
+        (*self.admission.stats(), SocketCounts { address: self.address(), counts: *self.socket.counts(), kernel_drops })
     }
 }

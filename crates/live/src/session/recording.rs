@@ -63,7 +63,7 @@ impl Recording {
         Ok(Self { folder: folder.to_path_buf(), rows, writer })
     }
 
-    /// Writes what is left and gives every file its name; gives the files.
+    /// Writes the rest and gives every file its name; gives the files.
     ///
     /// # Errors
     ///

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use cohaptic_harness::record::{PartialFile, RecordError};
+use cohaptic_harness::record::{RecordError, RecordFile};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
@@ -22,13 +22,13 @@ pub(crate) struct Release {
 /// Columns `peer,due,late_us`, in the order of sending. It left at `due + late_us`.
 #[derive(Debug)]
 pub(super) struct Releases {
-    file: PartialFile,
+    file: RecordFile,
     names: Vec<String>,
 }
 
 impl Releases {
     pub(super) fn create(folder: &Path, scene: &Scene) -> Result<Self, RecordError> {
-        let mut file = PartialFile::create(folder.join("releases.csv"))?;
+        let mut file = RecordFile::create(folder.join("releases.csv"))?;
         file.write(b"peer,due,late_us\n")?;
         Ok(Self { file, names: scene.peers.iter().map(|peer| peer.name.clone()).collect() })
     }

@@ -6,13 +6,13 @@ use std::time::Duration;
 
 use cohaptic_harness::Summary;
 use cohaptic_harness::live::{PeerState, SeatStats};
-use cohaptic_realtime::udp::DoorCounts;
+use cohaptic_realtime::udp::EndpointCounts;
 use cohaptic_realtime::{LatenessSummary, Prepared, Validity};
 use cohaptic_wan::LinkStats;
 
-use crate::DoorStats;
+use crate::AdmissionStats;
 
-/// A session at one moment, for those who look on.
+/// A session at one moment, for onlookers.
 #[derive(Clone, Debug)]
 pub struct Status {
     /// Since it began, in logical time.
@@ -28,7 +28,7 @@ pub struct Status {
     /// Each directed link, by sender, then receiver.
     pub links: Vec<LinkStatus>,
     /// What the door has done; `None` in a scene without peers in other programs.
-    pub door: Option<DoorStats>,
+    pub admission: Option<AdmissionStats>,
 }
 
 /// A peer at one moment.
@@ -72,10 +72,10 @@ pub struct Report {
     pub validity: Validity,
     /// By how much the clock on the wall was ahead of logical time when the last thing happened.
     pub behind: Duration,
-    /// What came in at each peer that lives elsewhere; `None` for one that is simulated here.
+    /// What came in at each peer that is remote; `None` for one that is simulated here.
     pub seats: Vec<Option<SeatStats>>,
     /// What the door has done, and the socket before it.
-    pub door: Option<(DoorStats, SocketCounts)>,
+    pub admission: Option<(AdmissionStats, SocketCounts)>,
     /// What the system granted and refused.
     pub prepared: Prepared,
     /// The files of the record.
@@ -88,7 +88,7 @@ pub struct SocketCounts {
     /// Where it listened.
     pub address: SocketAddr,
     /// What it took and sent.
-    pub counts: DoorCounts,
+    pub counts: EndpointCounts,
     /// What the kernel dropped because nobody read in time; `None` if the system does not tell.
     pub kernel_drops: Option<u64>,
 }

@@ -1,4 +1,4 @@
-//! What is measured while a session runs.
+//! The figures of a session while it runs.
 
 use std::time::Duration;
 
@@ -100,7 +100,7 @@ impl Observer for Watch {
 
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), Stopped> {
         if let Fate::Delivered(at) = row.fate {
-            self.links[row.from * self.peers + row.to].deliver(row.size.get(), at.saturating_duration_since(row.sent));
+            self.links[row.path.from.index() * self.peers + row.path.to.index()].deliver(row.size.get(), at.saturating_duration_since(row.offered));
         }
         self.recording.as_ref().map_or(Ok(()), |recording| recording.packet(row))
     }

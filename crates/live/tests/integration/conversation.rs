@@ -1,7 +1,7 @@
 //! A client and a door in virtual time, over a way that loses, doubles and reorders.
 
 use cohaptic_live::client::{Client, ClientConfig, Heard, SessionInfo};
-use cohaptic_live::{Admission, Door, MAX_DATAGRAM, SystemEntropy};
+use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, SystemEntropy};
 use cohaptic_peer::wire;
 use cohaptic_units::Instant;
 use proptest::prelude::*;
@@ -55,8 +55,8 @@ fn client(with_key: bool) -> Client {
     Client::new(config, at(0))
 }
 
-fn door(with_key: bool) -> Door {
-    Door::new(config().with_key(with_key.then(key)), &mut SystemEntropy).unwrap()
+fn door(with_key: bool) -> AdmissionControl {
+    AdmissionControl::new(config().with_key(with_key.then(key)), &mut SystemEntropy).unwrap()
 }
 
 /// Plays a session, begun anew in the middle, and gives what was let in and heard as new in each half.

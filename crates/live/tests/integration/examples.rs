@@ -61,12 +61,13 @@ impl Mechanics {
             axes: 3,
             contact: Contact::Grasp,
             coupling: self.coupling,
+            tick,
             compute_delay: false,
             enclosure: None,
         };
         let others = Held::new((1..self.peers).map(|_| State::REST));
         let mut peer: Peer<3, _, _> =
-            Peer::new(config, device, object, Coordination::AveragePosition.strategy(self.coordination, self.peers as usize), others);
+            Peer::new(config, device, object, Coordination::AveragePosition.strategy(self.coordination, self.peers as usize, tick), others);
         for k in 0..ticks {
             let now = Instant::from_nanos(k * 1_000_000);
             peer.compute(now);

@@ -1,7 +1,7 @@
 //! Whatever a stranger sends: nothing moves, nothing panics, nothing grows, and every datagram is counted once.
 
 use cohaptic_live::client::{Client, ClientConfig, Heard, Joined};
-use cohaptic_live::{Admission, Door, MAX_DATAGRAM, Refusal};
+use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, Refusal};
 use proptest::prelude::*;
 
 use crate::support::{
@@ -9,7 +9,7 @@ use crate::support::{
 };
 
 /// A door whose seat is taken from address 1, with the number 10.
-fn taken() -> (Door, Joined) {
+fn taken() -> (AdmissionControl, Joined) {
     let mut door = keyed_door();
     let joined = shake_hands(&mut door, at(0), address(1), &joining(1));
     admitted(door.handle_datagram(at(0), address(1), &sealed(&joined, &sample(1, 10))));
@@ -17,7 +17,7 @@ fn taken() -> (Door, Joined) {
 }
 
 /// What a stranger must not be able to change, wherever it is kept: all that the door shows but its counters.
-fn shown(door: &Door) -> String {
+fn shown(door: &AdmissionControl) -> String {
     door.seats(at(50)).map(|seat| format!("{seat:?}")).collect()
 }
 

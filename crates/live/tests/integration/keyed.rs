@@ -1,8 +1,8 @@
 //! A session with a key: hello, welcome, and samples under keys of their joining.
 
+use cohaptic_live::admission::WELCOMES_PER_SECOND;
 use cohaptic_live::client::OpenError;
-use cohaptic_live::door::WELCOMES_PER_SECOND;
-use cohaptic_live::{Admission, Door, MAX_DATAGRAM, Place, Refusal, SessionKey};
+use cohaptic_live::{Admission, AdmissionControl, MAX_DATAGRAM, Place, Refusal, SessionKey};
 use cohaptic_peer::wire;
 
 use crate::support::{Counting, SEAT, SESSION, address, admitted, assert_counts, at, config, joining, keyed_door, sample, sealed, shake_hands};
@@ -96,7 +96,7 @@ fn a_recording_of_an_earlier_joining_is_worthless() {
     // At another door with the same key and session.
     let mut other = Counting::default();
     cohaptic_live::Entropy::fill(&mut other, &mut [0; 64]).unwrap();
-    let mut door = Door::new(config().with_key(Some(crate::support::key())), &mut other).unwrap();
+    let mut door = AdmissionControl::new(config().with_key(Some(crate::support::key())), &mut other).unwrap();
     for datagram in &recording {
         door.handle_datagram(at(0), address(1), datagram);
     }

@@ -1,7 +1,7 @@
 //! A session without a key: the first good sample takes a seat.
 
-use cohaptic_live::Door;
-use cohaptic_live::{Admission, DoorConfig, DoorError, Limits, MAX_DATAGRAM, Place, Refusal, Seat};
+use cohaptic_live::AdmissionControl;
+use cohaptic_live::{Admission, AdmissionConfig, AdmissionConfigError, Limits, MAX_DATAGRAM, Place, Refusal, Seat};
 use cohaptic_peer::{State, wire};
 use std::time::Duration;
 
@@ -114,7 +114,7 @@ fn each_fault_has_its_own_count() {
 #[test]
 fn limits_keep_a_copy_in_the_room() {
     let limits = Some(Limits { position: 1.0, velocity: 10.0 });
-    let mut door = Door::new(DoorConfig { limits, ..config() }, &mut Counting::default()).unwrap();
+    let mut door = AdmissionControl::new(AdmissionConfig { limits, ..config() }, &mut Counting::default()).unwrap();
     let mut send = |sequence: u64, position: f64, velocity: f64| {
         let state = State { position: [position], velocity: [velocity] };
         door.handle_datagram(at(0), address(1), &encode(&wire::Sample { session: SESSION, sender: 1, sequence, sent: at(0), state }))
@@ -126,18 +126,18 @@ fn limits_keep_a_copy_in_the_room() {
 
 #[test]
 fn a_configuration_that_makes_no_sense_makes_no_door() {
-    let refuse = |config: DoorConfig| Door::new(config, &mut Counting::default()).unwrap_err();
-    assert_eq!(refuse(DoorConfig { axes: 0, ..config() }), DoorError::Axes { found: 0 });
-    assert_eq!(refuse(DoorConfig { axes: 4, ..config() }), DoorError::Axes { found: 4 });
-    assert_eq!(refuse(DoorConfig { peers: 2, ..config() }), DoorError::Beyond { place: Place(2), peers: 2 });
+    let refuse = |config: AdmissionConfig| AdmissionControl::new(config, &mut Counting::default()).unwrap_err();
+    assert_eq!(refuse(AdmissionConfig { axes: 0, ..config() }), AdmissionConfigError::Axes { found: 0 });
+    assert_eq!(refuse(AdmissionConfig { axes: 4, ..config() }), AdmissionConfigError::Axes { found: 4 });
+    assert_eq!(refuse(AdmissionConfig { peers: 2, ..config() }), AdmissionConfigError::Beyond { place: Place(2), peers: 2 });
     let twice = vec![seat(SEAT, "a"), seat(SEAT, "b")];
-    assert_eq!(refuse(DoorConfig { seats: twice, ..config() }), DoorError::Twice { place: SEAT });
+    assert_eq!(refuse(AdmissionConfig { seats: twice, ..config() }), AdmissionConfigError::Twice { place: SEAT });
     assert_eq!(
-        refuse(DoorConfig { seats: vec![Seat { tick: Duration::ZERO, ..seat(SEAT, "a") }], ..config() }),
-        DoorError::Span { name: "tick", found: Duration::ZERO }
+        refuse(AdmissionConfig { seats: vec![Seat { tick: Duration::ZERO, ..seat(SEAT, "a") }], ..config() }),
+        AdmissionConfigError::Span { name: "tick", found: Duration::ZERO }
     );
-    assert_eq!(refuse(DoorConfig { update: Duration::MAX, ..config() }), DoorError::Span { name: "update", found: Duration::MAX });
+    assert_eq!(refuse(AdmissionConfig { update: Duration::MAX, ..config() }), AdmissionConfigError::Span { name: "update", found: Duration::MAX });
     let limits = Limits { position: f64::INFINITY, velocity: 0.0 };
-    assert_eq!(refuse(DoorConfig { limits: Some(limits), ..config() }), DoorError::Limits { found: limits });
+    assert_eq!(refuse(AdmissionConfig { limits: Some(limits), ..config() }), AdmissionConfigError::Limits { found: limits });
     assert_eq!(STALE, config().stale_after);
 }

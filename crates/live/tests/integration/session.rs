@@ -114,7 +114,7 @@ fn a_sample_counts_from_when_the_kernel_had_it_and_not_from_when_it_was_read() {
     let report = session.run(&mut conductor).unwrap();
     assert!(conductor.begun.unwrap().elapsed() >= HELD_UP && conductor.number <= 200, "no pair was read in time");
     let taken = report.seats[1].unwrap().taken;
-    assert_eq!(taken, conductor.number, "{:?}", report.door);
+    assert_eq!(taken, conductor.number, "{:?}", report.admission);
     let inputs = read(folder.path(), "inputs.csv");
     let mut samples = inputs.iter().filter(|line| line[1] == "sample").map(|line| line[0].parse::<u64>().unwrap());
     let [last, first] = [(); 2].map(|()| samples.next_back().unwrap());
@@ -194,7 +194,7 @@ fn what_is_sent_to_a_program_is_recorded_and_the_link_that_was_meant_is_changed(
     assert_eq!(changes.iter().map(|line| (line[2].as_str(), line[3].as_str())).collect::<Vec<_>>(), [("here", "there")]);
 
     let released = report.releases.count;
-    let (_, socket) = report.door.unwrap();
+    let (_, socket) = report.admission.unwrap();
     assert!(released >= ENOUGH);
     assert_eq!(socket.counts.sent + socket.counts.failures.in_all(), released);
     let releases = read(folder.path(), "releases.csv");

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use cohaptic_live::client::{Joined, Joining};
-use cohaptic_live::{Admission, Admitted, Door, DoorConfig, Entropy, EntropyError, MAX_DATAGRAM, Place, Refusal, Seat, SessionKey};
+use cohaptic_live::{Admission, AdmissionConfig, AdmissionControl, Admitted, Entropy, EntropyError, MAX_DATAGRAM, Place, Refusal, Seat, SessionKey};
 use cohaptic_peer::{State, wire};
 use cohaptic_units::Instant;
 use proptest::prelude::ProptestConfig;
@@ -41,17 +41,17 @@ pub(crate) fn seat(place: Place, name: &str) -> Seat {
     Seat { place, name: name.to_owned(), tick: Duration::from_millis(1) }
 }
 
-pub(crate) fn config() -> DoorConfig {
+pub(crate) fn config() -> AdmissionConfig {
     let seats = [(2, "third"), (1, "right")].map(|(place, name)| seat(Place(place), name));
-    DoorConfig { stale_after: STALE, ..DoorConfig::new(SESSION, 1, 3, Duration::from_millis(8), seats.to_vec()) }
+    AdmissionConfig { stale_after: STALE, ..AdmissionConfig::new(SESSION, 1, 3, Duration::from_millis(8), seats.to_vec()) }
 }
 
-pub(crate) fn keyless_door() -> Door {
-    Door::new(config(), &mut Counting::default()).unwrap()
+pub(crate) fn keyless_door() -> AdmissionControl {
+    AdmissionControl::new(config(), &mut Counting::default()).unwrap()
 }
 
-pub(crate) fn keyed_door() -> Door {
-    Door::new(config().with_key(Some(key())), &mut Counting::default()).unwrap()
+pub(crate) fn keyed_door() -> AdmissionControl {
+    AdmissionControl::new(config().with_key(Some(key())), &mut Counting::default()).unwrap()
 }
 
 pub(crate) fn at(millis: u64) -> Instant {
@@ -79,7 +79,7 @@ pub(crate) fn joining(nonce: u8) -> Joining {
 }
 
 /// Says hello and takes the welcome.
-pub(crate) fn shake_hands(door: &mut Door, now: Instant, from: SocketAddr, joining: &Joining) -> Joined {
+pub(crate) fn shake_hands(door: &mut AdmissionControl, now: Instant, from: SocketAddr, joining: &Joining) -> Joined {
     let Admission::Reply { to, bytes } = door.handle_datagram(now, from, &joining.hello()) else { panic!("no welcome") };
     assert_eq!(to, from);
     joining.handle_welcome(&bytes).unwrap()
@@ -102,7 +102,7 @@ pub(crate) fn admitted(admission: Admission) -> (bool, Admitted) {
 }
 
 /// Every counter is what is listed; those that are not listed are zero. And nothing was lost between them.
-pub(crate) fn assert_counts(door: &Door, admitted: u64, welcomed: u64, refused: &[(Refusal, u64)]) {
+pub(crate) fn assert_counts(door: &AdmissionControl, admitted: u64, welcomed: u64, refused: &[(Refusal, u64)]) {
     let stats = door.stats();
     let found: Vec<_> = stats.refusals().filter(|&(_, count)| count > 0).collect();
     let mut expected: Vec<_> = refused.iter().copied().filter(|&(_, count)| count > 0).collect();

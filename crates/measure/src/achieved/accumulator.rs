@@ -25,7 +25,7 @@ pub struct Accumulator {
     jitter: Jitter,
 }
 
-/// What is known of one packet. Default: never heard of.
+/// The history of one packet. Default: never heard of.
 #[derive(Clone, Copy, Debug, Default)]
 struct Packet {
     /// Delay of the first copy to arrive \[ns\], plus one; 0: none arrived.
@@ -38,7 +38,7 @@ struct Packet {
 /// What can be said of a packet in the end.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Outcome {
-    /// It arrived after so many nanoseconds.
+    /// It arrived after this delay \[ns\].
     Received(u64),
     /// No copy arrived, and none can arrive any more.
     Lost,
@@ -49,7 +49,6 @@ pub(super) enum Outcome {
 /// A record came after one of a later instant. Nothing was changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("a record of {at} came after one of {latest}: expected records in the order in which things happened")]
-#[non_exhaustive]
 pub struct RecordOutOfOrder {
     /// The instant of the record.
     pub at: Instant,
@@ -105,8 +104,6 @@ impl Accumulator {
                 }
                 self.arrives(record, at, first_copy);
             }
-            // `Fate` may grow; what is no end and makes no copy changes no figure here.
-            _ => {}
         }
         Ok(())
     }

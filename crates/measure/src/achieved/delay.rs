@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::accumulator::Outcome;
+use crate::batches;
 use crate::series::{self, NORMAL_975, count, seconds};
 
 /// Figures of the delays of the packets that arrived, the first copy of each.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct DelayFigures {
     /// The mean \[s\].
     pub mean_s: f64,
@@ -70,15 +70,15 @@ impl DelayFigures {
         let squares: Vec<f64> = delays.iter().map(|delay| (delay - mean).powi(2)).collect();
         Some(Self {
             mean_s: mean,
-            mean_se_s: series::batch_standard_error(&delays),
+            mean_se_s: batches::batch_standard_error(&delays),
             sd_s: sd,
-            sd_se_s: sd.filter(|&sd| sd > 0.0).and_then(|sd| Some(series::batch_standard_error(&squares)? / (2.0 * sd))),
+            sd_se_s: sd.filter(|&sd| sd > 0.0).and_then(|sd| Some(batches::batch_standard_error(&squares)? / (2.0 * sd))),
             least_s: seconds(least),
             greatest_s: seconds(greatest),
             quantiles_s: QUANTILES.into_iter().map(|(name, p)| (name, series::quantile(&sorted, p) / 1e9)).collect(),
             quantile_intervals_95_s: QUANTILES
                 .into_iter()
-                .filter_map(|(name, p)| Some((name, series::quantile_interval(&sorted, &series, p)?.map(seconds))))
+                .filter_map(|(name, p)| Some((name, batches::quantile_interval(&sorted, &series, p)?.map(seconds))))
                 .collect(),
             autocorrelation: series::autocorrelation(&by_packet, LAGS),
             autocorrelation_bound_95: NORMAL_975 / count(fewest_pairs(&by_packet).max(1)).sqrt(),

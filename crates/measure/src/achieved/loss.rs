@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use super::accumulator::Outcome;
 use super::delay::LAGS;
+use crate::batches;
 use crate::series::{self, NORMAL_975, count_u64, wilson};
 
 /// Figures of which packets arrived, in the order of sending.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct LossFigures {
     /// Packets of which a copy arrived.
     pub received: u64,
@@ -60,8 +60,8 @@ impl LossFigures {
             received,
             lost,
             value: (ended > 0).then(|| count_u64(lost) / count_u64(ended)),
-            interval_95: series::share_interval(&indicator),
-            standard_error: series::batch_standard_error(&indicator),
+            interval_95: batches::share_interval(&indicator),
+            standard_error: batches::batch_standard_error(&indicator),
             run_mean: mean_of_lengths(&runs),
             run_mean_se: standard_error_of_lengths(&runs),
             gap_mean: mean_of_lengths(&gaps),

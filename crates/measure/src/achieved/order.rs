@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use crate::series::{count_u64, share_interval};
+use crate::batches::share_interval;
+use crate::series::count_u64;
 
 /// Figures of the order in which packets arrived; extra copies are passed over.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct OrderFigures {
     /// The share of packets received that are reordered: their number is below `NextExp`, the greatest number that has arrived plus one (RFC 4737,
     /// section 3.3). `None` if nothing arrived.
@@ -19,7 +19,7 @@ pub struct OrderFigures {
     /// section 4.2.2).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reordering_extent_mean: Option<f64>,
-    /// The greatest extent \[arrivals\]: a buffer of so many packets restores the order.
+    /// The greatest extent \[arrivals\]: a buffer of this number of packets restores the order.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reordering_extent_max: Option<u64>,
 }

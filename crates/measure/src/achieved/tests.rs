@@ -10,7 +10,7 @@ const MS: u64 = 1_000_000;
 
 fn row(sequence: u64, copy: u8, offered_ms: u64, at_ms: u64, fate: Fate) -> PacketRecord {
     let [offered, at] = [offered_ms, at_ms].map(|ms| Instant::from_nanos(ms * MS));
-    PacketRecord { sequence, copy, offered, at, size: Bytes::new(125), fate, marked: false, damaged: false }
+    PacketRecord { path: (), sequence, copy, offered, at, size: Bytes::new(125), fate, marked: false, damaged: false }
 }
 
 fn arrives(sequence: u64, copy: u8, offered_ms: u64, at_ms: u64) -> PacketRecord {
@@ -120,7 +120,7 @@ fn gamma_link(seed: u64) -> Achieved {
             let at = Instant::from_nanos(sequence * MS + (delay * 1e6) as u64);
             let is_lost = rng.unit() < 0.2;
             let (at, fate) = if is_lost { (offered, Fate::Dropped(DropCause::Loss)) } else { (at, Fate::Delivered(at)) };
-            PacketRecord { sequence, copy: 0, offered, at, size: Bytes::new(64), fate, marked: false, damaged: false }
+            PacketRecord { path: (), sequence, copy: 0, offered, at, size: Bytes::new(64), fate, marked: false, damaged: false }
         })
         .collect();
     records.reverse();

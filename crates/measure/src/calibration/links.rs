@@ -8,7 +8,7 @@ use cohaptic_wan::{Chance, Correlation, Delay, Distribution, GilbertElliott, Jit
 use super::{OF_BATCHES, OF_LIKELIHOOD, Tally};
 use crate::achieved::{Accumulator, Achieved};
 use crate::asked::Asked;
-use crate::beside::{Beside, Figure};
+use crate::comparison::{Comparison, Figure};
 use crate::steady::SteadyStream;
 use crate::test_rng::TestRng;
 
@@ -54,7 +54,7 @@ fn random_link(rng: &mut TestRng) -> LinkConfig {
 fn measured(seed: u64, config: LinkConfig) -> (Asked, Vec<Figure>, Achieved) {
     let asked = Asked::of_config(&config, STREAM.every, STREAM.info.size);
     let mut link = Link::new(seed, &LinkName::between("a", "b"), config);
-    let (mut beside, mut accumulator) = (Beside::default(), Accumulator::new());
+    let (mut beside, mut accumulator) = (Comparison::default(), Accumulator::new());
     STREAM
         .over(
             &mut link,

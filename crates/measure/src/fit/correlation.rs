@@ -17,7 +17,6 @@ use crate::series::{NORMAL_975, count};
 
 /// The correlation of delays in time.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct CorrelationFit {
     /// The correlation time τ \[s\].
     pub time_s: f64,

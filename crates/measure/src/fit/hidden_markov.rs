@@ -18,7 +18,7 @@ pub(super) struct HiddenMarkov {
     pub(super) log_likelihood: f64,
 }
 
-/// The likelihood has flat ridges: after so many rounds the last digits do not matter any more.
+/// The likelihood has flat ridges: after this number of rounds the last digits do not matter any more.
 const ROUNDS: usize = 400;
 /// Less gain than this in a round is none.
 const SETTLED: f64 = 1e-5;

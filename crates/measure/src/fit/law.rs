@@ -6,7 +6,6 @@ use statrs::function::{erf, gamma};
 /// A family of laws by the name that scenes give it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
 pub enum DelayLaw {
     /// Normal.
     Normal,

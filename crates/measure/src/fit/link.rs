@@ -11,7 +11,6 @@ use super::loss::LossModel;
 
 /// A link as it can be written into a scene.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct FittedLink {
     /// The mean one-way delay \[s\].
     pub delay_s: f64,
@@ -23,7 +22,6 @@ pub struct FittedLink {
 
 /// Jitter as it can be written into a scene.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct FittedJitter {
     /// The standard deviation \[s\].
     pub sd_s: f64,

@@ -23,7 +23,6 @@ pub struct Measurements {
 
 /// Why measurements are refused. Packets are counted from 1.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum MeasurementsError {
     /// A time or delay is NaN or infinite.
     #[error("packet {packet}: found {value}, expected a finite time and a finite delay (a lost packet has none)")]

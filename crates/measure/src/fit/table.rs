@@ -19,7 +19,6 @@ use super::{Measurement, Measurements, MeasurementsError};
 
 /// Why a file is not read as measurements. Lines are counted from 1, the header being line 1.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum TableError {
     /// The file cannot be read.
     #[error("cannot be read: {0}")]

@@ -33,7 +33,7 @@ pub(super) fn interface_description(name: &str) -> Vec<u8> {
     block(&mut to, INTERFACE_DESCRIPTION, |to| {
         half(to, LINKTYPE_RAW);
         half(to, 0);
-        // No limit to what is captured of a packet.
+        // No limit to the captured length of a packet.
         word(to, 0);
         option(to, OPTION_INTERFACE_NAME, up_to(name, usize::from(u16::MAX)).as_bytes());
         // 10⁻⁹ s.
@@ -97,7 +97,7 @@ fn length(bytes: usize) -> u32 {
     u32::try_from(bytes).expect("a block holds one datagram and a line of text")
 }
 
-/// The beginning of a text, of at most so many bytes.
+/// The beginning of a text, of at most a number of bytes.
 fn up_to(text: &str, most: usize) -> &str {
     let cut = (0..=most.min(text.len())).rev().find(|&cut| text.is_char_boundary(cut)).unwrap_or(0);
     &text[..cut]

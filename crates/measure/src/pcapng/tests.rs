@@ -8,7 +8,7 @@ use super::*;
 
 fn record(sequence: u64, at: u64, size: u64, fate: Fate) -> PacketRecord {
     let (offered, at) = (Instant::from_nanos(sequence * 1_000), Instant::from_nanos(at));
-    PacketRecord { sequence, copy: 0, offered, at, size: Bytes::new(size), fate, marked: false, damaged: false }
+    PacketRecord { path: (), sequence, copy: 0, offered, at, size: Bytes::new(size), fate, marked: false, damaged: false }
 }
 
 fn delivered(sequence: u64, at: u64, size: u64) -> PacketRecord {

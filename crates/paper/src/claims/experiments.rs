@@ -80,7 +80,7 @@ fn less_time(travels: &[Travel]) -> Claim {
     )
 }
 
-/// How far a time may be from the paper's: what is read from a plot, and what a motor and a person add.
+/// How far a time may be from the paper's: the reading of a plot, and what a motor and a person add.
 const NEAR: f64 = 0.1;
 
 fn times(travels: &[Travel]) -> Claim {

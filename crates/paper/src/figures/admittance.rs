@@ -93,7 +93,7 @@ fn curve(case: Case, frequencies: &[f64]) -> Result<Curve, PaperError> {
     Ok(Curve { case, is_stable, decibels: response.magnitudes_db(), phases: response.phases_deg(), distances })
 }
 
-/// Over what the viscosity is looked at: peers, delays, gains, who touches.
+/// The variations over which the viscosity is looked at: peers, delays, gains, which peers touch.
 fn sweep() -> Vec<Case> {
     let mut all = Vec::new();
     for peers in [2, 3, 4, 5, 8, 16] {

@@ -2,7 +2,7 @@
 //!
 //! Over an ideal network the difference modes of N copies have the stiffness N/(N−1)·KT (Rakhsha & Constantinescu 2015, equation 6): bounded in N.
 
-use super::{Law, LawParameters, Observation};
+use super::{Law, LawParameter, LawParameters, Observation, Pull};
 use crate::{Gains, Number};
 
 /// The law of Rakhsha & Constantinescu (2015).
@@ -13,6 +13,9 @@ pub struct AveragePosition<C = f64> {
 }
 
 impl AveragePosition {
+    pub(super) const PULL: Pull = Pull::Mean;
+    pub(super) const PARAMETERS: &[LawParameter] = &[];
+
     pub(super) const fn new(parameters: &LawParameters) -> Self {
         Self { gains: parameters.gains }
     }

@@ -12,6 +12,7 @@ pub struct LawStrategy<const A: usize> {
     coordination: Coordination,
     parameters: LawParameters,
     law: BuiltIn,
+    horizon: Option<f64>,
     /// What the law remembers along each axis, one axis after another.
     memory: Vec<f64>,
 }
@@ -21,7 +22,8 @@ impl<const A: usize> LawStrategy<A> {
     #[must_use]
     pub fn new(coordination: Coordination, parameters: LawParameters) -> Self {
         let law = coordination.law(&parameters);
-        Self { coordination, parameters, law, memory: vec![0.0; A * Law::<f64>::memory(&law)] }
+        let memory = vec![0.0; A * Law::<f64>::memory(&law)];
+        Self { coordination, parameters, horizon: Law::<f64>::horizon(&law), law, memory }
     }
 }
 
@@ -30,12 +32,17 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
     fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
         let mut command = Command { force: [0.0; A], target: State::REST };
         let remembered = self.memory.len() / A;
+        let lead = self.horizon.map_or([0.0; A], |horizon| context.held.lead(context.local_time, horizon));
         for axis in 0..A {
-            let seen = Observation { own: context.own.along(axis), mean: context.held.mean().along(axis) };
+            let seen = Observation { own: context.own.along(axis), mean: context.held.mean().along(axis), lead: lead[axis] };
             command.force[axis] = self.law.force(&seen, &mut self.memory[axis * remembered..(axis + 1) * remembered]);
             command.target.set_along(axis, self.law.target(&seen));
         }
         command
+    }
+
+    fn needs_ages(&self) -> bool {
+        self.horizon.is_some()
     }
 
     fn set_gains(&mut self, gains: Gains) {

@@ -5,15 +5,19 @@
 //! calls; every law is one, and so is a type that is simulated and not a law.
 
 mod average_position;
+mod extrapolated;
 mod law;
 mod law_strategy;
 mod proportional_derivative;
 mod registry;
+mod smoothed_average_position;
 mod strategy;
 
 pub use average_position::AveragePosition;
-pub use law::{Law, LawParameters, Observation};
+pub use extrapolated::Extrapolated;
+pub use law::{Law, LawParameter, LawParameters, LawValues, Observation, Pull};
 pub use law_strategy::LawStrategy;
 pub use proportional_derivative::ProportionalDerivative;
-pub use registry::{BuiltIn, Coordination};
+pub use registry::{BuiltIn, Coordination, LawSettings};
+pub use smoothed_average_position::SmoothedAveragePosition;
 pub use strategy::{Command, Context, Strategy};

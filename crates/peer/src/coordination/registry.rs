@@ -1,14 +1,19 @@
 //! The laws that a scene can name.
 
-use super::{AveragePosition, Law, LawParameters, LawStrategy, Observation, ProportionalDerivative};
+use core::time::Duration;
+
+use super::{
+    AveragePosition, Extrapolated, Law, LawParameter, LawParameters, LawStrategy, LawValues, Observation, ProportionalDerivative, Pull,
+    SmoothedAveragePosition,
+};
 use crate::{Gains, Motion, Number};
 
 macro_rules! registry {
-    ($($(#[$doc:meta])+ $law:ident: $name:literal,)+) => {
+    ($($law:ident: $name:literal, $about:literal;)+) => {
         /// The laws that a scene can name: the registry.
         #[derive(Clone, Copy, PartialEq, Eq, Debug)]
         pub enum Coordination {
-            $($(#[$doc])+ $law,)+
+            $(#[doc = concat!("Each copy is drawn ", $about, ".")] $law,)+
         }
 
         impl Coordination {
@@ -23,18 +28,42 @@ macro_rules! registry {
                 }
             }
 
+            /// Where it draws each copy, in words.
+            #[must_use]
+            pub const fn about(self) -> &'static str {
+                match self {
+                    $(Self::$law => $about,)+
+                }
+            }
+
+            /// How it pulls towards the others.
+            #[must_use]
+            pub const fn pull(self) -> Pull {
+                match self {
+                    $(Self::$law => $law::PULL,)+
+                }
+            }
+
+            /// The parameters that this law alone has.
+            #[must_use]
+            pub const fn parameters(self) -> &'static [LawParameter] {
+                match self {
+                    $(Self::$law => $law::PARAMETERS,)+
+                }
+            }
+
+            /// The strategy of one peer out of `peers` whose tick has that period, with the law's own parameters at their defaults.
+            #[must_use]
+            pub fn strategy<const A: usize>(self, gains: Gains, peers: usize, tick: Duration) -> LawStrategy<A> {
+                LawStrategy::new(self, LawParameters { gains, peers, tick, own: LawValues::defaults(self.parameters()) })
+            }
+
             /// The law with these parameters.
             #[must_use]
             pub fn law(self, parameters: &LawParameters) -> BuiltIn {
                 match self {
                     $(Self::$law => BuiltIn::$law($law::new(parameters)),)+
                 }
-            }
-
-            /// The strategy of one peer out of `peers`.
-            #[must_use]
-            pub fn strategy<const A: usize>(self, gains: Gains, peers: usize) -> LawStrategy<A> {
-                LawStrategy::new(self, LawParameters { gains, peers })
             }
         }
 
@@ -62,6 +91,12 @@ macro_rules! registry {
                 }
             }
 
+            fn horizon(&self) -> Option<f64> {
+                match self {
+                    $(Self::$law(law) => law.horizon(),)+
+                }
+            }
+
             #[inline(always)]
             fn force(&self, seen: &Observation<N>, memory: &mut [N]) -> N {
                 match self {
@@ -80,8 +115,32 @@ macro_rules! registry {
 }
 
 registry! {
-    /// Each copy is pulled towards the mean of the others.
-    AveragePosition: "average-position",
-    /// Each copy is pulled towards each of the others.
-    ProportionalDerivative: "proportional-derivative",
+    AveragePosition: "average-position", "to the mean of the others";
+    ProportionalDerivative: "proportional-derivative", "to each of the others";
+    SmoothedAveragePosition: "smoothed-average-position", "to the mean of the others, by a force that follows with a lag";
+    Extrapolated: "extrapolated", "to the mean of where the others are by now, by their velocities";
+}
+
+/// The parameters that laws alone have, of every law: a scene has them whatever its strategy is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct LawSettings([LawValues; Coordination::ALL.len()]);
+
+impl Default for LawSettings {
+    /// Every parameter at its default.
+    fn default() -> Self {
+        Self(core::array::from_fn(|law| LawValues::defaults(Coordination::ALL[law].parameters())))
+    }
+}
+
+impl LawSettings {
+    /// Those of a law.
+    #[must_use]
+    pub const fn of(&self, law: Coordination) -> &LawValues {
+        &self.0[law as usize]
+    }
+
+    /// Those of a law, to be changed.
+    pub const fn of_mut(&mut self, law: Coordination) -> &mut LawValues {
+        &mut self.0[law as usize]
+    }
 }

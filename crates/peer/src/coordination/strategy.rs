@@ -11,6 +11,8 @@ use crate::{Gains, Held, State};
 pub struct Context<'a, const A: usize> {
     /// The instant of the tick.
     pub now: Instant,
+    /// What the peer's own clock shows.
+    pub local_time: Instant,
     /// The peer's own copy of the object.
     pub own: &'a State<A>,
     /// The newest samples from the others.
@@ -33,6 +35,11 @@ pub trait Strategy<const A: usize> {
     /// The command at a tick. Called exactly once a tick, after the samples that have arrived were taken in.
     fn command(&mut self, context: &Context<'_, A>) -> Command<A>;
 
+    /// Whether the strategy asks for [`Held::lead`]; asked once, when the peer is made.
+    fn needs_ages(&self) -> bool {
+        false
+    }
+
     /// New gains, from the next tick on. A strategy without gains ignores them.
     fn set_gains(&mut self, gains: Gains);
 
@@ -50,6 +57,10 @@ pub trait Strategy<const A: usize> {
 impl<const A: usize, S: Strategy<A> + ?Sized> Strategy<A> for Box<S> {
     fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
         (**self).command(context)
+    }
+
+    fn needs_ages(&self) -> bool {
+        (**self).needs_ages()
     }
 
     fn set_gains(&mut self, gains: Gains) {

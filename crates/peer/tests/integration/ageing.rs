@@ -11,6 +11,7 @@ use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
+const TICK: Duration = Duration::from_millis(1);
 const GAINS: Gains = Gains { stiffness: 2000.0, damping: 7.0 };
 
 /// A peer and the ages that it gives to others.
@@ -44,11 +45,12 @@ impl Receiver {
 
 /// Peer 0 of so many, at rest at `own`; the others begin at the origin.
 fn receiver(peers: usize, own: f64) -> Receiver {
-    let config = PeerConfig { session: 1, place: 0, axes: 1, contact: Contact::None, coupling: GAINS, compute_delay: false, enclosure: None };
+    let config =
+        PeerConfig { session: 1, place: 0, axes: 1, contact: Contact::None, coupling: GAINS, tick: TICK, compute_delay: false, enclosure: None };
     let clock = Clock::regular(Duration::from_millis(1));
     let object = ObjectCopy::new(CopyConfig { mass: 0.2, damping: 0.0 }, at(own, 0.0), Integrator::Exact, &clock);
     let held = Held::new(vec![State::REST; peers - 1]);
-    let peer = Peer::new(config, RestingDevice { position: [0.0] }, object, Coordination::AveragePosition.strategy(GAINS, peers), held);
+    let peer = Peer::new(config, RestingDevice { position: [0.0] }, object, Coordination::AveragePosition.strategy(GAINS, peers, TICK), held);
     Receiver { peer, ages: Ages::default() }
 }
 

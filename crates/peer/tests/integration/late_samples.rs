@@ -19,12 +19,20 @@ const PLACE: u32 = 1;
 /// Peer 1 of three.
 fn receiver() -> Receiver {
     let gains = Gains { stiffness: 1000.0, damping: 5.0 };
-    let config =
-        PeerConfig { session: SESSION, place: PLACE, axes: 1, contact: Contact::None, coupling: gains, compute_delay: false, enclosure: None };
+    let config = PeerConfig {
+        session: SESSION,
+        place: PLACE,
+        axes: 1,
+        contact: Contact::None,
+        coupling: gains,
+        tick: Duration::from_millis(1),
+        compute_delay: false,
+        enclosure: None,
+    };
     let clock = Clock::regular(Duration::from_millis(1));
     let object = ObjectCopy::new(CopyConfig { mass: 0.15, damping: 0.0 }, State::REST, Integrator::Exact, &clock);
     let held = Held::new([state(0, 0), state(2, 0)]);
-    Peer::new(config, RestingDevice { position: [0.0] }, object, Coordination::AveragePosition.strategy(gains, 3), held)
+    Peer::new(config, RestingDevice { position: [0.0] }, object, Coordination::AveragePosition.strategy(gains, 3, Duration::from_millis(1)), held)
 }
 
 /// What sender `from` sends as its sample `sequence`, the first being number 1. Small integers: their means are exact.

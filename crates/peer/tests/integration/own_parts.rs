@@ -45,7 +45,16 @@ impl Strategy<1> for FollowTheFirst {
 
 fn peer<D: Device<1>, S: Strategy<1>>(device: D, strategy: S, compute_delay: bool) -> Peer<1, D, S> {
     let coupling = Gains { stiffness: 2.0, damping: 0.0 };
-    let config = PeerConfig { session: 0, place: 0, axes: 1, contact: Contact::Grasp, coupling, compute_delay, enclosure: None };
+    let config = PeerConfig {
+        session: 0,
+        place: 0,
+        axes: 1,
+        contact: Contact::Grasp,
+        coupling,
+        tick: Duration::from_millis(1),
+        compute_delay,
+        enclosure: None,
+    };
     let clock = Clock::regular(Duration::from_millis(1));
     // So heavy that it stays where it is.
     let object = ObjectCopy::new(CopyConfig { mass: 1e300, damping: 0.0 }, State::REST, Integrator::Exact, &clock);

@@ -61,7 +61,7 @@ pub fn page_in_browser(folder: &Path, page: &str) -> Option<Vec<String>> {
     Some(faults)
 }
 
-/// With which colours a browser draws each kind of element (`path.line s0|fill|stroke|color|background`) of a document for a reader who prefers that scheme.
+/// With which colours a browser draws each kind of element (`path.line s0|fill|stroke|color|background`) of a document for a reader of that scheme.
 /// `None` where there is no `chromium` on the path; see [`in_browser`].
 ///
 /// # Panics
@@ -78,7 +78,7 @@ fn placed(lines: &[String], expected: &[(&str, usize)]) -> Vec<String> {
         lines.iter().map(|line| (line.split(' ').take(7).filter_map(|word| word.parse().ok()).collect(), line.as_str())).collect();
     let mut faults = Vec::new();
     for (number, (name, texts)) in expected.iter().enumerate() {
-        let own: Vec<_> = rows.iter().filter(|(row, _)| row.len() == 7 && (row[0] - crate::content::count(number)).abs() < 0.5).collect();
+        let own: Vec<_> = rows.iter().filter(|(row, _)| row.len() == 7 && (row[0] - crate::extent::count(number)).abs() < 0.5).collect();
         if own.len() != *texts {
             faults.push(format!("{name}: the browser shows {} of {texts} texts", own.len()));
         }

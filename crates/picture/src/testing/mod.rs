@@ -23,7 +23,7 @@ pub struct TextBox {
     pub sides: [f64; 4],
 }
 
-/// What is wrong with a picture, in sentences; empty if nothing is: it is no well-formed XML, a number has more than two decimals, a text is outside of the picture
+/// The faults of a picture, in sentences; empty if there are none: it is no well-formed XML, a number has more than two decimals, a text is outside of the picture
 /// or on another.
 #[must_use]
 pub fn faults(svg: &str) -> Vec<String> {

@@ -5,7 +5,7 @@ use std::io::IoSliceMut;
 
 use quinn_udp::{BATCH_SIZE, RecvMeta};
 
-/// Room for one batch, to be shared by all sockets of a thread: 2 MB, of which the kernel gives what is touched.
+/// Room for one batch, to be shared by all sockets of a thread: 2 MB, of which the kernel gives the touched pages.
 pub struct ReceiveBuffers {
     bytes: Vec<u8>,
     pub(super) told: [RecvMeta; BATCH_SIZE],

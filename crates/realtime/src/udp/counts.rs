@@ -6,7 +6,7 @@ use rustix::io::Errno;
 
 /// What a socket did so far.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct DoorCounts {
+pub struct EndpointCounts {
     /// Datagrams that came in and were handed on.
     pub received: u64,
     /// Datagrams that came in and were dropped, because they were longer than this socket takes.

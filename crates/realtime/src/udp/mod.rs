@@ -11,12 +11,12 @@
 
 mod buffers;
 mod counts;
-mod door;
+mod endpoint;
 mod kernel_drops;
 mod outbox;
 
 pub use buffers::ReceiveBuffers;
-pub use counts::{DoorCounts, SendFailures};
-pub use door::{BindError, Datagram, DoorConfig, UdpDoor};
+pub use counts::{EndpointCounts, SendFailures};
+pub use endpoint::{BindError, Datagram, EndpointConfig, UdpEndpoint};
 /// The two bits of a datagram's IP header that say whether its ends understand congestion marks, and whether it carries one (RFC 3168).
 pub use quinn_udp::EcnCodepoint as Ecn;

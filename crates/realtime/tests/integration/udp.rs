@@ -4,7 +4,7 @@ use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::AsFd as _;
 use std::time::Duration;
 
-use cohaptic_realtime::udp::{DoorConfig, Ecn, ReceiveBuffers, UdpDoor};
+use cohaptic_realtime::udp::{Ecn, EndpointConfig, ReceiveBuffers, UdpEndpoint};
 use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Pacing};
 use cohaptic_units::Instant;
 
@@ -12,17 +12,17 @@ type Received = (SocketAddr, Vec<u8>, Option<Ecn>, Instant);
 
 const LOOPBACKS: [&str; 2] = ["127.0.0.1:0", "[::1]:0"];
 
-fn door(address: &str, config: DoorConfig) -> UdpDoor {
-    UdpDoor::bind(address.parse().unwrap(), config).unwrap()
+fn endpoint(address: &str, config: EndpointConfig) -> UdpEndpoint {
+    UdpEndpoint::bind(address.parse().unwrap(), config).unwrap()
 }
 
 /// Reads until there are so many; the wait is for a machine that is busy, and ends as soon as they are there.
-fn receive(door: &mut UdpDoor, clock: &MonotonicClock, count: usize) -> Vec<Received> {
+fn receive(endpoint: &mut UdpEndpoint, clock: &MonotonicClock, count: usize) -> Vec<Received> {
     let (mut buffers, mut received) = (ReceiveBuffers::new(), Vec::new());
     let end = clock.now() + Duration::from_secs(60);
     while received.len() < count && clock.now() < end {
-        Pacer::new(Pacing::Sleep).wait(clock, Some(end), &[door.as_fd()]).unwrap();
-        door.receive(&mut buffers, clock, |datagram| received.push((datagram.from, datagram.bytes.to_vec(), datagram.ecn, datagram.at))).unwrap();
+        Pacer::new(Pacing::Sleep).wait(clock, Some(end), &[endpoint.as_fd()]).unwrap();
+        endpoint.receive(&mut buffers, clock, |datagram| received.push((datagram.from, datagram.bytes.to_vec(), datagram.ecn, datagram.at))).unwrap();
     }
     received
 }
@@ -31,7 +31,7 @@ fn receive(door: &mut UdpDoor, clock: &MonotonicClock, count: usize) -> Vec<Rece
 fn what_goes_out_together_comes_in_one_by_one_in_order_with_its_congestion_bits() {
     for address in LOOPBACKS {
         let clock = MonotonicClock::start();
-        let (mut sender, mut receiver) = (door(address, DoorConfig::default()), door(address, DoorConfig::default()));
+        let (mut sender, mut receiver) = (endpoint(address, EndpointConfig::default()), endpoint(address, EndpointConfig::default()));
         let lengths: Vec<usize> = (0..200).map(|n| [64, 64, 64, 64, 9, 0, 1232, 1232, 3000, 64][n % 10]).collect();
         let ecn = |n: usize| [None, Some(Ecn::Ect0), Some(Ecn::Ect1), Some(Ecn::Ce)][n / 50];
         let before = clock.now();
@@ -61,9 +61,9 @@ fn what_goes_out_together_comes_in_one_by_one_in_order_with_its_congestion_bits(
 #[test]
 fn the_longest_datagram_is_whole_and_a_longer_one_than_asked_for_is_counted() {
     let clock = MonotonicClock::start();
-    let mut wide = door("127.0.0.1:0", DoorConfig::default());
-    let mut narrow = door("127.0.0.1:0", DoorConfig { largest: 100, ..DoorConfig::default() });
-    let mut sender = door("127.0.0.1:0", DoorConfig::default());
+    let mut wide = endpoint("127.0.0.1:0", EndpointConfig::default());
+    let mut narrow = endpoint("127.0.0.1:0", EndpointConfig { largest: 100, ..EndpointConfig::default() });
+    let mut sender = endpoint("127.0.0.1:0", EndpointConfig::default());
     // 65,535 bytes less the headers of IPv4 and UDP.
     let longest: Vec<u8> = (0..65_507_u32).map(|n| u8::try_from(n % 251).unwrap()).collect();
     sender.queue(wide.local_address(), &longest, None);
@@ -81,7 +81,7 @@ fn the_longest_datagram_is_whole_and_a_longer_one_than_asked_for_is_counted() {
 #[test]
 fn one_that_cannot_be_sent_is_counted_and_the_others_go_on() {
     let clock = MonotonicClock::start();
-    let (mut sender, mut receiver) = (door("127.0.0.1:0", DoorConfig::default()), door("127.0.0.1:0", DoorConfig::default()));
+    let (mut sender, mut receiver) = (endpoint("127.0.0.1:0", EndpointConfig::default()), endpoint("127.0.0.1:0", EndpointConfig::default()));
     let there = receiver.local_address();
     let nobody = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     sender.queue(there, b"first", None);
@@ -101,9 +101,9 @@ fn one_that_cannot_be_sent_is_counted_and_the_others_go_on() {
 
 #[test]
 fn what_waits_is_bounded_and_what_the_kernel_drops_is_known() {
-    let mut sender = door("127.0.0.1:0", DoorConfig { waiting: 3, ..DoorConfig::default() });
+    let mut sender = endpoint("127.0.0.1:0", EndpointConfig { waiting: 3, ..EndpointConfig::default() });
     // The least buffer that Linux grants takes a few datagrams.
-    let small = door("127.0.0.1:0", DoorConfig { receive_buffer: 1, ..DoorConfig::default() });
+    let small = endpoint("127.0.0.1:0", EndpointConfig { receive_buffer: 1, ..EndpointConfig::default() });
     assert!(small.granted_receive_buffer() > 0);
     for _ in 0..5 {
         sender.queue(small.local_address(), &[0; 64], None);
@@ -120,13 +120,13 @@ fn what_waits_is_bounded_and_what_the_kernel_drops_is_known() {
 
 #[test]
 fn an_address_that_is_taken_is_refused_with_the_address() {
-    let first = door("[::1]:0", DoorConfig::default());
-    let error = UdpDoor::bind(first.local_address(), DoorConfig::default()).unwrap_err();
+    let first = endpoint("[::1]:0", EndpointConfig::default());
+    let error = UdpEndpoint::bind(first.local_address(), EndpointConfig::default()).unwrap_err();
     assert_eq!(error.address, first.local_address());
     assert!(error.to_string().starts_with(&format!("cannot listen on {}: ", first.local_address())), "{error}");
     // The same port of the other family is another socket.
     let v4 = SocketAddr::new([127, 0, 0, 1].into(), first.local_address().port());
-    if let Err(error) = UdpDoor::bind(v4, DoorConfig::default()) {
+    if let Err(error) = UdpEndpoint::bind(v4, EndpointConfig::default()) {
         // Somebody else may have it.
         assert_eq!(error.source.kind(), std::io::ErrorKind::AddrInUse);
     }

@@ -1,4 +1,4 @@
-//! Who sent it, through a proxy: clients, each with a port of its own on the far side.
+//! The sender of a datagram, through a proxy: clients, each with a port of its own on the far side.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -6,14 +6,14 @@ use std::net::SocketAddr;
 
 use cohaptic_units::Instant;
 
-/// A client: its place, and how many had that place before. What is on its way to one that has left does not reach the one that came after it.
+/// A client: its place, and how many had that place before. A datagram on its way to a client that has left does not reach the one that came after it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct ClientId {
     pub(super) slot: u32,
     generation: u32,
 }
 
-/// The clients, at most so many.
+/// The clients, at most a number of them.
 #[derive(Debug)]
 pub(super) struct Clients {
     places: BTreeMap<SocketAddr, u32>,

@@ -1,16 +1,17 @@
-//! What comes in, what leaves, and what is counted of both.
+//! Arrivals, departures, and the counters of both.
 
 use core::time::Duration;
 use std::net::SocketAddr;
 
 use cohaptic_realtime::udp::Ecn;
 use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
 
 /// Where a datagram comes in or goes out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Port {
     /// The port that stands for this program of a mesh.
-    Program(u32),
+    Program(NodeId),
     /// Where clients of a proxy send to.
     Listen,
     /// The port of its own that the client in this place has on the far side.
@@ -24,7 +25,7 @@ pub struct Arrival<'a> {
     pub at: Instant,
     /// Where.
     pub port: Port,
-    /// Who sent it.
+    /// The sender.
     pub from: SocketAddr,
     /// What it carries. Its length is its size on the link: headers are not counted, and [`cohaptic_wan::Framing`] can add them.
     pub bytes: &'a [u8],

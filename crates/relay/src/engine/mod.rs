@@ -14,7 +14,7 @@ use std::sync::Arc;
 use cohaptic_realtime::Lateness;
 use cohaptic_realtime::udp::Ecn;
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{Fate, LinkModel, LinkStats, Network, NetworkConfig, NetworkError, NetworkEvent, NodeId, PacketInfo};
+use cohaptic_wan::{Fate, LinkModel, LinkStats, Network, NetworkConfig, NetworkError, NodeId, PacketEvent, PacketInfo, PacketRecord, Path};
 
 use crate::config::{Change, ConfigError, Form, Limits, RelayConfig};
 use clients::Clients;
@@ -52,6 +52,10 @@ pub struct Engine {
     released: Option<Arc<Packet>>,
 }
 
+/// The nodes of a proxy's network.
+const CLIENT: NodeId = NodeId(0);
+const SERVER: NodeId = NodeId(1);
+
 #[derive(Debug)]
 enum Routes {
     Programs(Programs),
@@ -61,8 +65,8 @@ enum Routes {
 #[derive(Debug)]
 struct Staged {
     at: Instant,
-    from: u32,
-    to: u32,
+    from: NodeId,
+    to: NodeId,
     packet: Arc<Packet>,
 }
 
@@ -128,12 +132,12 @@ impl Engine {
                 None => return self.refuse(Intake::NoRoom),
                 Some((client, is_new)) => {
                     opened = is_new.then_some(client.slot);
-                    (0, 1, Some(client))
+                    (CLIENT, SERVER, Some(client))
                 }
             },
             (Routes::Clients { clients, server }, Port::Client(slot)) if from == *server => match clients.at_port(slot, at) {
                 None => return self.refuse(Intake::Stranger),
-                client => (1, 0, client),
+                client => (SERVER, CLIENT, client),
             },
             (Routes::Programs(_) | Routes::Clients { .. }, _) => return self.refuse(Intake::Stranger),
         };
@@ -172,7 +176,7 @@ impl Engine {
             self.pass(at);
             let info = PacketInfo { size: Bytes::new(packet.bytes.len() as u64), ecn_capable: packet.ecn.is_some() };
             self.counts.offered += 1;
-            let offered = self.network.handle_packet(self.now, NodeId(from), NodeId(to), info, packet);
+            let offered = self.network.handle_packet(self.now, from, to, info, packet);
             debug_assert_eq!(offered, Ok(()), "time has not gone back, and the routes name no other links");
         }
         self.staged = staged;
@@ -212,15 +216,15 @@ impl Engine {
                 Fate::Delivered(at) => {
                     self.packets -= 1;
                     self.bytes -= length;
-                    let link = self.link(event.from.0, event.to.0);
+                    let link = self.link(event.path.from, event.path.to);
                     self.links[link].delivered_bytes += event.payload.bytes.len() as u64;
-                    self.recent[link].record(at.saturating_duration_since(event.sent));
+                    self.recent[link].record(at.saturating_duration_since(event.offered));
                     let Some((port, to)) = self.way_out(&event) else {
                         self.links[link].undeliverable += 1;
                         self.pool.put(event.payload);
                         continue;
                     };
-                    let NetworkEvent { mut payload, marked, damage, .. } = event;
+                    let PacketEvent { record: PacketRecord { marked, .. }, mut payload, damage } = event;
                     if let Some(damage) = damage {
                         // A copy of it may be on its way still, undamaged.
                         damage.apply(&mut Arc::make_mut(&mut payload).bytes);
@@ -235,7 +239,7 @@ impl Engine {
                     self.pool.put(event.payload);
                 }
                 // The copy, which has an end of its own.
-                Fate::Duplicated | _ => {
+                Fate::Duplicated => {
                     self.packets += 1;
                     self.bytes += length;
                 }
@@ -277,13 +281,13 @@ impl Engine {
     /// What a link did; `None` if there is none.
     #[must_use]
     pub fn link_stats(&self, from: NodeId, to: NodeId) -> Option<(LinkStats, LinkCounts)> {
-        Some((self.network.link_stats(from, to)?, self.links[self.link(from.0, to.0)]))
+        Some((self.network.link_stats(from, to)?, self.links[self.link(from, to)]))
     }
 
     /// The delays of the latest datagrams that came out of a link, in no order: of 128 at most.
     #[must_use]
     pub fn recent_delays(&self, from: NodeId, to: NodeId) -> &[Duration] {
-        self.recent.get(self.link(from.0, to.0)).map_or(&[], Recent::delays)
+        self.recent.get(self.link(from, to)).map_or(&[], Recent::delays)
     }
 
     /// What came in.
@@ -315,7 +319,7 @@ impl Engine {
 
     /// Where a program is, if that is known; `None` for a proxy.
     #[must_use]
-    pub fn program_address(&self, program: u32) -> Option<SocketAddr> {
+    pub fn program_address(&self, program: NodeId) -> Option<SocketAddr> {
         match &self.routes {
             Routes::Programs(programs) => programs.address(program),
             Routes::Clients { .. } => None,
@@ -324,13 +328,13 @@ impl Engine {
 
     /// Where a datagram that has come out of its link goes, and from which port: that which stands for its sender.
     #[inline]
-    fn way_out(&self, event: &NetworkEvent<Arc<Packet>>) -> Option<(Port, SocketAddr)> {
+    fn way_out(&self, event: &PacketEvent<Arc<Packet>, Path>) -> Option<(Port, SocketAddr)> {
         match &self.routes {
-            Routes::Programs(programs) => Some((Port::Program(event.from.0), programs.address(event.to.0)?)),
+            Routes::Programs(programs) => Some((Port::Program(event.path.from), programs.address(event.path.to)?)),
             Routes::Clients { clients, server } => {
                 let client = event.payload.client?;
                 let address = clients.address(client)?;
-                Some(if event.to.0 == 0 { (Port::Listen, address) } else { (Port::Client(client.slot), *server) })
+                Some(if event.path.to == CLIENT { (Port::Listen, address) } else { (Port::Client(client.slot), *server) })
             }
         }
     }
@@ -349,8 +353,8 @@ impl Engine {
         debug_assert_eq!(passed, Ok(()), "time has not gone back");
     }
 
-    fn link(&self, from: u32, to: u32) -> usize {
-        from as usize * self.names.len() + to as usize
+    fn link(&self, from: NodeId, to: NodeId) -> usize {
+        from.index() * self.names.len() + to.index()
     }
 
     #[cold]

@@ -24,7 +24,7 @@ pub(super) struct Pool {
     idle: Vec<Arc<Packet>>,
     /// The bytes that idle ones keep.
     kept: usize,
-    /// They keep no more than this, so that many long ones do not leave their length to many short ones.
+    /// They keep no more than this, such that many long ones do not leave their length to many short ones.
     most_kept: usize,
 }
 

@@ -1,10 +1,11 @@
-//! Who sent it, in a mesh: programs by their addresses, given or learnt.
+//! The sender of a datagram, in a mesh: programs by their addresses, given or learnt.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 
 use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
 
 use crate::config::Program;
 
@@ -14,11 +15,11 @@ use crate::config::Program;
 /// there is none, whose address was learnt and has been silent too long. It is never that of the program to which it speaks.
 #[derive(Debug)]
 pub(super) struct Programs {
-    places: BTreeMap<SocketAddr, u32>,
+    places: BTreeMap<SocketAddr, NodeId>,
     programs: Vec<Known>,
     forget_after: Duration,
     /// The sender before: most datagrams of a batch are of one.
-    last: Option<(SocketAddr, u32)>,
+    last: Option<(SocketAddr, NodeId)>,
 }
 
 #[derive(Debug)]
@@ -31,13 +32,13 @@ struct Known {
 impl Programs {
     pub(super) fn new(programs: &[Program], forget_after: Duration) -> Self {
         let known = |program: &Program| Known { address: program.address, is_given: program.address.is_some(), heard: Instant::ZERO };
-        let places = (0..).zip(programs).filter_map(|(place, program)| Some((program.address?, place))).collect();
+        let places = (0..).map(NodeId).zip(programs).filter_map(|(place, program)| Some((program.address?, place))).collect();
         Self { places, programs: programs.iter().map(known).collect(), forget_after, last: None }
     }
 
-    /// Who sends from that address to the port of program `to`; `None`: a stranger.
+    /// The program that sends from that address to the port of program `to`; `None`: a stranger.
     #[inline]
-    pub(super) fn sender(&mut self, from: SocketAddr, to: u32, now: Instant) -> Option<u32> {
+    pub(super) fn sender(&mut self, from: SocketAddr, to: NodeId, now: Instant) -> Option<NodeId> {
         let place = match self.last {
             Some((address, place)) if address == from => place,
             _ => {
@@ -46,24 +47,24 @@ impl Programs {
                 place
             }
         };
-        self.programs[place as usize].heard = now;
+        self.programs[place.index()].heard = now;
         Some(place)
     }
 
     /// Where a program is; `None` if that is not known yet.
     #[inline]
-    pub(super) fn address(&self, place: u32) -> Option<SocketAddr> {
-        self.programs.get(place as usize)?.address
+    pub(super) fn address(&self, place: NodeId) -> Option<SocketAddr> {
+        self.programs.get(place.index())?.address
     }
 
     #[cold]
-    fn learn(&mut self, from: SocketAddr, to: u32, now: Instant) -> Option<u32> {
-        let open = |place: &u32| *place != to && !self.programs[*place as usize].is_given;
-        let count = u32::try_from(self.programs.len()).unwrap_or(u32::MAX);
-        let silent = |place: &u32| now.saturating_duration_since(self.programs[*place as usize].heard) >= self.forget_after;
-        let unknown = |place: &u32| self.programs[*place as usize].address.is_none();
-        let place = (0..count).filter(open).find(unknown).or_else(|| (0..count).filter(open).find(silent))?;
-        if let Some(before) = self.programs[place as usize].address.replace(from) {
+    fn learn(&mut self, from: SocketAddr, to: NodeId, now: Instant) -> Option<NodeId> {
+        let open = |place: &NodeId| *place != to && !self.programs[place.index()].is_given;
+        let nodes = || (0..self.programs.len()).map(NodeId::new);
+        let silent = |place: &NodeId| now.saturating_duration_since(self.programs[place.index()].heard) >= self.forget_after;
+        let unknown = |place: &NodeId| self.programs[place.index()].address.is_none();
+        let place = nodes().filter(open).find(unknown).or_else(|| nodes().filter(open).find(silent))?;
+        if let Some(before) = self.programs[place.index()].address.replace(from) {
             self.places.remove(&before);
         }
         self.places.insert(from, place);
@@ -93,27 +94,30 @@ mod tests {
     #[test]
     fn given_addresses_are_known_and_strangers_are_not_taken_for_them() {
         let mut programs = programs([Some(1), Some(2), Some(3)]);
-        assert_eq!((1..=4).map(|port| programs.sender(address(port), 0, second(99))).collect::<Vec<_>>(), [Some(0), Some(1), Some(2), None]);
+        assert_eq!(
+            (1..=4).map(|port| programs.sender(address(port), NodeId(0), second(99))).collect::<Vec<_>>(),
+            [Some(NodeId(0)), Some(NodeId(1)), Some(NodeId(2)), None]
+        );
     }
 
     #[test]
     fn a_stranger_is_the_first_program_that_it_may_be() {
         let mut programs = programs([None, Some(2), None]);
         // It speaks to program 0, so it is not that one.
-        assert_eq!(programs.sender(address(9), 0, second(1)), Some(2));
-        assert_eq!(programs.sender(address(8), 1, second(1)), Some(0));
-        assert_eq!(programs.sender(address(7), 1, second(1)), None);
-        assert_eq!((programs.address(0), programs.address(2)), (Some(address(8)), Some(address(9))));
+        assert_eq!(programs.sender(address(9), NodeId(0), second(1)), Some(NodeId(2)));
+        assert_eq!(programs.sender(address(8), NodeId(1), second(1)), Some(NodeId(0)));
+        assert_eq!(programs.sender(address(7), NodeId(1), second(1)), None);
+        assert_eq!((programs.address(NodeId(0)), programs.address(NodeId(2))), (Some(address(8)), Some(address(9))));
     }
 
     #[test]
     fn one_that_was_learnt_and_falls_silent_makes_room_for_another() {
         let mut programs = programs([None, Some(2), Some(3)]);
-        assert_eq!(programs.sender(address(9), 1, second(1)), Some(0));
-        assert_eq!(programs.sender(address(8), 1, second(30)), None);
-        assert_eq!(programs.sender(address(8), 1, second(31)), Some(0));
+        assert_eq!(programs.sender(address(9), NodeId(1), second(1)), Some(NodeId(0)));
+        assert_eq!(programs.sender(address(8), NodeId(1), second(30)), None);
+        assert_eq!(programs.sender(address(8), NodeId(1), second(31)), Some(NodeId(0)));
         // The one before is a stranger now.
-        assert_eq!(programs.sender(address(9), 1, second(32)), None);
-        assert_eq!(programs.address(0), Some(address(8)));
+        assert_eq!(programs.sender(address(9), NodeId(1), second(32)), None);
+        assert_eq!(programs.address(NodeId(0)), Some(address(8)));
     }
 }

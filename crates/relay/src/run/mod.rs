@@ -1,7 +1,7 @@
 //! The relay in real time: one thread that waits for sockets and for the next release.
 
 mod density;
-mod doors;
+mod ports;
 mod report;
 
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -10,7 +10,7 @@ use std::io;
 use std::net::SocketAddr;
 use std::sync::mpsc::Receiver;
 
-use cohaptic_realtime::udp::{BindError, DoorConfig};
+use cohaptic_realtime::udp::{BindError, EndpointConfig};
 use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock, Pacer, Pacing, Tolerance, Wishes, Woken, prepare_thread};
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkModel, NodeId};
@@ -18,12 +18,11 @@ use cohaptic_wan::{LinkModel, NodeId};
 use crate::config::{ConfigError, RelayConfig};
 use crate::engine::Engine;
 use density::Density;
-use doors::{Doors, Heard};
+use ports::{Heard, Ports};
 pub use report::{LinkReport, PortReport, Report, View};
 
 /// Why there is no relay, or why it stopped.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum RelayError {
     /// There is no such relay.
     #[error(transparent)]
@@ -66,7 +65,6 @@ impl Default for RunOptions {
 
 /// What may be said to a relay while it runs.
 #[derive(Clone, Debug)]
-#[non_exhaustive]
 pub enum Control {
     /// A link becomes another one, from when it is heard on.
     SetLink {
@@ -83,7 +81,7 @@ pub enum Control {
 #[derive(Debug)]
 pub struct Relay {
     engine: Engine,
-    doors: Doors,
+    ports: Ports,
     release: Lateness,
     density: Density,
     refused_changes: u64,
@@ -102,14 +100,14 @@ impl Relay {
     /// # Errors
     ///
     /// [`RelayError`] if there is no such relay, or a port cannot be had.
-    pub fn bind(config: RelayConfig, door: DoorConfig) -> Result<Self, RelayError> {
-        let doors = Doors::open(&config, door)?;
-        Ok(Self { engine: Engine::new(config)?, doors, release: Lateness::new(), density: Density::new(), refused_changes: 0 })
+    pub fn bind(config: RelayConfig, port: EndpointConfig) -> Result<Self, RelayError> {
+        let ports = Ports::open(&config, port)?;
+        Ok(Self { engine: Engine::new(config)?, ports, release: Lateness::new(), density: Density::new(), refused_changes: 0 })
     }
 
     /// Where it listens: each program's name and the port that stands for it; of a proxy, `listen`.
     pub fn ports(&self) -> impl Iterator<Item = (&str, SocketAddr)> {
-        self.doors.addresses()
+        self.ports.addresses()
     }
 
     /// Runs, in this thread, until `stop` is set (which is looked at as often as `look` is called), or until its end. `control` is looked at without
@@ -131,17 +129,17 @@ impl Relay {
         let (mut look_at, mut heard) = (Instant::ZERO, None);
         let mut pacer = Pacer::new(options.pacing);
         loop {
-            // What came in first: then nothing that has not been read came before what is let pass.
+            // Arrivals first: then no unread datagram came before the instant that is let pass.
             let Heard { until, count } = match heard.take() {
                 Some(heard) => heard,
-                None => self.doors.receive(&mut self.engine, &clock)?,
+                None => self.ports.receive(&mut self.engine, &clock)?,
             };
-            self.doors.follow_clients(&mut self.engine);
+            self.ports.follow_clients(&mut self.engine);
             self.take_control(control, until);
             self.engine.handle_timeout(until);
-            let is_more = self.doors.take_releases(&mut self.engine);
+            let is_more = self.ports.take_releases(&mut self.engine);
             let before = self.release.count();
-            self.doors.send(&clock, &mut self.release);
+            self.ports.send(&clock, &mut self.release);
             let now = clock.now();
             self.density.note(now, count as u64 + self.release.count() - before);
             let is_over = end.is_some_and(|end| now >= end);
@@ -161,11 +159,11 @@ impl Relay {
             elapsed,
             prepared,
             links: report::links(&self.engine),
-            ports: self.doors.report(),
+            ports: self.ports.report(),
             intake: *self.engine.counts(),
             clamped: self.engine.clamped().clone(),
             held: self.engine.held(),
-            without_socket: self.doors.without_socket(),
+            without_socket: self.ports.without_socket(),
             refused_changes: self.refused_changes,
             validity: options.tolerance.judge(&self.release),
             release: self.release,
@@ -188,14 +186,14 @@ impl Relay {
         }
         let due = self.engine.poll_timeout();
         let mut until = due.map_or(look_at, |due| due.min(look_at));
-        if self.doors.has_waiting() {
+        if self.ports.has_waiting() {
             until = until.min(clock.now() + AGAIN);
         }
         if due != Some(until) {
-            pacer.wait(clock, Some(until), &[self.doors.readable()])?;
+            pacer.wait(clock, Some(until), &[self.ports.readable()])?;
             return Ok(None);
         }
-        match pacer.approach(clock, due, &[self.doors.readable()])? {
+        match pacer.approach(clock, due, &[self.ports.readable()])? {
             Woken::Deadline => self.meet(clock, until),
             Woken::Readable | Woken::Early => Ok(None),
         }
@@ -207,7 +205,7 @@ impl Relay {
         let ready_at = Instant::ZERO + due.saturating_duration_since(Instant::ZERO).saturating_sub(MADE_READY);
         let mut now = clock.now();
         while now < ready_at {
-            let heard = self.doors.receive(&mut self.engine, clock)?;
+            let heard = self.ports.receive(&mut self.engine, clock)?;
             if heard.count > 0 {
                 return Ok(Some(heard));
             }
@@ -216,11 +214,11 @@ impl Relay {
         if now < due {
             // Nothing is due earlier, so that all of it leaves then. What comes in until then is offered then.
             self.engine.handle_timeout(due);
-            self.doors.take_releases(&mut self.engine);
+            self.ports.take_releases(&mut self.engine);
             while clock.now() < due {
                 core::hint::spin_loop();
             }
-            self.doors.send(clock, &mut self.release);
+            self.ports.send(clock, &mut self.release);
         }
         Ok(None)
     }

@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::net::SocketAddr;
 
-use cohaptic_realtime::udp::DoorCounts;
+use cohaptic_realtime::udp::EndpointCounts;
 use cohaptic_realtime::{Lateness, Prepared, Validity};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkStats, NodeId};
@@ -23,7 +23,7 @@ pub struct Report {
     pub ports: Vec<PortReport>,
     /// What came in.
     pub intake: IntakeCounts,
-    /// How late each datagram was handed to the kernel: the release error. It includes what is in `clamped`.
+    /// How late each datagram was handed to the kernel: the release error. It includes the share in `clamped`.
     pub release: Lateness,
     /// By how much datagrams were offered later than they came, of those that were.
     pub clamped: Lateness,
@@ -58,7 +58,7 @@ pub struct PortReport {
     /// Where it is; `None` for the ports of clients.
     pub address: Option<SocketAddr>,
     /// What it received and sent, and what it did not.
-    pub counts: DoorCounts,
+    pub counts: EndpointCounts,
     /// How many bytes may wait in the kernel to be read, as the kernel counts them.
     pub receive_buffer: usize,
     /// Datagrams that the kernel dropped because that was full; `None` if the system does not tell.
@@ -118,7 +118,7 @@ impl View<'_> {
 
     /// Where a program is, if that is known; `None` for a proxy.
     #[must_use]
-    pub fn program_address(&self, program: u32) -> Option<SocketAddr> {
+    pub fn program_address(&self, program: NodeId) -> Option<SocketAddr> {
         self.engine.program_address(program)
     }
 }

@@ -6,7 +6,7 @@ use cohaptic_linkfile::{LinkTable, RelayFile};
 use cohaptic_realtime::udp::Ecn;
 use cohaptic_relay::{Arrival, Change, ConfigError, Engine, Form, Intake, Limits, Mesh, Port, RelayConfig};
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
+use cohaptic_wan::{Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo, Path};
 use proptest::prelude::*;
 
 use super::{address, at, link, mesh};
@@ -17,17 +17,17 @@ fn three(usual: LinkModel, own: &[((usize, usize), LinkModel)]) -> RelayConfig {
     mesh(&[program(0), program(1), program(2)], usual, own)
 }
 
-fn arrival<'a>(when: Instant, from: u32, to: u32, bytes: &'a [u8], ecn: Option<Ecn>) -> Arrival<'a> {
-    Arrival { at: when, port: Port::Program(to), from: address(9000 + u16::try_from(from).unwrap()), bytes, ecn }
+fn arrival<'a>(when: Instant, from: u16, to: u16, bytes: &'a [u8], ecn: Option<Ecn>) -> Arrival<'a> {
+    Arrival { at: when, port: Port::Program(NodeId(to)), from: address(9000 + from), bytes, ecn }
 }
 
 /// A datagram that was sent or that left: when, from whom to whom, what, marked how.
-type Passing = (Instant, u32, u32, Vec<u8>, Option<Ecn>);
+type Passing = (Instant, u16, u16, Vec<u8>, Option<Ecn>);
 
 fn drain(engine: &mut Engine, left: &mut Vec<Passing>) {
     while let Some(release) = engine.poll_release() {
-        let Port::Program(from) = release.port else { panic!("{:?}", release.port) };
-        let to = u32::from(release.to.port()) - 9000;
+        let Port::Program(NodeId(from)) = release.port else { panic!("{:?}", release.port) };
+        let to = release.to.port() - 9000;
         left.push((release.at, from, to, release.bytes.to_vec(), release.ecn));
     }
 }
@@ -45,14 +45,15 @@ fn virtual_time(config: &RelayConfig, offers: &[Passing]) -> Vec<Passing> {
     let Form::Mesh(Mesh { programs, links }) = &config.form else { panic!() };
     let nodes = programs.iter().map(|program| program.name.clone()).collect();
     let mut network: Network<(Vec<u8>, Option<Ecn>)> =
-        Network::new(NetworkConfig { seed: config.seed, nodes, general: true }, |from, to| links.between(from.0 as usize, to.0 as usize).clone());
+        Network::new(NetworkConfig { seed: config.seed, nodes, general: true }, |from, to| links.between(from.index(), to.index()).clone());
     let mut left = Vec::new();
     let mut drain = |network: &mut Network<(Vec<u8>, Option<Ecn>)>| {
         while let Some(event) = network.poll_event() {
             if let Fate::Delivered(when) = event.fate {
+                let (marked, Path { from, to }) = (event.marked, event.path);
                 let (mut bytes, ecn) = event.payload;
                 event.damage.iter().for_each(|damage| damage.apply(&mut bytes));
-                left.push((when, event.from.0, event.to.0, bytes, if event.marked { Some(Ecn::Ce) } else { ecn }));
+                left.push((when, from.0, to.0, bytes, if marked { Some(Ecn::Ce) } else { ecn }));
             }
         }
     };
@@ -90,7 +91,7 @@ proptest! {
     #[test]
     fn the_fates_are_those_of_virtual_time(
         usual in any_link(), own in any_link(),
-        sent in prop::collection::vec((0_u64..3000, 0_u32..3, 1_u32..3, 0_usize..200, 0_usize..4), 1..120),
+        sent in prop::collection::vec((0_u64..3000, 0_u16..3, 1_u16..3, 0_usize..200, 0_usize..4), 1..120),
     ) {
         let config = three(usual, &[((0, 1), own)]);
         let mut now = 0;
@@ -125,7 +126,7 @@ proptest! {
     fn what_is_staged_is_offered_in_order_of_time(mut instants in prop::collection::vec(0_u64..1000, 1..50)) {
         let mut engine = Engine::new(three(link(&["delay=1ms"]), &[])).unwrap();
         for (n, micros) in instants.iter().enumerate() {
-            let from = u32::try_from(n % 3).unwrap();
+            let from = u16::try_from(n % 3).unwrap();
             engine.stage(arrival(at(*micros), from, (from + 1) % 3, &[1], None));
         }
         engine.offer_staged();
@@ -179,18 +180,18 @@ fn beyond_the_bounds_the_datagram_that_comes_is_dropped_and_its_link_counts_it()
 fn what_comes_to_a_program_that_nobody_has_heard_of_is_counted() {
     let config = mesh(&[("a", address(7000), None), ("b", address(7001), None)], link(&["delay=1ms"]), &[]);
     let mut engine = Engine::new(config).unwrap();
-    let hello = |micros, from: u16, to| Arrival { at: at(micros), port: Port::Program(to), from: address(from), bytes: b"hello", ecn: None };
+    let hello = |micros, from: u16, to| Arrival { at: at(micros), port: Port::Program(NodeId(to)), from: address(from), bytes: b"hello", ecn: None };
     assert_eq!(engine.handle_datagram(hello(0, 4000, 1)), Intake::Offered);
     engine.handle_timeout(at(1000));
     assert_eq!(engine.poll_release(), None);
     assert_eq!(engine.link_stats(NodeId(0), NodeId(1)).unwrap().1.undeliverable, 1);
-    assert_eq!((engine.program_address(0), engine.program_address(1)), (Some(address(4000)), None));
+    assert_eq!((engine.program_address(NodeId(0)), engine.program_address(NodeId(1))), (Some(address(4000)), None));
     // b is heard of while the second hello is on its way.
     engine.handle_datagram(hello(2000, 4000, 1));
     engine.handle_datagram(hello(2500, 4001, 0));
     engine.handle_timeout(at(3000));
     let release = engine.poll_release().unwrap();
-    assert_eq!((release.port, release.to, release.bytes), (Port::Program(0), address(4001), &b"hello"[..]));
+    assert_eq!((release.port, release.to, release.bytes), (Port::Program(NodeId(0)), address(4001), &b"hello"[..]));
     assert_eq!(engine.poll_release(), None);
     assert_eq!(engine.held().0, 1);
 }
@@ -253,6 +254,6 @@ fn a_relay_that_cannot_be_is_refused_and_a_file_becomes_one() {
     assert_eq!((config.seed, config.limits.packets, config.changes.len()), (3, 9, 2));
     let mut engine = Engine::new(config).unwrap();
     assert_eq!(engine.names(), ["a", "b"]);
-    let hello = Arrival { at: at(0), port: Port::Program(1), from: "[::1]:9".parse().unwrap(), bytes: b"x", ecn: None };
+    let hello = Arrival { at: at(0), port: Port::Program(NodeId(1)), from: "[::1]:9".parse().unwrap(), bytes: b"x", ecn: None };
     assert_eq!(engine.handle_datagram(hello), Intake::Offered);
 }

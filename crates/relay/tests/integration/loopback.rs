@@ -8,7 +8,7 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use cohaptic_realtime::udp::{DoorConfig, Ecn, ReceiveBuffers, UdpDoor};
+use cohaptic_realtime::udp::{Ecn, EndpointConfig, ReceiveBuffers, UdpEndpoint};
 use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Pacing, Tolerance, Wishes};
 use cohaptic_relay::{Control, Form, Limits, Proxy, Relay, RelayConfig, Report, RunOptions, View};
 use cohaptic_units::Bytes;
@@ -30,7 +30,7 @@ struct Running {
 }
 
 fn start(config: RelayConfig, pacing: Pacing) -> Running {
-    run(Relay::bind(config, DoorConfig::default()).unwrap(), pacing)
+    run(Relay::bind(config, EndpointConfig::default()).unwrap(), pacing)
 }
 
 fn run(relay: Relay, pacing: Pacing) -> Running {
@@ -197,8 +197,8 @@ fn three_programs_speak_to_each_other_through_their_own_links() {
 #[test]
 fn congestion_bits_pass_and_a_link_that_marks_marks() {
     let clock = MonotonicClock::start();
-    let door = || UdpDoor::bind("127.0.0.1:0".parse().unwrap(), DoorConfig::default()).unwrap();
-    let (mut left, mut right) = (door(), door());
+    let port = || UdpEndpoint::bind("127.0.0.1:0".parse().unwrap(), EndpointConfig::default()).unwrap();
+    let (mut left, mut right) = (port(), port());
     let port = "127.0.0.1:0".parse().unwrap();
     let config = mesh(
         &[("left", port, Some(left.local_address())), ("right", port, Some(right.local_address()))],
@@ -206,7 +206,7 @@ fn congestion_bits_pass_and_a_link_that_marks_marks() {
         &[((1, 0), link(&["delay=1ms", "loss=100%", "mark-instead-of-loss=true"]))],
     );
     let relay = start(config, Pacing::Sleep);
-    let pass = |from: &mut UdpDoor, port: SocketAddr, to: &mut UdpDoor, ecn: Option<Ecn>| {
+    let pass = |from: &mut UdpEndpoint, port: SocketAddr, to: &mut UdpEndpoint, ecn: Option<Ecn>| {
         from.queue(port, b"marked?", ecn);
         from.flush();
         let (mut buffers, mut found) = (ReceiveBuffers::new(), None);
@@ -258,7 +258,7 @@ fn what_waits_at_a_port_is_read_before_time_passes() {
     let port = "127.0.0.1:0".parse().unwrap();
     let place = |socket: &UdpSocket| Some(socket.local_addr().unwrap());
     let config = mesh(&[("left", port, place(&left)), ("right", port, place(&right))], link(&["delay=1h"]), &[]);
-    let relay = Relay::bind(config, DoorConfig::default()).unwrap();
+    let relay = Relay::bind(config, EndpointConfig::default()).unwrap();
     let (_, there) = relay.ports().nth(1).unwrap();
     for sequence in 0..COUNT {
         left.send_to(&sequence.to_le_bytes(), there).unwrap();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use cohaptic_linkfile::router::{NamedLink, Side};
 use cohaptic_realtime::Lateness;
 use cohaptic_units::Instant;
-use cohaptic_wan::{Fate, Link, LinkEvent, LinkModel, LinkName, PacketInfo};
+use cohaptic_wan::{Fate, Link, LinkModel, LinkName, PacketEvent, PacketInfo, PacketRecord};
 
 use super::LaneSnapshot;
 use crate::packet::Packet;
@@ -51,18 +51,18 @@ impl Lane {
     }
 
     /// The packet of an event, if it has arrived, with what the link did to it.
-    pub(super) fn arrived(&mut self, event: LinkEvent<Arc<Packet>>) -> Option<(Instant, Arc<Packet>)> {
+    pub(super) fn arrived(&mut self, event: PacketEvent<Arc<Packet>>) -> Option<(Instant, Arc<Packet>)> {
         let Fate::Delivered(at) = event.fate else { return None };
         self.delivered_bytes += event.size.get();
-        self.recent.record(at.saturating_duration_since(event.sent));
-        let mut packet = event.payload;
-        if event.marked || event.damage.is_some() {
+        self.recent.record(at.saturating_duration_since(event.offered));
+        let PacketEvent { record: PacketRecord { marked, .. }, payload: mut packet, damage } = event;
+        if marked || damage.is_some() {
             // A copy goes its own way: what happens to one does not happen to the other.
             let packet = Arc::make_mut(&mut packet);
-            if event.marked {
+            if marked {
                 packet.mark_congestion();
             }
-            if let Some(damage) = &event.damage {
+            if let Some(damage) = &damage {
                 packet.damage(damage);
             }
         }
@@ -74,7 +74,7 @@ impl Lane {
         LaneSnapshot {
             link: name.to_owned(),
             from,
-            stats: *self.link.stats(),
+            stats: self.link.stats(),
             delivered_bytes: self.delivered_bytes,
             overload: self.overload,
             recent_delay: recent.summary(),

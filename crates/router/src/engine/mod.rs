@@ -37,7 +37,7 @@ pub struct Engine {
     /// Two for each link, one after the other: from the left, from the right.
     lanes: Vec<Lane>,
     memory: Memory,
-    /// What is inside all links.
+    /// The packets inside all links.
     held: Memory,
     departures: VecDeque<Departure>,
     received: [Received; 2],
@@ -87,7 +87,7 @@ impl Engine {
 
     /// Takes a packet that came from a side.
     ///
-    /// What is no packet of IP goes to the other side at once; what claims to be one and is not goes nowhere.
+    /// A frame without a packet of IP goes to the other side at once; a malformed packet goes nowhere.
     pub fn handle_packet(&mut self, now: Instant, from: Side, packet: Packet) {
         self.handle_timeout(now);
         let now = self.now;

@@ -66,7 +66,7 @@ pub struct Counters {
     pub by_default: [Count; 2],
     /// Each link from the left and then from the right, in the order of the file.
     pub lanes: Vec<LaneSnapshot>,
-    /// What is inside all links now.
+    /// The packets inside all links now.
     pub held: Memory,
 }
 

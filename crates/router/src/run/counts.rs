@@ -61,7 +61,7 @@ impl Report {
         self.counters.received.iter().map(|received| received.all.packets).sum()
     }
 
-    /// Packets that did not come out, for any reason, and will not: what is on the way is not among them.
+    /// Packets that did not come out, for any reason, and will not: packets on the way are not among them.
     #[must_use]
     pub fn dropped(&self) -> u64 {
         self.counters.dropped() + self.written.iter().map(Written::lost).sum::<u64>()

@@ -31,7 +31,6 @@ pub struct Router<D = AnyDevice, C = MonotonicClock> {
 
 /// Why a router came to an end by itself.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum RunError {
     /// A device gives no more packets.
     #[error("{}: cannot read the device: {source}", side.name())]
@@ -79,7 +78,7 @@ impl<D: Device, C: Clock> Router<D, C> {
     /// Routes packets until `stop` is set, or until the run is `until` old. Every now and then, `every` so often and once at the end, `look` is called on
     /// this thread: packets wait meanwhile, so it should take microseconds.
     ///
-    /// What is inside the links at the end stays there: a further call goes on.
+    /// Packets inside the links at the end stay there: a further call goes on.
     ///
     /// # Errors
     ///
@@ -121,7 +120,7 @@ impl<D: Device, C: Clock> Router<D, C> {
         Ok(())
     }
 
-    /// Reads what is there, in turns, and lets packets leave whose time comes meanwhile.
+    /// Reads the packets that are there, in turns, and lets packets leave whose time comes meanwhile.
     fn receive(&mut self) -> Result<(), RunError> {
         for side in Side::BOTH {
             for _ in 0..IN_TURN {

@@ -32,7 +32,7 @@ const WAITING: usize = 8 << 20;
 pub struct Interface {
     socket: OwnedFd,
     index: usize,
-    /// To be told to hear only what is meant for it again, when this is dropped.
+    /// To be told to hear only its own packets again, when this is dropped.
     restore: Option<(Netlink, u32)>,
 }
 

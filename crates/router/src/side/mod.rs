@@ -133,7 +133,6 @@ pub struct OpenError {
 
 /// Why a device could not be opened.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum Failed {
     /// The system refused something.
     #[error("cannot {what}: {source}{}", way_out(source))]

@@ -38,7 +38,7 @@ impl Netlink {
         self.ask(NEW_LINK, REQUEST, &link(index, FLAG_UP, FLAG_UP))
     }
 
-    /// Lets a device hear what is meant for others, or not.
+    /// Lets a device hear packets for others, or not.
     pub(super) fn promiscuous(&self, index: u32, hears_all: bool) -> io::Result<()> {
         self.ask(NEW_LINK, REQUEST, &link(index, if hears_all { FLAG_PROMISCUOUS } else { 0 }, FLAG_PROMISCUOUS))
     }
@@ -81,7 +81,7 @@ impl Netlink {
     }
 }
 
-/// A message: its length, its kind, its flags, a number, and nobody in particular who asks (struct nlmsghdr).
+/// A message: its length, its kind, its flags, a number, and no particular asker (struct nlmsghdr).
 fn message(kind: u16, flags: u16, body: &[u8]) -> Vec<u8> {
     const HEADER: u32 = 16;
     let length = HEADER + u32::try_from(body.len()).unwrap_or(u32::MAX - HEADER);

@@ -11,7 +11,7 @@ use super::netlink::Netlink;
 use super::{Device, Failed, Sent};
 use crate::packet::Framing;
 
-/// How many packets wait in a device that we made until we read them. More than a burst, so that what is lost is lost by a link.
+/// How many packets wait in a device that we made until we read them. More than a burst, so that losses are those of a link.
 const WAITING: u32 = 2_000;
 
 /// A TUN device. One that we made is gone when this is dropped.

@@ -1,6 +1,7 @@
 //! The keys of a scene.
 
 use cohaptic_peer::Coordination;
+use cohaptic_peer::coordination::LawValues;
 use cohaptic_wan::DropCause;
 
 use cohaptic_linkfile::schema::{
@@ -57,15 +58,81 @@ static ENCLOSURE: Table = Table::of(&[&[
     required("damping", number(DAMPING), "Damping of the walls"),
 ]]);
 
-static COORDINATION: Table = Table::of(&[&[
+static COORDINATION: Table = Table::of(&[&GAINS_OF_ALL, LAWS.split_at(LAWS_WITH_KEYS).0]);
+const GAINS_OF_ALL: [Key; 5] = [
     required("strategy", Form::Words(&STRATEGIES), "Where each copy is drawn to"),
     required("stiffness", number(STIFFNESS), "Gain on the difference of positions, K_T"),
     usual("damping", number(DAMPING), "0", "Gain on the difference of velocities, B_T"),
     required("update", Form::Duration, "How often each peer sends a sample; a whole multiple of every peer's tick"),
     usual("scaling", Form::Words(&SCALINGS), "\"none\"", "How both gains follow the number of peers"),
-]]);
-const STRATEGIES: [(&str, &str); 2] =
-    [(Coordination::AveragePosition.name(), "to the mean of the others"), (Coordination::ProportionalDerivative.name(), "to each of the others")];
+];
+const STRATEGIES: [(&str, &str); Coordination::ALL.len()] = {
+    let mut words = [("", ""); Coordination::ALL.len()];
+    let mut place = 0;
+    while place < words.len() {
+        words[place] = (Coordination::ALL[place].name(), Coordination::ALL[place].about());
+        place += 1;
+    }
+    words
+};
+
+/// The keys of each law's own parameters, by its place in the registry; the first ones of a row are used.
+static LAW_KEYS: [[Key; LawValues::MOST]; Coordination::ALL.len()] = {
+    let mut keys = [const { [const { optional("", Form::Duration, "") }; LawValues::MOST] }; Coordination::ALL.len()];
+    let mut law = 0;
+    while law < keys.len() {
+        let parameters = Coordination::ALL[law].parameters();
+        let mut place = 0;
+        while place < parameters.len() {
+            keys[law][place] = usual(parameters[place].key, Form::Duration, parameters[place].default, parameters[place].about);
+            place += 1;
+        }
+        law += 1;
+    }
+    keys
+};
+static LAW_GROUPS: [[&[Key]; 1]; Coordination::ALL.len()] = {
+    let mut groups: [[&[Key]; 1]; Coordination::ALL.len()] = [[&[]]; Coordination::ALL.len()];
+    let mut law = 0;
+    while law < groups.len() {
+        groups[law] = [LAW_KEYS[law].split_at(Coordination::ALL[law].parameters().len()).0];
+        law += 1;
+    }
+    groups
+};
+static LAW_TABLES: [Table; Coordination::ALL.len()] = {
+    let mut tables = [const { Table::of(&[]) }; Coordination::ALL.len()];
+    let mut law = 0;
+    while law < tables.len() {
+        tables[law] = Table::of(&LAW_GROUPS[law]);
+        law += 1;
+    }
+    tables
+};
+/// How many laws have parameters of their own.
+const LAWS_WITH_KEYS: usize = {
+    let (mut law, mut count) = (0, 0);
+    while law < Coordination::ALL.len() {
+        if !Coordination::ALL[law].parameters().is_empty() {
+            count += 1;
+        }
+        law += 1;
+    }
+    count
+};
+/// The tables of the laws that have parameters of their own, one after another.
+static LAWS: [Key; Coordination::ALL.len()] = {
+    let mut keys = [const { optional("", Form::Duration, "") }; Coordination::ALL.len()];
+    let (mut law, mut count) = (0, 0);
+    while law < Coordination::ALL.len() {
+        if !Coordination::ALL[law].parameters().is_empty() {
+            keys[count] = optional(Coordination::ALL[law].name(), Form::Table(&LAW_TABLES[law]), "Parameters that this strategy alone has");
+            count += 1;
+        }
+        law += 1;
+    }
+    keys
+};
 const SCALINGS: [(&str, &str); 2] = [("none", "as they are written"), ("inverse-n", "times 4(N-1)/N^2 among N peers; of a coupling times 2/N")];
 
 static SIMULATION: Table = Table::of(&[&[

@@ -5,6 +5,7 @@ use core::time::Duration;
 use cohaptic_linkfile::document::Node;
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
+use cohaptic_peer::coordination::{LawSettings, LawValues};
 use cohaptic_peer::{Coordination, Gains, Integrator};
 
 use crate::model::{Axes, CoordinationSpec, Scaling};
@@ -57,8 +58,41 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<Coo
     let stiffness = table.required("stiffness", &STIFFNESS.expected(), |node, context| STIFFNESS.read(node, context));
     let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
     let update = table.required("update", "a duration above zero such as \"8ms\"", values::positive_duration);
+    let settings = read_settings(&mut table);
     table.finish();
-    Some(CoordinationSpec { strategy: strategy?, scaling: scaling?, gains: Gains { stiffness: stiffness?, damping: damping? }, update: update? })
+    Some(CoordinationSpec {
+        strategy: strategy?,
+        scaling: scaling?,
+        gains: Gains { stiffness: stiffness?, damping: damping? },
+        settings: settings?,
+        update: update?,
+    })
+}
+
+/// The tables `[coordination.NAME]`, each with the parameters that a strategy has of its own. They may stand there whatever the strategy of the scene is.
+fn read_settings(coordination: &mut TableReader<'_>) -> Option<LawSettings> {
+    let mut settings = LawSettings::default();
+    let mut is_read = true;
+    for law in Coordination::ALL.iter().copied().filter(|law| !law.parameters().is_empty()) {
+        let values = coordination.optional(law.name(), *settings.of(law), |node, context| read_values(node, context, law));
+        is_read &= values.is_some();
+        *settings.of_mut(law) = values.unwrap_or_default();
+    }
+    is_read.then_some(settings)
+}
+
+fn read_values(node: &Node, context: Context<'_>, law: Coordination) -> Option<LawValues> {
+    let mut table = TableReader::new(node, context, &format!("a table such as [coordination.{}]", law.name()))?;
+    let mut values = LawValues::defaults(law.parameters());
+    let mut is_read = true;
+    for (place, parameter) in law.parameters().iter().enumerate() {
+        match table.optional(parameter.key, values.get(place), values::duration) {
+            Some(value) => values.set(place, value),
+            None => is_read = false,
+        }
+    }
+    table.finish();
+    is_read.then_some(values)
 }
 
 /// How gains follow the number of peers.

@@ -4,7 +4,6 @@ use crate::AnalysisError;
 
 /// Why there is no admittance.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum AdmittanceError {
     /// There is no such peer.
     #[error("no peer in place {peer}: expected one of the {peers} peers of the scene, counted from 0")]

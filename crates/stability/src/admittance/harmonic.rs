@@ -119,7 +119,7 @@ impl Harmonic {
             let place = states + number;
             self.matrix[(place, place)] += Complex64::ONE;
             self.subtract(place, Source::Sent(sent.end - 1 - (age - 1) % sent.len()), turn(-self.periods * count(frames)));
-            self.subtract_reference(place, self.back * self.sum_of_turns(frames) * self.map.translation);
+            self.subtract_reference(place, self.back * self.sum_of_turns(frames) * self.map.translation(age));
         }
     }
 

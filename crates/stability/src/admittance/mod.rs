@@ -15,7 +15,8 @@ use cohaptic_scene::Scene;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::lifted::{Body, Lifted, Node};
+use crate::lifted::{Body, Lifted, Node, Sampling};
+use crate::linear_form::LinearLaw;
 use crate::network::NominalNetwork;
 use crate::parts::{radius_of, reduced};
 use crate::structure::{Contacts, Structure, arm, count, device_plant};
@@ -43,7 +44,6 @@ pub struct Admittance {
     nodes: Vec<Node>,
     weights: Matrix,
     timetable: Timetable,
-    coordination: Gains,
     time: f64,
     tied: bool,
     /// Which of the nodes is pushed.
@@ -96,10 +96,10 @@ impl Admittance {
     fn of_classes(scene: &Scene, structure: Structure, peer: usize, watch: &dyn Watch) -> Result<Self, AnalysisError> {
         let radius = radius_of(&reduced(&structure, scene, 1, Method::Reduced, watch)?.parts);
         let nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node(scene, class)).collect();
-        let (coordination, time) = (structure.coordination(scene), structure.time(scene));
+        let time = structure.time(scene);
         let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
         let Structure { timetable, weights, tied, .. } = structure;
-        Ok(Self { nodes, weights, timetable, coordination, time, tied, pushed, highest: 0.0, radius, notes: Vec::new() })
+        Ok(Self { nodes, weights, timetable, time, tied, pushed, highest: 0.0, radius, notes: Vec::new() })
     }
 
     /// The admittance at a frequency \[Hz\].
@@ -190,8 +190,8 @@ impl Admittance {
     }
 
     fn lifted(&self) -> Lifted<'_> {
-        let Self { nodes, weights, timetable, coordination, time, tied, .. } = self;
-        Lifted { nodes, weights, timetable, coordination: *coordination, time: *time, tied: *tied }
+        let Self { nodes, weights, timetable, time, tied, .. } = self;
+        Lifted { nodes, weights, timetable, sampling: Sampling::of(nodes), time: *time, tied: *tied }
     }
 
     /// Force over velocity, at a frequency that is one, and how far rounding may have moved it: 1/(v + d) − 1/v is −d/(v·(v + d)).
@@ -204,11 +204,11 @@ impl Admittance {
     /// Leaves nothing but the device of the pushed peer. A node has a copy, which then rests.
     fn leave_bare(&mut self, device: Option<Body>, clock: NodeClock, tied: bool) -> Result<(), AnalysisError> {
         let none = Gains { stiffness: 0.0, damping: 0.0 };
-        self.nodes = vec![Node { device, coupling: none, wall: None, compute_delay: false, ..self.nodes[self.pushed] }];
+        let bare = self.nodes[self.pushed].clone();
+        self.nodes = vec![Node { device, coupling: none, law: LinearLaw::none(), wall: None, compute_delay: false, ..bare }];
         self.weights = Matrix::zeros(1, 1);
         // It sends nothing, so that everything repeats with every tick.
         self.timetable = Timetable::new(&[NodeClock { phase: 0, every: 1, ..clock }], &[])?;
-        self.coordination = none;
         self.tied = tied;
         self.pushed = 0;
         Ok(())

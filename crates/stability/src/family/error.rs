@@ -6,7 +6,6 @@ use crate::AnalysisError;
 
 /// Why there is no family of scenes, or no radius in it.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum FamilyError {
     /// The scene is refused, as it is without the keys or with one of their values: an unknown key or peer, a value out of range.
     #[error(transparent)]

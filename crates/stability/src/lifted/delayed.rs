@@ -23,7 +23,7 @@ impl FrameMap {
         let moved = size - 1;
         // One row of the frame for each signal, in units of which `displaced` by the reference's motion is taken off.
         let mut rows: Vec<(&[f64], f64)> = kept.iter().map(|row| (self.states.row(*row), if self.is_position(*row) { 1.0 } else { 0.0 })).collect();
-        rows.extend((0..sent).map(|row| (self.sent.row(row), self.translation)));
+        rows.extend((0..sent).map(|row| (self.sent.row(row), self.translation(sent - row))));
         let reference = self.reference().map(|row| self.states.row(row));
         if let Some(reference) = reference {
             rows.push((reference, 0.0));
@@ -55,9 +55,10 @@ impl FrameMap {
             let steps = |frames: usize| u32::try_from(frames).unwrap_or(u32::MAX);
             add(Kernel::Delay(steps(frames - 1)), column, 1.0);
             if reference.is_some() && frames >= 2 {
-                add(Kernel::Delay(0), moved, -self.translation);
+                let translation = self.translation(*age);
+                add(Kernel::Delay(0), moved, -translation);
                 if frames >= 3 {
-                    add(Kernel::Sum(steps(frames - 2)), moved, -self.translation);
+                    add(Kernel::Sum(steps(frames - 2)), moved, -translation);
                 }
             }
         }

@@ -1,11 +1,9 @@
 //! One frame of the lifted system: where it leads, as a linear function of where it began.
 
-use cohaptic_peer::Gains;
-
-use super::majorant;
 use super::node::{Node, Rows, Scale, Scratch};
 use super::rounding::Rounding;
-use crate::timetable::{Event, Timetable};
+use super::{Sampling, majorant};
+use crate::timetable::{Event, Instants, Timetable};
 use crate::{Matrix, Unwatched, Watch};
 
 /// Nodes that are coupled through samples.
@@ -15,8 +13,8 @@ pub(crate) struct Lifted<'a> {
     /// The weight of each node's samples (column) in each node's target (row).
     pub(crate) weights: &'a Matrix,
     pub(crate) timetable: &'a Timetable,
-    /// KT and BT of average-position coordination.
-    pub(crate) coordination: Gains,
+    /// Which numbers of a sample the laws of the nodes use.
+    pub(crate) sampling: Sampling,
     /// What velocities are multiplied by \[s\].
     pub(crate) time: f64,
     /// Whether something ties the motion to ground. If not, the whole may be moved without a force, and positions are taken relative to the first
@@ -48,7 +46,7 @@ impl Instrument for Autonomous {}
 /// Where a frame leads.
 ///
 /// The unknowns, one column each: the states at the beginning, but for the reference; then the samples of earlier frames that are used; then inputs.
-/// A sample is (KT·x + BT·v) of the copy over (KT + BT/time): all that the others need of it, as a length.
+/// A sample is one number or two, as [`Sampling`] says, each with a place of its own: with c numbers a sample, number i of sample s has the place c·s + i.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct FrameMap {
     /// The states at the end, one row each, the reference among them, in positions as they are.
@@ -63,8 +61,8 @@ pub(crate) struct FrameMap {
     /// The samples of earlier frames that are used: of which node, how many samples before this frame's first.
     pub(crate) used: Vec<(usize, usize)>,
     depth: Vec<usize>,
-    /// How far a translation by 1 moves a sample.
-    pub(crate) translation: f64,
+    /// How far a translation by 1 moves each number of a sample.
+    translations: Vec<f64>,
     /// A bound of the rounding errors of all rows, in the largest sum of sizes of a row.
     pub(crate) error: f64,
 }
@@ -80,9 +78,7 @@ impl Lifted<'_> {
 
     /// [`Lifted::frame`]; `None` if the watch ends it.
     pub(crate) fn frame_watched(&self, instrument: &mut impl Instrument, watch: &dyn Watch) -> Option<FrameMap> {
-        let Gains { stiffness, damping } = self.coordination;
-        // What a sample is divided by [N/m].
-        let unit = stiffness + damping / self.time;
+        let (channels, silent) = (self.sampling.channels(), self.sampling.is_silent(self.time));
         let mut rows: Vec<Rows> = Vec::with_capacity(self.nodes.len());
         let mut count = 0;
         for node in self.nodes {
@@ -90,7 +86,7 @@ impl Lifted<'_> {
             count += node.states();
         }
         let reference = (!self.tied).then(|| rows[0].object);
-        let used = if unit > 0.0 { self.used() } else { Vec::new() };
+        let used = if silent { Vec::new() } else { self.used() };
         let states = count - usize::from(reference.is_some());
         let inputs = states + used.len();
         let columns = inputs + instrument.inputs();
@@ -109,7 +105,7 @@ impl Lifted<'_> {
         let mut samples = used.len();
         for sent in &self.timetable.sent {
             first_sent.push(samples);
-            samples += sent;
+            samples += sent * channels;
         }
         let mut store = Matrix::zeros(samples, columns);
         for place in 0..used.len() {
@@ -117,22 +113,26 @@ impl Lifted<'_> {
         }
         let mut next_sent = first_sent.clone();
         let nodes = self.nodes.len();
+        // The row of the first number of a sample; those of its others follow.
         let row_of = |node: usize, sample: i64| -> Option<usize> {
             match usize::try_from(sample) {
-                Ok(number) => Some(first_sent[node] + number),
-                Err(_) => used.iter().position(|(from, age)| *from == node && usize::try_from(-sample) == Ok(*age)),
+                Ok(number) => Some(first_sent[node] + number * channels),
+                Err(_) => used.iter().position(|(from, age)| *from == node && usize::try_from(-sample).map(|sample| sample * channels) == Ok(*age)),
             }
         };
-        let mut held: Vec<Option<usize>> = vec![None; nodes * nodes];
+        let mut held: Vec<Option<(usize, i64)>> = vec![None; nodes * nodes];
         for (to, from, sample) in &self.timetable.held {
-            held[to * nodes + from] = row_of(*from, *sample);
+            held[to * nodes + from] = row_of(*from, *sample).map(|row| (row, *sample));
         }
-        let mut targets = Matrix::zeros(nodes, columns);
+        // What each row of a node's law hears.
+        let law_rows = 1 + self.nodes.iter().map(|node| node.law.memory.len()).max().unwrap_or(0);
+        let mut heard = Matrix::zeros(nodes * law_rows, columns);
+        let instants = self.ages_matter().then(|| Instants::of(self.timetable, nodes));
         let mut stale = vec![true; nodes];
         let mut scratch = Scratch::default();
         scratch.resize(columns);
         let mut push = vec![0.0; columns];
-        let step = self.nodes.iter().map(|node| node.step_norm(self.coordination, scale)).fold(1.0, f64::max);
+        let step = self.nodes.iter().map(|node| node.step_norm(scale)).fold(1.0, f64::max);
         let mut rounding = Rounding::new(step);
         let mut since = 0;
         for event in &self.timetable.events {
@@ -146,28 +146,34 @@ impl Lifted<'_> {
             }
             match *event {
                 Event::Sample { node } => {
-                    if unit > 0.0 {
+                    if !silent {
                         let (x, v) = (z.row(rows[node].object), z.row(rows[node].object + 1));
-                        let sample = store.row_mut(next_sent[node]);
-                        for column in 0..columns {
-                            sample[column] = stiffness / unit * x[column] + damping / self.time / unit * v[column];
+                        for channel in 0..channels {
+                            let (position, velocity) = self.sampling.shares(channel, self.time);
+                            let sample = store.row_mut(next_sent[node] + channel);
+                            for column in 0..columns {
+                                sample[column] = position * x[column] + velocity * v[column];
+                            }
                         }
                     }
-                    next_sent[node] += 1;
+                    next_sent[node] += channels;
                 }
                 Event::Deliver { from, to, sample } => {
-                    held[to * nodes + from] = row_of(from, sample);
+                    held[to * nodes + from] = row_of(from, sample).map(|row| (row, sample));
                     stale[to] = true;
                 }
                 Event::Tick { node, at, span } => {
-                    if std::mem::take(&mut stale[node]) {
-                        let target = targets.row_mut(node);
-                        target.fill(0.0);
+                    if std::mem::take(&mut stale[node]) || instants.is_some() {
+                        (0..law_rows).for_each(|row| heard.row_mut(node * law_rows + row).fill(0.0));
                         for from in 0..nodes {
-                            let weight = self.weights[(node, from)] * unit;
-                            if let Some(sample) = held[node * nodes + from] {
-                                for (sum, entry) in target.iter_mut().zip(store.row(sample)) {
-                                    *sum += weight * entry;
+                            let Some((first, sample)) = held[node * nodes + from] else { continue };
+                            let age = instants.as_ref().map_or(0.0, |instants| instants.age(from, sample, at, self.timetable.frame));
+                            for channel in 0..channels {
+                                for (row, by) in self.nodes[node].heard(self.sampling, channel, age, self.time).enumerate() {
+                                    let weight = self.weights[(node, from)] * by;
+                                    for (sum, entry) in heard.row_mut(node * law_rows + row).iter_mut().zip(store.row(first + channel)) {
+                                        *sum += weight * entry;
+                                    }
                                 }
                             }
                         }
@@ -180,7 +186,8 @@ impl Lifted<'_> {
                         None => false,
                     };
                     let hand = pushed.then_some(push.as_slice());
-                    self.nodes[node].tick(&mut z, rows[node], self.coordination, targets.row(node), hand, span, scale, &mut scratch);
+                    let heard = |row: usize| heard.row(node * law_rows + row);
+                    self.nodes[node].tick(&mut z, rows[node], heard, hand, span, scale, &mut scratch);
                     rounding.tick(norm(&z, rows[node], self.nodes[node].states()));
                 }
             }
@@ -199,8 +206,8 @@ impl Lifted<'_> {
             sent: tail(&store, used.len()),
             first_sent: first_sent.iter().map(|first| first - used.len()).collect(),
             used,
-            depth: if unit > 0.0 { self.timetable.depth.clone() } else { vec![0; nodes] },
-            translation: if unit > 0.0 { stiffness / unit } else { 0.0 },
+            depth: self.timetable.depth.iter().map(|depth| if silent { 0 } else { depth * channels }).collect(),
+            translations: (0..channels).map(|channel| self.sampling.translation(channel, self.time)).collect(),
             error: if instrument.inputs() == 0 {
                 rounding.bound(|| self.error())
             } else {
@@ -216,7 +223,12 @@ impl Lifted<'_> {
         majorant::error_of(self, |_| compliance)
     }
 
-    /// The samples of earlier frames that are used in this one, by node and then by age.
+    /// Whether what is heard of a sample changes while it is held.
+    fn ages_matter(&self) -> bool {
+        self.nodes.iter().any(|node| node.law.horizon.is_some())
+    }
+
+    /// The numbers of samples of earlier frames that are used in this one, by node and then by age.
     fn used(&self) -> Vec<(usize, usize)> {
         let deliveries = self.timetable.events.iter().filter_map(|event| match event {
             Event::Deliver { from, to, sample } => Some((*to, *from, *sample)),
@@ -227,8 +239,12 @@ impl Lifted<'_> {
         let mut used: Vec<(usize, usize)> = all
             .filter(|(to, from, _)| self.weights[(*to, *from)] != 0.0)
             .filter_map(|(_, from, sample)| usize::try_from(-sample).ok().filter(|age| *age > 0).map(|age| (from, age)))
+            .flat_map(|(from, age)| {
+                let channels = self.sampling.channels();
+                (0..channels).map(move |channel| (from, age * channels - channel))
+            })
             .collect();
-        used.sort_unstable();
+        used.sort_unstable_by_key(|(from, age)| (*from, age.div_ceil(self.sampling.channels()), std::cmp::Reverse(*age)));
         used.dedup();
         used
     }
@@ -270,9 +286,9 @@ impl FrameMap {
             for age in 1..=*depth {
                 let row = first[node] + age - 1;
                 if age <= sent.len() {
-                    put(row, self.sent.row(sent.end - age), self.translation);
+                    put(row, self.sent.row(sent.end - age), self.translation(age));
                 } else {
-                    put(row, &[], self.translation);
+                    put(row, &[], self.translation(age));
                     shifted.push((row, first[node] + age - sent.len() - 1));
                 }
             }
@@ -283,12 +299,18 @@ impl FrameMap {
         matrix
     }
 
-    /// How many samples of earlier frames are states.
+    /// How far a translation by 1 moves a number of a sample that has that place before the first of the frame.
+    pub(crate) fn translation(&self, age: usize) -> f64 {
+        let channels = self.translations.len();
+        self.translations[(channels - age % channels) % channels]
+    }
+
+    /// How many numbers of samples of earlier frames are states.
     pub(crate) fn history(&self) -> usize {
         self.depth.iter().sum()
     }
 
-    /// The rows of `sent` that a node sent, in order of time.
+    /// The rows of `sent` that a node sent, in order of time and then of the numbers of a sample.
     pub(crate) fn sent_by(&self, node: usize) -> std::ops::Range<usize> {
         let end = self.first_sent.get(node + 1).copied().unwrap_or_else(|| self.sent.rows());
         self.first_sent[node]..end

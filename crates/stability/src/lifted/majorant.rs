@@ -12,7 +12,7 @@
 //! where the square of the growth ([`Rounding`](super::Rounding)) says nothing any more.
 
 use super::frame::Lifted;
-use super::node::{Body, Node};
+use super::node::{Body, Node, Scale};
 use crate::structure::count;
 use crate::timetable::Event;
 
@@ -44,33 +44,47 @@ impl Size {
 }
 
 /// The rows of a node.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct NodeSizes {
     device: [Size; 2],
     copy: [Size; 2],
     /// The forces that act next, on the copy and on the device \[N\].
     pending: [Size; 2],
+    /// What the law remembers, in its own units.
+    memory: Vec<Size>,
 }
 
 /// A bound of the errors of all rows of a frame as one matrix, in the 2-norm: of the states at the end and of the samples sent, positions and velocities,
 /// each relative to the reference or not. `compliance` is what the waiting forces of a node are multiplied by to be lengths [m/N].
 pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -> f64 {
     let nodes = lifted.nodes.len();
+    let unit = |node: usize, place: usize| lifted.nodes[node].memory_unit(place, Scale { time: lifted.time, compliance: compliance(node) });
     let begin = |node: usize| {
         let force = Size { sum: 1.0 / compliance(node), error: 0.0 };
-        NodeSizes { device: [Size::UNIT; 2], copy: [Size::UNIT; 2], pending: [force; 2] }
+        let memory = (0..lifted.nodes[node].law.memory.len()).map(|place| Size { sum: 1.0 / unit(node, place), error: 0.0 }).collect();
+        NodeSizes { device: [Size::UNIT; 2], copy: [Size::UNIT; 2], pending: [force; 2], memory }
     };
     let mut sizes: Vec<NodeSizes> = (0..nodes).map(begin).collect();
-    let gains = lifted.coordination;
-    let signal = |[x, v]: [Size; 2]| Size::ZERO.plus(gains.stiffness, x).plus(gains.damping / lifted.time, v);
+    let (sampling, time) = (lifted.sampling, lifted.time);
+    let channels = sampling.channels();
+    let signal = |[x, v]: [Size; 2]| -> Vec<Size> {
+        let of = |channel| {
+            let (position, velocity) = sampling.gains(channel, time);
+            Size::ZERO.plus(position, x).plus(velocity, v)
+        };
+        (0..channels).map(of).collect()
+    };
     let before = signal([Size::UNIT; 2]);
-    let mut sent: Vec<Vec<Size>> = vec![Vec::new(); nodes];
+    let mut sent: Vec<Vec<Vec<Size>>> = vec![Vec::new(); nodes];
     let mut squares = 0.0;
     let reference = |sizes: &[NodeSizes]| if lifted.tied { Size::ZERO } else { sizes[0].copy[0] };
     // Samples are taken relative to where the reference is at the end, which is not known yet: their own errors now, that of the reference then.
     let mut positions: Vec<Size> = Vec::new();
-    let of_sample = |sent: &[Vec<Size>], node: usize, sample: i64| usize::try_from(sample).ok().map_or(before, |number| sent[node][number]);
-    let mut held: Vec<Option<Size>> = vec![None; nodes * nodes];
+    let of_sample = |sent: &[Vec<Vec<Size>>], node: usize, sample: i64| {
+        usize::try_from(sample).ok().map_or_else(|| before.clone(), |number| sent[node][number].clone())
+    };
+    let oldest = lifted.timetable.oldest();
+    let mut held: Vec<Option<Vec<Size>>> = vec![None; nodes * nodes];
     for (to, from, sample) in &lifted.timetable.held {
         held[to * nodes + from] = Some(of_sample(&sent, *from, *sample));
     }
@@ -80,16 +94,20 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
                 let copy = sizes[node].copy;
                 positions.push(copy[0]);
                 squares += copy[1].error * copy[1].error;
-                sent[node].push(signal(copy).rounded(MEAN));
+                sent[node].push(signal(copy).into_iter().map(|size| size.rounded(MEAN)).collect());
             }
             Event::Deliver { from, to, sample } => held[to * nodes + from] = Some(of_sample(&sent, from, sample)),
             Event::Tick { node, span, .. } => {
-                let target = (0..nodes).fold(Size::ZERO, |sum, from| match held[node * nodes + from] {
-                    Some(sample) => sum.plus(lifted.weights[(node, from)], sample),
-                    None => sum,
-                });
-                let target = target.rounded(MEAN + count(nodes) * f64::EPSILON);
-                tick(&lifted.nodes[node], &mut sizes[node], target, lifted, span);
+                let mut heard = vec![Size::ZERO; 1 + lifted.nodes[node].law.memory.len()];
+                for from in 0..nodes {
+                    for (channel, number) in held[node * nodes + from].iter().flatten().enumerate() {
+                        for (heard, by) in heard.iter_mut().zip(lifted.nodes[node].heard(sampling, channel, oldest, time)) {
+                            *heard = heard.plus(lifted.weights[(node, from)] * sampling.of_gains(by, time), *number);
+                        }
+                    }
+                }
+                heard.iter_mut().for_each(|heard| *heard = heard.rounded(MEAN + count(channels * nodes) * f64::EPSILON));
+                tick(&lifted.nodes[node], &mut sizes[node], &heard, lifted, span);
             }
         }
     }
@@ -109,16 +127,25 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
         if lifted.nodes[node].compute_delay {
             size.pending.iter().for_each(|force| add(Size::ZERO.plus(compliance(node), *force).rounded(f64::EPSILON), Size::ZERO));
         }
+        let memory = size.memory.iter().enumerate();
+        memory.for_each(|(place, number)| add(Size::ZERO.plus(unit(node, place), *number).rounded(2.0 * f64::EPSILON), Size::ZERO));
     }
     squares.sqrt()
 }
 
 /// One tick of a node: see [`Node::tick`].
-fn tick(node: &Node, sizes: &mut NodeSizes, target: Size, lifted: &Lifted<'_>, span: std::time::Duration) {
+fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>, span: std::time::Duration) {
     let time = lifted.time;
-    let (wall, gains) = (node.wall.unwrap_or(cohaptic_peer::Gains { stiffness: 0.0, damping: 0.0 }), lifted.coordination);
+    let (wall, gains) = (node.wall.unwrap_or(cohaptic_peer::Gains { stiffness: 0.0, damping: 0.0 }), node.law.force.own);
     let [x, v] = sizes.copy;
-    let mut on_copy = target.plus(gains.stiffness + wall.stiffness, x).plus((gains.damping + wall.damping) / time, v);
+    let remembered = |sum: Size, by: &[f64]| by.iter().zip(&sizes.memory).fold(sum, |sum, (by, number)| sum.plus(*by, *number));
+    let next = node.law.memory.iter().zip(&heard[1..]).map(|(row, heard)| {
+        remembered(heard.plus(row.own.stiffness, x).plus(row.own.damping / time, v), &row.memory)
+            .rounded(TICK + count(row.memory.len()) * f64::EPSILON)
+    });
+    let next: Vec<Size> = next.collect();
+    let mut on_copy =
+        remembered(heard[0], &node.law.force.memory).plus(gains.stiffness + wall.stiffness, x).plus((gains.damping + wall.damping) / time, v);
     let mut on_device = Size::ZERO;
     if node.device.is_some() {
         let [xh, vh] = sizes.device;
@@ -126,6 +153,7 @@ fn tick(node: &Node, sizes: &mut NodeSizes, target: Size, lifted: &Lifted<'_>, s
         on_device = Size::ZERO.plus(stiffness, xh).plus(stiffness, x).plus(damping, vh).plus(damping, v);
         on_copy = on_copy.plus(1.0, on_device);
     }
+    sizes.memory = next;
     if node.compute_delay {
         let computed = [on_copy.rounded(TICK), on_device.rounded(TICK)];
         [on_copy, on_device] = std::mem::replace(&mut sizes.pending, computed);

@@ -8,7 +8,9 @@ pub(crate) mod frame;
 pub(crate) mod majorant;
 pub(crate) mod node;
 mod rounding;
+mod sampling;
 
 pub(crate) use frame::{Autonomous, FrameMap, Instrument, Lifted};
 pub(crate) use node::{Body, Node};
 pub(crate) use rounding::{Rounding, closer_of};
+pub(crate) use sampling::Sampling;

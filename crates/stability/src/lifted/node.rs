@@ -7,7 +7,9 @@ use std::time::Duration;
 
 use cohaptic_peer::{Clock, Gains, Integrator, Plant, StepMap};
 
+use super::Sampling;
 use crate::Matrix;
+use crate::linear_form::{LawRow, LinearLaw};
 
 /// A body's step maps for the spans between its ticks.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -29,13 +31,15 @@ impl Body {
 }
 
 /// A node: what of a peer takes part in the linear motion of one axis.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Node {
     /// The device and the arm that holds it; `None` where it touches nothing.
     pub(crate) device: Option<Body>,
     pub(crate) object: Body,
     /// KC and BC.
     pub(crate) coupling: Gains,
+    /// The coordination law.
+    pub(crate) law: LinearLaw,
     /// A spring and a damper that tie the copy to ground.
     pub(crate) wall: Option<Gains>,
     /// Whether forces are applied one tick after they were computed.
@@ -51,6 +55,8 @@ pub(crate) struct Rows {
     pub(crate) object: usize,
     /// The forces that were computed and act next: on the copy and, in the row after it, on the device.
     pub(crate) pending: Option<usize>,
+    /// The first of the numbers that the law remembers.
+    pub(crate) memory: usize,
 }
 
 /// The units of the states.
@@ -67,6 +73,7 @@ pub(crate) struct Scale {
 pub(crate) struct Scratch {
     coupling: Vec<f64>,
     on_object: Vec<f64>,
+    memory: Matrix,
 }
 
 impl Scratch {
@@ -80,14 +87,14 @@ impl Node {
     /// How many rows its states take.
     pub(crate) fn states(&self) -> usize {
         let bodies = if self.device.is_some() { 2 } else { 1 };
-        2 * bodies + if self.compute_delay { bodies } else { 0 }
+        2 * bodies + if self.compute_delay { bodies } else { 0 } + self.law.memory.len()
     }
 
     /// Its rows, from `first` on.
     pub(crate) fn rows(&self, first: usize) -> Rows {
         let device = self.device.map(|_| first);
         let object = first + if self.device.is_some() { 2 } else { 0 };
-        Rows { device, object, pending: self.compute_delay.then_some(object + 2) }
+        Rows { device, object, pending: self.compute_delay.then_some(object + 2), memory: first + self.states() - self.law.memory.len() }
     }
 
     /// The compliance that makes the node's forces lengths: how far a force moves the copy within the common time.
@@ -96,10 +103,18 @@ impl Node {
     }
 
     /// The largest sum of the sizes of a row of one tick's matrix, in the units of `scale`: how much rounding errors grow in a tick at most.
-    pub(crate) fn step_norm(&self, coordination: Gains, scale: Scale) -> f64 {
+    pub(crate) fn step_norm(&self, scale: Scale) -> f64 {
         let gain = |gains: Gains| gains.stiffness.abs() + gains.damping.abs() / scale.time;
         let wall = self.wall.map_or(0.0, gain);
-        let on_object = 2.0 * if self.device.is_some() { gain(self.coupling) } else { 0.0 } + 2.0 * gain(coordination) + wall;
+        // Samples are used up to the horizon at most; one that is without end counts by the gains alone, as its own row does.
+        let oldest = self.law.horizon.filter(|horizon| horizon.is_finite()).unwrap_or(0.0);
+        let seen = |row: &LawRow| gain(row.own) + gain(row.heard) + row.ahead.abs() * oldest / scale.time;
+        let remembered = |row: &LawRow| row.memory.iter().enumerate().map(|(place, by)| by.abs() / self.memory_unit(place, scale)).sum::<f64>();
+        let coordination = match self.law.pull() {
+            Some(gains) => 2.0 * gain(gains),
+            None => seen(&self.law.force) + remembered(&self.law.force),
+        };
+        let on_object = 2.0 * if self.device.is_some() { gain(self.coupling) } else { 0.0 } + coordination + wall;
         let row = |body: &Body, force: f64| {
             let (e, g) = body.short.1.coefficients();
             let position = 1.0 + e[0][0].abs() + e[0][1].abs() / scale.time + g[0].abs() * force;
@@ -107,27 +122,35 @@ impl Node {
             position.max(velocity)
         };
         let device = self.device.as_ref().map_or(0.0, |body| row(body, 2.0 * gain(self.coupling)));
-        row(&self.object, on_object).max(device)
+        let memory = |(place, row): (usize, &LawRow)| (seen(row) + remembered(row)) * self.memory_unit(place, scale);
+        let memory = self.law.memory.iter().enumerate().map(memory).fold(0.0, f64::max);
+        row(&self.object, on_object).max(device).max(memory)
     }
 
-    /// One tick: forces from the rows as they are, `target` the force of the held samples on the copy \[N\], `hand` that of the hand on the device \[N\].
-    /// Every row is a linear function of the same unknowns, one column each.
+    /// What a number that the law remembers is multiplied by to be a length: by how far its part of the force moves the copy within the common time.
+    pub(crate) fn memory_unit(&self, place: usize, scale: Scale) -> f64 {
+        let by = self.law.force.memory[place].abs();
+        scale.compliance * if by > 0.0 { by } else { 1.0 }
+    }
+
+    /// One tick: forces from the rows as they are, `heard` what each row of the law hears of the samples held \[N\], FT's first, which pulls the copy there;
+    /// `hand` the force of the hand on the device \[N\]. Every row is a linear function of the same unknowns, one column each.
     #[expect(clippy::too_many_arguments, reason = "what a tick needs, each of its own kind")]
-    pub(crate) fn tick(
+    pub(crate) fn tick<'a>(
         &self,
         z: &mut Matrix,
         rows: Rows,
-        coordination: Gains,
-        target: &[f64],
+        heard: impl Fn(usize) -> &'a [f64],
         hand: Option<&[f64]>,
         span: Duration,
         scale: Scale,
         scratch: &mut Scratch,
     ) {
-        let own = coordination_of(coordination, self.wall);
+        let own = coordination_of(self.law.force.own, self.wall);
         let columns = z.columns();
-        let Scratch { coupling, on_object } = scratch;
+        let Scratch { coupling, on_object, memory } = scratch;
         {
+            let target = heard(0);
             let (x, v) = (z.row(rows.object), z.row(rows.object + 1));
             let damping = own.damping / scale.time;
             for column in 0..columns {
@@ -143,6 +166,9 @@ impl Node {
                     on_object[column] += force;
                 }
             }
+        }
+        if !self.law.memory.is_empty() {
+            self.remember(z, rows, heard, scale, (on_object, memory));
         }
         if let Some(pending) = rows.pending {
             exchange(z.row_mut(pending), on_object, scale.compliance);
@@ -162,6 +188,50 @@ impl Node {
             }
             advance(z, first, device.map(span), coupling, scale.time);
         }
+    }
+}
+
+impl Node {
+    /// What is remembered takes part in the force, and becomes what it is from now on.
+    fn remember<'a>(
+        &self,
+        z: &mut Matrix,
+        rows: Rows,
+        heard: impl Fn(usize) -> &'a [f64],
+        scale: Scale,
+        (on_object, next): (&mut [f64], &mut Matrix),
+    ) {
+        let columns = z.columns();
+        for (place, by) in self.law.force.memory.iter().enumerate() {
+            let share = by / self.memory_unit(place, scale);
+            for (force, remembered) in on_object.iter_mut().zip(z.row(rows.memory + place)) {
+                *force -= share * remembered;
+            }
+        }
+        next.reset(self.law.memory.len(), columns);
+        for (row, law) in self.law.memory.iter().enumerate() {
+            let unit = self.memory_unit(row, scale);
+            let (x, v, heard) = (z.row(rows.object), z.row(rows.object + 1), heard(row + 1));
+            let damping = law.own.damping / scale.time;
+            for (column, next) in next.row_mut(row).iter_mut().enumerate() {
+                *next = unit * (law.own.stiffness * x[column] + damping * v[column] - heard[column]);
+            }
+            for (place, by) in law.memory.iter().enumerate() {
+                let share = unit * (by / self.memory_unit(place, scale));
+                for (next, remembered) in next.row_mut(row).iter_mut().zip(z.row(rows.memory + place)) {
+                    *next += share * remembered;
+                }
+            }
+        }
+        for row in 0..self.law.memory.len() {
+            z.row_mut(rows.memory + row).copy_from_slice(next.row(row));
+        }
+    }
+
+    /// What the rows of the law hear of a unit of that number of a sample of that age \[s\], FT's first \[N\].
+    pub(crate) fn heard(&self, sampling: Sampling, channel: usize, age: f64, time: f64) -> impl Iterator<Item = f64> {
+        let age = self.law.horizon.map_or(0.0, |horizon| age.min(horizon));
+        self.law.rows().map(move |row| sampling.heard(row, channel, age, time))
     }
 }
 

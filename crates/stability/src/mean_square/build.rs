@@ -10,7 +10,7 @@ use super::nanoseconds;
 use super::tracked::Tracked;
 use crate::lifted::Lifted;
 use crate::lifted::node::Scale;
-use crate::timetable::{Event, Timetable};
+use crate::timetable::{Event, Instants};
 use crate::{Radius, Watch};
 
 /// A link of the scene.
@@ -20,34 +20,6 @@ pub(crate) struct Line {
     pub(crate) to: usize,
     /// `None`: what arrives when is in the timetable.
     pub(crate) chance: Option<(Hazards, Option<LossChain>)>,
-}
-
-/// When each node samples and ticks in a frame \[ns\].
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct Instants {
-    pub(crate) sends: Vec<Vec<u64>>,
-    pub(crate) ticks: Vec<Vec<u64>>,
-}
-
-impl Instants {
-    pub(crate) fn of(timetable: &Timetable, nodes: usize) -> Self {
-        let (mut sends, mut ticks) = (vec![Vec::new(); nodes], vec![Vec::new(); nodes]);
-        let mut sampled = vec![false; nodes];
-        for event in &timetable.events {
-            match *event {
-                Event::Sample { node } => sampled[node] = true,
-                Event::Deliver { .. } => {}
-                Event::Tick { node, at, .. } => {
-                    // A node samples at a tick of its own.
-                    if std::mem::take(&mut sampled[node]) {
-                        sends[node].push(at);
-                    }
-                    ticks[node].push(at);
-                }
-            }
-        }
-        Self { sends, ticks }
-    }
 }
 
 /// The frame of nodes over lines; those that are not there hold nothing.
@@ -62,7 +34,6 @@ const LOOK: usize = 1024;
 /// [`events`]; `None` if whoever watches ends it.
 pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants, watch: &dyn Watch) -> Option<Events> {
     let nodes = lifted.nodes.len();
-    let unit = lifted.coordination.stiffness + lifted.coordination.damping / lifted.time;
     let scale = Scale { time: lifted.time, compliance: lifted.nodes[0].compliance(lifted.time) };
     let frame = nanoseconds(lifted.timetable.frame);
     let mut depth = lifted.timetable.depth.clone();
@@ -76,7 +47,8 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
     let mut count = 0;
     let mut made = Events::default();
     let mut moved = Vec::new();
-    let translation = if unit > 0.0 { lifted.coordination.stiffness / unit } else { 0.0 };
+    let numbers = lifted.sampling.channels();
+    let translation = |number: usize| lifted.sampling.translation(number, lifted.time);
     for node in lifted.nodes {
         let rows = node.rows(count);
         first.push(count);
@@ -88,19 +60,19 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
     }
     let mut first_sample = Vec::with_capacity(nodes);
     for (depth, sent) in depth.iter().zip(&lifted.timetable.sent) {
-        for place in 0..*depth {
-            made.kept.push((count + place + sent, count + place));
-            moved.push(translation);
+        for place in 0..depth * numbers {
+            made.kept.push((count + place + sent * numbers, count + place));
+            moved.push(translation(place % numbers));
         }
-        first_sample.push(count + depth);
-        count += depth + sent;
+        first_sample.push(count + depth * numbers);
+        count += (depth + sent) * numbers;
     }
-    let held_row = |line: usize| count + line;
-    for line in 0..lines.len() {
-        made.kept.push((held_row(line), held_row(line)));
-        moved.push(translation);
+    let held_row = |line: usize| count + line * numbers;
+    for place in 0..lines.len() * numbers {
+        made.kept.push((count + place, count + place));
+        moved.push(translation(place % numbers));
     }
-    made.rows = count + lines.len();
+    made.rows = count + lines.len() * numbers;
     made.chains = lines.iter().map(chain_states).collect();
     if !lifted.tied {
         let reference = lifted.nodes[0].rows(0).object;
@@ -109,13 +81,21 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
         moved.remove(place);
         made.reference = Some((reference, moved));
     }
-    let row_of = |node: usize, sample: i64| usize::try_from(i64::try_from(first_sample[node]).unwrap_or(i64::MAX) + sample).unwrap_or(0);
+    let row_of = |node: usize, sample: i64| {
+        let signed = |number: usize| i64::try_from(number).unwrap_or(i64::MAX);
+        usize::try_from(signed(first_sample[node]) + signed(numbers) * sample).unwrap_or(0)
+    };
+    // Position and velocity of every sample, if what is heard of them changes while they are held: then they are extrapolated to the present at every tick.
+    let extrapolates = lifted.nodes.iter().any(|node| node.law.horizon.is_some());
+    let of_samples = first_sample.iter().zip(depth.iter().zip(&lifted.timetable.sent));
+    let samples = of_samples.flat_map(|(first, (depth, sent))| (first - depth * numbers..first + sent * numbers).step_by(numbers));
+    let extrapolated: Vec<usize> = if extrapolates && numbers == 2 { samples.chain((0..lines.len()).map(held_row)).collect() } else { Vec::new() };
 
     let mut pending: Vec<Option<Tracked>> = vec![None; nodes];
     let (mut tick, mut sample) = (vec![0; nodes], vec![0; nodes]);
-    let held_of = |node: usize| -> Vec<(usize, f64)> {
-        let of = lines.iter().enumerate().filter(|(_, line)| line.to == node);
-        of.map(|(place, line)| (held_row(place), lifted.weights[(node, line.from)])).collect()
+    let held_of = |node: usize| -> Vec<Vec<(usize, f64)>> {
+        let of = || lines.iter().enumerate().filter(|(_, line)| line.to == node);
+        (0..numbers).map(|number| of().map(|(place, line)| (held_row(place) + number, lifted.weights[(node, line.from)])).collect()).collect()
     };
     let flush = |pending: &mut Vec<Option<Tracked>>, made: &mut Events, node: usize| {
         if let Some(map) = pending[node].take() {
@@ -131,16 +111,18 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
             Event::Sample { node } => {
                 flush(&mut pending, &mut made, node);
                 let object = lifted.nodes[node].rows(first[node]).object;
-                let (position, velocity) = if unit > 0.0 { (translation, lifted.coordination.damping / lifted.time / unit) } else { (0.0, 0.0) };
-                let row = first_sample[node] + sample[node];
-                made.steps.push(Step::Sample { row, of: [(object, position), (object + 1, velocity)] });
+                for number in 0..numbers {
+                    let (position, velocity) = lifted.sampling.shares(number, lifted.time);
+                    let row = first_sample[node] + sample[node] * numbers + number;
+                    made.steps.push(Step::Sample { row, of: [(object, position), (object + 1, velocity)] });
+                }
                 sample[node] += 1;
             }
             Event::Deliver { from, to, sample } => {
                 if let Some(link) = lines.iter().position(|line| (line.from, line.to) == (from, to)) {
                     flush(&mut pending, &mut made, to);
                     let outcomes = vec![Arrive { from: 0, to: 0, take: Some(row_of(from, sample)), probability: 1.0 }];
-                    made.steps.push(Step::Deliver { link, row: held_row(link), outcomes });
+                    made.steps.push(Step::Deliver { link, row: held_row(link), numbers, outcomes });
                 }
             }
             Event::Tick { node, span, .. } => {
@@ -148,13 +130,19 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
                     for outcomes in outcomes(line, tick[node], &instants.sends[line.from], frame) {
                         flush(&mut pending, &mut made, node);
                         let outcomes = outcomes.into_iter().map(|outcome| Arrive::new(outcome, |sample| row_of(line.from, sample))).collect();
-                        made.steps.push(Step::Deliver { link, row: held_row(link), outcomes });
+                        made.steps.push(Step::Deliver { link, row: held_row(link), numbers, outcomes });
                     }
                 }
                 tick[node] += 1;
                 let states = lifted.nodes[node].states();
-                let map = pending[node].get_or_insert_with(|| Tracked::new(states, states));
-                map.tick(&lifted.nodes[node], lifted, unit, span, scale);
+                let map = pending[node].get_or_insert_with(|| Tracked::new(states, states, numbers));
+                map.tick(&lifted.nodes[node], lifted, span, scale);
+                if node + 1 == nodes && !extrapolated.is_empty() {
+                    // All tick together: the last one ends the instant.
+                    (0..nodes).for_each(|node| flush(&mut pending, &mut made, node));
+                    let share = span.as_secs_f64() / lifted.time;
+                    made.steps.extend(extrapolated.iter().map(|row| Step::Sample { row: *row, of: [(*row, 1.0), (row + 1, share)] }));
+                }
             }
         }
     }

@@ -68,7 +68,8 @@ struct Delivery {
 pub(crate) struct EqualScratch {
     rows: Matrix,
     node: Scratch,
-    target: Vec<f64>,
+    seen: Vec<f64>,
+    heard: Matrix,
     common: Block,
     apart: Block,
     relation: Matrix,
@@ -107,10 +108,10 @@ impl Equal {
     ///
     /// `lifted` has one node; its timetable and weights are not looked at.
     pub(crate) fn radius(&self, lifted: &Lifted<'_>, scratch: &mut EqualScratch) -> Option<f64> {
-        let EqualScratch { rows, node, target, common, apart, relation, workspace } = scratch;
+        let EqualScratch { rows, node, seen, heard, common, apart, relation, workspace } = scratch;
         let n1 = self.peers - 1.0;
-        self.block(lifted, 1.0, lifted.tied, (rows, node, target), common)?;
-        self.block(lifted, -1.0 / n1, true, (rows, node, target), apart)?;
+        self.block(lifted, 1.0, lifted.tied, (rows, node, seen, heard), common)?;
+        self.block(lifted, -1.0 / n1, true, (rows, node, seen, heard), apart)?;
         let lowest = common.modulus().max(apart.modulus()).max(self.kept).powi(2);
         // The coefficients of the relation only fall as γ grows, so its inverse rises.
         let mut rise = |gamma: f64| {
@@ -127,13 +128,11 @@ impl Equal {
         lifted: &Lifted<'_>,
         weight: f64,
         tied: bool,
-        (rows, scratch, target): (&mut Matrix, &mut Scratch, &mut Vec<f64>),
+        (rows, scratch, seen, heard): (&mut Matrix, &mut Scratch, &mut Vec<f64>, &mut Matrix),
         block: &mut Block,
     ) -> Option<()> {
         let node = &lifted.nodes[0];
-        let gains = lifted.coordination;
-        let unit = gains.stiffness + gains.damping / lifted.time;
-        let (position_share, velocity_share) = (gains.stiffness / unit, gains.damping / lifted.time / unit);
+        let (position_share, velocity_share) = lifted.sampling.shares(0, lifted.time);
         let scale = Scale { time: lifted.time, compliance: node.compliance(lifted.time) };
         let own = node.rows(0);
         let (states, depth, sent) = (node.states(), self.depth, self.timetable.sent[0]);
@@ -149,7 +148,7 @@ impl Equal {
         }
         rows[(noise, size)] = 1.0;
         scratch.resize(columns);
-        target.resize(columns, 0.0);
+        seen.resize(columns, 0.0);
         block.size = size;
         block.direct.clear();
         // u − n at each delivery is a row below those of the end of the frame.
@@ -177,16 +176,19 @@ impl Equal {
                             }
                             rows[(mean, column)] = missed * held + arrives * fresh;
                             rows[(noise, column)] *= missed;
-                            target[column] = fresh - held;
+                            seen[column] = fresh - held;
                         }
-                        block.direct.push(target[size..=size + next].to_vec());
+                        block.direct.push(seen[size..=size + next].to_vec());
                         rows[(noise, size + 1 + next)] += 1.0;
                         next += 1;
                     }
-                    for (column, target) in target.iter_mut().enumerate() {
-                        *target = unit * (weight * rows[(mean, column)] + rows[(noise, column)]);
+                    heard.reset(1 + node.law.memory.len(), columns);
+                    for (row, by) in node.heard(lifted.sampling, 0, 0.0, lifted.time).enumerate() {
+                        for (column, heard) in heard.row_mut(row).iter_mut().enumerate() {
+                            *heard = by * (weight * rows[(mean, column)] + rows[(noise, column)]);
+                        }
                     }
-                    node.tick(rows, own, gains, target, None, span, scale, scratch);
+                    node.tick(rows, own, |row| heard.row(row), None, span, scale, scratch);
                     tick += 1;
                 }
             }

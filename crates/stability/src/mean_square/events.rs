@@ -47,12 +47,13 @@ pub(crate) struct Events {
 
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) enum Step {
-    /// The rows from `first` on become `map` times (those rows and, last, the mean of what is held); `sizes` are those of the terms of the map.
-    Move { first: usize, map: Matrix, sizes: Matrix, held: Vec<(usize, f64)> },
+    /// The rows from `first` on become `map` times (those rows and, last, the mean of each number of the samples held); `sizes` are those of the terms of the
+    /// map.
+    Move { first: usize, map: Matrix, sizes: Matrix, held: Vec<Vec<(usize, f64)>> },
     /// The row becomes that combination.
     Sample { row: usize, of: [(usize, f64); 2] },
-    /// The row of what is held may become that of a sample: `take` is a row.
-    Deliver { link: usize, row: usize, outcomes: Vec<Arrive> },
+    /// The rows of what is held, as many as a sample has numbers, may become those of a sample: `take` is its first row.
+    Deliver { link: usize, row: usize, numbers: usize, outcomes: Vec<Arrive> },
 }
 
 /// An outcome with the row that it takes.
@@ -81,7 +82,7 @@ impl Events {
         self.chains.iter().product()
     }
 
-    fn deliver(&self, moments: Vec<Matrix>, link: usize, row: usize, outcomes: &[Arrive]) -> Vec<Matrix> {
+    fn deliver(&self, moments: Vec<Matrix>, link: usize, (row, numbers): (usize, usize), outcomes: &[Arrive]) -> Vec<Matrix> {
         let inner: usize = self.chains[link + 1..].iter().product();
         let own = self.chains[link];
         let mut after: Vec<Matrix> = Vec::with_capacity(moments.len());
@@ -89,25 +90,19 @@ impl Events {
             let to = joint / inner % own;
             let base = joint - to * inner;
             let mut sum = Matrix::zeros(self.rows, self.rows);
-            let mut line = vec![0.0; self.rows];
-            let mut corner = 0.0;
+            let mut taken = Taken::new(numbers, self.rows);
             for from in 0..own {
                 let source = &moments[base + from * inner];
                 let mut whole = 0.0;
                 for outcome in outcomes.iter().filter(|outcome| (outcome.from, outcome.to) == (from, to)) {
-                    let taken = outcome.take.unwrap_or(row);
                     whole += outcome.probability;
-                    for (line, entry) in line.iter_mut().zip(source.row(taken)) {
-                        *line += outcome.probability * entry;
-                    }
-                    corner += outcome.probability * source[(taken, taken)];
+                    taken.add(source, outcome, row);
                 }
                 if whole != 0.0 {
                     add(&mut sum, source, whole);
                 }
             }
-            line[row] = corner;
-            set_line(&mut sum, row, &line);
+            taken.put(&mut sum, row);
             after.push(sum);
         }
         after
@@ -130,23 +125,17 @@ impl Events {
                 }
                 moments
             }
-            Step::Deliver { link, row, outcomes } => match (self.chains[*link], outcomes.as_slice()) {
+            Step::Deliver { link, row, numbers, outcomes } => match (self.chains[*link], outcomes.as_slice()) {
                 // Nothing to keep apart: in place.
                 (1, _) => {
                     for moment in &mut moments {
-                        let mut line = vec![0.0; self.rows];
-                        let mut corner = 0.0;
-                        for outcome in outcomes {
-                            let taken = outcome.take.unwrap_or(*row);
-                            line.iter_mut().zip(moment.row(taken)).for_each(|(line, entry)| *line += outcome.probability * entry);
-                            corner += outcome.probability * moment[(taken, taken)];
-                        }
-                        line[*row] = corner;
-                        set_line(moment, *row, &line);
+                        let mut taken = Taken::new(*numbers, self.rows);
+                        outcomes.iter().for_each(|outcome| taken.add(moment, outcome, *row));
+                        taken.put(moment, *row);
                     }
                     moments
                 }
-                (_, outcomes) => self.deliver(moments, *link, *row, outcomes),
+                (_, outcomes) => self.deliver(moments, *link, (*row, *numbers), outcomes),
             },
         }
     }
@@ -217,7 +206,7 @@ impl Positive for Events {
     fn roundings(&self) -> usize {
         let of = |step: &Step| match step {
             // Twice a product with the map, of whose columns the last is a weighted sum, and the mean of the two triangles.
-            Step::Move { map, held, .. } => 2 * (map.columns() + 2 * held.len() + 2) + 2,
+            Step::Move { map, held, .. } => 2 * (map.columns() + 2 * held.iter().map(Vec::len).sum::<usize>() + 2) + 2,
             // Two products, a sum, and the factors' own: twice.
             Step::Sample { .. } => 12,
             Step::Deliver { outcomes, .. } => 2 * outcomes.len() + 4,
@@ -237,25 +226,60 @@ impl Positive for Events {
     }
 }
 
+/// The rows of what is held after a delivery, in the making.
+struct Taken {
+    lines: Vec<Vec<f64>>,
+    /// Their products with one another.
+    corner: Matrix,
+}
+
+impl Taken {
+    fn new(numbers: usize, rows: usize) -> Self {
+        Self { lines: vec![vec![0.0; rows]; numbers], corner: Matrix::zeros(numbers, numbers) }
+    }
+
+    /// An outcome that takes rows of `source`; what is held stands from `row` on.
+    fn add(&mut self, source: &Matrix, outcome: &Arrive, row: usize) {
+        let (taken, probability) = (outcome.take.unwrap_or(row), outcome.probability);
+        for (number, line) in self.lines.iter_mut().enumerate() {
+            line.iter_mut().zip(source.row(taken + number)).for_each(|(line, entry)| *line += probability * entry);
+            for other in 0..self.corner.columns() {
+                self.corner[(number, other)] += probability * source[(taken + number, taken + other)];
+            }
+        }
+    }
+
+    fn put(mut self, moment: &mut Matrix, row: usize) {
+        for (number, line) in self.lines.iter_mut().enumerate() {
+            line[row..row + self.corner.columns()].copy_from_slice(self.corner.row(number));
+            set_line(moment, row + number, line);
+        }
+    }
+}
+
 /// X ← T·X·Tᵀ for a T that changes a few rows.
-fn advance(moment: &mut Matrix, first: usize, map: &Matrix, held: &[(usize, f64)]) {
+fn advance(moment: &mut Matrix, first: usize, map: &Matrix, held: &[Vec<(usize, f64)>]) {
     let (own, size) = (map.rows(), moment.rows());
-    // The rows that it depends on: its own and the mean of what is held.
-    let mut sources = Matrix::zeros(own + 1, size);
+    // The rows that it depends on: its own and the means of what is held.
+    let mut sources = Matrix::zeros(own + held.len(), size);
     for place in 0..own {
         sources.row_mut(place).copy_from_slice(moment.row(first + place));
     }
-    for (row, weight) in held {
-        sources.row_mut(own).iter_mut().zip(moment.row(*row)).for_each(|(sum, entry)| *sum += weight * entry);
+    for (number, held) in held.iter().enumerate() {
+        for (row, weight) in held {
+            sources.row_mut(own + number).iter_mut().zip(moment.row(*row)).for_each(|(sum, entry)| *sum += weight * entry);
+        }
     }
     let lines = map.times(&sources);
     // Of the new rows, the columns of the same rows change too.
-    let mut corner = Matrix::zeros(own, own + 1);
+    let mut corner = Matrix::zeros(own, own + held.len());
     for row in 0..own {
         for place in 0..own {
             corner[(row, place)] = lines[(row, first + place)];
         }
-        corner[(row, own)] = held.iter().map(|(column, weight)| weight * lines[(row, *column)]).sum();
+        for (number, held) in held.iter().enumerate() {
+            corner[(row, own + number)] = held.iter().map(|(column, weight)| weight * lines[(row, *column)]).sum();
+        }
     }
     let corner = corner.times(&map.transposed());
     for row in 0..own {

@@ -130,7 +130,6 @@ impl LinkLaw {
             Loss::GilbertElliottInTime(chain) => (0.0, Some(LossChain::InTime(*chain))),
             Loss::FourState(chain) => (0.0, Some(LossChain::FourState(*chain))),
             Loss::Pattern(_) => return Err("its losses are chosen by a pattern beside something random"),
-            _ => return Err("its model of loss is not known here"),
         };
         let discarded = match &config.corruption {
             None => 0.0,
@@ -153,7 +152,6 @@ impl LinkLaw {
                 Displacement::Later { by } => Some((reorder.packets.probability().get(), Some(nanos(by)))),
                 Displacement::Jump { .. } => return Err("its packets jump only now and then"),
                 Displacement::Behind { .. } => return Err("its packets are put behind others"),
-                _ => return Err("its reordering is not known here"),
             },
         };
         let law = config.delay.law().cloned();
@@ -262,8 +260,6 @@ pub(crate) fn is_random(model: &LinkModel) -> bool {
         }
         LinkModel::Replay(_) => false,
         LinkModel::Modulated(_) | LinkModel::Kernel(_) => true,
-        // What is not known may be anything, and is refused as such.
-        _ => true,
     }
 }
 

@@ -33,7 +33,7 @@ use std::time::Duration;
 use cohaptic_scene::Scene;
 
 use self::arrivals::Hazards;
-use self::build::{Instants, Line, events_watched};
+use self::build::{Line, events_watched};
 pub(crate) use self::equal::{Equal, EqualScratch};
 use self::law::{LinkLaw, is_random};
 use self::positive::{Positive, radius_watched};
@@ -43,8 +43,8 @@ use crate::cost::PASSES;
 use crate::lifted::{Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
-use crate::structure::{Contacts, Structure, count};
-use crate::timetable::{NodeClock, Timetable};
+use crate::structure::{Contacts, Structure, count, linear_law};
+use crate::timetable::{Instants, NodeClock, Timetable};
 use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, Radius, Verdict, Watch};
 
 /// More unknowns of the second moment than this are refused, whatever the caller allows: they take minutes.
@@ -194,7 +194,6 @@ fn of_contacts(
     let frame = structure.timetable.frame;
     let nominal_squared = nominal.over(2);
     let random = random_links(scene)?;
-    let gains = structure.coordination(scene);
     let nothing = Found { radius: nominal_squared, held: NOTHING, method: MeanSquareMethod::Nominal, frame, unknowns: 0 };
     let mut found = if random.is_empty() {
         nothing
@@ -204,7 +203,7 @@ fn of_contacts(
             None => one_by_one(scene, network, &structure, &combination.contacts, &random, limits, notes)?,
         }
     };
-    if gains.stiffness + gains.damping <= 0.0 {
+    if structure.is_silent(scene) {
         found = Found { held: found.held, ..nothing };
     }
     // What nobody touches moves on its own.
@@ -336,9 +335,9 @@ impl Alike {
     }
 }
 
-/// Whether all peers are equal, over equal links.
+/// Whether all peers are equal, over equal links, and hear one number of each sample.
 fn alike(scene: &Scene, structure: &Structure) -> bool {
-    structure.classes.len() == 1 && only_model(scene)
+    structure.classes.len() == 1 && only_model(scene) && structure.sampling(scene).channels() == 1
 }
 
 /// Equal peers over equal links, if these lose independently and nothing overtakes.
@@ -427,6 +426,11 @@ fn one_by_one(
     // Joint states make it more, never less.
     within(cost, limits)?;
     let instants = Instants::of(&timetable, peers);
+    let horizon = linear_law(scene, 0).and_then(|law| law.horizon);
+    if horizon.is_some_and(|horizon| timetable.oldest() > horizon) {
+        let link = format!("{} → {}", scene.peers[0].name, scene.peers[1].name);
+        return Err(AnalysisError::ChanceWithoutMoments { link, why: BEYOND_HORIZON });
+    }
     let (mut lines, mut held) = (Vec::new(), NOTHING);
     let mut tied = structure.tied;
     for (from, to) in pairs {
@@ -442,8 +446,15 @@ fn one_by_one(
         }
         match hazards(scene, network, (from, to), timetable.frame, &instants.sends[from], &instants.ticks[to], notes)? {
             Some((hazards, law)) => {
+                let depth = hazards.depth();
                 let line = Line { from, to, chance: Some((hazards, law.chain)) };
-                held = line.staying(&instants, timetable.frame).map_or(held, |stays| held.or(stays));
+                if let Some(stays) = line.staying(&instants, timetable.frame) {
+                    if !within_horizon(horizon, timetable.frame, stays, depth) {
+                        let link = format!("{} → {}", scene.peers[from].name, scene.peers[to].name);
+                        return Err(AnalysisError::ChanceWithoutMoments { link, why: BEYOND_HORIZON });
+                    }
+                    held = held.or(stays);
+                }
                 lines.push(line);
             }
             None => {
@@ -471,6 +482,19 @@ fn one_by_one(
     limits.watch.expects(cost.operations());
     let radius = radius_watched(&operator, cost.of_a_pass(), limits.watch).ok_or(AnalysisError::Stopped)?;
     Ok(Found { radius, held, method: MeanSquareMethod::Events, frame: timetable.frame, unknowns })
+}
+
+/// The probability that a sample is held beyond the horizon of a law that extrapolates which counts as none.
+const NEVER: f64 = 1e-9;
+const BEYOND_HORIZON: &str = "its samples may be held for longer than the strategy extrapolates them: expected a longer horizon";
+
+/// Whether a link whose samples arrive within `depth` frames, and on which nothing arrives in a frame with the probability `stays`, brings a newer sample
+/// before one is older than `horizon` \[s\], up to which a law extrapolates; but for a probability of [`NEVER`].
+fn within_horizon(horizon: Option<f64>, frame: Duration, stays: Radius, depth: usize) -> bool {
+    horizon.is_none_or(|horizon| {
+        let frames = horizon / frame.as_secs_f64() - count(depth + 1);
+        frames >= 0.0 && stays.value.powf(frames.floor()) <= NEVER
+    })
 }
 
 /// The sizes of a frame with a number of random links, each of which brings every sample that is sent; without the joint states of their chains.

@@ -74,13 +74,12 @@ impl Symmetric {
     /// The frame of that many peers like the only node of `lifted`, whose timetable has no deliveries: those are in `hazards`.
     pub(crate) fn new(peers: usize, lifted: &Lifted<'_>, hazards: &Hazards) -> Self {
         let node = &lifted.nodes[0];
-        let unit = lifted.coordination.stiffness + lifted.coordination.damping / lifted.time;
         let scale = Scale { time: lifted.time, compliance: node.compliance(lifted.time) };
         let rows = node.rows(0);
         let (states, depth, sent) = (node.states(), hazards.depth(), lifted.timetable.sent[0]);
         let (size, full) = (states + depth, states + depth + sent);
         // A map in the making: its columns are the states it begins with and, last, what is held.
-        let mut map = Tracked::new(full, size);
+        let mut map = Tracked::new(full, size, 1);
         let mut steps = Vec::new();
         let (mut tick, mut sample, mut roundings) = (0, 0, 0);
         let mut flush = |map: &Tracked, order: &dyn Fn(usize) -> usize, rows: usize| {
@@ -95,8 +94,7 @@ impl Symmetric {
         for event in &lifted.timetable.events {
             match *event {
                 Event::Sample { .. } => {
-                    let gains = lifted.coordination;
-                    let (position, velocity) = if unit > 0.0 { (gains.stiffness / unit, gains.damping / lifted.time / unit) } else { (0.0, 0.0) };
+                    let (position, velocity) = lifted.sampling.shares(0, lifted.time);
                     map.combine(states + depth + sample, [(rows.object, position), (rows.object + 1, velocity)]);
                     sample += 1;
                 }
@@ -104,13 +102,13 @@ impl Symmetric {
                 Event::Tick { span, .. } => {
                     if !hazards.at[tick].is_empty() {
                         steps.push(flush(&map, &|row| row, full));
-                        map = Tracked::new(full, full);
+                        map = Tracked::new(full, full, 1);
                         for hazard in &hazards.at[tick] {
                             let place = i64::try_from(states + depth).unwrap_or(i64::MAX) + hazard.sample;
                             steps.push(Step::Deliver { state: usize::try_from(place).unwrap_or(0), probability: hazard.hazard });
                         }
                     }
-                    map.tick(node, lifted, unit, span, scale);
+                    map.tick(node, lifted, span, scale);
                     tick += 1;
                 }
             }
@@ -118,7 +116,7 @@ impl Symmetric {
         // What was sent in the frame is of an earlier one in the next.
         steps.push(flush(&map, &|row| if row < states { row } else { row + sent }, size));
         let translation = (!lifted.tied).then(|| {
-            let moved = if unit > 0.0 { lifted.coordination.stiffness / unit } else { 0.0 };
+            let moved = lifted.sampling.translation(0, lifted.time);
             let mut states: Vec<f64> = (0..states).map(|row| if row == rows.object || Some(row) == rows.device { 1.0 } else { 0.0 }).collect();
             states.resize(size, moved);
             (states, moved)

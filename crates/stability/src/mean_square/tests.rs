@@ -376,7 +376,7 @@ fn the_mean_of_many_runs_is_what_the_operator_says() {
         Line { from, to, chance: Some((found.unwrap().unwrap().0, None)) }
     };
     let node = structure.node(&scene, 0);
-    let (nodes, weights) = ([node, node], Matrix::from_fn(2, 2, |row, column| if row == column { 0.0 } else { 1.0 }));
+    let (nodes, weights) = ([node.clone(), node], Matrix::from_fn(2, 2, |row, column| if row == column { 0.0 } else { 1.0 }));
     let lifted = Lifted { nodes: &nodes, weights: &weights, timetable: &timetable, ..structure.quotient(&scene, &nodes) };
     let operator = build::events(&lifted, &[line(1, 0), line(0, 1)], &instants);
     // All at rest and at the origin, but for the copy of the second peer, which nobody has heard of yet. In the operator, in order: device and copy of

@@ -22,35 +22,39 @@ const TICK: usize = 48;
 /// A share of the terms as small as this does not outgrow the entries: those of a tick are at most |T| + 2·I, and the diagonal of T is near 1.
 const SHARE: usize = 4;
 
-/// The columns are the states to begin with and, last, what is held.
+/// The columns are the states to begin with and, last, each number of the sample held.
 #[derive(Clone, Debug)]
 pub(crate) struct Tracked {
     pub(crate) value: Matrix,
     terms: Matrix,
+    held: usize,
     events: usize,
 }
 
 impl Tracked {
     /// The first rows are the states as they are; what is below is zero.
-    pub(crate) fn new(rows: usize, columns: usize) -> Self {
-        let value = Matrix::from_fn(rows, columns + 1, |row, column| if row == column && column < columns { 1.0 } else { 0.0 });
-        Self { value, terms: Matrix::zeros(rows, columns + 1), events: 0 }
+    pub(crate) fn new(rows: usize, columns: usize, held: usize) -> Self {
+        let value = Matrix::from_fn(rows, columns + held, |row, column| if row == column && column < columns { 1.0 } else { 0.0 });
+        Self { value, terms: Matrix::zeros(rows, columns + held), held, events: 0 }
     }
 
-    /// A tick of the node whose states are the first rows; what is held exerts `unit` on its copy.
-    pub(crate) fn tick(&mut self, node: &Node, lifted: &Lifted<'_>, unit: f64, span: Duration, scale: Scale) {
+    /// A tick of the node whose states are the first rows, and whose samples held are extrapolated to that tick.
+    pub(crate) fn tick(&mut self, node: &Node, lifted: &Lifted<'_>, span: Duration, scale: Scale) {
         let states = node.states();
+        let held = self.held;
+        let heard: Vec<Vec<f64>> = (0..held).map(|number| node.heard(lifted.sampling, number, 0.0, lifted.time).collect()).collect();
         let turn = |matrix: &mut Matrix| {
             let mut scratch = Scratch::default();
             scratch.resize(matrix.columns());
-            let mut target = vec![0.0; matrix.columns()];
-            target[matrix.columns() - 1] = unit;
-            node.tick(matrix, node.rows(0), lifted.coordination, &target, None, span, scale, &mut scratch);
+            let columns = matrix.columns() - held;
+            let of = |row: usize, column: usize| column.checked_sub(columns).map_or(0.0, |number| heard[number][row]);
+            let heard = Matrix::from_fn(1 + node.law.memory.len(), columns + held, of);
+            node.tick(matrix, node.rows(0), |row| heard.row(row), None, span, scale, &mut scratch);
         };
-        let mut single = Self::new(states, states).value;
+        let mut single = Self::new(states, states, held).value;
         turn(&mut single);
-        let last = self.value.columns() - 1;
-        let terms = Matrix::from_fn(states, last + 1, |row, column| {
+        let columns = self.value.columns() - held;
+        let terms = Matrix::from_fn(states, columns + held, |row, column| {
             let of_states: f64 = (0..states)
                 .map(|state| {
                     let size = single[(row, state)].abs();
@@ -58,7 +62,7 @@ impl Tracked {
                     size * self.terms[(state, column)] + (size + kept) * self.value[(state, column)].abs()
                 })
                 .sum();
-            of_states + if column == last { single[(row, states)].abs() } else { 0.0 }
+            of_states + column.checked_sub(columns).map_or(0.0, |number| single[(row, states + number)].abs())
         });
         for row in 0..states {
             self.terms.row_mut(row).copy_from_slice(terms.row(row));

@@ -212,11 +212,11 @@ fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, Ana
         return Err(AnalysisError::TooManyShare { peers, most: MOST_SHARING });
     }
     let config = NetworkConfig { seed: scene.seed, nodes: scene.peers.iter().map(|peer| peer.name.clone()).collect(), general: false };
-    let link = |from: NodeId, to: NodeId| -> LinkConfig { lines.links[scene.links.config_between(from.0 as usize, to.0 as usize)].config.clone() };
+    let link = |from: NodeId, to: NodeId| -> LinkConfig { lines.links[scene.links.config_between(from.index(), to.index())].config.clone() };
     let mut network = Network::new(config, link);
     let mut rates = Vec::new();
     for (place, peer) in scene.peers.iter().enumerate() {
-        let node = NodeId(u32::try_from(place).unwrap_or(u32::MAX));
+        let node = NodeId::new(place);
         let others = || (0..peers).filter(move |other| *other != place);
         for (line, nominal) in [(AccessLine::Uplink(node), &lines.uplinks[place]), (AccessLine::Downlink(node), &lines.downlinks[place])] {
             let Some(nominal) = nominal else { continue };

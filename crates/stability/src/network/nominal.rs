@@ -35,7 +35,6 @@ impl Nominal {
                 only(mean, format!("a link that changes by chance is replaced by the mean of the delays of its states, {}, alone", Span(mean)))
             }
             LinkModel::Kernel(_) => only(mean, format!("Linux's netem is replaced by its mean delay, {}, alone", Span(mean))),
-            _ => only(mean, format!("a link of an unknown kind is replaced by its mean delay, {}", Span(mean))),
         }
     }
 
@@ -71,10 +70,9 @@ impl Nominal {
     #[expect(clippy::cast_precision_loss, reason = "a rate, compared with a tolerance")]
     pub(crate) fn rate(&self, size: Bytes) -> Option<(f64, f64)> {
         let bits = |bytes: Bytes| bytes.get() as f64 * 8.0;
-        let line = self.config.bottleneck.as_ref().and_then(|line| match &line.service {
-            Service::Rate(rate) => Some((rate.as_bits_per_sec() as f64, bits(line.framing.on_the_line(size)))),
-            Service::Recorded(recording) => Some((recording.mean_rate(), bits(line.framing.on_the_line(size)))),
-            _ => None,
+        let line = self.config.bottleneck.as_ref().map(|line| match &line.service {
+            Service::Rate(rate) => (rate.as_bits_per_sec() as f64, bits(line.framing.on_the_line(size))),
+            Service::Recorded(recording) => (recording.mean_rate(), bits(line.framing.on_the_line(size))),
         });
         let bucket = self.config.token_bucket.map(|bucket| (bucket.rate.as_bits_per_sec() as f64, bits(bucket.framing.on_the_line(size))));
         line.into_iter().chain(bucket).min_by(|one, other| (one.0 / one.1).total_cmp(&(other.0 / other.1)))
@@ -196,7 +194,6 @@ fn regular(slots: Slots, replaced: &mut Vec<String>) -> Slots {
     let (mean, random) = match slots.gap() {
         SlotGap::Between { min, max } => (*min + (*max - *min) / 2, min != max),
         SlotGap::Drawn(delay) => (delay.mean(), delay.jitter().is_some()),
-        _ => return slots,
     };
     if random {
         replaced.push(format!("random gaps between slots are replaced by their mean, {}", Span(mean)));

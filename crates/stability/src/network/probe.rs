@@ -108,9 +108,8 @@ impl Probe {
                 waiting.push((now, place));
                 continue;
             }
-            let Ok(from) = u32::try_from(place) else { continue };
             // Instants come in order, and every sender is a node.
-            let _ = self.network.handle_broadcast(now, NodeId(from), self.info, ());
+            let _ = self.network.handle_broadcast(now, NodeId::new(place), self.info, ());
             self.sent[place] += 1;
             self.next.extend(self.senders[place].instant(self.sent[place]).map(|at| (at, place)));
             if self.next.first().is_none_or(|(at, _)| *at > now) {
@@ -128,8 +127,8 @@ impl Probe {
                 continue;
             }
             let arrived = matches!(event.fate, Fate::Delivered(_));
-            let taken = if arrived { u64::try_from((event.at - event.sent).as_nanos()).unwrap_or(LOST) } else { LOST };
-            let path = &mut self.taken[event.from.0 as usize * self.nodes + event.to.0 as usize];
+            let taken = if arrived { u64::try_from((event.at - event.offered).as_nanos()).unwrap_or(LOST) } else { LOST };
+            let path = &mut self.taken[event.path.from.index() * self.nodes + event.path.to.index()];
             let Ok(place) = usize::try_from(event.sequence) else { continue };
             if path.len() <= place {
                 path.resize(place + 1, PENDING);

@@ -17,7 +17,6 @@ pub struct Automaton {
 
 /// Why a pattern and matrices are no automaton.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
-#[non_exhaustive]
 pub enum AutomatonError {
     /// The graph is no pattern.
     #[error(transparent)]

@@ -30,7 +30,6 @@ pub struct Pattern {
 
 /// Why a graph is not a pattern.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
-#[non_exhaustive]
 pub enum PatternError {
     /// There is no node.
     #[error("a pattern needs at least one node")]

@@ -28,7 +28,6 @@ pub struct Certificate {
 
 /// Why shapes and a rate are no certificate.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
-#[non_exhaustive]
 pub enum CertificateError {
     /// The rate is negative, infinite or not a number.
     #[error("a rate is a finite number and not negative, not {rate}")]

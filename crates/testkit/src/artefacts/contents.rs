@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::{DropCause, Fate};
+use cohaptic_wan::{DropCause, Fate, Path};
 
 use super::folder::{MARK, MARKED};
 use crate::record::Record;
@@ -15,17 +15,17 @@ pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
     let mut table = String::new();
     let hosts = record.trace().hosts();
     let names = file_names(hosts);
-    for pair in record.pairs() {
-        let (from, to) = (&names[pair.0], &names[pair.1]);
-        let log = record.fates_of(pair);
+    for path in record.paths() {
+        let (from, to) = (&names[path.from.index()], &names[path.to.index()]);
+        let log = record.fates_of(path);
         let fates = format!("fates-{from}-to-{to}.csv");
-        let (one, other) = (&hosts[pair.0], &hosts[pair.1]);
+        let (one, other) = (&hosts[path.from.index()], &hosts[path.to.index()]);
         // Writing to a `String` cannot fail.
         let _ = writeln!(links, "{one} -> {other}: replay {fates}");
         let _ = writeln!(table, "  {one} -> {other}: {}", counts(&log));
         files.push((fates, log.to_text().into_bytes()));
         #[cfg(feature = "pcapng")]
-        files.push((format!("packets-{from}-to-{to}.pcapng"), capture(record, pair, one, other)));
+        files.push((format!("packets-{from}-to-{to}.pcapng"), capture(record, path, one, other)));
     }
     let mut trace = String::new();
     for event in record.trace().events() {
@@ -66,11 +66,11 @@ fn counts(log: &cohaptic_wan::FateLog) -> String {
 }
 
 #[cfg(feature = "pcapng")]
-fn capture(record: &Record, pair: (usize, usize), from: &str, to: &str) -> Vec<u8> {
+fn capture(record: &Record, path: Path, from: &str, to: &str) -> Vec<u8> {
     let write = || -> std::io::Result<Vec<u8>> {
         let mut capture = cohaptic_measure::pcapng::CaptureWriter::new(Vec::new(), &format!("{from} -> {to}"))?;
-        for seen in record.packets_of(pair) {
-            capture.write(&seen.record, &seen.payload)?;
+        for seen in record.packets_of(path) {
+            capture.write(&seen.without_path(), &seen.payload)?;
         }
         capture.finish()
     };

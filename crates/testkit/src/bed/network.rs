@@ -15,7 +15,7 @@ impl Testbed {
     pub fn network(mut self, network: &ImpairedNetwork) -> Self {
         let hosts = self.names.len();
         assert!(network.hosts() == hosts, "a network of {} hosts for a test bed of {hosts}: expected as many", network.hosts());
-        self.links.extend(network.links().map(|(from, to, link)| ((from.0 as usize, to.0 as usize), link.model())));
+        self.links.extend(network.links().map(|(from, to, link)| ((from.index(), to.index()), link.model())));
         self
     }
 }

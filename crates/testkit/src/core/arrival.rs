@@ -10,19 +10,20 @@ impl Core {
     /// Deals with what has come out of the links.
     pub(super) fn take_arrivals(&mut self) {
         while let Some(event) = self.network.poll_event() {
-            let (from, to) = (event.from.0 as usize, event.to.0 as usize);
+            let (from, to) = (event.path.from.index(), event.path.to.index());
             let packet = PacketName { from, to, sequence: event.sequence, copy: event.copy >> 1 };
             self.recording.keep(|| seen(&event, event.payload.bytes.clone()));
             match event.fate {
                 Fate::Delivered(at) => {
                     // A copy of it may be on its way still, undamaged.
+                    let marked = event.marked;
                     let mut parcel = event.payload;
                     if let Some(damage) = &event.damage {
                         let mut bytes = Vec::from(parcel.bytes);
                         damage.apply(&mut bytes);
                         parcel.bytes = bytes.into();
                     }
-                    let arrived = if self.is_cut(from, to) { Err(Lost::Cut) } else { self.arrive(to, at, parcel, event.marked, from) };
+                    let arrived = if self.is_cut(from, to) { Err(Lost::Cut) } else { self.arrive(to, at, parcel, marked, from) };
                     let what = match arrived {
                         Ok(()) => Happening::Arrived { packet },
                         Err(why) => Happening::Lost { packet, why },
@@ -30,7 +31,7 @@ impl Core {
                     self.recording.note(at, what);
                 }
                 Fate::Dropped(cause) => self.recording.note(event.at, Happening::Lost { packet, why: Lost::Link(cause) }),
-                Fate::Duplicated | _ => self.recording.note(event.at, Happening::Copied { packet }),
+                Fate::Duplicated => self.recording.note(event.at, Happening::Copied { packet }),
             }
         }
     }

@@ -102,7 +102,7 @@ impl Core {
             changes: VecDeque::new(),
             #[cfg(feature = "quinn")]
             entropy: entropy::Entropy::new(seed),
-            network: Network::new(config, |from, to| link(from.0 as usize, to.0 as usize)),
+            network: Network::new(config, |from, to| link(from.index(), to.index())),
             hosts: names.iter().map(|_| HostState::default()).collect(),
             sockets: Sockets::default(),
             cut: vec![false; names.len() * names.len()],
@@ -218,8 +218,7 @@ impl Core {
 pub(crate) use node as network_node;
 
 pub(crate) fn node(place: usize) -> NodeId {
-    // A network has at most 23,170 nodes.
-    NodeId(u32::try_from(place).unwrap_or(u32::MAX))
+    NodeId::new(place)
 }
 
 /// The state machine, and how what belongs to tasks gets at it.

@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 use cohaptic_units::Instant;
-use cohaptic_wan::{Network, NetworkEvent, PacketRecord};
+use cohaptic_wan::{Network, PacketEvent, PacketRecord, Path};
 
 use super::Settings;
 use crate::trace::{Happening, Trace};
@@ -16,15 +16,8 @@ pub(crate) struct Recording {
     pub(super) keeps_packets: bool,
 }
 
-/// What became of a packet on its link.
-#[derive(Clone, Debug)]
-pub(crate) struct Seen {
-    pub(crate) from: usize,
-    pub(crate) to: usize,
-    pub(crate) record: PacketRecord,
-    #[cfg_attr(not(feature = "pcapng"), expect(dead_code, reason = "only captures hold what packets carry"))]
-    pub(crate) payload: Bytes,
-}
+/// What became of a packet on its link, with what it carried.
+pub(crate) type Seen = PacketEvent<Bytes, Path>;
 
 impl Recording {
     pub(crate) const fn new(hosts: Vec<String>, settings: &Settings) -> Self {
@@ -63,25 +56,15 @@ impl Recording {
 }
 
 /// What a link says of a packet, as the row of its log. Without access lines the only copy is that of the link, whose number in a network is 2.
-pub(crate) fn seen<P>(event: &NetworkEvent<P>, payload: Bytes) -> Seen {
-    let record = PacketRecord {
-        sequence: event.sequence,
-        copy: event.copy >> 1,
-        offered: event.sent,
-        at: event.at,
-        size: event.size,
-        fate: event.fate,
-        marked: event.marked,
-        damaged: event.damage.is_some(),
-    };
-    Seen { from: event.from.0 as usize, to: event.to.0 as usize, record, payload }
+pub(crate) fn seen<P>(event: &PacketEvent<P, Path>, payload: Bytes) -> Seen {
+    PacketEvent { record: PacketRecord { copy: event.copy >> 1, ..event.record }, payload, damage: event.damage.clone() }
 }
 
 /// No link holds a packet for longer than this many of its events.
 const MOST_EVENTS: u32 = 10_000_000;
 
 /// Follows the packets that are in a network until they have arrived or are lost, as long as nothing more is sent.
-pub(crate) fn follow_to_the_end<P: Clone>(network: &mut Network<P>, mut keep: impl FnMut(&NetworkEvent<P>)) {
+pub(crate) fn follow_to_the_end<P: Clone>(network: &mut Network<P>, mut keep: impl FnMut(&PacketEvent<P, Path>)) {
     for _ in 0..MOST_EVENTS {
         while let Some(event) = network.poll_event() {
             keep(&event);

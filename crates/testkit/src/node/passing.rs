@@ -2,7 +2,7 @@
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::{Fate, NetworkEvent, PacketInfo};
+use cohaptic_wan::{Fate, PacketEvent, PacketInfo, Path};
 
 use super::address::{addresses, place_of};
 use super::run::Parcel;
@@ -103,7 +103,7 @@ impl NodeRun {
     /// Deals with what has come out of the links.
     pub(super) fn take_events(&mut self) {
         while let Some(event) = self.network.poll_event() {
-            let (from, to) = (event.from.0 as usize, event.to.0 as usize);
+            let (from, to) = (event.path.from.index(), event.path.to.index());
             self.recording.keep(|| seen(&event, event.payload.bytes.clone()));
             let packet = PacketName { from, to, sequence: event.sequence, copy: event.copy >> 1 };
             match event.fate {
@@ -121,7 +121,7 @@ impl NodeRun {
                     }
                 }
                 Fate::Dropped(cause) => self.recording.note(event.at, Happening::Lost { packet, why: Lost::Link(cause) }),
-                Fate::Duplicated | _ => self.recording.note(event.at, Happening::Copied { packet }),
+                Fate::Duplicated => self.recording.note(event.at, Happening::Copied { packet }),
             }
         }
     }
@@ -170,7 +170,7 @@ impl NodeRun {
 }
 
 /// What a packet carries, with the damage that was done to it.
-fn as_received(event: NetworkEvent<Parcel>) -> Parcel {
+fn as_received(event: PacketEvent<Parcel, Path>) -> Parcel {
     let mut parcel = event.payload;
     if let Some(damage) = &event.damage {
         // A copy of it may be on its way still, undamaged.

@@ -92,7 +92,7 @@ impl NodeRun {
         let count = names.len();
         let mut run = Self {
             nodes: nodes.into_iter().map(Some).collect(),
-            network: Network::new(config, |from, to| link(from.0 as usize, to.0 as usize)),
+            network: Network::new(config, |from, to| link(from.index(), to.index())),
             changes: changes.into(),
             now: Instant::ZERO,
             up: vec![true; count],

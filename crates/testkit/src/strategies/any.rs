@@ -116,8 +116,8 @@ impl Strategy for Networks {
     fn new_tree(&self, runner: &mut TestRunner) -> NewTree<Self> {
         let mut network = self.ideal.clone();
         let impaired = Dice(runner.rng()).pick(1, &[2, 4]);
-        let hosts = u32::try_from(network.hosts()).unwrap_or(u32::MAX);
-        let pairs = (0..hosts).flat_map(|from| (0..hosts).map(move |to| (NodeId(from), NodeId(to)))).filter(|(from, to)| from != to);
+        let hosts = network.hosts();
+        let pairs = (0..hosts).flat_map(|from| (0..hosts).map(move |to| (NodeId::new(from), NodeId::new(to)))).filter(|(from, to)| from != to);
         for (from, to) in pairs {
             let is_ideal = Dice(runner.rng()).below(4) >= impaired;
             network = network.with_link(from, to, link(&self.bounds, is_ideal, runner)?);

@@ -177,7 +177,7 @@ impl ImpairedNetwork {
     pub(super) fn without_host(&self, gone: usize) -> Self {
         let moved = |node: NodeId| {
             let place = usize::try_from(node.0).unwrap_or(usize::MAX);
-            (place != gone).then_some(NodeId(node.0 - u32::from(place > gone)))
+            (place != gone).then_some(NodeId(node.0 - u16::from(place > gone)))
         };
         let mut less = Self::ideal((self.hosts - 1).max(1));
         let links = self.links.iter().filter_map(|((from, to), link)| Some((moved(*from)?, moved(*to)?, link.clone())));
@@ -186,7 +186,7 @@ impl ImpairedNetwork {
     }
 
     fn nodes(&self) -> impl Iterator<Item = NodeId> + use<> {
-        (0..u32::try_from(self.hosts).unwrap_or(u32::MAX)).map(NodeId)
+        (0..self.hosts).map(NodeId::new)
     }
 
     fn is_link(&self, from: NodeId, to: NodeId) -> bool {

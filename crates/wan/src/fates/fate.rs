@@ -1,10 +1,9 @@
 //! What becomes of a packet. Everything that can happen has a name, and every name a counter.
 
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::Instant;
 
 /// Why a packet was dropped.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-#[non_exhaustive]
 pub enum DropCause {
     /// A predicate of the program took it.
     Filter,
@@ -64,7 +63,6 @@ impl DropCause {
 
 /// What became of a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[non_exhaustive]
 pub enum Fate {
     /// It came out of the far end at this instant.
     Delivered(Instant),
@@ -93,27 +91,6 @@ impl Fate {
             Self::Duplicated => false,
         }
     }
-}
-
-/// What became of one packet, or of one copy of it: the row of a fate log.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub struct PacketRecord {
-    /// The number of the packet on its link, from 0.
-    pub sequence: u64,
-    /// 0: the packet itself. Copies that the link made are counted from 1.
-    pub copy: u8,
-    /// When the packet was handed to the link.
-    pub offered: Instant,
-    /// When it arrived or was dropped, or when the copy was made.
-    pub at: Instant,
-    /// The size of the packet.
-    pub size: Bytes,
-    /// What became of it.
-    pub fate: Fate,
-    /// Whether "congestion experienced" was marked.
-    pub marked: bool,
-    /// Whether bits were flipped.
-    pub damaged: bool,
 }
 
 #[cfg(test)]

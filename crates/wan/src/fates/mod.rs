@@ -2,4 +2,5 @@
 
 pub(crate) mod fate;
 pub(crate) mod log;
+pub(crate) mod record;
 pub(crate) mod stats;

@@ -20,7 +20,6 @@ pub struct Chance {
 #[error(
     "events of probability {probability} cannot have the correlation {correlation} from one packet to the next: expected {least:.6} or more, and less than 1"
 )]
-#[non_exhaustive]
 pub struct ChanceError {
     /// The probability.
     pub probability: Probability,

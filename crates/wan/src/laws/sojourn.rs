@@ -10,7 +10,6 @@ use crate::random::unit;
 
 /// The law of a span of time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum Sojourn {
     /// Always as long.
     Fixed(Duration),

@@ -9,7 +9,6 @@ use crate::packet::PacketInfo;
 
 /// A packet as a filter sees it.
 #[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
 pub struct Offered<'a, P> {
     /// The number of the packet on this link, from 0.
     pub sequence: u64,

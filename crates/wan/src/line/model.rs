@@ -19,7 +19,6 @@ use crate::stages::modulation::Modulated;
 
 /// What a link is: one configuration, several in turn, a recording, or Linux's netem to the bit.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 #[expect(clippy::large_enum_variant, reason = "nearly all links are of the large variant, and a scene shares one model between its links")]
 pub enum LinkModel {
     /// One configuration.

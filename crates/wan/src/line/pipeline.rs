@@ -27,7 +27,6 @@ use crate::stages::order::{Order, OrderStage};
 /// Time was given that is earlier than a time given before. Nothing was changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("time went back to {now} after {was}")]
-#[non_exhaustive]
 pub struct TimeWentBack {
     /// The time given.
     pub now: Instant,

@@ -8,9 +8,9 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
-use crate::fates::fate::PacketRecord;
 use crate::fates::fate::{DropCause, Fate};
 use crate::fates::log::FateLog;
+use crate::fates::record::PacketRecord;
 use crate::packet::damage::Damage;
 use crate::packet::{Carried, Exit, Output, Outputs};
 

@@ -11,7 +11,6 @@ use super::Contradiction;
 /// Why the words are no netem, and which of them is to blame.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{kind}")]
-#[non_exhaustive]
 pub struct NetemError {
     /// What is wrong.
     pub kind: NetemErrorKind,
@@ -21,7 +20,6 @@ pub struct NetemError {
 
 /// What is wrong with the words of a netem.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum NetemErrorKind {
     /// A word where an option was expected.
     #[error("unknown word \"{word}\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, slot, seed or the end")]

@@ -22,7 +22,6 @@ use crate::stages::slots::Slots;
 
 /// Why words that `tc` accepts ask for what cannot be.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ExactError {
     /// Options that do not go together.
     #[error(transparent)]

@@ -6,7 +6,6 @@ use super::{DelaySpec, GemodelSpec, LossSpec, Netem, Percent, SlotGap, SlotSpec,
 
 /// Two options that cannot both be meant, or one that lacks another.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum Contradiction {
     /// There is nothing to overtake.
     #[error("reorder sends packets before those that wait: expected a delay above zero beside it")]

@@ -1,17 +1,10 @@
-//! What a network is made of, and what it says.
+//! What a network is made of.
 
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use cohaptic_units::{Bytes, Instant};
-
-use crate::fates::fate::Fate;
+use super::id::NodeId;
 use crate::line::pipeline::TimeWentBack;
-use crate::packet::damage::Damage;
-
-/// A node of a network, by its place from 0.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub struct NodeId(pub u32);
 
 /// A line that a node shares between all its paths.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -35,7 +28,6 @@ pub struct NetworkConfig {
 
 /// Why a call failed. Nothing was changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum NetworkError {
     /// An earlier call had a later instant.
     #[error(transparent)]
@@ -51,33 +43,4 @@ pub enum NetworkError {
     /// There is no such access line.
     #[error("there is no {0:?}")]
     NoLine(AccessLine),
-}
-
-/// What became of one packet, end to end, or that a copy of it was made.
-#[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub struct NetworkEvent<P> {
-    /// Who sent it.
-    pub from: NodeId,
-    /// To whom.
-    pub to: NodeId,
-    /// The number of the packet on its path, from 0.
-    pub sequence: u64,
-    /// 0 for the packet itself. A copy that its uplink made differs in the lowest bit, one that its link made in the second, its downlink in the third.
-    /// With [`Fate::Duplicated`] it is the number of the new copy.
-    pub copy: u8,
-    /// When the network took it.
-    pub sent: Instant,
-    /// When it arrived or was dropped, or when the copy was made.
-    pub at: Instant,
-    /// Its size.
-    pub size: Bytes,
-    /// What it carries, as it was offered: see `damage`.
-    pub payload: P,
-    /// What became of it.
-    pub fate: Fate,
-    /// Whether an active queue marked it: congestion experienced.
-    pub marked: bool,
-    /// The bits that were flipped. [`Damage::apply`] flips them.
-    pub damage: Option<Damage>,
 }

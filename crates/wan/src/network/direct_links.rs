@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 
 use cohaptic_units::{Instant, Probability};
 
+use super::id::LinkId;
 use crate::fates::fate::DropCause;
 use crate::fates::stats::LinkStats;
 use crate::line::direct::{Direct, Words};
@@ -26,7 +27,7 @@ use crate::stages::order::Order;
 #[derive(Clone, Debug)]
 pub struct DirectLinks {
     until: Instant,
-    links: Vec<One>,
+    links: Vec<LinkState>,
     /// What links without memory have in common.
     kinds: Vec<(LinkConfig, Kind)>,
     with_memory: Vec<Remembering>,
@@ -47,7 +48,7 @@ pub struct Arrivals {
 
 /// A link.
 #[derive(Clone, Debug)]
-struct One {
+struct LinkState {
     draws: Stream,
     offered: u64,
     latest: Instant,
@@ -105,7 +106,7 @@ impl DirectLinks {
             }
         };
         let draws = Stream::new(seed, name.as_str().as_bytes());
-        self.links.push(One { draws, offered: 0, latest: Instant::ZERO, delivered: 0, delay_nanos: 0, lost: 0, is });
+        self.links.push(LinkState { draws, offered: 0, latest: Instant::ZERO, delivered: 0, delay_nanos: 0, lost: 0, is });
         true
     }
 
@@ -116,8 +117,9 @@ impl DirectLinks {
     ///
     /// If there are no such links.
     #[inline(always)]
-    pub fn offer(&mut self, now: Instant, first: usize, count: usize, but: u8, arrivals: &mut Arrivals) {
+    pub fn offer(&mut self, now: Instant, first: LinkId, count: usize, but: u8, arrivals: &mut Arrivals) {
         (arrivals.arrive, arrivals.overtake) = (0, 0);
+        let first = first.index();
         match &mut self.kinds[..] {
             [(_, kind)] if self.with_memory.is_empty() => alike(kind, &mut self.links[first..first + count], now, self.until, but, arrivals),
             _ => self.offer_one_by_one(now, first, count, but, arrivals),
@@ -142,9 +144,9 @@ impl DirectLinks {
     /// # Panics
     ///
     /// If there is no such link.
-    pub fn forget(&mut self, link: usize, sent: Instant, arrival: Instant) {
+    pub fn forget(&mut self, link: LinkId, sent: Instant, arrival: Instant) {
         if arrival <= self.until {
-            let link = &mut self.links[link];
+            let link = &mut self.links[link.index()];
             link.delivered -= 1;
             link.delay_nanos -= u128::from(arrival.as_nanos() - sent.as_nanos());
         }
@@ -156,8 +158,8 @@ impl DirectLinks {
     ///
     /// If there is no such link.
     #[must_use]
-    pub fn stats(&self, link: usize) -> LinkStats {
-        let One { offered, delivered, delay_nanos, lost, is, .. } = self.links[link];
+    pub fn stats(&self, link: LinkId) -> LinkStats {
+        let LinkState { offered, delivered, delay_nanos, lost, is, .. } = self.links[link.index()];
         let outage = match is {
             Is::Plain(_) => 0,
             Is::Remembering(place) => self.with_memory[place as usize].outage,
@@ -213,7 +215,7 @@ impl DirectLinks {
 
 /// Offers a packet to neighbouring links of one kind: each step for all of them before the next.
 #[inline(always)]
-fn alike(kind: &mut Kind, links: &mut [One], now: Instant, until: Instant, but: u8, arrivals: &mut Arrivals) {
+fn alike(kind: &mut Kind, links: &mut [LinkState], now: Instant, until: Instant, but: u8, arrivals: &mut Arrivals) {
     let mut words = [[0; 2]; DirectLinks::AT_ONCE];
     let Arrivals { sequences, at, .. } = arrivals;
     for (link, (words, sequence)) in links.iter().zip(words.iter_mut().zip(sequences)) {
@@ -272,7 +274,7 @@ impl Kind {
     }
 }
 
-impl One {
+impl LinkState {
     /// Counts a packet, and says whether it overtakes; `fate` is when it arrives, or `None` if it is lost.
     #[inline(always)]
     fn count(&mut self, now: Instant, until: Instant, fate: Option<Instant>) -> bool {
@@ -347,7 +349,7 @@ mod tests {
                 link.handle_packet(now, PacketInfo::from(Bytes::new(64)), 0).unwrap_or_else(|error| panic!("{place}: {error}"));
             }
             let mut offered = Arrivals::NONE;
-            links.offer(now, 0, direct.len(), but, &mut offered);
+            links.offer(now, LinkId(0), direct.len(), but, &mut offered);
             for place in offered.places() {
                 let so_far = &mut arrivals[place];
                 assert_eq!(offered.overtakes(place), so_far.iter().any(|(at, _)| *at > offered.at[place]));
@@ -366,7 +368,7 @@ mod tests {
             arrivals.sort_unstable();
             arrivals.retain(|(at, _)| *at <= until);
             assert_eq!(delivered, *arrivals, "{}", direct[place]);
-            assert_eq!(links.stats(place), *link.stats(), "{}", direct[place]);
+            assert_eq!(links.stats(LinkId::new(place)), link.stats(), "{}", direct[place]);
         }
     }
 
@@ -376,11 +378,11 @@ mod tests {
         let mut links = DirectLinks::new(Instant::from_nanos(5_000_000));
         assert!(links.add(1, &LinkName::between("a", "b"), &model("delay 5ms")));
         let mut arrivals = Arrivals::NONE;
-        links.offer(Instant::ZERO, 0, 1, 0, &mut arrivals);
+        links.offer(Instant::ZERO, LinkId(0), 1, 0, &mut arrivals);
         assert_eq!((arrivals.arrive, arrivals.overtake, arrivals.sequences[0]), (1, 0, 0));
-        assert_eq!((links.stats(0).delivered(), links.stats(0).in_flight()), (1, 0));
-        links.forget(0, Instant::ZERO, arrivals.at[0]);
-        assert_eq!((links.stats(0).delivered(), links.stats(0).in_flight(), links.stats(0).mean_delay()), (0, 1, None));
+        assert_eq!((links.stats(LinkId(0)).delivered(), links.stats(LinkId(0)).in_flight()), (1, 0));
+        links.forget(LinkId(0), Instant::ZERO, arrivals.at[0]);
+        assert_eq!((links.stats(LinkId(0)).delivered(), links.stats(LinkId(0)).in_flight(), links.stats(LinkId(0)).mean_delay()), (0, 1, None));
     }
 
     #[test]
@@ -394,6 +396,6 @@ mod tests {
 
     #[test]
     fn a_link_without_memory_takes_a_cache_line() {
-        assert_eq!(size_of::<One>(), 64);
+        assert_eq!(size_of::<LinkState>(), 64);
     }
 }

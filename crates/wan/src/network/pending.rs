@@ -4,19 +4,33 @@ use core::num::NonZeroU32;
 
 use cohaptic_units::{Bytes, Instant};
 
+use super::id::{LinkId, NodeId, Path};
 use crate::event_queue::Event;
+use crate::fates::fate::Fate;
+use crate::fates::record::{PacketEvent, PacketRecord};
 use crate::packet::PacketInfo;
+use crate::packet::damage::Damage;
 
 /// A packet on its way.
 #[derive(Clone, Debug)]
 pub(super) struct InNetwork<P> {
     pub(super) sequence: u64,
-    pub(super) sent: Instant,
+    pub(super) offered: Instant,
     /// When it entered the line that it is in.
     pub(super) entered: Instant,
     pub(super) path: Path,
     pub(super) size: SizeAndMarks,
     pub(super) payload: P,
+}
+
+impl<P> InNetwork<P> {
+    #[inline(always)]
+    pub(super) fn event(self, at: Instant, fate: Fate, damage: Option<Damage>) -> PacketEvent<P, Path> {
+        let Self { sequence, offered, path, size, payload, .. } = self;
+        let (copy, marked, size) = (size.copy(), size.has(SizeAndMarks::MARKED), size.size());
+        let record = PacketRecord { path, sequence, copy, offered, at, size, fate, marked, damaged: damage.is_some() };
+        PacketEvent { record, payload, damage }
+    }
 }
 
 /// The size of a packet in the upper 24 bits, and below what happened to it. A bit is always set, so that an `Option` of what has it is no larger.
@@ -39,6 +53,10 @@ impl SizeAndMarks {
         Bytes::new((self.0.get() >> 8).into())
     }
 
+    pub(super) fn info(self) -> PacketInfo {
+        PacketInfo { size: self.size(), ecn_capable: self.has(Self::ECN_CAPABLE) }
+    }
+
     pub(super) fn copy(self) -> u8 {
         self.0.get().to_le_bytes()[0] & 0b111
     }
@@ -52,68 +70,78 @@ impl SizeAndMarks {
     }
 }
 
-/// From whom to whom.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) struct Path {
-    pub(super) from: u16,
-    pub(super) to: u16,
-}
-
 /// Something that will happen on a line.
 #[derive(Clone, Debug)]
 pub(super) struct Pending<P> {
     pub(super) at: Instant,
     /// The packet's sequence on its path.
     pub(super) sequence: u64,
-    pub(super) sent: Instant,
+    pub(super) offered: Instant,
     pub(super) entered: Instant,
-    pub(super) place: Place,
+    pub(super) turn: Turn,
     pub(super) path: Path,
     pub(super) size: SizeAndMarks,
     /// `None`: the time to wake the line's engine.
     pub(super) payload: Option<P>,
 }
 
-/// Kind and line in one number: what breaks ties between simultaneous events. All engines are woken before anything arrives, so that what leaves one
-/// line finds the room that a departure from the next line makes at the same instant.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) struct Place(u32);
-
-/// Which of its three lines a packet is in.
+/// A line of the network.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Hop {
-    Uplink,
-    Link,
-    Downlink,
+pub(super) enum LineId {
+    Uplink(NodeId),
+    Link(LinkId),
+    Downlink(NodeId),
 }
 
-/// Lines are counted in the lower bits of a [`Place`].
-const LINE_BITS: u32 = 29;
-
-impl Place {
-    pub(super) fn waking(hop: Hop, line: u32) -> Self {
-        Self((hop as u32) << LINE_BITS | line)
-    }
-
-    pub(super) fn arrival(hop: Hop, line: u32) -> Self {
-        Self((hop as u32 + 3) << LINE_BITS | line)
-    }
-
-    pub(super) fn hop(self) -> Hop {
-        match self.0 >> LINE_BITS {
-            0 | 3 => Hop::Uplink,
-            1 | 4 => Hop::Link,
-            _ => Hop::Downlink,
+impl LineId {
+    /// The bit in which a copy that this line made differs from its packet.
+    pub(super) const fn copy_bit(self) -> u32 {
+        match self {
+            Self::Uplink(_) => 1,
+            Self::Link(_) => 1 << 1,
+            Self::Downlink(_) => 1 << 2,
         }
     }
+}
 
-    pub(super) fn line(self) -> u32 {
-        self.0 & ((1 << LINE_BITS) - 1)
+/// What happens on which line, in one number: what breaks ties between simultaneous events. All engines are woken before anything arrives, so that what
+/// leaves one line finds the room that a departure from the next line makes at the same instant.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(super) struct Turn(u32);
+
+/// Links and nodes are counted in the lower bits of a [`Turn`].
+const NUMBER_BITS: u32 = 29;
+
+impl Turn {
+    #[inline(always)]
+    pub(super) fn waking(line: LineId) -> Self {
+        let (kind, number) = match line {
+            LineId::Uplink(node) => (0, node.0.into()),
+            LineId::Link(link) => (1, link.0),
+            LineId::Downlink(node) => (2, node.0.into()),
+        };
+        Self(kind << NUMBER_BITS | number)
+    }
+
+    #[inline(always)]
+    pub(super) fn arrival(line: LineId) -> Self {
+        Self(Self::waking(line).0 + (3 << NUMBER_BITS))
+    }
+
+    #[inline(always)]
+    pub(super) fn line(self) -> LineId {
+        let number = self.0 & ((1 << NUMBER_BITS) - 1);
+        let node = NodeId(number as u16);
+        match self.0 >> NUMBER_BITS {
+            0 | 3 => LineId::Uplink(node),
+            1 | 4 => LineId::Link(LinkId(number)),
+            _ => LineId::Downlink(node),
+        }
     }
 }
 
 impl<P> Event for Pending<P> {
-    type Key = (Instant, Place, u64, Path, u8);
+    type Key = (Instant, Turn, u64, Path, u8);
 
     #[inline]
     fn at(&self) -> Instant {
@@ -122,6 +150,6 @@ impl<P> Event for Pending<P> {
 
     #[inline]
     fn key(&self) -> Self::Key {
-        (self.at, self.place, self.sequence, self.path, self.size.copy())
+        (self.at, self.turn, self.sequence, self.path, self.size.copy())
     }
 }

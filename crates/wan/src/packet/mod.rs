@@ -38,6 +38,10 @@ pub(crate) struct Packet<T> {
     /// 0 for the packet itself, 1 for the copy that this link made.
     pub(crate) copy: u8,
     pub(crate) info: PacketInfo,
+    /// Whether a line before this one marked it.
+    pub(crate) was_marked: bool,
+    /// Whether a line before this one flipped bits of it.
+    pub(crate) was_damaged: bool,
     pub(crate) marks: Marks,
     pub(crate) item: T,
 }
@@ -45,7 +49,7 @@ pub(crate) struct Packet<T> {
 impl<T> Packet<T> {
     /// A packet that enters a link, or comes from another line with these marks.
     pub(crate) fn new(number: u64, info: PacketInfo, marks: Marks, item: T) -> Carried<T> {
-        Box::new(Self { number, copy: 0, info, marks, item })
+        Box::new(Self { number, copy: 0, info, was_marked: marks.congestion, was_damaged: marks.damage.is_some(), marks, item })
     }
 
     /// As that copy.

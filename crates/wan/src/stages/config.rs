@@ -64,7 +64,6 @@ pub struct LinkConfig {
 
 /// In which order packets pass the stages.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-#[non_exhaustive]
 pub enum Layout {
     /// That of the fields of [`LinkConfig`]: first what the network does, then the queue, then propagation.
     #[default]

@@ -30,7 +30,6 @@ pub struct Corruption {
 
 /// How bits are chosen.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum Flips {
     /// Some packets are damaged, each of them in so many different bits, every set of them equally likely; in all bits if there are not so many.
     Bits {

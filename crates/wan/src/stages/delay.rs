@@ -30,7 +30,6 @@ pub struct Jitter {
 
 /// How delays of successive packets hang together: as images of a Gaussian chain, z(n) = φ·z(n−1) + √(1−φ²)·ε(n), delay = F⁻¹(Φ(z)), a Gaussian copula.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-#[non_exhaustive]
 pub enum Correlation {
     /// Not at all.
     #[default]
@@ -75,7 +74,6 @@ enum Memory {
 
 /// Why a delay is refused.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum DelayError {
     /// A law with a least value would begin below the floor, where it could not be kept, or its deviation is too large for its mean.
     #[error(

@@ -33,7 +33,6 @@ pub struct ModulatorState {
 
 /// Why a modulator is refused. States count from 0.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ModulatorError {
     /// There is no state.
     #[error("a modulator without states: expected at least one")]

@@ -52,7 +52,6 @@ pub struct IdleOutages {
 
 /// Why a list of outages is refused. The index counts from zero in the order given.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum OutagesError {
     /// The outage ends before it begins, or when it begins.
     #[error("outage {index} ends at {to}, which is not after {from} when it begins")]

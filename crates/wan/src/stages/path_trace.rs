@@ -38,7 +38,6 @@ struct Row {
 
 /// Why a recording is refused. Lines count from 1.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum PathTraceError {
     /// The first line names no such columns.
     #[error("line 1: expected the columns t,delay or t,delay,loss")]

@@ -26,7 +26,6 @@ pub struct Reorder {
 
 /// How a packet leaves its place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum Displacement {
     /// It jumps ahead: it takes no delay at all and overtakes what is under way (netem's reordering). Only every `gap`-th packet may; 1: any.
     Jump {

@@ -32,7 +32,6 @@ pub struct Slots {
 
 /// How long it is from one slot to the next.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum SlotGap {
     /// Uniform between two spans.
     Between {
@@ -48,7 +47,6 @@ pub enum SlotGap {
 /// The longest gap is shorter than the shortest.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("gaps between slots of {} to {}: expected the longest not below the shortest", cohaptic_units::print::Span(*min), cohaptic_units::print::Span(*max))]
-#[non_exhaustive]
 pub struct SlotsError {
     /// The shortest.
     pub min: Duration,

@@ -169,7 +169,7 @@ mod tests {
 
     use super::*;
     use crate::stages::impairment::ParameterValue;
-    use crate::{Delay, FateLog, Impairments, Link, LinkConfig, LinkEvent, LinkModel, LinkName, Order};
+    use crate::{Delay, FateLog, Impairments, Link, LinkConfig, LinkModel, LinkName, Order, PacketEvent};
 
     const MS: Duration = Duration::from_millis(1);
 
@@ -195,7 +195,7 @@ mod tests {
     }
 
     /// What becomes of packets of which one is sent a millisecond, in the order in which they arrive.
-    fn events(model: impl Into<LinkModel>, packets: u64) -> Vec<LinkEvent<u64>> {
+    fn events(model: impl Into<LinkModel>, packets: u64) -> Vec<PacketEvent<u64>> {
         let mut link = Link::new(3, &LinkName::between("a", "b"), model);
         for number in 0..packets {
             link.handle_packet(Instant::from_nanos(number * 1_000_000), Bytes::new(64), number).unwrap();
@@ -208,7 +208,7 @@ mod tests {
 
     /// The numbers of the packets and their arrivals.
     fn arrivals(model: impl Into<LinkModel>, packets: u64) -> Vec<(u64, Instant)> {
-        events(model, packets).into_iter().map(|event| (event.payload, event.at)).collect()
+        events(model, packets).into_iter().map(|event| (event.payload, event.record.at)).collect()
     }
 
     /// Campbell's theorem with λ = 2/s, h = 1 s, d = 0.5 s: mean 1 s, variance 0.5 s². Over T = 200 000 s, seen every 50 ms, the mean has the variance 2σ²d/T, a
@@ -289,7 +289,7 @@ mod tests {
     fn a_replay_of_its_log_does_what_it_did() {
         let spiky = || config(5.0, 50 * MS, 100 * MS, Order::AllowReordering);
         let original = arrivals(spiky(), 500);
-        let log = FateLog::new(events(spiky(), 500).iter().map(LinkEvent::record)).unwrap();
+        let log = FateLog::new(events(spiky(), 500).into_iter().map(|event| event.record)).unwrap();
         assert_eq!(arrivals(LinkModel::Replay(Arc::new(log)), 500), original);
         assert_eq!(arrivals(spiky(), 500), original);
     }

@@ -10,7 +10,7 @@ use cohaptic_wan::parameters::{Form, Table};
 use cohaptic_wan::{
     Between, Bottleneck, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Counts, Delay, DeliveryTrace, Discipline, Displacement,
     Distribution, FateLog, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Impairments, Jitter, KernelNetem, Layout,
-    Link, LinkConfig, LinkEvent, LinkModel, LinkName, Loss, Modulated, Modulator, ModulatorState, Order, Outages, PacketInfo, PacketRecord,
+    Link, LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, ModulatorState, Order, Outages, PacketEvent, PacketInfo, PacketRecord,
     ParameterValue, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket, Values,
 };
 use proptest::collection::vec;
@@ -39,7 +39,7 @@ pub(crate) fn any_link(model: impl Into<LinkModel>) -> Link<Payload> {
 }
 
 /// All that becomes of packets offered with those gaps, in the order in which it is polled at the end.
-pub(crate) fn all_events(model: impl Into<LinkModel>, offered: &[(Duration, PacketInfo)]) -> Vec<LinkEvent<Payload>> {
+pub(crate) fn all_events(model: impl Into<LinkModel>, offered: &[(Duration, PacketInfo)]) -> Vec<PacketEvent<Payload>> {
     let mut subject = any_link(model);
     let mut now = Instant::ZERO;
     for ((gap, info), number) in offered.iter().zip(0..) {
@@ -52,7 +52,7 @@ pub(crate) fn all_events(model: impl Into<LinkModel>, offered: &[(Duration, Pack
 
 /// The records of a fate log, in its order.
 pub(crate) fn all_records(model: impl Into<LinkModel>, offered: &[(Duration, PacketInfo)]) -> Vec<PacketRecord> {
-    FateLog::new(all_events(model, offered).iter().map(LinkEvent::record)).unwrap().records().to_vec()
+    FateLog::new(all_events(model, offered).iter().map(|event| event.record)).unwrap().records().to_vec()
 }
 
 /// Packets of a few bytes, half of them with ECN.
@@ -420,7 +420,7 @@ pub(crate) fn kernel() -> BoxedStrategy<KernelNetem> {
 pub(crate) fn replay() -> BoxedStrategy<LinkModel> {
     (any_stages(), packets())
         .prop_map(|(config, offered)| {
-            let log = FateLog::new(all_events(config, &offered).iter().map(LinkEvent::record)).unwrap();
+            let log = FateLog::new(all_events(config, &offered).iter().map(|event| event.record)).unwrap();
             LinkModel::Replay(Arc::new(log))
         })
         .boxed()

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{
-    AccessLine, Bottleneck, Delay, Distribution, DropCause, Fate, Link, LinkConfig, LinkEvent, LinkName, Network, NetworkConfig, NetworkError,
-    NodeId, Order, QueueLimit, Service, TimeWentBack,
+    AccessLine, Bottleneck, Delay, Distribution, DropCause, Fate, Link, LinkConfig, LinkName, Network, NetworkConfig, NetworkError, NodeId, Order,
+    PacketEvent, QueueLimit, Service, TimeWentBack,
 };
 use proptest::prelude::*;
 
@@ -15,7 +15,7 @@ use crate::random_links::{
 };
 
 /// All that becomes of packets offered with those gaps, in the order in which it is polled at the end.
-fn run(config: &LinkConfig, offered: &[(Duration, Bytes)]) -> Vec<LinkEvent<Payload>> {
+fn run(config: &LinkConfig, offered: &[(Duration, Bytes)]) -> Vec<PacketEvent<Payload>> {
     let mut subject = link(config.clone());
     let mut now = Instant::ZERO;
     for ((gap, size), number) in offered.iter().zip(0..) {
@@ -34,9 +34,9 @@ proptest! {
         for event in run(&config, &offered) {
             if let Fate::Delivered(at) = event.fate {
                 prop_assert_eq!(at, event.at);
-                prop_assert!(at >= event.sent + config.delay.least(), "{:?}", event);
+                prop_assert!(at >= event.offered + config.delay.least(), "{:?}", event);
             } else {
-                prop_assert_eq!(event.at, event.sent);
+                prop_assert_eq!(event.at, event.offered);
             }
         }
     }
@@ -161,7 +161,7 @@ proptest! {
             4 => subject.handle_packet(later, left, nobody, Bytes::new(1), 0).unwrap_err(),
             5 => subject.set_link(later, nobody, left, changed).unwrap_err(),
             // Node 2^16 must not be taken for node 0.
-            _ => subject.handle_packet(later, NodeId(1 << 16), right, Bytes::new(1), 0).unwrap_err(),
+            _ => subject.handle_packet(later, NodeId(u16::MAX), right, Bytes::new(1), 0).unwrap_err(),
         };
         if let NetworkError::TimeWentBack(TimeWentBack { now: given, was, .. }) = error {
             prop_assert!(which < 3 && (given, was) == (past, now));
@@ -218,7 +218,7 @@ fn the_least_delay_is_kept_and_nearly_reached() {
     let delay = jittery(mean, sd, Distribution::Uniform);
     let offered = vec![(nanos(1_000), Bytes::new(64)); usize::from(COUNT)];
     let events = run(&LinkConfig { delay: delay.clone(), ..LinkConfig::default() }, &offered);
-    let smallest = events.into_iter().map(|event| event.at - event.sent).min().unwrap();
+    let smallest = events.into_iter().map(|event| event.at - event.offered).min().unwrap();
     let width = sd.mul_f64(2.0 * 3f64.sqrt());
     assert!(smallest >= delay.least(), "{smallest:?} is below {:?}", delay.least());
     assert!(smallest < delay.least() + width.mul_f64(6.91 / f64::from(COUNT)), "{smallest:?} is far above {:?}", delay.least());

@@ -30,7 +30,7 @@ impl Ledger {
     }
 
     fn drain_network(&mut self, network: &mut Network<Payload>) -> Result<(), TestCaseError> {
-        drain_network(network).into_iter().try_for_each(|event| self.note(event.from, event.to, event.sequence, event.fate))
+        drain_network(network).into_iter().try_for_each(|event| self.note(event.path.from, event.path.to, event.sequence, event.fate))
     }
 
     fn known(&self) -> u64 {
@@ -60,12 +60,12 @@ fn balance(stats: &LinkStats) -> Result<(), TestCaseError> {
 /// What the counters of a link say against the fates that a copy of it gives when it is drained, so that the link itself may stay undrained.
 fn audit(link: &Link<Payload>, polled: &Ledger, offered: u64) -> Result<(), TestCaseError> {
     let mut ledger = polled.clone();
-    balance(link.stats())?;
+    balance(&link.stats())?;
     // What has arrived counts as delivered when it is polled.
     let mut drained = link.clone();
     ledger.drain(&mut drained)?;
     let stats = drained.stats();
-    balance(stats)?;
+    balance(&stats)?;
     prop_assert_eq!(stats.offered(), offered);
     prop_assert!(ledger.known() <= offered, "more fates than packets");
     prop_assert_eq!(stats.delivered(), ledger.delivered());
@@ -153,7 +153,7 @@ fn audit_network(plan: &Plan, network: &Network<Payload>, polled: &Ledger, offer
     let (mut in_flight, mut delivered) = (0, 0);
     let mut dropped_by_cause: BTreeMap<DropCause, u64> = BTreeMap::new();
     let mut add = |stats: &LinkStats| -> Result<(), TestCaseError> {
-        balance(stats)?;
+        balance(&stats)?;
         in_flight += stats.in_flight();
         for cause in DropCause::ALL {
             *dropped_by_cause.entry(cause).or_default() += stats.dropped(cause);

@@ -12,7 +12,7 @@ fn delays(seed: u64, delay: &Delay, count: u64) -> Vec<f64> {
     let mut link = Link::new(seed, &LinkName::between("a", "b"), LinkConfig { delay: delay.clone(), ..LinkConfig::default() });
     (0..count).for_each(|number| link.handle_packet(Instant::from_nanos(number * 1_000_000_000), Bytes::new(64), ()).unwrap());
     link.handle_timeout(Instant::MAX).unwrap();
-    std::iter::from_fn(|| link.poll_event()).map(|event| (event.at - event.sent).as_nanos() as f64).collect()
+    std::iter::from_fn(|| link.poll_event()).map(|event| (event.at - event.offered).as_nanos() as f64).collect()
 }
 
 /// Of 40,000 delays, those at most the p-quantile are a binomial number. 200 of them are compared at 4.75 standard deviations, which all hold with probability

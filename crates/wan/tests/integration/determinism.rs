@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
-use cohaptic_wan::{
-    Distribution, DropCause, Fate, Layout, Link, LinkConfig, LinkEvent, LinkName, Loss, Network, NetworkConfig, NetworkEvent, NodeId,
-};
+use cohaptic_wan::{Distribution, DropCause, Fate, Layout, Link, LinkConfig, LinkName, Loss, Network, NetworkConfig, NodeId, PacketEvent, Path};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -26,7 +24,7 @@ enum Looking {
     Every(Duration),
 }
 
-fn look(subject: &mut Link<Payload>, from: Instant, to: Instant, looking: Looking) -> Vec<LinkEvent<Payload>> {
+fn look(subject: &mut Link<Payload>, from: Instant, to: Instant, looking: Looking) -> Vec<PacketEvent<Payload>> {
     let mut events = Vec::new();
     let mut now = from;
     loop {
@@ -42,7 +40,7 @@ fn look(subject: &mut Link<Payload>, from: Instant, to: Instant, looking: Lookin
     }
 }
 
-fn run(config: &LinkConfig, offered: &[(Duration, Bytes)], looking: Looking) -> Vec<LinkEvent<Payload>> {
+fn run(config: &LinkConfig, offered: &[(Duration, Bytes)], looking: Looking) -> Vec<PacketEvent<Payload>> {
     let mut subject = link(config.clone());
     let mut now = Instant::ZERO;
     let mut events = Vec::new();
@@ -57,7 +55,7 @@ fn run(config: &LinkConfig, offered: &[(Duration, Bytes)], looking: Looking) -> 
 }
 
 /// What a network with that plan does with those packets, polled where the packets say so.
-fn run_network(plan: &Plan, general: bool, script: &[Sending]) -> Vec<NetworkEvent<Payload>> {
+fn run_network(plan: &Plan, general: bool, script: &[Sending]) -> Vec<PacketEvent<Payload, Path>> {
     let mut subject = plan.build(general);
     let mut now = Instant::ZERO;
     let mut events = Vec::new();
@@ -102,7 +100,7 @@ proptest! {
         // Who polls between two calls of one instant sees what the first of them did before what the second does: so simultaneous events are sorted.
         let sorted = |script: &[Sending]| {
             let mut events = run_network(&plan, false, script);
-            events.sort_by_key(|event| (event.at, event.from, event.to, event.sequence));
+            events.sort_by_key(|event| (event.at, event.path.from, event.path.to, event.sequence));
             events
         };
         let sometimes = sorted(&script);
@@ -147,8 +145,8 @@ proptest! {
     fn a_network_of_one_path_behaves_as_a_link(config in any_config(), changed in any_config(), offered in offers(), polls: bool, change in 0..80usize) {
         let mut alone = Link::new(SEED, &LinkName::between(&name(0), &name(1)), config.clone());
         let mut network = Plan { nodes: 2, links: vec![config; 4], uplinks: vec![None, None], downlinks: vec![None, None] }.build(false);
-        let of_link = |event: LinkEvent<Payload>| (event.sequence, event.sent, event.at, event.size, event.payload, event.fate);
-        let of_network = |event: NetworkEvent<Payload>| (event.sequence, event.sent, event.at, event.size, event.payload, event.fate);
+        let of_link = |event: PacketEvent<Payload>| (event.sequence, event.offered, event.at, event.size, event.payload, event.fate);
+        let of_network = |event: PacketEvent<Payload, Path>| (event.sequence, event.offered, event.at, event.size, event.payload, event.fate);
         let mut both = [Vec::new(), Vec::new()];
         let mut now = Instant::ZERO;
         for (number, (gap, size)) in offered.into_iter().enumerate() {
@@ -173,7 +171,7 @@ proptest! {
         both[1].extend(drain_network(&mut network).into_iter().map(of_network));
         let [of_link, of_network] = both;
         prop_assert_eq!(of_link, of_network);
-        prop_assert_eq!(Some(*alone.stats()), network.link_stats(NodeId(0), NodeId(1)));
+        prop_assert_eq!(Some(alone.stats()), network.link_stats(NodeId(0), NodeId(1)));
     }
 
     /// Also when the one node more comes first in the list, so that all the others have other numbers.
@@ -181,14 +179,14 @@ proptest! {
     fn a_node_more_moves_no_other_paths_fates(small in plan(3, 0.01), extra in vec(any_config(), 16), script in sendings(3), more in sendings(4), place in 0..4usize) {
         let build = |names: &[usize], link: &dyn Fn(usize, usize) -> LinkConfig| {
             let config = NetworkConfig { seed: SEED, nodes: names.iter().copied().map(name).collect(), general: false };
-            Network::<Payload>::new(config, |from, to| link(names[from.0 as usize], names[to.0 as usize]))
+            Network::<Payload>::new(config, |from, to| link(names[from.index()], names[to.index()]))
         };
         let mut names = vec![0, 1, 2];
         let among_three = |from: usize, to: usize| small.links[from * 3 + to].clone();
         let mut three = build(&names, &among_three);
         names.insert(place, 3);
         let mut four = build(&names, &|from, to| if from < 3 && to < 3 { among_three(from, to) } else { extra[from * 4 + to].clone() });
-        let number = |node: NodeId| NodeId(u32::try_from(names.iter().position(|name| *name == node.0 as usize).unwrap()).unwrap());
+        let number = |node: NodeId| NodeId::new(names.iter().position(|name| *name == node.index()).unwrap());
 
         let mut now = Instant::ZERO;
         for (sending, other) in script.iter().zip(more.iter().cycle()) {
@@ -201,8 +199,8 @@ proptest! {
         }
         let by_path = |network: &mut Network<Payload>, names: &[usize]| {
             network.handle_timeout(Instant::MAX).unwrap();
-            let node = |id: NodeId| names[id.0 as usize];
-            drain_network(network).into_iter().map(|event| ((node(event.from), node(event.to), event.sequence), (event.at, event.fate))).collect::<BTreeMap<_, _>>()
+            let node = |id: NodeId| names[id.index()];
+            drain_network(network).into_iter().map(|event| ((node(event.path.from), node(event.path.to), event.sequence), (event.at, event.fate))).collect::<BTreeMap<_, _>>()
         };
         let alone = by_path(&mut three, &[0, 1, 2]);
         let mut joined = by_path(&mut four, &names);

@@ -59,7 +59,7 @@ proptest! {
         network.handle_timeout(Instant::MAX).unwrap();
         let events = drain(&mut subject);
         prop_assert_eq!(events.len(), count);
-        prop_assert!(events.iter().all(|event| event.fate == Fate::Delivered(event.at) && event.at >= event.sent));
+        prop_assert!(events.iter().all(|event| event.fate == Fate::Delivered(event.at) && event.at >= event.offered));
         prop_assert_eq!(subject.stats().in_flight(), 0);
         prop_assert!(subject.poll_timeout().is_none());
         prop_assert_eq!(drain_network(&mut network).len(), count);
@@ -93,7 +93,7 @@ fn a_million_packets_are_in_flight_on_one_link() {
         subject.handle_timeout(Instant::MAX).unwrap();
         let mut numbers = 0..COUNT;
         while let Some(event) = subject.poll_event() {
-            assert_eq!((Some(event.payload), event.at), (numbers.next(), event.sent + Duration::from_secs(10)));
+            assert_eq!((Some(event.payload), event.at), (numbers.next(), event.offered + Duration::from_secs(10)));
         }
         assert!(numbers.is_empty());
         assert_eq!(subject.stats().mean_delay(), Some(Duration::from_secs(10)));
@@ -128,7 +128,7 @@ fn a_link_without_delay_delivers_at_the_instant_of_sending() {
         subject.handle_packet(now, Bytes::new(64), 0).unwrap();
         assert_eq!(subject.poll_timeout(), Some(now));
         subject.handle_timeout(now).unwrap();
-        assert_eq!(subject.poll_event().map(|event| (event.sent, event.fate)), Some((now, Fate::Delivered(now))));
+        assert_eq!(subject.poll_event().map(|event| (event.offered, event.fate)), Some((now, Fate::Delivered(now))));
     }
 }
 

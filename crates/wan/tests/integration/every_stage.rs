@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{
-    Displacement, DropCause, Fate, FateLog, Layout, Link, LinkConfig, LinkEvent, LinkModel, Network, NetworkConfig, NetworkEvent, NodeId, Order,
-    PacketInfo,
+    Displacement, DropCause, Fate, FateLog, Layout, Link, LinkConfig, LinkModel, Network, NetworkConfig, NodeId, Order, PacketEvent, PacketInfo, Path,
 };
 use proptest::prelude::*;
 
@@ -23,7 +22,7 @@ struct Ledger {
 impl Ledger {
     fn drain(&mut self, link: &mut Link<Payload>, now: Instant) -> Result<(), TestCaseError> {
         for event in drain(link) {
-            prop_assert!(event.sent <= event.at && event.at <= now, "an event before its packet or in the future: {:?}", event);
+            prop_assert!(event.offered <= event.at && event.at <= now, "an event before its packet or in the future: {:?}", event);
             prop_assert!(self.last <= event.at, "events come in the order of their instants: {:?} after {}", event, self.last);
             prop_assert_eq!(event.payload, event.sequence);
             self.last = event.at;
@@ -70,7 +69,7 @@ enum Looking {
     Every(u64),
 }
 
-fn driven(model: &LinkModel, offered: &[(std::time::Duration, PacketInfo)], looking: Looking) -> Vec<LinkEvent<Payload>> {
+fn driven(model: &LinkModel, offered: &[(std::time::Duration, PacketInfo)], looking: Looking) -> Vec<PacketEvent<Payload>> {
     let mut subject = any_link(model.clone());
     let (mut now, mut events) = (Instant::ZERO, Vec::new());
     for ((gap, info), number) in offered.iter().zip(0..) {
@@ -96,13 +95,13 @@ fn driven(model: &LinkModel, offered: &[(std::time::Duration, PacketInfo)], look
 
 type Seen = (u64, u8, Instant, Instant, Bytes, Payload, Fate, bool, Option<cohaptic_wan::Damage>);
 
-fn of_link(event: LinkEvent<Payload>) -> Seen {
-    (event.sequence, event.copy, event.sent, event.at, event.size, event.payload, event.fate, event.marked, event.damage)
+fn of_link(event: PacketEvent<Payload>) -> Seen {
+    (event.sequence, event.copy, event.offered, event.at, event.size, event.payload, event.fate, event.marked, event.damage)
 }
 
-fn of_network(event: NetworkEvent<Payload>) -> Seen {
+fn of_network(event: PacketEvent<Payload, Path>) -> Seen {
     // A link is the second of three lines, so that its copies have the second bit.
-    (event.sequence, event.copy / 2, event.sent, event.at, event.size, event.payload, event.fate, event.marked, event.damage)
+    (event.sequence, event.copy / 2, event.offered, event.at, event.size, event.payload, event.fate, event.marked, event.damage)
 }
 
 proptest! {
@@ -143,7 +142,7 @@ proptest! {
     #[test]
     fn the_events_of_a_link_are_a_fate_log(model in any_model(), offered in packets()) {
         let events = all_events(model, &offered);
-        let log = FateLog::new(events.iter().map(LinkEvent::record));
+        let log = FateLog::new(events.iter().map(|event| event.record));
         prop_assert_eq!(log.map(|log| log.packets()), Ok(offered.len()));
     }
 
@@ -195,7 +194,7 @@ proptest! {
         both[1].extend(drain_network(&mut network).into_iter().map(of_network));
         let [of_link, of_network] = both;
         prop_assert_eq!(of_link, of_network);
-        prop_assert_eq!(Some(*alone.stats()), network.link_stats(left, right));
+        prop_assert_eq!(Some(alone.stats()), network.link_stats(left, right));
     }
 
     /// A limit that is never reached needs the engine that keeps packets; without it the link is a function from a packet to its arrival.
@@ -227,7 +226,7 @@ proptest! {
         let least = config.delay.least() + config.trace.as_ref().map_or_else(Default::default, cohaptic_wan::PathTrace::least);
         for event in all_events(config, &offered) {
             if matches!(event.fate, Fate::Delivered(_) | Fate::Dropped(DropCause::Checksum)) {
-                prop_assert!(event.at >= event.sent + least, "{:?}", event);
+                prop_assert!(event.at >= event.offered + least, "{:?}", event);
             }
         }
     }

@@ -14,9 +14,9 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{
     Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Delay, DeliveryTrace, Discipline, Displacement, FateLog,
-    FateRow, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter, KernelNetem, Layout, LinkConfig, LinkEvent,
-    LinkModel, LinkName, Loss, Modulated, Modulator, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red,
-    Reorder, Service, Slots, Sojourn, TokenBucket,
+    FateRow, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter, KernelNetem, Layout, LinkConfig, LinkModel,
+    LinkName, Loss, Modulated, Modulator, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red, Reorder,
+    Service, Slots, Sojourn, TokenBucket,
 };
 
 use crate::any_link::{JITTERS, KERNEL_WORDS, all_events, micros};
@@ -35,7 +35,7 @@ fn traffic() -> Vec<(Duration, PacketInfo)> {
 }
 
 fn fingerprint(model: LinkModel) -> u64 {
-    let log = FateLog::new(all_events(model, &traffic()).iter().map(LinkEvent::record)).unwrap();
+    let log = FateLog::new(all_events(model, &traffic()).iter().map(|event| event.record)).unwrap();
     let rows: Vec<String> = log.records().iter().map(|record| format!("{}\n", FateRow(*record))).collect();
     hash(rows.concat().as_bytes())
 }
@@ -184,7 +184,7 @@ fn models() -> Vec<(String, LinkModel)> {
     let modulator = Modulator::from_rates("cell", &[vec![0.0, 50.0, 10.0], vec![60.0, 0.0, 40.0], vec![90.0, 5.0, 0.0]]).unwrap();
     let states = vec![base(), all.clone(), LinkConfig { loss: Loss::Independent(p(0.5)), ..base() }];
     models.push(("modulated".into(), Modulated::new(modulator, states).unwrap().into()));
-    let log = FateLog::new(all_events(all, &traffic()[..1_000]).iter().map(LinkEvent::record)).unwrap();
+    let log = FateLog::new(all_events(all, &traffic()[..1_000]).iter().map(|event| event.record)).unwrap();
     models.push(("replay".into(), LinkModel::Replay(Arc::new(log))));
     for words in KERNEL_WORDS {
         let netem = Netem::parse(words).unwrap();

@@ -183,7 +183,7 @@ fn packets_at_random_wait_as_long_as_pollaczek_and_khinchine_say() {
 
         let mut cycles: Vec<(f64, f64)> = Vec::new();
         while let Some(event) = link.poll_event() {
-            let wait = (event.at - event.sent).as_nanos() as f64 - SERVICE;
+            let wait = (event.at - event.offered).as_nanos() as f64 - SERVICE;
             if wait == 0.0 {
                 cycles.push((0.0, 0.0));
             }

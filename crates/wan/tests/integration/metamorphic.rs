@@ -7,8 +7,8 @@ use std::time::Duration;
 use cohaptic_units::{Bytes, Instant, Rate};
 use cohaptic_wan::{
     Between, Bottleneck, Chance, Checksum, Corruption, Damage, Delay, Distribution, DropCause, Fate, FateLog, Flips, Framing, Jitter, Link,
-    LinkConfig, LinkEvent, LinkModel, Loss, Modulated, Modulator, ModulatorState, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, QueueLimit,
-    Reorder, Service, Slots, TokenBucket,
+    LinkConfig, LinkModel, Loss, Modulated, Modulator, ModulatorState, Outage, Outages, PacketEvent, PacketInfo, PathTrace, Pattern, Peak,
+    QueueLimit, Reorder, Service, Slots, TokenBucket,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -145,12 +145,12 @@ fn scalable() -> BoxedStrategy<Scalable> {
         .boxed()
 }
 
-fn fate(event: &LinkEvent<u64>) -> &'static str {
+fn fate(event: &PacketEvent<u64>) -> &'static str {
     event.fate.name()
 }
 
 /// The packets, by number and copy, of which a question has the answer yes.
-fn answers<T>(events: &[LinkEvent<u64>], answer: impl Fn(&LinkEvent<u64>) -> Option<T>) -> BTreeMap<(u64, u8), T> {
+fn answers<T>(events: &[PacketEvent<u64>], answer: impl Fn(&PacketEvent<u64>) -> Option<T>) -> BTreeMap<(u64, u8), T> {
     events.iter().filter(|event| event.fate.is_end()).filter_map(|event| Some(((event.sequence, event.copy), answer(event)?))).collect()
 }
 
@@ -262,19 +262,19 @@ proptest! {
             LinkConfig { loss: Loss::Independent(probability(losses.1)), limit: Some(30), bottleneck, ..base.clone() },
             LinkConfig { reorder: Some(Reorder { packets: Chance::independent(probability(0.0)), how: cohaptic_wan::Displacement::Later { by: micros(1) } }), ..base.clone() },
         ];
-        let all: Vec<Vec<LinkEvent<u64>>> = variants.iter().map(|config| all_events(config.clone(), &offered)).collect();
+        let all: Vec<Vec<PacketEvent<u64>>> = variants.iter().map(|config| all_events(config.clone(), &offered)).collect();
         let first = &all[0];
         for other in &all[1..] {
             // Damage to packets that got as far as being damaged.
-            let damage = |events: &[LinkEvent<u64>]| answers(events, |event| matches!(event.fate, Fate::Delivered(_)).then(|| event.damage.as_ref().map(Damage::bits).map(<[u64]>::to_vec)));
+            let damage = |events: &[PacketEvent<u64>]| answers(events, |event| matches!(event.fate, Fate::Delivered(_)).then(|| event.damage.as_ref().map(Damage::bits).map(<[u64]>::to_vec)));
             agree(&damage(first), &damage(other))?;
             // A packet that was not lost is copied in both or in neither.
             let survived: Vec<u64> = other.iter().filter(|event| event.copy == 0 && fate(event) != "loss").map(|event| event.sequence).collect();
-            let copied = |events: &[LinkEvent<u64>]| events.iter().filter(|event| event.fate == Fate::Duplicated && survived.contains(&event.sequence)).map(|event| event.sequence).collect::<Vec<_>>();
+            let copied = |events: &[PacketEvent<u64>]| events.iter().filter(|event| event.fate == Fate::Duplicated && survived.contains(&event.sequence)).map(|event| event.sequence).collect::<Vec<_>>();
             prop_assert_eq!({ let mut copied = copied(first); copied.sort_unstable(); copied }, { let mut copied = copied(other); copied.sort_unstable(); copied });
         }
         // Delays, where no queue stands before the path.
-        let delay = |events: &[LinkEvent<u64>]| answers(events, |event| matches!(event.fate, Fate::Delivered(_)).then_some(event.at));
+        let delay = |events: &[PacketEvent<u64>]| answers(events, |event| matches!(event.fate, Fate::Delivered(_)).then_some(event.at));
         agree(&delay(&all[0]), &delay(&all[1]))?;
         agree(&delay(&all[0]), &delay(&all[3]))?;
     }
@@ -282,11 +282,11 @@ proptest! {
     /// A link that replays its own log writes it again, and once more.
     #[test]
     fn a_replay_of_a_replay_is_the_log(config in any_stages(), offered in packets()) {
-        let log = FateLog::new(all_events(config, &offered).iter().map(LinkEvent::record)).unwrap();
+        let log = FateLog::new(all_events(config, &offered).iter().map(|event| event.record)).unwrap();
         let sizes: Vec<(Duration, PacketInfo)> = offered.iter().map(|(gap, info)| (*gap, info.size.into())).collect();
         let mut again = log.clone();
         for _ in 0..2 {
-            again = FateLog::new(all_events(LinkModel::Replay(Arc::new(again)), &sizes).iter().map(LinkEvent::record)).unwrap();
+            again = FateLog::new(all_events(LinkModel::Replay(Arc::new(again)), &sizes).iter().map(|event| event.record)).unwrap();
             prop_assert_eq!(&again, &log);
         }
         // Also through the text of a file.
@@ -296,7 +296,7 @@ proptest! {
     /// What the log does not know is dropped; the payload and the size are those of the packet offered now.
     #[test]
     fn what_comes_after_the_log_is_dropped(config in any_stages(), offered in packets(), more in 1..5usize) {
-        let log = FateLog::new(all_events(config, &offered).iter().map(LinkEvent::record)).unwrap();
+        let log = FateLog::new(all_events(config, &offered).iter().map(|event| event.record)).unwrap();
         let packets = log.packets();
         let mut subject: Link<u64> = any_link(LinkModel::Replay(Arc::new(log)));
         for number in 0..packets + more {

@@ -194,7 +194,7 @@ pub(crate) fn network_fates(plan: &Plan, sendings: &[Sending]) -> BTreeMap<(Node
         let own = of(&packets, &|packet| packet.path.0 == node);
         sent.extend(match uplink {
             None => own,
-            Some(config) => through(&own, config, LinkName::uplink(&name(node.0 as usize))),
+            Some(config) => through(&own, config, LinkName::uplink(&name(node.index()))),
         });
     }
     let mut carried = Vec::new();
@@ -202,14 +202,14 @@ pub(crate) fn network_fates(plan: &Plan, sendings: &[Sending]) -> BTreeMap<(Node
         for to in plan.node_ids().filter(|to| *to != from) {
             let mut own = of(&sent, &|packet| packet.path == (from, to));
             own.sort_by_key(|packet| (packet.at, packet.call, packet.sequence));
-            carried.extend(through(&own, plan.link(from, to), LinkName::between(&name(from.0 as usize), &name(to.0 as usize))));
+            carried.extend(through(&own, plan.link(from, to), LinkName::between(&name(from.index()), &name(to.index()))));
         }
     }
     for (node, downlink) in plan.node_ids().zip(&plan.downlinks) {
         let mut own = of(&carried, &|packet| packet.path.1 == node);
         own.sort_by_key(|packet| (packet.at, packet.call, packet.path.0, packet.sequence));
         if let Some(config) = downlink {
-            through(&own, config, LinkName::downlink(&name(node.0 as usize)));
+            through(&own, config, LinkName::downlink(&name(node.index())));
         }
     }
     fates

@@ -154,7 +154,7 @@ fn compare_network(plan: &Plan, general: bool, script: &[Sending]) -> Result<(),
     }
     let count = events.len();
     prop_assert_eq!(count, script.len());
-    let by_path = events.into_iter().map(|event| ((event.from, event.to, event.sequence), (event.at, event.fate))).collect();
+    let by_path = events.into_iter().map(|event| ((event.path.from, event.path.to, event.sequence), (event.at, event.fate))).collect();
     let model = network_fates(plan, script);
     prop_assert_eq!(model, by_path);
     Ok(())

@@ -32,7 +32,7 @@ fn waits(seed: u64, load: f64, count: u64) -> (Vec<(u64, u64)>, Vec<u64>) {
     }
     link.handle_timeout(Instant::MAX).unwrap();
     let events = std::iter::from_fn(|| link.poll_event());
-    let waits = events.map(|event| u64::try_from((event.at - event.sent).as_nanos()).unwrap() - event.size.get()).collect();
+    let waits = events.map(|event| u64::try_from((event.at - event.offered).as_nanos()).unwrap() - event.size.get()).collect();
     (offered, waits)
 }
 

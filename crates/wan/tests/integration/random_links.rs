@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Probability, Rate};
 use cohaptic_wan::{
-    AccessLine, Bottleneck, Delay, Distribution, Framing, GilbertElliott, Jitter, Link, LinkConfig, LinkEvent, LinkName, Loss, Network,
-    NetworkConfig, NetworkEvent, NodeId, Order, Outage, Outages, QueueLimit,
+    AccessLine, Bottleneck, Delay, Distribution, Framing, GilbertElliott, Jitter, Link, LinkConfig, LinkName, Loss, Network, NetworkConfig, NodeId,
+    Order, Outage, Outages, PacketEvent, Path, QueueLimit,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -71,7 +71,7 @@ pub(crate) struct Plan {
 
 impl Plan {
     pub(crate) fn link(&self, from: NodeId, to: NodeId) -> &LinkConfig {
-        &self.links[from.0 as usize * self.nodes + to.0 as usize]
+        &self.links[from.index() * self.nodes + to.index()]
     }
 
     pub(crate) fn build(&self, general: bool) -> Network<Payload> {
@@ -89,7 +89,7 @@ impl Plan {
     }
 
     pub(crate) fn node_ids(&self) -> impl Iterator<Item = NodeId> {
-        (0..self.nodes).map(|node| NodeId(u32::try_from(node).unwrap()))
+        (0..self.nodes).map(|node| NodeId::new(node))
     }
 }
 
@@ -101,11 +101,11 @@ pub(crate) fn link(config: LinkConfig) -> Link<Payload> {
     Link::new(SEED, &LinkName::between("left", "right"), config)
 }
 
-pub(crate) fn drain(link: &mut Link<Payload>) -> Vec<LinkEvent<Payload>> {
+pub(crate) fn drain(link: &mut Link<Payload>) -> Vec<PacketEvent<Payload>> {
     std::iter::from_fn(|| link.poll_event()).collect()
 }
 
-pub(crate) fn drain_network(network: &mut Network<Payload>) -> Vec<NetworkEvent<Payload>> {
+pub(crate) fn drain_network(network: &mut Network<Payload>) -> Vec<PacketEvent<Payload, Path>> {
     std::iter::from_fn(|| network.poll_event()).collect()
 }
 
@@ -230,7 +230,7 @@ pub(crate) fn plan(nodes: usize, access: f64) -> impl Strategy<Value = Plan> {
     })
 }
 
-pub(crate) fn sendings(nodes: u32) -> impl Strategy<Value = Vec<Sending>> {
+pub(crate) fn sendings(nodes: u16) -> impl Strategy<Value = Vec<Sending>> {
     let sending = (gap(), 0..nodes, 1..nodes, size(), any::<bool>()).prop_map(move |(gap, from, ahead, size, poll)| Sending {
         gap,
         from: NodeId(from),

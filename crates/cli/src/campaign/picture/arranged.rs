@@ -1,6 +1,6 @@
 //! Which key lies along which axis, and which has a panel for each of its values.
 
-use cohaptic_campaign::{Plan, Variation};
+use cohaptic_campaign::{CampaignPlan, Variation};
 use cohaptic_picture::{Axis, cell_edges};
 
 use crate::stability::quantity::axis_of_key;
@@ -47,7 +47,7 @@ pub(super) struct Along {
 
 impl Arranged {
     /// `None` if no key has several values; an error in words if there would be too much to see.
-    pub(super) fn new(plan: &Plan) -> Result<Option<Self>, String> {
+    pub(super) fn new(plan: &CampaignPlan) -> Result<Option<Self>, String> {
         let varied: Vec<(usize, &Variation)> = plan.variations().iter().enumerate().filter(|(_, vary)| vary.count() > 1).collect();
         let numbers: Vec<(usize, Along)> =
             varied.iter().filter_map(|(key, vary)| Along::of_numbers(*key, vary).map(|along| (*key, along))).take(2).collect();
@@ -79,7 +79,7 @@ impl Arranged {
     }
 
     /// What a panel shows, in words, behind what all of them show; empty if there is one alone and nothing to be said.
-    pub(super) fn title(&self, plan: &Plan, facet: usize, what: &str) -> String {
+    pub(super) fn title(&self, plan: &CampaignPlan, facet: usize, what: &str) -> String {
         let places = self.places(facet, &[]);
         let texts: Vec<String> = self.panels.iter().map(|(key, _)| plan.variations()[*key].override_text(places[*key])).collect();
         match (texts.is_empty(), what.is_empty()) {
@@ -90,7 +90,7 @@ impl Arranged {
     }
 
     /// The combination at these places along the axes, in a panel.
-    pub(super) fn combination(&self, plan: &Plan, facet: usize, at: &[usize]) -> usize {
+    pub(super) fn combination(&self, plan: &CampaignPlan, facet: usize, at: &[usize]) -> usize {
         usize::try_from(plan.combination(&self.places(facet, at))).unwrap_or(usize::MAX)
     }
 

@@ -9,12 +9,12 @@ mod verdicts;
 
 use std::path::Path;
 
-use cohaptic_campaign::{MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Plan, Quantiles, Report};
+use cohaptic_campaign::{CampaignPlan, MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Quantiles, Report};
 use cohaptic_picture::{Panel, Picture, Size};
 
 use super::Finished;
 use crate::failure::Failure;
-use crate::output_file::write_file;
+use crate::file::write_file;
 use arranged::{Arranged, Keys};
 use scale::Scale;
 
@@ -28,7 +28,7 @@ pub(super) struct Drawn {
 /// What all pictures of a campaign have in common.
 struct Sheet<'a> {
     title: &'a str,
-    plan: &'a Plan,
+    plan: &'a CampaignPlan,
     report: &'a Report,
     arranged: Arranged,
     size: Size,

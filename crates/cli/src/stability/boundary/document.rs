@@ -7,7 +7,7 @@ use super::Order;
 
 /// What `cohaptic stability boundary --json` prints.
 #[derive(Serialize)]
-pub(super) struct Document<'a> {
+pub(super) struct BoundaryDocument<'a> {
     title: &'a str,
     key: &'a str,
     unit: &'a str,
@@ -43,7 +43,7 @@ struct StretchDocument {
     high: f64,
 }
 
-impl<'a> Document<'a> {
+impl<'a> BoundaryDocument<'a> {
     pub(super) fn new(order: &'a Order, found: &Boundary, files: &'a [String]) -> Self {
         let crossings = found.crossings.iter();
         Self {

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use cohaptic_picture::Size;
 use cohaptic_stability::{Boundary, Cell, Criterion, Crossing};
+use cohaptic_units::print::csv_field;
 
 use super::Order;
 use super::picture::Picture;
 use super::words::crossing_in_words;
 use crate::failure::Failure;
+use crate::file::write_file;
 use crate::output;
-use crate::output_file::{field, write_file};
 use crate::stability::quantity::axis_of;
 use crate::stability::source;
 
@@ -28,7 +29,7 @@ pub(super) fn write(folder: &Path, order: &Order, found: &Boundary, size: Size) 
 }
 
 fn crossings(order: &Order, found: &Boundary) -> String {
-    let mut text = format!("{},from,to\n", field(&order.range.key));
+    let mut text = format!("{},from,to\n", csv_field(&order.range.key));
     for crossing in &found.crossings {
         text.push_str(&format!("{:?},{},{}\n", crossing.value, crossing.from.word(), crossing.to.word()));
     }
@@ -38,7 +39,7 @@ fn crossings(order: &Order, found: &Boundary) -> String {
 fn samples(order: &Order, found: &Boundary) -> String {
     let is_mean_square = order.family.criterion() == Criterion::MeanSquare;
     let columns = if is_mean_square { "mean_square_radius,error_bound,verdict,judged" } else { "spectral_radius,error_bound,verdict" };
-    let mut text = format!("{},{columns}\n", field(&order.range.key));
+    let mut text = format!("{},{columns}\n", csv_field(&order.range.key));
     for (value, Cell { radius, is_nominal }) in &found.known {
         text.push_str(&format!("{value:?},{:?},{:?},{}", radius.value, radius.error, radius.verdict().word()));
         if is_mean_square {

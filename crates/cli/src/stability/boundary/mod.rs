@@ -19,7 +19,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::{input, interrupt, output};
-use document::Document;
+use document::BoundaryDocument;
 
 /// The file in which values looked at are kept.
 const ROWS: &str = "boundary.rows.partial";
@@ -54,7 +54,7 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
             return Err(failure(arguments, &order.range, error));
         }
     };
-    if !found.is_settled() && interrupt::asked() {
+    if !found.is_settled() && interrupt::requested() {
         return Err(interrupted(&found, rows, &known, arguments));
     }
     let mut written = Vec::new();
@@ -62,12 +62,13 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
         written = files::write(folder, &order, &found, arguments.pictures.size())?;
         rows.map_or(Ok(()), RowsFile::remove)?;
     }
-    if arguments.scene.json {
-        output::json(DocumentSchema::StabilityBoundary, &Document::new(&order, &found, &written))?;
-    } else {
-        output::text(&words::describe(&order, &found))?;
-        output::wrote(&written);
-    }
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::STABILITY_BOUNDARY,
+        &BoundaryDocument::new(&order, &found, &written),
+        || words::describe(&order, &found),
+        &written,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -112,7 +113,7 @@ fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic
     let known: Vec<(f64, Cell)> = known.iter().filter_map(|(_, row)| Some((*row.first()?, cell(row)?))).collect();
     let progress = Progress::through_values();
     progress.tick();
-    let watch = CellWatch::new(&progress, "value", &interrupt::asked);
+    let watch = CellWatch::new(&progress, "value", &interrupt::requested);
     let found = Boundary::find_watched(&order.family, order.options, &known, |count| progress.reach_number(count as u64), &watch);
     progress.clear();
     found
@@ -124,7 +125,7 @@ fn failure(arguments: &BoundaryArguments, range: &KeyRange, error: BoundaryError
         BoundaryError::Radius(error) => {
             Said { file: &arguments.scene.scene, ranges: &[("--along", range.clone())], overrides: ("--set", &[]) }.failure(error)
         }
-        error @ (BoundaryError::Options { .. } | BoundaryError::Keys { .. } | _) => Failure::Input(error.to_string()),
+        error @ (BoundaryError::Options { .. } | BoundaryError::Keys { .. }) => Failure::Input(error.to_string()),
     }
 }
 

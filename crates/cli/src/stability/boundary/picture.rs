@@ -2,7 +2,7 @@
 
 use cohaptic_picture::{Axis, Line, Look, Panel};
 
-/// What is shown.
+/// The content of the picture.
 pub(super) struct Picture<'a> {
     pub(super) title: &'a str,
     /// The axis of the key.

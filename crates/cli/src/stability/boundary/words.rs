@@ -1,7 +1,5 @@
 //! A boundary in words.
 
-use std::fmt::Write as _;
-
 use cohaptic_stability::{Boundary, Criterion, Crossing, KeyRange};
 
 use cohaptic_units::print::Counted;
@@ -11,10 +9,7 @@ use super::Order;
 pub(super) fn describe(order: &Order, found: &Boundary) -> String {
     let range = &order.range;
     let mut text = format!("{}\n\n", order.title);
-    // Writing to a string does not fail.
-    let mut line = |line: String| {
-        let _ = writeln!(text, "  {line}");
-    };
+    let mut line = |line: String| text.push_str(&format!("  {line}\n"));
     let judged = if order.family.criterion() == Criterion::MeanSquare { " in the mean square" } else { "" };
     line(format!("{}{judged} from {}", found.first.word(), range.text(range.low)));
     for crossing in &found.crossings {

@@ -8,7 +8,7 @@ use crate::stability::source;
 
 /// What `cohaptic stability map --json` prints.
 #[derive(Serialize)]
-pub(super) struct Document<'a> {
+pub(super) struct MapDocument<'a> {
     title: &'a str,
     x_key: &'a str,
     x_unit: &'a str,
@@ -73,7 +73,7 @@ pub(super) fn notes(maps: &[VariantMap]) -> Vec<String> {
     source::nominal(cells, ["cell is", "cells are"]).into_iter().collect()
 }
 
-impl<'a> Document<'a> {
+impl<'a> MapDocument<'a> {
     pub(super) fn new(order: &'a Order, maps: &'a [VariantMap], wall_s: f64, cells: usize, files: &'a [String]) -> Self {
         let first = maps.first();
         let (x, y) = (order.x(), order.y());

@@ -4,12 +4,13 @@ use std::path::Path;
 
 use cohaptic_picture::Size;
 use cohaptic_stability::Criterion;
+use cohaptic_units::print::csv_field;
 
 use super::picture::{Axis, Outline, Picture};
 use super::{Order, VariantMap};
 use crate::failure::Failure;
+use crate::file::write_file;
 use crate::output;
-use crate::output_file::{field, write_file};
 use crate::stability::quantity::axis_of;
 use crate::stability::source;
 
@@ -30,7 +31,7 @@ pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap], size:
 
 /// One row a cell, x running fastest.
 fn table(order: &Order, VariantMap { map, criterion, verdicts, .. }: &VariantMap) -> String {
-    let keys = format!("{},{}", field(&order.x().key), field(&order.y().key));
+    let keys = format!("{},{}", csv_field(&order.x().key), csv_field(&order.y().key));
     let mut text = match criterion {
         Criterion::SpectralRadius => format!("{keys},spectral_radius,verdict\n"),
         Criterion::MeanSquare => format!("{keys},mean_square_radius,verdict,judged\n"),

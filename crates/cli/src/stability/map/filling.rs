@@ -90,7 +90,7 @@ fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper) -> Result<(V
             keeper.keep(variant * rows + row, cells);
             progress.one_more();
         };
-        let stop = || interrupt::asked() || keeper.broken.load(Ordering::Relaxed);
+        let stop = || interrupt::requested() || keeper.broken.load(Ordering::Relaxed);
         let watch = CellWatch::new(&progress, "cell", &stop);
         let filled = Map::resume_watched(family, order.grid, known, done, &watch).map_err(|error| (variant, error));
         if filled.is_err() {

@@ -19,7 +19,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::variants::Variant;
 use crate::{input, output};
-use document::Document;
+use document::MapDocument;
 use filling::Filled;
 
 /// Everything that is asked for, checked: nothing is written before there is one.
@@ -63,13 +63,14 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         files = files::write(folder, &order, &mut maps, arguments.pictures.size())?;
         rows.map_or(Ok(()), super::rows_file::RowsFile::remove)?;
     }
-    let document = Document::new(&order, &maps, wall_s, cells, &files);
-    if arguments.scene.json {
-        output::json(DocumentSchema::StabilityMap, &document)?;
-    } else {
-        output::text(&words::describe(&order, &maps, &document, arguments.out.is_none()))?;
-        output::wrote(&files);
-    }
+    let document = MapDocument::new(&order, &maps, wall_s, cells, &files);
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::STABILITY_MAP,
+        &document,
+        || words::describe(&order, &maps, &document, arguments.out.is_none()),
+        &files,
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -104,7 +105,7 @@ impl Order {
         let said = Said { file: &arguments.scene.scene, ranges: &self.ranges, overrides: (variant.option, &variant.overrides) };
         match error {
             MapError::Family(error) => said.failure(error),
-            error @ (MapError::Grid { .. } | MapError::Keys { .. } | MapError::Known { .. } | _) => Failure::Input(error.to_string()),
+            error @ (MapError::Grid { .. } | MapError::Keys { .. } | MapError::Known { .. }) => Failure::Input(error.to_string()),
         }
     }
 

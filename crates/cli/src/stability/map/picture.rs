@@ -11,7 +11,7 @@ pub(super) struct Picture<'a> {
     pub(super) x: Axis<'a>,
     pub(super) y: Axis<'a>,
     pub(super) outlines: Vec<Outline>,
-    /// The stable region of the first variant: anticlockwise around what is stable, clockwise around what is not.
+    /// The stable region of the first variant: anticlockwise around stable cells, clockwise around others.
     pub(super) regions: Vec<Polyline>,
     /// Which cells of the first variant are nominal, row by row.
     pub(super) nominal: &'a [Vec<bool>],

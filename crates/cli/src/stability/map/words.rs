@@ -6,7 +6,7 @@ use cohaptic_stability::{Criterion, Verdict};
 
 use cohaptic_units::print::Counted;
 
-use super::document::{Document, notes};
+use super::document::{MapDocument, notes};
 use super::{Order, VariantMap, glance};
 use crate::output::{are, figure};
 use crate::stability::quantity::label;
@@ -15,7 +15,7 @@ use crate::stability::source;
 /// More pictures than this do not fit on a screen.
 const MOST_PICTURES: usize = 4;
 
-pub(super) fn describe(order: &Order, maps: &[VariantMap], document: &Document<'_>, pictures: bool) -> String {
+pub(super) fn describe(order: &Order, maps: &[VariantMap], document: &MapDocument<'_>, pictures: bool) -> String {
     let mut text = format!("{}\n", order.title);
     for (number, map) in maps.iter().enumerate() {
         // Writing to a string does not fail.

@@ -9,7 +9,7 @@ use super::worst::WorstDocument;
 
 /// What `cohaptic stability point --json` prints.
 #[derive(Serialize)]
-pub(super) struct Document<'a> {
+pub(super) struct PointDocument<'a> {
     title: &'a str,
     /// In the mean square where links leave something to chance.
     verdict: &'static str,
@@ -57,7 +57,7 @@ struct PartDocument<'a> {
     error_bound: f64,
 }
 
-impl<'a> Document<'a> {
+impl<'a> PointDocument<'a> {
     pub(super) fn new(scene: &'a Scene, judgement: &'a Judgement, worst: Option<&'a SceneWorstCase>) -> Self {
         let Judgement { verdict, analysis, mean_square } = judgement;
         let radius = mean_square.as_ref().map(|mean_square| mean_square.radius);

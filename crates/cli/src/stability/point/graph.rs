@@ -8,7 +8,7 @@ use cohaptic_stability::{AnalysisError, Graph, GraphError, Judgement, Matrix, an
 use super::ended;
 use crate::analysis_watch::AnalysisWatch;
 use crate::failure::Failure;
-use crate::text_file;
+use crate::file;
 
 /// What the verdict leaves out where links leave something to chance.
 const NOMINAL: &str = "the verdict is nominal, with every delay its mean and nothing lost: the second moment is not followed on a graph";
@@ -32,8 +32,7 @@ pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, F
         | GraphError::Weight { .. }
         | GraphError::Alone { .. }
         | GraphError::Irregular
-        | GraphError::NotLinear
-        | _) => refused(error.to_string()),
+        | GraphError::NotLinear) => refused(error.to_string()),
     })?;
     if has_chance(scene) {
         analysis.notes.push(NOMINAL.to_owned());
@@ -43,7 +42,7 @@ pub(super) fn on(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, F
 
 /// A file of weights: one line a peer, numbers between commas.
 fn weights(file: &Path) -> Result<Graph, Failure> {
-    let text = text_file::read(file)?;
+    let text = file::read_text(file)?;
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let entry = |entry: &str| {

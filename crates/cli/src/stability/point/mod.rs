@@ -16,7 +16,7 @@ use crate::arguments::PointArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, not_analysed};
 use crate::{input, output};
-use document::Document;
+use document::PointDocument;
 
 /// The user asked for the end.
 fn ended() -> Failure {
@@ -37,10 +37,12 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         }
     };
     let worst = worst::of(&scene, arguments, path)?;
-    if arguments.scene.json {
-        output::json(DocumentSchema::StabilityPoint, &Document::new(&scene, &judgement, worst.as_ref()))?;
-    } else {
-        output::text(&words::describe(&scene, &judgement, worst.as_ref()))?;
-    }
+    output::answer(
+        arguments.scene.json,
+        DocumentSchema::STABILITY_POINT,
+        &PointDocument::new(&scene, &judgement, worst.as_ref()),
+        || words::describe(&scene, &judgement, worst.as_ref()),
+        output::NO_FILES,
+    )?;
     Ok(ExitCode::SUCCESS)
 }

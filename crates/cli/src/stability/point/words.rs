@@ -1,7 +1,5 @@
 //! A verdict in words.
 
-use std::fmt::Write as _;
-
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, WorstVerdict};
 
@@ -17,10 +15,7 @@ const MOST_MODES: usize = 16;
 pub(super) fn describe(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>) -> String {
     let Judgement { verdict, analysis, mean_square } = judgement;
     let mut text = format!("{}\n\n{}\n", scene.title, sentence(*verdict, mean_square.is_some()));
-    // Writing to a string does not fail.
-    let mut line = |line: String| {
-        let _ = writeln!(text, "  {line}");
-    };
+    let mut line = |line: String| text.push_str(&format!("  {line}\n"));
     if let Some(mean_square) = mean_square {
         line(format!("mean-square radius {} over a frame of {}", number(mean_square.radius), Span(mean_square.frame)));
         line(format!("with nothing left to chance: {}", analysis.verdict().word()));

@@ -37,8 +37,7 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
         | SceneWorstCaseError::Frame { .. }
         | SceneWorstCaseError::Pattern { .. }
         | SceneWorstCaseError::TooMany { .. }
-        | SceneWorstCaseError::TooLarge { .. }
-        | _) => Failure::Input(format!("{}: {error}", crate::input::named(path).display())),
+        | SceneWorstCaseError::TooLarge { .. }) => Failure::Input(format!("{}: {error}", crate::input::named(path).display())),
     })
 }
 

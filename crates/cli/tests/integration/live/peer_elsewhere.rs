@@ -97,21 +97,21 @@ fn in_virtual_time(desk: &Desk, offers: &BTreeMap<usize, Vec<u64>>, end: u64) ->
     let scene = Scene::read_live(&desk.path("scene.toml"), &[]).unwrap();
     let names: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
     let config = NetworkConfig { seed: scene.seed, nodes: names.clone(), general: false };
-    let mut network = Network::<()>::new(config, |from, to| scene.links.between(from.0 as usize, to.0 as usize).clone());
+    let mut network = Network::<()>::new(config, |from, to| scene.links.between(from.index(), to.index()).clone());
     let mut order: Vec<(u64, usize)> = offers.iter().flat_map(|(from, sent)| sent.iter().map(|at| (*at, *from))).collect();
     order.sort_unstable();
     let mut seen = BTreeSet::new();
     let info = PacketInfo { size: Bytes::new(64), ecn_capable: true };
     let mut drain = |network: &mut Network<()>| {
         while let Some(event) = network.poll_event() {
-            let link = format!("{}->{}", names[event.from.0 as usize], names[event.to.0 as usize]);
+            let link = format!("{}->{}", names[event.path.from.index()], names[event.path.to.index()]);
             let arrived = if let Fate::Delivered(at) = event.fate { Some(at.as_nanos()) } else { None };
-            seen.insert((link, event.sequence, event.sent.as_nanos(), arrived, event.fate.name().to_owned()));
+            seen.insert((link, event.sequence, event.offered.as_nanos(), arrived, event.fate.name().to_owned()));
         }
     };
     for (at, from) in order {
         for to in (0..3).filter(|to| *to != from) {
-            let node = |place: usize| NodeId(u32::try_from(place).unwrap());
+            let node = |place: usize| NodeId::new(place);
             network.handle_packet(Instant::from_nanos(at), node(from), node(to), info, ()).unwrap();
         }
         drain(&mut network);

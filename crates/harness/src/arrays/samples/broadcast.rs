@@ -6,9 +6,12 @@ use std::collections::VecDeque;
 
 use cohaptic_scene::Scene;
 
+use cohaptic_units::Instant;
+
 use super::quads::{self, Quad};
 use super::{Sample, others};
 use crate::arrays::blocks::Blocks;
+use crate::arrays::lead::mean_lead;
 
 /// What is on the way, and what is held from each sender.
 #[derive(Clone, Debug)]
@@ -19,6 +22,8 @@ pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
     /// What is held from each sender but the first, by axis, as the first peer holds it; and from the first.
     held: [Vec<Quad<L>>; A],
     first: Sample<A, L>,
+    /// How many samples of each sender have arrived.
+    arrived: Vec<u64>,
     changed: bool,
 }
 
@@ -40,6 +45,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
             peers,
             held: std::array::from_fn(|_| quads::empty(peers - 1)),
             first: Sample::initial(scenes, 0),
+            arrived: vec![0; peers],
             changed: true,
         };
         for sender in 0..peers {
@@ -60,6 +66,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         while let Some(&Sent { sender, sample, .. }) = self.on_the_way.front().filter(|sent| sent.due <= tick) {
             self.on_the_way.pop_front();
             self.hold(sender, &sample);
+            self.arrived[sender] += 1;
             self.changed = true;
         }
     }
@@ -75,6 +82,24 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
                 quads::set(&mut self.held[axis], place, run, sample.position[axis][run], sample.velocity[axis][run]);
             }
         }
+    }
+
+    /// By how much what a peer holds has moved on since it was sent: along an axis, at a receiver, in a run. `sent` says when a sample of a sender was sent.
+    pub(in crate::arrays) fn lead(
+        &self,
+        (axis, peer, run): (usize, usize, usize),
+        now: Instant,
+        horizon: f64,
+        sent: impl Fn(usize, u64) -> Instant,
+    ) -> f64 {
+        let moving = |sender: usize| {
+            let velocity = match sender.checked_sub(1) {
+                Some(place) => quads::velocity(&self.held[axis], place, run),
+                None => self.first.velocity[axis][run],
+            };
+            (self.arrived[sender].checked_sub(1).map_or(Instant::ZERO, |newest| sent(sender, newest)), velocity)
+        };
+        mean_lead((0..self.peers).filter(|sender| *sender != peer).map(moving), now, horizon, others(self.peers))
     }
 
     /// The means are those of what is held.

@@ -22,6 +22,11 @@ pub(super) fn set<const L: usize>(quads: &mut [Quad<L>], place: usize, run: usiz
     quad[place % 4 + 4][run] = velocity;
 }
 
+/// The velocity of the sample in that place of a run.
+pub(super) fn velocity<const L: usize>(quads: &[Quad<L>], place: usize, run: usize) -> f64 {
+    quads[place / 4][place % 4 + 4][run]
+}
+
 /// Lets two samples change places, in all runs.
 #[inline(always)]
 pub(super) fn swap<const L: usize>(quads: &mut [Quad<L>], one: usize, other: &mut ([f64; L], [f64; L])) {

@@ -7,11 +7,12 @@ use std::collections::BTreeMap;
 
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
-use cohaptic_wan::{Arrivals, DirectLinks, LinkName, LinkStats};
+use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkName, LinkStats};
 
 use super::quads::{self, Quad};
 use super::{Sample, others};
 use crate::arrays::blocks::Blocks;
+use crate::arrays::lead::mean_lead;
 
 /// Ticks ahead that lie in the wheel; what arrives later than that is kept aside.
 const HORIZON: u64 = 256;
@@ -152,7 +153,7 @@ impl<const A: usize, const L: usize> Single<A, L> {
             // Eight links lead to eight receivers of one run or to one receiver of eight runs; some of them, or all, to the sender itself.
             let own = (sender * L).wrapping_sub(first);
             let but = if own < DirectLinks::AT_ONCE { ((1_u16 << L) - 1) << own } else { 0 };
-            links.offer(now, sender * row + first, DirectLinks::AT_ONCE.min(row - first), but as u8, &mut arrivals);
+            links.offer(now, LinkId::new(sender * row + first), DirectLinks::AT_ONCE.min(row - first), but as u8, &mut arrivals);
             for place in arrivals.places() {
                 let (receiver, run, at) = ((first + place) / L, (first + place) % L, arrivals.at[place]);
                 // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
@@ -179,6 +180,23 @@ impl<const A: usize, const L: usize> Single<A, L> {
     /// What has arrived is held from now on.
     pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
         self.take_in(tick, Instant::MAX);
+    }
+
+    /// By how much what a peer holds has moved on since it was sent: along an axis, at a receiver, in a run. `sent` says when a sample of a sender was sent.
+    pub(in crate::arrays) fn lead(
+        &self,
+        (axis, peer, run): (usize, usize, usize),
+        now: Instant,
+        horizon: f64,
+        sent: impl Fn(usize, u64) -> Instant,
+    ) -> f64 {
+        let first = peer * row_of(self.peers);
+        let moving = |place: usize| {
+            let sender = place + usize::from(place >= peer);
+            let newest = self.next[(first + place) * L + run].checked_sub(1);
+            (newest.map_or(Instant::ZERO, |newest| sent(sender, newest)), quads::velocity(&self.held[axis], first + place, run))
+        };
+        mean_lead((0..self.peers - 1).map(moving), now, horizon, others(self.peers))
     }
 
     /// The means are those of what is held.
@@ -258,7 +276,7 @@ impl<const A: usize, const L: usize> Single<A, L> {
                 let receiver = usize::from(packet.receiver);
                 let place = packet.place as usize - receiver * row_of(self.peers);
                 let sender = place + usize::from(place >= receiver);
-                self.links.forget((sender * self.peers + receiver) * L + run, sent(sender, packet.sequence), packet.arrival);
+                self.links.forget(LinkId::new((sender * self.peers + receiver) * L + run), sent(sender, packet.sequence), packet.arrival);
             }
         }
     }
@@ -270,7 +288,7 @@ impl<const A: usize, const L: usize> Single<A, L> {
 
     /// The counters of a link.
     pub(in crate::arrays) fn stats(&self, from: usize, to: usize, run: usize) -> LinkStats {
-        self.links.stats((from * self.peers + to) * L + run)
+        self.links.stats(LinkId::new((from * self.peers + to) * L + run))
     }
 }
 

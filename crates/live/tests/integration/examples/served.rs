@@ -3,7 +3,7 @@
 use std::net::UdpSocket;
 use std::time::{Duration, Instant as Wall};
 
-use cohaptic_live::{Admission, Door, DoorConfig, MAX_DATAGRAM, Place, Refusal, SessionKey, SystemEntropy};
+use cohaptic_live::{Admission, AdmissionConfig, AdmissionControl, MAX_DATAGRAM, Place, Refusal, SessionKey, SystemEntropy};
 use cohaptic_peer::{State, wire};
 use cohaptic_units::Instant;
 
@@ -16,7 +16,7 @@ const THERE: f64 = 0.02;
 /// A door, its socket, and what came through.
 struct Served {
     socket: UdpSocket,
-    door: Door,
+    door: AdmissionControl,
     began: Wall,
     key: Option<SessionKey>,
     /// The numbers of the samples that were let in, as the door numbered them.
@@ -88,9 +88,9 @@ impl Served {
     }
 }
 
-fn new_door(key: Option<SessionKey>) -> Door {
+fn new_door(key: Option<SessionKey>) -> AdmissionControl {
     // Long enough for any pause that a busy machine makes.
-    Door::new(DoorConfig { stale_after: Duration::from_secs(600), ..config() }.with_key(key), &mut SystemEntropy).unwrap()
+    AdmissionControl::new(AdmissionConfig { stale_after: Duration::from_secs(600), ..config() }.with_key(key), &mut SystemEntropy).unwrap()
 }
 
 /// Starts a program for so many seconds, serves it to its end, and gives both sides' accounts. `restart_after`: how many samples are let in before

@@ -11,7 +11,7 @@ fn capture(frames: &[(u64, u64, &[u8])]) -> Vec<u8> {
     for &(sequence, micros, payload) in frames {
         let at = Instant::from_nanos(micros * 1_000);
         let size = Bytes::new(payload.len() as u64);
-        let record = PacketRecord { sequence, copy: 0, offered: at, at, size, fate: Fate::Delivered(at), marked: false, damaged: false };
+        let record = PacketRecord { path: (), sequence, copy: 0, offered: at, at, size, fate: Fate::Delivered(at), marked: false, damaged: false };
         writer.write(&record, payload).unwrap();
     }
     writer.finish().unwrap()

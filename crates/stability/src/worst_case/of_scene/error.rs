@@ -11,7 +11,6 @@ use crate::AnalysisError;
 
 /// Why the worst case of a scene cannot be bounded.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SceneWorstCaseError {
     /// The scene cannot be analysed at all.
     #[error(transparent)]

@@ -61,7 +61,7 @@ impl Block<'_> {
         // What is held at the beginning stands with the samples of its sender, as if of an age beyond all that are used.
         let timetable = timetable(self.lifted.timetable, &links, &deliveries, &depth);
         let frame = Lifted { timetable: &timetable, ..self.lifted }.frame(&mut Autonomous);
-        if self.lifted.coordination.stiffness + self.lifted.coordination.damping == 0.0 {
+        if self.lifted.sampling.is_silent(self.lifted.time) {
             // Samples are not used at all.
             return (frame.monodromy(), frame.error);
         }
@@ -105,22 +105,21 @@ impl Block<'_> {
         for (row, source) in kept.enumerate() {
             put(row, frame.states.row(source), None, if frame.is_position(source) { 1.0 } else { 0.0 });
         }
-        let translation = frame.translation;
         for (node, depth) in depth.iter().enumerate() {
             for age in 1..=*depth {
                 let row = first[node] + age - 1;
                 match age {
-                    1 => put(row, frame.sent.row(frame.sent_by(node).start), None, translation),
-                    _ => put(row, &[], Some(row - 1), translation),
+                    1 => put(row, frame.sent.row(frame.sent_by(node).start), None, frame.translation(1)),
+                    _ => put(row, &[], Some(row - 1), frame.translation(1)),
                 }
             }
         }
         for (place, link) in links.iter().enumerate() {
             let newest = deliveries.iter().filter(|delivery| (delivery.from, delivery.to) == (link.from, link.to)).map(|delivery| delivery.age).min();
             match newest {
-                Some(0) => put(held + place, frame.sent.row(frame.sent_by(link.from).start), None, translation),
-                Some(age) => put(held + place, &[], Some(first[link.from] + age - 1), translation),
-                None => put(held + place, &[], Some(held + place), translation),
+                Some(0) => put(held + place, frame.sent.row(frame.sent_by(link.from).start), None, frame.translation(1)),
+                Some(age) => put(held + place, &[], Some(first[link.from] + age - 1), frame.translation(1)),
+                None => put(held + place, &[], Some(held + place), frame.translation(1)),
             }
         }
         (matrix, frame.error)

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use cohaptic_peer::coordination::LawSettings;
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
 use cohaptic_scene::{Scene, SceneError};
 
@@ -33,6 +34,8 @@ pub struct Draft {
     pub strategy: Coordination,
     /// KT and BT.
     pub gains: Gains,
+    /// The parameters that strategies have of their own.
+    pub settings: LawSettings,
     /// The period of sending \[µs\].
     pub update: u64,
     /// Which integrator with how many steps; `None` is the exact one.
@@ -138,6 +141,7 @@ impl Draft {
             enclosure: None,
             strategy: Coordination::AveragePosition,
             gains: Gains { stiffness: 1000.0, damping: 5.0 },
+            settings: LawSettings::default(),
             update: 1000,
             integrator: None,
             peers: (1..=peers).map(|number| DraftPeer::calm(&format!("peer{number}"))).collect(),
@@ -188,7 +192,11 @@ impl Draft {
         ));
         let Gains { stiffness: k, damping: b } = gains;
         let name = self.strategy.name();
-        line(format!("coordination = {{ strategy = \"{name}\", stiffness = {k:?}, damping = {b:?}, update = \"{update}us\" }}"));
+        let value = |place: usize| self.settings.of(self.strategy).get(place).as_nanos();
+        let own: Vec<String> =
+            self.strategy.parameters().iter().enumerate().map(|(place, parameter)| format!("{} = \"{}ns\"", parameter.key, value(place))).collect();
+        let own = if own.is_empty() { String::new() } else { format!(", {name} = {{ {} }}", own.join(", ")) };
+        line(format!("coordination = {{ strategy = \"{name}\", stiffness = {k:?}, damping = {b:?}, update = \"{update}us\"{own} }}"));
         if let Some((integrator, substeps)) = self.integrator {
             line(format!("simulation = {{ integrator = \"{integrator}\", substeps = {substeps} }}"));
         }

@@ -13,7 +13,7 @@ fn delay(link: &ImpairedLink) -> Duration {
     link.netem().delay.as_ref().map_or(Duration::ZERO, |delay| delay.time)
 }
 
-fn link(network: &ImpairedNetwork, from: u32, to: u32) -> &ImpairedLink {
+fn link(network: &ImpairedNetwork, from: u16, to: u16) -> &ImpairedLink {
     network.link(NodeId(from), NodeId(to)).unwrap()
 }
 
@@ -137,7 +137,7 @@ proptest! {
 
     #[test]
     fn whatever_a_program_cannot_stand_is_all_that_is_left(
-        pairs in subsequence((0..20_u32).collect::<Vec<_>>(), 1..=2), weaknesses in (weakness(), weakness()), seed in any::<u64>()
+        pairs in subsequence((0..20_u16).collect::<Vec<_>>(), 1..=2), weaknesses in (weakness(), weakness()), seed in any::<u64>()
     ) {
         // The n-th ordered pair of five hosts.
         let pairs = pairs.into_iter().map(|n| (n / 4, (n / 4 + 1 + n % 4) % 5));

@@ -10,7 +10,6 @@ use crate::fates::fate::DropCause;
 
 /// Why a text or a list of records is no complete fate log. Lines are counted from 1, the header being line 1.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum FateLogError {
     /// The first line is not the header.
     #[error("line 1: found \"{found}\", expected the header \"{}\"", FateRow::HEADER)]

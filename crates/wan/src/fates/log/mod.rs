@@ -25,7 +25,7 @@ pub use row::FateRow;
 use text::Numbered;
 
 use crate::fates::fate::Fate;
-use crate::fates::fate::PacketRecord;
+use crate::fates::record::PacketRecord;
 
 /// The fates of all packets of a link, checked: every packet from 0 to the last is there and complete.
 ///

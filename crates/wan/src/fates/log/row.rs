@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::fates::fate::PacketRecord;
+use crate::fates::record::PacketRecord;
 
 /// A record as a line of a fate log, without the newline: `2,0,2000000,64,27000000,delivered,1,0`.
 ///
@@ -18,7 +18,7 @@ impl FateRow {
 
 impl fmt::Display for FateRow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let PacketRecord { sequence, copy, offered, at, size, fate, marked, damaged } = self.0;
+        let PacketRecord { path: (), sequence, copy, offered, at, size, fate, marked, damaged } = self.0;
         let (offered, at, size, fate) = (offered.as_nanos(), at.as_nanos(), size.get(), fate.name());
         write!(f, "{sequence},{copy},{offered},{size},{at},{fate},{},{}", u8::from(marked), u8::from(damaged))
     }

@@ -72,6 +72,7 @@ fn what_cannot_have_happened_is_refused() {
     ));
     let at = Instant::from_nanos;
     let twice = PacketRecord {
+        path: (),
         sequence: 0,
         copy: 0,
         offered: at(0),
@@ -88,6 +89,7 @@ fn what_cannot_have_happened_is_refused() {
 fn packet(sequence: u64, offered: u64, size: u64, ends: &[(u64, u8, bool, bool)]) -> Vec<PacketRecord> {
     let at = |span: u64| Instant::from_nanos(offered.saturating_add(span));
     let row = |copy, at, fate, marked, damaged| PacketRecord {
+        path: (),
         sequence,
         copy,
         offered: Instant::from_nanos(offered),

@@ -8,7 +8,8 @@ use cohaptic_units::{Bytes, Instant};
 
 use super::error::FateLogError;
 use super::row::FateRow;
-use crate::fates::fate::{DropCause, Fate, PacketRecord};
+use crate::fates::fate::{DropCause, Fate};
+use crate::fates::record::PacketRecord;
 
 /// A record and the line on which it stood.
 pub(super) type Numbered = (u64, PacketRecord);
@@ -37,6 +38,7 @@ fn record(line: u64, row: &str) -> Result<PacketRecord, FateLogError> {
     let row = Row { line, cells };
     let at = Instant::from_nanos(row.number(4)?);
     Ok(PacketRecord {
+        path: (),
         sequence: row.number(0)?,
         copy: row.read(1, "a number from 0 to 255")?,
         offered: Instant::from_nanos(row.number(2)?),

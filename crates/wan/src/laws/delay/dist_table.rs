@@ -19,7 +19,6 @@ pub struct DistTable {
 
 /// Why a text is no table. Lines and columns count from 1, columns in characters.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum DistTableError {
     /// A word that is no integer.
     #[error("line {line}, column {column}: `{word}` is no integer: expected one from -32768 to 32767, decimal, 0x… or 0… in octal")]

@@ -18,7 +18,6 @@ pub struct Empirical {
 
 /// Why values are no law.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum EmpiricalError {
     /// Fewer than two values, or more than [`Empirical::MOST`].
     #[error("an empirical law has {found} values: expected 2 to {}", Empirical::MOST)]

@@ -2,7 +2,6 @@
 
 /// Why a law, or a correlation of one, is refused. Numbers are in the caller's unit.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum LawError {
     /// NaN or an infinity.
     #[error("the {quantity} is {found}: expected a finite number")]

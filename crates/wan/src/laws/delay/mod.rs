@@ -86,7 +86,6 @@ use tail::Tail;
 
 /// The form of a law. The table of the [module](self) says what each is and what it does at the floor.
 #[derive(Clone, PartialEq, Debug, Default)]
-#[non_exhaustive]
 pub enum Distribution {
     /// Normal, cut at the floor.
     #[default]

@@ -50,7 +50,6 @@ struct Packet<T> {
 
 /// Why a netem has no qdisc.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum QdiscError {
     /// The options contradict each other.
     #[error(transparent)]
@@ -71,7 +70,6 @@ pub enum QdiscError {
 
 /// What happens to a packet as it is offered.
 #[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum Output<T> {
     /// A copy was made. It goes its own way, and is told of before the packet.
     Duplicated,
@@ -88,7 +86,6 @@ pub enum Output<T> {
 
 /// Why a packet was dropped.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum DropReason {
     /// The loss model took it.
     Loss,
@@ -98,7 +95,6 @@ pub enum DropReason {
 
 /// A packet that leaves.
 #[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub struct Dequeued<T> {
     /// The packet.
     pub item: T,

@@ -5,8 +5,9 @@ use core::time::Duration;
 use cohaptic_units::{Bytes, Instant};
 
 use crate::fates::fate::{DropCause, Fate};
+use crate::fates::record::PacketEvent;
 use crate::line::name::LinkName;
-use crate::link::{Link, LinkEvent};
+use crate::link::Link;
 use crate::netem::Netem;
 use crate::stages::config::LinkConfig;
 
@@ -15,7 +16,7 @@ fn config(words: &str) -> LinkConfig {
 }
 
 /// What becomes of packets that come every millisecond, by packet and copy.
-fn run(words: &str, packets: u64) -> Vec<LinkEvent<()>> {
+fn run(words: &str, packets: u64) -> Vec<PacketEvent<()>> {
     let mut link = Link::new(3, &LinkName::between("a", "b"), config(words));
     let mut events = Vec::new();
     for number in 0..packets {
@@ -51,7 +52,7 @@ fn every_figure_of_a_line_is_the_one_that_was_said() {
 
     // Damaged packets travel too, and are discarded when they arrive.
     let travelled = events.iter().filter(|event| event.fate.is_end() && event.fate != Fate::Dropped(DropCause::Loss));
-    let delays: Vec<f64> = travelled.map(|event| (event.at - event.sent).as_secs_f64() * 1e3).collect();
+    let delays: Vec<f64> = travelled.map(|event| (event.at - event.offered).as_secs_f64() * 1e3).collect();
     assert_eq!(delays.len() as f64, passed);
     // A renewal process: 2 that must wait, and then as many as a geometric law of 5 % says, 22 in all with variance 0.95/0.05² = 380.
     let jumped = delays.iter().filter(|delay| **delay == 0.0).count() as f64;
@@ -71,7 +72,7 @@ fn every_figure_of_a_line_is_the_one_that_was_said() {
 /// Uniform over 90 to 110 ms: the mean is known to 5.77/√n ms; no delay is outside and the sample comes within 1 % of both ends.
 #[test]
 fn jitter_without_distribution_is_a_half_width() {
-    let delays: Vec<f64> = run("delay 100ms 10ms", 20_000).iter().map(|event| (event.at - event.sent).as_secs_f64() * 1e3).collect();
+    let delays: Vec<f64> = run("delay 100ms 10ms", 20_000).iter().map(|event| (event.at - event.offered).as_secs_f64() * 1e3).collect();
     let (least, most) = delays.iter().fold((f64::MAX, f64::MIN), |(least, most), delay| (least.min(*delay), most.max(*delay)));
     assert!((90.0..90.1).contains(&least) && (109.9..=110.0).contains(&most), "{least} {most}");
     near("mean", delays.iter().sum::<f64>() / 20_000.0, 100.0, 5.7735 / 20_000_f64.sqrt());
@@ -84,7 +85,7 @@ fn the_rate_stands_behind_the_delay() {
     let mut departures: Vec<Instant> = events.iter().map(|event| event.at).collect();
     departures.sort_unstable();
     assert!(departures.windows(2).all(|pair| pair[1] - pair[0] >= Duration::from_millis(1)));
-    assert!(events.iter().all(|event| event.at - event.sent >= Duration::from_millis(21)));
+    assert!(events.iter().all(|event| event.at - event.offered >= Duration::from_millis(21)));
 }
 
 #[test]

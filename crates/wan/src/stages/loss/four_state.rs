@@ -26,7 +26,6 @@ pub struct FourState {
 
 /// Why a four-state model is refused.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum FourStateError {
     /// The gap would be left with more than certainty.
     #[error("p13 = {p13} and p14 = {p14} are more than 1 together: expected a sum of at most 1")]

@@ -22,7 +22,6 @@ pub struct GilbertElliottInTime {
 /// A time in a state is zero.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("a link cannot be good or bad for no time at all: expected mean times above zero")]
-#[non_exhaustive]
 pub struct NoTime;
 
 /// Where the chain was, and when.

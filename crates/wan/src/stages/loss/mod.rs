@@ -26,7 +26,6 @@ use crate::random::{PacketDraws, Purpose, unit};
 
 /// A loss model.
 #[derive(Clone, PartialEq, Debug, Default)]
-#[non_exhaustive]
 pub enum Loss {
     /// Nothing is lost, and no random number is drawn.
     #[default]

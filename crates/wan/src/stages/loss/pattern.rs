@@ -26,7 +26,6 @@ pub enum Counts {
 
 /// Why a pattern is refused.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum PatternError {
     /// A span ends before it begins, or when it begins.
     #[error("span {index} is empty: expected an end after its begin")]

@@ -42,7 +42,6 @@ pub struct Bottleneck {
 
 /// How fast a line sends.
 #[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum Service {
     /// Always at this rate.
     Rate(Rate),
@@ -52,7 +51,6 @@ pub enum Service {
 
 /// Which packets of a queue are dropped. The limit holds with all of them.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-#[non_exhaustive]
 pub enum Discipline {
     /// The newest, when the queue is full.
     #[default]

@@ -20,7 +20,6 @@ pub struct DeliveryTrace {
 
 /// Why a recording is refused. Lines count from 1.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum DeliveryTraceError {
     /// A line is no whole number of milliseconds.
     #[error("line {line}: expected a whole number of milliseconds")]

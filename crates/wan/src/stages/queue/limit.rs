@@ -10,7 +10,6 @@ use cohaptic_units::Bytes;
 
 /// How much may wait in a queue. What is being sent does not count.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum QueueLimit {
     /// At most so many packets wait; with 0, a packet that finds the line busy is dropped.
     Packets(u64),

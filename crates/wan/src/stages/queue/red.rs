@@ -17,7 +17,6 @@ pub struct Red {
 
 /// Why parameters of RED are refused.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum RedError {
     /// The thresholds are not in order.
     #[error("RED begins to drop at {min} and drops all at {max}: expected the first below the second")]

@@ -305,7 +305,6 @@ impl Line {
             Some(QueueLimit::Packets(limit)) => self.queue.len() as u64 + 1 > limit,
             Some(QueueLimit::Bytes(limit)) => self.bytes() + size > limit.get(),
             Some(QueueLimit::Time(limit)) => u128::from(self.turn(now) - now) > limit.as_nanos(),
-            Some(other) => unreachable!("no model for {other:?}"),
         }
     }
 

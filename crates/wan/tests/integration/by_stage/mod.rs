@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use cohaptic_units::Instant;
 use cohaptic_wan::random::{PacketDraws, Stream};
-use cohaptic_wan::{Chance, DropCause, Fate, FateLog, LinkConfig, LinkEvent, PacketInfo};
+use cohaptic_wan::{Chance, DropCause, Fate, FateLog, LinkConfig, PacketEvent, PacketInfo};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -72,7 +72,7 @@ fn script<C: Clone + std::fmt::Debug + 'static>(config: BoxedStrategy<C>) -> Box
 }
 
 /// What a link does with a script.
-fn events<C: Clone>(script: &Script<C>, link: impl Fn(C) -> LinkConfig) -> Vec<LinkEvent<u64>> {
+fn events<C: Clone>(script: &Script<C>, link: impl Fn(C) -> LinkConfig) -> Vec<PacketEvent<u64>> {
     let Some((_, Act::Change(first))) = script.first() else { unreachable!("a script begins with a configuration") };
     let mut subject = any_link(link(first.clone()));
     for (now, act) in &script[1..] {
@@ -90,7 +90,7 @@ fn events<C: Clone>(script: &Script<C>, link: impl Fn(C) -> LinkConfig) -> Vec<L
 
 /// The same in the order of a fate log.
 fn said<C: Clone>(script: &Script<C>, link: impl Fn(C) -> LinkConfig) -> Vec<Said> {
-    let log = FateLog::new(events(script, link).iter().map(LinkEvent::record)).unwrap();
+    let log = FateLog::new(events(script, link).iter().map(|event| event.record)).unwrap();
     log.records().iter().map(|record| (record.sequence, record.copy, record.at, record.fate, record.marked)).collect()
 }
 

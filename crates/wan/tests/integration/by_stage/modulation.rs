@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cohaptic_units::Instant;
 use cohaptic_wan::random::{Purpose, Stream};
-use cohaptic_wan::{LinkEvent, Modulator, PacketInfo, Sojourn};
+use cohaptic_wan::{Modulator, PacketEvent, PacketInfo, Sojourn};
 use proptest::prelude::*;
 
 use crate::any_link::{all_events, any_link, modulated, packets};
@@ -27,7 +27,6 @@ fn path(modulator: &Modulator, until: u64) -> Vec<(u64, usize)> {
             Sojourn::Exponential(mean) => mean.as_nanos() as f64 * exponential(),
             Sojourn::Uniform(from, to) => from.as_nanos() as f64 + (to - from).as_nanos() as f64 * draws.next_unit(),
             Sojourn::Erlang(mean, stages) => mean.as_nanos() as f64 / f64::from(stages) * (0..stages).map(|_| exponential()).sum::<f64>(),
-            other => unreachable!("no model for {other:?}"),
         };
         let end = begin + (span.round_ties_even() as u64).max(1);
         if end > until {
@@ -78,7 +77,7 @@ proptest! {
         }
         offer_until(&mut subject, u64::MAX);
         subject.handle_timeout(Instant::MAX).unwrap();
-        let sorted = |mut events: Vec<LinkEvent<u64>>| {
+        let sorted = |mut events: Vec<PacketEvent<u64>>| {
             events.sort_by_key(|event| (event.sequence, event.copy, event.fate.is_end(), event.at));
             events
         };

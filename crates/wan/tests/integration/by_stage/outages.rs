@@ -17,7 +17,6 @@ fn span(law: Sojourn, number: u64) -> u64 {
         Sojourn::Exponential(mean) => exponential(mean.as_nanos() as f64),
         Sojourn::Uniform(from, to) => from.as_nanos() as f64 + (to - from).as_nanos() as f64 * draws.next_unit(),
         Sojourn::Erlang(mean, stages) => (0..stages).map(|_| exponential(1.0)).sum::<f64>() * (mean.as_nanos() as f64 / f64::from(stages)),
-        other => unreachable!("no model for {other:?}"),
     };
     (nanos.round_ties_even() as u64).max(1)
 }

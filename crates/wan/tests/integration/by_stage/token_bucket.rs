@@ -84,7 +84,6 @@ fn model(script: &Script<TokenBucket>) -> Vec<Said> {
                         pass(&mut buckets, &mut queue, &config, None, &mut future);
                         (future.last().unwrap().2 - crate::random_links::at(*now)) > limit
                     }
-                    Some(other) => unreachable!("no model for {other:?}"),
                 };
                 if too_large {
                     said.push(dropped(*packet, *now, DropCause::Mtu, false));

@@ -1,0 +1,34 @@
+//! Text files of users that are read, and files that are written.
+
+use std::io::{self, Write as _};
+use std::path::Path;
+
+use cohaptic_files::write_whole;
+
+use crate::failure::Failure;
+use crate::output;
+
+/// The text of a file; bytes that are no text are refused at their line.
+pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
+    let bytes = cohaptic_files::read_bytes(path).map_err(|error| Failure::File { verb: "read", path: path.to_path_buf(), error })?;
+    text_of(bytes, path)
+}
+
+/// The bytes of a file as text.
+pub(crate) fn text_of(bytes: Vec<u8>, path: &Path) -> Result<String, Failure> {
+    String::from_utf8(bytes).map_err(|error| {
+        let right = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = right.iter().filter(|byte| **byte == b'\n').count() + 1;
+        Failure::Input(format!("{}:{line}: not UTF-8: expected a text file", output::path(path)))
+    })
+}
+
+/// Writes a whole file. If it cannot be written, on a disk that is full for instance, nothing of it is left: unlike a record, it can be made again.
+pub(crate) fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
+    write_whole(path, |file| file.write_all(content.as_ref())).map_err(unwritten(path))
+}
+
+/// That a file cannot be written.
+pub(crate) fn unwritten(path: &Path) -> impl Fn(io::Error) -> Failure {
+    |error| Failure::File { verb: "write", path: path.to_path_buf(), error }
+}

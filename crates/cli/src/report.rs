@@ -1,0 +1,122 @@
+//! How a command that ended without its result says so: in words on standard error, under `--json` in a document on standard output in place of the answer.
+
+use std::io::{self, Write as _};
+use std::process::ExitCode;
+
+use anstream::{AutoStream, ColorChoice};
+use anstyle::{AnsiColor, Style};
+use clap::builder::StyledStr;
+use clap::error::{ContextKind, ContextValue};
+use cohaptic_scene::Diagnostic;
+use cohaptic_units::{Visible, visible_lines};
+use serde::Serialize;
+
+use crate::document_schema::DocumentSchema;
+use crate::failure::{BAD_INPUT, CLOSED, Failure, INTERRUPTED};
+use crate::output;
+
+/// Says on standard error what went wrong, under `--json` in a document on standard output too, and gives the exit status.
+pub(crate) fn report(failure: &Failure) -> ExitCode {
+    let status = failure.status();
+    // Whoever closes a pipe has read enough: that is no error, and there is nothing to be said.
+    if status == CLOSED {
+        return ExitCode::from(status);
+    }
+    let message = failure.message();
+    let (kind, colour) = if status == INTERRUPTED { ("interrupted", AnsiColor::Yellow) } else { ("error", AnsiColor::Red) };
+    let style = if AutoStream::choice(&io::stderr()) == ColorChoice::Never { Style::new() } else { colour.on_default().bold() };
+    // If standard error cannot be written to either, the exit status is all that is left to say it with.
+    let _ = io::stderr()
+        .write_all(visible_lines(&format!("{kind}: {message}\n")).replacen(&format!("{kind}:"), &format!("{style}{kind}:{style:#}"), 1).as_bytes());
+    if output::wants_json_error() {
+        let _ = print(failure, &message, status);
+    }
+    ExitCode::from(status)
+}
+
+/// Reports arguments that make no sense as clap does, under `--json` in a document too, and gives the exit status. Help and version are no errors.
+pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
+    // As clap itself does it: what cannot be printed is not said.
+    let _ = error.print();
+    let status = u8::try_from(error.exit_code()).unwrap_or(BAD_INPUT);
+    if error.use_stderr() && output::wants_json_error() {
+        let _ = print_usage(&error.render().to_string(), status);
+    }
+    ExitCode::from(status)
+}
+
+/// The refusal of an argument, in which nothing that was typed disturbs a terminal.
+pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
+    let shown = |text: &String| Visible(text).to_string();
+    let texts: Vec<(ContextKind, ContextValue)> = error
+        .context()
+        .filter_map(|(kind, value)| match value {
+            ContextValue::String(text) => Some((kind, ContextValue::String(shown(text)))),
+            ContextValue::Strings(texts) => Some((kind, ContextValue::Strings(texts.iter().map(shown).collect()))),
+            // Advice repeats what was typed; it loses its colours.
+            ContextValue::StyledStrs(texts) => {
+                Some((kind, ContextValue::StyledStrs(texts.iter().map(|text| StyledStr::from(shown(&text.to_string()))).collect())))
+            }
+            ContextValue::None | ContextValue::Bool(_) | ContextValue::StyledStr(_) | ContextValue::Number(_) | _ => None,
+        })
+        .collect();
+    for (kind, value) in texts {
+        error.insert(kind, value);
+    }
+    error
+}
+
+#[derive(Serialize)]
+struct ErrorDocument<'a> {
+    /// The exit status.
+    status: u8,
+    /// As on standard error, without `error:`.
+    message: &'a str,
+    /// Where it is; `null` where no text is meant.
+    place: Option<FaultLocation<'a>>,
+}
+
+#[derive(Serialize)]
+struct FaultLocation<'a> {
+    /// `null` for an option.
+    file: Option<String>,
+    /// What was given on the command line; `null` for a file.
+    argument: Option<String>,
+    /// From 1.
+    line: usize,
+    /// From 1, in characters.
+    column: usize,
+    /// The dotted path; `null` if the text could not be read that far.
+    key: Option<&'a str>,
+    /// The fault at that place and the expectation, in one line.
+    fault: &'a str,
+}
+
+/// Prints the document of a failure.
+fn print(failure: &Failure, message: &str, status: u8) -> Result<(), Failure> {
+    let place = failure.scene_error().and_then(|error| error.diagnostic()).map(|diagnostic| place(failure, diagnostic));
+    output::json(DocumentSchema::ERROR, &ErrorDocument { status, message, place })
+}
+
+/// Prints the document of arguments that make no sense.
+fn print_usage(message: &str, status: u8) -> Result<(), Failure> {
+    let message = message.strip_prefix("error: ").unwrap_or(message).trim_end();
+    output::json(DocumentSchema::ERROR, &ErrorDocument { status, message, place: None })
+}
+
+fn place<'a>(failure: &Failure, diagnostic: &'a Diagnostic) -> FaultLocation<'a> {
+    let argument = diagnostic.override_text().map(|text| {
+        // Keys of a link are words of their own, and no override.
+        let is_word = matches!(failure, Failure::LinkKeys(_));
+        if is_word { text.strip_prefix("link.").unwrap_or(text).to_owned() } else { format!("{} {text}", failure.option()) }
+    });
+    let key = diagnostic.key();
+    FaultLocation {
+        file: diagnostic.file().map(output::path),
+        argument,
+        line: diagnostic.line(),
+        column: diagnostic.column(),
+        key: (!key.is_empty()).then_some(key),
+        fault: diagnostic.message(),
+    }
+}

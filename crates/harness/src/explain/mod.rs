@@ -1,0 +1,291 @@
+//! What a scene makes the program model, what it leaves out, and why.
+
+#[cfg(test)]
+mod links;
+
+use cohaptic_peer::{Contact, Hand, Integrator, wire};
+use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
+use cohaptic_units::print::{Counted, Number, Span};
+use cohaptic_wan::LinkModel;
+
+use crate::arrays::Shape;
+use crate::plan::{DeviceChoice, Model, Plan, Ticking};
+
+/// What `cohaptic explain` shows.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Explanation {
+    /// The parts that are modelled, and how.
+    pub models: Vec<ModelRow>,
+    /// The parts that are not modelled, and why.
+    pub left_out: Vec<String>,
+    /// The sizes of the state.
+    pub dimensions: Dimensions,
+    /// What a run is expected to cost.
+    pub cost: Cost,
+}
+
+/// One part of the scene and its model.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct ModelRow {
+    /// Which part.
+    pub part: String,
+    /// How it is modelled.
+    pub model: String,
+    /// Why so.
+    pub reason: String,
+}
+
+/// The sizes of the state of the running scene.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Dimensions {
+    /// Positions and velocities of devices and copies.
+    pub plant: u64,
+    /// Numbers in the samples held from other peers.
+    pub held: u64,
+    /// Packets on the way at once, about: sent per second times the mean delay.
+    pub in_flight: u64,
+}
+
+/// The estimated cost of a run, from the speeds in `docs/speed.md`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Cost {
+    /// Control ticks of all peers in a simulated second.
+    pub peer_ticks_per_s: f64,
+    /// Packets sent in a simulated second.
+    pub packets_per_s: f64,
+    /// Simulated seconds per second of processor time with nothing recorded, within a factor of two on a present-day core. Access lines are not
+    /// counted.
+    pub realtime_factor: f64,
+    /// What `--out` writes in a simulated second, about \[byte\].
+    pub record_bytes_per_s: f64,
+}
+
+/// Nanoseconds for a control tick of one peer with one axis, for a packet over a link of constant delay, and for one over a link with more
+/// impairments: see `docs/speed.md`.
+struct Nanos {
+    a_tick: f64,
+    a_packet: f64,
+    an_impaired_packet: f64,
+}
+
+const WITH_EVENTS: Nanos = Nanos { a_tick: 12.0, a_packet: 20.0, an_impaired_packet: 45.0 };
+const IN_ARRAYS: Nanos = Nanos { a_tick: 8.0, a_packet: 1.0, an_impaired_packet: 25.0 };
+
+/// Bytes of a row of `trajectory.csv` (for its first axis and for each further one) and of `packets.csv`, in scenes of ordinary size.
+const BYTES_A_TICK: f64 = 20.0;
+const BYTES_AN_AXIS: f64 = 145.0;
+const BYTES_A_PACKET: f64 = 40.0;
+
+/// Says what the scene makes the program model.
+#[must_use]
+pub fn explain(scene: &Scene) -> Explanation {
+    let plan = Plan::new(scene, Model::Least, false);
+    let mut rows = Rows::default();
+    rows.clock_and_motion(scene, &plan);
+    rows.peers(scene, &plan);
+    rows.coordination(scene);
+    rows.network(scene);
+    let in_arrays = Shape::of(scene, &plan, &FromScene).is_some();
+    if in_arrays {
+        rows.model(
+            "runs that nobody watches",
+            "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
+            "all tick together, nothing changes on the way, and over the links nothing waits; a run that is recorded has events",
+        );
+    }
+    let nanos = if in_arrays { IN_ARRAYS } else { WITH_EVENTS };
+    Explanation { dimensions: dimensions(scene, &plan), cost: cost(scene, &nanos), models: rows.models, left_out: rows.left_out }
+}
+
+#[derive(Default)]
+struct Rows {
+    models: Vec<ModelRow>,
+    left_out: Vec<String>,
+}
+
+impl Rows {
+    fn model(&mut self, part: &str, model: impl Into<String>, reason: impl Into<String>) {
+        self.models.push(ModelRow { part: part.into(), model: model.into(), reason: reason.into() });
+    }
+
+    fn leave_out(&mut self, what: impl Into<String>) {
+        self.left_out.push(what.into());
+    }
+
+    fn clock_and_motion(&mut self, scene: &Scene, plan: &Plan) {
+        let axes = scene.axes.count();
+        self.model("axes", format!("{axes}"), format!("scene.axes = {axes}; the other axes do not exist"));
+        match plan.ticking {
+            Ticking::Lockstep => {
+                let tick = Span(scene.peers[0].clock.tick);
+                self.model("ticks", format!("lockstep, every {tick}"), "all clocks are equal, without offset or drift");
+                self.leave_out("an event for each tick: all peers tick together");
+            }
+            Ticking::EventDriven => self.model("ticks", "an event queue", "ticks, offsets or drifts differ: each peer ticks at its own instants"),
+        }
+        let integrator = match scene.integrator {
+            Integrator::Exact => "the matrix exponential of each body with its held inputs".to_owned(),
+            Integrator::SemiImplicitEuler { steps } => format!("semi-implicit Euler, {} a tick", Counted(steps, "step")),
+            Integrator::RungeKutta4 { steps } => format!("Runge-Kutta of order 4, {} a tick", Counted(steps, "step")),
+        };
+        self.model("motion", integrator, "forces are held over a tick, so a step is one linear map, computed once");
+        if scene.object.enclosure.is_none() {
+            self.leave_out("walls: the object has no enclosure");
+        } else {
+            self.model("enclosure", "sampled walls, spring and damper", "object.enclosure");
+        }
+        if scene.timeline.is_empty() {
+            self.leave_out("changes: the timeline is empty");
+        } else {
+            self.model("timeline", Counted(scene.timeline.len(), "change").to_string(), "each applied at its instant, before anything else");
+        }
+    }
+
+    fn peers(&mut self, scene: &Scene, plan: &Plan) {
+        let copy = if scene.object.split_mass { "the mass of the object is split" } else { "every copy has the whole mass" };
+        self.model("object", format!("{} of {} kg", Counted(scene.peers.len(), "copy"), Number(scene.copy_mass())), copy);
+        for (group, peers) in groups(scene, plan) {
+            let part = format!("peer {}", names(&peers));
+            match group {
+                DeviceChoice::Simulated => self.model(&part, describe(peers[0]), "it touches the object"),
+                DeviceChoice::Resting => self.leave_out(format!("the device of {}: it touches nothing and no hand moves it", names(&peers))),
+                DeviceChoice::Unobserved => {
+                    self.leave_out(format!("the device of {}: it touches nothing; it is simulated only where it is recorded", names(&peers)));
+                }
+            }
+        }
+        if scene.peers.iter().all(|peer| !peer.compute_delay) {
+            self.leave_out("computed forces from the last tick: no peer has a compute-delay");
+        }
+    }
+
+    fn coordination(&mut self, scene: &Scene) {
+        let spec = &scene.coordination;
+        let gains = spec.gains.scaled(spec.scaling.coordination_factor(scene.peers.len()));
+        let scaling = match spec.scaling {
+            Scaling::None => "as written",
+            Scaling::InverseN => "scaled by 4(N-1)/N^2",
+        };
+        let mut model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), Number(gains.stiffness), Number(gains.damping));
+        for (place, parameter) in spec.strategy.parameters().iter().enumerate() {
+            model.push_str(&format!(", {} = {}", parameter.key, Span(spec.settings.of(spec.strategy).get(place))));
+        }
+        self.model("coordination", model, format!("gains {scaling}; the mean of the samples held is kept until one changes"));
+        let len = wire::datagram_len(scene.axes.count());
+        self.model(
+            "samples",
+            format!("{len} bytes to each other peer every {}", Span(spec.update)),
+            "encoded, sent and decoded as they would be live",
+        );
+    }
+
+    fn network(&mut self, scene: &Scene) {
+        let used = used_links(scene);
+        for (config, count) in &used {
+            let part = format!("{count} {}", if *count == 1 { "link" } else { "links" });
+            if config.is_constant_delay() {
+                self.model(&part, format!("constant delay {}", Span(config.mean_delay())), "one addition a packet: nothing else is configured");
+            } else {
+                self.model(&part, config.words(), "a chain of the stages that are configured");
+            }
+        }
+        let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
+        let one_delay = used.len() == 1 && used.iter().all(|(config, _)| config.is_constant_delay());
+        if one_delay && !links_change && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()) {
+            self.model("packets on the way", "a ring", "all delays are equal, so packets arrive in the order in which they were sent");
+            self.leave_out("sorting of arrivals");
+        } else {
+            self.model("packets on the way", "a calendar queue", "arrivals are not in the order of sending");
+        }
+        for (peer, direction, line) in access_lines(scene) {
+            self.model(&format!("{direction} of {peer}"), line.words(), "shared by all that passes it");
+        }
+        let timeline_is_random = scene.timeline.iter().any(|change| {
+            matches!(&change.what, ChangeKind::Link(link) if link.config.has_chance())
+                || matches!(&change.what, ChangeKind::AllLinks(links) if links.configs().iter().any(|link| link.has_chance()))
+        });
+        let lines_are_random = access_lines(scene).iter().any(|(_, _, line)| line.has_chance());
+        if used.iter().all(|(config, _)| !config.has_chance()) && !lines_are_random && !timeline_is_random {
+            self.leave_out("random numbers: no link leaves anything to chance");
+        }
+    }
+}
+
+/// Peers of the same kind together, in the order of their first.
+fn groups<'a>(scene: &'a Scene, plan: &Plan) -> Vec<(DeviceChoice, Vec<&'a PeerSpec>)> {
+    let mut groups: Vec<(DeviceChoice, Vec<&PeerSpec>)> = Vec::new();
+    for (peer, choice) in scene.peers.iter().zip(&plan.devices) {
+        match groups.iter_mut().find(|(other, peers)| other == choice && describe(peers[0]) == describe(peer)) {
+            Some((_, peers)) => peers.push(peer),
+            None => groups.push((*choice, vec![peer])),
+        }
+    }
+    groups
+}
+
+fn names(peers: &[&PeerSpec]) -> String {
+    match peers {
+        [first, .., last] if peers.len() > 4 => format!("{} to {} ({} peers)", first.name, last.name, peers.len()),
+        _ => peers.iter().map(|peer| peer.name.as_str()).collect::<Vec<_>>().join(", "),
+    }
+}
+
+fn describe(peer: &PeerSpec) -> String {
+    let contact = match peer.contact {
+        Contact::Grasp => "grasps the object",
+        Contact::None => "touches nothing",
+        Contact::Push(_) => "pushes the object from one side",
+    };
+    let hand = match &peer.hand {
+        None => "no hand force",
+        Some(Hand::Force(force)) if force.is_constant() => "a constant hand force",
+        Some(Hand::Force(_)) => "a hand force sampled at each tick",
+        Some(Hand::Arm { .. }) => "an arm, its spring and damper part of the plant",
+    };
+    format!("device of {} kg that {contact}, {hand}", peer.device.mass)
+}
+
+/// The configurations that links between different peers have, and how many links have each.
+fn used_links(scene: &Scene) -> Vec<(&LinkModel, u64)> {
+    scene.links.used().map(|(config, count)| (config.as_ref(), count)).collect()
+}
+
+fn access_lines(scene: &Scene) -> Vec<(&str, &'static str, &LinkModel)> {
+    scene
+        .peers
+        .iter()
+        .flat_map(|peer| [(peer.name.as_str(), "uplink", peer.uplink.as_ref()), (peer.name.as_str(), "downlink", peer.downlink.as_ref())])
+        .filter_map(|(peer, direction, line)| line.map(|line| (peer, direction, line)))
+        .collect()
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an estimate of a count, not negative")]
+fn dimensions(scene: &Scene, plan: &Plan) -> Dimensions {
+    let (peers, axes) = (scene.peers.len() as u64, scene.axes.count() as u64);
+    let devices = plan.devices.iter().filter(|choice| **choice == DeviceChoice::Simulated).count() as u64;
+    let links = used_links(scene).into_iter();
+    let delays: f64 = links.map(|(config, count)| config.mean_delay().as_secs_f64() * count_f64(count)).sum();
+    Dimensions {
+        plant: 2 * axes * (peers + devices),
+        held: 2 * axes * peers * (peers - 1),
+        in_flight: (delays / scene.coordination.update.as_secs_f64()).ceil() as u64,
+    }
+}
+
+fn cost(scene: &Scene, nanos: &Nanos) -> Cost {
+    let axes = count_f64(scene.axes.count() as u64);
+    let peer_ticks_per_s: f64 = scene.peers.iter().map(|peer| peer.clock.tick.as_secs_f64().recip()).sum();
+    let update = scene.coordination.update.as_secs_f64();
+    let packets = |constant: bool| -> f64 {
+        used_links(scene).iter().filter(|(config, _)| config.is_constant_delay() == constant).map(|(_, count)| count_f64(*count) / update).sum()
+    };
+    let busy = peer_ticks_per_s * nanos.a_tick * axes + packets(true) * nanos.a_packet + packets(false) * nanos.an_impaired_packet;
+    let packets_per_s = packets(true) + packets(false);
+    let record_bytes_per_s = peer_ticks_per_s * (BYTES_A_TICK + BYTES_AN_AXIS * axes) + packets_per_s * BYTES_A_PACKET;
+    Cost { peer_ticks_per_s, packets_per_s, realtime_factor: 1e9 / busy, record_bytes_per_s }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts of links and axes are far below 2^53")]
+fn count_f64(count: u64) -> f64 {
+    count as f64
+}

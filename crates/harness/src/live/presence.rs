@@ -1,0 +1,162 @@
+//! The presence of remote peers: which are there, what the others feel of them, and the datagrams to be sent to them.
+
+use std::collections::VecDeque;
+
+use cohaptic_peer::wire::{MAX_LEN, Sample};
+use cohaptic_peer::{Age, Ages, Device, Peer, ReceiveError, Reception, Strategy};
+use cohaptic_scene::{PeerKind, Scene};
+use cohaptic_units::Instant;
+
+use super::seat::Seat;
+
+/// A datagram, in place.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Datagram {
+    bytes: [u8; MAX_LEN],
+    len: usize,
+}
+
+impl Datagram {
+    pub(crate) const fn new(bytes: [u8; MAX_LEN], len: usize) -> Self {
+        Self { bytes, len }
+    }
+}
+
+impl std::ops::Deref for Datagram {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        &self.bytes[..self.len]
+    }
+}
+
+impl std::fmt::Debug for Datagram {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:x?}", &**self)
+    }
+}
+
+/// A datagram that the network has delivered to a peer in another process.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Transmit {
+    /// The receiver.
+    pub to: usize,
+    /// When it arrived.
+    pub at: Instant,
+    /// Its bytes, with whatever damage the network did.
+    pub datagram: Datagram,
+}
+
+/// The remote peers of a scene.
+#[derive(Debug)]
+pub(crate) struct RemotePeers<const A: usize> {
+    seats: Vec<Option<Seat>>,
+    /// The ages of the others, for each local peer.
+    ages: Vec<Ages<A>>,
+    /// What each (sender, receiver) was last told.
+    told: Vec<Option<Age>>,
+    outbox: VecDeque<Transmit>,
+    /// Whether any peer lives in another process.
+    pub(crate) has_processes: bool,
+    /// The first local peer.
+    pub(crate) lead: usize,
+    /// When something came in from outside whose consequences have not been looked at.
+    pub(crate) undrained: Option<Instant>,
+}
+
+impl<const A: usize> RemotePeers<A> {
+    pub(crate) fn new(scene: &Scene) -> Self {
+        let peers = scene.peers.len();
+        let seat = |(place, peer): (usize, &cohaptic_scene::PeerSpec)| {
+            let is_process = matches!(peer.kind, PeerKind::Udp(_));
+            peer.kind.silence().map(|silence| Seat::new(is_process, silence, peers, scene.peer_config(place).coupling))
+        };
+        let seats: Vec<Option<Seat>> = scene.peers.iter().enumerate().map(seat).collect();
+        let has_processes = seats.iter().flatten().any(|seat| seat.is_process);
+        let lead = seats.iter().position(|seat| seat.as_ref().is_none_or(|seat| !seat.is_process)).unwrap_or(0);
+        let (ages, told) = (vec![Ages::default(); peers], vec![None; peers * peers]);
+        Self { seats, ages, told, outbox: VecDeque::new(), has_processes, lead, undrained: None }
+    }
+
+    pub(crate) fn seat(&self, place: usize) -> Option<&Seat> {
+        self.seats.get(place)?.as_ref()
+    }
+
+    pub(crate) fn seat_mut(&mut self, place: usize) -> Option<&mut Seat> {
+        self.seats.get_mut(place)?.as_mut()
+    }
+
+    /// Whether a peer lives in another process.
+    pub(crate) fn is_process(&self, place: usize) -> bool {
+        self.seat(place).is_some_and(|seat| seat.is_process)
+    }
+
+    /// Notices peers that have fallen silent, and calls `silent` for each.
+    pub(crate) fn notice_silence(&mut self, now: Instant, mut silent: impl FnMut(usize)) {
+        for (place, seat) in self.seats.iter_mut().enumerate() {
+            if seat.as_mut().is_some_and(|seat| seat.notice_silence(now)) {
+                silent(place);
+            }
+        }
+    }
+
+    /// From now on the first sample of that number or a later one is a return of that peer to the other.
+    pub(crate) fn await_return<D: Device<A>, S: Strategy<A>>(&mut self, from: usize, to: usize, sequence: u64, peer: &mut Peer<A, D, S>) {
+        self.ages[to].await_return(peer, other(from, to), sequence);
+    }
+
+    /// A sample has arrived.
+    pub(crate) fn take_in<D: Device<A>, S: Strategy<A>>(
+        &mut self,
+        now: Instant,
+        ends: (usize, usize),
+        sample: &Sample<A>,
+        peer: &mut Peer<A, D, S>,
+    ) -> Result<Reception, ReceiveError> {
+        let (from, to) = ends;
+        let received = self.ages[to].handle_sample(peer, sample)?;
+        if received == Reception::Newest {
+            self.arrived(now, from, to);
+        }
+        Ok(received)
+    }
+
+    /// A sample has arrived that is newer than all before it.
+    fn arrived(&mut self, now: Instant, from: usize, to: usize) {
+        let Some(seat) = self.seats.get_mut(from).and_then(Option::as_mut).filter(|seat| seat.is_process) else { return };
+        if !self.ages[to].take_return(other(from, to)) {
+            return;
+        }
+        seat.fades[to].moved(now);
+        if !seat.is_silent() {
+            seat.fades[to].rise(now);
+        }
+    }
+
+    /// Tells a peer that is about to tick what it feels of the remote peers.
+    pub(crate) fn tell<D: Device<A>, S: Strategy<A>>(&mut self, to: usize, now: Instant, peer: &mut Peer<A, D, S>) {
+        let peers = self.seats.len();
+        for (from, seat) in self.seats.iter().enumerate().filter(|(from, _)| *from != to) {
+            let Some(seat) = seat else { continue };
+            let (age, told) = (seat.fades[to].age(now), &mut self.told[from * peers + to]);
+            if *told != Some(age) {
+                *told = Some(age);
+                self.ages[to].set(peer, other(from, to), age);
+            }
+        }
+        self.ages[to].apply(peer);
+    }
+
+    pub(crate) fn send_out(&mut self, to: usize, at: Instant, datagram: Datagram) {
+        self.outbox.push_back(Transmit { to, at, datagram });
+    }
+
+    pub(crate) fn next_transmit(&mut self) -> Option<Transmit> {
+        self.outbox.pop_front()
+    }
+}
+
+/// The place of a sender among the others of a receiver.
+const fn other(from: usize, to: usize) -> usize {
+    if from < to { from } else { from - 1 }
+}

@@ -1,0 +1,439 @@
+//! The running scene: its peers, its network, its clock, with A simulated axes.
+
+mod live;
+mod remote;
+
+use std::time::Duration;
+
+use cohaptic_peer::{Clock, Contact, Device, Held, ObjectCopy, Peer, Reception, RestingDevice, SimulatedDevice, State, Strategy};
+use cohaptic_scene::{Change, ChangeKind, Scene};
+use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
+
+use crate::datagrams::{Datagrams, Handle};
+use crate::disturbance::Disturbance;
+use crate::observer::{Observer, StateRow, TickRow};
+use crate::plan::{DeviceChoice, Plan};
+use crate::schedule::Schedule;
+use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
+
+pub(crate) use remote::{NoRemote, Remote};
+
+/// A scene in the middle of a run; E holds its remote peers.
+pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
+    /// The axes that the scene has, of the A that are simulated.
+    axes: usize,
+    names: Vec<String>,
+    members: Vec<Member<A, S, E::Device>>,
+    network: Network<Handle>,
+    datagrams: Datagrams<A>,
+    schedule: Schedule,
+    /// The changes to come, the next one last.
+    changes: Vec<Change>,
+    coordination_factor: f64,
+    end: Instant,
+    now: Instant,
+    /// Where each copy was at its latest tick.
+    latest: Vec<[f64; A]>,
+    max_discrepancy: f64,
+    finite: bool,
+    /// The peers that tick at the present instant, if not all local ones.
+    ticking: Vec<usize>,
+    /// In lockstep, the next tick at which anybody sends.
+    earliest_send: u64,
+    remote: E,
+}
+
+/// A peer with its clock.
+struct Member<const A: usize, S, D> {
+    peer: Peer<A, DeviceModel<A, D>, S>,
+    clock: Clock,
+    tick: u64,
+    /// The tick at which it sends next, and how many ticks later again.
+    next_send: u64,
+    send_every: u64,
+    stale_samples: u64,
+    refused_samples: u64,
+}
+
+/// What stands for a peer's device; D is the type of those that nobody simulates.
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "most peers of most scenes are the large variant, and a box would cost a cache miss a tick")]
+pub(crate) enum DeviceModel<const A: usize, D> {
+    Unsimulated(D),
+    Simulated(SimulatedDevice<A>),
+}
+
+impl<const A: usize, D: Device<A>> Device<A> for DeviceModel<A, D> {
+    #[inline]
+    fn state(&self) -> State<A> {
+        match self {
+            Self::Unsimulated(device) => device.state(),
+            Self::Simulated(device) => device.state(),
+        }
+    }
+
+    #[inline]
+    fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
+        match self {
+            Self::Unsimulated(device) => device.advance(now, span, coupling_force),
+            Self::Simulated(device) => device.advance(now, span, coupling_force),
+        }
+    }
+}
+
+/// The two bodies of a peer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bodies<const A: usize> {
+    pub(crate) device: [f64; A],
+    pub(crate) object: [f64; A],
+    pub(crate) contact: Contact,
+}
+
+/// What one step of a run came to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Step {
+    Ticked,
+    Ended(Ending),
+}
+
+impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
+    /// The scene at its beginning, with the strategies that `strategy` makes for the places of the peers.
+    pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>, remote: E, strategy: impl Fn(usize) -> S) -> Self {
+        let initial: Vec<State<A>> = (0..scene.peers.len()).map(|place| scene.initial_state(place)).collect();
+        let member = |place| Member::new(scene, plan, &initial, disturbance, place, strategy(place));
+        let members: Vec<Member<A, S, E::Device>> = (0..scene.peers.len()).map(member).collect();
+        Self {
+            axes: scene.axes.count(),
+            names: scene.peers.iter().map(|peer| peer.name.clone()).collect(),
+            latest: members.iter().map(|member| member.peer.object().state().position).collect(),
+            members,
+            network: network(scene, plan),
+            datagrams: Datagrams::default(),
+            schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock).enumerate()),
+            changes: scene.timeline.iter().rev().cloned().collect(),
+            coordination_factor: scene.coordination.scaling.coordination_factor(scene.peers.len()),
+            end: Instant::ZERO.saturating_add(scene.duration),
+            now: Instant::ZERO,
+            max_discrepancy: 0.0,
+            finite: true,
+            ticking: (0..scene.peers.len()).collect(),
+            earliest_send: 0,
+            remote,
+        }
+    }
+
+    /// The instant of the latest step.
+    pub(crate) fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// The end of the scene.
+    pub(crate) fn end(&self) -> Instant {
+        self.end
+    }
+
+    /// Everything that happens at the next instant at which a peer ticks, or the end of the scene.
+    pub(crate) fn step<O: Observer>(&mut self, observer: &mut O, watch: Watch) -> Result<Step, O::Error> {
+        let Some(now) = self.schedule.next_instant().filter(|now| *now < self.end) else {
+            return self.finish(observer, watch).map(Step::Ended);
+        };
+        if !self.finite {
+            return Ok(Step::Ended(Ending::Diverged(now)));
+        }
+        self.now = now;
+        if !self.changes.is_empty() {
+            self.change(now);
+        }
+        self.schedule.take(now, &mut self.ticking);
+        self.send(now);
+        self.deliver(now, observer, watch)?;
+        self.compute_and_move(now, observer, watch)?;
+        self.measure_discrepancy();
+        Ok(Step::Ticked)
+    }
+
+    /// What came out, up to `ending`.
+    pub(crate) fn summary(&self, ending: Ending) -> Summary {
+        let stop = match ending {
+            Ending::Complete => self.end,
+            Ending::Diverged(at) | Ending::Interrupted(at) => at,
+        };
+        let peers = self.members.iter().zip(&self.names).map(|(member, name)| {
+            let State { position, velocity } = member.peer.object().state();
+            PeerSummary {
+                name: name.clone(),
+                position: position[..self.axes].to_vec(),
+                velocity: velocity[..self.axes].to_vec(),
+                stale_samples: member.stale_samples,
+                refused_samples: member.refused_samples,
+            }
+        });
+        Summary {
+            ending,
+            duration: stop - Instant::ZERO,
+            ticks: self.members.iter().map(|member| member.tick).max().unwrap_or(0),
+            peers: peers.collect(),
+            links: self.link_summaries(),
+            access_lines: self.access_summaries(),
+            max_discrepancy: self.max_discrepancy,
+        }
+    }
+
+    /// Where each peer's device and copy are, and whether they touch.
+    pub(crate) fn bodies(&self) -> impl Iterator<Item = Bodies<A>> {
+        self.members.iter().map(|member| Bodies {
+            device: member.peer.device().state().position,
+            object: member.peer.object().state().position,
+            contact: member.peer.contact(),
+        })
+    }
+
+    /// Changes of the timeline up to and including `now`, each at its own instant.
+    #[inline(never)]
+    fn change(&mut self, now: Instant) {
+        while let Some(change) = self.changes.pop_if(|change| change.at <= now) {
+            match change.what {
+                ChangeKind::Link(link) => self.set_link(change.at, link.from, link.to, &link.config),
+                ChangeKind::AllLinks(links) => {
+                    let places = 0..self.members.len();
+                    for (from, to) in places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to) {
+                        self.set_link(change.at, from, to, links.between(from, to));
+                    }
+                }
+                ChangeKind::Contact { peer, contact } => self.members[peer].peer.set_contact(contact),
+                ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
+                    DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
+                    DeviceModel::Unsimulated(_) => {}
+                },
+                ChangeKind::Coordination(gains) => {
+                    for member in &mut self.members {
+                        member.peer.strategy_mut().set_gains(gains.scaled(self.coordination_factor));
+                    }
+                }
+            }
+        }
+    }
+
+    fn set_link(&mut self, at: Instant, from: usize, to: usize, link: &LinkModel) {
+        self.network.set_link(at, NodeId::new(from), NodeId::new(to), link.clone()).expect("changes are in order of time");
+    }
+
+    /// Step 1: those whose time it is send their sample to everybody else.
+    fn send(&mut self, now: Instant) {
+        if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.remote.lead()].tick < self.earliest_send {
+            return;
+        }
+        let others = self.members.len() - 1;
+        for &from in &self.ticking {
+            let member = &mut self.members[from];
+            if member.tick != member.next_send {
+                continue;
+            }
+            member.next_send += member.send_every;
+            let local_time = member.clock.local_time(member.tick);
+            let stored = self.datagrams.store(others, self.axes, |datagram| member.peer.sample(local_time, datagram));
+            let (handle, len) = stored.expect("a run ends before a state that is not finite is sent");
+            // Capable of ECN, so that a queue that marks has something to mark: nobody sends less for it, but a marked packet arrives.
+            let info = PacketInfo { size: Bytes::new(len as u64), ecn_capable: true };
+            self.network.handle_broadcast(now, NodeId::new(from), info, handle).expect("instants come in order");
+        }
+        self.earliest_send = self.members.iter().map(|member| member.next_send).min().unwrap_or(0);
+    }
+
+    /// Step 2: whatever has arrived is handed to its receiver.
+    fn deliver<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
+        self.network.handle_timeout(now).expect("instants come in order");
+        while let Some(event) = self.network.poll_event() {
+            if let Fate::Delivered(_) = event.fate {
+                let receiver = &mut self.members[event.path.to.index()];
+                let sample = self.datagrams.sample(event.payload);
+                match self.remote.receive(now, &event, sample, self.axes, &mut receiver.peer) {
+                    None | Some(Ok(Reception::Newest)) => {}
+                    Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
+                    Some(Err(_)) if event.damage.is_some() => receiver.refused_samples += 1,
+                    Some(Err(error)) => unreachable!("peers of one scene understand each other: {error}"),
+                }
+            }
+            if event.fate == Fate::Duplicated {
+                self.datagrams.retain(event.payload);
+            } else {
+                self.datagrams.release(event.payload);
+            }
+            // Making a copy is no end: the packet and its copy each have one.
+            if watch.packets && event.fate.is_end() {
+                observer.on_packet(&event.record)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Steps 3 and 4: each peer that ticks computes forces and moves to the next tick.
+    fn compute_and_move<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
+        let lockstep = match &mut self.schedule {
+            Schedule::Lockstep { tick, next } => {
+                *next = now.saturating_add(*tick);
+                Some(*tick)
+            }
+            Schedule::EventDriven(_) => None,
+        };
+        if let (Some(span), false, true) = (lockstep, watch.ticks, E::IS_EMPTY) {
+            self.move_together(now, span);
+            return Ok(());
+        }
+        for &place in &self.ticking {
+            let member = &mut self.members[place];
+            self.remote.attend(now, place, &mut member.peer, self.axes, observer)?;
+            let forces = member.peer.compute(now);
+            let object = member.peer.object().state();
+            self.latest[place] = object.position;
+            if watch.ticks {
+                let axes = self.axes;
+                let device = member.peer.device().state();
+                observer.on_tick(&TickRow {
+                    at: now,
+                    peer: place,
+                    device: row(&device, axes),
+                    object: row(object, axes),
+                    target: row(&forces.target, axes),
+                    coupling_force: &forces.coupling[..axes],
+                    coordination_force: &forces.coordination[..axes],
+                })?;
+            }
+            member.tick += 1;
+            let span = lockstep.unwrap_or_else(|| {
+                let next = member.clock.instant(member.tick);
+                self.schedule.tick_again(place, next);
+                next.unwrap_or(Instant::MAX) - now
+            });
+            member.peer.advance(now, span);
+            self.finite &= member.is_finite();
+        }
+        Ok(())
+    }
+
+    /// The work of each peer that ticks, where all tick and nobody watches: it took 10 % off a tick.
+    #[inline]
+    fn move_together(&mut self, now: Instant, span: Duration) {
+        let mut finite = true;
+        for (member, latest) in self.members.iter_mut().zip(&mut self.latest) {
+            member.peer.compute(now);
+            *latest = member.peer.object().state().position;
+            member.tick += 1;
+            member.peer.advance(now, span);
+            finite &= member.is_finite();
+        }
+        self.finite &= finite;
+    }
+
+    #[inline]
+    fn measure_discrepancy(&mut self) {
+        let (mut low, mut high) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A]);
+        for (place, position) in self.latest.iter().enumerate() {
+            if !self.remote.is_there(place) {
+                continue;
+            }
+            for axis in 0..A {
+                low[axis] = if position[axis] < low[axis] { position[axis] } else { low[axis] };
+                high[axis] = if position[axis] > high[axis] { position[axis] } else { high[axis] };
+            }
+        }
+        for axis in 0..A {
+            self.max_discrepancy = self.max_discrepancy.max(high[axis] - low[axis]);
+        }
+    }
+
+    /// The end of the scene: what has arrived by then is delivered.
+    fn finish<O: Observer>(&mut self, observer: &mut O, watch: Watch) -> Result<Ending, O::Error> {
+        self.change(self.end);
+        self.deliver(self.end, observer, watch)?;
+        Ok(if self.finite { Ending::Complete } else { Ending::Diverged(self.end) })
+    }
+
+    fn link_summaries(&self) -> Vec<LinkSummary> {
+        let places = 0..self.members.len();
+        let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to)));
+        pairs
+            .filter(|(from, to)| from != to)
+            .filter_map(|(from, to)| self.network.link_stats(NodeId::new(from), NodeId::new(to)).map(|stats| LinkSummary { from, to, stats }))
+            .collect()
+    }
+
+    fn access_summaries(&self) -> Vec<AccessSummary> {
+        let lines = (0..self.members.len()).flat_map(|peer| [(peer, true), (peer, false)]);
+        lines
+            .filter_map(|(peer, uplink)| {
+                let line = if uplink { AccessLine::Uplink(NodeId::new(peer)) } else { AccessLine::Downlink(NodeId::new(peer)) };
+                self.network.access_stats(line).map(|stats| AccessSummary { peer, uplink, stats })
+            })
+            .collect()
+    }
+}
+
+/// What an observer wants to see.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Watch {
+    pub(crate) ticks: bool,
+    pub(crate) packets: bool,
+}
+
+impl Watch {
+    pub(crate) fn of(observer: &impl Observer) -> Self {
+        Self { ticks: observer.wants_ticks(), packets: observer.wants_packets() }
+    }
+}
+
+impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Member<A, S, D> {
+    fn new(scene: &Scene, plan: &Plan, initial: &[State<A>], disturbance: Option<Disturbance>, place: usize, strategy: S) -> Self {
+        let spec = &scene.peers[place];
+        let (clock, integrator) = (spec.clock, scene.integrator);
+        let displaced =
+            |body| disturbance.map_or(initial[place], |disturbance| disturbance.displace(initial[place], scene.axes.count(), place, body));
+        let device = match plan.devices[place] {
+            DeviceChoice::Resting | DeviceChoice::Unobserved => DeviceModel::Unsimulated(RestingDevice { position: displaced(0).position }.into()),
+            DeviceChoice::Simulated => {
+                DeviceModel::Simulated(SimulatedDevice::new(spec.device, spec.hand.as_ref(), displaced(0), integrator, &clock))
+            }
+        };
+        let object = ObjectCopy::new(scene.copy_config(), displaced(1), integrator, &clock);
+        let others = initial.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
+        let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
+        Self {
+            peer: Peer::new(scene.peer_config(place), device, object, strategy, Held::new(others)),
+            clock,
+            tick: 0,
+            next_send: spec.phase,
+            send_every: u64::try_from(send_every).unwrap_or(u64::MAX),
+            stale_samples: 0,
+            refused_samples: 0,
+        }
+    }
+
+    #[inline]
+    fn is_finite(&self) -> bool {
+        // Each kind by itself: asked as one, both become a selection of addresses, which costs two peers a fiftieth of a tick.
+        let device = match self.peer.device() {
+            DeviceModel::Unsimulated(device) => device.state().is_finite(),
+            DeviceModel::Simulated(device) => device.state().is_finite(),
+        };
+        self.peer.object().state().is_finite() & device
+    }
+}
+
+fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {
+    let config = NetworkConfig { seed: scene.seed, nodes: scene.peers.iter().map(|peer| peer.name.clone()).collect(), general: plan.general_links };
+    let mut network = Network::new(config, |from, to| scene.links.between(from.index(), to.index()).clone());
+    for (place, peer) in scene.peers.iter().enumerate() {
+        let lines = [(AccessLine::Uplink(NodeId::new(place)), &peer.uplink), (AccessLine::Downlink(NodeId::new(place)), &peer.downlink)];
+        for (line, config) in lines {
+            if let Some(config) = config {
+                network = network.with_access_line(line, config.clone()).expect("the network has a node for every peer");
+            }
+        }
+    }
+    network
+}
+
+fn row<const A: usize>(state: &State<A>, axes: usize) -> StateRow<'_> {
+    StateRow { position: &state.position[..axes], velocity: &state.velocity[..axes] }
+}

@@ -1,0 +1,104 @@
+//! The questions of a running scene about its remote peers.
+
+use cohaptic_peer::wire::{MAX_LEN, Sample};
+use cohaptic_peer::{Device, Peer, ReceiveError, Reception, RestingDevice, Strategy};
+use cohaptic_units::Instant;
+use cohaptic_wan::{Damage, PacketEvent, Path};
+
+use super::DeviceModel;
+use crate::datagrams::Handle;
+use crate::observer::Observer;
+
+/// The peers of a running scene that are remote: in other processes, or with their device in somebody's hand.
+///
+/// A type parameter of the world and not a field that may be empty: virtual time, where all peers are local, is not to carry what live scenes need. As a
+/// field, with ages in every peer, it cost two peers a seventh of a tick and ten of them a tenth, though nothing ever came of its questions.
+pub(crate) trait Remote<const A: usize> {
+    /// What stands for a device that nobody simulates.
+    type Device: Device<A> + From<RestingDevice<A>>;
+
+    /// Whether all peers are local whatever the scene, so that they may tick in one loop that asks nothing.
+    const IS_EMPTY: bool;
+
+    /// The first local peer, by whose ticks all of them tick in lockstep.
+    fn lead(&self) -> usize;
+
+    /// Whether a peer is there, so that it is of interest how far its copy is from the others.
+    fn is_there(&self, place: usize) -> bool;
+
+    /// Hands a packet that the network has delivered to its receiver, and says what became of it; `None` if that lives in another process.
+    fn receive<S: Strategy<A>>(
+        &mut self,
+        now: Instant,
+        event: &PacketEvent<Handle, Path>,
+        sample: &Sample<A>,
+        axes: usize,
+        receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
+    ) -> Option<Result<Reception, ReceiveError>>;
+
+    /// Tells a peer that is about to tick the ages of the remote peers; its own device may be one of them.
+    fn attend<S: Strategy<A>, O: Observer>(
+        &mut self,
+        now: Instant,
+        place: usize,
+        peer: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
+        axes: usize,
+        observer: &mut O,
+    ) -> Result<(), O::Error>;
+}
+
+/// All peers are local: virtual time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NoRemote;
+
+impl<const A: usize> Remote<A> for NoRemote {
+    type Device = RestingDevice<A>;
+
+    const IS_EMPTY: bool = true;
+
+    #[inline(always)]
+    fn lead(&self) -> usize {
+        0
+    }
+
+    #[inline(always)]
+    fn is_there(&self, _place: usize) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn receive<S: Strategy<A>>(
+        &mut self,
+        _now: Instant,
+        event: &PacketEvent<Handle, Path>,
+        sample: &Sample<A>,
+        axes: usize,
+        receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
+    ) -> Option<Result<Reception, ReceiveError>> {
+        Some(match &event.damage {
+            None => receiver.handle_sample(sample),
+            Some(damage) => receiver.handle_datagram(datagram(sample, axes, Some(damage), &mut [0; MAX_LEN])),
+        })
+    }
+
+    #[inline(always)]
+    fn attend<S: Strategy<A>, O: Observer>(
+        &mut self,
+        _now: Instant,
+        _place: usize,
+        _peer: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
+        _axes: usize,
+        _observer: &mut O,
+    ) -> Result<(), O::Error> {
+        Ok(())
+    }
+}
+
+/// The bytes of a sample as they arrive.
+pub(super) fn datagram<'a, const A: usize>(sample: &Sample<A>, axes: usize, damage: Option<&Damage>, buffer: &'a mut [u8; MAX_LEN]) -> &'a [u8] {
+    let len = sample.encode(axes, buffer);
+    if let Some(damage) = damage {
+        damage.apply(&mut buffer[..len]);
+    }
+    &buffer[..len]
+}

@@ -1,0 +1,151 @@
+//! One seat: its holder, which numbers were seen, and whether it can be taken.
+
+use core::time::Duration;
+use std::net::SocketAddr;
+
+use cohaptic_units::Instant;
+
+use super::{JOININGS_END, Place, Refusal, SEQUENCE_BITS, Seat, Under, WELCOMES_PER_SECOND, Window};
+use crate::seal::JoiningKeys;
+
+const SECOND: Duration = Duration::from_secs(1);
+
+/// What a seat is like at an instant.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SeatStatus<'a> {
+    /// Its place.
+    pub place: Place,
+    /// The name of the peer in the scene.
+    pub name: &'a str,
+    /// Where the peer was heard from last; `None` if it never was.
+    pub address: Option<SocketAddr>,
+    /// When a sample of it was let in last; `None` if none ever was.
+    pub heard: Option<Instant>,
+    /// Whether that is less than `stale_after` ago.
+    pub present: bool,
+    /// How often the seat was taken.
+    pub joinings: u64,
+    /// How many samples were let in.
+    pub admitted: u64,
+}
+
+/// A seat and its holder.
+#[derive(Debug)]
+pub(super) struct SeatState {
+    seat: Seat,
+    occupant: Option<Occupant>,
+    joinings: u64,
+    admitted: u64,
+    /// When the present second of welcomes began, and how many it has had.
+    welcomes: Option<(Instant, u32)>,
+}
+
+/// The holder of a seat, present or gone.
+#[derive(Debug)]
+pub(super) struct Occupant {
+    pub(super) address: SocketAddr,
+    /// `None` in a session without a key.
+    pub(super) keys: Option<Box<JoiningKeys>>,
+    heard: Instant,
+    window: Window,
+}
+
+impl SeatState {
+    pub(super) const fn free(seat: Seat) -> Self {
+        Self { seat, occupant: None, joinings: 0, admitted: 0, welcomes: None }
+    }
+
+    pub(super) const fn place(&self) -> Place {
+        self.seat.place
+    }
+
+    pub(super) const fn tick(&self) -> Duration {
+        self.seat.tick
+    }
+
+    pub(super) const fn joinings(&self) -> u64 {
+        self.joinings
+    }
+
+    pub(super) const fn occupant(&self) -> Option<&Occupant> {
+        self.occupant.as_ref()
+    }
+
+    /// The holder of the seat, if heard lately.
+    pub(super) fn present(&self, now: Instant, stale_after: Duration) -> Option<&Occupant> {
+        self.occupant.as_ref().filter(|occupant| since(occupant.heard, now) < stale_after)
+    }
+
+    pub(super) fn status(&self, now: Instant, stale_after: Duration) -> SeatStatus<'_> {
+        let Self { seat, occupant, joinings, admitted, .. } = self;
+        SeatStatus {
+            place: seat.place,
+            name: &seat.name,
+            address: occupant.as_ref().map(|occupant| occupant.address),
+            heard: occupant.as_ref().map(|occupant| occupant.heard),
+            present: self.present(now, stale_after).is_some(),
+            joinings: *joinings,
+            admitted: *admitted,
+        }
+    }
+
+    /// Whether a hello for this seat may be answered now; if so it is counted.
+    pub(super) fn may_welcome(&mut self, now: Instant) -> bool {
+        match &mut self.welcomes {
+            Some((began, count)) if since(*began, now) < SECOND => {
+                let may = *count < WELCOMES_PER_SECOND;
+                *count += u32::from(may);
+                may
+            }
+            welcomes => {
+                *welcomes = Some((now, 1));
+                true
+            }
+        }
+    }
+
+    /// Takes in a sample that is good in itself. Whether it took the seat.
+    pub(super) fn take_or_keep(&mut self, now: Instant, stale_after: Duration, from: SocketAddr, number: u64, under: Under) -> Result<bool, Refusal> {
+        let present = self.present(now, stale_after).is_some();
+        let same_address = self.occupant.as_ref().is_some_and(|occupant| occupant.address == from);
+        let keys = match under {
+            // With a key, a joining lasts until the next one, however long the peer is silent. Without, it ends with the silence.
+            Under::Present if self.occupant.as_ref().is_some_and(|occupant| occupant.keys.is_some()) => return self.keep(now, number),
+            Under::Present if present && same_address => return self.keep(now, number),
+            Under::Present => None,
+            Under::New(keys) => Some(keys),
+        };
+        // New keys from the address of the holder: the same program has begun anew. Anybody else waits until he has gone.
+        if present && !same_address {
+            return Err(Refusal::SeatTaken);
+        }
+        if self.joinings == JOININGS_END {
+            return Err(Refusal::JoiningsUsedUp);
+        }
+        self.joinings += 1;
+        self.admitted += 1;
+        self.occupant = Some(Occupant { address: from, keys, heard: now, window: Window::beginning_with(number) });
+        Ok(true)
+    }
+
+    fn keep(&mut self, now: Instant, number: u64) -> Result<bool, Refusal> {
+        let Some(occupant) = &mut self.occupant else { return Err(Refusal::NotJoined) };
+        if !occupant.window.accept(number) {
+            return Err(Refusal::Replayed);
+        }
+        occupant.heard = now;
+        self.admitted += 1;
+        Ok(false)
+    }
+
+    /// The number that a sample of the present joining has for those inside: it never goes back when the peer joins again. That of the first joining
+    /// is unchanged.
+    pub(super) const fn number_inside(&self, number: u64) -> u64 {
+        self.joinings.saturating_sub(1) << SEQUENCE_BITS | number
+    }
+}
+
+/// How long ago `then` was; nothing if it is yet to come.
+const fn since(then: Instant, now: Instant) -> Duration {
+    Duration::from_nanos(now.as_nanos().saturating_sub(then.as_nanos()))
+}

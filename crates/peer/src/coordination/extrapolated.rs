@@ -1,0 +1,49 @@
+//! Average-position coordination towards where the others are by now: samples are extrapolated with their velocities.
+//!
+//! The dead reckoning of distributed simulation (IEEE 1278.1, first order): x̂ⱼ = xⱼ + min(age, horizon)·vⱼ, and FT = KT·(x − mean x̂ⱼ) + BT·(v − mean vⱼ).
+//! Copies that move alike at one velocity then exert no force on each other, however old the samples are.
+
+use super::{Law, LawParameter, LawParameters, Observation, Pull};
+use crate::{Gains, Motion, Number};
+
+/// The average-position law with extrapolated samples.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Extrapolated<C = f64> {
+    /// KT and BT.
+    gains: Gains<C>,
+    /// Up to which age samples are extrapolated \[s\].
+    horizon: f64,
+}
+
+impl Extrapolated {
+    pub(super) const PULL: Pull = Pull::Mean;
+    pub(super) const PARAMETERS: &[LawParameter] =
+        &[LawParameter { key: "horizon", default: "\"100ms\"", about: "Up to which age samples are extrapolated; 0 for average-position itself" }];
+
+    pub(super) const fn new(parameters: &LawParameters) -> Self {
+        Self { gains: parameters.gains, horizon: parameters.own.get(0).as_secs_f64() }
+    }
+}
+
+impl<C: Copy> Extrapolated<C> {
+    #[inline(always)]
+    pub(super) fn map<D>(&self, coefficient: impl FnMut(&C) -> D) -> Extrapolated<D> {
+        Extrapolated { gains: self.gains.map(coefficient), horizon: self.horizon }
+    }
+}
+
+impl<N: Number> Law<N> for Extrapolated<N> {
+    fn horizon(&self) -> Option<f64> {
+        (self.horizon > 0.0).then_some(self.horizon)
+    }
+
+    #[inline(always)]
+    fn force(&self, seen: &Observation<N>, _memory: &mut [N]) -> N {
+        self.gains.force(seen.own.relative_to(self.target(seen)))
+    }
+
+    #[inline(always)]
+    fn target(&self, seen: &Observation<N>) -> Motion<N> {
+        Motion { position: seen.mean.position + seen.lead, velocity: seen.mean.velocity }
+    }
+}

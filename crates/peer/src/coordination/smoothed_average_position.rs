@@ -1,0 +1,50 @@
+//! Average-position coordination whose force follows with a first-order lag.
+//!
+//! FT of [`AveragePosition`](super::AveragePosition) through the low-pass filter lag·dFT/dt + FT = F, exact for an F that is held over a tick:
+//! FT(k) = a·FT(k − 1) + (1 − a)·F(k) with a = e^(−Tc/lag).
+
+use super::{Law, LawParameter, LawParameters, Observation, Pull};
+use crate::{Gains, Number};
+
+/// The average-position law behind a first-order lag.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct SmoothedAveragePosition<C = f64> {
+    /// KT and BT.
+    gains: Gains<C>,
+    /// a, the share of the force of the tick before.
+    kept: C,
+    /// 1 − a.
+    taken: C,
+}
+
+impl SmoothedAveragePosition {
+    pub(super) const PULL: Pull = Pull::Mean;
+    pub(super) const PARAMETERS: &[LawParameter] =
+        &[LawParameter { key: "lag", default: "\"10ms\"", about: "Time constant of the force; 0 for average-position itself" }];
+
+    pub(super) fn new(parameters: &LawParameters) -> Self {
+        let periods = parameters.tick.as_secs_f64() / parameters.own.get(0).as_secs_f64();
+        // 1 − a without the rounding of a: a short tick leaves a near 1.
+        Self { gains: parameters.gains, kept: libm::exp(-periods), taken: -libm::expm1(-periods) }
+    }
+}
+
+impl<C: Copy> SmoothedAveragePosition<C> {
+    #[inline(always)]
+    pub(super) fn map<D>(&self, mut coefficient: impl FnMut(&C) -> D) -> SmoothedAveragePosition<D> {
+        SmoothedAveragePosition { gains: self.gains.map(&mut coefficient), kept: coefficient(&self.kept), taken: coefficient(&self.taken) }
+    }
+}
+
+impl<N: Number> Law<N> for SmoothedAveragePosition<N> {
+    fn memory(&self) -> usize {
+        1
+    }
+
+    #[inline(always)]
+    fn force(&self, seen: &Observation<N>, memory: &mut [N]) -> N {
+        let pull = self.gains.force(seen.own.relative_to(seen.mean));
+        memory[0] = self.kept * memory[0] + self.taken * pull;
+        memory[0]
+    }
+}

@@ -1,0 +1,379 @@
+//! The sockets of a relay: what they take in goes to the engine, what the engine lets go leaves through them.
+
+use core::fmt;
+use core::mem::MaybeUninit;
+use std::collections::VecDeque;
+use std::io;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
+
+use cohaptic_realtime::udp::{BindError, EndpointConfig, EndpointCounts, ReceiveBuffers, UdpEndpoint};
+use cohaptic_realtime::{Clock as _, Lateness, MonotonicClock};
+use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
+use rustix::event::{Timespec, epoll};
+use rustix::io::Errno;
+
+use super::PortReport;
+use crate::config::{Form, RelayConfig};
+use crate::engine::{Arrival, Engine, Intake, Port};
+
+/// All sockets.
+pub(super) struct Ports {
+    /// Those of a mesh are its programs'; those of a proxy the one that listens, and then the clients'.
+    ports: Vec<Option<OpenPort>>,
+    layout: Layout,
+    config: EndpointConfig,
+    /// Readable when one of them is.
+    epoll: OwnedFd,
+    buffers: ReceiveBuffers,
+    /// New clients.
+    opened: Vec<u32>,
+    /// Those in which something is queued.
+    dirty: Vec<usize>,
+    /// What the ports of clients that have left did.
+    left: Tally,
+    /// Clients that were sent away because no socket could be had.
+    without_socket: u64,
+}
+
+#[derive(Debug)]
+struct OpenPort {
+    socket: UdpEndpoint,
+    /// When what waits in it to be sent should leave.
+    departures: VecDeque<Instant>,
+    is_dirty: bool,
+}
+
+#[derive(Debug)]
+enum Layout {
+    Mesh(Vec<String>),
+    Proxy { clients: SocketAddr },
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
+    counts: EndpointCounts,
+    kernel_drops: u64,
+}
+
+/// The batches read from one socket before the others, and due departures, have their turn.
+const BATCHES: usize = 8;
+
+/// The datagrams that leave before arrivals have their turn.
+const RELEASES: usize = 1024;
+
+impl Ports {
+    /// Opens the ports that are there from the beginning.
+    pub(super) fn open(config: &RelayConfig, endpoint: EndpointConfig) -> Result<Self, BindError> {
+        let (addresses, layout): (Vec<SocketAddr>, _) = match &config.form {
+            Form::Mesh(mesh) => {
+                let names = mesh.programs.iter().map(|program| program.name.clone()).collect();
+                (mesh.programs.iter().map(|program| program.port).collect(), Layout::Mesh(names))
+            }
+            Form::Proxy(proxy) => (vec![proxy.listen], Layout::Proxy { clients: beside(proxy.to) }),
+        };
+        let nowhere = SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0));
+        let failed = |address: SocketAddr| move |error: Errno| BindError { address, source: error.into() };
+        let epoll = epoll::create(epoll::CreateFlags::CLOEXEC).map_err(failed(nowhere))?;
+        let mut ports = Self {
+            ports: Vec::new(),
+            layout,
+            config: endpoint,
+            epoll,
+            buffers: ReceiveBuffers::new(),
+            opened: Vec::new(),
+            dirty: Vec::new(),
+            left: Tally::default(),
+            without_socket: 0,
+        };
+        for (place, address) in addresses.into_iter().enumerate() {
+            ports.open_at(place, address)?;
+        }
+        Ok(ports)
+    }
+
+    /// What becomes readable when something has come.
+    pub(super) fn readable(&self) -> BorrowedFd<'_> {
+        self.epoll.as_fd()
+    }
+
+    /// Hands what has come in to the engine. Says up to when all has been: time must not be let pass beyond, or what came earlier would be late.
+    pub(super) fn receive(&mut self, engine: &mut Engine, clock: &MonotonicClock) -> io::Result<Heard> {
+        let mut heard = Heard { count: 0, until: clock.now() };
+        if self.ports.len() == 1 {
+            self.receive_at(0, engine, clock, &mut heard)?;
+        } else {
+            // Asking the kernel which of them have something costs less than asking two of them.
+            let mut events = [MaybeUninit::uninit(); 64];
+            let ready = match epoll::wait(&self.epoll, &mut events, Some(&Timespec::default())) {
+                Ok((ready, _)) => &*ready,
+                Err(Errno::INTR) => &[],
+                Err(error) => return Err(error.into()),
+            };
+            for event in ready {
+                let place = usize::try_from(event.data.u64()).unwrap_or(usize::MAX);
+                self.receive_at(place, engine, clock, &mut heard)?;
+            }
+        }
+        if heard.count > 0 {
+            engine.offer_staged();
+        }
+        Ok(heard)
+    }
+
+    fn receive_at(&mut self, place: usize, engine: &mut Engine, clock: &MonotonicClock, heard: &mut Heard) -> io::Result<()> {
+        let Some(Some(open)) = self.ports.get_mut(place) else { return Ok(()) };
+        let port = match (&self.layout, u32::try_from(place).unwrap_or(u32::MAX)) {
+            (Layout::Mesh(_), _) => Port::Program(NodeId::new(place)),
+            (Layout::Proxy { .. }, 0) => Port::Listen,
+            (Layout::Proxy { .. }, place) => Port::Client(place - 1),
+        };
+        let (opened, mut last) = (&mut self.opened, None);
+        for batch in 1..=BATCHES {
+            let count = open.socket.receive(&mut self.buffers, clock, |datagram| {
+                last = Some(datagram.at);
+                let intake = engine.stage(Arrival { at: datagram.at, port, from: datagram.from, bytes: datagram.bytes, ecn: datagram.ecn });
+                if let Intake::FromNewClient(slot) = intake {
+                    opened.push(slot);
+                }
+            })?;
+            heard.count += count;
+            if count < UdpEndpoint::BATCH {
+                break;
+            }
+            if batch == BATCHES {
+                // There may be more, which came after this one.
+                heard.until = last.map_or(heard.until, |last| last.min(heard.until));
+            }
+        }
+        Ok(())
+    }
+
+    /// Closes the ports of clients that have left, and opens those of clients that have come.
+    #[inline]
+    pub(super) fn follow_clients(&mut self, engine: &mut Engine) {
+        if let Layout::Proxy { clients } = self.layout {
+            self.follow(engine, clients);
+        }
+    }
+
+    fn follow(&mut self, engine: &mut Engine, clients: SocketAddr) {
+        while let Some(slot) = engine.poll_closed() {
+            if let Some(port) = self.ports.get_mut(slot as usize + 1).and_then(Option::take) {
+                self.left.add(&port.socket);
+            }
+        }
+        while let Some(slot) = self.opened.pop() {
+            if self.open_at(slot as usize + 1, clients).is_err() {
+                self.without_socket += 1;
+                engine.close_client(slot);
+            }
+        }
+    }
+
+    fn open_at(&mut self, place: usize, address: SocketAddr) -> Result<(), BindError> {
+        let socket = UdpEndpoint::bind(address, self.config)?;
+        epoll::add(&self.epoll, &socket, epoll::EventData::new_u64(place as u64), epoll::EventFlags::IN)
+            .map_err(|error| BindError { address, source: error.into() })?;
+        while self.ports.len() <= place {
+            self.ports.push(None);
+        }
+        self.ports[place] = Some(OpenPort { socket, departures: VecDeque::new(), is_dirty: false });
+        Ok(())
+    }
+
+    /// Takes from the engine what leaves now, and says whether there is more.
+    #[inline]
+    pub(super) fn take_releases(&mut self, engine: &mut Engine) -> bool {
+        for _ in 0..RELEASES {
+            let Some(release) = engine.poll_release() else { return false };
+            let place = match release.port {
+                Port::Program(program) => program.index(),
+                Port::Listen => 0,
+                Port::Client(slot) => slot as usize + 1,
+            };
+            // Always there: clients without a socket have been sent away.
+            let Some(Some(port)) = self.ports.get_mut(place) else { continue };
+            if port.socket.queue(release.to, release.bytes, release.ecn) {
+                // When it should have left had it been offered when it came.
+                let late = u64::try_from(release.late.as_nanos()).unwrap_or(u64::MAX);
+                port.departures.push_back(Instant::from_nanos(release.at.as_nanos().saturating_sub(late)));
+                if !core::mem::replace(&mut port.is_dirty, true) {
+                    self.dirty.push(place);
+                }
+            }
+        }
+        true
+    }
+
+    /// Sends what was taken, and records how late each is: the time before the call of the kernel, less when it should leave. A datagram that was offered
+    /// to its link later than it came is that much later, too.
+    #[inline]
+    pub(super) fn send(&mut self, clock: &MonotonicClock, lateness: &mut Lateness) {
+        let ports = &mut self.ports;
+        self.dirty.retain(|place| {
+            let Some(Some(OpenPort { socket, departures, is_dirty })) = ports.get_mut(*place) else { return false };
+            socket.flush_with(
+                || clock.now(),
+                |before, count| departures.drain(..count.min(departures.len())).for_each(|at| lateness.record(before.saturating_duration_since(at))),
+            );
+            *is_dirty = socket.has_waiting();
+            *is_dirty
+        });
+    }
+
+    /// Whether the kernel did not take all that should leave.
+    pub(super) fn has_waiting(&self) -> bool {
+        !self.dirty.is_empty()
+    }
+
+    /// Each port that stands for a program, or that listens, with its name.
+    pub(super) fn addresses(&self) -> impl Iterator<Item = (&str, SocketAddr)> {
+        let count = match &self.layout {
+            Layout::Mesh(names) => names.len(),
+            Layout::Proxy { .. } => 1,
+        };
+        let name = |place: usize| match &self.layout {
+            Layout::Mesh(names) => names.get(place).map_or("", String::as_str),
+            Layout::Proxy { .. } => "listen",
+        };
+        let ports = self.ports.iter().take(count).enumerate();
+        ports.filter_map(move |(place, port)| Some((name(place), port.as_ref()?.socket.local_address())))
+    }
+
+    /// Clients that were sent away because no socket could be had.
+    pub(super) const fn without_socket(&self) -> u64 {
+        self.without_socket
+    }
+
+    /// What each port did; those of all clients together.
+    pub(super) fn report(&self) -> Vec<PortReport> {
+        let mut ports: Vec<PortReport> = Vec::new();
+        for (place, (name, address)) in self.addresses().enumerate() {
+            if let Some(Some(OpenPort { socket, .. })) = self.ports.get(place) {
+                ports.push(PortReport {
+                    name: name.to_owned(),
+                    address: Some(address),
+                    counts: *socket.counts(),
+                    receive_buffer: socket.granted_receive_buffer(),
+                    kernel_drops: socket.kernel_drops().ok().flatten(),
+                });
+            }
+        }
+        if let Layout::Proxy { .. } = self.layout {
+            let mut tally = self.left;
+            self.ports.iter().skip(1).flatten().for_each(|port| tally.add(&port.socket));
+            let granted = self.ports.iter().skip(1).flatten().map(|port| port.socket.granted_receive_buffer()).min();
+            ports.push(PortReport {
+                name: "clients".to_owned(),
+                address: None,
+                counts: tally.counts,
+                receive_buffer: granted.unwrap_or(0),
+                kernel_drops: Some(tally.kernel_drops),
+            });
+        }
+        ports
+    }
+}
+
+impl fmt::Debug for Ports {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Ports").field("layout", &self.layout).field("config", &self.config).finish_non_exhaustive()
+    }
+}
+
+/// What was heard.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Heard {
+    /// So many datagrams.
+    pub(super) count: usize,
+    /// All that came up to then.
+    pub(super) until: Instant,
+}
+
+impl Tally {
+    fn add(&mut self, socket: &UdpEndpoint) {
+        let (sum, more) = (&mut self.counts, socket.counts());
+        sum.received += more.received;
+        sum.oversized += more.oversized;
+        sum.receive_errors += more.receive_errors;
+        sum.sent += more.sent;
+        sum.send_calls += more.send_calls;
+        let (sum, more) = (&mut sum.failures, more.failures);
+        sum.full += more.full;
+        sum.refused += more.refused;
+        sum.unreachable += more.unreachable;
+        sum.too_large += more.too_large;
+        sum.forbidden += more.forbidden;
+        sum.other += more.other;
+        self.kernel_drops += socket.kernel_drops().ok().flatten().unwrap_or(0);
+    }
+}
+
+/// A free port from which that address can be reached; on loopback nobody else reaches it.
+fn beside(to: SocketAddr) -> SocketAddr {
+    match (to.is_ipv6(), to.ip().is_loopback()) {
+        (true, true) => (Ipv6Addr::LOCALHOST, 0).into(),
+        (true, false) => (Ipv6Addr::UNSPECIFIED, 0).into(),
+        (false, true) => (Ipv4Addr::LOCALHOST, 0).into(),
+        (false, false) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    use cohaptic_linkfile::{LinkTable, link_from_keys};
+
+    use super::*;
+    use crate::{Limits, Mesh, Program, Proxy};
+
+    /// A client for which no port can be had is forgotten and counted; the next one is not harmed.
+    #[test]
+    fn a_client_without_a_port_is_sent_away_and_counted() {
+        let here = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let link = link_from_keys(&[]).unwrap();
+        let proxy = Proxy { listen: here, to: SocketAddr::from((Ipv4Addr::LOCALHOST, 9)), forth: link.clone(), back: link, most_clients: 2 };
+        let config = RelayConfig { seed: 0, form: Form::Proxy(proxy), limits: Limits::default(), changes: Vec::new() };
+        let (mut ports, mut engine) = (Ports::open(&config, EndpointConfig::default()).unwrap(), Engine::new(config).unwrap());
+        // Somebody has it.
+        let taken = std::net::UdpSocket::bind(here).unwrap();
+        for (clients, expected) in [(taken.local_addr().unwrap(), (0, 1)), (here, (1, 1))] {
+            ports.layout = Layout::Proxy { clients };
+            let from = SocketAddr::from((Ipv4Addr::LOCALHOST, 10));
+            let intake = engine.handle_datagram(Arrival { at: Instant::ZERO, port: Port::Listen, from, bytes: b"ask", ecn: None });
+            let Intake::FromNewClient(slot) = intake else { panic!("{intake:?}") };
+            ports.opened.push(slot);
+            ports.follow_clients(&mut engine);
+            assert_eq!((engine.clients(), ports.without_socket()), expected);
+        }
+    }
+
+    /// A datagram offered to its link later than it came leaves that much later than it should, however soon it is sent then.
+    #[test]
+    fn what_was_offered_late_is_released_late() {
+        let [left, right] = [SocketAddr::from((Ipv4Addr::LOCALHOST, 9)), SocketAddr::from((Ipv4Addr::LOCALHOST, 10))];
+        let port = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let program = |name: &str, address| Program { name: name.to_owned(), port, address: Some(address) };
+        let links = LinkTable::new(2, Arc::new(link_from_keys(&[]).unwrap()), []);
+        let form = Form::Mesh(Mesh { programs: vec![program("left", left), program("right", right)], links });
+        let config = RelayConfig { seed: 0, form, limits: Limits::default(), changes: Vec::new() };
+        let clock = MonotonicClock::start();
+        let (mut ports, mut engine) = (Ports::open(&config, EndpointConfig::default()).unwrap(), Engine::new(config).unwrap());
+        let late = Duration::from_millis(5);
+        let passed = Instant::ZERO.saturating_add(late);
+        while clock.now() < passed {
+            std::hint::spin_loop();
+        }
+        engine.handle_timeout(passed);
+        engine.handle_datagram(Arrival { at: Instant::ZERO, port: Port::Program(NodeId(1)), from: left, bytes: b"late", ecn: None });
+        assert!(!ports.take_releases(&mut engine));
+        let mut lateness = Lateness::new();
+        ports.send(&clock, &mut lateness);
+        assert_eq!(lateness.count(), 1);
+        assert!(lateness.summary().max >= late, "{:?}", lateness.summary());
+    }
+}

@@ -1,0 +1,93 @@
+//! The packets of a network behind its lines: those that propagate, and the events that were not polled yet.
+
+use alloc::collections::{BTreeMap, VecDeque};
+
+use cohaptic_units::Instant;
+
+use super::id::{NodeId, Path};
+use super::pending::{InNetwork, LineId, Pending, SizeAndMarks, Turn};
+use crate::event_queue::EventQueue;
+use crate::fates::fate::Fate;
+use crate::fates::record::PacketEvent;
+use crate::line::Sink;
+use crate::packet::Marks;
+use crate::packet::damage::Damage;
+
+#[derive(Clone, Debug)]
+pub(super) struct Traffic<P> {
+    pub(super) pending: EventQueue<Pending<P>>,
+    pub(super) happened: VecDeque<PacketEvent<P, Path>>,
+    /// The damage to packets on their way that are flagged as damaged.
+    damages: BTreeMap<(Path, u64, u8), Damage>,
+}
+
+impl<P> Traffic<P> {
+    pub(super) fn new() -> Self {
+        Self { pending: EventQueue::new(), happened: VecDeque::new(), damages: BTreeMap::new() }
+    }
+
+    /// The packet propagates on that line.
+    #[inline(always)]
+    pub(super) fn schedule(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) {
+        let InNetwork { sequence, offered, entered, path, size, payload } = packet;
+        self.pending.push(Pending { at, sequence, offered, entered, turn: Turn::arrival(line), path, size, payload: Some(payload) });
+    }
+
+    /// The line's engine must be woken.
+    pub(super) fn announce(&mut self, at: Instant, line: LineId) {
+        let turn = Turn::waking(line);
+        let (path, size) = (Path { from: NodeId(0), to: NodeId(0) }, SizeAndMarks::NOTHING);
+        self.pending.push(Pending { at, sequence: 0, offered: at, entered: at, turn, path, size, payload: None });
+    }
+
+    #[inline(always)]
+    pub(super) fn event(&mut self, packet: InNetwork<P>, at: Instant, fate: Fate) -> PacketEvent<P, Path> {
+        let damage = self.take_damage(&packet);
+        packet.event(at, fate, damage)
+    }
+
+    #[inline(always)]
+    pub(super) fn take_damage(&mut self, packet: &InNetwork<P>) -> Option<Damage> {
+        if packet.size.has(SizeAndMarks::DAMAGED) { self.find_damage(packet.path, packet.sequence, packet.size) } else { None }
+    }
+
+    #[cold]
+    fn find_damage(&mut self, path: Path, sequence: u64, size: SizeAndMarks) -> Option<Damage> {
+        self.damages.remove(&(path, sequence, size.copy()))
+    }
+}
+
+/// Where the packets of one line's engine go.
+pub(super) struct Exits<'a, P> {
+    pub(super) traffic: &'a mut Traffic<P>,
+    pub(super) line: LineId,
+}
+
+impl<P> Exits<'_, P> {
+    fn marked(&self, packet: InNetwork<P>, copy: u8, marks: &Marks) -> InNetwork<P> {
+        let size = packet
+            .size
+            .with(self.line.copy_bit(), copy == 1)
+            .with(SizeAndMarks::MARKED, marks.congestion)
+            .with(SizeAndMarks::DAMAGED, marks.damage.is_some())
+            .with(SizeAndMarks::DISCARDED_ON_ARRIVAL, marks.discarded_on_arrival);
+        InNetwork { size, ..packet }
+    }
+}
+
+impl<P> Sink<InNetwork<P>> for Exits<'_, P> {
+    fn arrives(&mut self, at: Instant, packet: InNetwork<P>, copy: u8, marks: Marks) {
+        let packet = self.marked(packet, copy, &marks);
+        if let Some(damage) = marks.damage {
+            self.traffic.damages.insert((packet.path, packet.sequence, packet.size.copy()), damage);
+        }
+        self.traffic.schedule(at, self.line, packet);
+    }
+
+    fn happened(&mut self, at: Instant, fate: Fate, packet: InNetwork<P>, copy: u8, marks: Marks) {
+        let packet = self.marked(packet, copy, &marks);
+        // The damage is that of the packet and of its copy, of which each has an event of its own.
+        let damage = marks.damage.filter(|_| fate.is_end());
+        self.traffic.happened.push_back(packet.event(at, fate, damage));
+    }
+}
