@@ -208,7 +208,7 @@ mod tests {
 
     /// The numbers of the packets and their arrivals.
     fn arrivals(model: impl Into<LinkModel>, packets: u64) -> Vec<(u64, Instant)> {
-        events(model, packets).into_iter().map(|event| (event.payload, event.at)).collect()
+        events(model, packets).into_iter().map(|event| (event.payload, event.record.at)).collect()
     }
 
     /// Campbell's theorem with λ = 2/s, h = 1 s, d = 0.5 s: mean 1 s, variance 0.5 s². Over T = 200 000 s, seen every 50 ms, the mean has the variance 2σ²d/T, a
