@@ -7,7 +7,7 @@
 //!
 //! Every run is the run that [`cohaptic_harness::Simulation`] makes of the same scene with the same seed, to the last bit.
 //!
-//! A plan [with verdicts](Plan::with_verdicts) has each combination judged once, by a [`Judge`] that its caller brings, before anything runs.
+//! A plan [with verdicts](CampaignPlan::with_verdicts) has each combination judged once, by a [`Judge`] that its caller brings, before anything runs.
 //!
 //! Nothing here is printed and no clock is read.
 //!

@@ -1,7 +1,7 @@
 //! Ctrl-C and SIGTERM: the first asks for an end in good order, which has most of a second; the second ends at once.
 //!
 //! A computation that asks often enough ends by itself. One that cannot ask, such as the eigenvalues of a large matrix, is ended when its time is over: nothing is lost
-//! that is whole, because files are written under another name until they are ([`crate::output_file`]), and a command that has whole results before its
+//! that is whole, because files are written under another name until they are ([`crate::file`]), and a command that has whole results before its
 //! end leaves word of what to do with them ([`keep`]).
 
 use std::io::Write as _;

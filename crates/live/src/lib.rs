@@ -1,6 +1,6 @@
 //! Live sessions: a scene driven by the wall clock, in which some of the peers are other programs.
 //!
-//! Here is the [`door`]: what a datagram from outside must be before it may touch the scene, and how what goes out is made. It does no input or
+//! Here is [admission](AdmissionControl), the *door* of the protocol: what a datagram from outside must be before it may touch the scene, and how what goes out is made. It does no input or
 //! output and reads no clock; whoever drives it owns the sockets. [`client`] is the other side of it, for programs in Rust, and [`handshake`] the
 //! datagrams that both exchange. The protocol is written byte by byte in `docs/live-protocol.md`.
 //!

@@ -7,7 +7,7 @@
 //! | [`achieved`] | figures of a link's delays, losses and order, each with its uncertainty, to be set beside what was asked for |
 //! | [`steady`] | a steady stream of packets over one link |
 //! | [`asked`] | the figures that follow from the laws of a link |
-//! | [`beside`] | what was achieved beside what was asked for, and whether it is too far off |
+//! | [`comparison`] | the achieved figures beside the configured ones, and whether they are too far off |
 //! | [`fit`](mod@fit) | an estimate of a link from measured one-way delays and losses, with its goodness |
 //!
 //! It knows packets ([`PacketRecord`]) and nothing of what they carry. Figures are computed with the

@@ -1,4 +1,4 @@
-//! The other side of the [`door`](crate::door), for programs in Rust: it makes and checks datagrams, and leaves sockets and clocks to its user.
+//! The other side of [admission](crate::AdmissionControl), for programs in Rust: it makes and checks datagrams, and leaves sockets and clocks to its user.
 //!
 //! A [`Client`] does all that `docs/live-protocol.md` asks of a program: it says hello until it is answered, seals and opens, tells new samples from
 //! late ones, and begins anew when it has heard nothing new for a second. [`Joining`] and [`Joined`] are the datagrams alone.
