@@ -130,7 +130,9 @@ impl Node {
     /// What a number that the law remembers is multiplied by to be a length: by how far its part of the force moves the copy within the common time.
     pub(crate) fn memory_unit(&self, place: usize, scale: Scale) -> f64 {
         let by = self.law.force.memory[place].abs();
-        scale.compliance * if by > 0.0 { by } else { 1.0 }
+        // A force that is remembered acts for that long, where one that waits acts for a tick.
+        let ticks = scale.time / self.object.short.0.as_secs_f64();
+        scale.compliance * ticks * if by > 0.0 { by } else { 1.0 }
     }
 
     /// One tick: forces from the rows as they are, `heard` what each row of the law hears of the samples held \[N\], FT's first, which pulls the copy there;

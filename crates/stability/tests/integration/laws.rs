@@ -38,7 +38,7 @@ fn the_determinant_finds_the_same_of_laws() {
     }
 }
 
-/// With losses and random delays; a horizon of a second is never reached.
+/// With losses and random delays; a horizon of a second is never reached. The proven bounds of long lags are wider than those of other laws.
 #[test]
 fn the_mean_squares_of_laws_come_out() {
     let entries = entries("mean_square");

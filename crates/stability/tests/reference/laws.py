@@ -128,6 +128,7 @@ def mean_squares():
     """(name, scene, why). A horizon of 1 s is never reached but with a chance far below the digits given."""
     chain = "{ gilbert-elliott = { p = 0.05, r = 0.4 } }"
     jitter = '{ sd = "1443375ns", distribution = "uniform" }'
+    unlike = [(0, 1, "loss = 0.4"), (2, 0, "loss = 0.0"), (1, 2, 'loss = 0.6; delay = "3ms"')]
     for law, short, own in ((smoothed, "smoothed", "10ms"), (extrapolated, "extrapolated", "1s")):
         make = partial(law, **{"lag" if law is smoothed else "horizon": own})
         for loss in (None, 0.1, 0.5):
@@ -138,7 +139,7 @@ def mean_squares():
         yield f"{short}-n3-8ms-p0.1-free", make(3, 200.0, bo=1.0, delay="8ms", loss=0.1, contact="none"), "none touches"
         yield (
             f"{short}-n3-different",
-            make(3, 400.0, delay="8ms", loss=0.1, peers=["", "phase = 3", NONE], links=[(0, 1, "loss = 0.4"), (2, 0, "loss = 0.0"), (1, 2, 'loss = 0.6; delay = "3ms"')]),
+            make(3, 400.0, delay="8ms", loss=0.1, peers=["", "phase = 3", NONE], links=unlike),
             "another probability on each link",
         )
         yield f"{short}-n2-gilbert", make(2, 500.0, delay="8ms", loss=chain), "bursts of 2.5 packets"
