@@ -95,7 +95,7 @@ impl Step {
             Self::Samplers => "## Random delays",
             Self::Stability => "## Verdicts on stability",
             Self::Testkit => "## The test kit",
-            Self::Peers => "## Comparison others",
+            Self::Peers => "## Beside others",
         }
     }
 

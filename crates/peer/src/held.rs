@@ -49,7 +49,7 @@ impl<const A: usize> Held<A> {
         held
     }
 
-    /// Keeps from now on what [`Held::lead`] needs: what is held so far counts as sampled at the instant 0 of its sender's clock.
+    /// Keeps send times and velocities for [`Held::lead`] from now on: the samples held so far count as sampled at the instant 0 of their senders' clocks.
     pub fn keep_ages(&mut self) {
         let motion = |sample: &HeldSample<A>| Extrapolation { sent: Instant::ZERO, velocity: sample.state.velocity };
         self.motions = Some(self.samples.iter().map(motion).collect());

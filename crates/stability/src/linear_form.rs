@@ -139,7 +139,7 @@ impl LinearLaw {
         let remembered = Law::<f64>::memory(law);
         let seen = Observation { own: Form::motion(0), mean: Form::motion(1), lead: Form::unknown(4) };
         let forms = law.map(|number| Form::of(*number));
-        // FT and what is remembered, where one of the numbers remembered is an unknown and the others are zero.
+        // FT and the memory after the tick, with one number of the memory before it as an unknown and the others zero.
         let come_out = |unknown: Option<usize>| {
             let mut memory = vec![Form::of(0.0); remembered];
             if let Some(unknown) = unknown {

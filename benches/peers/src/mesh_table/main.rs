@@ -32,7 +32,7 @@ fn main() {
 }
 
 fn head() {
-    println!("# Comparison others: speed\n");
+    println!("# Beside others: speed\n");
     println!("The same scenes on this project and on what others wrote, in one run. This page is written by\n");
     println!("    cd benches/peers && (cargo run --release --bin mesh-table && others/run) > ../../docs/peers-speed.md\n");
     println!("and measured on: {}. Processor time on one core, the median of {ROUNDS} rounds in which", machine());

@@ -52,6 +52,7 @@ shipped![
     "network/constant-delay",
     "network/corrupt",
     "network/duplicate",
+    "network/handover-spikes",
     "network/ideal",
     "network/in-order",
     "network/jitter-correlated",

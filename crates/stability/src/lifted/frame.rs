@@ -223,7 +223,7 @@ impl Lifted<'_> {
         majorant::error_of(self, |_| compliance)
     }
 
-    /// Whether what is heard of a sample changes while it is held.
+    /// Whether the law of a node uses the ages of samples, so that the same sample is heard differently from tick to tick.
     fn ages_matter(&self) -> bool {
         self.nodes.iter().any(|node| node.law.horizon.is_some())
     }

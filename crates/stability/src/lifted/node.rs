@@ -194,7 +194,7 @@ impl Node {
 }
 
 impl Node {
-    /// What is remembered takes part in the force, and becomes what it is from now on.
+    /// The memory of the law takes part in the force and takes its next values.
     fn remember<'a>(
         &self,
         z: &mut Matrix,

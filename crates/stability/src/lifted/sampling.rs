@@ -63,7 +63,7 @@ impl Sampling {
         }
     }
 
-    /// What is heard of a number as it is in [`Sampling::gains`], from what is heard of it as it is in [`Sampling::shares`].
+    /// The coefficient of a number in the scale of [`Sampling::gains`], from its coefficient in the scale of [`Sampling::shares`].
     pub(crate) fn of_gains(self, heard: f64, time: f64) -> f64 {
         let unit = self.unit(time);
         if unit > 0.0 && unit.is_finite() { heard / unit } else { 1.0 }

@@ -85,7 +85,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
         let signed = |number: usize| i64::try_from(number).unwrap_or(i64::MAX);
         usize::try_from(signed(first_sample[node]) + signed(numbers) * sample).unwrap_or(0)
     };
-    // Position and velocity of every sample, if what is heard of them changes while they are held: then they are extrapolated to the present at every tick.
+    // The rows of the positions of all samples, if the law uses ages: these are extrapolated to the present at every tick.
     let extrapolates = lifted.nodes.iter().any(|node| node.law.horizon.is_some());
     let of_samples = first_sample.iter().zip(depth.iter().zip(&lifted.timetable.sent));
     let samples = of_samples.flat_map(|(first, (depth, sent))| (first - depth * numbers..first + sent * numbers).step_by(numbers));

@@ -52,7 +52,7 @@ pub(crate) enum Step {
     Move { first: usize, map: Matrix, sizes: Matrix, held: Vec<Vec<(usize, f64)>> },
     /// The row becomes that combination.
     Sample { row: usize, of: [(usize, f64); 2] },
-    /// The rows of what is held, as many as a sample has numbers, may become those of a sample: `take` is its first row.
+    /// The rows of a held sample, as many as a sample has numbers, may become those of another sample: `take` is its first row.
     Deliver { link: usize, row: usize, numbers: usize, outcomes: Vec<Arrive> },
 }
 
@@ -226,7 +226,7 @@ impl Positive for Events {
     }
 }
 
-/// The rows of what is held after a delivery, in the making.
+/// The rows of a held sample after a delivery, in the making.
 struct Taken {
     lines: Vec<Vec<f64>>,
     /// Their products with one another.
@@ -238,7 +238,7 @@ impl Taken {
         Self { lines: vec![vec![0.0; rows]; numbers], corner: Matrix::zeros(numbers, numbers) }
     }
 
-    /// An outcome that takes rows of `source`; what is held stands from `row` on.
+    /// Adds an outcome that takes rows of `source`; the held sample stands from `row` on.
     fn add(&mut self, source: &Matrix, outcome: &Arrive, row: usize) {
         let (taken, probability) = (outcome.take.unwrap_or(row), outcome.probability);
         for (number, line) in self.lines.iter_mut().enumerate() {
@@ -260,7 +260,7 @@ impl Taken {
 /// X ← T·X·Tᵀ for a T that changes a few rows.
 fn advance(moment: &mut Matrix, first: usize, map: &Matrix, held: &[Vec<(usize, f64)>]) {
     let (own, size) = (map.rows(), moment.rows());
-    // The rows that it depends on: its own and the means of what is held.
+    // The rows that it depends on: its own and the means of the samples held.
     let mut sources = Matrix::zeros(own + held.len(), size);
     for place in 0..own {
         sources.row_mut(place).copy_from_slice(moment.row(first + place));
