@@ -12,11 +12,16 @@ use proptest::sample::select;
 use crate::{Draft, DraftHand, DraftLink, DraftPeer, Place, contact_to_toml};
 
 /// The laws of the paper.
-const PAPER: &[Coordination] = &[Coordination::AveragePosition, Coordination::ProportionalDerivative];
+pub const PAPER: &[Coordination] = &[Coordination::AveragePosition, Coordination::ProportionalDerivative];
 
 /// Anything that a scene can hold: 2 to 5 peers, every kind of link, contact, hand and clock, up to three axes, changes on the way. It may be unstable.
 pub fn anything() -> impl Strategy<Value = Draft> {
     anything_among(2..=5_usize)
+}
+
+/// [`anything`] with a law of the paper.
+pub fn anything_of_the_paper() -> impl Strategy<Value = Draft> {
+    (anything(), select(PAPER)).prop_map(|(draft, strategy)| Draft { strategy, ..draft })
 }
 
 /// A law with values for the parameters that it has of its own, up to 40 ms.

@@ -1,5 +1,6 @@
 //! A checked scene: what a file says once every default is filled in and every value is known to make sense.
 
+use core::fmt;
 use core::time::Duration;
 use std::path::PathBuf;
 
@@ -91,7 +92,7 @@ pub enum Scaling {
 }
 
 /// The coordination controller, the same at every peer.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq)]
 pub struct CoordinationSpec {
     /// The strategy.
     pub strategy: Coordination,
@@ -103,6 +104,19 @@ pub struct CoordinationSpec {
     pub settings: LawSettings,
     /// The period of sending, Tn; a whole multiple of every peer's tick, on its own clock.
     pub update: Duration,
+}
+
+impl fmt::Debug for CoordinationSpec {
+    /// Parameters of strategies are shown only where one is not at its default: fingerprints of records are made of this text.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { strategy, scaling, gains, settings, update } = self;
+        let mut shown = f.debug_struct("CoordinationSpec");
+        shown.field("strategy", strategy).field("scaling", scaling).field("gains", gains).field("update", update);
+        if *settings != LawSettings::default() {
+            shown.field("settings", settings);
+        }
+        shown.finish()
+    }
 }
 
 /// One peer.

@@ -103,7 +103,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "update =",
             "updat =",
-            "8:1: coordination.updat: unknown key: expected one of strategy, scaling, stiffness, damping, update; did you mean \"update\"?",
+            "8:1: coordination.updat: unknown key: expected one of strategy, scaling, stiffness, damping, update, smoothed-average-position, extrapolated; did you mean \"update\"?",
         ),
         ("damping = 5.0 }\ncoupling", "dampening = 5.0 }\ncoupling", "10:24: peer.device.dampening: unknown key: expected one of mass, damping"),
         (
@@ -177,7 +177,7 @@ fn a_wrong_unit_or_type_is_refused() {
         (
             "average-position",
             "average-positoin",
-            "6:12: coordination.strategy: unknown name \"average-positoin\": expected one of average-position, proportional-derivative; did you mean \"average-position\"?",
+            "6:12: coordination.strategy: unknown name \"average-positoin\": expected one of average-position, proportional-derivative, smoothed-average-position, extrapolated; did you mean \"average-position\"?",
         ),
         ("[peer]", "[peer]\nhand = \"soft\"", "10:8: peer.hand: unknown hand \"soft\": expected \"none\""),
         ("[peer]", "[peer]\ncontact = { pull = 1 }", "10:13: peer.contact.pull: unknown key: expected push"),

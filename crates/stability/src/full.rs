@@ -13,7 +13,7 @@ use crate::cost::{full_operations, pushed_operations};
 use crate::lifted::majorant::error_of;
 use crate::lifted::{Body, Lifted, Node, closer_of};
 use crate::network::{LinkTiming, NominalNetwork};
-use crate::structure::{Contacts, Structure, arm, common_time, count, device_plant, linear_law};
+use crate::structure::{Contacts, Structure, arm, common_time, count, device_plant, has_equal_clocks, linear_law};
 use crate::timetable::{Event, Instants, NodeClock, Timetable};
 use crate::{AnalysisError, Matrix, StateKind, StateName, Watch};
 
@@ -140,6 +140,9 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             Peer::new(config, device, object, strategy(place), Held::new((1..peers).map(|_| State::REST)))
         };
         let members: Vec<Member<A, S>> = (0..peers).map(member).collect();
+        if members.iter().any(|member| member.strategy().needs_ages()) && !has_equal_clocks(scene) {
+            return Err(AnalysisError::AgesByClocks { strategy: scene.coordination.strategy.name() });
+        }
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
         let tied = silent || (0..peers).any(|place| contacts.touching[place] && arm(&scene.peers[place]).stiffness > 0.0);
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);

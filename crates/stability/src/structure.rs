@@ -173,6 +173,11 @@ pub(crate) fn linear_law(scene: &Scene, peer: usize) -> Option<LinearLaw> {
     LinearLaw::of(&scene.law(peer))
 }
 
+/// Whether all peers have the same tick, offset and drift.
+pub(crate) fn has_equal_clocks(scene: &Scene) -> bool {
+    scene.peers.iter().all(|spec| spec.clock == scene.peers[0].clock)
+}
+
 /// Refuses laws that have no linear form, and laws that use the ages of samples between clocks that differ: ages then do not repeat from frame to frame.
 fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
     let strategy = scene.coordination.strategy.name();
@@ -181,7 +186,7 @@ fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
     let other = (1..peers).filter(|peer| scene.peers[*peer].clock.tick != first.clock.tick);
     for peer in std::iter::once(0).chain(other) {
         let law = linear_law(scene, peer).ok_or(AnalysisError::OtherStrategy { strategy })?;
-        if law.horizon.is_some() && scene.peers.iter().any(|spec| spec.clock != first.clock) {
+        if law.horizon.is_some() && !has_equal_clocks(scene) {
             return Err(AnalysisError::AgesByClocks { strategy });
         }
     }

@@ -22,6 +22,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
 
+use crate::paper::BOTH;
 use crate::{TICK, ages, cases};
 
 /// Of a device's damping, what the coupling may use; the rest bounds what a hand can put in.
@@ -143,7 +144,7 @@ pub(crate) fn springs() -> impl Strategy<Value = Draft> {
     ];
     // The device's damping in parts of what its coupling asks for at least.
     let peer = (contact, hand, (100.0..4000.0, 0.8..4.0, 0.02..0.3), (-0.05..0.05, -0.5..0.5), 0..8_u64);
-    let object = (0.05..2.0, any::<bool>(), 10.0..2000.0, select(Coordination::ALL), select(vec![1_u64, 2, 4, 8]), any::<u32>());
+    let object = (0.05..2.0, any::<bool>(), 10.0..2000.0, select(&BOTH), select(vec![1_u64, 2, 4, 8]), any::<u32>());
     (2..=4_usize).prop_flat_map(move |count| {
         (object.clone(), vec(peer.clone(), count), links::any_network(count)).prop_map(move |(object, peers, links)| {
             let (mass, split_mass, stiffness, strategy, every, seed) = object;
@@ -237,7 +238,7 @@ proptest! {
         peers in 2..=40_usize,
         (stiffness, mass, every, frames) in (10.0..2000.0, 0.05..5.0, select(vec![2_u64, 4, 8]), 0..3_u64),
         losses in 0..3_u32,
-        strategy in select(Coordination::ALL),
+        strategy in select(&BOTH),
     ) {
         let mut draft = Draft { mass, split_mass: false, strategy, update: 1000 * every, ..Draft::calm(peers) };
         draft.gains = Gains { stiffness, damping: 0.0 };

@@ -10,7 +10,7 @@
 use std::time::Duration;
 
 use cohaptic_harness::Model;
-use cohaptic_peer::{Contact, Coordination, Gains};
+use cohaptic_peer::{Contact, Gains};
 use cohaptic_tests::{Draft, DraftHand, links, run};
 use cohaptic_wan::Fate;
 use proptest::collection::vec;
@@ -18,6 +18,7 @@ use proptest::prelude::*;
 use proptest::sample::select;
 
 use crate::cases;
+use crate::paper::BOTH;
 use crate::settling::{Settling, motions, spread};
 
 /// When the links heal \[ms\].
@@ -28,7 +29,7 @@ pub(crate) const PLAIN: &str = "jitter = \"0s\", order = \"allow-reordering\", l
 /// Two to four peers that are moved about until the links heal, which then have that delay \[µs\].
 fn moved() -> impl Strategy<Value = (Draft, u64)> {
     let peer = (any::<bool>(), (100.0..4000.0, 0.0..10.0), (0.05..0.3, 0.5..8.0), (-0.03..0.03, -0.3..0.3), 0..8_u64, -2.0..2.0);
-    let object = (0.1..1.0, any::<bool>(), 0.2..3.0, (20.0..1200.0, 0.0..12.0), select(Coordination::ALL), select(vec![4_u64, 8]), any::<u32>());
+    let object = (0.1..1.0, any::<bool>(), 0.2..3.0, (20.0..1200.0, 0.0..12.0), select(&BOTH), select(vec![4_u64, 8]), any::<u32>());
     (2..=4_usize).prop_flat_map(move |count| {
         (object.clone(), vec(peer.clone(), count), links::any_network(count), 0..=16_000_u64).prop_map(|(object, peers, links, delay)| {
             let (mass, split_mass, damping, (stiffness, gain), strategy, every, seed) = object;

@@ -13,7 +13,7 @@ use cohaptic_harness::live::LiveScene;
 use cohaptic_harness::{Model, Observer, TickRow};
 use cohaptic_peer::coordination::LawStrategy;
 use cohaptic_peer::wire::MAX_LEN;
-use cohaptic_peer::{ArmConfig, Contact, Coordination, Gains, Held, ObjectCopy, Peer, RestingDevice, State};
+use cohaptic_peer::{ArmConfig, Contact, Gains, Held, ObjectCopy, Peer, RestingDevice, State};
 use cohaptic_scene::Scene;
 use cohaptic_tests::{Draft, DraftHand, DraftLink, links, run};
 use cohaptic_units::Instant;
@@ -23,6 +23,7 @@ use proptest::sample::select;
 
 use crate::cases;
 use crate::healing::PLAIN;
+use crate::paper::BOTH;
 use crate::settling::{Motion, Settling, motions, spread};
 
 const MILLISECOND: core::time::Duration = core::time::Duration::from_millis(1);
@@ -110,7 +111,7 @@ fn elsewhere(draft: &Draft) -> Scene {
 
 /// Two or three peers, the last of which lives elsewhere, and what their links are like until it comes to stay. If `held`, an arm that wants to rest at 0 holds the first one's device.
 fn scenes() -> impl Strategy<Value = (Draft, Vec<DraftLink>)> {
-    let object = (0.2..1.0, 0.2..3.0, 50.0..600.0, 1.0..10.0, select(Coordination::ALL), select(vec![4_u64, 8]), 0..=12_000_u32);
+    let object = (0.2..1.0, 0.2..3.0, 50.0..600.0, 1.0..10.0, select(&BOTH), select(vec![4_u64, 8]), 0..=12_000_u32);
     let whole = (object, 2..=3_usize, any::<bool>(), -0.03..0.03, 50.0..400.0).prop_map(|(object, count, held, place, arm)| {
         let (mass, damping, stiffness, gain, strategy, every, delay) = object;
         let mut draft = Draft { mass, damping, strategy, update: 1000 * every, split_mass: false, ..Draft::calm(count) };

@@ -14,13 +14,14 @@
 //! for a sample breaks this claim and that of [`crate::energy`] too: `damage-passes.toml`.
 
 use cohaptic_harness::Model;
-use cohaptic_peer::{Contact, Coordination, Gains};
+use cohaptic_peer::{Contact, Gains};
 use cohaptic_tests::{Draft, DraftHand, Log, Tick, links, run};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
 
 use crate::energy::{Ledger, damped, pulls, springs, stiffness};
+use crate::paper::BOTH;
 use crate::{TICK, ages, cases};
 
 /// For each tick and each peer, the longest time between the sendings of two samples that replace one another then \[s\].
@@ -67,7 +68,7 @@ fn largest_excess(log: &Log, peers: usize, (stiffness, damping): (f64, f64)) -> 
 /// Three peers of any gains over any network.
 fn pushed() -> impl Strategy<Value = Draft> {
     let peer = (-3.0..3.0, any::<bool>(), 0..8_u64, -0.05..0.05);
-    let object = (0.1..1.0, 0.0..5.0, (10.0..800.0, 0.0..15.0), select(Coordination::ALL), select(vec![1_u64, 4, 8]), any::<u32>());
+    let object = (0.1..1.0, 0.0..5.0, (10.0..800.0, 0.0..15.0), select(&BOTH), select(vec![1_u64, 4, 8]), any::<u32>());
     (object, vec(peer, 3), links::any_network(3)).prop_map(|((mass, damping, (stiffness, gain), strategy, every, seed), peers, links)| {
         let mut draft = Draft { duration: 500, seed, mass, damping, strategy, update: 1000 * every, links, ..Draft::calm(3) };
         draft.gains = Gains { stiffness, damping: gain };

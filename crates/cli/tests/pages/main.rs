@@ -72,6 +72,7 @@ pages! {
     claims: "docs/claims.md",
     commands: "docs/commands.md",
     the_book: "docs/README.md",
+    extending: "docs/extending.md",
     falcon: "docs/falcon.md",
     hard_cases: "docs/hard-cases.md",
     live: "docs/live.md",
