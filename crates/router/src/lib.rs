@@ -39,7 +39,7 @@
 //! let departure = engine.poll_departure().expect("it has arrived");
 //! assert_eq!((departure.at.as_nanos(), departure.to), (24_000_000, Side::Right));
 //! assert_eq!(departure.packet.bytes(), bytes);
-//! # Ok::<(), cohaptic_linkfile::SceneError>(())
+//! # Ok::<(), cohaptic_linkfile::FileError>(())
 //! ```
 
 mod engine;
