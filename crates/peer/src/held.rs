@@ -90,8 +90,8 @@ impl<const A: usize> Held<A> {
         let Some(motions) = self.motions.as_ref().filter(|motions| !motions.is_empty()) else { return [0.0; A] };
         for (place, motion) in motions.iter().enumerate() {
             let age = age(now, motion.sent).min(horizon);
-            for axis in 0..A {
-                sums[place % 4][axis] += age * motion.velocity[axis];
+            for (sum, velocity) in sums[place % 4].iter_mut().zip(motion.velocity) {
+                *sum += age * velocity;
             }
         }
         let [a, b, c, d] = sums;
@@ -228,7 +228,7 @@ mod tests {
         held.keep_ages();
         held.accept(0, 0, at_ms(10), at(1.0));
         held.hold(1, at_ms(5), at(2.0));
-        let expected = (0.030_f64.min(0.033) * -1.0 + 0.033 * -2.0) / 2.0;
+        let expected = (-0.030 + 0.033 * -2.0) / 2.0;
         assert_eq!(held.lead(at_ms(40), 0.033), [expected]);
         assert_eq!(held.lead(at_ms(1), 0.033), [0.0]);
         assert!(!held.accept(0, 0, at_ms(39), at(7.0)));

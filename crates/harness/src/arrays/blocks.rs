@@ -214,11 +214,11 @@ impl<const A: usize> Blocks<A> {
 
     /// Replaces by how much the samples that a peer holds have moved on, in all runs.
     pub(super) fn set_lead<const L: usize>(&mut self, axis: usize, peer: usize, lead: [f64; L]) {
-        for run in 0..L {
+        for (run, lead) in lead.into_iter().enumerate() {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
-            self.blocks[block].lead.0[lane] = lead[run];
+            self.blocks[block].lead.0[lane] = lead;
             if peer + 1 == self.places.peers && run + 1 == L {
-                self.blocks[block].lead.0[lane..].fill(lead[run]);
+                self.blocks[block].lead.0[lane..].fill(lead);
             }
         }
     }
@@ -315,6 +315,7 @@ fn distances<const L: usize>(mut low: Eight, mut high: Eight) -> [f64; L] {
 
 /// [`Block::tick`]. By references of their own the compiler knows that nothing that is written is read in another lane.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "each by a reference of its own")]
 fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool>(
     devices: &mut Motions,
     objects: &mut Motions,

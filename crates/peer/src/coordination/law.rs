@@ -79,7 +79,7 @@ pub struct LawParameter {
 
 /// The values of a law's own parameters, in the order of [`Coordination::parameters`](super::Coordination::parameters).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct LawValues([Duration; LawValues::MOST]);
+pub struct LawValues([Duration; Self::MOST]);
 
 impl LawValues {
     /// How many parameters of its own a law has at most.

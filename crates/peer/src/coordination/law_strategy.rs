@@ -33,8 +33,8 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
         let mut command = Command { force: [0.0; A], target: State::REST };
         let remembered = self.memory.len() / A;
         let lead = self.horizon.map_or([0.0; A], |horizon| context.held.lead(context.local_time, horizon));
-        for axis in 0..A {
-            let seen = Observation { own: context.own.along(axis), mean: context.held.mean().along(axis), lead: lead[axis] };
+        for (axis, lead) in lead.into_iter().enumerate() {
+            let seen = Observation { own: context.own.along(axis), mean: context.held.mean().along(axis), lead };
             command.force[axis] = self.law.force(&seen, &mut self.memory[axis * remembered..(axis + 1) * remembered]);
             command.target.set_along(axis, self.law.target(&seen));
         }

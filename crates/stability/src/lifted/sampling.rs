@@ -75,7 +75,6 @@ impl Sampling {
     }
 
     /// What that number of a sample of that age \[s\] is multiplied by in what a row of a law hears \[N\].
-    #[expect(clippy::float_cmp, reason = "a law alone has the gains themselves")]
     pub(crate) fn heard(self, row: &LawRow, channel: usize, age: f64, time: f64) -> f64 {
         match (self, channel) {
             (Self::Combined(gains), _) if row.heard == gains => self.unit(time),
