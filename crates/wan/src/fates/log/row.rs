@@ -6,7 +6,7 @@ use crate::fates::record::PacketRecord;
 
 /// A record as a line of a fate log, without the newline: `2,0,2000000,64,27000000,delivered,1,0`.
 ///
-/// The column `at_ns` is [`PacketRecord::at`]. A reader takes it for the instant of [`Fate::Delivered`] too, which it is.
+/// The column `at_ns` is [`PacketRecord::at`]. A reader takes it for the instant of [`Fate::Delivered`](crate::Fate::Delivered) too, which it is.
 #[derive(Clone, Copy, Debug)]
 pub struct FateRow(pub PacketRecord);
 
