@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
 use cohaptic_wan::{
-    Between, Bottleneck, Chance, Checksum, Corruption, Damage, Delay, Distribution, DropCause, Fate, FateLog, Flips, Framing, Jitter, Link,
-    LinkConfig, LinkModel, Loss, Modulated, Modulator, ModulatorState, Outage, Outages, PacketEvent, PacketInfo, PathTrace, Pattern, Peak,
+    Between, Bottleneck, Chance, Checksum, Corruption, Damage, Delay, Distribution, DropCause, Fate, FateLog, Flips, Framing, Impairments, Jitter,
+    Link, LinkConfig, LinkModel, Loss, Modulated, Modulator, ModulatorState, Outage, Outages, PacketEvent, PacketInfo, PathTrace, Pattern, Peak,
     QueueLimit, Reorder, Service, Slots, TokenBucket,
 };
 use proptest::collection::vec;
@@ -194,6 +194,7 @@ proptest! {
     fn traffic_that_starts_later_arrives_later(mut config in any_stages(), offered in packets(), later in 1..1_000_000_000u64) {
         config.outages = Outages::default();
         config.trace = None;
+        config.listed = Impairments::default();
         if let Loss::Pattern(_) = config.loss {
             config.loss = Loss::None;
         }
