@@ -81,6 +81,17 @@ pub enum Hand {
     },
 }
 
+impl Hand {
+    /// The impedance of an arm; `None` for a force.
+    #[must_use]
+    pub const fn arm(&self) -> Option<ArmConfig> {
+        match self {
+            Self::Arm { arm, .. } => Some(*arm),
+            Self::Force(_) => None,
+        }
+    }
+}
+
 /// How the device touches the copy of the object.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Contact {

@@ -71,10 +71,7 @@ impl DeviceConfig {
     /// enters as a held force.
     #[must_use]
     pub fn plant(self, hand: Option<&Hand>) -> Plant {
-        let arm = match hand {
-            Some(Hand::Arm { arm, .. }) => *arm,
-            Some(Hand::Force(_)) | None => ArmConfig { mass: 0.0, damping: 0.0, stiffness: 0.0 },
-        };
+        let arm = hand.and_then(Hand::arm).unwrap_or(ArmConfig { mass: 0.0, damping: 0.0, stiffness: 0.0 });
         Plant { mass: self.mass + arm.mass, damping: self.damping + arm.damping, stiffness: arm.stiffness }
     }
 }

@@ -1,6 +1,6 @@
 //! What the parts of a peer are made from, with every scaling applied.
 
-use cohaptic_peer::{CopyConfig, PeerConfig, State};
+use cohaptic_peer::{CopyConfig, Gains, PeerConfig, Plant, State};
 
 use crate::Scene;
 
@@ -18,11 +18,39 @@ impl Scene {
             place: u32::try_from(place).expect("a scene has fewer than 2^32 peers"),
             axes: self.axes.count(),
             contact: spec.contact,
-            coupling: spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers.len())),
+            coupling: self.coupling(place),
             tick: spec.clock.tick,
             compute_delay: spec.compute_delay,
             enclosure: self.object.enclosure,
         }
+    }
+
+    /// KC and BC between the device and the copy of the peer in that place.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn coupling(&self, place: usize) -> Gains {
+        let spec = &self.peers[place];
+        spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers.len()))
+    }
+
+    /// KT and BT: `gains`, those of the scene or those that the timeline sets, scaled by the number of peers.
+    #[must_use]
+    pub fn coordination_gains(&self, gains: Gains) -> Gains {
+        gains.scaled(self.coordination.scaling.coordination_factor(self.peers.len()))
+    }
+
+    /// The device of the peer in that place along one axis, with the arm that holds it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn device_plant(&self, place: usize) -> Plant {
+        let spec = &self.peers[place];
+        spec.device.plant(spec.hand.as_ref())
     }
 
     /// Each peer's copy of the object.

@@ -52,9 +52,9 @@ impl Scene {
     /// What the law of a peer is made from: the gains scaled by the number of peers, its tick, and the parameters of the law itself.
     fn law_parameters(&self, peer: usize) -> LawParameters {
         let peers = self.peers.len();
-        let CoordinationSpec { strategy, scaling, gains, settings, .. } = &self.coordination;
+        let CoordinationSpec { strategy, gains, settings, .. } = &self.coordination;
         LawParameters {
-            gains: gains.scaled(scaling.coordination_factor(peers)),
+            gains: self.coordination_gains(*gains),
             peers,
             tick: self.peers[peer].clock.tick,
             own: *settings.of(*strategy),

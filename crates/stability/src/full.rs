@@ -13,7 +13,7 @@ use crate::cost::{full_operations, pushed_operations};
 use crate::lifted::majorant::error_of;
 use crate::lifted::{Body, Lifted, Node, closer_of};
 use crate::network::{LinkTiming, NominalNetwork};
-use crate::structure::{Contacts, Structure, arm, common_time, count, device_plant, has_equal_clocks, linear_law};
+use crate::structure::{Contacts, Structure, common_time, count, has_equal_clocks, linear_law};
 use crate::timetable::{Event, Instants, NodeClock, Timetable};
 use crate::{AnalysisError, Matrix, StateKind, StateName, Watch};
 
@@ -70,7 +70,7 @@ fn error_of_known(scene: &Scene, structure: &Structure, time: f64) -> f64 {
         if node.device.is_none() {
             // A device that touches nothing moves on its own, and is pushed with the others.
             let spec = &scene.peers[peer];
-            node.device = Some(Body::new(device_plant(spec), scene.integrator, &spec.clock));
+            node.device = Some(Body::new(scene.device_plant(peer), scene.integrator, &spec.clock));
             node.coupling = Gains { stiffness: 0.0, damping: 0.0 };
         }
         node
@@ -134,7 +134,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             config.contact = if contacts.touching[place] { Contact::Grasp } else { Contact::None };
             config.enclosure = None;
             // The hand's force moves the device about and has no part in how it moves on its own; the arm has.
-            let hand = matches!(spec.hand, Some(Hand::Arm { .. })).then(|| Hand::Arm { arm: arm(spec), follows: Signal::Constant([0.0; 3]) });
+            let hand = spec.hand.as_ref().and_then(Hand::arm).map(|arm| Hand::Arm { arm, follows: Signal::Constant([0.0; 3]) });
             let device = SimulatedDevice::new(spec.device, hand.as_ref(), State::REST, scene.integrator, &spec.clock);
             let object = ObjectCopy::new(scene.copy_config(), State::REST, scene.integrator, &spec.clock);
             Peer::new(config, device, object, strategy(place), Held::new((1..peers).map(|_| State::REST)))
@@ -144,7 +144,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             return Err(AnalysisError::AgesByClocks { strategy: scene.coordination.strategy.name() });
         }
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
-        let tied = silent || (0..peers).any(|place| contacts.touching[place] && arm(&scene.peers[place]).stiffness > 0.0);
+        let tied = silent || (0..peers).any(|place| contacts.touching[place] && scene.device_plant(place).stiffness > 0.0);
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);
         let touching = contacts.touching.iter().copied().enumerate();
         let time = common_time(scene, timetable.frame, linear_law(scene, 0).map_or(scene.coordination.gains, |law| law.force.own), touching, false);
@@ -371,7 +371,7 @@ impl Layout {
             layout.first.push(layout.size);
             layout.pending.push(pending);
             layout.memory.push(memory);
-            if !contacts.touching[place] && arm(&scene.peers[place]).stiffness == 0.0 {
+            if !contacts.touching[place] && scene.device_plant(place).stiffness == 0.0 {
                 layout.loose.extend((0..A).map(|axis| layout.size + axis));
             }
             layout.size += 4 * A + if pending { 2 * A } else { 0 } + memory;

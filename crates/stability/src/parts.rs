@@ -8,7 +8,7 @@ use cohaptic_scene::Scene;
 use crate::cost::eigenvalue_operations;
 use crate::lifted::{Autonomous, Lifted};
 use crate::spectrum::bounded_radius;
-use crate::structure::{Structure, arm, device_plant};
+use crate::structure::Structure;
 use crate::{AnalysisError, Matrix, Method, Radius, Watch};
 
 /// A part of a scene that moves on its own.
@@ -140,9 +140,9 @@ pub(crate) fn alone(structure: &Structure, scene: &Scene, class: usize, axes: us
 
 /// A device that touches nothing: its velocity and, if an arm ties it to ground, its position.
 pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -> (Radius, usize) {
-    let spec = &scene.peers[structure.classes[class][0]];
-    let (short, long) = spec.clock.spans();
-    let plant = device_plant(spec);
+    let place = structure.classes[class][0];
+    let (short, long) = scene.peers[place].clock.spans();
+    let plant = scene.device_plant(place);
     // A frame is so many ticks; of a clock that drifts, some are longer by a nanosecond. Their steps have the same eigenvectors.
     let frame = structure.timetable.frame.as_nanos();
     let ticks = frame / short.as_nanos().max(1);
@@ -151,7 +151,7 @@ pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -
     let (some, others) = (over(short, ticks - longer), over(long, longer));
     let value = some.value * others.value;
     let error = some.error * (others.value + others.error) + some.value * others.error + f64::EPSILON * value;
-    (Radius { value, error }, if arm(spec).stiffness > 0.0 { 2 } else { 1 })
+    (Radius { value, error }, if plant.stiffness > 0.0 { 2 } else { 1 })
 }
 
 /// The spectral radius of one step of a body: of its velocity alone if nothing ties it to ground.

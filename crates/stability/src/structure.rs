@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::{ArmConfig, Gains, Hand, Plant};
+use cohaptic_peer::Gains;
 use cohaptic_scene::{PeerSpec, Scene};
 
 use crate::lifted::{Body, Lifted, Node, Sampling};
@@ -98,7 +98,7 @@ impl Structure {
             count(heard) / others
         });
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
-        let arm = |class: &Vec<usize>| contacts.touching[class[0]] && arm(&scene.peers[class[0]]).stiffness > 0.0;
+        let arm = |class: &Vec<usize>| contacts.touching[class[0]] && scene.device_plant(class[0]).stiffness > 0.0;
         let tied = contacts.at_wall || silent || classes.iter().any(arm);
         let touching = classes.iter().map(|class| contacts.touching[class[0]]).collect();
         Ok(Self { classes, touching, at_wall: contacts.at_wall, timetable, apart, weights, tied, peers })
@@ -127,21 +127,16 @@ impl Structure {
 
     /// The node that stands for a class.
     pub(crate) fn node(&self, scene: &Scene, class: usize) -> Node {
-        let spec = &scene.peers[self.classes[class][0]];
-        let object = Plant { mass: scene.copy_mass(), damping: scene.object.damping, stiffness: 0.0 };
+        let place = self.classes[class][0];
+        let spec = &scene.peers[place];
         Node {
-            device: self.touching[class].then(|| Body::new(device_plant(spec), scene.integrator, &spec.clock)),
-            object: Body::new(object, scene.integrator, &spec.clock),
-            coupling: self.coupling(spec),
+            device: self.touching[class].then(|| Body::new(scene.device_plant(place), scene.integrator, &spec.clock)),
+            object: Body::new(scene.copy_config().plant(), scene.integrator, &spec.clock),
+            coupling: scene.coupling(place),
             law: self.law(scene, class),
             wall: scene.object.enclosure.filter(|_| self.at_wall).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping }),
             compute_delay: spec.compute_delay,
         }
-    }
-
-    /// KC and BC of a peer, scaled.
-    pub(crate) fn coupling(&self, spec: &PeerSpec) -> Gains {
-        spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers))
     }
 
     /// The weight with which a difference within a class comes back: −1/(N−1).
@@ -199,14 +194,13 @@ pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, p
     let wall = scene.object.enclosure.filter(|_| at_wall).map_or(0.0, |wall| wall.stiffness);
     let (mut fastest, mut tick) = (0.0_f64, frame);
     for (place, touching) in peers {
-        let spec = &scene.peers[place];
-        let device = device_plant(spec);
-        let coupling = if touching { spec.coupling.stiffness * spec.coupling_scaling.coupling_factor(scene.peers.len()) } else { 0.0 };
+        let device = scene.device_plant(place);
+        let coupling = if touching { scene.coupling(place).stiffness } else { 0.0 };
         fastest = fastest.max((coordination.stiffness + wall + coupling) / scene.copy_mass());
         if touching {
             fastest = fastest.max((coupling + device.stiffness) / device.mass);
         }
-        tick = tick.min(spec.clock.tick);
+        tick = tick.min(scene.peers[place].clock.tick);
     }
     (1.0 / fastest.sqrt()).clamp(tick.as_secs_f64(), frame.as_secs_f64())
 }
@@ -230,24 +224,11 @@ pub(crate) fn links(classes: &[Vec<usize>], network: &NominalNetwork) -> Vec<(us
     links
 }
 
-/// The device and the arm that holds it.
-pub(crate) fn device_plant(spec: &PeerSpec) -> Plant {
-    let arm = arm(spec);
-    Plant { mass: spec.device.mass + arm.mass, damping: spec.device.damping + arm.damping, stiffness: arm.stiffness }
-}
-
-/// The arm that holds a peer's device; zero without one.
-pub(crate) fn arm(spec: &PeerSpec) -> ArmConfig {
-    match &spec.hand {
-        Some(Hand::Arm { arm, .. }) => *arm,
-        Some(Hand::Force(_)) | None => ArmConfig { mass: 0.0, damping: 0.0, stiffness: 0.0 },
-    }
-}
-
 /// Whether two peers move by the same equations.
 fn alike(one: &PeerSpec, other: &PeerSpec, touching: bool) -> bool {
     let same_clock = (one.clock, one.phase, one.compute_delay) == (other.clock, other.phase, other.compute_delay);
-    let same_device = || (one.device, arm(one)) == (other.device, arm(other));
+    let plant = |spec: &PeerSpec| spec.device.plant(spec.hand.as_ref());
+    let same_device = || (one.device, plant(one)) == (other.device, plant(other));
     let same_coupling = || (one.coupling, one.coupling_scaling) == (other.coupling, other.coupling_scaling);
     same_clock && same_device() && (!touching || same_coupling())
 }

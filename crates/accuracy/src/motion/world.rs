@@ -36,7 +36,6 @@ pub(crate) struct Pair {
 impl Pair {
     /// The pair of a scene, for a number of ticks.
     pub(crate) fn of(motion: &MotionScene, scene: &Scene, ticks: usize) -> Self {
-        let device = |peer: usize| scene.peers[peer].device.plant(scene.peers[peer].hand.as_ref());
         let copy = scene.copy_config().plant();
         // Arms of these scenes want to stay where they are, which is no held force.
         let force = |peer: usize, at: Instant| match &scene.peers[peer].hand {
@@ -49,10 +48,10 @@ impl Pair {
             Contact::Push(direction) => Touch::Push(if direction.positive { 1.0 } else { -1.0 }),
         };
         Self {
-            coupling: scene.peers[0].coupling,
-            coordination: scene.coordination.gains,
+            coupling: scene.coupling(0),
+            coordination: scene.coordination_gains(scene.coordination.gains),
             touch: [touch(0), touch(1)],
-            plants: [device(0), device(1), copy, copy],
+            plants: [scene.device_plant(0), scene.device_plant(1), copy, copy],
             hands: (0..ticks).map(instant).map(|at| [force(0, at), force(1, at)]).collect(),
             update: motion.update,
             delay: motion.delay,

@@ -11,7 +11,7 @@ use cohaptic_peer::{Contact, Enclosure, Gains, HandForce, Motion, Plant, State, 
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use super::eight::{Eight, Mask, WIDTH, larger, smaller};
+use super::lanes::{Lanes, Mask, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
 
 /// All bodies on all axes.
@@ -31,9 +31,9 @@ pub(super) struct Blocks<const A: usize> {
 }
 
 /// Position and velocity of eight bodies along one axis.
-type Motions = Motion<Eight>;
+type Motions = Motion<Lanes>;
 
-/// Eight devices with their copies of the object, along one axis.
+/// Lanes devices with their copies of the object, along one axis.
 #[derive(Clone, Debug)]
 struct Block {
     device: Motions,
@@ -41,14 +41,14 @@ struct Block {
     /// The mean of the samples held.
     mean: Motions,
     /// By how much those have moved on since they were sent.
-    lead: Eight,
+    lead: Lanes,
     /// What the law remembers: the numbers of one lane after those of another.
     memory: Vec<f64>,
-    hand: Eight,
+    hand: Lanes,
     /// KC and BC.
-    coupling: Gains<Eight>,
+    coupling: Gains<Lanes>,
     grasps: Mask,
-    device_map: StepMap<Eight>,
+    device_map: StepMap<Lanes>,
     /// The contacts of all eight, if any of them is one-sided.
     contacts: Option<Box<[Contact; WIDTH]>>,
     axis: usize,
@@ -59,17 +59,17 @@ struct Block {
 /// What all peers of a run have in common.
 #[derive(Clone, Debug)]
 struct Common {
-    law: BuiltIn<Eight>,
-    object_map: StepMap<Eight>,
+    law: BuiltIn<Lanes>,
+    object_map: StepMap<Lanes>,
 }
 
 /// The forces of a tick on eight peers.
 #[derive(Clone, Copy, Debug)]
 struct Forces {
     /// FC.
-    coupling: Eight,
+    coupling: Lanes,
     /// FC − FT, and the walls.
-    on_object: Eight,
+    on_object: Lanes,
 }
 
 /// Forces that are applied a tick late.
@@ -88,25 +88,25 @@ pub(super) struct Moved<const L: usize> {
     pub(super) finite: [bool; L],
 }
 
-const ZERO_MAP: StepMap<Eight> = StepMap::new([[Eight::ZERO; 2]; 2], [Eight::ZERO; 2]);
+const ZERO_MAP: StepMap<Lanes> = StepMap::new([[Lanes::ZERO; 2]; 2], [Lanes::ZERO; 2]);
 
 impl Forces {
-    const NONE: Self = Self { coupling: Eight::ZERO, on_object: Eight::ZERO };
+    const NONE: Self = Self { coupling: Lanes::ZERO, on_object: Lanes::ZERO };
 }
 
 /// Replaces the step map of one lane.
-fn set_map(maps: &mut StepMap<Eight>, lane: usize, map: &StepMap) {
+fn set_map(maps: &mut StepMap<Lanes>, lane: usize, map: &StepMap) {
     let (state, force) = map.coefficients();
     let mut numbers = state.into_iter().flatten().chain(force);
-    *maps = maps.map(|eight| {
-        let mut eight = *eight;
-        eight.0[lane] = numbers.next().unwrap_or_default();
-        eight
+    *maps = maps.map(|lanes| {
+        let mut lanes = *lanes;
+        lanes.0[lane] = numbers.next().unwrap_or_default();
+        lanes
     });
 }
 
 /// The laws of runs that are made of one law, as one of eight lanes; lane l is of run l modulo their number.
-fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Eight> {
+fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Lanes> {
     let coefficients = |law: &BuiltIn| {
         let mut all = Vec::new();
         let _ = law.map(|coefficient| all.push(*coefficient));
@@ -117,7 +117,7 @@ fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Eight> {
     let mut place = 0..;
     laws[0].map(|_| {
         let place = place.next().unwrap_or_default();
-        Eight(std::array::from_fn(|lane| each[lane % laws.len()][place]))
+        Lanes(std::array::from_fn(|lane| each[lane % laws.len()][place]))
     })
 }
 
@@ -248,10 +248,10 @@ impl<const A: usize> Blocks<A> {
     /// Everybody computes forces and moves to the next tick.
     #[inline(always)]
     pub(super) fn advance<const L: usize>(&mut self) -> Moved<L> {
-        let (mut discrepancy, mut size) = ([0.0; L], Eight::ZERO);
+        let (mut discrepancy, mut size) = ([0.0; L], Lanes::ZERO);
         let per_axis = self.places.blocks();
         for axis in 0..A {
-            let (mut low, mut high) = (Eight::splat(f64::INFINITY), Eight::splat(f64::NEG_INFINITY));
+            let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
             for place in axis * per_axis..(axis + 1) * per_axis {
                 let block = &mut self.blocks[place];
                 low = block.object.position.smaller(low);
@@ -280,7 +280,7 @@ impl<const A: usize> Blocks<A> {
 
     /// Whether everything in each run is finite, where `size` is the sum of the sizes of all that moves.
     #[inline(always)]
-    fn finite<const L: usize>(&self, size: Eight) -> [bool; L] {
+    fn finite<const L: usize>(&self, size: Lanes) -> [bool; L] {
         // A sum of sizes is finite only if they all are. Were it not for overflow it would also be so the other way round.
         let [a, b, c, d, e, f, g, h] = (size & self.goes_on).0;
         if ((a + e) + (b + f)) + ((c + g) + (d + h)) < f64::INFINITY { [true; L] } else { self.look_at_each() }
@@ -302,7 +302,7 @@ impl<const A: usize> Blocks<A> {
 
 /// The distance from the least to the greatest of each run.
 #[inline(always)]
-fn distances<const L: usize>(mut low: Eight, mut high: Eight) -> [f64; L] {
+fn distances<const L: usize>(mut low: Lanes, mut high: Lanes) -> [f64; L] {
     let mut width = WIDTH;
     while width > L {
         width /= 2;
@@ -319,11 +319,11 @@ fn distances<const L: usize>(mut low: Eight, mut high: Eight) -> [f64; L] {
 fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool>(
     devices: &mut Motions,
     objects: &mut Motions,
-    (means, leads): (&Motions, &Eight),
+    (means, leads): (&Motions, &Lanes),
     memory: &mut [f64],
-    hands: &Eight,
-    (coupling, grasps): (&Gains<Eight>, &Mask),
-    device_map: &StepMap<Eight>,
+    hands: &Lanes,
+    (coupling, grasps): (&Gains<Lanes>, &Mask),
+    device_map: &StepMap<Lanes>,
     common: &Common,
 ) {
     let remembered = memory.len() / WIDTH;
@@ -349,7 +349,7 @@ fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool>(
 
 impl Block {
     fn empty(axis: usize, memory: usize) -> Self {
-        let zero = Eight::ZERO;
+        let zero = Lanes::ZERO;
         let rest = Motion { position: zero, velocity: zero };
         Self {
             device: rest,
@@ -398,8 +398,8 @@ impl Block {
 
     /// The forces of a tick without walls.
     #[inline(always)]
-    fn forces(&mut self, law: &BuiltIn<Eight>) -> Forces {
-        let mut coupling = Eight::ZERO;
+    fn forces(&mut self, law: &BuiltIn<Lanes>) -> Forces {
+        let mut coupling = Lanes::ZERO;
         for lane in 0..WIDTH {
             coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), self.apart(lane));
         }
@@ -410,7 +410,7 @@ impl Block {
                 coupling.0[lane] = contacts[lane].force_along(self.axis, &gains, self.apart(lane));
             }
         }
-        let mut on_copy = Eight::ZERO;
+        let mut on_copy = Lanes::ZERO;
         let remembered = self.memory.len() / WIDTH;
         for lane in 0..WIDTH {
             let seen = Observation { own: lane_of(&self.object, lane), mean: lane_of(&self.mean, lane), lead: self.lead.0[lane] };
@@ -428,7 +428,7 @@ impl Block {
     }
 
     #[inline(never)]
-    fn add_walls(&self, walls: &[Option<Enclosure>], on_object: &mut Eight) {
+    fn add_walls(&self, walls: &[Option<Enclosure>], on_object: &mut Lanes) {
         for lane in 0..WIDTH {
             if let Some(walls) = &walls[lane % walls.len()] {
                 on_object.0[lane] += walls.force_along(self.axis, self.object.position.0[lane], self.object.velocity.0[lane]);
@@ -438,7 +438,7 @@ impl Block {
 
     /// Moves devices and copies to the next tick.
     #[inline(always)]
-    fn advance(&mut self, object_map: &StepMap<Eight>, forces: &Forces) {
+    fn advance(&mut self, object_map: &StepMap<Lanes>, forces: &Forces) {
         for lane in 0..WIDTH {
             let map = self.device_map.map(|coefficient| coefficient.0[lane]);
             let mut device = lane_of(&self.device, lane);
@@ -456,7 +456,7 @@ impl Block {
     }
 
     #[inline(always)]
-    fn size(&self) -> Eight {
+    fn size(&self) -> Lanes {
         let size = |motions: &Motions| motions.position.abs() + motions.velocity.abs();
         size(&self.device) + size(&self.object)
     }

@@ -8,7 +8,7 @@
 //! With events, a second of ten peers takes 5.1 times as long over constant delays, and 2.0 times over jitter and loss.
 
 mod blocks;
-mod eight;
+mod lanes;
 mod lead;
 mod place;
 mod samples;
@@ -25,7 +25,7 @@ use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
 use crate::summary::{Ending, LinkSummary, PeerSummary, Summary};
 use blocks::{Blocks, Moved};
 use place::Places;
-use samples::{Broadcast, Single};
+use samples::{Broadcast, PerPacket};
 pub(crate) use shape::Shape;
 pub use side_by_side::{run_side_by_side, same_shape};
 
@@ -51,7 +51,7 @@ pub(crate) struct Arrays<'a, const A: usize, const L: usize> {
 #[derive(Debug)]
 enum Samples<const A: usize, const L: usize> {
     Broadcast(Broadcast<A, L>),
-    Single(Single<A, L>),
+    PerPacket(PerPacket<A, L>),
 }
 
 impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
@@ -61,7 +61,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         let tick_nanos = nanos(shape.tick);
         let samples = match shape.delay {
             Some(delay) => Samples::Broadcast(Broadcast::new(&scenes, nanos(delay).div_ceil(tick_nanos))),
-            None => Samples::Single(Single::new(&scenes, shape.end, tick_nanos)),
+            None => Samples::PerPacket(PerPacket::new(&scenes, shape.end, tick_nanos)),
         };
         Self {
             blocks: Blocks::new(places, &scenes, &laws),
@@ -92,7 +92,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
                 }
             }
             if now >= self.shape.end {
-                if let Samples::Single(samples) = &mut self.samples {
+                if let Samples::PerPacket(samples) = &mut self.samples {
                     samples.finish(tick);
                 }
                 let end = self.shape.end;
@@ -116,7 +116,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
         match &mut self.samples {
             Samples::Broadcast(samples) => samples.deliver(tick),
-            Samples::Single(samples) => samples.deliver(tick),
+            Samples::PerPacket(samples) => samples.deliver(tick),
         }
         self.blocks.move_hands(now);
         if let Some(horizons) = &self.horizons {
@@ -146,7 +146,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             for axis in 0..A {
                 let lead = std::array::from_fn(|run| match &self.samples {
                     Samples::Broadcast(samples) => samples.lead((axis, peer, run), now, horizons[run], sent),
-                    Samples::Single(samples) => samples.lead((axis, peer, run), now, horizons[run], sent),
+                    Samples::PerPacket(samples) => samples.lead((axis, peer, run), now, horizons[run], sent),
                 });
                 self.blocks.set_lead::<L>(axis, peer, lead);
             }
@@ -161,7 +161,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             *next += self.shape.send_every;
             match &mut self.samples {
                 Samples::Broadcast(samples) => samples.send(tick, peer, &self.blocks),
-                Samples::Single(samples) => samples.send(tick, now, peer, &self.blocks),
+                Samples::PerPacket(samples) => samples.send(tick, now, peer, &self.blocks),
             }
         }
         self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
@@ -199,7 +199,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             Ending::Diverged(_) | Ending::Interrupted(_) => Instant::from_nanos((ticks - 1) * nanos(self.shape.tick)),
         };
         if delivered_until < self.shape.end
-            && let Samples::Single(samples) = &mut self.samples
+            && let Samples::PerPacket(samples) = &mut self.samples
         {
             let Shape { tick, send_every, phases, .. } = &self.shape;
             samples.end_early(run, |sender, sequence| Instant::from_nanos((phases[sender] + sequence * send_every) * nanos(*tick)));
@@ -208,7 +208,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             let (position, velocity) = (0..A).map(|axis| self.blocks.object(axis, place, run)).unzip();
             let stale_samples = match &self.samples {
                 Samples::Broadcast(_) => 0,
-                Samples::Single(samples) => samples.stale_samples(place, run),
+                Samples::PerPacket(samples) => samples.stale_samples(place, run),
             };
             PeerSummary { name: peer.name.clone(), position, velocity, stale_samples, refused_samples: 0 }
         });
@@ -231,7 +231,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     /// The counters of a link after so many ticks, if what arrives by an instant is delivered.
     fn link_stats(&self, from: usize, to: usize, run: usize, ticks: u64, until: Instant) -> LinkStats {
         let delay = match (&self.samples, self.shape.delay) {
-            (Samples::Single(samples), _) => return samples.stats(from, to, run),
+            (Samples::PerPacket(samples), _) => return samples.stats(from, to, run),
             (Samples::Broadcast(_), delay) => nanos(delay.unwrap_or_default()),
         };
         // Over a constant delay a link need not count: sent at phase, phase + M, phase + 2M …
@@ -256,7 +256,7 @@ impl<const A: usize, const L: usize> NullaryFnOnce for Motion<'_, A, L> {
     fn call(self) -> Moved<L> {
         match self.samples {
             Samples::Broadcast(samples) => samples.refresh(self.blocks),
-            Samples::Single(samples) => samples.refresh(self.blocks),
+            Samples::PerPacket(samples) => samples.refresh(self.blocks),
         }
         self.blocks.advance::<L>()
     }

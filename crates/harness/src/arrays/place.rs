@@ -1,6 +1,6 @@
 //! Where the numbers of a body lie.
 
-use super::eight::WIDTH;
+use super::lanes::WIDTH;
 
 /// Which of the eight numbers of which block.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -6,11 +6,11 @@ use cohaptic_scene::Scene;
 use super::blocks::Blocks;
 
 pub(super) use broadcast::Broadcast;
-pub(super) use single::Single;
+pub(super) use per_packet::PerPacket;
 
 mod broadcast;
+mod per_packet;
 mod quads;
-mod single;
 
 /// A sample of every run, along all axes.
 #[derive(Clone, Copy, Debug)]

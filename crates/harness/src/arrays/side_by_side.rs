@@ -2,7 +2,7 @@
 
 use cohaptic_scene::{Axes, FromScene, Scene};
 
-use super::eight::WIDTH;
+use super::lanes::WIDTH;
 use super::{Arrays, Shape};
 use crate::plan::{Model, Plan};
 use crate::{NoObserver, Simulation, Summary};
@@ -24,7 +24,7 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
         let alike = rest.iter().take(WIDTH).take_while(|scene| shape.is_some() && self::shape(scene) == shape).count();
         if let Some(shape) = shape.filter(|shape| pays(shape, alike)) {
             let (now, later) = rest.split_at(alike);
-            summaries.extend(run_eight(now, shape));
+            summaries.extend(run_lanes(now, shape));
             rest = later;
         } else {
             let Ok(summary) = Simulation::new(first, Model::Least).run(&mut NoObserver);
@@ -55,7 +55,7 @@ fn shape(scene: &Scene) -> Option<Shape> {
 }
 
 /// Runs up to eight scenes of one shape; the last one fills the lanes that are left.
-fn run_eight(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
+fn run_lanes(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
     let lanes: [&Scene; WIDTH] = std::array::from_fn(|lane| &scenes[lane.min(scenes.len() - 1)]);
     let laws = lanes.map(|scene| scene.law(0));
     let summaries = match lanes[0].axes {

@@ -161,7 +161,7 @@ impl Rows {
 
     fn coordination(&mut self, scene: &Scene) {
         let spec = &scene.coordination;
-        let gains = spec.gains.scaled(spec.scaling.coordination_factor(scene.peers.len()));
+        let gains = scene.coordination_gains(spec.gains);
         let scaling = match spec.scaling {
             Scaling::None => "as written",
             Scaling::InverseN => "scaled by 4(N-1)/N^2",

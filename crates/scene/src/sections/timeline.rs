@@ -155,13 +155,10 @@ fn contact_is_possible(peer: &PeerSpec, contact: Contact, node: &Node, context: 
 
 /// An arm adds its mass to the device: it cannot appear, vanish or change while the scene runs.
 fn hand_is_possible(peer: &PeerSpec, hand: Option<&Hand>, node: &Node, context: Context<'_>) -> bool {
-    let arm = |hand: Option<&Hand>| match hand {
-        Some(Hand::Arm { arm, .. }) => Some(*arm),
-        Some(Hand::Force(_)) | None => None,
-    };
-    let same = arm(peer.hand.as_ref()) == arm(hand);
+    let arm = peer.hand.as_ref().and_then(Hand::arm);
+    let same = arm == hand.and_then(Hand::arm);
     if !same {
-        let expected = if arm(peer.hand.as_ref()).is_some() { "a hand with the same arm" } else { "a hand without an arm" };
+        let expected = if arm.is_some() { "a hand with the same arm" } else { "a hand without an arm" };
         let message = format!("an arm cannot appear, vanish or change while the scene runs: expected {expected} for peer \"{}\"", peer.name);
         context.fault_at(node, message);
     }

@@ -19,7 +19,7 @@ use crate::lifted::{Body, Lifted, Node, Sampling};
 use crate::linear_form::LinearLaw;
 use crate::network::NominalNetwork;
 use crate::parts::{radius_of, reduced};
-use crate::structure::{Contacts, Structure, arm, count, device_plant};
+use crate::structure::{Contacts, Structure, count};
 use crate::timetable::{Event, NodeClock, Timetable};
 use crate::{AnalysisError, Matrix, Method, Radius, Unwatched, Verdict, Watch};
 
@@ -84,8 +84,9 @@ impl Admittance {
         let structure = Structure::with_alone(&[scene], &network, &contacts, Some(peer))?;
         let mut admittance = Self::of_classes(scene, structure, peer, watch)?;
         if !contacts.touching[peer] {
-            let device = Some(Body::new(device_plant(spec), scene.integrator, &spec.clock));
-            admittance.leave_bare(device, NodeClock::of(scene, peer), arm(spec).stiffness > 0.0)?;
+            let device = scene.device_plant(peer);
+            let body = Some(Body::new(device, scene.integrator, &spec.clock));
+            admittance.leave_bare(body, NodeClock::of(scene, peer), device.stiffness > 0.0)?;
         }
         admittance.highest = 0.5 * admittance.tick_rate();
         admittance.notes = network.notes.iter().cloned().chain(notes).collect();

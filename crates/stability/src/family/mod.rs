@@ -22,7 +22,7 @@ pub use criterion::{Cell, Criterion};
 pub use error::FamilyError;
 pub use range::{KeyRange, KeyRangeError};
 
-use crate::plan::PlanScratch;
+use crate::scene_radius::RadiusScratch;
 use crate::{Radius, Unwatched, Watch, has_chance};
 use leaves::Probe;
 use prepared::Prepared;
@@ -58,7 +58,7 @@ struct Last {
     fixed: Vec<u64>,
     prepared: Arc<Prepared>,
     scene: Scene,
-    plans: Vec<PlanScratch>,
+    radii: Vec<RadiusScratch>,
     family: Arc<()>,
 }
 
@@ -86,7 +86,7 @@ impl Family {
         let high: Vec<f64> = family.keys.iter().map(|range| range.high).collect();
         let at_low = family.scene(&low).map_err(|error| family.no_number(error))?;
         let at_high = family.scene(&high).map_err(|error| family.no_number(error))?;
-        crate::plan::plans(&[&at_low])?;
+        crate::scene_radius::scene_radii(&[&at_low])?;
         // The chance at one end may be none at the other: no loss, no jitter. In between a key may take no value at all.
         let inside: Vec<f64> = family.keys.iter().enumerate().map(|(key, range)| range.odd(key)).collect();
         let chance = has_chance(&at_low) || has_chance(&at_high) || family.scene(&inside).is_ok_and(|scene| has_chance(&scene));
@@ -176,10 +176,10 @@ impl Family {
             .is_some_and(|last| Arc::ptr_eq(&last.family, &self.identity) && self.fixed_bits(values).eq(last.fixed.iter().copied()));
         if !is_last {
             let prepared = self.prepared(values)?;
-            let (scene, plans) = prepared.scratch();
-            scratch.last = Some(Last { fixed: self.fixed_bits(values).collect(), prepared, scene, plans, family: self.identity.clone() });
+            let (scene, radii) = prepared.scratch();
+            scratch.last = Some(Last { fixed: self.fixed_bits(values).collect(), prepared, scene, radii, family: self.identity.clone() });
         }
-        let Some(Last { prepared, scene, plans, .. }) = &mut scratch.last else {
+        let Some(Last { prepared, scene, radii, .. }) = &mut scratch.last else {
             return Ok(Cell::certain(Radius { value: f64::NAN, error: f64::INFINITY }));
         };
         // Two keys at most.
@@ -191,8 +191,8 @@ impl Family {
         let learned = &learned[..count];
         prepared.write(learned, scene);
         let cell = match self.criterion {
-            Criterion::SpectralRadius => Cell::certain(prepared.radius::<BOUND>(scene, plans)),
-            Criterion::MeanSquare => prepared.mean_square::<BOUND>(learned, scene, plans, watch)?,
+            Criterion::SpectralRadius => Cell::certain(prepared.radius::<BOUND>(scene, radii)),
+            Criterion::MeanSquare => prepared.mean_square::<BOUND>(learned, scene, radii, watch)?,
         };
         if !prepared.is_varied() {
             // It stands for these values only.

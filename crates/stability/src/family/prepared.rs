@@ -5,7 +5,7 @@ use cohaptic_scene::Scene;
 use super::criterion::Cell;
 use super::leaves::{Leaf, Probe, learn};
 use crate::mean_square::Followed;
-use crate::plan::{Plan, PlanScratch, plans};
+use crate::scene_radius::{RadiusScratch, SceneRadius, scene_radii};
 use crate::{AnalysisError, Limits, Radius, Watch, has_chance, mean_square_watched};
 
 /// A scene with learned keys.
@@ -17,7 +17,7 @@ pub(super) struct Prepared {
     /// For each learned key, the numbers of the others, where the second moment may be followed peer by peer.
     others: Vec<Vec<Leaf>>,
     /// One for each combination of contacts.
-    plans: Vec<Plan>,
+    radii: Vec<SceneRadius>,
 }
 
 impl Prepared {
@@ -25,9 +25,9 @@ impl Prepared {
     pub(super) fn new(mut probes: Vec<Probe>) -> Result<Option<Self>, AnalysisError> {
         let Some(mut leaves) = learn(&mut probes) else { return Ok(None) };
         let scenes: Vec<&Scene> = probes.iter().map(|probe| &probe.scene).collect();
-        let plans = plans(&scenes)?;
+        let radii = scene_radii(&scenes)?;
         // Of each class only the first member is ever looked at.
-        let mut looked_at: Vec<usize> = plans.iter().flat_map(|plan| plan.classes().iter().map(|class| class[0])).collect();
+        let mut looked_at: Vec<usize> = radii.iter().flat_map(|radius| radius.classes().iter().map(|class| class[0])).collect();
         looked_at.sort_unstable();
         looked_at.dedup();
         let is_other = |leaf: &Leaf| matches!(leaf, Leaf::Peer(place, _) if looked_at.binary_search(place).is_err());
@@ -37,7 +37,7 @@ impl Prepared {
             leaves.retain(|leaf| !is_other(leaf));
         }
         let scene = probes.swap_remove(0).scene;
-        Ok(Some(Self { scene, leaves, others, plans }))
+        Ok(Some(Self { scene, leaves, others, radii }))
     }
 
     pub(super) fn is_varied(&self) -> bool {
@@ -50,9 +50,9 @@ impl Prepared {
         self.leaves.iter().map(Vec::len).sum()
     }
 
-    /// A scene of one's own to write in, and room for every plan.
-    pub(super) fn scratch(&self) -> (Scene, Vec<PlanScratch>) {
-        (self.scene.clone(), self.plans.iter().map(|_| PlanScratch::default()).collect())
+    /// A scene of one's own to write in, and room for every radius.
+    pub(super) fn scratch(&self) -> (Scene, Vec<RadiusScratch>) {
+        (self.scene.clone(), self.radii.iter().map(|_| RadiusScratch::default()).collect())
     }
 
     /// Writes those values of the learned keys into the scene.
@@ -66,15 +66,15 @@ impl Prepared {
         &self,
         values: &[f64],
         scene: &mut Scene,
-        scratch: &mut [PlanScratch],
+        scratch: &mut [RadiusScratch],
         watch: &dyn Watch,
     ) -> Result<Cell, AnalysisError> {
-        let is_certain = |plan: &Plan| matches!(plan.followed(), Ok(Followed::Certain));
-        if self.plans.iter().all(is_certain) {
+        let is_certain = |radius: &SceneRadius| matches!(radius.followed(), Ok(Followed::Certain));
+        if self.radii.iter().all(is_certain) {
             return Ok(Cell { radius: self.radius::<BOUND>(scene, scratch).over(2), is_nominal: false });
         }
-        let quick = |scratch: &mut [PlanScratch]| {
-            self.plans.iter().zip(scratch).try_fold(0.0, |worst: f64, (plan, scratch)| Some(worst.max(plan.mean_square(scene, scratch)?)))
+        let quick = |scratch: &mut [RadiusScratch]| {
+            self.radii.iter().zip(scratch).try_fold(0.0, |worst: f64, (radius, scratch)| Some(worst.max(radius.mean_square(scene, scratch)?)))
         };
         if !BOUND && let Some(value) = quick(scratch) {
             return Ok(Cell { radius: Radius { value, error: 0.0 }, is_nominal: false });
@@ -90,8 +90,8 @@ impl Prepared {
     }
 
     /// The largest radius of all combinations of contacts.
-    pub(super) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut [PlanScratch]) -> Radius {
-        let radii = self.plans.iter().zip(scratch).map(|(plan, scratch)| plan.radius::<BOUND>(scene, scratch));
+    pub(super) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut [RadiusScratch]) -> Radius {
+        let radii = self.radii.iter().zip(scratch).map(|(radius, scratch)| radius.radius::<BOUND>(scene, scratch));
         let worst = |one: Radius, other: Radius| {
             if BOUND {
                 one.or(other)

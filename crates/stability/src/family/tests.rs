@@ -133,15 +133,15 @@ proptest! {
         let family = family(&overrides, &["coordination.stiffness=0..100000"]);
         let scene = family.scene(&[stiffness]).unwrap();
         let prepared = family.prepared(&[stiffness]).unwrap();
-        let (mut own, mut plans) = prepared.scratch();
+        let (mut own, mut radii) = prepared.scratch();
         prepared.write(&[stiffness], &mut own);
-        prepared.radius::<true>(&own, &mut plans);
+        prepared.radius::<true>(&own, &mut radii);
         let network = crate::network::NominalNetwork::of(&scene).unwrap();
         let contacts = crate::analysis::combinations(&scene).unwrap().remove(0).contacts;
         let structure = crate::structure::Structure::of(&[&scene], &network, &contacts).unwrap();
         let nodes = [structure.node(&scene, 0)];
         let frame = structure.quotient(&scene, &nodes).frame(&mut crate::lifted::Autonomous);
-        prop_assert_eq!(plans[0].together(), &frame.monodromy());
+        prop_assert_eq!(radii[0].together(), &frame.monodromy());
         agrees(&family, &[stiffness], &mut FamilyScratch::default());
     }
 }

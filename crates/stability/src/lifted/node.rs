@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::{Clock, Gains, Integrator, Plant, StepMap};
+use cohaptic_peer::{Clock, Gains, Integrator, Motion, Plant, StepMap, tick};
 
 use super::Sampling;
 use crate::Matrix;
@@ -27,6 +27,12 @@ impl Body {
 
     pub(crate) fn map(&self, span: Duration) -> &StepMap {
         if span == self.short.0 { &self.short.1 } else { &self.long }
+    }
+
+    /// The step map for velocities multiplied by `time` \[s\]; its forces stay in newtons.
+    pub(crate) fn scaled_map(&self, span: Duration, time: f64) -> StepMap {
+        let (e, g) = self.map(span).coefficients();
+        StepMap::new([[e[0][0], e[0][1] / time], [e[1][0] * time, e[1][1]]], [g[0], g[1] * time])
     }
 }
 
@@ -66,6 +72,13 @@ pub(crate) struct Scale {
     pub(crate) time: f64,
     /// What forces are multiplied by [m/N].
     pub(crate) compliance: f64,
+}
+
+impl Scale {
+    /// Gains towards a velocity that is multiplied by the common time.
+    pub(crate) fn gains(self, gains: Gains) -> Gains {
+        Gains { stiffness: gains.stiffness, damping: gains.damping / self.time }
+    }
 }
 
 /// Rows that a tick works with, kept from tick to tick.
@@ -148,24 +161,23 @@ impl Node {
         scale: Scale,
         scratch: &mut Scratch,
     ) {
-        let own = coordination_of(self.law.force.own, self.wall);
+        let own = scale.gains(coordination_of(self.law.force.own, self.wall));
         let columns = z.columns();
         let Scratch { coupling, on_object, memory } = scratch;
         {
             let target = heard(0);
             let (x, v) = (z.row(rows.object), z.row(rows.object + 1));
-            let damping = own.damping / scale.time;
             for column in 0..columns {
-                on_object[column] = target[column] - (own.stiffness * x[column] + damping * v[column]);
+                let copy = Motion { position: x[column], velocity: v[column] };
+                on_object[column] = tick::on_object(0.0, tick::coordinate(&own, copy) - target[column]);
             }
             if let Some(device) = rows.device {
                 let (xh, vh) = (z.row(device), z.row(device + 1));
-                let (stiffness, damping) = (self.coupling.stiffness, self.coupling.damping / scale.time);
+                let gains = scale.gains(self.coupling);
                 for column in 0..columns {
-                    //= Rakhsha & Constantinescu 2015, eq. (9)
-                    let force = stiffness * (xh[column] - x[column]) + damping * (vh[column] - v[column]);
-                    coupling[column] = force;
-                    on_object[column] += force;
+                    let copy = Motion { position: x[column], velocity: v[column] };
+                    coupling[column] = tick::grasp(&gains, Motion { position: xh[column], velocity: vh[column] }.relative_to(copy));
+                    on_object[column] += coupling[column];
                 }
             }
         }
@@ -178,17 +190,12 @@ impl Node {
                 exchange(z.row_mut(pending + 1), coupling, scale.compliance);
             }
         }
-        advance(z, rows.object, self.object.map(span), on_object, scale.time);
+        advance(z, rows.object, &self.object.scaled_map(span, scale.time), on_object);
         if let (Some(first), Some(device)) = (rows.device, &self.device) {
-            for force in coupling.iter_mut() {
-                *force = -*force;
+            for (column, force) in coupling.iter_mut().enumerate() {
+                *force = tick::on_device(hand.map_or(0.0, |hand| hand[column]), *force);
             }
-            if let Some(hand) = hand {
-                for (force, hand) in coupling.iter_mut().zip(hand) {
-                    *force += hand;
-                }
-            }
-            advance(z, first, device.map(span), coupling, scale.time);
+            advance(z, first, &device.scaled_map(span, scale.time), coupling);
         }
     }
 }
@@ -238,7 +245,7 @@ impl Node {
 }
 
 /// Coordination and wall pull on the copy's own state alike.
-fn coordination_of(coordination: Gains, wall: Option<Gains>) -> Gains {
+pub(crate) fn coordination_of(coordination: Gains, wall: Option<Gains>) -> Gains {
     wall.map_or(coordination, |wall| Gains { stiffness: coordination.stiffness + wall.stiffness, damping: coordination.damping + wall.damping })
 }
 
@@ -251,13 +258,11 @@ fn exchange(stored: &mut [f64], force: &mut [f64], compliance: f64) {
     }
 }
 
-fn advance(z: &mut Matrix, first: usize, map: &StepMap, force: &[f64], time: f64) {
-    let (e, g) = map.coefficients();
-    let (e01, e10, g1) = (e[0][1] / time, e[1][0] * time, g[1] * time);
+fn advance(z: &mut Matrix, first: usize, map: &StepMap, force: &[f64]) {
     let (x, v) = z.two_rows_mut(first);
-    for ((x, v), f) in x.iter_mut().zip(v).zip(force) {
-        let (x0, v0) = (*x, *v);
-        *x = x0 + (e[0][0] * x0 + e01 * v0 + g[0] * f);
-        *v = v0 + (e10 * x0 + e[1][1] * v0 + g1 * f);
+    for ((x, v), force) in x.iter_mut().zip(v).zip(force) {
+        let mut body = Motion { position: *x, velocity: *v };
+        map.advance(&mut body, *force);
+        (*x, *v) = (body.position, body.velocity);
     }
 }

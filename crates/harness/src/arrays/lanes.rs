@@ -1,21 +1,21 @@
-//! Eight numbers at once.
+//! Lanes numbers at once.
 
 use std::ops::{Add, BitAnd, Div, Mul, Sub};
 
 /// How many numbers are computed at once: a cache line, and one register of the widest processors.
 pub(super) const WIDTH: usize = 8;
 
-/// Eight numbers that have the same done to them. Each is rounded as it would be alone, so what they are computed with changes no bit.
+/// Lanes numbers that have the same done to them. Each is rounded as it would be alone, so what they are computed with changes no bit.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub(super) struct Eight(pub(super) [f64; WIDTH]);
+pub(super) struct Lanes(pub(super) [f64; WIDTH]);
 
 /// For each of eight numbers all bits or none.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct Mask([u64; WIDTH]);
 
-impl Eight {
+impl Lanes {
     pub(super) const ZERO: Self = Self([0.0; WIDTH]);
 
     #[inline(always)]
@@ -73,13 +73,13 @@ impl Mask {
 
     /// `yes` where it holds, `no` elsewhere.
     #[inline(always)]
-    pub(super) fn choose(self, yes: Eight, no: Eight) -> Eight {
-        Eight(std::array::from_fn(|i| f64::from_bits(yes.0[i].to_bits() & self.0[i] | no.0[i].to_bits() & !self.0[i])))
+    pub(super) fn choose(self, yes: Lanes, no: Lanes) -> Lanes {
+        Lanes(std::array::from_fn(|i| f64::from_bits(yes.0[i].to_bits() & self.0[i] | no.0[i].to_bits() & !self.0[i])))
     }
 }
 
 /// The numbers where the mask holds, +0 elsewhere.
-impl BitAnd<Mask> for Eight {
+impl BitAnd<Mask> for Lanes {
     type Output = Self;
 
     #[inline(always)]
@@ -90,7 +90,7 @@ impl BitAnd<Mask> for Eight {
 
 macro_rules! each {
     ($operation:ident, $name:ident, $sign:tt) => {
-        impl $operation for Eight {
+        impl $operation for Lanes {
             type Output = Self;
 
             #[inline(always)]
@@ -113,9 +113,9 @@ mod tests {
     fn a_mask_takes_away_even_the_sign_of_zero() {
         let mut mask = Mask::NONE;
         mask.set(1, true);
-        let masked = Eight::splat(-0.0) & mask;
+        let masked = Lanes::splat(-0.0) & mask;
         assert_eq!((masked.0[0].to_bits(), masked.0[1].to_bits()), (0, (-0.0_f64).to_bits()));
-        let chosen = mask.choose(Eight::splat(1.0), Eight::splat(2.0));
+        let chosen = mask.choose(Lanes::splat(1.0), Lanes::splat(2.0));
         assert_eq!((chosen.0[0], chosen.0[1], mask.get(0), mask.get(1)), (2.0, 1.0, false, true));
     }
 }

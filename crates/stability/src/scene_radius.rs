@@ -8,19 +8,19 @@ use crate::lifted::{Autonomous, Body, Lifted, Node};
 use crate::mean_square::{EqualScratch, Followed};
 use crate::network::NominalNetwork;
 use crate::parts::loose_device;
-use crate::small::{SmallFrame, SmallNode};
 use crate::spectrum::Workspace;
-use crate::structure::{Contacts, Structure, arm, device_plant};
+use crate::stack_frame::{StackFrame, StackNode};
+use crate::structure::{Contacts, Structure};
 use crate::{AnalysisError, Matrix, Radius};
 
 /// What about a linear scene does not change with its numbers.
 #[derive(Clone, Debug)]
-pub(crate) struct Plan {
+pub(crate) struct SceneRadius {
     structure: Structure,
     /// Whether something other than an arm ties the object to ground.
     tied: bool,
-    /// The frame of the averages, if it is small.
-    together: Option<SmallFrame>,
+    /// The frame of the averages, if it fits on the stack.
+    together: Option<StackFrame>,
     apart: Vec<Option<Apart>>,
     /// −1/(N−1).
     difference: Matrix,
@@ -31,14 +31,14 @@ pub(crate) struct Plan {
 /// How the members of a class differ.
 #[derive(Clone, Debug)]
 struct Apart {
-    small: Option<SmallFrame>,
+    stack: Option<StackFrame>,
     /// How many of its frames the whole scene's takes.
     frames: u32,
 }
 
 /// Room for the computation, and the step maps of the bodies seen last.
 #[derive(Debug, Default)]
-pub(crate) struct PlanScratch {
+pub(crate) struct RadiusScratch {
     nodes: Vec<Node>,
     bodies: Vec<Bodies>,
     together: Matrix,
@@ -57,7 +57,7 @@ struct Bodies {
     loose: Option<Radius>,
 }
 
-impl PlanScratch {
+impl RadiusScratch {
     /// The matrix of the averages that was computed last.
     #[cfg(test)]
     pub(crate) fn together(&self) -> &Matrix {
@@ -65,7 +65,7 @@ impl PlanScratch {
     }
 }
 
-impl Plan {
+impl SceneRadius {
     /// For scenes that differ in numbers only. Whether an arm ties the object to ground may differ too.
     pub(crate) fn new(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
         // Without arms, to see what else ties.
@@ -75,11 +75,11 @@ impl Plan {
         }
         let all: Vec<&Scene> = std::iter::once(&armless).chain(scenes.iter().copied()).collect();
         let structure = Structure::of(&all, network, contacts)?;
-        let together = SmallFrame::of(&structure.timetable);
+        let together = StackFrame::of(&structure.timetable);
         let apart = structure.apart.iter().map(|timetable| {
             timetable.as_ref().map(|timetable| {
                 let frames = structure.timetable.frame.as_nanos() / timetable.frame.as_nanos().max(1);
-                Apart { small: SmallFrame::of(timetable), frames: u32::try_from(frames).unwrap_or(u32::MAX) }
+                Apart { stack: StackFrame::of(timetable), frames: u32::try_from(frames).unwrap_or(u32::MAX) }
             })
         });
         let apart = apart.collect();
@@ -99,16 +99,16 @@ impl Plan {
     }
 
     /// The largest radius of all parts. Without `BOUND` its error is zero and means nothing.
-    pub(crate) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut PlanScratch) -> Radius {
+    pub(crate) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Radius {
         self.refresh(scene, scratch);
-        let PlanScratch { nodes, bodies, together, apart, workspace, .. } = scratch;
+        let RadiusScratch { nodes, bodies, together, apart, workspace, .. } = scratch;
         let structure = &self.structure;
         let quotient = self.quotient(scene, nodes);
         let mut worst = part::<BOUND>(self.together.as_ref(), &quotient, together, workspace);
         for (class, part_of) in self.apart.iter().enumerate() {
-            if let (Some(Apart { small, frames }), Some(timetable)) = (part_of, &structure.apart[class]) {
+            if let (Some(Apart { stack, frames }), Some(timetable)) = (part_of, &structure.apart[class]) {
                 let lifted = Lifted { nodes: &nodes[class..=class], weights: &self.difference, timetable, tied: true, ..quotient };
-                let radius = part::<BOUND>(small.as_ref(), &lifted, apart, workspace).over(*frames);
+                let radius = part::<BOUND>(stack.as_ref(), &lifted, apart, workspace).over(*frames);
                 worst = worse::<BOUND>(worst, radius);
             }
             if let Some(loose) = bodies[class].loose {
@@ -119,13 +119,13 @@ impl Plan {
     }
 
     /// The radius of the second moment over a frame, without a bound of its error; `None` if it is not followed here, or the numbers leave their range.
-    pub(crate) fn mean_square(&self, scene: &Scene, scratch: &mut PlanScratch) -> Option<f64> {
-        let square = |this: &Self, scratch: &mut PlanScratch| this.radius::<false>(scene, scratch).value.powi(2);
+    pub(crate) fn mean_square(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Option<f64> {
+        let square = |this: &Self, scratch: &mut RadiusScratch| this.radius::<false>(scene, scratch).value.powi(2);
         let Ok(Followed::Equal { frame, held }) = &self.followed else {
             return matches!(self.followed, Ok(Followed::Certain)).then(|| square(self, scratch));
         };
         self.refresh(scene, scratch);
-        let PlanScratch { nodes, bodies, equal, .. } = &mut *scratch;
+        let RadiusScratch { nodes, bodies, equal, .. } = &mut *scratch;
         let quotient = self.quotient(scene, nodes);
         if quotient.sampling.is_silent(quotient.time) {
             // Nothing is done with what arrives.
@@ -138,46 +138,48 @@ impl Plan {
     /// The system of the classes' averages with the numbers of that scene.
     fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
         let structure = &self.structure;
-        let armed = |class: usize| structure.touching[class] && arm(self.representative(scene, class)).stiffness > 0.0;
+        let armed = |class: usize| structure.touching[class] && scene.device_plant(self.representative(class)).stiffness > 0.0;
         let tied = self.tied || (0..nodes.len()).any(armed);
         Lifted { tied, ..structure.quotient(scene, nodes) }
     }
 
-    fn representative<'a>(&self, scene: &'a Scene, class: usize) -> &'a cohaptic_scene::PeerSpec {
-        &scene.peers[self.structure.classes[class][0]]
+    /// The peer that stands for a class.
+    fn representative(&self, class: usize) -> usize {
+        self.structure.classes[class][0]
     }
 
     /// Brings the nodes up to date; step maps only where a body has changed.
-    fn refresh(&self, scene: &Scene, scratch: &mut PlanScratch) {
+    fn refresh(&self, scene: &Scene, scratch: &mut RadiusScratch) {
         let classes = self.structure.classes.len();
         let loose = |class: usize| (!self.structure.touching[class]).then(|| loose_device(&self.structure, scene, class).0);
         if scratch.nodes.len() != classes {
             scratch.nodes = self.structure.nodes(scene);
             let bodies = |class: usize| Bodies {
-                object: object_plant(scene),
-                device: device_plant(self.representative(scene, class)),
-                law: scene.law(self.structure.classes[class][0]),
+                object: scene.copy_config().plant(),
+                device: scene.device_plant(self.representative(class)),
+                law: scene.law(self.representative(class)),
                 loose: loose(class),
             };
             scratch.bodies = (0..classes).map(bodies).collect();
             return;
         }
-        let object = object_plant(scene);
+        let object = scene.copy_config().plant();
         for class in 0..classes {
-            let spec = self.representative(scene, class);
+            let place = self.representative(class);
+            let clock = &scene.peers[place].clock;
             let (node, bodies) = (&mut scratch.nodes[class], &mut scratch.bodies[class]);
             if bodies.object != object {
                 bodies.object = object;
-                node.object = Body::new(object, scene.integrator, &spec.clock);
+                node.object = Body::new(object, scene.integrator, clock);
             }
-            let device = device_plant(spec);
+            let device = scene.device_plant(place);
             if bodies.device != device {
                 bodies.device = device;
                 bodies.loose = loose(class);
-                node.device = node.device.map(|_| Body::new(device, scene.integrator, &spec.clock));
+                node.device = node.device.map(|_| Body::new(device, scene.integrator, clock));
             }
-            node.coupling = self.structure.coupling(spec);
-            let law = scene.law(self.structure.classes[class][0]);
+            node.coupling = scene.coupling(place);
+            let law = scene.law(place);
             if bodies.law != law {
                 bodies.law = law;
                 node.law = self.structure.law(scene, class);
@@ -185,10 +187,6 @@ impl Plan {
             node.wall = node.wall.and(scene.object.enclosure).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping });
         }
     }
-}
-
-fn object_plant(scene: &Scene) -> Plant {
-    Plant { mass: scene.copy_mass(), damping: scene.object.damping, stiffness: 0.0 }
 }
 
 fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
@@ -202,9 +200,9 @@ fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
 }
 
 /// The radius of a lifted system.
-fn part<const BOUND: bool>(small: Option<&SmallFrame>, lifted: &Lifted<'_>, matrix: &mut Matrix, workspace: &mut Workspace) -> Radius {
-    let error = match (small, SmallNode::of(lifted)) {
-        (Some(small), Some(node)) => small.monodromy::<BOUND>(node, matrix, || lifted.error()),
+fn part<const BOUND: bool>(stack: Option<&StackFrame>, lifted: &Lifted<'_>, matrix: &mut Matrix, workspace: &mut Workspace) -> Radius {
+    let error = match (stack, StackNode::of(lifted)) {
+        (Some(stack), Some(node)) => stack.monodromy::<BOUND>(node, matrix, || lifted.error()),
         _ => {
             let frame = lifted.frame(&mut Autonomous);
             *matrix = frame.monodromy();
@@ -215,8 +213,8 @@ fn part<const BOUND: bool>(small: Option<&SmallFrame>, lifted: &Lifted<'_>, matr
 }
 
 /// The linear scenes that a scene falls into, one for each combination of contacts.
-pub(crate) fn plans(scenes: &[&Scene]) -> Result<Vec<Plan>, AnalysisError> {
+pub(crate) fn scene_radii(scenes: &[&Scene]) -> Result<Vec<SceneRadius>, AnalysisError> {
     let network = NominalNetwork::of(scenes[0])?;
     let combinations = crate::analysis::combinations(scenes[0])?;
-    combinations.iter().map(|combination| Plan::new(scenes, &network, &combination.contacts)).collect()
+    combinations.iter().map(|combination| SceneRadius::new(scenes, &network, &combination.contacts)).collect()
 }

@@ -26,7 +26,7 @@ fn slot(tick: u64) -> usize {
 
 /// The links, what is on the way, and what each peer holds of each other.
 #[derive(Clone, Debug)]
-pub(in crate::arrays) struct Single<const A: usize, const L: usize> {
+pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     peers: usize,
     ticks: Ticks,
     end: Instant,
@@ -100,7 +100,7 @@ impl Ticks {
     }
 }
 
-impl<const A: usize, const L: usize> Single<A, L> {
+impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
     pub(in crate::arrays) fn new(scenes: &[&Scene], end: Instant, tick_nanos: u64) -> Self {
         let peers = scenes[0].peers.len();
@@ -150,7 +150,7 @@ impl<const A: usize, const L: usize> Single<A, L> {
         let (row, places) = (*peers * L, row_of(*peers));
         let mut arrivals = Arrivals::NONE;
         for first in (0..row).step_by(DirectLinks::AT_ONCE) {
-            // Eight links lead to eight receivers of one run or to one receiver of eight runs; some of them, or all, to the sender itself.
+            // Lanes links lead to eight receivers of one run or to one receiver of eight runs; some of them, or all, to the sender itself.
             let own = (sender * L).wrapping_sub(first);
             let but = if own < DirectLinks::AT_ONCE { ((1_u16 << L) - 1) << own } else { 0 };
             links.offer(now, LinkId::new(sender * row + first), DirectLinks::AT_ONCE.min(row - first), but as u8, &mut arrivals);

@@ -5,10 +5,11 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::Gains;
+use cohaptic_peer::{Gains, Motion, StepMap, tick};
 
 use crate::Matrix;
-use crate::lifted::{Body, Lifted, Node, Rounding};
+use crate::lifted::node::{Scale, coordination_of};
+use crate::lifted::{Lifted, Node, Rounding};
 use crate::timetable::{Event, Timetable};
 
 /// More samples of earlier frames than this, or more sent in one frame, are left to the general path.
@@ -18,7 +19,7 @@ const MOST_STATES: usize = 4;
 
 /// What happens in a frame of one node that hears itself.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct SmallFrame {
+pub(crate) struct StackFrame {
     steps: Vec<Step>,
     /// The ages of the samples of earlier frames that are used, ascending.
     used: Vec<usize>,
@@ -38,7 +39,7 @@ enum Step {
 
 /// What a frame is worked out from, beside its steps.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SmallNode<'a> {
+pub(crate) struct StackNode<'a> {
     pub(crate) node: &'a Node,
     /// How its own samples come back.
     pub(crate) weight: f64,
@@ -49,7 +50,7 @@ pub(crate) struct SmallNode<'a> {
     pub(crate) tied: bool,
 }
 
-impl<'a> SmallNode<'a> {
+impl<'a> StackNode<'a> {
     /// The only node of a system that this path is for: without a delay of the forces, with a law that is a pull towards the mean, and with something to hear.
     pub(crate) fn of(lifted: &Lifted<'a>) -> Option<Self> {
         let [node] = lifted.nodes else { return None };
@@ -58,8 +59,8 @@ impl<'a> SmallNode<'a> {
     }
 }
 
-impl SmallFrame {
-    /// The steps of a timetable; `None` if it is not of one node, or not small.
+impl StackFrame {
+    /// The steps of a timetable; `None` if it is not of one node, or has more states or samples than fit on the stack.
     pub(crate) fn of(timetable: &Timetable) -> Option<Self> {
         let ([sent], [depth]) = (timetable.sent.as_slice(), timetable.depth.as_slice()) else { return None };
         let deliveries = timetable.events.iter().filter_map(|event| match event {
@@ -89,21 +90,21 @@ impl SmallFrame {
 
     /// Writes the monodromy matrix into `matrix` and answers a bound of the error of its entries, in the largest sum of sizes of a row; zero without
     /// `BOUND`. `closer` is asked for another bound where the quick one says nothing.
-    pub(crate) fn monodromy<const BOUND: bool>(&self, small: SmallNode<'_>, matrix: &mut Matrix, closer: impl FnOnce() -> f64) -> f64 {
-        let states = small.node.states() - usize::from(!small.tied);
+    pub(crate) fn monodromy<const BOUND: bool>(&self, stack: StackNode<'_>, matrix: &mut Matrix, closer: impl FnOnce() -> f64) -> f64 {
+        let states = stack.node.states() - usize::from(!stack.tied);
         // Sizes that the compiler knows are worth a few copies of the loop.
         match states + self.used.len() {
-            0..=2 => self.run::<2, BOUND>(small, matrix, closer),
-            3 => self.run::<3, BOUND>(small, matrix, closer),
-            4 => self.run::<4, BOUND>(small, matrix, closer),
-            5 => self.run::<5, BOUND>(small, matrix, closer),
-            6 => self.run::<6, BOUND>(small, matrix, closer),
-            _ => self.run::<{ MOST_STATES + MOST_SAMPLES }, BOUND>(small, matrix, closer),
+            0..=2 => self.run::<2, BOUND>(stack, matrix, closer),
+            3 => self.run::<3, BOUND>(stack, matrix, closer),
+            4 => self.run::<4, BOUND>(stack, matrix, closer),
+            5 => self.run::<5, BOUND>(stack, matrix, closer),
+            6 => self.run::<6, BOUND>(stack, matrix, closer),
+            _ => self.run::<{ MOST_STATES + MOST_SAMPLES }, BOUND>(stack, matrix, closer),
         }
     }
 
-    fn run<const C: usize, const BOUND: bool>(&self, small: SmallNode<'_>, matrix: &mut Matrix, closer: impl FnOnce() -> f64) -> f64 {
-        let SmallNode { node, weight, coordination, time, tied } = small;
+    fn run<const C: usize, const BOUND: bool>(&self, stack: StackNode<'_>, matrix: &mut Matrix, closer: impl FnOnce() -> f64) -> f64 {
+        let StackNode { node, weight, coordination, time, tied } = stack;
         let Gains { stiffness, damping } = coordination;
         let unit = stiffness + damping / time;
         let (position_share, velocity_share) = (stiffness / unit, damping / time / unit);
@@ -119,16 +120,15 @@ impl SmallFrame {
         for place in 0..self.used.len() {
             store[place][states + place] = 1.0;
         }
-        let own = node.wall.map_or(coordination, |wall| Gains { stiffness: stiffness + wall.stiffness, damping: damping + wall.damping });
-        let own_damping = own.damping / time;
-        let (coupling, coupling_damping) = (node.coupling.stiffness, node.coupling.damping / time);
+        let scale = Scale { time, compliance: node.compliance(time) };
+        let own = scale.gains(coordination_of(coordination, node.wall));
+        let coupling = scale.gains(node.coupling);
         let gain = weight * unit;
         let aim_at = |sample: &[f64; C]| sample.map(|entry| 0.0 + gain * entry);
         let mut aim = self.held.map_or([0.0; C], |held| aim_at(&store[held]));
         let mut next_sent = self.used.len();
-        let scale = crate::lifted::node::Scale { time, compliance: node.compliance(time) };
         let mut rounding = Rounding::new(if BOUND { node.step_norm(scale).max(1.0) } else { 1.0 });
-        let mut maps: Option<(Duration, Map, Map)> = None;
+        let mut maps: Option<(Duration, StepMap, StepMap)> = None;
         for step in &self.steps {
             match *step {
                 Step::Sample => {
@@ -142,8 +142,8 @@ impl SmallFrame {
                     let (on_copy, on_device) = match maps {
                         Some((of, on_copy, on_device)) if of == span => (on_copy, on_device),
                         _ => {
-                            let on_copy = Map::of(&node.object, span, time);
-                            let on_device = node.device.as_ref().map_or(on_copy, |device| Map::of(device, span, time));
+                            let on_copy = node.object.scaled_map(span, time);
+                            let on_device = node.device.as_ref().map_or(on_copy, |device| device.scaled_map(span, time));
                             maps = Some((span, on_copy, on_device));
                             (on_copy, on_device)
                         }
@@ -151,17 +151,22 @@ impl SmallFrame {
                     if node.device.is_some() {
                         let [xh, vh, x, v] = &mut z;
                         for column in 0..C {
-                            let own_force = own.stiffness * x[column] + own_damping * v[column];
-                            //= Rakhsha & Constantinescu 2015, eq. (9)
-                            let force = coupling * (xh[column] - x[column]) + coupling_damping * (vh[column] - v[column]);
-                            on_copy.advance(&mut x[column], &mut v[column], (aim[column] - own_force) + force);
-                            on_device.advance(&mut xh[column], &mut vh[column], -force);
+                            let mut copy = Motion { position: x[column], velocity: v[column] };
+                            let mut device = Motion { position: xh[column], velocity: vh[column] };
+                            let held = tick::grasp(&coupling, device.relative_to(copy));
+                            let pull = tick::coordinate(&own, copy) - aim[column];
+                            on_copy.advance(&mut copy, tick::on_object(held, pull));
+                            on_device.advance(&mut device, tick::on_device(0.0, held));
+                            (x[column], v[column]) = (copy.position, copy.velocity);
+                            (xh[column], vh[column]) = (device.position, device.velocity);
                         }
                     } else {
                         let [x, v, ..] = &mut z;
                         for column in 0..C {
-                            let own_force = own.stiffness * x[column] + own_damping * v[column];
-                            on_copy.advance(&mut x[column], &mut v[column], aim[column] - own_force);
+                            let mut copy = Motion { position: x[column], velocity: v[column] };
+                            let pull = tick::coordinate(&own, copy) - aim[column];
+                            on_copy.advance(&mut copy, tick::on_object(0.0, pull));
+                            (x[column], v[column]) = (copy.position, copy.velocity);
                         }
                     }
                     if BOUND {
@@ -217,26 +222,5 @@ impl SmallFrame {
         for age in self.sent + 1..=self.depth {
             matrix[(states + age - 1, states + age - self.sent - 1)] += 1.0;
         }
-    }
-}
-
-/// A body's step in the units of the states.
-#[derive(Clone, Copy, Debug)]
-struct Map {
-    e: [[f64; 2]; 2],
-    g: [f64; 2],
-}
-
-impl Map {
-    fn of(body: &Body, span: Duration, time: f64) -> Self {
-        let (e, g) = body.map(span).coefficients();
-        Self { e: [[e[0][0], e[0][1] / time], [e[1][0] * time, e[1][1]]], g: [g[0], g[1] * time] }
-    }
-
-    #[inline]
-    fn advance(&self, x: &mut f64, v: &mut f64, force: f64) {
-        let (x0, v0) = (*x, *v);
-        *x = x0 + (self.e[0][0] * x0 + self.e[0][1] * v0 + self.g[0] * force);
-        *v = v0 + (self.e[1][0] * x0 + self.e[1][1] * v0 + self.g[1] * force);
     }
 }
