@@ -55,6 +55,7 @@ fn kernels(criterion: &mut Criterion) {
         gains: tick.coordination,
         peers: 3,
         tick: Duration::from_millis(1),
+        oldest: None,
         own: LawValues::default(),
     });
     group(

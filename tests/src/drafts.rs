@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::LawSettings;
+use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue};
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
 use proptest::collection::vec;
 use proptest::option;
@@ -24,12 +24,17 @@ pub fn anything_of_the_paper() -> impl Strategy<Value = Draft> {
     (anything(), select(PAPER)).prop_map(|(draft, strategy)| Draft { strategy, ..draft })
 }
 
-/// A law with values for the parameters that it has of its own, up to 40 ms.
+/// A law with values for the parameters that it has of its own, up to 40 ms or 40 N·s/m.
 fn law() -> impl Strategy<Value = (Coordination, LawSettings)> {
-    (select(Coordination::ALL), 0..40_000_u64).prop_map(|(law, micros)| {
+    (select(Coordination::ALL), 0..40_000_u32).prop_map(|(law, micros)| {
         let mut settings = LawSettings::default();
-        for place in 0..law.parameters().len() {
-            settings.of_mut(law).set(place, Duration::from_micros(micros));
+        for (place, parameter) in law.parameters().iter().enumerate() {
+            let value = match parameter.form {
+                LawForm::Duration | LawForm::AutomaticDuration => LawValue::Duration(Duration::from_micros(micros.into())),
+                // Up to 40 N·s/m.
+                LawForm::AutomaticDamping => LawValue::Number(1e-3 * f64::from(micros)),
+            };
+            settings.of_mut(law).set(place, value);
         }
         (law, settings)
     })

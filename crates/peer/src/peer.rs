@@ -25,6 +25,8 @@ pub struct PeerConfig {
     pub tick: Duration,
     /// Whether forces are applied one tick after they were computed.
     pub compute_delay: bool,
+    /// β, by how much the strategy damps the copy [N·s/m]; part of the copy's plant, and of FT on the record.
+    pub own_damping: f64,
     /// The walls around the object, if there are any.
     pub enclosure: Option<Enclosure>,
 }
@@ -177,7 +179,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         } else {
             self.applied = computed;
         }
-        Forces { coupling, coordination: command.force, target: command.target }
+        let damped = self.config.own_damping > 0.0;
+        let recorded = |axis: usize| if damped { command.force[axis] + self.config.own_damping * own.velocity[axis] } else { command.force[axis] };
+        Forces { coupling, coordination: core::array::from_fn(recorded), target: command.target }
     }
 
     /// Step 4: moves to the next tick, `span` after `now`.

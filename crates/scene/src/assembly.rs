@@ -1,5 +1,6 @@
 //! What the parts of a peer are made from, with every scaling applied.
 
+use cohaptic_peer::coordination::Law;
 use cohaptic_peer::{CopyConfig, Gains, PeerConfig, Plant, State};
 
 use crate::Scene;
@@ -21,6 +22,7 @@ impl Scene {
             coupling: self.coupling(place),
             tick: spec.clock.tick,
             compute_delay: spec.compute_delay,
+            own_damping: Law::<f64>::damping(&self.law(place)),
             enclosure: self.object.enclosure,
         }
     }
@@ -53,10 +55,14 @@ impl Scene {
         spec.device.plant(spec.hand.as_ref())
     }
 
-    /// Each peer's copy of the object.
+    /// The copy of the object of the peer in that place, with the damping that the coordination law adds.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
     #[must_use]
-    pub fn copy_config(&self) -> CopyConfig {
-        CopyConfig { mass: self.copy_mass(), damping: self.object.damping }
+    pub fn copy_config(&self, place: usize) -> CopyConfig {
+        CopyConfig { mass: self.copy_mass(), damping: self.object.damping + Law::<f64>::damping(&self.law(place)) }
     }
 
     /// Where the copy and the device of that peer begin.

@@ -33,6 +33,7 @@ mod content;
 mod context;
 mod link_keys;
 mod model;
+mod oldest_sample;
 mod quantities;
 mod read;
 mod scaling;

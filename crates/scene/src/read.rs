@@ -130,7 +130,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     if let Some(names) = &names {
         check_enough(names, peers_node, file);
     }
-    Some(Scene {
+    let scene = Scene {
         file: context.sources.file.to_path_buf(),
         title: title?.unwrap_or_else(|| default_title(context.sources.file)),
         duration: duration?,
@@ -143,7 +143,12 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         links: links.as_ref().and_then(LinkClasses::table)?,
         timeline: timeline?,
         expect: expect?,
-    })
+    };
+    if let Some(refused) = scene.refused_automatic() {
+        file.fault_at(coordination_node.unwrap_or(document), refused);
+        return None;
+    }
+    Some(scene)
 }
 
 /// The scenes that a path means: a file means itself, a folder every file below it that ends in `.toml`, in order of their paths.

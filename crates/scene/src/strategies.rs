@@ -53,11 +53,13 @@ impl Scene {
     fn law_parameters(&self, peer: usize) -> LawParameters {
         let peers = self.peers.len();
         let CoordinationSpec { strategy, gains, settings, .. } = &self.coordination;
+        let own = settings.of(*strategy);
         LawParameters {
             gains: self.coordination_gains(*gains),
             peers,
             tick: self.peers[peer].clock.tick,
-            own: *settings.of(*strategy),
+            oldest: if own.any_automatic() { self.oldest_sample() } else { None },
+            own: *own,
         }
     }
 }

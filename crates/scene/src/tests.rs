@@ -103,7 +103,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "update =",
             "updat =",
-            "8:1: coordination.updat: unknown key: expected one of strategy, scaling, stiffness, damping, update, smoothed-average-position, extrapolated; did you mean \"update\"?",
+            "8:1: coordination.updat: unknown key: expected one of strategy, scaling, stiffness, damping, update, smoothed-average-position, extrapolated, local-damping; did you mean \"update\"?",
         ),
         ("damping = 5.0 }\ncoupling", "dampening = 5.0 }\ncoupling", "10:24: peer.device.dampening: unknown key: expected one of mass, damping"),
         (
@@ -177,7 +177,7 @@ fn a_wrong_unit_or_type_is_refused() {
         (
             "average-position",
             "average-positoin",
-            "6:12: coordination.strategy: unknown name \"average-positoin\": expected one of average-position, proportional-derivative, smoothed-average-position, extrapolated; did you mean \"average-position\"?",
+            "6:12: coordination.strategy: unknown name \"average-positoin\": expected one of average-position, proportional-derivative, smoothed-average-position, extrapolated, local-damping; did you mean \"average-position\"?",
         ),
         ("[peer]", "[peer]\nhand = \"soft\"", "10:8: peer.hand: unknown hand \"soft\": expected \"none\""),
         ("[peer]", "[peer]\ncontact = { pull = 1 }", "10:13: peer.contact.pull: unknown key: expected push"),
@@ -289,6 +289,33 @@ fn what_does_not_fit_together_is_refused() {
         &two_axes.replace("[peer]", "[peer]\nhand = { force = 1.5 }"),
         "11:18: peer.hand.force: 1.5 has one component: expected a list of 2 numbers [N]",
     );
+}
+
+#[test]
+fn a_damping_that_no_link_bounds_is_refused() {
+    let local = SCENE.replace("average-position", "local-damping");
+    parse(&local, &[]).unwrap();
+    let unbounded = "5:1: coordination: a damping of \"auto\" needs the age of the oldest sample in use, which the links of this scene do not bound: expected an age, or a damping in N·s/m";
+    for added in
+        ["loss = \"1%\"\n", "jitter = \"1ms\"\n", "rate = \"1Mbit\"\n", "[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { delay = \"30ms\" }\n"]
+    {
+        check(&format!("{local}{added}"), unbounded);
+        parse(&format!("{local}{added}"), &["coordination.local-damping.age=\"50ms\""]).unwrap();
+        parse(&format!("{local}{added}"), &["coordination.local-damping.damping=60"]).unwrap();
+        // Of a strategy that is not in use nothing is asked.
+        parse(&format!("{local}{added}"), &["coordination.strategy=\"average-position\""]).unwrap();
+    }
+    let gains = "[[timeline]]\nat = \"1s\"\ncoordination = { stiffness = 100.0 }\n";
+    check(
+        &format!("{local}{gains}"),
+        "5:1: coordination: the timeline changes the gains, and a damping of \"auto\" does not follow them: expected a damping in N·s/m",
+    );
+    parse(&format!("{local}{gains}"), &["coordination.local-damping.damping=60"]).unwrap();
+    check_replaced(&[(
+        "update = \"8ms\"",
+        "update = \"8ms\"\nlocal-damping = { damping = \"automatic\" }",
+        "9:29: coordination.local-damping.damping: unknown name \"automatic\": expected auto, or a number of at least zero [N·s/m]",
+    )]);
 }
 
 #[test]

@@ -136,7 +136,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             // The hand's force moves the device about and has no part in how it moves on its own; the arm has.
             let hand = spec.hand.as_ref().and_then(Hand::arm).map(|arm| Hand::Arm { arm, follows: Signal::Constant([0.0; 3]) });
             let device = SimulatedDevice::new(spec.device, hand.as_ref(), State::REST, scene.integrator, &spec.clock);
-            let object = ObjectCopy::new(scene.copy_config(), State::REST, scene.integrator, &spec.clock);
+            let object = ObjectCopy::new(scene.copy_config(place), State::REST, scene.integrator, &spec.clock);
             Peer::new(config, device, object, strategy(place), Held::new((1..peers).map(|_| State::REST)))
         };
         let members: Vec<Member<A, S>> = (0..peers).map(member).collect();

@@ -202,7 +202,7 @@ mod tests {
     use super::*;
 
     fn parameters(gains: Gains) -> LawParameters {
-        LawParameters { gains, peers: 3, tick: Duration::from_millis(1), own: LawValues::default() }
+        LawParameters { gains, peers: 3, tick: Duration::from_millis(1), oldest: None, own: LawValues::default() }
     }
 
     /// Equation (10), and equation (2) as the sum of two pulls: KT·(x − x₁) + KT·(x − x₂) with x₁ + x₂ = 2·x̄.

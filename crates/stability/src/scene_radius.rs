@@ -155,7 +155,7 @@ impl SceneRadius {
         if scratch.nodes.len() != classes {
             scratch.nodes = self.structure.nodes(scene);
             let bodies = |class: usize| Bodies {
-                object: scene.copy_config().plant(),
+                object: scene.copy_config(self.representative(class)).plant(),
                 device: scene.device_plant(self.representative(class)),
                 law: scene.law(self.representative(class)),
                 loose: loose(class),
@@ -163,11 +163,11 @@ impl SceneRadius {
             scratch.bodies = (0..classes).map(bodies).collect();
             return;
         }
-        let object = scene.copy_config().plant();
         for class in 0..classes {
             let place = self.representative(class);
             let clock = &scene.peers[place].clock;
             let (node, bodies) = (&mut scratch.nodes[class], &mut scratch.bodies[class]);
+            let object = scene.copy_config(place).plant();
             if bodies.object != object {
                 bodies.object = object;
                 node.object = Body::new(object, scene.integrator, clock);

@@ -131,7 +131,7 @@ impl Structure {
         let spec = &scene.peers[place];
         Node {
             device: self.touching[class].then(|| Body::new(scene.device_plant(place), scene.integrator, &spec.clock)),
-            object: Body::new(scene.copy_config().plant(), scene.integrator, &spec.clock),
+            object: Body::new(scene.copy_config(place).plant(), scene.integrator, &spec.clock),
             coupling: scene.coupling(place),
             law: self.law(scene, class),
             wall: scene.object.enclosure.filter(|_| self.at_wall).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping }),

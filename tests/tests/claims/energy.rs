@@ -186,7 +186,7 @@ proptest! {
 }
 
 /// Two heavy copies that send at each tick over a constant delay: the case in which nothing of the bound is lost.
-fn heavy() -> Draft {
+pub(crate) fn heavy() -> Draft {
     let mut draft = Draft { mass: 40.0, duration: 20_000, link: "delay = \"20ms\"".to_owned(), ..Draft::calm(2) };
     draft.gains = Gains { stiffness: 100.0, damping: 0.0 };
     draft.peers[0].position = Some([0.01, 0.0, 0.0]);

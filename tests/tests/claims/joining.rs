@@ -33,7 +33,7 @@ type Process = Peer<1, RestingDevice<1>, LawStrategy<1>>;
 
 fn start(scene: &Scene, place: usize, x: f64) -> Process {
     let spec = &scene.peers[place];
-    let object = ObjectCopy::new(scene.copy_config(), State { position: [x], velocity: [0.0] }, scene.integrator, &spec.clock);
+    let object = ObjectCopy::new(scene.copy_config(place), State { position: [x], velocity: [0.0] }, scene.integrator, &spec.clock);
     let others = (0..scene.peers.len()).filter(|other| *other != place).map(|other| scene.initial_state(other));
     let strategy = scene.coordination.strategy.strategy(scene.coordination.gains, scene.peers.len(), scene.peers[0].clock.tick);
     Peer::new(scene.peer_config(place), RestingDevice { position: [0.0] }, object, strategy, Held::new(others))

@@ -20,6 +20,7 @@ mod felt;
 mod healing;
 mod joining;
 mod jumps;
+mod local_damping;
 mod paper;
 mod regions;
 mod settling;

@@ -8,6 +8,7 @@ mod equivalence;
 mod growth;
 mod held_samples;
 mod ideal_network;
+mod local_damping;
 mod own_strategies;
 mod replay;
 mod symmetry;

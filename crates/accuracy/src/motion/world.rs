@@ -36,7 +36,7 @@ pub(crate) struct Pair {
 impl Pair {
     /// The pair of a scene, for a number of ticks.
     pub(crate) fn of(motion: &MotionScene, scene: &Scene, ticks: usize) -> Self {
-        let copy = scene.copy_config().plant();
+        let copy = scene.copy_config(0).plant();
         // Arms of these scenes want to stay where they are, which is no held force.
         let force = |peer: usize, at: Instant| match &scene.peers[peer].hand {
             Some(Hand::Force(signal)) => Signal::value::<1>(signal, at)[0],

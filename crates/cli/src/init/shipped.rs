@@ -36,6 +36,8 @@ shipped![
     "coordination/difference-mode-pd",
     "coordination/difference-mode",
     "coordination/extrapolated",
+    "coordination/local-damping-throw",
+    "coordination/local-damping",
     "coordination/momentum",
     "coordination/n2-pd",
     "coordination/n2",

@@ -140,7 +140,7 @@ impl<const A: usize> Blocks<A> {
         let mut common = Common { law: law_of_lanes(laws), object_map: ZERO_MAP };
         for lane in 0..WIDTH {
             let run = lane % places.runs;
-            set_map(&mut common.object_map, lane, &scenes[run].copy_config().plant().step(tick, scenes[run].integrator));
+            set_map(&mut common.object_map, lane, &scenes[run].copy_config(0).plant().step(tick, scenes[run].integrator));
         }
         let step = |plant: Plant, run: usize| plant.step(tick, scenes[run].integrator);
         let hands: Vec<(usize, usize, HandForce<A>)> = (0..places.peers)

@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod links;
 
+use cohaptic_peer::coordination::{Law, LawForm, LawValue, UsedGains};
 use cohaptic_peer::{Contact, Hand, Integrator, wire};
 use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::{Counted, Number, Span};
@@ -168,7 +169,20 @@ impl Rows {
         };
         let mut model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), Number(gains.stiffness), Number(gains.damping));
         for (place, parameter) in spec.strategy.parameters().iter().enumerate() {
-            model.push_str(&format!(", {} = {}", parameter.key, Span(spec.settings.of(spec.strategy).get(place))));
+            model.push_str(&format!(", {} = ", parameter.key));
+            match (spec.settings.of(spec.strategy).get(place), parameter.form) {
+                (LawValue::Automatic, _) => model.push_str("auto"),
+                (LawValue::Duration(span), _) => model.push_str(&Span(span).to_string()),
+                (LawValue::Number(number), LawForm::AutomaticDamping) => model.push_str(&format!("{} N·s/m", Number(number))),
+                (LawValue::Number(number), LawForm::Duration | LawForm::AutomaticDuration) => model.push_str(&Number(number).to_string()),
+            }
+        }
+        let damping = Law::<f64>::damping(&scene.law(0));
+        if damping > 0.0 {
+            model.push_str(&format!("; each copy is damped by another {} N·s/m", Number(damping)));
+        }
+        if spec.strategy.gains() == UsedGains::Stiffness && gains.damping > 0.0 {
+            model.push_str("; BT is not used");
         }
         self.model("coordination", model, format!("gains {scaling}; the mean of the samples held is kept until one changes"));
         let len = wire::datagram_len(scene.axes.count());

@@ -395,7 +395,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
                 DeviceModel::Simulated(SimulatedDevice::new(spec.device, spec.hand.as_ref(), displaced(0), integrator, &clock))
             }
         };
-        let object = ObjectCopy::new(scene.copy_config(), displaced(1), integrator, &clock);
+        let object = ObjectCopy::new(scene.copy_config(place), displaced(1), integrator, &clock);
         let others = initial.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
         let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
         Self {

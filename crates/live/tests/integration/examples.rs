@@ -63,6 +63,7 @@ impl Mechanics {
             coupling: self.coupling,
             tick,
             compute_delay: false,
+            own_damping: 0.0,
             enclosure: None,
         };
         let others = Held::new((1..self.peers).map(|_| State::REST));

@@ -2,7 +2,7 @@
 //!
 //! Over an ideal network the difference modes of N copies have the stiffness N/(N−1)·KT (Rakhsha & Constantinescu 2015, equation 6): bounded in N.
 
-use super::{Law, LawParameter, LawParameters, Observation, Pull};
+use super::{Law, LawKind, LawParameters, Observation};
 use crate::tick::coordinate;
 use crate::{Gains, Number};
 
@@ -13,11 +13,8 @@ pub struct AveragePosition<C = f64> {
     pub gains: Gains<C>,
 }
 
-impl AveragePosition {
-    pub(super) const PULL: Pull = Pull::Mean;
-    pub(super) const PARAMETERS: &[LawParameter] = &[];
-
-    pub(super) const fn new(parameters: &LawParameters) -> Self {
+impl LawKind for AveragePosition {
+    fn new(parameters: &LawParameters) -> Self {
         Self { gains: parameters.gains }
     }
 }

@@ -3,7 +3,7 @@
 //! The dead reckoning of distributed simulation (IEEE 1278.1, first order): x̂ⱼ = xⱼ + min(age, horizon)·vⱼ, and FT = KT·(x − mean x̂ⱼ) + BT·(v − mean vⱼ).
 //! Copies that move alike at one velocity then exert no force on each other, however old the samples are.
 
-use super::{Law, LawParameter, LawParameters, Observation, Pull};
+use super::{Law, LawForm, LawKind, LawParameter, LawParameters, Observation};
 use crate::tick::coordinate;
 use crate::{Gains, Motion, Number};
 
@@ -16,13 +16,16 @@ pub struct Extrapolated<C = f64> {
     horizon: f64,
 }
 
-impl Extrapolated {
-    pub(super) const PULL: Pull = Pull::Mean;
-    pub(super) const PARAMETERS: &[LawParameter] =
-        &[LawParameter { key: "horizon", default: "\"100ms\"", about: "Up to which age samples are extrapolated; 0 for average-position itself" }];
+impl LawKind for Extrapolated {
+    const PARAMETERS: &[LawParameter] = &[LawParameter {
+        key: "horizon",
+        form: LawForm::Duration,
+        default: "\"100ms\"",
+        about: "Up to which age samples are extrapolated; 0 for average-position itself",
+    }];
 
-    pub(super) const fn new(parameters: &LawParameters) -> Self {
-        Self { gains: parameters.gains, horizon: parameters.own.get(0).as_secs_f64() }
+    fn new(parameters: &LawParameters) -> Self {
+        Self { gains: parameters.gains, horizon: parameters.own.duration(0).as_secs_f64() }
     }
 }
 

@@ -28,6 +28,11 @@ pub trait Law<N: Number> {
         0
     }
 
+    /// β [N·s/m]: by how much the law damps the peer's own copy. It is part of the body, bO + β, so it acts between ticks too, and [`Law::force`] leaves it out.
+    fn damping(&self) -> f64 {
+        0.0
+    }
+
     /// Up to which age \[s\] samples are extrapolated; `None` for a law that takes them as they are.
     fn horizon(&self) -> Option<f64> {
         None
@@ -44,6 +49,19 @@ pub trait Law<N: Number> {
     }
 }
 
+/// What the registry knows of a law.
+pub(super) trait LawKind {
+    /// How it pulls towards the others.
+    const PULL: Pull = Pull::Mean;
+    /// Which gains it uses.
+    const GAINS: UsedGains = UsedGains::Both;
+    /// The parameters that it alone has.
+    const PARAMETERS: &[LawParameter] = &[];
+
+    /// The law with these parameters.
+    fn new(parameters: &LawParameters) -> Self;
+}
+
 /// What the coefficients of a law are computed from.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LawParameters {
@@ -53,6 +71,8 @@ pub struct LawParameters {
     pub peers: usize,
     /// The period of the peer's tick, Tc.
     pub tick: Duration,
+    /// How many ticks old a sample in use is at most, where the links bound it; for parameters that are [`LawValue::Automatic`].
+    pub oldest: Option<u64>,
     /// The parameters that this law alone has.
     pub own: LawValues,
 }
@@ -66,20 +86,80 @@ pub enum Pull {
     Sum,
 }
 
-/// A parameter that one law alone has: a key of the table `[coordination.NAME]`, whose value is a duration.
+/// Which of the gains KT and BT a law uses.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum UsedGains {
+    /// Both.
+    Both,
+    /// KT alone.
+    Stiffness,
+}
+
+/// A parameter that one law alone has: a key of the table `[coordination.NAME]`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LawParameter {
     /// The key.
     pub key: &'static str,
+    /// What values it has.
+    pub form: LawForm,
     /// The value without the key, as TOML writes it.
     pub default: &'static str,
     /// What it means, without the last full stop.
     pub about: &'static str,
 }
 
+/// What values a parameter of a law has.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum LawForm {
+    /// A duration.
+    Duration,
+    /// `"auto"`, or a duration.
+    AutomaticDuration,
+    /// `"auto"`, or a damping of at least zero [N·s/m].
+    AutomaticDamping,
+}
+
+/// The value of a parameter of a law.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum LawValue {
+    /// `"auto"`: as the links of the scene ask for.
+    Automatic,
+    /// A duration.
+    Duration(Duration),
+    /// A number, in the unit of the [`LawForm`].
+    Number(f64),
+}
+
+impl LawValue {
+    /// The duration; `None` for any other value.
+    #[must_use]
+    pub const fn duration(self) -> Option<Duration> {
+        match self {
+            Self::Duration(duration) => Some(duration),
+            Self::Automatic | Self::Number(_) => None,
+        }
+    }
+
+    /// The number; `None` for any other value.
+    #[must_use]
+    pub const fn number(self) -> Option<f64> {
+        match self {
+            Self::Number(number) => Some(number),
+            Self::Automatic | Self::Duration(_) => None,
+        }
+    }
+}
+
 /// The values of a law's own parameters, in the order of [`Coordination::parameters`](super::Coordination::parameters).
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct LawValues([Duration; Self::MOST]);
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct LawValues([LawValue; Self::MOST]);
+
+impl Default for LawValues {
+    /// Durations of zero.
+    fn default() -> Self {
+        Self([LawValue::Duration(Duration::ZERO); Self::MOST])
+    }
+}
 
 impl LawValues {
     /// How many parameters of its own a law has at most.
@@ -89,14 +169,26 @@ impl LawValues {
     ///
     /// # Panics
     ///
-    /// If a default is no duration.
+    /// If a default has not the form of its parameter.
     #[must_use]
     pub fn defaults(parameters: &[LawParameter]) -> Self {
         let mut values = Self::default();
         for (value, parameter) in values.0.iter_mut().zip(parameters) {
-            *value = parse::duration(parameter.default.trim_matches('"')).expect("the default of a law's parameter is a duration");
+            let text = parameter.default.trim_matches('"');
+            let duration = || parse::duration(text).map(LawValue::Duration).expect("the default of a law's parameter has its form");
+            *value = match parameter.form {
+                LawForm::AutomaticDuration | LawForm::AutomaticDamping if text == "auto" => LawValue::Automatic,
+                LawForm::Duration | LawForm::AutomaticDuration => duration(),
+                LawForm::AutomaticDamping => LawValue::Number(text.parse().expect("the default of a law's parameter has its form")),
+            };
         }
         values
+    }
+
+    /// Whether a value is `"auto"`.
+    #[must_use]
+    pub fn any_automatic(&self) -> bool {
+        self.0.contains(&LawValue::Automatic)
     }
 
     /// The value of the parameter at that place.
@@ -105,8 +197,18 @@ impl LawValues {
     ///
     /// From [`LawValues::MOST`] on.
     #[must_use]
-    pub const fn get(&self, place: usize) -> Duration {
+    pub const fn get(&self, place: usize) -> LawValue {
         self.0[place]
+    }
+
+    /// The duration at that place; zero for any other value.
+    ///
+    /// # Panics
+    ///
+    /// From [`LawValues::MOST`] on.
+    #[must_use]
+    pub fn duration(&self, place: usize) -> Duration {
+        self.get(place).duration().unwrap_or(Duration::ZERO)
     }
 
     /// Replaces the value of the parameter at that place.
@@ -114,7 +216,7 @@ impl LawValues {
     /// # Panics
     ///
     /// From [`LawValues::MOST`] on.
-    pub const fn set(&mut self, place: usize, value: Duration) {
+    pub const fn set(&mut self, place: usize, value: LawValue) {
         self.0[place] = value;
     }
 }

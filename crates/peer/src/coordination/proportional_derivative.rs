@@ -2,7 +2,7 @@
 //!
 //! Over an ideal network the difference modes of N copies have the stiffness N·KT (Rakhsha & Constantinescu 2015, equation 3): it grows with N.
 
-use super::{Law, LawParameter, LawParameters, Observation, Pull};
+use super::{Law, LawKind, LawParameters, Observation, Pull};
 use crate::{Gains, Number};
 
 /// The conventional law.
@@ -15,12 +15,11 @@ pub struct ProportionalDerivative<C = f64> {
     summed: Gains<C>,
 }
 
-impl ProportionalDerivative {
-    pub(super) const PULL: Pull = Pull::Sum;
-    pub(super) const PARAMETERS: &[LawParameter] = &[];
+impl LawKind for ProportionalDerivative {
+    const PULL: Pull = Pull::Sum;
 
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-    pub(super) fn new(parameters: &LawParameters) -> Self {
+    fn new(parameters: &LawParameters) -> Self {
         Self { summed: parameters.gains.scaled(parameters.peers.saturating_sub(1) as f64) }
     }
 }

@@ -2,9 +2,10 @@
 
 use core::time::Duration;
 
+use super::law::LawKind as _;
 use super::{
-    AveragePosition, Extrapolated, Law, LawParameter, LawParameters, LawStrategy, LawValues, Observation, ProportionalDerivative, Pull,
-    SmoothedAveragePosition,
+    AveragePosition, Extrapolated, Law, LawParameter, LawParameters, LawStrategy, LawValues, LocalDamping, Observation, ProportionalDerivative, Pull,
+    SmoothedAveragePosition, UsedGains,
 };
 use crate::{Gains, Motion, Number};
 
@@ -40,7 +41,15 @@ macro_rules! registry {
             #[must_use]
             pub const fn pull(self) -> Pull {
                 match self {
-                    $(Self::$law => $law::PULL,)+
+                    $(Self::$law => <$law>::PULL,)+
+                }
+            }
+
+            /// Which gains it uses.
+            #[must_use]
+            pub const fn gains(self) -> UsedGains {
+                match self {
+                    $(Self::$law => <$law>::GAINS,)+
                 }
             }
 
@@ -48,21 +57,21 @@ macro_rules! registry {
             #[must_use]
             pub const fn parameters(self) -> &'static [LawParameter] {
                 match self {
-                    $(Self::$law => $law::PARAMETERS,)+
+                    $(Self::$law => <$law>::PARAMETERS,)+
                 }
             }
 
             /// The strategy of one peer out of `peers` whose tick has that period, with the law's own parameters at their defaults.
             #[must_use]
             pub fn strategy<const A: usize>(self, gains: Gains, peers: usize, tick: Duration) -> LawStrategy<A> {
-                LawStrategy::new(self, LawParameters { gains, peers, tick, own: LawValues::defaults(self.parameters()) })
+                LawStrategy::new(self, LawParameters { gains, peers, tick, oldest: None, own: LawValues::defaults(self.parameters()) })
             }
 
             /// The law with these parameters.
             #[must_use]
             pub fn law(self, parameters: &LawParameters) -> BuiltIn {
                 match self {
-                    $(Self::$law => BuiltIn::$law($law::new(parameters)),)+
+                    $(Self::$law => BuiltIn::$law(<$law>::new(parameters)),)+
                 }
             }
         }
@@ -88,6 +97,12 @@ macro_rules! registry {
             fn memory(&self) -> usize {
                 match self {
                     $(Self::$law(law) => law.memory(),)+
+                }
+            }
+
+            fn damping(&self) -> f64 {
+                match self {
+                    $(Self::$law(law) => law.damping(),)+
                 }
             }
 
@@ -119,10 +134,11 @@ registry! {
     ProportionalDerivative: "proportional-derivative", "to each of the others";
     SmoothedAveragePosition: "smoothed-average-position", "to the mean of the others, by a force that follows with a lag";
     Extrapolated: "extrapolated", "to the mean of where the others are by now, by their velocities";
+    LocalDamping: "local-damping", "to the mean of the others without damping between them, while ground damps it";
 }
 
 /// The parameters that laws alone have, of every law: a scene has them whatever its strategy is.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LawSettings([LawValues; Coordination::ALL.len()]);
 
 impl Default for LawSettings {

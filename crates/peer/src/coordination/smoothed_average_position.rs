@@ -3,7 +3,7 @@
 //! FT of [`AveragePosition`](super::AveragePosition) through the low-pass filter lag·dFT/dt + FT = F, exact for an F that is held over a tick:
 //! FT(k) = a·FT(k − 1) + (1 − a)·F(k) with a = e^(−Tc/lag).
 
-use super::{Law, LawParameter, LawParameters, Observation, Pull};
+use super::{Law, LawForm, LawKind, LawParameter, LawParameters, Observation};
 use crate::tick::coordinate;
 use crate::{Gains, Number};
 
@@ -18,13 +18,16 @@ pub struct SmoothedAveragePosition<C = f64> {
     taken: C,
 }
 
-impl SmoothedAveragePosition {
-    pub(super) const PULL: Pull = Pull::Mean;
-    pub(super) const PARAMETERS: &[LawParameter] =
-        &[LawParameter { key: "lag", default: "\"10ms\"", about: "Time constant of the force; 0 for average-position itself" }];
+impl LawKind for SmoothedAveragePosition {
+    const PARAMETERS: &[LawParameter] = &[LawParameter {
+        key: "lag",
+        form: LawForm::Duration,
+        default: "\"10ms\"",
+        about: "Time constant of the force; 0 for average-position itself",
+    }];
 
-    pub(super) fn new(parameters: &LawParameters) -> Self {
-        let periods = parameters.tick.as_secs_f64() / parameters.own.get(0).as_secs_f64();
+    fn new(parameters: &LawParameters) -> Self {
+        let periods = parameters.tick.as_secs_f64() / parameters.own.duration(0).as_secs_f64();
         // 1 − a without the rounding of a: a short tick leaves a near 1.
         Self { gains: parameters.gains, kept: libm::exp(-periods), taken: -libm::expm1(-periods) }
     }

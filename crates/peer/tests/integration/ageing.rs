@@ -45,8 +45,17 @@ impl Receiver {
 
 /// Peer 0 of so many, at rest at `own`; the others begin at the origin.
 fn receiver(peers: usize, own: f64) -> Receiver {
-    let config =
-        PeerConfig { session: 1, place: 0, axes: 1, contact: Contact::None, coupling: GAINS, tick: TICK, compute_delay: false, enclosure: None };
+    let config = PeerConfig {
+        session: 1,
+        place: 0,
+        axes: 1,
+        contact: Contact::None,
+        coupling: GAINS,
+        tick: TICK,
+        compute_delay: false,
+        own_damping: 0.0,
+        enclosure: None,
+    };
     let clock = Clock::regular(Duration::from_millis(1));
     let object = ObjectCopy::new(CopyConfig { mass: 0.2, damping: 0.0 }, at(own, 0.0), Integrator::Exact, &clock);
     let held = Held::new(vec![State::REST; peers - 1]);

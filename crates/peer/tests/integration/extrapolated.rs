@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::{LawParameters, LawStrategy, LawValues};
+use cohaptic_peer::coordination::{LawParameters, LawStrategy, LawValue, LawValues};
 use cohaptic_peer::{Context, Coordination, Gains, Held, State, Strategy as _};
 use cohaptic_units::Instant;
 use proptest::collection::vec;
@@ -13,8 +13,8 @@ use crate::laws::{Body, TICK, body, count, gains, pull, rounding};
 
 fn strategy(gains: Gains, horizon: Duration) -> LawStrategy<1> {
     let mut own = LawValues::default();
-    own.set(0, horizon);
-    LawStrategy::new(Coordination::Extrapolated, LawParameters { gains, peers: 2, tick: TICK, own })
+    own.set(0, LawValue::Duration(horizon));
+    LawStrategy::new(Coordination::Extrapolated, LawParameters { gains, peers: 2, tick: TICK, oldest: None, own })
 }
 
 /// FT at the local time 1 s of samples with those ages \[ms\].

@@ -27,6 +27,7 @@ fn receiver() -> Receiver {
         coupling: gains,
         tick: Duration::from_millis(1),
         compute_delay: false,
+        own_damping: 0.0,
         enclosure: None,
     };
     let clock = Clock::regular(Duration::from_millis(1));

@@ -53,6 +53,7 @@ fn peer<D: Device<1>, S: Strategy<1>>(device: D, strategy: S, compute_delay: boo
         coupling,
         tick: Duration::from_millis(1),
         compute_delay,
+        own_damping: 0.0,
         enclosure: None,
     };
     let clock = Clock::regular(Duration::from_millis(1));

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::{LawParameters, LawStrategy, LawValues};
+use cohaptic_peer::coordination::{LawParameters, LawStrategy, LawValue, LawValues};
 use cohaptic_peer::{Context, Coordination, Gains, Held, State, Strategy as _};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
@@ -12,8 +12,8 @@ use crate::laws::{Body, TICK, body, gains, pull};
 
 fn strategy(gains: Gains, lag: Duration) -> LawStrategy<1> {
     let mut own = LawValues::default();
-    own.set(0, lag);
-    LawStrategy::new(Coordination::SmoothedAveragePosition, LawParameters { gains, peers: 2, tick: TICK, own })
+    own.set(0, LawValue::Duration(lag));
+    LawStrategy::new(Coordination::SmoothedAveragePosition, LawParameters { gains, peers: 2, tick: TICK, oldest: None, own })
 }
 
 fn forces(strategy: &mut LawStrategy<1>, own: Body, other: Body, ticks: usize) -> Vec<f64> {

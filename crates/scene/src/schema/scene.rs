@@ -1,7 +1,7 @@
 //! The keys of a scene.
 
 use cohaptic_peer::Coordination;
-use cohaptic_peer::coordination::LawValues;
+use cohaptic_peer::coordination::{LawForm, LawValues};
 use cohaptic_wan::DropCause;
 
 use cohaptic_linkfile::schema::{
@@ -76,6 +76,15 @@ const STRATEGIES: [(&str, &str); Coordination::ALL.len()] = {
     words
 };
 
+const fn form_of(form: LawForm) -> Form {
+    match form {
+        LawForm::Duration => Form::Duration,
+        LawForm::AutomaticDuration => Form::AnyOf(const { &[Form::Words(&AUTOMATIC), Form::Duration] }),
+        LawForm::AutomaticDamping => Form::AnyOf(const { &[Form::Words(&AUTOMATIC), number(DAMPING)] }),
+    }
+}
+const AUTOMATIC: [(&str, &str); 1] = [("auto", "as the links of the scene ask for")];
+
 /// The keys of each law's own parameters, by its place in the registry; the first ones of a row are used.
 static LAW_KEYS: [[Key; LawValues::MOST]; Coordination::ALL.len()] = {
     let mut keys = [const { [const { optional("", Form::Duration, "") }; LawValues::MOST] }; Coordination::ALL.len()];
@@ -84,7 +93,7 @@ static LAW_KEYS: [[Key; LawValues::MOST]; Coordination::ALL.len()] = {
         let parameters = Coordination::ALL[law].parameters();
         let mut place = 0;
         while place < parameters.len() {
-            keys[law][place] = usual(parameters[place].key, Form::Duration, parameters[place].default, parameters[place].about);
+            keys[law][place] = usual(parameters[place].key, form_of(parameters[place].form), parameters[place].default, parameters[place].about);
             place += 1;
         }
         law += 1;

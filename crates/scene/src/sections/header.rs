@@ -2,10 +2,10 @@
 
 use core::time::Duration;
 
-use cohaptic_linkfile::document::Node;
+use cohaptic_linkfile::document::{Node, quote};
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
-use cohaptic_peer::coordination::{LawSettings, LawValues};
+use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue, LawValues};
 use cohaptic_peer::{Coordination, Gains, Integrator};
 
 use crate::model::{Axes, CoordinationSpec, Scaling};
@@ -86,13 +86,28 @@ fn read_values(node: &Node, context: Context<'_>, law: Coordination) -> Option<L
     let mut values = LawValues::defaults(law.parameters());
     let mut is_read = true;
     for (place, parameter) in law.parameters().iter().enumerate() {
-        match table.optional(parameter.key, values.get(place), values::duration) {
+        match table.optional(parameter.key, values.get(place), |node, context| read_value(parameter.form, node, context)) {
             Some(value) => values.set(place, value),
             None => is_read = false,
         }
     }
     table.finish();
     is_read.then_some(values)
+}
+
+fn read_value(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawValue> {
+    let is_automatic = node.as_text() == Some("auto");
+    match form {
+        LawForm::AutomaticDuration | LawForm::AutomaticDamping if is_automatic => Some(LawValue::Automatic),
+        LawForm::Duration | LawForm::AutomaticDuration => values::duration(node, context).map(LawValue::Duration),
+        LawForm::AutomaticDamping => match node.as_text() {
+            Some(word) => {
+                context.fault_at(node, format!("unknown name {}: expected auto, or {}", quote(word), DAMPING.expected()));
+                None
+            }
+            None => DAMPING.read(node, context).map(LawValue::Number),
+        },
+    }
 }
 
 /// How gains follow the number of peers.

@@ -191,7 +191,7 @@ mod simulated {
                 let spec = &scene.peers[place];
                 let hand = Hand::Force(Signal::Sine { amplitude: [1.0; 3], frequency: Hertz(hz), phase });
                 let device = SimulatedDevice::<1>::new(spec.device, (place == 0).then_some(&hand), State::REST, scene.integrator, &spec.clock);
-                let object = ObjectCopy::new(scene.copy_config(), State::REST, scene.integrator, &spec.clock);
+                let object = ObjectCopy::new(scene.copy_config(place), State::REST, scene.integrator, &spec.clock);
                 Peer::new(scene.peer_config(place), device, object, FromScene.strategy::<1>(scene, place), Held::new((1..n).map(|_| State::REST)))
             })
             .collect();

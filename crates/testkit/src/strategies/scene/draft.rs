@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use cohaptic_peer::coordination::LawSettings;
+use cohaptic_peer::coordination::{LawSettings, LawValue};
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
 use cohaptic_scene::{Scene, SceneError};
 
@@ -192,9 +192,13 @@ impl Draft {
         ));
         let Gains { stiffness: k, damping: b } = gains;
         let name = self.strategy.name();
-        let value = |place: usize| self.settings.of(self.strategy).get(place).as_nanos();
+        let value = |place: usize| match self.settings.of(self.strategy).get(place) {
+            LawValue::Automatic => "\"auto\"".to_owned(),
+            LawValue::Duration(duration) => format!("\"{}ns\"", duration.as_nanos()),
+            LawValue::Number(number) => format!("{number:?}"),
+        };
         let own: Vec<String> =
-            self.strategy.parameters().iter().enumerate().map(|(place, parameter)| format!("{} = \"{}ns\"", parameter.key, value(place))).collect();
+            self.strategy.parameters().iter().enumerate().map(|(place, parameter)| format!("{} = {}", parameter.key, value(place))).collect();
         let own = if own.is_empty() { String::new() } else { format!(", {name} = {{ {} }}", own.join(", ")) };
         line(format!("coordination = {{ strategy = \"{name}\", stiffness = {k:?}, damping = {b:?}, update = \"{update}us\"{own} }}"));
         if let Some((integrator, substeps)) = self.integrator {

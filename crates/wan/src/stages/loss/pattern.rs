@@ -106,6 +106,22 @@ impl Pattern {
         self.period.map(|period| lost as f64 / period as f64)
     }
 
+    /// The longest run of what it counts that it covers without a gap; `None` if it covers everything from some place on.
+    #[must_use]
+    pub fn longest_run(&self) -> Option<u64> {
+        let once = self.spans.iter().cloned();
+        // Two periods one after the other have every run that goes from one into the next.
+        let again = self.period.into_iter().flat_map(|period| self.spans.iter().map(move |span| span.start + period..span.end + period));
+        let (mut longest, mut run, mut end) = (0, 0, None);
+        for span in once.chain(again) {
+            run = if end == Some(span.start) { run } else { 0 } + (span.end - span.start);
+            longest = longest.max(run);
+            end = Some(span.end);
+        }
+        let covers_all = self.period.is_some_and(|period| longest > period) || longest == u64::MAX;
+        (!covers_all).then_some(longest)
+    }
+
     /// Whether it covers that packet at that instant.
     #[must_use]
     pub fn covers(&self, number: u64, now: Instant) -> bool {
@@ -137,6 +153,17 @@ mod tests {
         let pattern = Pattern::in_time(&[at(10)..at(20)], None).unwrap();
         let covered: Vec<u64> = (0..40).filter(|t| pattern.covers(0, at(*t))).collect();
         assert_eq!(covered, (10..20).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_longest_run_goes_on_into_the_next_period() {
+        let run = |packets: Vec<Range<u64>>, every: Option<u64>| Pattern::of_packets(packets, every).unwrap().longest_run();
+        assert_eq!(run(vec![1..2, 4..7], Some(10)), Some(3));
+        assert_eq!(run(vec![0..2, 8..10], Some(10)), Some(4));
+        assert_eq!(run(vec![0..2, 8..10], None), Some(2));
+        assert_eq!(run(vec![3..5, 5..6], Some(7)), Some(3));
+        assert_eq!(run(vec![0..4], Some(4)), None);
+        assert_eq!(run(Vec::new(), Some(4)), Some(0));
     }
 
     #[test]

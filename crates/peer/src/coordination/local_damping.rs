@@ -1,0 +1,67 @@
+//! A spring towards the mean of the others, and a damper that ties each copy to ground.
+//!
+//! Local damping injection in passive set-point control (Lee & Huang 2010, without its set-points): FT = KT·(x − mean xⱼ), and the copy has the damping bO + β. A spring
+//! whose far end is a sample held for m ticks does at most KT·(m + 1)·Tc times the square of the velocity of the copy as work; a β of that size takes it
+//! away, so the network injects no energy. The price is felt in free motion.
+
+use super::{Law, LawForm, LawKind, LawParameter, LawParameters, LawValue, Observation, UsedGains};
+use crate::tick::coordinate;
+use crate::{Gains, Number};
+
+/// The law with damping of the own copy.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct LocalDamping<C = f64> {
+    /// KT, and no damping between copies.
+    gains: Gains<C>,
+    /// β [N·s/m].
+    damping: f64,
+}
+
+impl LawKind for LocalDamping {
+    const GAINS: UsedGains = UsedGains::Stiffness;
+    const PARAMETERS: &[LawParameter] = &[
+        LawParameter {
+            key: "damping",
+            form: LawForm::AutomaticDamping,
+            default: "\"auto\"",
+            about: "Damping of each copy towards ground, β; auto for K_T times the age of the oldest sample in use and a tick",
+        },
+        LawParameter {
+            key: "age",
+            form: LawForm::AutomaticDuration,
+            default: "\"auto\"",
+            about: "The age of the oldest sample in use, for a damping of auto; auto where all links have constant delays, with patterns of lost packets or none",
+        },
+    ];
+
+    #[expect(clippy::cast_precision_loss, reason = "ticks are counted, far below 2^53")]
+    fn new(parameters: &LawParameters) -> Self {
+        let Gains { stiffness, .. } = parameters.gains;
+        let tick = parameters.tick.as_secs_f64();
+        let automatic = || match (parameters.own.get(1), parameters.oldest) {
+            (LawValue::Duration(age), _) => stiffness * (age.as_secs_f64() + tick),
+            (_, Some(oldest)) => stiffness * ((oldest + 1) as f64 * tick),
+            // Scenes in which the links bound no age are refused.
+            (_, None) => 0.0,
+        };
+        Self { gains: Gains { stiffness, damping: 0.0 }, damping: parameters.own.get(0).number().unwrap_or_else(automatic) }
+    }
+}
+
+impl<C: Copy> LocalDamping<C> {
+    #[inline(always)]
+    pub(super) fn map<D>(&self, coefficient: impl FnMut(&C) -> D) -> LocalDamping<D> {
+        LocalDamping { gains: self.gains.map(coefficient), damping: self.damping }
+    }
+}
+
+impl<N: Number> Law<N> for LocalDamping<N> {
+    fn damping(&self) -> f64 {
+        self.damping
+    }
+
+    #[inline(always)]
+    fn force(&self, seen: &Observation<N>, _memory: &mut [N]) -> N {
+        coordinate(&self.gains, seen.own.relative_to(seen.mean))
+    }
+}
