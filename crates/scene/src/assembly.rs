@@ -1,6 +1,6 @@
 //! What the parts of a peer are made from, with every scaling applied.
 
-use cohaptic_peer::coordination::Law;
+use cohaptic_peer::coordination::{Law, Pull};
 use cohaptic_peer::{CopyConfig, Gains, PeerConfig, Plant, State};
 
 use crate::Scene;
@@ -38,10 +38,22 @@ impl Scene {
         spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers.len()))
     }
 
-    /// KT and BT: `gains`, those of the scene or those that the timeline sets, scaled by the number of peers.
+    /// KT and BT: `gains`, those of the scene or those that the timeline sets, times [`Scene::coordination_factor`].
     #[must_use]
     pub fn coordination_gains(&self, gains: Gains) -> Gains {
-        gains.scaled(self.coordination.scaling.coordination_factor(self.peers.len()))
+        gains.scaled(self.coordination_factor())
+    }
+
+    /// What KT and BT are multiplied by for the number of peers.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
+    pub fn coordination_factor(&self) -> f64 {
+        let peers = self.peers.len();
+        let scaling = self.coordination.scaling.coordination_factor(peers);
+        match self.coordination.pull {
+            Pull::Mean => scaling,
+            Pull::Sum => scaling * (peers - 1) as f64,
+        }
     }
 
     /// The device of the peer in that place along one axis, with the arm that holds it.

@@ -4,7 +4,7 @@ use core::fmt;
 use core::time::Duration;
 use std::path::PathBuf;
 
-use cohaptic_peer::coordination::LawSettings;
+use cohaptic_peer::coordination::{LawSettings, Pull};
 use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::{DropCause, LinkModel};
@@ -98,6 +98,8 @@ pub struct CoordinationSpec {
     pub strategy: Coordination,
     /// How its gains are scaled with the number of peers.
     pub scaling: Scaling,
+    /// Whether KT and BT count once, or once for each other peer.
+    pub pull: Pull,
     /// KT and BT as written, before scaling.
     pub gains: Gains,
     /// The parameters that strategies have of their own, of every strategy.
@@ -107,11 +109,14 @@ pub struct CoordinationSpec {
 }
 
 impl fmt::Debug for CoordinationSpec {
-    /// Parameters of strategies are shown only where one is not at its default: fingerprints of records are made of this text.
+    /// The pull and parameters of strategies are shown only where they are not at their defaults: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { strategy, scaling, gains, settings, update } = self;
+        let Self { strategy, scaling, pull, gains, settings, update } = self;
         let mut shown = f.debug_struct("CoordinationSpec");
         shown.field("strategy", strategy).field("scaling", scaling).field("gains", gains).field("update", update);
+        if *pull != Pull::Mean {
+            shown.field("pull", pull);
+        }
         if *settings != LawSettings::default() {
             shown.field("settings", settings);
         }

@@ -96,7 +96,8 @@ pub fn analyse_on_watched(scene: &Scene, graph: &Graph, watch: &dyn Watch) -> Re
     let peers = scene.peers.len();
     let (spectrum, degree) = graph.spectrum(scene)?;
     let mut node = [structure.node(scene, 0)];
-    match (scene.coordination.strategy.pull(), degree) {
+    let pulls = [scene.coordination.strategy.pull(), scene.coordination.pull];
+    match (if pulls.contains(&Pull::Sum) { Pull::Sum } else { Pull::Mean }, degree) {
         (Pull::Mean, _) => {}
         // The sum over as many as are heard, in place of that over all others.
         (Pull::Sum, Some(degree)) => node[0].law = node[0].law.scaled(degree / count(peers - 1)),

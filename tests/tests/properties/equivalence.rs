@@ -1,7 +1,10 @@
 //! Average-position and proportional-derivative coordination are one law with different gains: Σⱼ K(x − xⱼ) over the N−1 others is (N−1)·K·(x − x̄).
 
 use cohaptic_harness::Model;
+use cohaptic_peer::coordination::Pull;
 use cohaptic_peer::{Coordination, Gains};
+use cohaptic_scene::Scene;
+use cohaptic_stability::{Method, analyse};
 use cohaptic_tests::{cases, drafts, first_difference, run};
 use proptest::prelude::*;
 
@@ -29,6 +32,20 @@ proptest! {
         draft.gains = Gains { stiffness: others * stiffness, damping: others * damping };
         let difference = first_difference(&proportional_derivative, &run(&draft.scene(), Model::Least));
         prop_assert!(difference.is_none(), "{}", difference.unwrap());
+    }
+
+    /// The key `pull`, also where the timeline changes gains.
+    #[test]
+    fn average_position_that_pulls_to_each_is_proportional_derivative(mut draft in drafts::anything_among(2..=6_usize)) {
+        draft.strategy = Coordination::ProportionalDerivative;
+        let proportional_derivative = draft.scene();
+        draft.strategy = Coordination::AveragePosition;
+        let mut sum = draft.scene();
+        sum.coordination.pull = Pull::Sum;
+        let difference = first_difference(&run(&proportional_derivative, Model::Least), &run(&sum, Model::Least));
+        prop_assert!(difference.is_none(), "{}", difference.unwrap());
+        let radius = |scene: &Scene| analyse(scene, Method::Reduced).map(|found| found.radius.value.to_bits()).map_err(drop);
+        prop_assert_eq!(radius(&proportional_derivative), radius(&sum));
     }
 
     /// And they are not the same with the same gains: otherwise the tests above would pass for a program that ignores the strategy.

@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod links;
 
-use cohaptic_peer::coordination::{Law, LawForm, LawValue, UsedGains};
+use cohaptic_peer::coordination::{Law, LawForm, LawValue, Pull, UsedGains};
 use cohaptic_peer::{Contact, Hand, Integrator, wire};
 use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::{Counted, Number, Span};
@@ -167,6 +167,10 @@ impl Rows {
             Scaling::None => "as written",
             Scaling::InverseN => "scaled by 4(N-1)/N^2",
         };
+        let pull = match spec.pull {
+            Pull::Mean => "",
+            Pull::Sum => ", times N-1",
+        };
         let mut model = format!("{}, KT = {} N/m, BT = {} N·s/m", spec.strategy.name(), Number(gains.stiffness), Number(gains.damping));
         for (place, parameter) in spec.strategy.parameters().iter().enumerate() {
             model.push_str(&format!(", {} = ", parameter.key));
@@ -184,7 +188,7 @@ impl Rows {
         if spec.strategy.gains() == UsedGains::Stiffness && gains.damping > 0.0 {
             model.push_str("; BT is not used");
         }
-        self.model("coordination", model, format!("gains {scaling}; the mean of the samples held is kept until one changes"));
+        self.model("coordination", model, format!("gains {scaling}{pull}; the mean of the samples held is kept until one changes"));
         let len = wire::datagram_len(scene.axes.count());
         self.model(
             "samples",

@@ -112,7 +112,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             datagrams: Datagrams::default(),
             schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock).enumerate()),
             changes: scene.timeline.iter().rev().cloned().collect(),
-            coordination_factor: scene.coordination.scaling.coordination_factor(scene.peers.len()),
+            coordination_factor: scene.coordination_factor(),
             end: Instant::ZERO.saturating_add(scene.duration),
             now: Instant::ZERO,
             max_discrepancy: 0.0,

@@ -5,7 +5,7 @@ use core::time::Duration;
 use cohaptic_linkfile::document::{Node, quote};
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
-use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue, LawValues};
+use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue, LawValues, Pull};
 use cohaptic_peer::{Coordination, Gains, Integrator};
 
 use crate::model::{Axes, CoordinationSpec, Scaling};
@@ -55,6 +55,8 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<Coo
     let names = strategies.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let strategy = table.required("strategy", &format!("one of {names}"), |node, context| values::choice(node, context, &strategies));
     let scaling = table.optional("scaling", Scaling::None, read_scaling);
+    let pulls = [("mean", Pull::Mean), ("sum", Pull::Sum)];
+    let pull = table.optional("pull", Pull::Mean, |node, context| values::choice(node, context, &pulls));
     let stiffness = table.required("stiffness", &STIFFNESS.expected(), |node, context| STIFFNESS.read(node, context));
     let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
     let update = table.required("update", "a duration above zero such as \"8ms\"", values::positive_duration);
@@ -63,6 +65,7 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<Coo
     Some(CoordinationSpec {
         strategy: strategy?,
         scaling: scaling?,
+        pull: pull?,
         gains: Gains { stiffness: stiffness?, damping: damping? },
         settings: settings?,
         update: update?,
