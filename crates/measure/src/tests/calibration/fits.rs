@@ -5,7 +5,7 @@ use rand_distr::{Distribution as _, Exp1, StandardNormal};
 
 use super::{OF_BATCHES, OF_LIKELIHOOD, Tally};
 use crate::fit::{LossModel, Measurement, Measurements, fit};
-use crate::test_rng::TestRng;
+use crate::tests::TestRng;
 
 const MEASUREMENTS: u64 = 250;
 const PACKETS: usize = 1_200;

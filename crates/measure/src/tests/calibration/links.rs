@@ -10,7 +10,7 @@ use crate::achieved::{Accumulator, Achieved};
 use crate::asked::Asked;
 use crate::comparison::{Comparison, Figure};
 use crate::steady::SteadyStream;
-use crate::test_rng::TestRng;
+use crate::tests::TestRng;
 
 const LINKS: u64 = 240;
 const STREAM: SteadyStream =
