@@ -1,9 +1,10 @@
-//! `releases.csv`: when each datagram to another program was due, and how late it was sent.
+//! `releases.csv`, when each datagram to another program was due and how late it was sent, and `lateness.csv`, the histograms of a session.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use cohaptic_harness::record::{RecordError, RecordFile};
+use cohaptic_realtime::Lateness;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
@@ -42,4 +43,17 @@ impl Releases {
     pub(super) fn finish(self) -> Result<PathBuf, RecordError> {
         self.file.finish()
     }
+}
+
+/// Columns `of,late_us,count`: the number of ticks, or releases, of a lateness, to three digits.
+pub(super) fn write_lateness(folder: &Path, ticks: &Lateness, releases: &Lateness) -> Result<PathBuf, RecordError> {
+    let mut file = RecordFile::create(folder.join("lateness.csv"))?;
+    file.write(b"of,late_us,count\n")?;
+    for (of, lateness) in [("tick", ticks), ("release", releases)] {
+        for (late, count) in lateness.recorded() {
+            let nanos = late.as_nanos();
+            file.write(format!("{of},{}.{:03},{count}\n", nanos / 1000, nanos % 1000).as_bytes())?;
+        }
+    }
+    file.finish()
 }
