@@ -1,15 +1,27 @@
-//! Texts made of the arguments themselves: manual pages (`cohaptic man`) and completions of shells (`cohaptic completions`).
+//! Texts for other programs: manual pages (`cohaptic man`) and completions of shells (`cohaptic completions`), made of the arguments themselves, and JSON Schemas of files (`cohaptic schema`).
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Command, CommandFactory as _};
 use clap_mangen::Man;
+use cohaptic_scene::schema::FileSchema;
 
-use crate::arguments::{Arguments, CompletionsArguments, ManArguments};
+use crate::arguments::{Arguments, CompletionsArguments, FileKind, ManArguments, SchemaArguments};
 use crate::failure::Failure;
 use crate::file::write_file;
 use crate::output;
+
+/// Prints the JSON Schema of a kind of file.
+pub(crate) fn schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
+    let kind = match arguments.kind {
+        FileKind::Scene => FileSchema::Scene,
+        FileKind::Relay => FileSchema::Relay,
+        FileKind::Router => FileSchema::Router,
+    };
+    output::raw(format!("{}\n", kind.json()).as_bytes())?;
+    Ok(ExitCode::SUCCESS)
+}
 
 /// Prints the page of a command, or writes all pages into a folder.
 pub(crate) fn man(arguments: &ManArguments) -> Result<ExitCode, Failure> {

@@ -1,13 +1,105 @@
-//! A relay in words.
+//! What a relay did, as a JSON document and in words.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use cohaptic_relay::{LinkReport, PortReport, Report};
+use cohaptic_realtime::Wish;
+use cohaptic_relay::{Form, LinkReport, PortReport, Report};
 use cohaptic_units::print::Counted;
+use serde::Serialize;
 
-use super::document::{Totals, refused};
 use super::setup::Setup;
+use crate::document_schema::document;
+use crate::documents::{self, lateness};
 use crate::realtime::{ConfiguredDelay, carried, counts, lasted, late, notes};
+
+/// What `cohaptic relay --json` prints.
+pub(super) fn document(setup: &Setup, report: &Report, asked: &[ConfiguredDelay], is_interrupted: bool) -> impl Serialize {
+    let totals = Totals::of(report);
+    document! {
+        title: setup.title.as_str(),
+        form: match setup.config.form {
+            Form::Mesh(_) => "mesh",
+            Form::Proxy(_) => "proxy",
+        },
+        duration_s: report.elapsed.as_secs_f64(),
+        ending: if is_interrupted { "interrupted" } else { "complete" },
+        valid: report.validity.is_valid(),
+        packets: totals.packets,
+        dropped: totals.dropped,
+        release_error_us: lateness(&report.release.summary()),
+        clamped_us: lateness(&report.clamped.summary()),
+        links: report.links.iter().zip(asked).map(|(link, asked)| link_document(link, asked)).collect::<Vec<_>>(),
+        ports: report.ports.iter().map(port_document).collect::<Vec<_>>(),
+        refused: refused(report).into_iter().collect::<BTreeMap<_, _>>(),
+        in_flight: document! { packets: report.held.0, bytes: report.held.1.get() },
+        unsent: totals.unsent,
+        clients_without_socket: report.without_socket,
+        granted: report.prepared.granted.iter().copied().map(Wish::name).collect::<Vec<_>>(),
+        refused_wishes: report.prepared.refused.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    }
+}
+
+fn link_document(link: &LinkReport, asked: &ConfiguredDelay) -> impl Serialize + use<> {
+    document! {
+        #[serde(flatten)]
+        link: documents::link(link.from.clone(), link.to.clone(), &link.stats),
+        asked_mean_delay_s: asked.first.map(|delay| delay.as_secs_f64()),
+        changes: asked.changes,
+        delivered_bytes: link.counts.delivered_bytes,
+        overload: link.counts.overload,
+        undeliverable: link.counts.undeliverable,
+    }
+}
+
+fn port_document(port: &PortReport) -> impl Serialize + use<> {
+    document! {
+        name: port.name.clone(),
+        address: port.address.map(|address| address.to_string()),
+        received: port.counts.received,
+        sent: port.counts.sent,
+        send_failures: port.counts.failures.by_reason().into_iter().collect::<BTreeMap<_, _>>(),
+        oversized: port.counts.oversized,
+        receive_errors: port.counts.receive_errors,
+        receive_buffer_bytes: port.receive_buffer,
+        kernel_drops: port.kernel_drops,
+    }
+}
+
+/// What was turned away at the door, by cause.
+pub(super) fn refused(report: &Report) -> [(&'static str, u64); 4] {
+    let intake = &report.intake;
+    [("stranger", intake.strangers), ("to-itself", intake.to_itself), ("no-room", intake.no_room), ("overload", intake.overload)]
+}
+
+/// Sums over everything.
+struct Totals {
+    /// What came in, whatever became of it.
+    packets: u64,
+    /// What was dropped by the relay, by its links, or by the kernel on the way out; not what the kernel dropped before anybody saw it.
+    dropped: u64,
+    sent: u64,
+    /// What had come out of its link and was not sent when the run ended.
+    unsent: u64,
+}
+
+impl Totals {
+    fn of(report: &Report) -> Self {
+        let intake = &report.intake;
+        let at_the_door = intake.overload + intake.strangers + intake.to_itself + intake.no_room;
+        let over_links = |count: fn(&LinkReport) -> u64| -> u64 { report.links.iter().map(count).sum() };
+        let over_ports = |count: fn(&PortReport) -> u64| -> u64 { report.ports.iter().map(count).sum() };
+        let undeliverable = over_links(|link| link.counts.undeliverable);
+        let (sent, failed) = (over_ports(|port| port.counts.sent), over_ports(|port| port.counts.failures.in_all()));
+        let delivered = over_links(|link| link.stats.delivered());
+        Self {
+            packets: intake.offered + at_the_door,
+            dropped: at_the_door + over_links(|link| link.stats.dropped_in_all()) + undeliverable + failed,
+            sent,
+            unsent: delivered.saturating_sub(undeliverable + sent + failed),
+        }
+    }
+}
 
 /// So many links are named.
 const MOST_LINKS: usize = 64;

@@ -1,10 +1,15 @@
-//! The JSON document of a map.
+//! Maps as a JSON document and in words, with small pictures.
 
-use cohaptic_stability::Criterion;
+use std::fmt::Write as _;
+
+use cohaptic_stability::{Criterion, Verdict};
+use cohaptic_units::print::Counted;
 use serde::Serialize;
 
-use super::{Order, Speed, VariantMap};
+use super::{Order, Speed, VariantMap, glance};
 use crate::document_schema::document;
+use crate::output::{are, figure};
+use crate::stability::quantity::label;
 use crate::stability::source;
 
 /// The answer of `cohaptic stability map --json`.
@@ -64,4 +69,45 @@ fn radii(map: &VariantMap) -> impl Serialize {
 pub(super) fn notes(maps: &[VariantMap]) -> Vec<String> {
     let cells: usize = maps.iter().map(VariantMap::nominal_cells).sum();
     source::nominal(cells, ["cell is", "cells are"]).into_iter().collect()
+}
+
+/// More pictures than this do not fit on a screen.
+const MOST_PICTURES: usize = 4;
+
+pub(super) fn describe(order: &Order, maps: &[VariantMap], speed: Speed, pictures: bool) -> String {
+    let mut text = format!("{}\n", order.title);
+    for (number, map) in maps.iter().enumerate() {
+        // Writing to a string does not fail.
+        let _ = match maps.len() {
+            1 => writeln!(text),
+            _ => writeln!(text, "\n{}", map.name),
+        };
+        if pictures && number < MOST_PICTURES {
+            let (x, y) = (label(order.x()), label(order.y()));
+            let axes = (glance::Axis { label: &x, values: &map.map.x }, glance::Axis { label: &y, values: &map.map.y });
+            text.push_str(&glance::draw(&axes.0, &axes.1, |column, row| map.verdicts[row][column] == Verdict::Stable));
+        }
+        let _ = writeln!(
+            text,
+            "  {:.2} % of {} stable{}{}",
+            100.0 * map.stable_fraction(),
+            are(order.grid.columns() * order.grid.rows(), "cell"),
+            if map.criterion == Criterion::MeanSquare { " in the mean square" } else { "" },
+            least(order, map)
+        );
+    }
+    let _ = writeln!(text, "\n{} computed in {:.3} s: {:.0} a second", Counted(speed.cells, "cell"), speed.wall_s, speed.cells_per_s());
+    for note in notes(maps) {
+        let _ = writeln!(text, "note: {note}");
+    }
+    text
+}
+
+/// The least radius, and where it is.
+fn least(order: &Order, VariantMap { map, criterion, .. }: &VariantMap) -> String {
+    let cells = map.y.iter().zip(&map.radius).flat_map(|(y, row)| map.x.iter().zip(row).map(move |(x, radius)| (*radius, *x, *y)));
+    let least = cells.filter(|(radius, ..)| radius.is_finite()).min_by(|one, other| one.0.total_cmp(&other.0));
+    least.map_or_else(String::new, |(radius, x, y)| {
+        format!("; the least {} is {}, at {} and {}", source::name(*criterion), figure(radius, 6), order.x().text(x), order.y().text(y))
+    })
 }

@@ -1,14 +1,58 @@
-//! A session as live control shows it.
+//! Between a session and onlookers, live control among them: nothing here waits.
+
+use std::sync::mpsc::Receiver;
 
 use cohaptic_control::{Description, Kind, LinkCounters, LinkName, PeerName, PeerView, Presence as Shown, Snapshot};
 use cohaptic_harness::live::Presence;
 use cohaptic_live::session::{LinkStatus, PeerStatus};
-use cohaptic_live::{Refusal, Status};
+use cohaptic_live::{Conductor, LinkChange, Refusal, Status};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
+use super::timeline::Elapsed;
 use crate::documents::micros;
-use crate::realtime::{counters, quantiles, quantiles_of};
+use crate::interrupt;
+use crate::realtime::{Edit, Look, counters, quantiles, quantiles_of};
+
+/// Publishes the session and hands in what live control changes.
+pub(super) struct SessionConductor {
+    look: Option<Look>,
+    wanted: Receiver<Edit>,
+    /// The links in the order of the description.
+    pairs: Vec<(usize, usize)>,
+    elapsed: Elapsed,
+    /// Of the scene.
+    axes: usize,
+}
+
+impl SessionConductor {
+    pub(super) const fn new(look: Option<Look>, wanted: Receiver<Edit>, pairs: Vec<(usize, usize)>, elapsed: Elapsed, axes: usize) -> Self {
+        Self { look, wanted, pairs, elapsed, axes }
+    }
+}
+
+impl Conductor for SessionConductor {
+    fn keep_going(&mut self) -> bool {
+        !interrupt::requested()
+    }
+
+    fn next_change(&mut self) -> Option<LinkChange> {
+        let Edit { link, keys, model } = self.wanted.try_recv().ok()?;
+        let (from, to) = *self.pairs.get(link)?;
+        Some(LinkChange { from, to, keys, model })
+    }
+
+    fn show(&mut self, status: Status) {
+        self.elapsed.set(Instant::ZERO.saturating_add(status.elapsed));
+        if let Some(look) = &self.look {
+            look.publish(snapshot(&status, self.axes));
+        }
+    }
+
+    fn wants_status(&self) -> bool {
+        self.look.is_some()
+    }
+}
 
 /// Every directed link, by sender, then receiver.
 pub(super) fn pairs(scene: &Scene) -> Vec<(usize, usize)> {

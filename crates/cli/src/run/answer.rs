@@ -1,13 +1,40 @@
-//! A run in words, with a plot.
+//! A run as a JSON document and in words.
 
 use cohaptic_harness::record::SANE_POSITION;
 use cohaptic_harness::{Ending, Summary};
 use cohaptic_scene::Scene;
 use cohaptic_units::print::{Counted, Span};
 use cohaptic_wan::DropCause;
+use serde::Serialize;
 
 use super::Run;
-use crate::terminal_plot;
+use crate::document_schema::document;
+use crate::documents::{access_line, ending_name, peer, peer_link};
+use crate::{output, terminal_plot};
+
+/// The answer of `cohaptic run --json`. `otherwise`: the differences of the scene from that of the session that is replayed. `against`: the document of the
+/// variant.
+pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option<impl Serialize>) -> impl Serialize {
+    let summary = &run.summary;
+    let duration_s = summary.duration.as_secs_f64();
+    document! {
+        title: scene.title.as_str(),
+        duration_s: duration_s,
+        ticks: summary.ticks,
+        ending: ending_name(summary.ending),
+        wall_s: run.wall_s,
+        realtime_factor: duration_s / run.wall_s,
+        peers: summary.peers.iter().map(peer).collect::<Vec<_>>(),
+        links: summary.links.iter().map(|link| peer_link(scene, link)).collect::<Vec<_>>(),
+        access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
+        max_discrepancy_m: summary.max_discrepancy,
+        files: run.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
+        #[serde(flatten)]
+        otherwise: (!otherwise.is_empty()).then(|| document! { replayed_otherwise: otherwise }),
+        #[serde(flatten)]
+        variant: against.map(|against| document! { against: against }),
+    }
+}
 
 /// A run in words.
 pub(super) fn describe(scene: &Scene, run: &Run) -> String {
