@@ -25,7 +25,6 @@ mod input;
 mod interrupt;
 mod link;
 mod live;
-mod man;
 mod output;
 mod paper;
 mod progress;
@@ -34,9 +33,9 @@ mod relay;
 mod report;
 mod router;
 mod run;
-mod schema;
 mod stability;
 mod terminal_plot;
+mod texts;
 mod variants;
 
 use std::process::ExitCode;
@@ -70,9 +69,9 @@ fn main() -> ExitCode {
         Command::Paper(arguments) => paper::paper(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::Init(arguments) => init::init(&arguments),
-        Command::Schema(arguments) => schema::schema(&arguments),
-        Command::Completions(arguments) => man::completions(&arguments),
-        Command::Man(arguments) => man::man(&arguments),
+        Command::Schema(arguments) => texts::schema(&arguments),
+        Command::Completions(arguments) => texts::completions(&arguments),
+        Command::Man(arguments) => texts::man(&arguments),
     };
     match done {
         // What was asked to end has ended, whatever came of it.

@@ -11,8 +11,6 @@
 //! must show a [`Token`]. The routes are in `docs/live-control.md`.
 
 mod board;
-mod description;
-mod editor;
 mod http;
 mod metrics;
 mod server;
@@ -21,9 +19,8 @@ mod token;
 mod typed;
 mod views;
 
-pub use board::{Board, Latest};
-pub use description::{Description, Kind, LinkName, PeerName};
-pub use editor::LinkEditor;
+pub use board::{Board, Latest, LinkEditor};
 pub use server::{ServeError, Server, ServerConfig, serve};
+pub use snapshot::{Description, Kind, LinkName, PeerName};
 pub use snapshot::{LinkCounters, PeerView, Presence, Quantiles, Snapshot};
 pub use token::{Token, TokenError};

@@ -35,8 +35,6 @@
 pub mod achieved;
 pub mod asked;
 mod batches;
-#[cfg(test)]
-mod calibration;
 pub mod comparison;
 pub mod fates;
 pub mod fit;
@@ -44,4 +42,4 @@ pub mod pcapng;
 mod series;
 pub mod steady;
 #[cfg(test)]
-mod test_rng;
+mod tests;

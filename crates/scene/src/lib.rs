@@ -36,7 +36,6 @@ mod model;
 mod oldest_sample;
 mod quantities;
 mod read;
-mod scaling;
 pub mod schema;
 mod sections;
 mod strategies;

@@ -4,7 +4,7 @@ use core::num::NonZeroU32;
 
 use cohaptic_wan::{Chance, Displacement, Reorder};
 
-use super::chance::read_chance_in;
+use super::read_chance_in;
 use crate::document::Node;
 use crate::reading::{Context, TableReader, only_one, values};
 

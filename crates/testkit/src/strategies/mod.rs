@@ -58,7 +58,6 @@ mod admits;
 mod any;
 mod bounds;
 mod bounds_error;
-mod chain;
 mod draw;
 mod forms;
 mod grid;
@@ -71,7 +70,7 @@ mod shrink;
 mod space;
 mod stage;
 
-pub use any::{LinkTree, Links, NetworkTree, Networks, any_link, any_network, links_like, networks_like};
+pub use any::{Links, Networks, any_link, any_network, links_like, networks_like};
 pub use bounds::{LinkBounds, LossModel};
 pub use bounds_error::BoundsError;
 pub use link::{ImpairedLink, LinkError};
