@@ -1,5 +1,5 @@
-//! Crates outside of the workspace that depend on the test kit alone, as those of somebody else would: one finds the bug planted in its protocol, the other is the
-//! first test of docs/testing.md.
+//! Crates outside of the workspace that depend on the test kit alone, as those of somebody else would: one finds the bug planted in its protocol, one is the first
+//! test of docs/testing.md, and one is what docs/tutorial-network-test.md ends with.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use std::path::{Path, PathBuf};
@@ -30,7 +30,9 @@ fn test(name: &str) -> (bool, String) {
 
 #[test]
 fn they_depend_on_the_test_kit_alone() {
-    for name in ["reliable-udp", "first-test"] {
+    let plain = r#"cohaptic-testkit = { path = "../../../crates/testkit" }"#;
+    let with_quic = r#"cohaptic-testkit = { path = "../../../crates/testkit", features = ["quinn"] }"#;
+    for (name, dependency) in [("reliable-udp", plain), ("first-test", plain), ("network-test", with_quic)] {
         let manifest = std::fs::read_to_string(example(name).join("Cargo.toml")).unwrap();
         let dependencies: Vec<&str> = manifest
             .lines()
@@ -39,15 +41,15 @@ fn they_depend_on_the_test_kit_alone() {
             .take_while(|line| !line.starts_with('['))
             .filter(|line| line.contains('='))
             .collect();
-        assert_eq!(dependencies, [r#"cohaptic-testkit = { path = "../../../crates/testkit" }"#]);
+        assert_eq!(dependencies, [dependency]);
         assert!(!manifest.contains("dependencies.") && !manifest.contains("dev-dependencies"), "other dependencies in\n{manifest}");
         assert!(manifest.contains("\n[workspace]\n"), "it is to be a workspace of its own");
     }
 }
 
 #[test]
-fn the_planted_bug_is_found_and_the_first_test_fails_as_the_chapter_says() {
-    // One after the other, so that the second finds built what the first has built.
+fn the_planted_bug_is_found_and_the_others_fail_as_their_pages_say() {
+    // One after the other, so that each finds built what those before have built.
     let (has_passed, text) = test("reliable-udp");
     assert!(has_passed, "{text}");
     for test in [
@@ -61,8 +63,21 @@ fn the_planted_bug_is_found_and_the_first_test_fails_as_the_chapter_says() {
     }
     let (has_passed, text) = test("first-test");
     assert!(!has_passed, "the first test of docs/testing.md is to fail:\n{text}");
-    let chapter = std::fs::read_to_string(example("../testing.md")).unwrap();
-    let shown = chapter.split("```text\n").nth(1).unwrap().split("```").next().unwrap();
+    assert_shown("testing.md", 1, &text);
+    assert_shown("tutorial-network-test.md", 1, &text);
+
+    let (has_passed, text) = test("network-test");
+    assert!(!has_passed, "the test of datagrams is to fail:\n{text}");
+    for test in ["each_question_has_its_own_answer ... ok", "late_answers ... ok", "positions_never_go_back ... FAILED"] {
+        assert!(text.contains(&format!("test {test}\n")), "expected {test}:\n{text}");
+    }
+    assert_shown("tutorial-network-test.md", 2, &text);
+}
+
+/// Fails unless the n-th block of text on a page, which begins with the minimal input, is among what a test has printed.
+fn assert_shown(page: &str, n: usize, text: &str) {
+    let content = std::fs::read_to_string(example("..").join(page)).unwrap();
+    let shown = content.split("```text\n").nth(n).unwrap().split("```").next().unwrap();
     assert!(shown.starts_with("minimal failing input"), "{shown}");
-    assert!(text.contains(shown), "docs/testing.md shows\n{shown}\nand this came:\n{text}");
+    assert!(text.contains(shown), "docs/{page} shows\n{shown}\nand this came:\n{text}");
 }

@@ -1,4 +1,4 @@
-//! The pictures of the README and of the pages are those that their commands draw.
+//! The picture of a page that takes longer to draw than the page has time for; those of the others are compared in `crates/cli/tests/pages`.
 
 use cohaptic_picture::testing::faults;
 
@@ -18,18 +18,6 @@ fn assert_shown(name: &str, drawn: &str) {
 /// The text of a page.
 fn page(path: &str) -> String {
     std::fs::read_to_string(shipped("..").join(path)).unwrap()
-}
-
-#[test]
-fn the_pictures_of_the_readme_are_drawn_by_its_first_command() {
-    let desk = Desk::new();
-    let page = page("README.md");
-    let command = "--against coordination.strategy=proportional-derivative --out out";
-    assert!(page.contains(&format!("run scenarios/paper/5-1-ap-2100.toml {command}")), "the README has another command");
-    assert!(page.contains("](docs/images/ap.svg)") && page.contains("](docs/images/pd.svg)"));
-    desk.cohaptic(&format!("run {} {command} --no-plot", shipped("paper/5-1-ap-2100.toml").display()));
-    assert_shown("ap.svg", &desk.read("out/positions.svg"));
-    assert_shown("pd.svg", &desk.read("out/against/positions.svg"));
 }
 
 #[test]

@@ -55,6 +55,11 @@ impl Folder {
         fs::write(path, content).unwrap();
     }
 
+    /// What is in a file that a command has written; `None` if there is none.
+    pub(crate) fn read(&self, name: &str) -> Option<String> {
+        fs::read_to_string(self.path("desk").join(name)).ok()
+    }
+
     /// Runs these lines in `sh`, with these words behind those of every `cohaptic`.
     pub(crate) fn run(&self, script: &str, run_with: &str) -> Outcome {
         let log = self.path("statuses");
@@ -92,4 +97,5 @@ fn a_script_sees_the_scenes_and_its_statuses_are_noted() {
     assert!(outcome.printed.contains("a.toml:1:4: "), "{}", outcome.printed);
     assert!(folder.has("sh") && !folder.has("no-such-program") && folder.has("test -d docs") && !folder.has("sh -c false"));
     assert_eq!(folder.run("cohaptic", "--version").statuses, [0]);
+    assert!(folder.read("said").is_some_and(|said| said.contains("lockstep")) && folder.read("unsaid").is_none());
 }

@@ -23,14 +23,15 @@
 //! | `needs: PROGRAM`, `needs: LINE` | where that program is not installed, or that line for `sh` fails, the block is not run |
 //! | `exit status: N N …` | of each `cohaptic` of the block in turn |
 //! | `source: PATH` | the block is that file of the project |
+//! | `drawn: FILE` | the picture in the next line is that file, which the commands of the page have written |
 //! | `figures vary` | of what is shown, numbers and units of time are not compared |
 //! | `figures vary: TEXT; TEXT` | the same, in lines that have one of these texts alone |
 //! | `lines vary: TEXT; TEXT` | of a line that has one of these texts nothing else is compared |
 //! | `run`, and lines `$ COMMAND` with what they print | commands that readers do not see: where the figures of a sentence or a table come from |
 //! | `figures printed above` | of the paragraph or table that follows: each number with a decimal point is one that the session before it printed, rounded |
 //!
-//! `COHAPTIC_UPDATE_PAGES=1 cargo test -p cohaptic-cli --test pages` writes into the pages what the commands print now; read the difference before it is
-//! kept. What was left out stays left out, as long as the lines around it can be found again.
+//! `COHAPTIC_UPDATE_PAGES=1 cargo test -p cohaptic-cli` writes into the pages what the commands print now, and draws the pictures anew; read the difference
+//! before it is kept. What was left out stays left out, as long as the lines around it can be found again.
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run here says so")]
@@ -39,8 +40,11 @@ mod blocks;
 mod compare;
 mod figures;
 mod folder;
+mod links;
 mod notes;
 mod page;
+mod pictures;
+mod prose;
 mod script;
 mod update;
 mod usage;
@@ -70,6 +74,7 @@ pages! {
     architecture: "docs/architecture.md",
     campaign: "docs/campaign.md",
     claims: "docs/claims.md",
+    coming_from: "docs/coming-from.md",
     commands: "docs/commands.md",
     the_book: "docs/README.md",
     extending: "docs/extending.md",
@@ -86,6 +91,9 @@ pages! {
     stability: "docs/stability.md",
     scenarios: "scenarios/README.md",
     testing: "docs/testing.md",
+    tutorial_laboratory: "docs/tutorial-laboratory.md",
+    tutorial_network_test: "docs/tutorial-network-test.md",
+    tutorial_paper: "docs/tutorial-paper.md",
 }
 
 fn root() -> PathBuf {
@@ -146,4 +154,15 @@ fn a_file_of_the_project_that_a_page_shows_is_that_file() {
         }
     }
     assert!(shown > 0, "no page shows a file");
+}
+
+#[test]
+fn the_least_version_of_rust_is_that_of_the_manifest() {
+    let read = |name: &str| fs::read_to_string(root().join(name)).unwrap();
+    let manifest = read("Cargo.toml");
+    let version = manifest.lines().find_map(|line| line.strip_prefix("rust-version = \"")).unwrap().trim_end_matches('"');
+    for (name, text) in [("README.md", "Rust "), ("docs/tutorial-network-test.md", "Rust "), ("Dockerfile", "FROM rust:")] {
+        let text = format!("{text}{version}");
+        assert!(read(name).contains(&text), "{name} does not say `{text}`");
+    }
 }

@@ -3,11 +3,14 @@
 use std::fs;
 use std::ops::Range;
 
+use cohaptic_picture::testing::faults;
+
 use crate::blocks::{Block, Kind, Shown};
 use crate::compare::same;
 use crate::figures;
 use crate::folder::{Folder, Outcome};
 use crate::notes::Notes;
+use crate::pictures::{Drawn, drawn};
 use crate::script::{commands, without_cargo};
 use crate::update::{replaced, shown_anew};
 use crate::{root, usage};
@@ -53,6 +56,9 @@ fn run<'a>(name: &'a str, text: &'a str, updates: bool) -> Page<'a> {
     }
     for block in &blocks {
         page.block(block);
+    }
+    for picture in drawn(name, text) {
+        page.picture(&picture);
     }
     page
 }
@@ -125,6 +131,27 @@ impl Page<'_> {
         } else {
             let what = format!("`{}` prints\n{}\nand the page shows\n{}\n", shown.command, outcome.printed, wanted.join("\n"));
             self.problem(shown.output.start - 1, &what);
+        }
+    }
+
+    /// Compares a picture with what the commands have drawn.
+    fn picture(&mut self, picture: &Drawn) {
+        let Some(anew) = self.folder.read(&picture.by_commands) else {
+            self.problem(picture.line, &format!("the commands do not write {}", picture.by_commands));
+            return;
+        };
+        for fault in faults(&anew) {
+            self.problem(picture.line, &fault);
+        }
+        let shown = root().join(&picture.shown);
+        if fs::read_to_string(&shown).unwrap_or_default() == anew {
+            return;
+        }
+        if self.updates {
+            fs::write(&shown, anew).unwrap();
+            eprintln!("{}: {} was drawn anew", self.name, picture.shown.display());
+        } else {
+            self.problem(picture.line, &format!("{} is another picture than {}", picture.shown.display(), picture.by_commands));
         }
     }
 
