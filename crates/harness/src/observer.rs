@@ -12,6 +12,37 @@ pub(crate) const INSTANTS_BETWEEN_QUESTIONS: u32 = 1024;
 ///
 /// Peers are named by their place in [`cohaptic_scene::Scene::peers`]. The rows borrow from the running scene: copy what you keep. By default an
 /// observer wants to see nothing; what it does not want costs nothing.
+///
+/// ```no_run
+/// use std::convert::Infallible;
+/// use std::path::Path;
+///
+/// use cohaptic_harness::{Model, Observer, Simulation, TickRow};
+/// use cohaptic_scene::Scene;
+///
+/// /// The largest coupling force that any user feels.
+/// #[derive(Default)]
+/// struct LargestForce(f64);
+///
+/// impl Observer for LargestForce {
+///     type Error = Infallible;
+///
+///     fn wants_ticks(&self) -> bool {
+///         true
+///     }
+///
+///     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
+///         self.0 = row.coupling_force.iter().fold(self.0, |largest, force| largest.max(force.abs()));
+///         Ok(())
+///     }
+/// }
+///
+/// let scene = Scene::read(Path::new("scenarios/network/ideal.toml"), &[])?;
+/// let mut largest = LargestForce::default();
+/// let summary = Simulation::new(&scene, Model::Least).run(&mut largest)?;
+/// println!("{:.2} N in {} ticks", largest.0, summary.ticks);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Observer {
     /// Why the run must end: a file that cannot be written, for instance. An observer that never fails has [`std::convert::Infallible`].
     type Error;

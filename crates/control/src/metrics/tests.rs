@@ -198,9 +198,11 @@ fn the_book_has_every_metric() {
     let (description, latest) = example("c");
     let families = parse(&text(&description, &latest));
     for (name, family) in &families {
-        assert!(book.contains(&format!("| `{name}` | {} |", family.kind)), "{name} is not in docs/live-control.md");
+        let is_its_line = |line: &str| line.split_whitespace().take(2).eq([name.as_str(), family.kind.as_str()]);
+        assert!(book.lines().any(is_its_line), "{name} is not in docs/live-control.md");
     }
-    assert_eq!(book.matches("| `cohaptic_").count(), families.len(), "docs/live-control.md has a metric that is not there");
+    let shown = book.lines().filter(|line| line.starts_with("cohaptic_")).count();
+    assert_eq!(shown, families.len(), "docs/live-control.md has a metric that is not there");
 }
 
 #[test]

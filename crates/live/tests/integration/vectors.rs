@@ -1,4 +1,4 @@
-//! The worked examples of `docs/live-protocol.md`, which were computed by another program (the page shows how).
+//! The worked examples of `docs/live-protocol.md`, which were computed by another program.
 
 use std::time::Duration;
 
@@ -9,16 +9,15 @@ use cohaptic_peer::{State, wire};
 
 use crate::support::{at, encode};
 
-const PAGE: &str = include_str!("../../../../docs/live-protocol.md");
+const EXAMPLES: &str = include_str!("../../../../docs/examples/live-protocol.txt");
 const SESSION: u64 = 0x0123_4567_89ab_cdef;
 
 /// The bytes of the block of that title.
 fn bytes(title: &str) -> Vec<u8> {
-    let fence = format!("```text {title}\n");
-    let (_, rest) = PAGE.split_once(&fence).expect(title);
-    let (block, _) = rest.split_once("```").unwrap();
-    let hex = block
+    let (_, rest) = EXAMPLES.split_once(&format!("[{title}]\n")).expect(title);
+    let hex = rest
         .lines()
+        .take_while(|line| !line.is_empty())
         .flat_map(|line| line.get(6..).unwrap_or_default().chars().take(47).collect::<String>().split(' ').map(str::to_owned).collect::<Vec<_>>());
     hex.filter(|pair| !pair.is_empty()).map(|pair| u8::from_str_radix(&pair, 16).unwrap()).collect()
 }
@@ -53,6 +52,6 @@ fn the_code_makes_the_bytes_of_the_page() {
     assert_eq!(*joined.welcome(), welcome);
     let mut out = [0; MAX_DATAGRAM];
     let len = joined.seal(&sample(1, 5, 40, 0.025, -1.5), &mut out).unwrap();
-    assert_eq!(out[..len], bytes("to the door"));
+    assert_eq!(out[..len], bytes("to the session"));
     assert_eq!(joined.open(&bytes("to the peer")), Ok(&sample(0, 7, 56, -0.5, 0.125)[..]));
 }

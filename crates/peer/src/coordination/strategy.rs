@@ -31,6 +31,67 @@ pub struct Command<const A: usize> {
 /// A coordination strategy of one peer.
 ///
 /// It must be deterministic: the answer depends on the calls made so far and on nothing else.
+///
+/// A peer with a strategy of its own, a tenth of a second of which is run:
+///
+/// ```
+/// use core::time::Duration;
+///
+/// use cohaptic_peer::{
+///     Clock, Command, Contact, Context, CopyConfig, DeviceConfig, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, SimulatedDevice, State,
+///     Strategy, wire::MAX_LEN,
+/// };
+/// use cohaptic_units::Instant;
+///
+/// /// Pulls towards the mean position of the others and brakes the own velocity.
+/// struct DampingInjection(Gains);
+///
+/// impl<const A: usize> Strategy<A> for DampingInjection {
+///     fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
+///         let (own, mean) = (context.own, *context.held.mean());
+///         let force = core::array::from_fn(|axis| {
+///             self.0.stiffness * (own.position[axis] - mean.position[axis]) + self.0.damping * own.velocity[axis]
+///         });
+///         Command { force, target: mean }
+///     }
+///
+///     fn set_gains(&mut self, gains: Gains) {
+///         self.0 = gains;
+///     }
+/// }
+///
+/// let tick = Duration::from_millis(1);
+/// let clock = Clock::regular(tick);
+/// let device = SimulatedDevice::<1>::new(DeviceConfig { mass: 0.1, damping: 5.0 }, None, State::REST, Integrator::Exact, &clock);
+/// let object = ObjectCopy::new(CopyConfig { mass: 0.15, damping: 0.0 }, State::REST, Integrator::Exact, &clock);
+/// let config = PeerConfig {
+///     session: 7,
+///     place: 0,
+///     axes: 1,
+///     contact: Contact::Grasp,
+///     coupling: Gains { stiffness: 3500.0, damping: 5.0 },
+///     tick,
+///     compute_delay: false,
+///     enclosure: None,
+/// };
+/// // One other peer, whose copy begins 1 cm away.
+/// let other = State { position: [0.01], velocity: [0.0] };
+/// let strategy = DampingInjection(Gains { stiffness: 1000.0, damping: 5.0 });
+/// let mut peer = Peer::new(config, device, object, strategy, Held::new([other]));
+///
+/// let mut datagram = [0; MAX_LEN];
+/// for k in 0..100 {
+///     let now = clock.instant(k).expect("a tenth of a second can be counted");
+///     if k % 8 == 0 {
+///         let len = peer.sample(clock.local_time(k), &mut datagram);
+///         let _to_send: &[u8] = &datagram[..len];
+///     }
+///     // peer.handle_datagram(…) for each datagram that has arrived by now
+///     let _forces = peer.compute(now);
+///     peer.advance(now, tick);
+/// }
+/// println!("{} m at {}", peer.object().state().position[0], Instant::from_nanos(100_000_000));
+/// ```
 pub trait Strategy<const A: usize> {
     /// The command at a tick. Called exactly once a tick, after the samples that have arrived were taken in.
     fn command(&mut self, context: &Context<'_, A>) -> Command<A>;

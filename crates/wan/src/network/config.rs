@@ -7,6 +7,45 @@ use super::id::NodeId;
 use crate::line::pipeline::TimeWentBack;
 
 /// A line that a node shares between all its paths.
+///
+/// A network with a slow uplink, links that flip a bit before a receiver without a checksum, and a filter:
+///
+/// ```
+/// use cohaptic_units::{Bytes, Instant, Probability, parse};
+/// use cohaptic_wan::{
+///     AccessLine, Bottleneck, Chance, Checksum, Corruption, Delay, Fate, Flips, Framing, LinkConfig, Network, NetworkConfig, NodeId, QueueLimit,
+/// };
+///
+/// let one_bit = Flips::Bits { packets: Chance::independent(Probability::ONE), count: 1 };
+/// let link = LinkConfig {
+///     corruption: Some(Corruption { bits: one_bit, within: Some(0..4), checksum: Checksum::Passes }),
+///     delay: Delay::constant(parse::duration("10ms")?),
+///     ..LinkConfig::default()
+/// };
+/// let slow = Bottleneck {
+///     framing: Framing { overhead: 28, cells: None },
+///     limit: Some(QueueLimit::Packets(20)),
+///     ..Bottleneck::at_rate(parse::rate("512kbit")?)
+/// };
+/// let nodes = ["a", "b", "c"].map(String::from).to_vec();
+/// let mut network = Network::new(NetworkConfig { seed: 1, nodes, general: false }, |_from, _to| link.clone())
+///     .with_access_line(AccessLine::Uplink(NodeId(0)), LinkConfig { bottleneck: Some(slow), ..LinkConfig::default() })?
+///     .with_filter(NodeId(0), NodeId(2), |_packet| true)?;
+///
+/// network.handle_broadcast(Instant::ZERO, NodeId(0), Bytes::new(8), [0_u8; 8])?;
+/// while let Some(next) = network.poll_timeout() {
+///     network.handle_timeout(next)?;
+///     while let Some(event) = network.poll_event() {
+///         if let (Fate::Delivered(at), Some(damage)) = (event.fate, &event.damage) {
+///             let mut bytes = event.payload;
+///             damage.apply(&mut bytes);
+///             assert_eq!(bytes.map(u8::count_ones).iter().sum::<u32>(), 1);
+///             assert_eq!((event.path.to, at > Instant::from_nanos(10_000_000)), (NodeId(1), true));
+///         }
+///     }
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum AccessLine {
     /// All that the node sends.

@@ -1,17 +1,24 @@
-//! What docs/testing.md says of misuse is what comes.
+//! What comes when the test kit is used wrongly stands in messages.txt.
 
 use std::net::Ipv4Addr;
 use std::time::Duration;
 
 use cohaptic_testkit::{Instant, Testbed, time};
 
-use super::{assert_shown, message_of};
+use super::message_of;
+
+const MESSAGES: &str = include_str!("messages.txt");
+
+/// Fails unless a message stands in the file.
+fn assert_shown(message: &str) {
+    assert!(MESSAGES.contains(message), "messages.txt does not have:\n{message}");
+}
 
 fn pair() -> Testbed {
     Testbed::new(["client", "server"])
 }
 
-/// Fails unless the chapter shows how a message begins, up to where it names a place in a file.
+/// Fails unless the file has how a message begins, up to where it names a place in a file.
 fn assert_begin_shown(message: &str, rest: &str) {
     let (begin, _) = message.split_once(rest).unwrap_or_else(|| panic!("{message}"));
     assert_shown(begin);

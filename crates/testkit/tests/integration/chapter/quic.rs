@@ -1,4 +1,4 @@
-//! The block of docs/testing.md on QUIC, as it stands there.
+//! What docs/testing.md says of QUIC.
 
 use cohaptic_testkit::wan::DropCause;
 use cohaptic_testkit::{Testbed, quinn};
