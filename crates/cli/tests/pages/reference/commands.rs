@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::help::{Entry, Help};
-use super::{WRITTEN, prose};
+use super::{WRITTEN, prose, table};
 
 /// What as many commands take with one meaning is explained once.
 const SHARED: usize = 2;
@@ -23,10 +23,9 @@ fn all(command: &[String]) -> Vec<(String, Help)> {
     help.parts.iter().flat_map(|part| all(&[command, &[part.clone()]].concat())).collect()
 }
 
-/// A line of a list.
-fn line(entry: &Entry) -> String {
-    let default = if entry.default.is_empty() { String::new() } else { format!(". Default: {}", prose(&entry.default)) };
-    format!("- `{}`: {}{default}\n", entry.name, prose(&entry.about))
+fn row(entry: &Entry) -> Vec<String> {
+    let default = if entry.default.is_empty() { String::new() } else { prose(&entry.default) };
+    vec![format!("`{}`", entry.name.replace('|', "\\|")), default, prose(&entry.about)]
 }
 
 /// The name of an option without its value.
@@ -45,8 +44,8 @@ pub(super) fn page() -> String {
         }
     }
     let mut page = format!("# Reference: commands\n\n{WRITTEN}\n\n{INTRODUCTION}\n## In several commands\n\n");
-    page.extend(shared.iter().map(|entry| line(entry)));
-    page.push('\n');
+    let rows: Vec<Vec<String>> = shared.iter().map(|entry| row(entry)).collect();
+    page += &table(&["argument or option", "default", "meaning"], &rows);
     for (name, help) in &all {
         let _ = write!(page, "## {name}\n\n{}.\n\n```text\n", help.about);
         for line in &help.usage {
@@ -54,12 +53,12 @@ pub(super) fn page() -> String {
         }
         page += "```\n\n";
         let (common, own): (Vec<&Entry>, Vec<&Entry>) = help.entries.iter().partition(|entry| shared.contains(entry));
-        page.extend(own.iter().map(|entry| line(entry)));
+        let rows: Vec<Vec<String>> = own.into_iter().map(row).collect();
+        page += &table(&["argument or option", "default", "meaning"], &rows);
         if !common.is_empty() {
             let names: Vec<String> = common.into_iter().map(option).collect();
-            page += &format!("- [as above](#in-several-commands): {}\n", names.join(", "));
+            let _ = write!(page, "[Also](#in-several-commands): {}.\n\n", names.join(", "));
         }
-        page.push('\n');
         page += "```text\n";
         for line in &help.examples {
             let _ = writeln!(page, "{line}");

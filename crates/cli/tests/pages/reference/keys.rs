@@ -6,7 +6,7 @@ use cohaptic_scene::schema::FileSchema;
 
 use super::{WRITTEN, prose, table};
 
-/// Of a table within another one: with fewer keys they are written out again.
+/// Tables with fewer keys are written out wherever they stand.
 const SHORT: usize = 3;
 
 const OF_FILES: &str = "\
@@ -156,9 +156,8 @@ impl Reference {
         let keys = shape(table);
         let mut own: Vec<&'static Key> = table.keys().collect();
         let within = |one: &[Shape], other: &[Shape]| one.iter().all(|key| other.contains(key));
-        // With all keys of another table, or with most of them. A few keys are written out again unless the table has no others.
-        let is_part = |known: &&Explained| within(&known.keys, &keys) && (known.keys.len() >= SHORT || known.keys.len() == keys.len());
-        let known = self.explained.iter().filter(is_part).max_by_key(|known| known.keys.len());
+        // With all keys of another table, or with most of them.
+        let known = self.explained.iter().filter(|known| within(&known.keys, &keys)).max_by_key(|known| known.keys.len());
         let larger = || self.explained.iter().find(|known| keys.len() >= SHORT && 2 * keys.len() > known.keys.len() && within(&keys, &known.keys));
         if let Some(known) = known.or_else(larger) {
             let missing: Vec<String> = known.keys.iter().filter(|key| !keys.contains(key)).map(|key| format!("`{}`", key.0)).collect();
@@ -167,7 +166,7 @@ impl Reference {
             let place = if prefix.is_empty() { "…".to_owned() } else { format!("`{prefix}…`") };
             own.retain(|key| !known.keys.contains(&(key.name, key.about, key.form.unit())));
             rows.push(vec![place, String::new(), String::new(), format!("All of [{}]({page}#{}){but}", known.name.replace('`', ""), known.anchor)]);
-        } else if !keys.is_empty() {
+        } else if keys.len() >= SHORT || prefix.is_empty() {
             self.explained.push(Explained { keys, name: name.to_owned(), page: self.page, anchor: self.anchor.clone() });
         }
         for key in own {
@@ -248,11 +247,10 @@ fn many(form: &str) -> String {
     if ["table", "duration", "size"].contains(&form) { format!("{form}s") } else { form.to_owned() }
 }
 
-/// Each word with its meaning; words alone where all mean one thing, or are plain.
+/// Each word with its meaning; words alone where all mean one thing.
 fn meanings(words: Words) -> Vec<String> {
     let differ = words.iter().any(|(_, meaning)| *meaning != words[0].1);
-    let are_plain = words.len() > 2 && words.iter().all(|(_, meaning)| meaning.split(' ').count() <= 3);
-    if !differ || are_plain {
+    if !differ {
         return vec![words.iter().map(|(word, _)| format!("`\"{word}\"`")).collect::<Vec<_>>().join(", ")];
     }
     words.iter().map(|(word, meaning)| format!("`\"{word}\"`: {meaning}")).collect()
