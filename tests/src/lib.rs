@@ -13,8 +13,6 @@ mod book {
     mod emulator {}
     #[doc = include_str!("../../docs/extending.md")]
     mod extending {}
-    #[doc = include_str!("../../docs/stability.md")]
-    mod stability {}
 }
 
 pub mod drafts;

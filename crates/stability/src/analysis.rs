@@ -120,6 +120,70 @@ pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Resu
 /// # Errors
 ///
 /// As [`analyse`], and if a strategy is not linear or remembers what it does not show.
+///
+/// # Examples
+///
+/// ```
+/// use cohaptic_peer::{Command, Context, Gains, Strategy};
+/// use cohaptic_scene::{Scene, Strategies};
+/// use cohaptic_stability::{Verdict, analyse_with};
+///
+/// /// Average position whose force follows with a lag: it remembers one number an axis.
+/// struct Smoothed {
+///     gains: Gains,
+///     force: [f64; 3],
+/// }
+///
+/// impl<const A: usize> Strategy<A> for Smoothed {
+///     fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
+///         let (own, target) = (context.own, *context.held.mean());
+///         for axis in 0..A {
+///             let (distance, speed) = (own.position[axis] - target.position[axis], own.velocity[axis] - target.velocity[axis]);
+///             let wanted = self.gains.stiffness * distance + self.gains.damping * speed;
+///             self.force[axis] += 0.5 * (wanted - self.force[axis]);
+///         }
+///         Command { force: core::array::from_fn(|axis| self.force[axis]), target }
+///     }
+///
+///     fn set_gains(&mut self, gains: Gains) {
+///         self.gains = gains;
+///     }
+///
+///     fn memory(&self) -> &[f64] {
+///         &self.force[..A]
+///     }
+///
+///     fn set_memory(&mut self, memory: &[f64]) {
+///         self.force[..A].copy_from_slice(memory);
+///     }
+/// }
+///
+/// struct AllSmoothed;
+///
+/// impl Strategies for AllSmoothed {
+///     type Strategy<const A: usize> = Smoothed;
+///
+///     fn strategy<const A: usize>(&self, scene: &Scene, _peer: usize) -> Smoothed {
+///         Smoothed { gains: scene.coordination.gains, force: [0.0; 3] }
+///     }
+/// }
+///
+/// fn main() -> Result<(), Box<dyn std::error::Error>> {
+///     let text = r#"
+///         scene = { duration = "2s", count = 3 }
+///         object.mass = 0.45
+///         coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+///         peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+///         link.delay = "8ms"
+///     "#;
+///     let scene = Scene::parse(text, "three.toml".as_ref(), &[])?;
+///     let analysis = analyse_with(&scene, &AllSmoothed)?;
+///     println!("{:.9} within {:.1e}, {} states", analysis.radius.value, analysis.radius.error, analysis.dimension);
+///     assert_eq!(analysis.verdict(), Verdict::Stable);
+///     assert_eq!(analysis.dimension, 17 + 3); // a number for each peer more than without the lag
+///     Ok(())
+/// }
+/// ```
 pub fn analyse_with(scene: &Scene, strategies: &impl Strategies) -> Result<Analysis, AnalysisError> {
     let combinations = combinations(scene)?;
     if combinations.iter().any(|combination| combination.axes != scene.axes.count()) {

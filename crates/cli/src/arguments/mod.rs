@@ -33,7 +33,7 @@ pub(crate) use stability::{
 
 /// Several people feel and move one virtual object together, over a bad network.
 ///
-/// A scene is one TOML file: the object, the peers, the links between them, and what is expected. docs/scenes.md lists every key.
+/// A scene is one TOML file: the object, the peers, the links between them, and what is expected. docs/reference-keys.md lists every key.
 #[derive(Debug, Parser)]
 #[command(name = "cohaptic", version, after_help = after(examples::PROGRAM))]
 pub(crate) struct Arguments {

@@ -27,7 +27,7 @@ pub(super) fn scene(scene: &toml::Table, name: &str, other_number: Option<usize>
     let mut text = format!(
         "# A scene to begin with, written by cohaptic init --from {name}.\n\
          # Keys behind a # are not in force: they show what else can be said, most of them with the value that holds without them.\n\
-         # All keys: docs/scenes.md. To run it: cohaptic run FILE. To vary it: --set link.delay=40ms.\n\
+         # All keys: docs/reference-keys.md. To run it: cohaptic run FILE. To vary it: --set link.delay=40ms.\n\
          # An editor for TOML explains and completes keys with the file that cohaptic schema prints.\n"
     );
     for key in FileSchema::Scene.root().keys() {

@@ -1,7 +1,7 @@
 //! Every command line on the pages of this project runs here, and prints what the page shows.
 //!
 //! A page is read from its first line to its last, in a folder of its own in which `scenarios` and `docs` are those of the project,
-//! and with an empty home. What counts:
+//! and with an empty home; `programs` is the folder here, with what readers do not see. What counts:
 //!
 //! | on the page | is |
 //! | --- | --- |
@@ -45,6 +45,7 @@ mod notes;
 mod page;
 mod pictures;
 mod prose;
+mod reference;
 mod script;
 mod update;
 mod usage;
@@ -76,6 +77,9 @@ pages! {
     claims: "docs/claims.md",
     coming_from: "docs/coming-from.md",
     commands: "docs/commands.md",
+    commands_analysis: "docs/commands-analysis.md",
+    commands_network: "docs/commands-network.md",
+    commands_run: "docs/commands-run.md",
     the_book: "docs/README.md",
     extending: "docs/extending.md",
     falcon: "docs/falcon.md",
@@ -84,6 +88,10 @@ pages! {
     live_control: "docs/live-control.md",
     model: "docs/model.md",
     netem: "docs/netem.md",
+    reference_commands: "docs/reference-commands.md",
+    reference_documents: "docs/reference-documents.md",
+    reference_keys: "docs/reference-keys.md",
+    reference_link_keys: "docs/reference-link-keys.md",
     relay: "docs/relay.md",
     results: "docs/results.md",
     router: "docs/router.md",

@@ -16,7 +16,7 @@ use crate::update::{replaced, shown_anew};
 use crate::{root, usage};
 
 /// Names the variable that lets the pages be written.
-const UPDATE: &str = "COHAPTIC_UPDATE_PAGES";
+pub(crate) const UPDATE: &str = "COHAPTIC_UPDATE_PAGES";
 
 struct Page<'a> {
     name: &'a str,

@@ -3,6 +3,7 @@
 use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::{LawForm, LawValues};
 use cohaptic_wan::DropCause;
+use cohaptic_wan::parameters::Quantity;
 
 use cohaptic_linkfile::schema::{
     Form, Key, Table, joined,
@@ -192,9 +193,9 @@ const DIRECTIONS: [(&str, &str); 6] =
     [("+x", "to larger x"), ("-x", "to smaller x"), ("+y", "to larger y"), ("-y", "to smaller y"), ("+z", "to larger z"), ("-z", "to smaller z")];
 static CLOCK: Table = Table::of(&[&[
     usual("offset", Form::Duration, "\"0s\"", "By how much its first tick is late"),
-    usual("drift", DRIFT, "0", "How fast it runs: parts per million as text, or seconds gained in a second"),
+    usual("drift", DRIFT, "0", "How fast it runs: parts per million as text, or seconds gained in a second, at most 0.1 either way"),
 ]]);
-const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number(ANGLE)]);
+const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number(Quantity::any(""))]);
 static SILENCE: Table = Table::of(&[&[
     usual("after", Form::Duration, "\"100ms\"", "After how long a silence the pull fades"),
     usual("fade", Form::Duration, "\"250ms\"", "How long that takes"),

@@ -258,33 +258,27 @@ fn every_property_is_described() {
     assert!(!text.contains("$ref") && !text.contains("allOf"), "editors for TOML do not take them");
 }
 
-/// The manual and the catalogue name the same keys.
+/// The pages of reference and the catalogue name the same keys.
 #[test]
-fn the_manual_has_the_keys_of_the_catalogue() {
+fn the_reference_has_the_keys_of_the_catalogue() {
     let page = |name: &str| std::fs::read_to_string(root().join("docs").join(name)).unwrap();
-    let manual = page("scenes.md") + &page("relay.md") + &page("router.md");
-    let listed: BTreeSet<&str> = tables().values().flat_map(|(_, table)| table.keys().map(|key| key.name)).collect();
-    for key in &listed {
-        let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-';
-        assert!(manual.split(|c: char| !is_word(c)).any(|word| word == *key), "no page names the key {key}");
-    }
-    let scenes = page("scenes.md");
-    let of_links = scenes.split("\n## `[link]`").nth(1).and_then(|section| section.split("\n| key").nth(1)).unwrap();
+    let links = page("reference-link-keys.md");
+    let of_links = links.split("\n## Keys of a link\n\n| key").nth(1).unwrap();
     let rows: Vec<&str> = of_links.lines().skip(2).take_while(|line| line.starts_with('|')).filter_map(|line| line.split('`').nth(1)).collect();
     assert_eq!(rows, cohaptic_linkfile::link::LINK_KEYS, "the table of the keys of a link");
-    let mut in_keys = false;
-    let mut named = 0;
-    for line in scenes.lines() {
-        if line.starts_with("| key") {
-            in_keys = true;
-        } else if !line.starts_with('|') {
-            in_keys = false;
-        }
-        let Some(key) = line.split('`').nth(1).filter(|_| in_keys && line.starts_with("| ")) else { continue };
-        if key.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
-            assert!(listed.contains(key), "the catalogue has no key {key}, which scenes.md lists");
-            named += 1;
+
+    let listed: BTreeSet<&str> = tables().values().flat_map(|(_, table)| table.keys().map(|key| key.name)).collect();
+    let pages = links + &page("reference-keys.md");
+    let mut named = BTreeSet::new();
+    for row in pages.lines().filter(|line| line.starts_with("| `")) {
+        let path = row.split('`').nth(1).unwrap();
+        for name in path.split('.').map(|name| name.trim_end_matches("[]")).filter(|name| !["", "…", "NAME"].contains(name)) {
+            named.insert(name);
         }
     }
-    assert!(named > 60, "{named}");
+    // The tables at the top of a file are headings.
+    for heading in pages.lines().filter(|line| line.starts_with("### ")) {
+        named.extend(heading.split('`').nth(1).map(|name| name.trim_matches(['[', ']']).split('.').next().unwrap_or_default()));
+    }
+    assert_eq!(named, listed);
 }

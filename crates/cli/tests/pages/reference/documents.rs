@@ -1,0 +1,573 @@
+//! The reference of JSON documents: what each key means, compared with documents that the commands print.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::{WRITTEN, table};
+use crate::folder::Folder;
+
+const INTRODUCTION: &str = "\
+The documents of `--json`, command by command. Every document begins with `schema`, its kind, and `version` ([commands.md](commands.md#json)); the tables leave these two out. Keys end in their
+unit. A number that is not finite is `null`. Brackets, `links[]`, mark a list; `NAME` stands for any name. A row with a link has all keys of another table.
+";
+
+/// A table of keys: each row has keys that are explained together, separated by commas, and what they are.
+struct Part {
+    name: &'static str,
+    rows: &'static [(&'static str, &'static str)],
+}
+
+/// The document of a command.
+struct Document {
+    command: &'static str,
+    /// Lines for `sh` that print documents of this kind, one each, and in which every key occurs.
+    lines: &'static [&'static str],
+    rows: &'static [(&'static str, &'static str)],
+}
+
+/// What the router needs: two devices in namespaces.
+const NAMESPACES: &str = "unshare --map-root-user --net --mount true && test -w /dev/net/tun && ip -V && python3 -V";
+
+/// Parts that several documents have. A row names one by its heading: `links[].@Counters`.
+const PARTS: [Part; 7] = [
+    Part {
+        name: "Counters",
+        rows: &[
+            ("offered, delivered", "packets that were sent into the line, and that came out"),
+            ("duplicated", "copies that the line made"),
+            ("dropped.NAME", "packets by [cause](emulator.md#fates-and-causes)"),
+            ("in_flight", "packets on the way at the end. The counters [balance](emulator.md#conservation)"),
+            ("marked, damaged", "delivered with a congestion mark; with flipped bits"),
+            ("mean_delay_s", "of what was delivered, in this line alone; `null` if nothing was"),
+        ],
+    },
+    Part { name: "Lateness", rows: &[("count", "how many"), ("p50, p99, p999, max", "quantiles [µs], and the largest value")] },
+    Part {
+        name: "Parts of a scene",
+        rows: &[
+            ("kind", "`whole`, `together` (equal peers as their average), `apart` (their differences), `mode` of a graph, `loose-device`"),
+            ("peer", "the first peer that is meant; absent where all are"),
+            ("dimension, multiplicity", "states, and how often the part occurs"),
+            ("spectral_radius, error_bound", "of this part"),
+        ],
+    },
+    Part {
+        name: "Curve of an admittance",
+        rows: &[
+            (
+                "points[].hz, points[].magnitude_db, points[].phase_deg",
+                "magnitude relative to 1 m/(N·s); phase above −180 and up to 180, negative where the velocity lags",
+            ),
+            ("points[].ideal_db", "magnitude of the free mass, whose phase is −90"),
+            ("viscosity.value, viscosity.error", "of slow motion [N·s/m]; `null` where there is no limit"),
+            ("inertia.value, inertia.error", "of slow motion [kg]"),
+            ("stiffness.value, stiffness.error", "of slow motion [N/m]"),
+            ("verdict, spectral_radius, error_bound", "of the linear scene that is analysed"),
+            ("warning", "what the numbers must not be taken for where a verdict is not `stable`, else `null`"),
+            ("object_mass_kg", "mass of the whole object"),
+            ("notes", "what is left out or taken as closed"),
+        ],
+    },
+    Part {
+        name: "Falcon",
+        rows: &[("simulated, serial, product, bus, address", "which device"), ("firmware", "`running`, or `loaded` by this command")],
+    },
+    Part {
+        name: "Exchanges with a Falcon",
+        rows: &[
+            ("seconds, exchanges, reports, reports_per_s", "how long, and how many packets"),
+            ("timeouts, garbage_bytes, faults, implausible, unlocated, unhomed, farewells", "how often something was wrong"),
+            ("late_turns, worst_late_us", "a turn is late by 0.1 ms or more"),
+            ("phase, light, homed, encoders, buttons", "seen last; encoders top, right, left"),
+            ("position_m, velocity_m_s, force_n", "seen last, from the origin; `null` where they mean nothing"),
+        ],
+    },
+    Part {
+        name: "Forces of a Falcon",
+        rows: &[
+            ("limit_n, largest_n", "the limit, and the largest force"),
+            ("limited, slewed, saturated", "how many forces were changed"),
+            ("zeroed.NAME", "how many were zero, by cause"),
+        ],
+    },
+];
+
+const DOCUMENTS: [Document; 20] = [
+    Document {
+        command: "run",
+        lines: &[
+            "cohaptic run scenarios/network/shared-access-line.toml --against scene.seed=2 --json --out out",
+            "cohaptic live scenarios/live/two-and-a-program.toml --for 50ms --listen 127.0.0.1:0 --no-priority --out session > said && \
+             cohaptic run scenarios/live/two-and-a-program.toml --inputs session/inputs.csv --force --json",
+        ],
+        rows: &[
+            ("title", "of the scene"),
+            ("duration_s", "how much was simulated: the scene's duration unless it diverged or was interrupted"),
+            ("ticks", "of the peer that made the most"),
+            ("ending", "`complete`, `diverged` (a position or velocity is not finite any more) or `interrupted`"),
+            ("wall_s, realtime_factor", "the time the run took, and `duration_s` divided by it. Only these differ from run to run"),
+            (
+                "peers[].name, peers[].position_m, peers[].velocity_m_s",
+                "state of the copy at the peer's first tick at or after the end: a number with one axis, else a list",
+            ),
+            ("peers[].stale_samples, peers[].refused_samples", "samples that came too late to be used, and that arrived damaged"),
+            ("links[].from, links[].to, links[].@Counters", "by sender, then receiver"),
+            ("access_lines[].peer, access_lines[].line, access_lines[].@Counters", "`line` is `uplink` or `downlink`"),
+            ("max_discrepancy_m", "[discrepancy](model.md#discrepancy)"),
+            ("files", "paths written by `--out`"),
+            ("replayed_otherwise", "with `--inputs --force`: what differs from the scene of the session"),
+            ("against", "the document of the second run; absent without `--against`"),
+        ],
+    },
+    Document {
+        command: "check",
+        lines: &["cohaptic check scenarios/paper/5-1-ap-2100.toml --json"],
+        rows: &[
+            ("scenes[].file, scenes[].passed, scenes[].failures", "in the order of the files; `failures` is a list of texts"),
+            ("scenes[].expects", "whether the scene has an `[expect]`"),
+            ("scenes[].notes", "what was judged in another way than with more time"),
+            ("scenes[].expectations[].expectation", "`stable`, `discrepancy`, `position`, `travel`, `loss` or `delay`"),
+            (
+                "scenes[].expectations[].name, scenes[].expectations[].expected, scenes[].expectations[].found",
+                "what is compared, what was expected and what came out, in words",
+            ),
+            ("scenes[].expectations[].passed", "whether that is as expected"),
+            ("scenes[].expectations[].unit", "of the next three: `m`, `s` or empty"),
+            (
+                "scenes[].expectations[].low, scenes[].expectations[].high",
+                "the limits or `null`. A stable scene has a radius of at most 1, an unstable one of at least 1",
+            ),
+            ("scenes[].expectations[].measured", "what came out; `null` if that is no number"),
+        ],
+    },
+    Document {
+        command: "explain",
+        lines: &["cohaptic explain scenarios/network/ideal.toml --json"],
+        rows: &[
+            ("title", "of the scene"),
+            ("models[].part, models[].model, models[].reason", "what is modelled, as what, and why"),
+            ("left_out", "list of texts"),
+            ("dimensions.plant", "positions and velocities of devices and copies"),
+            ("dimensions.held", "numbers in the samples held"),
+            ("dimensions.in_flight", "packets on the way at once, about"),
+            ("cost.peer_ticks_per_s, cost.packets_per_s", "in a simulated second"),
+            ("cost.realtime_factor", "estimated simulated seconds per second with nothing recorded"),
+            ("cost.record_bytes_per_s", "what `--out` writes in a simulated second, about"),
+        ],
+    },
+    Document {
+        command: "campaign",
+        lines: &["cohaptic campaign scenarios/network/loss-independent.toml --runs 2 --verdicts --out few --json"],
+        rows: &[
+            ("title", "of the scene of the first combination"),
+            ("runs, runs_computed", "in the table; done this time"),
+            ("wall_s, runs_per_s", "of this time"),
+            ("out, file, files", "the folder; the table; the table, verdicts and pictures"),
+            ("diverged", "how many runs"),
+            ("combinations[].vary, combinations[].runs, combinations[].diverged", "`vary` is a list of `KEY=VALUE`"),
+            (
+                "combinations[].mean_discrepancy_m, combinations[].largest_discrepancy_m, combinations[].worst_run",
+                "over the runs that did not diverge; the number of the run with the largest. `null` where all diverged",
+            ),
+            (
+                "combinations[].verdict, combinations[].judged, combinations[].radius, combinations[].error_bound, combinations[].reason",
+                "with `--verdicts`: [verdicts](campaign.md#verdicts)",
+            ),
+            ("notes", "what verdicts leave out, and what is not drawn"),
+        ],
+    },
+    Document {
+        command: "stability point",
+        lines: &[
+            "cohaptic stability point scenarios/network/loss-independent.toml --json",
+            "cohaptic stability point scenarios/paper/5-1-pd-1000.toml --losses-in-a-row 1 --json",
+        ],
+        rows: &[
+            ("title", "of the scene"),
+            ("verdict", "`stable`, `marginal`, `overflow` or `unstable`; in the mean square where `mean_square_radius` is there"),
+            ("spectral_radius, error_bound", "with nothing left to chance; the true radius is within the bound"),
+            ("mean_square_radius, mean_square_error_bound", "with random links whose second moment can be followed"),
+            ("rigid_modes, dimension", "how many were removed; how many states are left"),
+            ("method", "`reduced`, `determinant` or `full`"),
+            ("frame_s", "the span that the radius is over"),
+            (
+                "per_second, time_constant_s",
+                "the factor of the slowest disturbance in a second; after how long it is smaller by e, negative where it grows. `null` where the bounds of the radius leave more than a percent open",
+            ),
+            (
+                "time_constant_bounds_s",
+                "the least and the most that the bounds of the radius allow; `null` where it cannot be told whether a disturbance grows",
+            ),
+            ("parts[].@Parts of a scene", "of the worst combination of contacts"),
+            (
+                "modes[].contacts, modes[].verdict, modes[].spectral_radius, modes[].error_bound, modes[].parts[].@Parts of a scene",
+                "each combination of contacts, in words (empty: as they are)",
+            ),
+            ("worst_case.verdict", "if asked for: `stable`, `undecided` or `unstable`"),
+            ("worst_case.lower, worst_case.upper, worst_case.certificate", "bounds of the growth in `worst_case.step_s`"),
+            ("worst_case.links, worst_case.step_s, worst_case.dimension, worst_case.products, worst_case.notes", "what was searched, and how far"),
+            ("worst_case.sequence, worst_case.period", "the pattern that grows as the lower bound"),
+            ("notes", "what the verdict leaves out; where there are two radii, each note names its own"),
+        ],
+    },
+    Document {
+        command: "stability map",
+        lines: &[
+            "cohaptic stability map scenarios/coordination/n3.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --grid 3x3 --curve object.mass=1 --out map --json",
+            "cohaptic stability map scenarios/network/loss-independent.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --grid 2x2 --curve object.mass=1 --out lossy --json",
+        ],
+        rows: &[
+            ("title, files, notes", "of the scene; what was written; what is left out"),
+            ("x_key, x_unit, x, y_key, y_unit, y", "the two keys and their values"),
+            ("criterion", "`spectral-radius` or `mean-square`"),
+            ("spectral_radius, mean_square_radius", "one of both: a row for each y; `null` where it is not finite"),
+            ("nominal", "in the mean square: which cells leave out chance, a row for each y"),
+            ("nominal_cells, stable_fraction", "how many these are; the share of stable cells"),
+            ("curves[].name, curves[].overrides, curves[].file", "of each `--curve`"),
+            (
+                "curves[].criterion, curves[].spectral_radius, curves[].mean_square_radius, curves[].nominal, curves[].nominal_cells, curves[].stable_fraction",
+                "as above",
+            ),
+            ("wall_s, cells_per_s, cells_computed", "of this time; kept cells are not counted"),
+        ],
+    },
+    Document {
+        command: "stability boundary",
+        lines: &["cohaptic stability boundary scenarios/paper/5-1-ap-2100.toml --along coordination.stiffness=100..6000 --tolerance 0.1 --json"],
+        rows: &[
+            ("title, key, unit, low, high", "of the scene; of the key"),
+            ("criterion", "`spectral-radius` or `mean-square`"),
+            ("first", "the verdict at `low`"),
+            ("crossings[].value, crossings[].from, crossings[].to", "where the verdict changes, and how"),
+            ("marginal", "stretches that cannot be told from 1, each with `low` and `high`"),
+            (
+                "tolerance, samples, finest, coarsest",
+                "how exact a crossing is; how many values were looked at, and their least and greatest distance",
+            ),
+            ("settled", "`false` if it ended after 100000 values"),
+            ("nominal", "at how many values chance is left out"),
+            ("notes, files", "what is left out; what was written"),
+        ],
+    },
+    Document {
+        command: "admittance",
+        lines: &[
+            "cohaptic admittance scenarios/coordination/n3.toml --peer left --at 0.1 --curve object.mass=1 --json",
+            "cohaptic admittance scenarios/network/loss-independent.toml --peer left --at 0.1 --json",
+        ],
+        rows: &[
+            ("title, peer", "of the scene; which peer was pushed"),
+            ("@Curve of an admittance", "of the scene as it stands"),
+            (
+                "mean_square.verdict, mean_square.radius, mean_square.error_bound",
+                "of the second moment, where links leave something to chance and it can be followed",
+            ),
+            ("curves[].name, curves[].overrides, curves[].@Curve of an admittance", "of each `--curve`"),
+            ("files, interrupted", "what was written; whether frequencies are missing because of Ctrl-C"),
+        ],
+    },
+    Document {
+        command: "live",
+        lines: &["cohaptic live scenarios/live/two-and-a-program.toml --for 50ms --listen 127.0.0.1:0 --no-priority --json"],
+        rows: &[
+            ("title, duration_s, ending, ticks, max_discrepancy_m, files", "as [of a run](#run)"),
+            ("valid", "whether at most one in a thousand ticks and datagrams was later than the tolerance"),
+            ("late_ticks", "ticks later than the tolerance"),
+            ("lateness_us.@Lateness", "of ticks"),
+            ("release_lateness_us.@Lateness", "of datagrams to other programs"),
+            ("behind_us", "by how much logical time was behind the clock when the last event had happened"),
+            ("peers[].kind, peers[].name, peers[].position_m, peers[].velocity_m_s, peers[].stale_samples, peers[].refused_samples", "as of a run"),
+            (
+                "peers[].seat.taken, peers[].seat.joined, peers[].seat.refused, peers[].seat.out_of_order",
+                "of peers that live elsewhere: samples taken, how often it joined, samples refused and out of order",
+            ),
+            (
+                "peers[].seat.late, peers[].seat.most_late_us",
+                "samples that came after their instant and counted at the next, and by how much at most",
+            ),
+            ("links[].from, links[].to, links[].@Counters, access_lines", "as of a run"),
+            ("door.address, door.handled", "with other programs: where it listens; `handled` = `admitted` + `welcomed` + all of `refused`"),
+            ("door.admitted, door.welcomed, door.refused.NAME", "datagrams; refused ones [by cause](live-protocol.md#why-a-datagram-is-refused)"),
+            ("door.joinings, door.sent, door.nobody_there, door.send_failures.NAME, door.oversized, door.kernel_drops", "what else was counted"),
+            ("granted, refused_wishes", "what the system granted, and what it refused with the way out"),
+        ],
+    },
+    Document {
+        command: "relay",
+        lines: &["cohaptic relay --listen 127.0.0.1:0 --to 127.0.0.1:9 --for 50ms --no-priority --json"],
+        rows: &[
+            ("title, form", "of the file, or `LISTEN -> TO`; `mesh` or `proxy`"),
+            ("duration_s, ending", "how long it ran; `complete` (`--for`) or `interrupted`"),
+            ("valid", "whether releases were as late as tolerated"),
+            ("packets", "datagrams that came in. With the copies that links made: sent at all `ports`, `dropped`, `in_flight` and `unsent`"),
+            (
+                "dropped",
+                "datagrams and copies that did not go out, but for those that the kernel dropped before they were read, which are in `ports`",
+            ),
+            ("release_error_us.@Lateness", "of sent datagrams"),
+            ("clamped_us.@Lateness", "of datagrams that were read after time had passed beyond their time stamp"),
+            ("links[].from, links[].to, links[].@Counters", "of each directed link"),
+            (
+                "links[].asked_mean_delay_s, links[].changes",
+                "when the run began (`null` where only a recording knows); how often it was changed since",
+            ),
+            ("links[].delivered_bytes, links[].overload, links[].undeliverable", "as in [the report](relay.md#what-is-dropped-and-by-whom)"),
+            ("ports[].name, ports[].address, ports[].received, ports[].sent", "of a proxy: `listen`, and all `clients` together"),
+            ("ports[].send_failures.NAME, ports[].oversized, ports[].receive_errors", "datagrams that were not sent or read; failures by reason"),
+            ("ports[].receive_buffer_bytes, ports[].kernel_drops", "what the system granted; `null` if it does not tell"),
+            ("refused.NAME", "dropped on entry: `stranger`, `to-itself`, `no-room`, `overload`"),
+            ("in_flight.packets, in_flight.bytes", "on their way at the end"),
+            ("unsent", "came out of their links and were not sent before the end"),
+            ("clients_without_socket", "clients for which no socket could be had"),
+            ("granted, refused_wishes", "what the system granted the thread, and what it refused"),
+        ],
+    },
+    Document {
+        command: "router",
+        lines: &[
+            "cp programs/router.toml . && python3 programs/router.py router.toml --set 'rules=[{ protocol = \"icmp\", link = \"pass\" }]' --for 300ms --json",
+        ],
+        rows: &[
+            ("title, duration_s", "the file; how long it ran"),
+            ("ending", "`complete` (`--for`), `interrupted` or `failed`"),
+            ("valid, release_error_us.@Lateness", "whether releases were as late as tolerated; how late"),
+            ("packets, dropped", "what came in at both devices; what did not go out, for any reason"),
+            ("sides[].name, sides[].device", "left, right"),
+            (
+                "sides[].received.packets, sides[].received.bytes, sides[].received.not_ip, sides[].received.malformed, sides[].received.passed, sides[].received.dropped",
+                "from the device",
+            ),
+            ("sides[].by_default.packets, sides[].by_default.bytes", "of those, what no rule decided"),
+            (
+                "sides[].written.packets, sides[].written.bytes, sides[].written.full, sides[].written.too_long, sides[].written.refused",
+                "to the device",
+            ),
+            ("links[].name, links[].from, links[].to, links[].@Counters", "each link from the left, then from the right"),
+            ("links[].delivered_bytes, links[].overload, links[].asked_mean_delay_s, links[].changes", "as of the [relay](#relay)"),
+            ("rules[].packets, rules[].bytes", "what each rule decided"),
+            ("in_flight.packets, in_flight.bytes", "inside all links at the end"),
+            ("granted, refused_wishes", "what the system granted the thread, and what it refused"),
+        ],
+    },
+    Document {
+        command: "falcon probe",
+        lines: &["cohaptic falcon probe --simulated --virtual-time --json"],
+        rows: &[
+            ("falcons[].@Falcon", "of each device"),
+            ("falcons[].opened, falcons[].error", "whether it could be opened, and why not; nothing more is known of one that was not"),
+            ("falcons[].@Exchanges with a Falcon", "of each device"),
+        ],
+    },
+    Document {
+        command: "falcon home",
+        lines: &["cohaptic falcon home --simulated --virtual-time --json"],
+        rows: &[
+            ("@Falcon", "which device"),
+            ("ending", "`complete`, `interrupted` or `failed`"),
+            ("is_homed, is_active", "whether it was homed, and pulled out"),
+            ("@Exchanges with a Falcon", "what was exchanged"),
+        ],
+    },
+    Document {
+        command: "falcon watch",
+        lines: &["cohaptic falcon watch --simulated --virtual-time --for 2s --json"],
+        rows: &[
+            ("@Falcon", "which device"),
+            ("ending", "`complete`, `interrupted` or `failed`"),
+            ("active_after_s", "when forces first could go out"),
+            ("@Exchanges with a Falcon", "what was exchanged"),
+            ("lowest_m, highest_m, fastest_m_s", "of the grip"),
+            ("forces.@Forces of a Falcon", "what became of the forces asked for"),
+            ("files", "what was written"),
+        ],
+    },
+    Document {
+        command: "falcon simulate",
+        lines: &["cohaptic falcon simulate --for 1s --json"],
+        rows: &[
+            ("hand, seed, asked_n, ending, driver_error", "what was asked for, and how it ended"),
+            ("changes[].t_s, changes[].phase, changes[].light, more_changes", "phases as they came, the first hundred; how many more"),
+            ("@Exchanges with a Falcon", "what was exchanged"),
+            ("forces.@Forces of a Falcon", "what became of the force"),
+            (
+                "device.commands, device.garbage_bytes, device.misheard_bytes, device.largest_count, device.largest_count_unhomed, device.saturated, device.torque_timeouts",
+                "what the device saw",
+            ),
+            (
+                "true_position_m, largest_position_error_m, motor_force_n, largest_motor_force_n",
+                "of the simulated device itself; the position from the base",
+            ),
+        ],
+    },
+    Document {
+        command: "link",
+        lines: &["cohaptic link delay 20ms 2ms distribution normal loss 1% 25% duplicate 1% corrupt 1% rate 1mbit --packets 20000 --json"],
+        rows: &[
+            ("asked.spec", "as it was written"),
+            (
+                "asked.NAME",
+                "what follows from the laws: `mean_s`, `sd_s`, `least_s`, `quantiles_s`, `autocorrelation` (lags 1 to 10), `loss`, `loss_run_mean`, `loss_autocorrelation`, `duplicated`, `damaged`, `rate_bit_s`; what does not follow is left out",
+            ),
+            ("achieved.NAME", "what was measured, with standard errors (`_se`) and intervals of 95 %, as defined by the RFCs; copies count"),
+            ("compared[].name, compared[].asked, compared[].achieved, compared[].standard_error, compared[].outside", "the rows of the table"),
+            ("fates.@Counters but mean_delay_s", "what became of the packets"),
+            ("packets_per_s, interrupted, files", "how fast; whether it was cut short; what was written"),
+        ],
+    },
+    Document {
+        command: "fit",
+        lines: &["python3 programs/captures.py && cohaptic fit sender.pcap receiver.pcap --skew --json"],
+        rows: &[
+            ("link.NAME", "the link that fits best"),
+            ("goodness.NAME", "what was measured, and how well each law and each model of loss fits"),
+            ("scene", "the `[link]` table as text"),
+            (
+                "skew.seconds_per_second, skew.standard_error, skew.interval_99, skew.significant, skew.location, skew.blocks",
+                "with `--skew`: the [drift](commands-network.md#fit)",
+            ),
+            (
+                "matched.unmatched_sent, matched.unmatched_arrived, matched.ambiguous",
+                "of two captures: the packets that stand in one alone, or cannot be told apart",
+            ),
+        ],
+    },
+    Document {
+        command: "paper",
+        lines: &["cohaptic paper --quick --json"],
+        rows: &[
+            (
+                "claims[].id, claims[].claim, claims[].paper, claims[].ours, claims[].verdict",
+                "what the paper says, what was computed, and the verdict",
+            ),
+            ("claims[].scene, claims[].how", "text of the scene that shows it, or `null`; how it was computed"),
+            ("figures[].id, figures[].file, figures[].title", "`file` is `null` without `--out`"),
+            ("wall_s", "the time it took"),
+        ],
+    },
+    Document {
+        command: "accuracy",
+        lines: &["cohaptic accuracy --quick --only motion --json"],
+        rows: &[
+            ("rows[].subject, rows[].case, rows[].method, rows[].setting", "what was measured"),
+            ("rows[].cost, rows[].cost_unit, rows[].error, rows[].error_unit", "`null` where there is no such number"),
+            ("rows[].reference, rows[].note", "what the error is against; what else is to be known"),
+            ("interrupted, wall_s", "whether it was cut short; the time it took"),
+        ],
+    },
+    Document {
+        command: "Errors",
+        lines: &["cohaptic run scenarios/network/ideal.toml --set link.dlay=8ms --json 2> said"],
+        rows: &[
+            ("status, message", "the exit status; the message as on standard error, without `error:`"),
+            ("place", "where a text is refused, else `null`"),
+            ("place.file, place.argument", "the file (`null` for an option), and the argument, such as `--set link.dlay=8ms` (`null` for a file)"),
+            ("place.line, place.column, place.key", "both from 1; the dotted path or `null`"),
+            ("place.fault", "what is wrong and what was expected, in one line"),
+        ],
+    },
+];
+
+/// The heading of a part, and whether a key of it is left out.
+fn part_of(key: &str) -> Option<(&str, &'static Part, Option<&str>)> {
+    let (prefix, name) = key.split_once('@')?;
+    let (name, without) = name.split_once(" but ").map_or((name, None), |(name, without)| (name, Some(without)));
+    let part = PARTS.iter().find(|part| part.name == name).unwrap_or_else(|| panic!("there is no part {name}"));
+    Some((prefix, part, without))
+}
+
+/// The keys of rows, one by one.
+fn keys(rows: &'static [(&'static str, &'static str)]) -> Vec<String> {
+    let one = |key: &'static str| match part_of(key) {
+        Some((prefix, part, without)) => {
+            let inner = keys(part.rows).into_iter().filter(|key| Some(key.as_str()) != without);
+            inner.map(|key| format!("{prefix}{key}")).collect()
+        }
+        None => vec![key.to_owned()],
+    };
+    rows.iter().flat_map(|(keys, _)| keys.split(", ")).flat_map(one).collect()
+}
+
+fn shown(keys: &str) -> String {
+    let one = |key: &str| match part_of(key) {
+        Some((prefix, part, without)) => {
+            let but = without.map_or_else(String::new, |key| format!(" but `{key}`"));
+            let link = format!("[{}](#{}){but}", part.name, part.name.to_lowercase().replace(' ', "-"));
+            if prefix.is_empty() { link } else { format!("`{prefix}…` {link}") }
+        }
+        None => format!("`{key}`"),
+    };
+    keys.split(", ").map(one).collect::<Vec<_>>().join(", ")
+}
+
+fn rows(of: &[(&str, &str)]) -> String {
+    table(&["key", "value"], &of.iter().map(|(keys, about)| vec![shown(keys), (*about).to_owned()]).collect::<Vec<_>>())
+}
+
+/// The whole page.
+pub(super) fn page() -> String {
+    let mut page = format!("# Reference: JSON documents\n\n{WRITTEN}\n\n{INTRODUCTION}\n");
+    for document in &DOCUMENTS {
+        page += &format!("## {}\n\n{}", document.command, rows(document.rows));
+    }
+    page += "## Parts of several documents\n\n";
+    for part in &PARTS {
+        page += &format!("### {}\n\n{}", part.name, rows(part.rows));
+    }
+    page.trim_end().to_owned() + "\n"
+}
+
+/// The paths of all keys within a value that hold no table.
+fn paths(path: &str, value: &Value, found: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(members) if !members.is_empty() => {
+            for (name, member) in members {
+                paths(&if path.is_empty() { name.clone() } else { format!("{path}.{name}") }, member, found);
+            }
+        }
+        Value::Array(elements) if elements.iter().any(Value::is_object) => {
+            elements.iter().for_each(|element| paths(&format!("{path}[]"), element, found))
+        }
+        Value::Array(_) | Value::Object(_) | Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {
+            found.insert(path.to_owned());
+        }
+    }
+}
+
+/// Whether a path is that of a key of the table: `NAME` at its end stands for any name and what is within.
+fn is_of(path: &str, key: &str) -> bool {
+    match key.strip_suffix("NAME") {
+        Some(prefix) => path.starts_with(prefix) || prefix.strip_suffix('.') == Some(path),
+        None => path == key,
+    }
+}
+
+#[test]
+fn documents_have_the_keys_of_the_page_and_no_other() {
+    for document in &DOCUMENTS {
+        let keys = keys(document.rows);
+        let mut all = BTreeSet::new();
+        for line in document.lines {
+            let folder = Folder::new();
+            let needs = if document.command == "router" { NAMESPACES } else { "python3" };
+            if line.contains("python3") && !folder.has(needs) {
+                eprintln!("the document of {} is not read here, for want of `{needs}`", document.command);
+                continue;
+            }
+            let printed = folder.run(&format!("{{ {line}; }} 2> said-besides"), "").printed;
+            let begin = printed.find('{').unwrap_or_else(|| panic!("{line}: no document: {printed}"));
+            let value: Value = serde_json::from_str(&printed[begin..]).unwrap_or_else(|error| panic!("{line}: {error}: {printed}"));
+            paths("", &value, &mut all);
+        }
+        // A second document within the first has the same keys.
+        all.retain(|path| path != "schema" && path != "version" && !path.starts_with("against."));
+        for path in &all {
+            let is_list = keys.iter().any(|key| key.strip_prefix(path.as_str()).is_some_and(|rest| rest.starts_with("[]") || rest.starts_with('.')));
+            assert!(is_list || keys.iter().any(|key| is_of(path, key)), "{}: the page has no key {path}", document.command);
+        }
+        let is_seen =
+            |key: &String| all.is_empty() || key == "against" || all.iter().any(|path| is_of(path, key) || path.starts_with(&format!("{key}.")));
+        let missing: Vec<&String> = keys.iter().filter(|key| !is_seen(key)).collect();
+        assert!(missing.is_empty(), "{}: no document has {missing:?}", document.command);
+    }
+}

@@ -1,0 +1,267 @@
+//! The reference of keys.
+
+use cohaptic_linkfile::schema::link::{LINK_TABLE, MODULATOR};
+use cohaptic_linkfile::schema::{Form, Key, Need, Table, Words};
+use cohaptic_scene::schema::FileSchema;
+
+use super::{WRITTEN, prose, table};
+
+/// Tables with fewer keys are written out wherever they stand.
+const SHORT: usize = 3;
+
+const OF_FILES: &str = "\
+Every key of [scenes](scenes.md), [relay files](relay.md) and [router files](router.md). Links have a [page of their own](reference-link-keys.md). Values with units are explained in
+[scenes.md](scenes.md#how-values-are-written).
+
+A key with points, `device.mass`, stands in a table: `device = { mass = 0.1 }`. Brackets, `position[]`, mark a list. A *required* key must be given. One that is *required for all* must be
+given there or in the table that holds for all, such as `[peer]`. Any other key without a default may be left out.
+";
+const OF_LINKS: &str = "\
+Every key of a link. [emulator-stages.md](emulator-stages.md) says exactly what each does to a packet. They are taken by `[link]`, `[[links]]`, `uplink` and `downlink` of
+[scenes](scenes.md), by [relay files](relay.md), by `[links.NAME]` of [router files](router.md), by `set` in a timeline, by `cohaptic link`, and by
+[live control](live-control.md). The notation is that of [reference-keys.md](reference-keys.md).
+
+A link is often laid over another one: `[[links]]` over `[link]`, a change over what holds by then. Each key replaces the earlier one as a whole. Its default takes the earlier one
+away, as `\"0s\"` does for `jitter`; `queue` and `overhead` go with `rate`.
+";
+
+const HEADS: [&str; 4] = ["key", "form", "default", "meaning"];
+
+/// A key as far as two tables can share it.
+type Shape = (&'static str, &'static str, &'static str);
+
+fn shape(table: &Table) -> Vec<Shape> {
+    table.keys().map(|key| (key.name, key.about, key.form.unit())).collect()
+}
+
+/// A table that was explained.
+struct Explained {
+    keys: Vec<Shape>,
+    name: String,
+    page: &'static str,
+    anchor: String,
+}
+
+/// What was explained so far, and where the next rows go.
+#[derive(Default)]
+struct Reference {
+    explained: Vec<Explained>,
+    page: &'static str,
+    anchor: String,
+    /// Whether tables within tables come after the others.
+    puts_off: bool,
+    later: Vec<(String, &'static str, &'static Table)>,
+}
+
+/// Each page, named from the project's folder, with its text.
+pub(super) fn pages() -> [(&'static str, String); 2] {
+    let mut reference = Reference { page: "reference-link-keys.md", puts_off: true, ..Reference::default() };
+    let mut links = format!("# Reference: keys of links\n\n{WRITTEN}\n\n{OF_LINKS}\n");
+    links += &reference.section("##", "Keys of a link", &LINK_TABLE);
+    links += &reference.section("##", "Modulators", &MODULATOR);
+    let mut files = format!("# Reference: keys of files\n\n{WRITTEN}\n\n{OF_FILES}\n");
+    (reference.page, reference.puts_off) = ("reference-keys.md", false);
+    for (kind, head, name) in
+        [(FileSchema::Scene, "Scenes", "Scene"), (FileSchema::Relay, "Relay files", "Relay"), (FileSchema::Router, "Router files", "Router")]
+    {
+        files += &format!("## {head}\n\n");
+        for key in kind.root().keys() {
+            let needed = if key.need == Need::Required { " Required." } else { "" };
+            let heading = format!("{name} {}", head_of(key));
+            files += &format!("### {heading}\n\n{}.{needed}", prose(key.about));
+            for (_, inner) in tables(&key.form) {
+                files += &reference.rest_of_section(&heading, inner);
+            }
+        }
+    }
+    [("docs/reference-keys.md", files.trim_end().to_owned() + "\n"), ("docs/reference-link-keys.md", links.trim_end().to_owned() + "\n")]
+}
+
+/// How a table at the top of a file is written.
+fn head_of(key: &Key) -> String {
+    match &key.form {
+        Form::List(_) => format!("`[[{}]]`", key.name),
+        form if form.table().is_some_and(|table| table.others.is_some()) => format!("`[{}.NAME]`", key.name),
+        _ => format!("`[{}]`", key.name),
+    }
+}
+
+/// The anchor that a forge gives a heading.
+fn anchor(heading: &str) -> String {
+    let letter = |letter: char| match letter {
+        ' ' => Some('-'),
+        letter if letter.is_ascii_alphanumeric() || letter == '-' => Some(letter.to_ascii_lowercase()),
+        _ => None,
+    };
+    heading.chars().filter_map(letter).collect()
+}
+
+/// The tables within a form, each with what stands between a key and theirs.
+fn tables(form: &'static Form) -> Vec<(&'static str, &'static Table)> {
+    match form {
+        Form::Table(table) => vec![("", table)],
+        Form::AnyOf(forms) => forms.iter().flat_map(tables).collect(),
+        Form::List(element) | Form::Pair(element) => tables(element).into_iter().map(|(_, table)| ("[]", table)).collect(),
+        Form::Text
+        | Form::File
+        | Form::Boolean
+        | Form::Integer(..)
+        | Form::Number(_)
+        | Form::Vector(_)
+        | Form::Triple(_)
+        | Form::Duration
+        | Form::Rate
+        | Form::Size
+        | Form::Probability
+        | Form::Like(_)
+        | Form::Words(_) => Vec::new(),
+    }
+}
+
+impl Reference {
+    /// A table of its own, with those of its tables that are put off.
+    fn section(&mut self, marks: &str, heading: &str, table_of: &'static Table) -> String {
+        self.anchor = anchor(heading);
+        let mut rows = Vec::new();
+        self.table("", heading, table_of, &mut rows);
+        let mut text = format!("{marks} {heading}\n\n{}", table(&HEADS, &rows));
+        let later = std::mem::take(&mut self.later);
+        let puts_off = std::mem::replace(&mut self.puts_off, false);
+        for group in later.chunk_by(|one, other| one.0 == other.0) {
+            let name = &group[0].0;
+            self.anchor = anchor(name);
+            let mut rows = Vec::new();
+            for (_, list, inner) in group {
+                self.table(if list.is_empty() { "" } else { "[]." }, &format!("`{name}`"), inner, &mut rows);
+            }
+            text += &format!("{marks}# `{name}`\n\n{}", table(&HEADS, &rows));
+        }
+        self.puts_off = puts_off;
+        text
+    }
+
+    /// What comes behind the sentence on a table at the top of a file: its keys, or a link to them.
+    fn rest_of_section(&mut self, heading: &str, table_of: &'static Table) -> String {
+        self.anchor = anchor(heading);
+        let mut rows = Vec::new();
+        self.table("", heading, table_of, &mut rows);
+        match &rows[..] {
+            [only] if only[1].is_empty() => format!(" {}.\n\n", only[3]),
+            _ => format!("\n\n{}", table(&HEADS, &rows)),
+        }
+    }
+
+    /// The rows of a table, or one that names another table with the same keys.
+    fn table(&mut self, prefix: &str, name: &str, table: &'static Table, rows: &mut Vec<Vec<String>>) {
+        let keys = shape(table);
+        let mut own: Vec<&'static Key> = table.keys().collect();
+        let within = |one: &[Shape], other: &[Shape]| one.iter().all(|key| other.contains(key));
+        // With all keys of another table, or with most of them.
+        let known = self.explained.iter().filter(|known| within(&known.keys, &keys)).max_by_key(|known| known.keys.len());
+        let larger = || self.explained.iter().find(|known| keys.len() >= SHORT && 2 * keys.len() > known.keys.len() && within(&keys, &known.keys));
+        if let Some(known) = known.or_else(larger) {
+            let missing: Vec<String> = known.keys.iter().filter(|key| !keys.contains(key)).map(|key| format!("`{}`", key.0)).collect();
+            let but = if missing.is_empty() { String::new() } else { format!(" but {}", missing.join(", ")) };
+            let page = if known.page == self.page { "" } else { known.page };
+            let place = if prefix.is_empty() { "…".to_owned() } else { format!("`{prefix}…`") };
+            own.retain(|key| !known.keys.contains(&(key.name, key.about, key.form.unit())));
+            rows.push(vec![place, String::new(), String::new(), format!("All of [{}]({page}#{}){but}", known.name.replace('`', ""), known.anchor)]);
+        } else if keys.len() >= SHORT || prefix.is_empty() {
+            self.explained.push(Explained { keys, name: name.to_owned(), page: self.page, anchor: self.anchor.clone() });
+        }
+        for key in own {
+            self.key(prefix, key, rows);
+        }
+        if let Some(others) = table.others {
+            let path = format!("{prefix}NAME");
+            for (list, inner) in tables(others) {
+                self.table(&format!("{path}{list}."), &format!("`{path}`"), inner, rows);
+            }
+        }
+    }
+
+    fn key(&mut self, prefix: &str, key: &'static Key, rows: &mut Vec<Vec<String>>) {
+        let path = format!("{prefix}{}", key.name);
+        let mut words = Vec::new();
+        let form = form(&key.form, &mut words);
+        let meanings = if words.is_empty() { String::new() } else { format!(". {}", words.join("; ")) };
+        let inner = tables(&key.form);
+        let is_put_off = self.puts_off && prefix.is_empty() && !inner.is_empty();
+        let written = if is_put_off { form.replace("table", &format!("[table](#{})", anchor(key.name))) } else { form };
+        rows.push(vec![format!("`{path}`"), written, need(key), prose(&format!("{}{meanings}", key.about))]);
+        for (list, inner) in inner {
+            if is_put_off {
+                self.later.push((key.name.to_owned(), list, inner));
+            } else {
+                self.table(&format!("{path}{list}."), &format!("`{path}`"), inner, rows);
+            }
+        }
+    }
+}
+
+fn need(key: &Key) -> String {
+    match key.need {
+        Need::Required => "*required*".to_owned(),
+        Need::RequiredSomewhere => "*required for all*".to_owned(),
+        Need::Default(default) => format!("`{default}`"),
+        Need::Optional => String::new(),
+    }
+}
+
+/// What may stand there, in words; `words` gets those of which there are several.
+fn form(of: &Form, words: &mut Vec<String>) -> String {
+    let number =
+        |expected: String, many: &str| expected.replacen("a number", many, 1).replace("of at least zero", "≥ 0").replace("above zero", "> 0");
+    match of {
+        Form::Text => "text".to_owned(),
+        Form::File => "file".to_owned(),
+        Form::Boolean => "boolean".to_owned(),
+        // No limit that anybody meets.
+        Form::Integer(least, most) if *most >= u64::from(u32::MAX) => format!("integer ≥ {least}"),
+        Form::Integer(least, most) => format!("integer, {least} to {most}"),
+        Form::Number(amount) => number(amount.expected(), "number"),
+        Form::Vector(amount) => number(amount.expected(), "number or vector"),
+        Form::Triple(amount) => number(amount.expected(), "3 numbers"),
+        Form::Duration => "duration".to_owned(),
+        Form::Rate => "rate".to_owned(),
+        Form::Size => "size".to_owned(),
+        Form::Probability => "probability".to_owned(),
+        Form::Like(examples) => format!("text: {}", examples.iter().map(|example| format!("`\"{example}\"`")).collect::<Vec<_>>().join(", ")),
+        Form::Words([(word, _)]) => format!("`\"{word}\"`"),
+        Form::Words(choices) => {
+            words.extend(meanings(choices));
+            "word".to_owned()
+        }
+        Form::Table(_) => "table".to_owned(),
+        Form::List(element) => format!("list of {}", many(&form(element, words))),
+        Form::Pair(element) => format!("list of two {}", many(&form(element, words))),
+        Form::AnyOf(forms) => {
+            let mut all: Vec<String> = forms.iter().map(|of| form(of, words)).collect();
+            all.dedup();
+            all.join(" or ")
+        }
+    }
+}
+
+fn many(form: &str) -> String {
+    if ["table", "duration", "size"].contains(&form) { format!("{form}s") } else { form.to_owned() }
+}
+
+/// Each word with its meaning; words alone where all mean one thing.
+fn meanings(words: Words) -> Vec<String> {
+    let differ = words.iter().any(|(_, meaning)| *meaning != words[0].1);
+    if !differ {
+        return vec![words.iter().map(|(word, _)| format!("`\"{word}\"`")).collect::<Vec<_>>().join(", ")];
+    }
+    words.iter().map(|(word, meaning)| format!("`\"{word}\"`: {meaning}")).collect()
+}
+
+#[test]
+fn a_table_with_the_keys_of_another_one_names_it() {
+    let pages = pages();
+    let [files, links] = pages.each_ref().map(|(_, text)| text.as_str());
+    assert!(files.contains("\n### Scene `[[peers]]`\n\nOne peer each") && files.contains("| All of [Scene [peer]](#scene-peer) |"), "{files}");
+    assert!(files.contains("All of [Keys of a link](reference-link-keys.md#keys-of-a-link)"), "{files}");
+    assert!(files.contains("| `stiffness` | number ≥ 0 [N/m] | *required* | Gain on the difference of positions, K_T |"), "{files}");
+    assert!(links.contains("\n### `jitter`\n") && links.contains("[table](#jitter)"), "{links}");
+}

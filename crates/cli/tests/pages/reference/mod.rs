@@ -1,0 +1,85 @@
+//! The pages of reference, made from the program's own description: `--help`, the catalogue of keys that the JSON Schema is made of, and a list of the keys
+//! of JSON documents, which is compared with what the commands print.
+//!
+//! `COHAPTIC_UPDATE_PAGES=1` writes them anew.
+
+mod commands;
+mod documents;
+mod help;
+mod keys;
+
+use std::fs;
+
+use crate::page::UPDATE;
+use crate::root;
+
+/// Of a page that is written here.
+const WRITTEN: &str = "<!-- Written by the tests in crates/cli/tests/pages/reference from what the program says of itself. Do not edit. -->";
+
+/// Compares a page byte by byte, or writes it anew.
+fn assert_page(name: &str, text: &str) {
+    let path = root().join(name);
+    if std::env::var_os(UPDATE).is_some() {
+        fs::write(&path, text).unwrap();
+    }
+    let shown = fs::read_to_string(&path).unwrap_or_default();
+    let differs =
+        shown.lines().zip(text.lines()).position(|(shown, now)| shown != now).unwrap_or_else(|| shown.lines().count().min(text.lines().count()));
+    assert!(
+        shown == text,
+        "{name}:{}: the program says something else: {UPDATE}=1 writes the page anew\n  page:    {}\n  program: {}",
+        differs + 1,
+        shown.lines().nth(differs).unwrap_or_default(),
+        text.lines().nth(differs).unwrap_or_default(),
+    );
+}
+
+/// A table of Markdown; nothing where there are no rows. Columns in which nothing stands are left out.
+fn table(heads: &[&str], rows: &[Vec<String>]) -> String {
+    let used: Vec<usize> = (0..heads.len()).filter(|&column| rows.iter().any(|row| !row[column].is_empty())).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let line = |cells: &mut dyn Iterator<Item = &str>| {
+        cells.fold("|".to_owned(), |line, cell| line + " " + cell + if cell.is_empty() { "|" } else { " |" }) + "\n"
+    };
+    let mut text = line(&mut used.iter().map(|&column| heads[column]));
+    text += &line(&mut used.iter().map(|_| "---"));
+    for row in rows {
+        text += &line(&mut used.iter().map(|&column| row[column].as_str()));
+    }
+    text + "\n"
+}
+
+/// Text of the program within a table: options as code, and nothing that Markdown takes for itself.
+fn prose(text: &str) -> String {
+    let word = |word: &str| {
+        let end = word.find(|letter: char| letter != '-' && !letter.is_ascii_alphanumeric()).unwrap_or(word.len());
+        if word.starts_with("--") && end > 2 { format!("`{}`{}", &word[..end], &word[end..]) } else { word.to_owned() }
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ").replace('|', "\\|").replace('<', "&lt;").replace('*', "\\*")
+}
+
+#[test]
+fn the_page_of_commands_is_what_help_says() {
+    assert_page("docs/reference-commands.md", &commands::page());
+}
+
+#[test]
+fn the_page_of_documents_is_their_list() {
+    assert_page("docs/reference-documents.md", &documents::page());
+}
+
+#[test]
+fn the_pages_of_keys_are_the_catalogue() {
+    for (name, text) in keys::pages() {
+        assert_page(name, &text);
+    }
+}
+
+#[test]
+fn a_table_has_the_columns_that_say_something() {
+    let rows = [vec!["`a`".to_owned(), String::new(), prose("see --b, or a|b")], vec![String::new(), String::new(), "*".to_owned()]];
+    assert_eq!(table(&["key", "default", "meaning"], &rows), "| key | meaning |\n| --- | --- |\n| `a` | see `--b`, or a\\|b |\n| | * |\n\n");
+    assert_eq!(table(&["key"], &[]), "");
+}
