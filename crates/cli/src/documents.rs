@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_harness::{AccessSummary, Ending, LinkSummary, PeerSummary};
+#[cfg(target_os = "linux")]
 use cohaptic_realtime::LatenessSummary;
 use cohaptic_scene::Scene;
 use cohaptic_wan::{DropCause, LinkStats};
@@ -103,6 +104,7 @@ impl Counters {
     }
 }
 
+#[cfg(target_os = "linux")]
 impl LatenessDocument {
     pub(crate) fn new(lateness: &LatenessSummary) -> Self {
         let LatenessSummary { count, p50, p99, p999, max, sum: _ } = *lateness;

@@ -1,39 +1,46 @@
 //! One process at a time.
 
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io;
-use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
-use rustix::fs::{FlockOperation, flock};
-
-/// A lock on a file of its own, which goes with it. The system lets go of it when the process ends, however it ends.
+/// A lock on a file of its own, which is removed with it. The system lets go of it when the process ends, however it ends.
 #[derive(Debug)]
 pub(super) struct Lock {
     path: PathBuf,
-    _file: File,
+    /// Open as long as the lock is held.
+    file: Option<File>,
 }
 
 impl Lock {
     /// `None` if another process has it.
     pub(super) fn take(path: &Path) -> io::Result<Option<Self>> {
-        loop {
-            let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
-            match flock(&file, FlockOperation::NonBlockingLockExclusive) {
-                Ok(()) => {}
-                Err(rustix::io::Errno::WOULDBLOCK) => return Ok(None),
-                Err(error) => return Err(error.into()),
-            }
-            // Whoever had it may have removed the file in between: the locked file is then no lock for anybody.
-            if is_at(&file, path)? {
-                return Ok(Some(Self { path: path.to_path_buf(), _file: file }));
-            }
+        Ok(locked(path)?.map(|file| Self { path: path.to_path_buf(), file: Some(file) }))
+    }
+}
+
+/// The file, open and locked; `None` if another process has locked it.
+#[cfg(unix)]
+fn locked(path: &Path) -> io::Result<Option<File>> {
+    use rustix::fs::{FlockOperation, flock};
+    loop {
+        let file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
+        match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => {}
+            Err(rustix::io::Errno::WOULDBLOCK) => return Ok(None),
+            Err(error) => return Err(error.into()),
+        }
+        // The process that had it may have removed the file in between: the locked file is then no lock for anybody.
+        if is_at(&file, path)? {
+            return Ok(Some(file));
         }
     }
 }
 
 /// Whether that is the file of that name.
+#[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt as _;
     let here = file.metadata()?;
     match std::fs::metadata(path) {
         Ok(there) => Ok((here.dev(), here.ino()) == (there.dev(), there.ino())),
@@ -42,9 +49,25 @@ fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
+/// The file, open for this process alone; `None` if another process has it open.
+#[cfg(windows)]
+fn locked(path: &Path) -> io::Result<Option<File>> {
+    use std::os::windows::fs::OpenOptionsExt as _;
+    const ERROR_SHARING_VIOLATION: i32 = 32;
+    match File::options().read(true).write(true).create(true).truncate(false).share_mode(0).open(path) {
+        Ok(file) => Ok(Some(file)),
+        Err(error) if error.raw_os_error() == Some(ERROR_SHARING_VIOLATION) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
 impl Drop for Lock {
     fn drop(&mut self) {
-        // While it is held: nobody else can have taken it. If it stays, it is in nobody's way.
+        if cfg!(windows) {
+            // No open file is removed there. A process that opens it now keeps it, and the file stays.
+            self.file = None;
+        }
+        // Elsewhere while it is held: no other process can have taken it. A file that stays hinders nobody.
         let _ = std::fs::remove_file(&self.path);
     }
 }

@@ -23,8 +23,6 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use examples::after;
-
 pub(crate) use accuracy::AccuracyArguments;
 pub(crate) use admittance::AdmittanceArguments;
 pub(crate) use campaign::{CampaignArguments, TableFormat};
@@ -45,7 +43,7 @@ pub(crate) use stability::{BoundaryArguments, GridSize, LinksName, MapArguments,
 ///
 /// A scene is one TOML file: the object, the peers, the links between them, and what is expected. docs/scenes.md lists every key.
 #[derive(Debug, Parser)]
-#[command(name = "cohaptic", version, after_help = after(examples::PROGRAM))]
+#[command(name = "cohaptic", version, after_help = examples::of_program())]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
