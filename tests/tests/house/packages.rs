@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use serde_json::Value;
 
@@ -114,6 +115,25 @@ fn every_package_says_what_a_registry_shows() {
             assert_eq!(fs::read(folder.join(licence)).unwrap(), fs::read(root().join(licence)).unwrap(), "{name}");
         }
     }
+}
+
+/// Without building them: the test below looks at the files that they are built from.
+#[test]
+fn packages_are_made() {
+    let target = tempfile::tempdir().unwrap();
+    let ask = |mode: &[&str]| {
+        let mut command = Command::new(env!("CARGO"));
+        command.current_dir(root()).args(["package", "--workspace", "--no-verify", "--allow-dirty", "--target-dir"]).arg(target.path());
+        command.args(mode).output().unwrap()
+    };
+    let mut output = ask(&["--offline"]);
+    if !output.status.success() {
+        output = ask(&[]);
+    }
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let made = target.path().join("package");
+    let archives = fs::read_dir(made).unwrap().filter(|entry| entry.as_ref().unwrap().path().extension().is_some_and(|end| end == "crate"));
+    assert!(archives.count() > 20);
 }
 
 /// A package holds the files of its own folder alone. Unit tests may read others: they are run here.

@@ -66,6 +66,8 @@ macro_rules! pages {
 
 pages! {
     readme: "README.md",
+    contributing: "CONTRIBUTING.md",
+    security: "SECURITY.md",
     accuracy: "docs/accuracy.md",
     architecture: "docs/architecture.md",
     campaign: "docs/campaign.md",

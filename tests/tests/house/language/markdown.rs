@@ -160,11 +160,11 @@ fn code_is_left_out_and_lines_are_kept() {
     let expected = [
         (Kind::Heading, 1, "A title"),
         (Kind::Prose, 3, "One CODE  two three four."),
-        (Kind::Prose, 8, "an entry goes on"),
-        (Kind::Prose, 10, "another"),
-        (Kind::Cell, 15, "a cell"),
-        (Kind::Cell, 15, "CODE c"),
-        (Kind::Prose, 19, "End"),
+        (Kind::Prose, 9, "an entry goes on"),
+        (Kind::Prose, 11, "another"),
+        (Kind::Cell, 16, "a cell"),
+        (Kind::Cell, 16, "CODE c"),
+        (Kind::Prose, 20, "End"),
     ];
     assert_eq!(found, expected.map(|(kind, line, text)| (kind, line, text.to_owned())));
     let paragraph = &blocks(page)[1];
