@@ -1,7 +1,7 @@
 //! The same work in a hand-written loop without any abstraction: the limit of what one core can do, and what the program's speed is set against.
 //!
 //! It computes what a run of the mesh scene computes with nothing recorded but counters: N devices and copies, coupling and average-position
-//! forces, exact motion, a packet from each peer to each other, its delay (and loss, and jitter), the newest sample held of each sender, the mean
+//! forces, and exact motion. Each peer sends a packet to each other, with delay, loss and jitter. It keeps the newest sample of each sender, the mean
 //! when one has changed, the counters of every link, and the largest discrepancy. It leaves out what a program needs and a loop does not: bytes on
 //! the wire, a second axis, another strategy, another order of events, an observer, any check. The random numbers are the program's.
 

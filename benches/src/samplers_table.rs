@@ -38,7 +38,7 @@ fn main() -> Result<(), String> {
     );
     println!("- *99.99 %*: the error of the delay exceeded once in 10 000, relative to its distance from the mean.");
     println!(
-        "- *mean*, *sd*: what is delivered less what is asked for, in standard deviations asked for. Of tables by summing them up; of the exact ways by"
+        "- *mean*, *sd*: the value delivered less the value asked for, in standard deviations asked for. Of tables by summing them up; of the exact ways by"
     );
     println!("  integrating over a standard normal number, up to the largest that the way can give (for the inverse one of 53 bits).\n");
     println!(

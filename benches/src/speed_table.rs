@@ -89,7 +89,7 @@ fn one_run(work: Work) {
     }
     println!("\nThe loop is the straightforward one, and not the least there can be: where the ratio is below 1, the program keeps a sample once");
     println!(
-        "for all who get it, and does for several peers at once what the loop does one by one. A leaner loop, without counters, and other simulators on"
+        "for all peers that get it, and does for several peers at once what the loop does one by one. A leaner loop, without counters, and other simulators on"
     );
     println!("these scenes, all in one run: [peers-speed.md](peers-speed.md).");
     println!("The same cells as criterion benches: `cargo bench -p cohaptic-benches --bench mesh`.\n");
@@ -103,7 +103,7 @@ fn many_runs(work: Work) {
         "Runs of {seconds_a_run} simulated seconds of the mesh above that differ in their seed, as [a campaign](campaign.md) does them: {SIDE_BY_SIDE} side by side on one core, a number of"
     );
     println!(
-        "each in one register, beside the same runs one at a time. What comes out is compared first, and is the same to the bit. Runs a second of"
+        "each in one register, compared with the same runs one at a time. What comes out is compared first, and is the same to the bit. Runs a second of"
     );
     println!("processor time, the median of {} rounds in which all of them alternate.\n", work.rounds);
     println!("| peers | links | one at a time | {SIDE_BY_SIDE} side by side | gain |");

@@ -20,7 +20,7 @@ use cohaptic_units::Instant;
 /// How often it sends.
 pub const UPDATE: Duration = Duration::from_millis(8);
 
-/// Whom to visit, and for how long.
+/// The session to visit, and for how long.
 #[derive(Clone, Debug)]
 pub struct Invitation {
     /// Where the session listens.
@@ -130,7 +130,7 @@ struct Visiting {
     client: Client,
     sequence: u64,
     present: UdpEndpoint,
-    /// The socket of the visit before stays open during the next one: what the door sent in the moment at which it was left is still counted.
+    /// The socket of the visit before stays open during the next one: what the session sent in the moment at which it was left is still counted.
     former: UdpEndpoint,
     buffers: ReceiveBuffers,
     /// What closed sockets did, and what was made of what came.

@@ -50,7 +50,7 @@ impl Programs {
         if !output.status.success() {
             return Err(format!("{name} failed: {}", output.status));
         }
-        String::from_utf8(output.stdout).map_err(|_| format!("{name} printed what is not UTF-8"))
+        String::from_utf8(output.stdout).map_err(|_| format!("{name} printed text that is not UTF-8"))
     }
 }
 

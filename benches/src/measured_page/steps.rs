@@ -95,7 +95,7 @@ impl Step {
             Self::Samplers => "## Random delays",
             Self::Stability => "## Verdicts on stability",
             Self::Testkit => "## The test kit",
-            Self::Peers => "## Beside others",
+            Self::Peers => "## Compared with others",
         }
     }
 
@@ -104,8 +104,8 @@ impl Step {
         match self {
             Self::Speed => {
                 "How fast is one run, how far from the limit of the machine, what do many runs side by side gain, and does memory grow with time? Simulated seconds per
-second of processor time on one core, of N peers at 1 kHz who all hold the object; the *bare loop* does the same arithmetic by hand and nothing else. What
-is in the tables: [speed.md](speed.md)."
+second of processor time on one core, of N peers at 1 kHz who all hold the object; the *bare loop* does the same arithmetic by hand and nothing else. The
+tables are described in [speed.md](speed.md)."
             }
             Self::Campaign => {
                 "How many runs a second does [a campaign](campaign.md) make, from the scene to the table on the disk? Wall time, all of it: reading and checking the scene,
@@ -114,7 +114,7 @@ write are compared, and are the same to the byte."
             }
             Self::Accuracy => {
                 "What does each method cost, and how wrong is it? Costs are measured, errors computed unless a note says otherwise; each method of a table has done the same work.
-What is compared, against which reference, and how to read it: [accuracy.md](accuracy.md). In the plots, further left is cheaper, further down more exact."
+The methods that are compared, against which reference, and how to read it: [accuracy.md](accuracy.md). In the plots, further left is cheaper, further down more exact."
             }
             Self::Link => "What does a packet through one emulated link cost? What each stage adds: [link-speed.md](link-speed.md).",
             Self::Samplers => {
@@ -126,7 +126,7 @@ are: [samplers.md](samplers.md)."
 [stability-speed.md](stability-speed.md)."
             }
             Self::Testkit => {
-                "How fast and how exact is [the test kit](testing.md) beside turmoil, on the same programs? Of three hosts that send a datagram every 8 ms; the others:
+                "How fast and how exact is [the test kit](testing.md) compared with turmoil, on the same programs? Of three hosts that send a datagram every 8 ms; the others:
 [testkit-speed.md](testkit-speed.md)."
             }
             Self::Peers => {

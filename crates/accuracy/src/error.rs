@@ -7,7 +7,7 @@ use cohaptic_wan::{NetworkError, TimeWentBack};
 /// Why a measurement came to no end.
 #[derive(Debug, thiserror::Error)]
 pub enum AccuracyError {
-    /// Whoever watches asked for it.
+    /// The watcher asked for it.
     #[error("stopped")]
     Stopped,
     /// A scene of this crate is refused.

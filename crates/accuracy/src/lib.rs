@@ -1,5 +1,7 @@
 //! Speed against error: what every method of the program costs, and how wrong it is, on the same work.
 //!
+//! You need it if you choose between the methods of this project by their cost and their error. It needs Linux.
+//!
 //! [`measure`] gives [`Row`]s, one for each method at each setting. A cost is measured (processor time of the measuring thread, unless its unit says
 //! otherwise) and differs from run to run; an error is computed against a reference that is named in the row, and is the same every time unless the row
 //! says that it was measured too.
@@ -7,6 +9,15 @@
 //! [`text`], [`csv`], [`plots`] and [`html`] show rows, and look at nothing but them.
 //!
 //! It does not say which method is best: that depends on the error that one can live with, and this is what the rows are for.
+//! ```
+//! use cohaptic_accuracy::{Options, Subject, Unwatched, measure, text};
+//!
+//! let rows = measure(&[Subject::Time], Options { quick: true }, &Unwatched)?;
+//! let events = rows.iter().find(|row| row.method.contains("events")).expect("the method of this program is among them");
+//! assert!(events.cost.is_some());
+//! println!("{}", text(&rows));
+//! # Ok::<(), cohaptic_accuracy::AccuracyError>(())
+//! ```
 
 pub mod analysis;
 mod cost;

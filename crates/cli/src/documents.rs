@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_harness::{AccessSummary, Ending, LinkSummary, PeerSummary};
+#[cfg(target_os = "linux")]
 use cohaptic_realtime::LatenessSummary;
 use cohaptic_scene::Scene;
 use cohaptic_wan::{DropCause, LinkStats};
@@ -79,6 +80,7 @@ fn counters(stats: &LinkStats) -> impl Serialize + use<> {
     }
 }
 
+#[cfg(target_os = "linux")]
 /// How late things were, in microseconds.
 pub(crate) fn lateness(summary: &LatenessSummary) -> impl Serialize + use<> {
     let LatenessSummary { count, p50, p99, p999, max, sum: _ } = *summary;

@@ -5,7 +5,9 @@
 //! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, 141 standard
 //! output was closed.
 #![expect(non_camel_case_types, reason = "`document!` makes a type parameter of each key")]
+#![cfg_attr(not(target_os = "linux"), allow(dead_code, unused_imports, reason = "the commands that need Linux use them"))]
 
+#[cfg(target_os = "linux")]
 mod accuracy;
 mod admittance;
 mod analysis_watch;
@@ -14,9 +16,12 @@ mod campaign;
 mod check;
 mod document_schema;
 mod documents;
+#[cfg(not(target_os = "linux"))]
+mod elsewhere;
 mod expectations;
 mod explain;
 mod failure;
+#[cfg(target_os = "linux")]
 mod falcon;
 mod file;
 mod fit;
@@ -24,13 +29,17 @@ mod init;
 mod input;
 mod interrupt;
 mod link;
+#[cfg(target_os = "linux")]
 mod live;
 mod output;
 mod paper;
 mod progress;
+#[cfg(target_os = "linux")]
 mod realtime;
+#[cfg(target_os = "linux")]
 mod relay;
 mod report;
+#[cfg(target_os = "linux")]
 mod router;
 mod run;
 mod stability;
@@ -43,6 +52,8 @@ use std::process::ExitCode;
 use clap::Parser as _;
 
 use arguments::{Arguments, Command};
+#[cfg(not(target_os = "linux"))]
+use elsewhere::{accuracy, falcon, live, relay, router};
 
 fn main() -> ExitCode {
     if std::env::args_os().skip(1).take_while(|argument| argument != "--").any(|argument| argument == "--json") {

@@ -18,7 +18,7 @@ use crate::output;
 /// Says on standard error what went wrong, under `--json` in a document on standard output too, and gives the exit status.
 pub(crate) fn report(failure: &Failure) -> ExitCode {
     let status = failure.status();
-    // Whoever closes a pipe has read enough: that is no error, and there is nothing to be said.
+    // A reader that closes a pipe has read enough: that is no error, and there is nothing to be said.
     if status == CLOSED {
         return ExitCode::from(status);
     }

@@ -12,7 +12,7 @@ use tokio::sync::oneshot;
 use crate::http::{self, App};
 use crate::{Board, LinkEditor, Token, TokenError};
 
-/// Where to listen and whom to let in.
+/// Where to listen, and which requests to let in.
 #[derive(Clone, Debug)]
 pub struct ServerConfig {
     /// Where to listen. Port 0: any free one.
@@ -21,7 +21,7 @@ pub struct ServerConfig {
     pub token: Option<Token>,
     /// Whether an address may be given that other machines reach. All traffic, the token too, can then be read on the way.
     pub allow_remote: bool,
-    /// Names by which the server may be asked for, beside `localhost` and addresses, such as `"lab-pc.example"`. Other names are refused, so that
+    /// Names by which the server may be asked for, besides `localhost` and addresses, such as `"lab-pc.example"`. Other names are refused, so that
     /// no page of another site reaches the server by a name that it points here (DNS rebinding).
     pub hosts: Vec<String>,
 }

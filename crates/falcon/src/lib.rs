@@ -1,5 +1,7 @@
 //! The Novint Falcon, a haptic device with three axes: how to talk to it, where its grip is, how to push without hurting anybody, and one that is not there.
 //!
+//! You need it if you drive a Novint Falcon from Rust, or test such a program without the device.
+//!
 //! ```text
 //!                 device            a Falcon as the device of a peer
 //!                    │

@@ -1,7 +1,18 @@
 //! Files: read up to a limit, and written as a whole.
 //!
+//! You need it if your program reads files that may be too long, or must never leave half a file under its name.
+//!
 //! A regular file that is longer than the limit is refused before it is read. A pipe or a device has no length and is read up to the limit. A file that is
 //! written has its name only when it is whole ([`WholeFile`]).
+//! ```
+//! use std::io::Write as _;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("link.toml");
+//! cohaptic_files::write_whole(&path, |file| file.write_all(b"delay = \"24ms\""))?;
+//! assert_eq!(cohaptic_files::read_text(&path)?, "delay = \"24ms\"");
+//! # Ok::<(), std::io::Error>(())
+//! ```
 
 mod whole;
 

@@ -1,5 +1,7 @@
 //! Runs a scene: compiles it to the least it needs, owns the clock and the order of events, and records what happens.
 //!
+//! You need it if you run scenes from Rust: to record them, to watch every tick, or to drive a session.
+//!
 //! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that write each sample as a datagram and send it through a
 //! [`cohaptic_wan::Network`]; the datagram is read once for all its receivers. A scene that needs no events and has no observer runs in arrays, which hold
 //! numbers alone: no peers, no datagrams, no packets. An [`Observer`] sees every tick and every packet; [`record`] has observers that write CSV files and plots while the scene runs. [`check`] compares a

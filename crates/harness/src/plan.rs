@@ -1,4 +1,4 @@
-//! The scene compiled to the least that it needs: what is simulated how, and why. Whatever is chosen, the answer is the same to the bit.
+//! The scene compiled to the least that it needs: how each part is simulated, and why. Whatever is chosen, the answer is the same to the bit.
 
 use cohaptic_peer::{Contact, Drift};
 use cohaptic_scene::{Axes, ChangeKind, PeerSpec, Scene};
@@ -14,7 +14,7 @@ pub enum Model {
     General,
 }
 
-/// What is simulated how.
+/// How each part is simulated.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Plan {
     pub(crate) axes: Axes,

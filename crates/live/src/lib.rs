@@ -1,8 +1,10 @@
 //! Live sessions: a scene driven by the wall clock, in which some of the peers are other programs.
 //!
-//! Here is [admission](AdmissionControl), the *door* of the protocol: what a datagram from outside must be before it may touch the scene, and how what goes out is made. It does no input or
-//! output and reads no clock; whoever drives it owns the sockets. [`client`] is the other side of it, for programs in Rust, and [`handshake`] the
-//! datagrams that both exchange. The protocol is written byte by byte in `docs/live-protocol.md`.
+//! You need it if you host a session with peers in other programs, or write such a peer in Rust. It needs Linux.
+//!
+//! [`Session`] is such a session, with its sockets and its clock. [`AdmissionControl`] decides which datagrams from outside reach the scene, and makes those to
+//! the outside; it does no input or output and reads no clock. [`client`] is the other side, for programs in Rust, and [`handshake`] has the datagrams that
+//! both exchange. The protocol is written byte by byte in `docs/live-protocol.md`.
 //!
 //! It does not encrypt: a [`SessionKey`] keeps others from speaking, not from listening. Read [`AdmissionControl`] first.
 //!
@@ -17,12 +19,12 @@
 //! let key = SessionKey::from_bytes([7; 32]);
 //! let seats = vec![Seat { place: Place(1), name: "right".to_owned(), tick: Duration::from_millis(1) }];
 //! let config = AdmissionConfig { key: Some(key.clone()), ..AdmissionConfig::new(42, 1, 2, Duration::from_millis(8), seats) };
-//! let mut door = AdmissionControl::new(config, &mut SystemEntropy)?;
+//! let mut admission = AdmissionControl::new(config, &mut SystemEntropy)?;
 //!
 //! // The other program asks, and is told what the session is like.
 //! let from = "127.0.0.1:9000".parse().expect("an address");
 //! let joining = Joining::draw(42, Place(1), &key, &mut SystemEntropy)?;
-//! let Admission::Reply { bytes: welcome, .. } = door.handle_datagram(Instant::ZERO, from, &joining.hello()) else { panic!("welcome") };
+//! let Admission::Reply { bytes: welcome, .. } = admission.handle_datagram(Instant::ZERO, from, &joining.hello()) else { panic!("welcome") };
 //! let joined = joining.handle_welcome(&welcome)?;
 //!
 //! // Its first sample joins.
@@ -31,8 +33,8 @@
 //! let len = sample.encode(1, &mut plain);
 //! let mut sealed = [0; cohaptic_live::MAX_DATAGRAM];
 //! let sealed_len = joined.seal(&plain[..len], &mut sealed).expect("a sample");
-//! let admission = door.handle_datagram(Instant::ZERO, from, &sealed[..sealed_len]);
-//! assert!(matches!(admission, Admission::Sample { place: Place(1), joined: true, .. }));
+//! let decision = admission.handle_datagram(Instant::ZERO, from, &sealed[..sealed_len]);
+//! assert!(matches!(decision, Admission::Sample { place: Place(1), joined: true, .. }));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

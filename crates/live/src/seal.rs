@@ -6,7 +6,7 @@
 //! tag           = first 16 bytes of HMAC(key of the way, everything before the tag)
 //! ```
 //!
-//! The nonce of the client travels with every sample, so that the door need not remember requests: see [`crate::admission`].
+//! The nonce of the client travels with every sample, so that the session need not remember requests: see [`crate::admission`].
 
 use core::fmt;
 

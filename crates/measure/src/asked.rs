@@ -67,14 +67,14 @@ pub(crate) const QUANTILES: [(&str, f64); 7] =
 const LAGS: u32 = 10;
 
 impl Asked {
-    /// What is asked of a link over which packets of that size go, one every so often. A link with states, a replay and the kernel's netem have no
+    /// The figures asked of a link over which packets of that size go, one every so often. A link with states, a replay and the kernel's netem have no
     /// laws of their own: nothing is known of them.
     #[must_use]
     pub fn of(model: &LinkModel, every: Duration, size: Bytes) -> Self {
         model.as_fixed().map_or_else(Self::default, |config| Self::of_config(config, every, size))
     }
 
-    /// What is asked of one configuration.
+    /// The figures asked of one configuration.
     #[must_use]
     pub fn of_config(config: &LinkConfig, every: Duration, size: Bytes) -> Self {
         let law = config.delay.law();

@@ -1,4 +1,4 @@
-//! What was achieved beside what was asked for.
+//! The figures achieved, compared with those asked for.
 //!
 //! Each stage is judged by the packets that reached it, not counting copies: the loss model by packets that no outage took, damage by those that were
 //! not lost. So a figure is near the one asked for whatever the other stages do. A delay is compared only where nothing but its law makes it (no queue,
@@ -45,7 +45,7 @@ struct Seen {
     damaged: bool,
 }
 
-/// Takes the records of one link in any order and sets figures beside those asked for. It holds 48 bytes a packet.
+/// Takes the records of one link in any order and compares figures with those asked for. It holds 48 bytes a packet.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     packets: Vec<Seen>,

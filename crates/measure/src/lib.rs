@@ -1,13 +1,15 @@
 //! What a link did, in figures and files, and what link would have done it.
 //!
+//! You need it if you compare a link with its configuration, or estimate a link from measured delays.
+//!
 //! | module | is |
 //! | --- | --- |
 //! | [`fates`] | the fate log as a file: a streaming writer and a reader |
 //! | [`pcapng`] | the fates as a capture file that packet analysers open |
-//! | [`achieved`] | figures of a link's delays, losses and order, each with its uncertainty, to be set beside what was asked for |
+//! | [`achieved`] | figures of a link's delays, losses and order, each with its uncertainty, to be compared with those asked for |
 //! | [`steady`] | a steady stream of packets over one link |
 //! | [`asked`] | the figures that follow from the laws of a link |
-//! | [`comparison`] | the achieved figures beside the configured ones, and whether they are too far off |
+//! | [`comparison`] | the achieved figures compared with the configured ones, and whether they are too far off |
 //! | [`fit`](mod@fit) | an estimate of a link from measured one-way delays and losses, with its goodness |
 //!
 //! It knows packets ([`PacketRecord`]) and nothing of what they carry. Figures are computed with the

@@ -75,18 +75,18 @@ pub(crate) const DISTANCE: f64 = 0.02;
 pub(crate) const DELAYS_MS: [u32; 2] = [24, 48];
 
 const STABILITY_SCENES: [(Strategy, f64, bool, &str); 8] = [
-    (Strategy::Ap, 2100.0, true, include_str!("../../../scenarios/paper/5-1-ap-2100.toml")),
-    (Strategy::Pd, 2100.0, true, include_str!("../../../scenarios/paper/5-1-pd-2100.toml")),
-    (Strategy::Ap, 1000.0, true, include_str!("../../../scenarios/paper/5-1-ap-1000.toml")),
-    (Strategy::Pd, 1000.0, true, include_str!("../../../scenarios/paper/5-1-pd-1000.toml")),
-    (Strategy::Ap, 2100.0, false, include_str!("../../../scenarios/paper/5-1-ap-2100-no-arm.toml")),
-    (Strategy::Pd, 2100.0, false, include_str!("../../../scenarios/paper/5-1-pd-2100-no-arm.toml")),
-    (Strategy::Ap, 1000.0, false, include_str!("../../../scenarios/paper/5-1-ap-1000-no-arm.toml")),
-    (Strategy::Pd, 1000.0, false, include_str!("../../../scenarios/paper/5-1-pd-1000-no-arm.toml")),
+    (Strategy::Ap, 2100.0, true, include_str!("../scenarios/5-1-ap-2100.toml")),
+    (Strategy::Pd, 2100.0, true, include_str!("../scenarios/5-1-pd-2100.toml")),
+    (Strategy::Ap, 1000.0, true, include_str!("../scenarios/5-1-ap-1000.toml")),
+    (Strategy::Pd, 1000.0, true, include_str!("../scenarios/5-1-pd-1000.toml")),
+    (Strategy::Ap, 2100.0, false, include_str!("../scenarios/5-1-ap-2100-no-arm.toml")),
+    (Strategy::Pd, 2100.0, false, include_str!("../scenarios/5-1-pd-2100-no-arm.toml")),
+    (Strategy::Ap, 1000.0, false, include_str!("../scenarios/5-1-ap-1000-no-arm.toml")),
+    (Strategy::Pd, 1000.0, false, include_str!("../scenarios/5-1-pd-1000-no-arm.toml")),
 ];
 
 const TRAVEL_SCENES: [(Strategy, &str); 2] =
-    [(Strategy::Ap, include_str!("../../../scenarios/paper/5-2-ap.toml")), (Strategy::Pd, include_str!("../../../scenarios/paper/5-2-pd.toml"))];
+    [(Strategy::Ap, include_str!("../scenarios/5-2-ap.toml")), (Strategy::Pd, include_str!("../scenarios/5-2-pd.toml"))];
 
 /// The scene of Section 5.2 with that strategy, as a file.
 pub(crate) fn travel_text(strategy: Strategy) -> &'static str {

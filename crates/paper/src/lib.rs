@@ -1,10 +1,20 @@
 //! The figures and claims of Rakhsha & Constantinescu (2015) again.
 //!
+//! You need it if you compare the figures and claims of the paper with those of a changed model.
+//!
 //! [`reproduce`] computes everything anew: stability regions, admittances and simulated experiments, and for each claim of the paper a [`Verdict`] that
 //! rests on those numbers alone. Where a claim fails, the smallest scene found in which it fails is given with it. [`page`] makes one page of it.
 //!
 //! Nothing here reads a clock, draws a random number or prints: the same options give the same bytes. What the paper's experiments felt like to people is
 //! not reproduced; where its printed parameters do not give its printed numbers, the claims say so.
+//! ```
+//! use cohaptic_paper::{Options, Unwatched, Verdict, reproduce};
+//!
+//! let reproduction = reproduce(Options { quick: true, ..Options::default() }, &Unwatched)?;
+//! let claim = reproduction.claims.iter().find(|claim| claim.id == "any-number").expect("it is a claim of the paper");
+//! assert_eq!(claim.verdict, Verdict::Holds);
+//! # Ok::<(), cohaptic_paper::PaperError>(())
+//! ```
 
 mod case;
 mod claims;

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use crate::wire::Sample;
 use crate::{Device, Peer, ReceiveError, Reception, State, Strategy};
 
-/// What is held in place of a sender: weight·\[(1 − share)·before + share·newest\] + (1 − weight)·own, with its newest sample, what was held before it came
+/// The state held in place of that of a sender: weight·\[(1 − share)·before + share·newest\] + (1 − weight)·own, with its newest sample, the state held before it came
 /// back, and the receiver's own copy. Both numbers lie from 0 to 1.
 ///
 /// With a weight of 0 the sender exerts no force at all.
@@ -31,7 +31,7 @@ impl Age {
 
 /// The ages of those senders that have one, as one receiver sees them.
 ///
-/// They are kept beside the [`Peer`], not in it: most peers never have any, and are not to be larger for them nor to ask for them at every tick. Who drives
+/// They are kept beside the [`Peer`], not in it: most peers never have any, and are not to be larger for them nor to ask for them at every tick. The driver of
 /// a peer with ages calls [`Ages::handle_sample`] in place of [`Peer::handle_sample`], and [`Ages::apply`] before every [`Peer::compute`]. A state that
 /// [`Peer::hold`] puts in the place of a sender with an age is not kept.
 ///
@@ -39,7 +39,7 @@ impl Age {
 #[derive(Clone, Debug, Default)]
 pub struct Ages<const A: usize> {
     aged: Vec<Aged<A>>,
-    /// Whether the own state was part of what is held after the latest [`Ages::apply`]: it moves, so the mean does.
+    /// Whether the own state was part of the state held after the latest [`Ages::apply`]: it moves, so the mean does.
     fading: bool,
 }
 
@@ -82,7 +82,7 @@ impl<const A: usize> Ages<A> {
 
     /// Whether another peer has returned since this was last asked.
     ///
-    /// Whoever is told so sets the age anew before the next tick: with a weight above zero, to a share of zero that rises from there.
+    /// The caller then sets the age anew before the next tick: with a weight above zero, to a share of zero that rises from there.
     pub fn take_return(&mut self, other: usize) -> bool {
         self.aged.iter_mut().find(|aged| aged.place == other).is_some_and(|aged| core::mem::take(&mut aged.returned))
     }

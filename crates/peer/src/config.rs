@@ -1,4 +1,4 @@
-//! The parameters of a peer. Each is finite and not negative, a mass above zero: whoever makes one has checked that.
+//! The parameters of a peer. Each is finite and not negative, a mass above zero: the function that makes one checks that.
 
 use crate::tick::grasp;
 use crate::{Motion, Number, Signal};

@@ -20,7 +20,7 @@ pub struct Held<const A: usize> {
 #[derive(Clone, Copy, Debug)]
 struct HeldSample<const A: usize> {
     state: State<A>,
-    /// The lowest sequence number that is newer than what is held.
+    /// The lowest sequence number that is newer than the sample held.
     next: u64,
 }
 

@@ -1,5 +1,7 @@
 //! One participant of a networked haptic cooperation, and nothing of how its samples travel.
 //!
+//! You need it if you simulate a peer in your own program, or write a coordination law or a device.
+//!
 //! ```text
 //!   hand ──Fh──► device ──FC──► copy of the object ──FT──► coordination ◄── samples of the other peers
 //!                (mH, bH)  KC, BC     (mO, bO)      KT, BT
@@ -19,6 +21,50 @@
 //! | Fh, FC, FT | hand, coupling and coordination force | N |
 //!
 //! Positions, velocities and forces are arrays `[f64; A]` over the A = 1, 2 or 3 translational axes.
+//! ```
+//! use std::time::Duration;
+//!
+//! use cohaptic_peer::{
+//!     Clock, Command, Contact, Context, CopyConfig, Gains, Held, Integrator, ObjectCopy, Peer, PeerConfig, RestingDevice, State, Strategy,
+//! };
+//! use cohaptic_units::Instant;
+//!
+//! /// A spring between the own copy and the mean of the others.
+//! struct Spring {
+//!     stiffness: f64,
+//! }
+//!
+//! impl Strategy<1> for Spring {
+//!     fn command(&mut self, context: &Context<'_, 1>) -> Command<1> {
+//!         let target = *context.held.mean();
+//!         Command { force: [self.stiffness * (context.own.position[0] - target.position[0])], target }
+//!     }
+//!
+//!     fn set_gains(&mut self, gains: Gains) {
+//!         self.stiffness = gains.stiffness;
+//!     }
+//! }
+//!
+//! let tick = Duration::from_millis(1);
+//! let config = PeerConfig {
+//!     session: 1,
+//!     place: 0,
+//!     axes: 1,
+//!     contact: Contact::Grasp,
+//!     coupling: Gains { stiffness: 3500.0, damping: 5.0 },
+//!     tick,
+//!     compute_delay: false,
+//!     enclosure: None,
+//! };
+//! // A copy at rest at 0, and another peer whose copy is 10 mm away.
+//! let object = ObjectCopy::new(CopyConfig { mass: 0.45, damping: 0.0 }, State::REST, Integrator::Exact, &Clock::regular(tick));
+//! let other = State { position: [0.01], velocity: [0.0] };
+//! let held = Held::new([State::REST, other]);
+//! let mut peer = Peer::new(config, RestingDevice { position: [0.0] }, object, Spring { stiffness: 1000.0 }, held);
+//! peer.compute(Instant::ZERO);
+//! peer.advance(Instant::ZERO, tick);
+//! assert!(peer.object().state().position[0] > 0.0, "the copy moves towards the other one");
+//! ```
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(test, allow(clippy::float_cmp, clippy::cast_precision_loss, reason = "tests compare exact values and count samples"))]
 

@@ -101,7 +101,7 @@ pub enum ReceiveError {
     /// It is from nobody else in this session.
     #[error("a sample from peer {sender}, which is not another peer of this session")]
     Sender {
-        /// Who it says it is from.
+        /// The sender that it names.
         sender: u32,
     },
 }

@@ -1,5 +1,7 @@
 //! Pictures of curves, regions and maps as SVG documents that are fit to print, and pages of HTML that show them.
 //!
+//! You need it if your program draws curves, maps or bars for print and for pages.
+//!
 //! A [`Picture`] has a title, notes and [`Panel`]s in a grid; a panel has two [`Axis`] and contents: [`Line`], [`Band`], [`Region`], [`HeatMap`], [`Rug`].
 //! Texts wrap and never leave the picture or lie on each other, by widths that no common font exceeds; the legend is outside of the plots; lines differ by
 //! colour and by dashes. A picture is light or dark as its reader prefers, in a file, in an `<img>` and within a page. Text stays text. The [`Size`] is one or

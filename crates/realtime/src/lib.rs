@@ -1,5 +1,7 @@
 //! Logical time driven by the wall clock.
 //!
+//! You need it if a state machine of yours must act on time by the wall clock. It needs Linux.
+//!
 //! The state machines of this project are told the time. In virtual time a loop tells them; here a [`Clock`] does, and a [`Pacer`] waits until they want to
 //! be called. What they are told is always the instant at which a thing was due, never the one at which the program got round to it: a late wake-up makes
 //! one thing late and nothing after it. By how much is recorded ([`Lateness`]), and beyond a [`Tolerance`] a run says of itself that it was not valid.
@@ -12,7 +14,7 @@
 //! ```
 //!
 //! [`prepare_thread`] asks the system for what helps: no timer slack, `SCHED_FIFO`, locked memory; each is granted or refused with a plain message.
-//! [`udp`] has sockets that know when each datagram came in. Linux only. This crate knows nothing of links, peers, or the content of a datagram.
+//! [`udp`] has sockets that know when each datagram came in. This crate knows nothing of links, peers, or the content of a datagram.
 //!
 //! ```
 //! use std::time::Duration;
@@ -32,6 +34,9 @@
 //! assert!(clock.now() >= due);
 //! # Ok::<(), std::io::Error>(())
 //! ```
+
+#[cfg(not(target_os = "linux"))]
+compile_error!("cohaptic-realtime needs Linux: its timers, its sockets and the scheduling of its threads are those of Linux");
 
 mod clock;
 mod lateness;

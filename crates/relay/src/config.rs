@@ -55,22 +55,22 @@ pub struct Program {
 pub struct Proxy {
     /// Where clients send to.
     pub listen: SocketAddr,
-    /// Whom they speak to.
+    /// The program that they speak to.
     pub to: SocketAddr,
     /// The link from the clients to that address, shared by all of them.
     pub forth: LinkModel,
     /// The link back.
     pub back: LinkModel,
-    /// So many clients at once; each has a socket. What others send is dropped and counted.
+    /// The most clients at once; each has a socket. What others send is dropped and counted.
     pub most_clients: u32,
 }
 
 /// What a relay may take.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Limits {
-    /// So many datagrams may be on their way at once; what comes beyond is dropped. Copies that a link makes count, but are not refused.
+    /// The most datagrams in flight at once; those beyond are dropped. Copies that a link makes count, but are not refused.
     pub packets: u64,
-    /// So many bytes of them, headers not counted.
+    /// The most bytes of them, headers not counted.
     pub bytes: Bytes,
     /// An address that was learnt, and a client, is forgotten when it has been silent for so long.
     pub forget_after: Duration,
@@ -140,7 +140,7 @@ impl From<RelayFile> for RelayConfig {
 }
 
 impl Proxy {
-    /// So many clients unless said otherwise.
+    /// The most clients unless said otherwise.
     pub const MOST_CLIENTS: u32 = 256;
 }
 

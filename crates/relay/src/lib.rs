@@ -1,5 +1,7 @@
 //! UDP between programs through the emulator, in real time.
 //!
+//! You need it if your own program puts emulated links between programs that speak UDP. It needs Linux.
+//!
 //! Programs that know nothing of each other's place send to a port of the relay, which stands for the program that they speak to. What they send passes the
 //! directed link between the two, in the emulator of [`cohaptic_wan`], and leaves when the link lets it go.
 //!
@@ -18,6 +20,30 @@
 //! Memory is bounded: beyond a number of datagrams or bytes on their way, arrivals are dropped and counted as overload; strangers are dropped and counted.
 //!
 //! Read [`RelayConfig`] first, then [`Relay::bind`].
+//! ```
+//! use std::net::SocketAddr;
+//! use std::sync::Arc;
+//!
+//! use cohaptic_linkfile::{LinkTable, link_from_keys};
+//! use cohaptic_relay::{Arrival, Engine, Form, Limits, Mesh, Port, Program, RelayConfig};
+//! use cohaptic_units::Instant;
+//! use cohaptic_wan::NodeId;
+//!
+//! // Two programs, each with a port that stands for it, and 24 ms both ways.
+//! let address = |port: u16| SocketAddr::from(([127, 0, 0, 1], port));
+//! let program = |name: &str, n: u16| Program { name: name.to_owned(), port: address(7000 + n), address: Some(address(9000 + n)) };
+//! let link = Arc::new(link_from_keys(&["delay=24ms".to_owned()])?);
+//! let mesh = Mesh { programs: vec![program("left", 0), program("right", 1)], links: LinkTable::new(2, link, []) };
+//! let mut engine = Engine::new(RelayConfig { seed: 1, form: Form::Mesh(mesh), limits: Limits::default(), changes: vec![] })?;
+//!
+//! // A datagram from the left program to the port that stands for the right one.
+//! engine.handle_datagram(Arrival { at: Instant::ZERO, port: Port::Program(NodeId(1)), from: address(9000), bytes: b"a sample", ecn: None });
+//! let due = engine.poll_timeout().expect("it is in flight");
+//! engine.handle_timeout(due);
+//! let release = engine.poll_release().expect("it leaves");
+//! assert_eq!((release.at.as_nanos(), release.to, &release.bytes[..]), (24_000_000, address(9001), &b"a sample"[..]));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod config;
 mod engine;

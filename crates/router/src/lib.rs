@@ -1,5 +1,7 @@
 //! Any IP traffic through the emulator in real time.
 //!
+//! You need it if your own program puts emulated links between hosts or interfaces. It needs Linux.
+//!
 //! A [`Router`] stands between two devices: TUN devices, which are ends of the network for their hosts, or two Ethernet interfaces, which it joins like a
 //! cable. What comes in at one goes through the link that the first matching rule names, and leaves at the other one at the instant that the link says: its
 //! *logical* departure, so that lateness never adds up. A seeded link does to the same packets at the same instants what it does in virtual time.
@@ -10,7 +12,7 @@
 //!                        instant
 //! ```
 //!
-//! It does not answer, fragment or route packets, and does not count hops: hosts see a wire. Other frames (ARP) cross at once. Linux only. Nothing here
+//! It does not answer, fragment or route packets, and does not count hops: hosts see a wire. Other frames (ARP) cross at once. Nothing here
 //! prints.
 //!
 //! Read [`Engine`] first, then [`Router`]. The file is [`cohaptic_linkfile::router::RouterFile`].

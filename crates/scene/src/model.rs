@@ -250,9 +250,9 @@ pub struct Change {
 /// What changes.
 #[derive(Clone, PartialEq, Debug)]
 pub enum ChangeKind {
-    /// A link takes a new configuration; what is on the way keeps its delay.
+    /// A link takes a new configuration; packets in flight keep their delays.
     Link(LinkChange),
-    /// All links take the configurations of this table; what is on the way keeps its delay.
+    /// All links take the configurations of this table; packets in flight keep their delays.
     AllLinks(LinkTable),
     /// A peer's contact changes.
     Contact {

@@ -38,7 +38,7 @@ impl Method {
     }
 }
 
-/// What is known about the stability of a scene.
+/// The stability of a scene, as far as it is known.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Analysis {
     /// The largest radius of all modes of contact, the rigid-body modes left out.
@@ -93,7 +93,7 @@ pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError>
 ///
 /// # Errors
 ///
-/// As for [`analyse`], and [`AnalysisError::Stopped`] if whoever watches ends it.
+/// As for [`analyse`], and [`AnalysisError::Stopped`] if the watcher ends it.
 pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let equivalent = (0..scene.peers.len()).all(|peer| linear_law(scene, peer).is_some());
     match method {
@@ -252,7 +252,7 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
     Analysis { radius, rigid_modes, dimension, method, frame, modes, notes }
 }
 
-/// What a verdict leaves out, beside what is said already.
+/// What a verdict leaves out, in addition to the notes so far.
 pub(crate) fn notes(said: &[String], combinations: usize, scene: &Scene) -> Vec<String> {
     let mut notes = said.to_vec();
     if combinations > 1 {

@@ -58,7 +58,7 @@ pub enum AnalysisError {
     Overloaded {
         /// Which line.
         line: String,
-        /// What is offered [bit/s].
+        /// The rate offered [bit/s].
         load: f64,
         /// What it carries [bit/s].
         rate: f64,
@@ -68,9 +68,9 @@ pub enum AnalysisError {
         "what becomes of samples from {from} to {to} does not repeat within {most} of them: expected a link of constant delay, or periods that meet sooner"
     )]
     NoPattern {
-        /// Who sends.
+        /// The sender.
         from: String,
-        /// Who receives.
+        /// The receiver.
         to: String,
         /// Within how many it should, with all other links.
         most: usize,
@@ -102,7 +102,7 @@ pub enum AnalysisError {
         /// How many are allowed.
         most: f64,
     },
-    /// Whoever watched ended it.
+    /// The watcher ended it.
     #[error("the analysis was stopped before its end")]
     Stopped,
     /// The second moment takes too many numbers.

@@ -33,7 +33,7 @@ pub(crate) struct FullMap {
     pub(crate) relative: Vec<bool>,
 }
 
-/// What is known about a strategy before anything is pushed.
+/// The facts about a strategy that are known before anything is pushed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Trust {
     /// One of this workspace: linear by its tests. Looking again would push a quarter as many vectors more.
@@ -154,7 +154,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         Ok(Self { samples: vec![Vec::new(); peers], instants, members, names, timetable, layout, time, compliance, growth: 1.0 })
     }
 
-    /// The matrix, vector by vector; `None` if whoever watches ends it.
+    /// The matrix, vector by vector; `None` if the watcher ends it.
     fn map(mut self, watch: &dyn Watch) -> Option<FullMap> {
         let size = self.layout.size;
         let events = self.timetable.events.len();
@@ -185,7 +185,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             watch.done(pushed_operations(events, A));
         }
         let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
-        // As for the lifted system: each tick rounds, and what is left of the frame magnifies that by at most about the growth.
+        // As for the lifted system: each tick rounds, and the rest of the frame magnifies that by at most about the growth.
         let error = 10.0 * f64::EPSILON * count(ticks) * self.growth * self.growth * count(kept.len()).sqrt();
         let names = self.layout.names::<A>(&self.timetable.depth);
         Some(FullMap {
@@ -220,7 +220,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             let scale = [&reached_one, &reached_other, &rest].into_iter().flatten().fold(amplitude, |largest: f64, entry| largest.max(entry.abs()));
             let unit: Vec<f64> = reached_one.iter().map(|entry| entry / amplitude).collect();
             let small = small.get_or_insert_with(|| unit.clone());
-            // Of the small one, what is left beside a constant force may be few digits.
+            // Of the small one, few digits may be left next to a constant force.
             let homogeneous = |place: usize| (unit[place] - small[place]).abs() * amplitude * 1e-3;
             let apart = |place: usize| (reached_one[place] - 2.0 * reached_other[place] - reached_both[place]).abs().max(homogeneous(place));
             let limit = 1e-9 * scale.max(self.growth);
@@ -263,7 +263,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         reached
     }
 
-    /// The same, written over what is in `reached`.
+    /// The same, written over `reached`.
     fn push(&mut self, z: &[f64], begin: Instant, reached: &mut [f64]) {
         let begin_local = EARLIER.saturating_add(begin - Instant::ZERO);
         self.restore(z, begin_local);

@@ -1,4 +1,4 @@
-//! Equal peers on a graph: who hears whom.
+//! Equal peers on a graph: which peer hears which.
 //!
 //! A scene lets everybody hear everybody. Where each of N equal peers hears only its neighbours, with weights that are mutual, the averaging matrix
 //! D⁻¹W has a full set of eigenvectors and real eigenvalues λ from −1 to 1 (D^½·D⁻¹W·D^−½ is symmetric). Along each eigenvector every peer does the same thing,
@@ -15,7 +15,7 @@ use crate::parts::{alone, lifted_part};
 use crate::structure::{Structure, count};
 use crate::{AnalysisError, ContactMode, Matrix, Method, PartKind, Unwatched, Watch};
 
-/// Who hears whom.
+/// Which peer hears which.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Graph {
     /// Everybody hears everybody, as in a scene: λ = 1 and N−1 times −1/(N−1).

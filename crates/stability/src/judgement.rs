@@ -33,7 +33,7 @@ pub fn judge(scene: &Scene, method: Method, most: usize) -> Result<Judgement, An
 ///
 /// # Errors
 ///
-/// As for [`judge`], and [`AnalysisError::Stopped`] if whoever watches ends it.
+/// As for [`judge`], and [`AnalysisError::Stopped`] if the watcher ends it.
 pub fn judge_watched(scene: &Scene, method: Method, limits: &Limits<'_>) -> Result<Judgement, AnalysisError> {
     let mut analysis = analyse_watched(scene, method, limits.watch)?;
     if !has_chance(scene) {

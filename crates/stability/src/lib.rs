@@ -1,9 +1,29 @@
 //! Stability and performance of a scene, without simulating it.
 //!
+//! You need it if you ask from Rust for which gains and delays a scene is stable, and how stiff or heavy it feels.
+//!
 //! One frame of a linear scene, from one common sampling to the next, multiplies its state by a constant matrix, the *monodromy matrix*. The scene is
 //! stable if and only if every eigenvalue of that matrix is inside the unit circle, once the motion of everything together is left out: space has no
 //! origin. This crate builds that matrix from the same plants and strategies that the simulator steps (lifting: Araki & Yamamoto 1986; Rakhsha &
 //! Constantinescu 2015, Section 3), reduces it where peers are alike, and says how sure it is of the answer.
+//! ```
+//! use cohaptic_scene::Scene;
+//! use cohaptic_stability::{Method, Verdict, analyse};
+//!
+//! let text = r#"
+//!     scene = { duration = "1s", count = 2 }
+//!     object = { mass = 0.45 }
+//!     coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+//!     peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+//!     link = { delay = "8ms" }
+//! "#;
+//! let verdict = |overrides: &[String]| -> Result<Verdict, Box<dyn std::error::Error>> {
+//!     Ok(analyse(&Scene::parse(text, "two.toml".as_ref(), overrides)?, Method::Reduced)?.verdict())
+//! };
+//! assert_eq!(verdict(&[])?, Verdict::Stable);
+//! assert_eq!(verdict(&["link.delay=24ms".to_owned()])?, Verdict::Unstable);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod admittance;
 mod analysis;

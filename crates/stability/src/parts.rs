@@ -143,7 +143,7 @@ pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -
     let place = structure.classes[class][0];
     let (short, long) = scene.peers[place].clock.spans();
     let plant = scene.device_plant(place);
-    // A frame is so many ticks; of a clock that drifts, some are longer by a nanosecond. Their steps have the same eigenvectors.
+    // A frame is a number of ticks; of a clock that drifts, some are longer by a nanosecond. Their steps have the same eigenvectors.
     let frame = structure.timetable.frame.as_nanos();
     let ticks = frame / short.as_nanos().max(1);
     let longer = if long == short { 0 } else { frame - ticks * short.as_nanos() };

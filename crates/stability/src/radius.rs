@@ -17,7 +17,7 @@ pub enum Verdict {
     Stable,
     /// The radius cannot be told from 1 within its error.
     Marginal,
-    /// Nothing is known of the radius: numbers overflowed, or their errors grew so large that 1 is lost beside them.
+    /// Nothing is known of the radius: numbers overflowed, or their errors grew so large that 1 is lost in them.
     Overflow,
     /// The radius is above 1: some disturbance grows.
     Unstable,
@@ -32,7 +32,7 @@ impl Radius {
         if low > 1.0 { Self { value: f64::INFINITY, error: 0.0 } } else { Self::UNKNOWN }
     }
 
-    /// The verdict: [`Verdict::Marginal`] where the error reaches 1, [`Verdict::Overflow`] where it reaches farther than 2^52, beside which 1 is rounding.
+    /// The verdict: [`Verdict::Marginal`] where the error reaches 1, [`Verdict::Overflow`] where it reaches farther than 2^52, compared with which 1 is rounding.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         let (low, high) = self.bounds();

@@ -23,7 +23,7 @@ pub(crate) struct StackFrame {
     steps: Vec<Step>,
     /// The ages of the samples of earlier frames that are used, ascending.
     used: Vec<usize>,
-    /// What is held when the frame begins, by its place among the samples.
+    /// The sample held when the frame begins, by its place among the samples.
     held: Option<usize>,
     sent: usize,
     depth: usize,
@@ -37,7 +37,7 @@ enum Step {
     Tick(Duration),
 }
 
-/// What a frame is worked out from, beside its steps.
+/// What a frame is worked out from, besides its steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StackNode<'a> {
     pub(crate) node: &'a Node,

@@ -50,7 +50,7 @@ impl Structure {
         Self::with_alone(scenes, network, contacts, None)
     }
 
-    /// The same with one peer in a class of its own, whoever is equal to it: that which is pushed moves unlike those that are not.
+    /// The same with one peer in a class of its own, also if others are equal to it: that which is pushed moves unlike those that are not.
     pub(crate) fn with_alone(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, alone: Option<usize>) -> Result<Self, AnalysisError> {
         let scene = scenes[0];
         let peers = scene.peers.len();

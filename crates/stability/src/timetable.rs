@@ -153,7 +153,7 @@ impl Timetable {
             let (from, to) = (*from, *to);
             let arrivals = arrivals(&clocks[from], &clocks[to], timing, first_sample[from], end);
             let mut need = |sample: i64| depth[from] = depth[from].max(usize::try_from(-sample).unwrap_or(0));
-            // What is held when the frame begins matters if the node ticks before anything arrives.
+            // The sample held when the frame begins matters if the node ticks before anything arrives.
             if arrivals.new.first().is_none_or(|(at, _)| *at > first_tick_at[to])
                 && let Some(sample) = arrivals.before
             {

@@ -133,7 +133,7 @@ impl Host {
         self.shared.lock().is_up(self.node)
     }
 
-    /// Gives the host addresses that nobody has had, as a phone gets that leaves the house. Those before belong to nobody: packets to them, also those on their way, are
+    /// Gives the host addresses that nobody has had, as a phone gets that leaves its network. Those before belong to nobody: packets to them, also those on their way, are
     /// lost. Sockets bound to `0.0.0.0` or `[::]` go on with the new ones, others cannot send any more.
     pub fn change_addresses(&self) -> Addresses {
         self.shared.lock().change_addresses(self.node)

@@ -1,5 +1,7 @@
 //! Tests of networked programs over emulated bad links, in virtual time, the same way every time.
 //!
+//! You need it if you test a program that sends datagrams, and want every failure again from its seed.
+//!
 //! A [`Testbed`] is hosts and the [links](wan) between them. A program that is run on it has [UDP sockets](UdpSocket) with the methods of tokio's,
 //! [timers](time), and hosts that crash, come back, and lose sight of each other. Nothing waits in real time: the clock jumps to the next event.
 //!

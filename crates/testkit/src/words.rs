@@ -57,7 +57,7 @@ impl WordsError {
         self.excerpt.column
     }
 
-    /// What is wrong, and what was expected.
+    /// The fault, and what was expected.
     #[must_use]
     pub fn message(&self) -> &str {
         &self.message
@@ -75,7 +75,7 @@ impl fmt::Display for WordsError {
     }
 }
 
-/// What is wrong with some bytes of a line.
+/// A fault in some bytes of a line.
 type Fault = (Range<usize>, String);
 
 /// Reads a text. `file` reads the file of a fate log, by the path in the text.

@@ -1,6 +1,6 @@
 //! A line of a source and the place in it that is meant, ready to be shown.
 //!
-//! Whatever stands in the source, what is shown is one line of at most [`LONGEST`] characters without control characters.
+//! Whatever stands in the source, the excerpt is one line of at most [`LONGEST`] characters without control characters.
 
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;

@@ -1,5 +1,7 @@
 //! Typed quantities of network and time, and the text they are written as in scenes.
 //!
+//! You need it if your program reads or writes quantities with units: durations, rates, sizes and probabilities.
+//!
 //! Everything that must be exact is an integer in a newtype: an [`Instant`] is a count of nanoseconds since the scene began, a [`Rate`] bits per
 //! second, a [`Bytes`] bytes. [`Probability`] is a checked `f64`, [`Hertz`] and [`RadPerSec`] keep the factor 2π in one place. Mechanical
 //! quantities (masses, stiffnesses, forces) are plain `f64` in SI units elsewhere, because they become matrices at once.

@@ -14,7 +14,7 @@
 //! and sorting it once is cheaper than a heap's sifting of every event. Which bucket an event is in, or whether the
 //! queue is a ring, never changes the order: that is by key alone.
 //!
-//! In the calendar an event stays where it was stored first, in a slab. What is sorted is one word an event: how far into its bucket it happens, and
+//! In the calendar an event stays where it was stored first, in a slab. The sorted key is one word an event: how far into its bucket it happens, and
 //! where it is. Events themselves, of 48 bytes, are moved only in and out.
 //!
 //! The width of a bucket follows the events, so that a bucket holds about eight: fewer cost a search for the next bucket each, more a longer sort.

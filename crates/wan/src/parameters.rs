@@ -276,7 +276,7 @@ impl Quantity {
     }
 }
 
-/// At least zero, beside others.
+/// At least zero, together with others.
 pub const WEIGHT: Quantity = Quantity::not_negative("");
 /// At least zero \[packet\].
 pub const PACKETS: Quantity = Quantity::not_negative("packets");

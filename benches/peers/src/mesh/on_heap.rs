@@ -8,7 +8,7 @@ use super::draws::Draws;
 use super::on_loop::outcome;
 use super::{Mesh, Outcome, Packet, TICK_NANOS, TICKS_A_FRAME};
 
-/// What happens, and to whom.
+/// An event, and the peer that it happens to.
 #[derive(Clone, Copy, Debug)]
 enum What {
     Arrives(Packet),

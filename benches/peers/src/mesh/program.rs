@@ -52,7 +52,7 @@ impl Program {
             Self::Cohaptic | Self::CohapticWatched => "congestion control, layers below the datagram, networks of routers",
             Self::Loop => "time between ticks, any other scene, bytes, counters of links, records",
             Self::Heap => "any other scene, bytes, counters of links, records",
-            Self::Nexosim => "links: no delay, loss, jitter, rate, queue or counter but what is written here; bytes",
+            Self::Nexosim => "links: no delay, loss, jitter, rate, queue or counter but those written here; bytes",
             Self::Bach => "random loss, rate, correlation, counters of links; bytes",
             Self::BachSockets => "a law of delay or loss (a monitor written here decides), rate, correlation, counters of links",
             Self::Turmoil => {

@@ -32,7 +32,7 @@ fn main() {
 }
 
 fn head() {
-    println!("# Beside others: speed\n");
+    println!("# Compared with others: speed\n");
     println!("The same scenes on this project and on what others wrote, in one run. This page is written by\n");
     println!("    cd benches/peers && (cargo run --release --bin mesh-table && others/run) > ../../docs/peers-speed.md\n");
     println!("and measured on: {}. Processor time on one core, the median of {ROUNDS} rounds in which", machine());
@@ -45,7 +45,7 @@ fn mesh() {
         "N peers at 1 kHz, each grasping the object through a device, one of them pushed by a constant hand, 125 samples a second to each other peer:"
     );
     println!(
-        "the scene of [speed.md](speed.md). All but cohaptic have the same arithmetic (`benches/peers/src/mesh/body.rs`) and differ in who keeps the time and"
+        "the scene of [speed.md](speed.md). All but cohaptic have the same arithmetic (`benches/peers/src/mesh/body.rs`) and differ in the part that keeps the time and"
     );
     println!(
         "brings the samples; each is written as its own documentation would have it, and for speed. All draw loss and jitter from the same addresses, so that"
@@ -64,7 +64,7 @@ fn mesh() {
     println!(
         "a packet is less than any program can move one in. Its second row is the same scene with an observer that is shown every packet: event by event, as any scene"
     );
-    println!("runs that needs events. That is the row to set beside other schedulers.\n");
+    println!("runs that needs events. That is the row to compare with other schedulers.\n");
     println!(
         "*Arrives* is the largest time, measured over all packets, between the instant at which a packet should arrive and that at which the program has it.\n"
     );
@@ -168,7 +168,7 @@ fn links() {
         "delay, any law but the uniform one; a rate that holds packets up before they are delayed; outages, slots, corruption, queues but for tail drop, token"
     );
     println!(
-        "buckets; what became of a packet that does not come out. It gives no instant with a packet, so that who wants to know it must poll at each timeout, and"
+        "buckets; what became of a packet that does not come out. It gives no instant with a packet, so that a program that wants to know it must poll at each timeout, and"
     );
     println!(
         "its clock is the standard library's, so that virtual time begins at an instant of the wall clock. The bare ring and heap model nothing but their row.\n"

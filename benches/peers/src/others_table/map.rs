@@ -1,4 +1,4 @@
-//! The stability map by numpy, beside `cohaptic stability map`.
+//! The stability map by numpy, compared with `cohaptic stability map`.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -68,7 +68,7 @@ impl Subject {
 
 fn main() {
     println!("# The test kit: how fast and how exact\n");
-    println!("Beside [turmoil](https://docs.rs/turmoil) 0.7.2 (MIT), on the same programs, in one run. This page is written by\n");
+    println!("Compared with [turmoil](https://docs.rs/turmoil) 0.7.2 (MIT), on the same programs, in one run. This page is written by\n");
     println!("    cd benches/peers && cargo run --release > ../../docs/testkit-speed.md\n");
     println!("and measured on: {}. Each figure is the median of {ROUNDS} rounds in which all alternate, in seconds of processor time.", machine());
     println!("How a program is tested with it: [testing.md](testing.md).\n");

@@ -8,7 +8,7 @@ use futures_util::future;
 
 /// How long each is on its way.
 pub const DELAY: Duration = Duration::from_millis(24);
-/// So much later than the one before it does a host begin: the clocks of real ones are not aligned either.
+/// The time between the begins of two hosts: the clocks of real ones are not aligned either.
 const OFFSET: Duration = Duration::from_nanos(97_531);
 /// The bytes of a datagram.
 pub const SIZE: usize = 64;

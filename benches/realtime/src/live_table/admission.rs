@@ -1,4 +1,4 @@
-//! What the door costs.
+//! The cost of admission.
 
 use std::error::Error;
 use std::net::SocketAddr;
@@ -11,7 +11,7 @@ use cohaptic_peer::State;
 use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_units::Instant;
 
-/// So many datagrams are decided about in a round.
+/// The number of datagrams that are decided about in a round.
 pub(crate) const COUNT: u32 = 10_000;
 
 /// The rounds of which the median is taken.
@@ -31,7 +31,7 @@ pub(crate) struct Cost {
 
 type Datagram = ([u8; MAX_DATAGRAM], usize);
 
-/// A door whose seat is taken, and the peer that has it.
+/// An admission control whose seat is taken, and the peer that has it.
 struct Subject {
     door: AdmissionControl,
     joined: Option<Joined>,

@@ -98,13 +98,13 @@ fn row(name: &str, wishes: Wishes, run: &Loop) {
 }
 
 fn at_the_door() -> Result<(), Box<dyn Error>> {
-    println!("## The door\n");
+    println!("## Admission\n");
     println!(
         "What it costs to decide about one datagram, and to make one ready: the median of {} rounds of {} on one thread, in processor time.",
         admission::ROUNDS,
         admission::COUNT
     );
-    println!("No sockets: the [door](live-protocol.md) alone. Samples of three axes, 96 bytes without a seal and 128 with one.\n");
+    println!("No sockets: the [admission of datagrams](live-protocol.md) alone. Samples of three axes, 96 bytes without a seal and 128 with one.\n");
     println!("| datagram | what becomes of it | ns |");
     println!("| --- | --- | ---: |");
     for cost in admission::costs()? {

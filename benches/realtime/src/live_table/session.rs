@@ -20,7 +20,7 @@ pub(crate) fn run(peers: usize, pacing: Pacing, wishes: Wishes, span: Duration) 
     let listen = SocketAddr::from(([127, 0, 0, 1], 0));
     let config = SessionConfig { key: Some(key.clone()), pacing, wishes, ..SessionConfig::new(listen) };
     let session = Session::open(&scene, config, |_| None)?;
-    let door = session.address().ok_or("the session has no door")?;
+    let door = session.address().ok_or("the session has no address")?;
     let place = u32::try_from(peers - 1)?;
     // It stays to the end.
     let visitor = Visitor::start(Invitation { door, session: scene.seed, place, key, stay: span * 2, away: span });

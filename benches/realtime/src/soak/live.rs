@@ -18,7 +18,7 @@ use super::verdict::Account;
 use super::{PEERS, TICK, VISITOR};
 use crate::visitor::Visits;
 
-/// How far logical time was from the clock on the wall, over the looks since the sample before. `CLOCK_MONOTONIC`, read by whoever looks on.
+/// How far logical time was from the clock on the wall, over the looks since the sample before. `CLOCK_MONOTONIC`, read by the thread that looks on.
 ///
 /// The session does not tell at which reading its time began: between the last reading before it was started and the first from within. So there is an earliest and a
 /// latest answer, and each rule is judged by the one that is in favour of the session: what it fails, it fails for certain.
@@ -159,9 +159,9 @@ pub(super) fn accounts(status: &Status) -> Vec<Account> {
     accounts.push(Account::of("ticks made and ticks of logical time", status.ticks.count, u64::try_from(ticks).unwrap_or(u64::MAX)));
     if let (Some(door), Some(seat)) = (&status.admission, status.peers.get(visitor).and_then(|peer| peer.seat)) {
         let settled = door.admitted + door.welcomed + door.refused_in_all();
-        accounts.push(Account::of("datagrams at the door, and admitted, welcomed and refused", door.handled, settled));
+        accounts.push(Account::of("datagrams that came in, and admitted, welcomed and refused", door.handled, settled));
         accounts.push(Account::of(
-            "admitted by the door, and by the scene or refused there",
+            "admitted by the session, and by the scene or refused there",
             door.admitted,
             seat.taken + seat.refused + seat.out_of_order,
         ));
@@ -194,7 +194,7 @@ pub(super) fn last_accounts(end: &LiveEnd, visits: &Visits) -> Vec<Account> {
             counts.received + counts.oversized,
             socket.kernel_drops,
         ),
-        Account::of("received by the session, and handled at its door", counts.received, door.handled),
+        Account::of("received by the session, and handled by its admission", counts.received, door.handled),
         Account::of("made ready for the visitor, and sent or failed", made_ready, counts.sent + counts.failures.in_all()),
         Account::with_drops("sent to the visitor, and received or dropped by the kernel", counts.sent, visits.received, visits.kernel_drops),
     ]

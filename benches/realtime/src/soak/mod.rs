@@ -84,7 +84,7 @@ pub struct Outcome {
     pub refused: Vec<String>,
 }
 
-/// So many accounts that do not balance are kept.
+/// The number of accounts that do not balance and are kept.
 const MOST_UNBALANCED: usize = 20;
 
 /// Longer than anything is on its way; a loaded machine may need it to read what has come.

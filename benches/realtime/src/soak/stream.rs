@@ -24,7 +24,7 @@ const RATE: u64 = 1000;
 /// The size of a datagram \[byte\].
 const SIZE: usize = 64;
 
-/// So many datagrams at most leave the relay before it looks up.
+/// The most datagrams that leave the relay before it looks up.
 const AT_ONCE: u64 = 1024;
 
 /// The relay at one moment.

@@ -5,11 +5,10 @@ use core::fmt;
 use super::live::nanos;
 use super::{Outcome, Row, TICK};
 
-/// So much more memory may be held in the last quarter than in the first \[kB\].
+/// The additional memory that may be held in the last quarter than in the first \[kB\].
 ///
-/// Nothing may grow with time; what may still be touched for the first time after a quarter is bounded: pages of at most six histograms of 190 kB, when something
-/// is as late as nothing was before, and of the rooms of four sockets for 32 datagrams, when that number comes at once, of which small datagrams touch a page each
-/// (512 kB). The rest, 400 kB, is for the table of the soak itself and for the allocator. In an hour more than six million packets pass between the middle of the
+/// Nothing may grow with time. Memory that is touched for the first time after a quarter is bounded: pages of at most six histograms of 190 kB, when something
+/// is as late as nothing was before, and of the buffers of four sockets for 32 datagrams (512 kB). Small datagrams that come at once touch a page each. The rest, 400 kB, is for the table of the soak itself and for the allocator. In an hour more than six million packets pass between the middle of the
 /// first quarter and that of the last: to keep a byte of each would be three times this.
 pub const MEMORY_BOUND: u64 = 2048;
 
@@ -121,7 +120,7 @@ fn conserved(outcome: &Outcome) -> Judgement {
     } else {
         broken.join("; ")
     };
-    Judgement { rule: "what is counted in two places is equal", verdict: verdict(broken.is_empty() && !outcome.accounts.is_empty()), why }
+    Judgement { rule: "counts of one thing in two places are equal", verdict: verdict(broken.is_empty() && !outcome.accounts.is_empty()), why }
 }
 
 fn visited(outcome: &Outcome) -> Judgement {

@@ -30,7 +30,7 @@ fn eight_seconds_lose_nothing_and_keep_nothing() {
     assert!(outcome.elapsed >= plan.duration && !outcome.interrupted);
     assert!(outcome.rows.len() > 16, "one every half second and one at the end");
 
-    for rule in ["what is counted in two places", "logical time is never ahead", "open files do not grow"] {
+    for rule in ["counts of one thing in two places", "logical time is never ahead", "open files do not grow"] {
         let judgement = find(&judgements, rule);
         assert_eq!(judgement.verdict, Verdict::Kept, "{judgement:?}");
     }

@@ -16,8 +16,8 @@ pub struct Reference {
     pub frames: Option<u32>,
 }
 
-const RADII: &str = include_str!("../../../stability/tests/reference/radii.json");
-const MEAN_SQUARE: &str = include_str!("../../../stability/tests/reference/mean_square.json");
+const RADII: &str = include_str!("../../reference/radii.json");
+const MEAN_SQUARE: &str = include_str!("../../reference/mean_square.json");
 
 /// The scenes of the table.
 const NAMES: [(&str, Option<u32>); 9] = [

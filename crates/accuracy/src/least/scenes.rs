@@ -34,7 +34,7 @@ pub(super) enum Recorded {
 }
 
 impl Variant {
-    /// What a reader should know of it beside its cost.
+    /// What a reader should know of it besides its cost.
     pub(super) fn words(&self) -> String {
         match self.overrides {
             [] => String::new(),

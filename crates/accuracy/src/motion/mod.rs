@@ -1,4 +1,4 @@
-//! Motion between ticks: the exact propagator beside integrators that step.
+//! Motion between ticks: the exact propagator compared with integrators that step.
 //!
 //! All methods do the same: two peers compute their forces at ticks of 1 ms and hold them. They differ in how a body with a held force gets to the next
 //! tick. The reference is the same loop with at least 100 bits and the exact exponential.

@@ -60,7 +60,7 @@ fn of_model(case: &str, method: &str, model: &LinkModel, what: &str, effort: Eff
     // Bartlett's formulas for a Gaussian chain: what n packets leave open.
     let square = ASKED * ASKED;
     let (of_lag, of_sd) = (((1.0 - square) / n).sqrt(), (0.5 * (1.0 + square) / (1.0 - square) / n).sqrt());
-    let note = |figure: String, noise: f64| format!("{figure}; {what}; so many packets leave {noise:.1e} open");
+    let note = |figure: String, noise: f64| format!("{figure}; {what}; this number of packets leaves {noise:.1e} open");
     done.push(Row {
         error: Some((at_lag_one - ASKED).abs()),
         error_unit: "autocorrelation at lag one [1]",

@@ -19,7 +19,7 @@ const DISTANCE: &str = "Kolmogorov distance [1]";
 const TAIL: &str = "99.9 % quantile [of its distance from the mean]";
 const EXACT_LAW: &str = "the exact law";
 
-/// So many draws are timed at a time.
+/// The number of draws that are timed together.
 const BATCH: u32 = 1000;
 
 /// How wrong a way is, and how that is known.

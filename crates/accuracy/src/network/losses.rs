@@ -1,4 +1,4 @@
-//! Loss models: how many packets it takes until the mean and the runs of losses are known, beside what theory says.
+//! Loss models: how many packets it takes until the mean and the runs of losses are known, compared with theory.
 
 use cohaptic_units::{Bytes, Instant, Probability};
 use cohaptic_wan::netem::Netem;

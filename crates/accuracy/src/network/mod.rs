@@ -3,7 +3,7 @@
 //! - [`ways`] to draw a delay: tables as netem has them and finer ones, the inverse of the law, what the program draws, and others' samplers;
 //! - [`errors`] of a way: computed from its table or its function, so that they are the same every time. What can only be drawn is drawn often, and
 //!   the row says how much of its error is that of the number of draws.
-//! - loss models: how many packets it takes until the mean loss and the mean run of losses are known to some error, beside what theory says;
+//! - loss models: how many packets it takes until the mean loss and the mean run of losses are known to some error, compared with theory;
 //! - jitter that hangs together from packet to packet: what was asked for, and what comes out.
 
 mod chain;

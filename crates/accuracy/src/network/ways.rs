@@ -24,7 +24,7 @@ pub fn laws() -> [(&'static str, Law); 4] {
     .map(|(name, distribution, floor)| (name, Law::new(&distribution, MEAN, SD, Some(floor)).expect("a law")))
 }
 
-/// The laws that are compared beside those of [`laws`], with the same mean and deviation.
+/// The laws that are compared in addition to those of [`laws`], with the same mean and deviation.
 ///
 /// # Panics
 ///

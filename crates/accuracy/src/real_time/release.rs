@@ -54,7 +54,7 @@ impl Way {
     pub(super) const fn words(self) -> &'static str {
         match self {
             Self::Wheel => "wakes at whole milliseconds, as tokio's timers and many event loops do",
-            Self::Sleep => "sleeps for what is left, which it computes before",
+            Self::Sleep => "sleeps for the rest, which it computes before",
             Self::Until => "sleeps until an instant, so that computing it costs nothing",
             Self::Paced(Pacing::Sleep) => "asks to be woken as much earlier as it is usually late",
             Self::Paced(Pacing::Spin { .. }) => "is woken that much earlier and looks at the clock for the rest",

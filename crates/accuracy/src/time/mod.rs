@@ -1,7 +1,7 @@
-//! Time: events in whole nanoseconds beside steps of a millisecond.
+//! Time: events in whole nanoseconds compared with steps of a millisecond.
 //!
 //! Other simulators of control over networks go in steps and have every time as a number of steps. What that does to delays, and to the answer whether a
-//! scene is stable, is set beside what it costs; and where it does nothing at all, as for peers that tick together every millisecond when delays are
+//! scene is stable, is compared with its cost; and where it does nothing at all, as for peers that tick together every millisecond when delays are
 //! rounded up, that is a row too.
 
 mod events;

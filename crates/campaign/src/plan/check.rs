@@ -11,7 +11,7 @@ use crate::campaign::Watch;
 use crate::error::CampaignError;
 use crate::table::Roster;
 
-/// So many combinations are checked between two looks at whether to go on.
+/// The number of combinations that are checked between two looks at whether to go on.
 const BLOCK: u64 = 64;
 
 /// What the scenes of a campaign have in common.

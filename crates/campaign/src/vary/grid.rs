@@ -5,7 +5,7 @@ use cohaptic_linkfile::{number_and_unit, text_of_quantity};
 use super::{MOST_VALUES, Varied, VaryError};
 use crate::table::Value;
 
-/// So many values from one end to the other, both among them.
+/// This number of values from one end to the other, both among them.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Grid {
     low: f64,

@@ -16,7 +16,13 @@ pub(super) fn after(examples: &[&str]) -> String {
     text
 }
 
-pub(super) const PROGRAM: &[&str] =
+/// The examples of the program, the exit status, and on systems other than Linux the commands that need Linux.
+pub(super) fn of_program() -> String {
+    let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: accuracy, falcon, live, relay, router." };
+    after(PROGRAM) + needs
+}
+
+const PROGRAM: &[&str] =
     &["cohaptic init", "cohaptic run scene.toml", "cohaptic run scenarios/paper/5-1-ap-2100.toml --set link.delay=40ms", "cohaptic check scenarios"];
 
 pub(super) const RUN: &[&str] = &[

@@ -96,7 +96,7 @@ pub(crate) struct WatchArguments {
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::FALCON_SIMULATE))]
 pub(crate) struct SimulateArguments {
-    /// Who holds the grip
+    /// The hand that holds the grip
     #[arg(long, value_enum, default_value_t = HandName::Swaying)]
     pub(crate) hand: HandName,
     #[arg(help = "Ask the driver for this force [N] all the time")]

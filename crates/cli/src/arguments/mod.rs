@@ -17,8 +17,6 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use cohaptic_picture::{Size, SizeError};
 
-use examples::after;
-
 pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
 };
@@ -35,7 +33,7 @@ pub(crate) use stability::{
 ///
 /// A scene is one TOML file: the object, the peers, the links between them, and what is expected. docs/reference-keys.md lists every key.
 #[derive(Debug, Parser)]
-#[command(name = "cohaptic", version, after_help = after(examples::PROGRAM))]
+#[command(name = "cohaptic", version, after_help = examples::of_program())]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,

@@ -3,10 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
+#[cfg(target_os = "linux")]
 use cohaptic_accuracy::Subject;
 
 use super::PictureArguments;
 use super::examples::{self, after};
+
+/// Elsewhere the command `accuracy` is refused whatever its subjects are.
+#[cfg(not(target_os = "linux"))]
+type Subject = String;
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::PAPER))]
@@ -43,6 +48,12 @@ pub(crate) struct AccuracyArguments {
     pub(crate) json: bool,
 }
 
+#[cfg(not(target_os = "linux"))]
+fn subject(text: &str) -> Result<Subject, String> {
+    Ok(text.to_owned())
+}
+
+#[cfg(target_os = "linux")]
 fn subject(text: &str) -> Result<Subject, String> {
     Subject::ALL.into_iter().find(|subject| subject.name() == text).ok_or_else(|| {
         let names = Subject::ALL.map(Subject::name).join(", ");

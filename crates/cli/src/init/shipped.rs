@@ -17,7 +17,7 @@ pub(super) fn names() -> impl Iterator<Item = &'static str> {
 macro_rules! shipped {
     ($($name:literal),* $(,)?) => {
         /// Each with its name: its path within `scenarios/`, without the ending.
-        const SCENES: &[(&str, &str)] = &[$(($name, include_str!(concat!("../../../../scenarios/", $name, ".toml")))),*];
+        const SCENES: &[(&str, &str)] = &[$(($name, include_str!(concat!("../../scenarios/", $name, ".toml")))),*];
     };
 }
 

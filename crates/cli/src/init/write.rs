@@ -19,7 +19,7 @@ const EXAMPLES: [(&str, &str); 6] = [
     ("queue", "{ limit = \"100 packets\" }"),
 ];
 
-/// Keys that are not proposed: they mean something only beside others.
+/// Keys that are not proposed: they mean something only together with others.
 const NOT_PROPOSED: [&str; 4] = ["count", "substeps", "netem-profile", "name"];
 
 /// A scene as text. `other_number`: how many peers the shipped scene has, if this one has another number.

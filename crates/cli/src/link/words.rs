@@ -52,7 +52,7 @@ fn row(figure: &Figure) -> String {
 /// A name, what was asked, what was achieved, and the standard error of that.
 type Other = (&'static str, Option<f64>, Option<f64>, Option<f64>);
 
-/// What is shown where it was not compared.
+/// The mark where nothing was compared.
 fn others(spec: &Spec, achieved: &Achieved) -> [Other; 8] {
     let (asked, delay, loss) = (&spec.asked, achieved.delay.as_ref(), &achieved.loss);
     let first = |lags: &[f64]| lags.first().copied();

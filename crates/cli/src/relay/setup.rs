@@ -99,12 +99,12 @@ impl Setup {
         let line = |(place, (_, port)): (usize, (&str, SocketAddr))| match form {
             Form::Proxy(proxy) => {
                 *title = format!("{port} -> {}", proxy.to);
-                format!("listening on {port} for what is meant for {}", proxy.to)
+                format!("listening on {port} for datagrams to {}", proxy.to)
             }
             Form::Mesh(mesh) => {
                 let Some(program) = mesh.programs.get(place) else { return String::new() };
                 let address = program.address.map_or_else(|| "wherever it first sends from".to_owned(), |address| address.to_string());
-                format!("listening on {port} for what is meant for {}, which is at {address}", program.name)
+                format!("listening on {port} for datagrams to {}, which is at {address}", program.name)
             }
         };
         ports.enumerate().map(line).collect()
@@ -145,6 +145,6 @@ fn local(option: &str, address: SocketAddr) -> Result<(), Failure> {
     }
     Err(Failure::Input(format!(
         "{option} {address} is not on loopback: expected an address such as 127.0.0.1 or ::1, or --allow-remote as well. The relay authenticates nobody: \
-         who reaches its ports can speak through it"
+         anybody who reaches its ports can speak through it"
     )))
 }

@@ -54,7 +54,7 @@ impl Running {
     /// The address of the port that was said next, and what it is for.
     pub(crate) fn port(&self) -> (SocketAddr, String) {
         let said = self.said("listening on ");
-        let (address, purpose) = said.split_once(" for what is meant for ").unwrap();
+        let (address, purpose) = said.split_once(" for datagrams to ").unwrap();
         (address.parse().unwrap(), purpose.to_owned())
     }
 

@@ -71,6 +71,8 @@ macro_rules! pages {
 
 pages! {
     readme: "README.md",
+    contributing: "CONTRIBUTING.md",
+    security: "SECURITY.md",
     accuracy: "docs/accuracy.md",
     architecture: "docs/architecture.md",
     campaign: "docs/campaign.md",
@@ -113,7 +115,7 @@ fn markdown(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let (path, name) = (entry.path(), entry.file_name());
         let hidden = name.to_string_lossy().starts_with('.');
-        if path.is_dir() && !hidden && name != "target" {
+        if entry.file_type().unwrap().is_dir() && !hidden && name != "target" {
             markdown(&path, found);
         } else if path.extension().is_some_and(|extension| extension == "md") {
             found.push(path);

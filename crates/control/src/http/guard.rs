@@ -63,7 +63,7 @@ fn check(app: &App, uri: &Uri, headers: &HeaderMap) -> Result<(), Refusal> {
 
 /// Whether a host, with or without a port, is one to be asked for.
 ///
-/// Whoever points a name of theirs at this machine, so that a page of theirs may talk to it, has to ask by that name. So addresses are let in, and
+/// An attacker may point a name at this machine, so that a page may talk to it: requests of that page ask by that name. So addresses are let in, and
 /// names that are known.
 fn is_known(authority: &str, names: &[String]) -> bool {
     let (host, port) = match authority.strip_prefix('[') {

@@ -1,4 +1,4 @@
-//! What the loop tells whoever looks at it.
+//! The state that the loop shows to other threads.
 
 use core::time::Duration;
 

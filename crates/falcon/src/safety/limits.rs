@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use thiserror::Error;
 
-/// Limits that every force keeps to, whoever asks for it.
+/// Limits that every force keeps to.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Limits {
     /// The largest force \[N\], by its length.

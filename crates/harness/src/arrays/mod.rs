@@ -1,7 +1,7 @@
 //! Scenes that need no events: all numbers of all peers in arrays, one scene or several of one shape side by side.
 //!
-//! Where everybody ticks together, nothing changes on the way, no packet waits for another, and nobody watches, a run is a loop over ticks: who sends,
-//! what has arrived, forces, motion. Here that loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. It is what
+//! Where everybody ticks together, nothing changes on the way, no packet waits for another, and nobody watches, a run is a loop over ticks: sending,
+//! arrivals, forces, motion. Here that loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. It is what
 //! [`crate::world::World`] does, with the same operations in the same order on each number, the same random numbers at the same addresses and the same
 //! counters, and comes to the same [`Summary`] to the bit.
 //!
@@ -186,7 +186,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
     }
 
-    /// Writes down what came out of a run after so many ticks.
+    /// Writes down the results of a run after that number of ticks.
     fn end(&mut self, run: usize, ticks: u64, ending: Ending) {
         let stop = match ending {
             Ending::Complete => self.shape.end,
@@ -228,7 +228,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         self.summaries[run] = Some(summary);
     }
 
-    /// The counters of a link after so many ticks, if what arrives by an instant is delivered.
+    /// The counters of a link after that number of ticks, if what arrives by an instant is delivered.
     fn link_stats(&self, from: usize, to: usize, run: usize, ticks: u64, until: Instant) -> LinkStats {
         let delay = match (&self.samples, self.shape.delay) {
             (Samples::PerPacket(samples), _) => return samples.stats(from, to, run),

@@ -9,7 +9,7 @@ pub(super) struct Spot {
     pub(super) lane: usize,
 }
 
-/// Bodies by axis, then peer, then run; each axis begins a block of its own, so that what is done along an axis is done to whole blocks.
+/// Bodies by axis, then peer, then run; each axis begins a block of its own, so that work along an axis is work on whole blocks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Places {
     pub(super) peers: usize,
@@ -28,7 +28,7 @@ impl Places {
         Spot { block: axis * self.blocks() + number / WIDTH, lane: number % WIDTH }
     }
 
-    /// Every spot of an axis with who lies there. Those beyond the last peer of the last run repeat it: they move as it does, so that whole blocks can be
+    /// Every spot of an axis with the peer that lies there. Those beyond the last peer of the last run repeat it: they move as it does, so that whole blocks can be
     /// looked at.
     pub(super) fn all(self, axis: usize) -> impl Iterator<Item = (Spot, usize, usize)> {
         let last = self.peers * self.runs - 1;

@@ -1,4 +1,4 @@
-//! Samples between peers: what is on the way, and what each peer holds of the others.
+//! Samples between peers: those in flight, and those that each peer holds of the others.
 
 use cohaptic_peer::State;
 use cohaptic_scene::Scene;

@@ -35,11 +35,11 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
     summaries
 }
 
-/// Whether so many scenes of a shape are run faster in eight lanes than one after the other.
+/// Whether that number of scenes of a shape is run faster in eight lanes than one after the other.
 ///
 /// Lanes that nobody needs cost what the others do. Where samples travel together, eight runs of three peers take a third of the time of eight alone, of ten
 /// peers half of it. Where each packet has an arrival of its own, that is most of the work and done for each run by itself: eight runs of three peers take
-/// half, of ten peers five sixths, and from sixteen peers on more than alone, since eight times what is on the way does not fit into the nearest cache.
+/// half, of ten peers five sixths, and from sixteen peers on more than alone, since eight times the samples in flight do not fit into the nearest cache.
 fn pays(shape: &Shape, alike: usize) -> bool {
     if shape.delay.is_some() { alike >= 5 } else { alike >= 7 && shape.peers <= 12 }
 }

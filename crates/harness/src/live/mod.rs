@@ -1,6 +1,6 @@
 //! A scene some of whose peers are remote: in other processes, or with their device in somebody's hand.
 //!
-//! [`LiveScene`] is a state machine. Whoever drives it hands in what comes from outside with the instant at which it came, lets time pass, and sends on what
+//! [`LiveScene`] is a state machine. Its driver hands in what comes from outside with the instant at which it came, lets time pass, and sends on what
 //! the network has delivered. It reads no clock and touches no socket: driven by the clock of the wall it is a live session, driven by the recorded
 //! [`Inputs`] of one, with [`replay`], it is the same session in virtual time, with the same fates and the same motion.
 //!

@@ -92,7 +92,7 @@ impl LiveScene {
     /// Takes a sample of a peer of kind `udp`, which came at `at`, and sends it on over the links of that peer. Gives the instant at which it counts: `at`, or
     /// the first that is open.
     ///
-    /// The datagram is one of that peer for certain: whoever calls has made sure where it came from. It is checked all the same. A refused sample is counted
+    /// The datagram is one of that peer for certain: the caller has made sure where it came from. It is checked all the same. A refused sample is counted
     /// and changes nothing. The peer's samples must have rising numbers; after a silence they may begin anew. For the others they are numbered on.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! `network.svg`: each link as a row of two panels: delays over time with the losses below them, and the distribution of the delay beside the configured one.
+//! `network.svg`: each link as a row of two panels: delays over time with the losses below them, and the distribution of the delay with the configured one.
 //!
 //! Memory is bounded: over time the least and greatest delay of each span are kept, and of the distribution how many delays lie in each ten microseconds.
 

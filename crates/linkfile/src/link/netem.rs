@@ -13,7 +13,7 @@ use crate::document::{Node, Place};
 use crate::reading::named_file::{Fault, beside_document, read_file};
 use crate::reading::{Context, TableReader, values};
 
-/// What is made of the words.
+/// The model that the words give.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Profile {
     /// What they say, with the laws of this program.

@@ -62,7 +62,7 @@ impl LinkKeys {
         self.iter().find(|(name, _)| *name == key).map(|(_, value)| value)
     }
 
-    /// These keys with one laid over them. What is not TOML is taken as text, as in `--set`: `8ms` needs no quotes. [`LinkKeys::model`] tells whether
+    /// These keys with one laid over them. A value that is not TOML is taken as text, as in `--set`: `8ms` needs no quotes. [`LinkKeys::model`] tells whether
     /// key and value make sense.
     #[must_use]
     pub fn with(&self, key: &str, value: &str) -> Self {

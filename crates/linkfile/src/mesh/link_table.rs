@@ -8,8 +8,8 @@ use cohaptic_wan::LinkModel;
 
 /// The directed links of a full mesh. Equal links share one configuration.
 ///
-/// A mesh of N peers has N·(N−1) links, nearly all of them alike. What is stored is the configuration that most links have, and each link that has
-/// another one: memory grows with the number of peers and with what is said about single links, and not with N². Two tables are equal exactly if the same
+/// A mesh of N peers has N·(N−1) links, nearly all of them alike. The table stores the configuration that most links have, and each link that has
+/// another one: memory grows with the number of peers and with the entries for single links, and not with N². Two tables are equal exactly if the same
 /// peers have equal links between them, however they came about.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LinkTable {
@@ -164,7 +164,7 @@ pub(super) fn first_left(peers: usize, given: impl Iterator<Item = (usize, usize
 #[derive(Default)]
 struct Configs {
     found: Vec<Arc<LinkModel>>,
-    /// Those found, by what is the same in equal ones and tells most others apart.
+    /// Those found, by a key that is equal in equal ones and tells most others apart.
     places: BTreeMap<(Duration, u64), Vec<usize>>,
 }
 

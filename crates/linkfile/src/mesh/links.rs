@@ -93,7 +93,7 @@ fn read_entry(
     let mut table = TableReader::new(entry, context, "a table with from, to and link keys")?;
     let ends = read_ends(&mut table, context);
     let to = table.get("to");
-    // Its other keys, known and unknown, are looked at below; what is missing is said here.
+    // Its other keys, known and unknown, are looked at below; a missing key is reported here.
     if entry.as_table().is_some_and(|table| table.get("from").is_none() || table.get("to").is_none()) {
         let rest = entry.as_table()?.0.iter().filter(|entry| !matches!(entry.name.as_str(), "from" | "to"));
         if rest.clone().all(|entry| LINK_KEYS.contains(&entry.name.as_str())) {

@@ -12,12 +12,12 @@ use super::values;
 use crate::document::{Diagnostic, Node, Origin};
 use crate::fingerprint::Fingerprint;
 
-/// What is wrong in the text of a file, and where.
+/// A fault in the text of a file, and its place.
 #[derive(Debug)]
 pub struct Fault {
     /// The bytes of the text that are meant.
     pub span: Range<usize>,
-    /// What is wrong, and what was expected.
+    /// The fault, and what was expected.
     pub message: String,
 }
 

@@ -38,7 +38,7 @@ pub fn number(node: &Node, context: Context<'_>, expected: &str) -> Option<f64> 
             }
             exact?
         }
-        // The text of a TOML float is one that Rust reads; what is not becomes a NaN, which is refused.
+        // The text of a TOML float is one that Rust reads; any other becomes a NaN, which is refused.
         Value::Float(text) => text.parse().unwrap_or(f64::NAN),
         Value::Text(_) | Value::Boolean(_) | Value::Date | Value::List(_) | Value::Table(_) => {
             context.fault_at(node, format!("found {}: expected {expected}", node.describe()));

@@ -1,4 +1,4 @@
-//! `[\[programs\]]`: who takes part, and where.
+//! `[\[programs\]]`: the programs, and their addresses.
 
 use std::net::SocketAddr;
 
@@ -11,7 +11,7 @@ use crate::reading::{Context, Names, TableReader, values};
 /// Each has a socket, and each pair two links.
 const MOST_PROGRAMS: usize = 256;
 
-/// What is written of a program, with the nodes that faults point at.
+/// The entry of a program, with the nodes that faults point at.
 #[derive(Debug)]
 struct Written<'a> {
     program: RelayProgram,

@@ -158,7 +158,7 @@ pub enum Target {
     Drop,
 }
 
-/// Which packets go where. What is `None` holds for every packet.
+/// Which packets go where. A condition that is `None` holds for every packet.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct RuleSpec {
     /// The side from which the packet comes.

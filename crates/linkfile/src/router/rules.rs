@@ -89,7 +89,7 @@ fn check_protocol(
     Some(())
 }
 
-/// A target: a link, or what is none.
+/// A target: a link, or an action without one.
 pub(super) fn read_target(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<Target> {
     let name = values::text(node, context, TARGET)?;
     match name {

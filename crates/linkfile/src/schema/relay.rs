@@ -23,7 +23,7 @@ static RELAY: Table = Table::of(&[&[
 ]]);
 static PROGRAM: Table = Table::of(&[&[
     required("name", Form::Text, "Its name, which names its links: unique, not all, without space and without . > / , and quotes"),
-    required("port", Form::Like(&["127.0.0.1:7001"]), "The address that stands for it: whoever sends there speaks to it"),
+    required("port", Form::Like(&["127.0.0.1:7001"]), "The address that stands for it: a program that sends there speaks to it"),
     optional("address", Form::Like(&["127.0.0.1:9001"]), "Where it sends from and listens; without it learnt from the first datagram that it sends"),
 ]]);
 static TIMELINE: Table = Table::of(&[&[

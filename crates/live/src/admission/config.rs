@@ -1,4 +1,4 @@
-//! What a door is told when it is made.
+//! The parameters of an admission control.
 
 use core::fmt;
 use core::time::Duration;
@@ -37,7 +37,7 @@ pub struct Limits {
     pub velocity: f64,
 }
 
-/// What a door is made of.
+/// The parameters of an admission control.
 #[derive(Clone, Debug)]
 pub struct AdmissionConfig {
     /// Only peers of one session understand each other; the seed of the scene.
@@ -98,7 +98,7 @@ impl AdmissionConfig {
     }
 }
 
-/// Why a door cannot be made.
+/// Why an admission control cannot be made.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum AdmissionConfigError {
     /// A sample has 1 to 3 axes.

@@ -1,4 +1,4 @@
-//! The door of a live session: which datagrams from outside reach the scene, and how those to the outside are made.
+//! Admission to a live session: which datagrams from outside reach the scene, and how those to the outside are made.
 //!
 //! ```text
 //!                      ┌── Sample: goes on to the scene's links
@@ -7,14 +7,14 @@
 //! ```
 //!
 //! Without a key the first sample for a seat joins, and the seat belongs to its address until it has been silent for a while. With a key a peer says
-//! hello, is answered by a nonce of the server, and joins with the first sample that is sealed under keys made of both nonces. The door remembers
+//! hello, is answered by a nonce of the server, and joins with the first sample that is sealed under keys made of both nonces. The session remembers
 //! nothing of those that asked:
 //!
 //! - The server's nonce is a keyed hash of the seat, of how often the seat was taken, and of the address that asked. The client's nonce comes with
-//!   every sealed sample. So the door can make the keys again when a sample needs them.
+//!   every sealed sample. So the session can make the keys again when a sample needs them.
 //! - When a seat is taken, every nonce given out for it before is void. A recording of an earlier joining, or one that is sent from another address,
 //!   has a wrong tag.
-//! - A hello changes nothing. Whoever repeats recorded ones gets answers he can do nothing with.
+//! - A hello changes nothing. A host that repeats recorded ones gets answers that it cannot use.
 //!
 //! Memory is that of the seats. The numbers of a seat never go back for those inside: an admitted sample has the number of the joining in its upper 24
 //! bits and the number that the peer gave it in the lower 40, so a peer that joins again and counts from 0 is newer than it was.
@@ -43,7 +43,7 @@ use seats::{Occupant, SeatState};
 /// The numbers that a peer may give its samples are below this.
 pub const SEQUENCE_END: u64 = 1 << SEQUENCE_BITS;
 /// How many hellos for one seat are answered within a second. Enough for its peer to be answered while somebody repeats recorded ones, and little
-/// enough work for the door: some milliseconds.
+/// enough work for a session: some milliseconds.
 pub const WELCOMES_PER_SECOND: u32 = 1000;
 
 const SEQUENCE_BITS: u32 = 40;
@@ -103,7 +103,7 @@ pub struct AdmissionControl {
     key: Option<SessionKey>,
     stale_after: Duration,
     limits: Option<Limits>,
-    /// What the nonces are made with, drawn anew for each door, so that no two doors give the same ones.
+    /// What the nonces are made with, drawn anew for each session, so that no two sessions give the same ones.
     secret: Secret,
     /// By place.
     seats: Vec<SeatState>,
@@ -127,7 +127,7 @@ enum Under {
 }
 
 impl AdmissionControl {
-    /// A door with all its seats free. 32 bytes are drawn from `entropy`, now and never again: with the same ones it does the same to the same
+    /// An admission control with all its seats free. 32 bytes are drawn from `entropy`, now and never again: with the same ones it does the same to the same
     /// datagrams.
     ///
     /// # Errors
@@ -175,7 +175,7 @@ impl AdmissionControl {
         ready
     }
 
-    /// What the door has done.
+    /// The counts so far.
     #[must_use]
     pub const fn stats(&self) -> &AdmissionStats {
         &self.stats
@@ -272,7 +272,7 @@ impl AdmissionControl {
         keys.map(|keys| Under::New(Box::new(keys))).ok_or(otherwise)
     }
 
-    /// The nonce for whoever asks for that seat from that address, until the seat is taken the next time.
+    /// The nonce for a program that asks for that seat from that address, until the seat is taken the next time.
     fn server_nonce(&self, index: usize, from: SocketAddr) -> Nonce {
         let seat = &self.seats[index];
         // An IPv4 address reads the same where a socket of IPv6 shows it mapped. Scope and flow label are of this machine alone.

@@ -6,7 +6,7 @@ use cohaptic_peer::wire::DecodeError;
 
 use crate::handshake::HandshakeError;
 
-/// Why the door did not let a datagram in. Nothing but a counter has changed.
+/// Why the session did not let a datagram in. Nothing but a counter has changed.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Refusal {
     /// Shorter than the header of a sample.
@@ -31,7 +31,7 @@ pub enum Refusal {
     SequenceRange,
     /// Of another session.
     ForeignSession,
-    /// From a place that is none of the door's seats.
+    /// From a place that is no seat of the session.
     UnknownSeat,
     /// For a seat whose holder is another program that was heard lately.
     SeatTaken,
@@ -133,7 +133,7 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// What the door has done. Every datagram that was handed in is admitted, welcomed or refused: the three add up to [`AdmissionStats::handled`].
+/// The counts of the admission. Every datagram that was handed in is admitted, welcomed or refused: the three add up to [`AdmissionStats::handled`].
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct AdmissionStats {
     /// Datagrams that were handed in.

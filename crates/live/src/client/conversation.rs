@@ -1,4 +1,4 @@
-//! What a program says to the door, and what it makes of what it hears, from the first hello to the end.
+//! What a program says to the session, and what it makes of what it hears, from the first hello to the end.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -146,7 +146,7 @@ impl Client {
         if self.key.is_some() && self.joined.is_none() { self.next_hello } else { self.silent_from().max(self.next_hello) }
     }
 
-    /// Takes in a datagram from the door. Never panics; a datagram for somebody else changes nothing.
+    /// Takes in a datagram from the session. Never panics; a datagram for somebody else changes nothing.
     pub fn handle_datagram(&mut self, now: Instant, datagram: &[u8]) -> Heard {
         if let Some(joining) = &self.joining
             && let Ok(joined) = joining.handle_welcome(datagram)
@@ -163,7 +163,7 @@ impl Client {
         self.open(datagram).map_or(Heard::Ignored, |sample| self.take(now, sample))
     }
 
-    /// Writes a sample for the door, sealed if there is a key, and gives its length. `None` before the first welcome, where there is a key, and if
+    /// Writes a sample for the session, sealed if there is a key, and gives its length. `None` before the first welcome, where there is a key, and if
     /// `sample` is longer than a sample.
     pub fn seal(&self, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<usize> {
         match (&self.key, &self.joined) {

@@ -75,18 +75,18 @@ pub struct Joined {
 }
 
 impl Joined {
-    /// What the door has said of the session.
+    /// What the session has said of the session.
     #[must_use]
     pub const fn welcome(&self) -> &Welcome {
         &self.welcome
     }
 
-    /// Writes a sample for the door and gives its length; `None` if `sample` is longer than a sample.
+    /// Writes a sample for the session and gives its length; `None` if `sample` is longer than a sample.
     pub fn seal(&self, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<usize> {
         self.keys.to_door.seal(&self.keys.client_nonce, sample, out)
     }
 
-    /// The sample in a datagram from the door. It may be late or repeated: go by the number in it, sender by sender.
+    /// The sample in a datagram from the session. It may be late or repeated: go by the number in it, sender by sender.
     ///
     /// # Errors
     ///
@@ -104,7 +104,7 @@ impl Joined {
     }
 }
 
-/// Why a datagram from the door cannot be opened.
+/// Why a datagram from the session cannot be opened.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum OpenError {
     /// It has another length than a sealed sample of this session.

@@ -22,7 +22,7 @@ impl Default for Beginning {
 impl Beginning {
     /// The session begins at `at`, unless it has begun.
     pub(super) fn begin(&self, at: Instant) {
-        // Whoever was first has set it.
+        // The first thread has set it.
         let _ = self.0.compare_exchange(NOT_YET, at.as_nanos(), Ordering::Relaxed, Ordering::Relaxed);
     }
 

@@ -1,8 +1,8 @@
 //! The two datagrams before the samples, in sessions with a key: a [`Hello`] is answered by a [`Welcome`].
 //!
 //! Both are 88 bytes: an answer that is no longer than its request amplifies nothing for a sender with a false address. They end
-//! with a tag under the session key, and differ in their first four bytes, so that neither passes for the other. A hello alone changes nothing at the
-//! door.
+//! with a tag under the session key, and differ in their first four bytes, so that neither passes for the other. A hello alone changes nothing in the
+//! session.
 
 mod hello;
 mod welcome;

@@ -1,4 +1,4 @@
-//! The door answers a hello with what a peer must know of the session.
+//! The session answers a hello with what a peer must know of the session.
 //!
 //! ```text
 //! offset  size  field
@@ -24,7 +24,7 @@ use crate::{Nonce, Place, SessionKey};
 /// The first four bytes of a welcome.
 pub const WELCOME_MAGIC: [u8; 4] = *b"CHPW";
 
-/// What the door tells a peer that has said [`Hello`](super::Hello).
+/// What the session tells a peer that has said [`Hello`](super::Hello).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Welcome {
     /// How many axes a sample has.

@@ -12,7 +12,7 @@ use crate::{Entropy, EntropyError};
 /// The length of a session key \[byte\].
 const KEY_LEN: usize = 32;
 
-/// The secret of a session. Whoever has it may take any seat of the session; it does not tell peers from each other.
+/// The secret of a session. A program that has it may take any seat of the session; it does not tell peers from each other.
 ///
 /// It is overwritten when it is dropped, and never printed.
 #[derive(Clone)]

@@ -66,7 +66,7 @@ pub enum SessionError {
     /// The socket.
     #[error(transparent)]
     Bind(#[from] BindError),
-    /// The door.
+    /// The admission of peers in other programs.
     #[error("nobody can be let in: {0}")]
     AdmissionControl(#[from] AdmissionConfigError),
     /// The record.

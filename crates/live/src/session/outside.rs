@@ -1,4 +1,4 @@
-//! Peers in other programs: the socket and the door behind it.
+//! Peers in other programs: the socket and the admission behind it.
 
 use std::net::SocketAddr;
 use std::os::fd::BorrowedFd;
@@ -26,7 +26,7 @@ pub(super) struct Outside {
 
 /// Nobody at a desk moves a copy farther or faster than this; what says so is no motion but a fault, and would throw every other copy out of the room.
 const LIMITS: Limits = Limits { position: 10.0, velocity: 100.0 };
-/// A sample longer than what the door takes is refused by it, and counted there.
+/// A sample that is too long is refused by the admission, and counted there.
 const LARGEST: usize = 2048;
 /// Datagrams of a few peers at 125 Hz: a second of a thousand of them.
 const RECEIVE_BUFFER: usize = 1 << 20;

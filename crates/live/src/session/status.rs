@@ -27,7 +27,7 @@ pub struct Status {
     pub peers: Vec<PeerStatus>,
     /// Each directed link, by sender, then receiver.
     pub links: Vec<LinkStatus>,
-    /// What the door has done; `None` in a scene without peers in other programs.
+    /// The counts of the admission; `None` in a scene without peers in other programs.
     pub admission: Option<AdmissionStats>,
 }
 
@@ -74,7 +74,7 @@ pub struct Report {
     pub behind: Duration,
     /// What came in at each peer that is remote; `None` for one that is simulated here.
     pub seats: Vec<Option<SeatStats>>,
-    /// What the door has done, and the socket before it.
+    /// The counts of the admission, and of the socket before it.
     pub admission: Option<(AdmissionStats, SocketCounts)>,
     /// What the system granted and refused.
     pub prepared: Prepared,

@@ -35,7 +35,7 @@ pub(super) struct Carried {
     filled: usize,
 }
 
-/// So many delays are remembered: at 125 Hz those of a second.
+/// The number of delays that are remembered: at 125 Hz those of a second.
 const RECENT: usize = 125;
 
 impl Carried {

@@ -1,4 +1,4 @@
-//! What a link achieved, to be set beside what it was asked for.
+//! The figures that a link achieved, to be compared with those asked for.
 //!
 //! Every figure is one that the literature defines, and has a standard error or an interval wherever there is a textbook one. Those of means, *proportions*
 //! (Wilson) and *quantiles* (order statistics) take from batch means how much packets hang together.

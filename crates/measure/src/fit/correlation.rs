@@ -20,7 +20,7 @@ use crate::series::{NORMAL_975, count};
 pub struct CorrelationFit {
     /// The correlation time τ \[s\].
     pub time_s: f64,
-    /// Its standard error \[s\], from the curvature of the likelihood of ln τ with the variance estimated too: so much that 1.96 of it reach the farther
+    /// Its standard error \[s\], from the curvature of the likelihood of ln τ with the variance estimated too: large enough that 1.96 of it reach the farther
     /// end of the interval of ln τ. `None` where the likelihood is flat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_se_s: Option<f64>,

@@ -109,7 +109,7 @@ pub enum FitError {
     },
     /// A delay is negative: the clocks are offset.
     #[error(
-        "the packet sent at {sent_s} s has a delay of {delay_s} s: expected none below zero (are the two clocks offset? shift the delays by what is known of it)"
+        "the packet sent at {sent_s} s has a delay of {delay_s} s: expected none below zero (are the two clocks offset? shift the delays by the offset)"
     )]
     NegativeDelay {
         /// When it was sent \[s\].

@@ -70,7 +70,7 @@ fn contains(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
         section_5.radius()?.value,
         section_5.with(Strategy::Pd).radius()?.value
     );
-    let claim = "What is stable with PD is stable with AP: AP's region contains PD's";
+    let claim = "Gains that are stable with PD are stable with AP: AP's region contains PD's";
     let claim = |verdict| Claim::new("region-contains", claim, "Figs. 3, 4; “can keep … stable for stiffer coordination”", ours, verdict);
     Ok(match found {
         None if outside.is_empty() => claim(Verdict::Holds),

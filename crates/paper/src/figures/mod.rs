@@ -21,7 +21,7 @@ pub struct Figure {
     pub title: String,
     /// What agrees with the paper and what does not.
     pub caption: String,
-    /// The paper's numbers beside ours.
+    /// The paper's numbers, and the computed ones.
     pub table: Table,
     /// The drawing, an SVG document with a ground of its own, light or dark as its reader prefers.
     pub svg: String,

@@ -44,7 +44,7 @@ fn panel(atlas: &Atlas, setting: Setting, strategy: Strategy) -> Panel {
 }
 
 fn caption(atlas: &Atlas, settings: &[Setting]) -> String {
-    let mut text = "Lines are where the spectral radius is 1: who crosses one changes from stable to unstable or back. The shares below say how much is stable. \
+    let mut text = "Lines are where the spectral radius is 1: gains that cross one change from stable to unstable or back. The shares below say how much is stable. \
                     The paper has one panel and prints no areas; it leaves open whether Td is one way, and its Section 2 gives each copy mO/N."
         .to_owned();
     for setting in settings {

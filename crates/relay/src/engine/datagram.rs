@@ -59,7 +59,7 @@ pub struct Release<'a> {
     pub late: Duration,
     /// From where.
     pub port: Port,
-    /// To whom.
+    /// The receiver.
     pub to: SocketAddr,
     /// What it carries, damaged if the link has damaged it.
     pub bytes: &'a [u8],

@@ -116,7 +116,7 @@ impl Engine {
         intake
     }
 
-    /// Takes a datagram in, but leaves it at the door until [`Engine::offer_staged`]: datagrams that were read from several sockets are offered in the order
+    /// Takes a datagram in, but lets it wait until [`Engine::offer_staged`]: datagrams that were read from several sockets are offered in the order
     /// in which they came.
     #[inline]
     pub fn stage(&mut self, arrival: Arrival<'_>) -> Intake {
@@ -157,7 +157,7 @@ impl Engine {
         opened.map_or(Intake::Offered, Intake::FromNewClient)
     }
 
-    /// Offers to their links what waits at the door, in the order of the instants. What came before an instant that has been let pass is offered at that
+    /// Offers to their links what waits, in the order of the instants. What came before an instant that has been let pass is offered at that
     /// instant, and counted.
     pub fn offer_staged(&mut self) {
         if !self.staged.is_sorted_by_key(|staged| staged.at) {

@@ -11,7 +11,7 @@ pub(super) struct Recent {
 }
 
 impl Recent {
-    /// So many delays are remembered.
+    /// The number of delays that are remembered.
     const MOST: usize = 128;
 
     #[inline]

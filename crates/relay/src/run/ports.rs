@@ -286,7 +286,7 @@ impl fmt::Debug for Ports {
 /// What was heard.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Heard {
-    /// So many datagrams.
+    /// A number of datagrams.
     pub(super) count: usize,
     /// All that came up to then.
     pub(super) until: Instant,

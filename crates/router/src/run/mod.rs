@@ -52,7 +52,7 @@ const LONGEST: usize = (1 << 16) + 64;
 /// read that much late.
 const TOO_CLOSE: Duration = Duration::from_micros(10);
 
-/// So many packets are read from one device before the other one has its turn.
+/// The number of packets that are read from one device before the other one has its turn.
 const IN_TURN: usize = 16;
 
 impl Router {

@@ -1,4 +1,4 @@
-//! `[\[peers\]]` and `count`: who takes part.
+//! `[\[peers\]]` and `count`: the peers of the scene.
 
 use core::time::Duration;
 use std::collections::BTreeMap;

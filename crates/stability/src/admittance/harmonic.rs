@@ -2,7 +2,7 @@
 //!
 //! A frame is a linear map from its unknowns u (states relative to the reference, samples of earlier frames) and the push e^{jωt} to the states at its end
 //! and the samples it sends. In steady state a frame later everything is e^{jωT} times as large, and a sample from q frames ago was e^{−jωqT} times
-//! as large as its like of this frame, whatever q: a long delay costs nothing. What is relative to a reference that moved in between is corrected by how
+//! as large as its like of this frame, whatever q: a long delay costs nothing. A sample relative to a reference that moved in between is corrected by how
 //! far that went, D·e^{−jωT}·Σ_{i<q} e^{−jωiT} if it goes by D in this frame. That leaves as many equations as unknowns.
 
 use std::f64::consts::TAU;
@@ -14,7 +14,7 @@ use super::response::AdmittancePoint;
 use crate::lifted::{FrameMap, Instrument, Lifted};
 use crate::structure::count;
 
-/// e^{jωt} after so many periods, whole ones left out first.
+/// e^{jωt} after that number of periods, whole ones left out first.
 fn turn(periods: f64) -> Complex64 {
     let angle = TAU * (periods - periods.round());
     Complex64::new(libm::cos(angle), libm::sin(angle))
@@ -159,7 +159,7 @@ impl Harmonic {
         let looked = faer::Mat::from_fn(size, 1, |row, _| self.sine.seen[row]);
         let of_states: Complex64 = (0..size).map(|row| self.sine.seen[row] * solution[(row, 0)]).sum();
         let direct = self.sine.seen[size] + Complex64::I * self.sine.seen[size + 1];
-        // A change δM of the equations changes the answer by yᵀ·δM·u, where Mᵀ·y is what is looked at.
+        // A change δM of the equations changes the answer by yᵀ·δM·u, where Mᵀ·y picks the output.
         let adjoint = decomposed.solve_transpose(&looked);
         let weight: f64 = (0..size).map(|row| adjoint[(row, 0)].norm()).sum();
         let largest = (0..size).map(|row| solution[(row, 0)].norm()).fold(1.0, f64::max);

@@ -8,7 +8,7 @@
 //!
 //! both parts in ω² alone. Their first coefficients are found by extrapolation to ω² = 0 (Richardson 1911): the frequency is halved again and again, a
 //! table of differences (Neville) removes one term of the series after the other, and the entry is taken that changed least (Ridders 1982) over three
-//! frequencies. That stops by itself between frequencies that are too high for the series and those so low that rounding covers what is looked for.
+//! frequencies. That stops by itself between frequencies that are too high for the series and those so low that rounding covers the answer.
 
 use std::f64::consts::TAU;
 
@@ -37,7 +37,7 @@ pub struct Estimate {
 
 /// How many frequencies are tried, each half of the one before.
 const FREQUENCIES: usize = 30;
-/// How many terms of the series are removed at most: beyond that rounding grows faster than what is left shrinks.
+/// How many terms of the series are removed at most: beyond that rounding grows faster than the rest shrinks.
 const MOST_TERMS: usize = 8;
 
 impl LowFrequencyFit {

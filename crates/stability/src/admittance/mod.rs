@@ -35,7 +35,7 @@ const TOGETHER: usize = 256;
 /// The admittance of one peer's device, with the hands of all others at rest: ready to be evaluated at any frequency.
 ///
 /// Peers that are equal are treated together, so that it costs the same for any number of them. Arms are part of the scene and stay, that of the peer
-/// itself too: the force is what is added to what they do. A peer that touches nothing has the admittance of its bare device.
+/// itself too: the force is added to theirs. A peer that touches nothing has the admittance of its bare device.
 ///
 /// Where a scene is not linear, the linear scene is analysed in which every one-sided contact is closed and no copy is at a wall: see
 /// [`Admittance::notes`]. In a scene of several axes it is the admittance along the axis that the peer pushes along, or the first.
@@ -124,7 +124,7 @@ impl Admittance {
         self.response_watched(frequencies, &Unwatched)
     }
 
-    /// [`Admittance::response`] at as many of those frequencies as there is time for: up to the first that was not looked at when whoever watches ended it.
+    /// [`Admittance::response`] at as many of those frequencies as there is time for: up to the first that was not looked at when the watcher ended it.
     /// A point is [`Admittance::operations`].
     ///
     /// # Errors
@@ -184,7 +184,7 @@ impl Admittance {
         self.radius.verdict()
     }
 
-    /// What is left out or taken as closed, in words.
+    /// The parts left out or taken as closed, in words.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::{Cell, Verdict};
 
-/// The radius within an interval is taken to leave the chord by at most so many times what the second differences around it say.
+/// The radius within an interval is taken to leave the chord by at most this many times what the second differences around it say.
 const SAFETY: f64 = 4.0;
 
 /// The values looked at so far, in order.

@@ -1,8 +1,8 @@
 //! Boundaries: every value of one key at which a scene turns stable or unstable.
 //!
 //! Stability regions are not convex and have islands, so the line is looked at in many places first. Then, pass after pass, the intervals between
-//! neighbouring samples are gone through: where the verdict changes they are halved down to the tolerance; where it does not, and the radius bends so
-//! much that it may reach 1 and come back in between, they are halved until it certainly does not. What the radius does within an interval is judged
+//! neighbouring samples are gone through: where the verdict changes they are halved down to the tolerance; where it does not, and the radius bends
+//! enough to reach 1 and come back in between, they are halved until it certainly does not. What the radius does within an interval is judged
 //! by the second differences around it, so an island that is smooth on the scale of the samples, or a tangency, is found however narrow it is; one that
 //! shows nothing of itself at the samples around it is not, and the result says how fine it looked.
 

@@ -33,7 +33,7 @@ pub(super) struct Trip {
     pub(super) nearest: Complex64,
 }
 
-/// What is the same for all points of a circle.
+/// The numbers that all points of a circle have in common.
 struct Limits {
     inner: f64,
     /// Of each kernel: its limits, and inner^−j.

@@ -35,7 +35,7 @@ impl DelayedLoop {
             sizes.push(value.norm());
             error += value.norm() * term.norm;
         }
-        // Sums of so many terms, and Gauss–Jordan elimination with pivots of a matrix of that size (growth is taken as the size: Higham 2002, 9.3).
+        // Sums of that number of terms, and Gauss–Jordan elimination with pivots of a matrix of that size (growth is taken as the size: Higham 2002, 9.3).
         let dimension = f64::from(u32::try_from(size).unwrap_or(u32::MAX));
         let rounding = 8.0 * f64::EPSILON * (dimension + f64::from(u32::try_from(sizes.len()).unwrap_or(u32::MAX))) * error;
         let direction = invert(&mut matrix, size)?;

@@ -22,7 +22,7 @@ pub(crate) struct Lifted<'a> {
     pub(crate) tied: bool,
 }
 
-/// What is pushed and looked at within a frame.
+/// The inputs and outputs within a frame.
 pub(crate) trait Instrument {
     /// How many inputs there are, each a column more.
     fn inputs(&self) -> usize {

@@ -19,7 +19,7 @@ use crate::timetable::Event;
 /// What the operations of a tick round, relative to the terms that they add up: at most fifteen in a row, the rounding of the step maps' coefficients and of
 /// the units among them.
 const TICK: f64 = 16.0 * f64::EPSILON;
-/// Rounding of a sample, and of the mean of samples beside one rounding for each node.
+/// Rounding of a sample, and of the mean of samples in addition to one rounding for each node.
 const MEAN: f64 = 6.0 * f64::EPSILON;
 
 /// A bound of the sum of the sizes of a row, and one of its error.

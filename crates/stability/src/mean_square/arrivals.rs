@@ -14,7 +14,7 @@
 //! newer. If a is the newest sample that has arrived, then none after a has, so the hazards of those after a hold given a: the *place*
 //! r = max(a − lo, 0), with lo the oldest sample that may arrive yet, is a Markov chain.
 
-/// The probability that a sample has arrived so many nanoseconds after it was sent.
+/// The probability that a sample has arrived that number of nanoseconds after it was sent.
 pub(crate) trait Arrival {
     /// Zero before it can arrive; not decreasing.
     fn within(&self, nanos: i128) -> f64;

@@ -31,7 +31,7 @@ pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -
 /// How many events are worked out before it is asked whether to go on.
 const LOOK: usize = 1024;
 
-/// [`events`]; `None` if whoever watches ends it.
+/// [`events`]; `None` if the watcher ends it.
 pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants, watch: &dyn Watch) -> Option<Events> {
     let nodes = lifted.nodes.len();
     let scale = Scale { time: lifted.time, compliance: lifted.nodes[0].compliance(lifted.time) };
@@ -42,7 +42,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
             depth[line.from] = depth[line.from].max(hazards.depth());
         }
     }
-    // Rows: states of nodes, samples of nodes, what is held.
+    // Rows: states of nodes, samples of nodes, samples held.
     let mut first = Vec::with_capacity(nodes);
     let mut count = 0;
     let mut made = Events::default();

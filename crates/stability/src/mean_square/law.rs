@@ -22,11 +22,11 @@ pub(crate) struct LinkLaw {
     discarded: f64,
     duplicated: f64,
     netem: bool,
-    /// What is added to every delay \[ns\].
+    /// The time added to every delay \[ns\].
     extra: i128,
     mean: i128,
     law: Option<Law>,
-    /// With this probability, the delay is replaced by none, or made so much longer \[ns\].
+    /// With this probability, the delay is replaced by none, or made longer by this \[ns\].
     displaced: Option<(f64, Option<i128>)>,
     pub(crate) correlated_delays: bool,
     pub(crate) in_order: bool,
@@ -71,7 +71,7 @@ impl LossChain {
         self.moves(1.0).iter().all(|(_, _, lost, _)| *lost)
     }
 
-    /// The moves of a sample sent so many seconds after the one before.
+    /// The moves of a sample sent that number of seconds after the one before.
     pub(crate) fn moves(&self, gap: f64) -> Vec<LossMove> {
         let live = self.live();
         let mut moves = Vec::with_capacity(2 * live.len() * live.len());

@@ -132,7 +132,7 @@ pub fn mean_square_within(scene: &Scene, most: usize) -> Result<MeanSquare, Anal
 ///
 /// # Errors
 ///
-/// As for [`mean_square`]; [`AnalysisError::TooManyOperations`] beyond the limit, [`AnalysisError::Stopped`] if whoever watches ends it.
+/// As for [`mean_square`]; [`AnalysisError::TooManyOperations`] beyond the limit, [`AnalysisError::Stopped`] if the watcher ends it.
 pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSquare, AnalysisError> {
     let limits = &Limits { unknowns: limits.unknowns.min(MOST_UNKNOWNS), ..*limits };
     let network = NominalNetwork::of(scene)?;

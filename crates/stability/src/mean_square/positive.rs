@@ -12,7 +12,7 @@
 //! # Rounding
 //!
 //! A computation of sums, products and constants changes each of its terms by at most as many roundings as the term goes through. If these are at most K
-//! (`roundings`) and S are the sizes of the terms of each entry, added up (`sizes`), then what is computed is within γ_K·S of the exact image (Higham 2002,
+//! (`roundings`) and S are the sizes of the terms of each entry, added up (`sizes`), then the computed image is within γ_K·S of the exact image (Higham 2002,
 //! Section 3.1). That γY − L(Y) is positive definite whatever these errors are is shown by Cholesky's factorisation with Rump's criterion
 //! (`worst_case::verified`). That Y is not is shown by an entry of its diagonal below zero, with no rounding at all. So the bounds hold for the operator with
 //! the coefficients as stored, and as far as the errors of these are counted among the roundings for the exact one; numbers that underflow are not counted.
@@ -79,11 +79,11 @@ pub(crate) fn radius_watched(operator: &impl Positive, operations: f64, watch: &
 enum Ended {
     /// Numbers overflowed.
     Overflow,
-    /// Whoever watches ended it.
+    /// The watcher ended it.
     Stopped,
 }
 
-/// An operator times a power of two, each image of which is seen by whoever watches.
+/// An operator times a power of two, each image of which is shown to the watcher.
 struct Images<'a, O> {
     operator: &'a O,
     factor: f64,
@@ -230,7 +230,7 @@ impl Krylov {
         Some(if real > 0.0 { real } else { scale })
     }
 
-    /// The tightest bounds around a guess that can be checked in this space; `None` if whoever watches ends it.
+    /// The tightest bounds around a guess that can be checked in this space; `None` if the watcher ends it.
     fn bounds(&self, operator: &impl Positive, guess: f64, watch: &dyn Watch) -> Option<(f64, f64)> {
         let mut low = 0.0;
         let mut apart = NEAREST;

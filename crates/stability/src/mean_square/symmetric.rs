@@ -8,7 +8,7 @@
 //! h  = E of h_ij times: [0] h_ij  [1] h_ji  [2] h_ik  [3] h_kj  [4] h_jk (and h_ki)  [5] h_kl
 //! ```
 //!
-//! Every event is a few lines in these: with q the probability of missing a sample u_j = cᵀa_j and p = 1 − q, delivering on all links at once maps
+//! Every event is a few lines in these. Let q be the probability of missing a sample u_j = cᵀa_j, and p = 1 − q. Delivering on all links at once maps
 //! E h_ij h_kl to q²·E h_ij h_kl + q·p·(E h_ij u_l + E u_j h_kl) + p²·E u_j u_l for two links, and E h_ij² to q·E h_ij² + p·E u_j² for one and the same.
 //!
 //! The space decomposes under the permutations into the common motion (once), the differences of peers (N − 1 copies: a_i, and the sums of h over
@@ -16,7 +16,7 @@
 //! kind is, so these blocks are the coordinates.
 //!
 //! All receivers hold much the same of a sender, so the sums of h grow with N − 1, and their unit vectors' components with its root, while a_i does not:
-//! beside each other they would cost the more digits the more peers there are. In the blocks of the first two kinds h is therefore divided by √(N − 1), which
+//! together they would cost the more digits the more peers there are. In the blocks of the first two kinds h is therefore divided by √(N − 1), which
 //! makes of the sums the means that act on peers; then every coefficient of a frame is of size 1 for any N, and none is a difference of large numbers.
 
 use super::arrivals::Hazards;
@@ -37,7 +37,7 @@ pub(crate) struct Symmetric {
     steps: Vec<Step>,
     /// The states of a peer at the beginning of a frame.
     size: usize,
-    /// The translation of a peer's states and of what is held, if the whole may be moved; positions are relative to the mean over all copies.
+    /// The translation of a peer's states and of the samples held, if the whole may be moved; positions are relative to the mean over all copies.
     translation: Option<(Vec<f64>, f64)>,
     /// Where the position of the copy stands among the states.
     position: usize,
@@ -65,7 +65,7 @@ struct Map {
 struct Moment {
     own: Matrix,
     other: Matrix,
-    /// With what is held of a sender by the peer, of the peer by a receiver, and of others by others.
+    /// With the sample of a sender held by the peer, of the peer by a receiver, and of others by others.
     with: [Vec<f64>; 3],
     held: [f64; 6],
 }
@@ -78,7 +78,7 @@ impl Symmetric {
         let rows = node.rows(0);
         let (states, depth, sent) = (node.states(), hazards.depth(), lifted.timetable.sent[0]);
         let (size, full) = (states + depth, states + depth + sent);
-        // A map in the making: its columns are the states it begins with and, last, what is held.
+        // A map in the making: its columns are the states it begins with and, last, the samples held.
         let mut map = Tracked::new(full, size, 1);
         let mut steps = Vec::new();
         let (mut tick, mut sample, mut roundings) = (0, 0, 0);
@@ -216,7 +216,7 @@ impl Symmetric {
         }
     }
 
-    /// The blocks: of the common motion, of the differences, and of what is held with sums of zero, symmetric and antisymmetric.
+    /// The blocks: of the common motion, of the differences, and of the samples held with sums of zero, symmetric and antisymmetric.
     fn blocks(&self, moment: &Moment, signs: Signs) -> (Matrix, Matrix, f64, f64) {
         let Moment { own, other, with: [r, s, o], held: h } = moment;
         let (n, minus) = (self.peers, signs.minus());
@@ -357,7 +357,7 @@ impl Positive for Symmetric {
 
     fn roundings(&self) -> usize {
         let of = |step: &Step| match step {
-            // A product from both sides, and the sums over what is held.
+            // A product from both sides, and the sums over the samples held.
             Step::Move { map, .. } => 2 * map.own.columns() + 32,
             Step::Deliver { .. } => 12,
         };

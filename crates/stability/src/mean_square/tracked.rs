@@ -32,7 +32,7 @@ pub(crate) struct Tracked {
 }
 
 impl Tracked {
-    /// The first rows are the states as they are; what is below is zero.
+    /// The first rows are the states as they are; the rows below are zero.
     pub(crate) fn new(rows: usize, columns: usize, held: usize) -> Self {
         let value = Matrix::from_fn(rows, columns + held, |row, column| if row == column && column < columns { 1.0 } else { 0.0 });
         Self { value, terms: Matrix::zeros(rows, columns + held), held, events: 0 }
@@ -84,13 +84,13 @@ impl Tracked {
     }
 
     /// At least the size of each entry, and a [`SHARE`]-th of the terms that it was added up from, on average over the events. Little more than the former:
-    /// what is larger here grows from step to step.
+    /// a coefficient that is larger here grows from step to step.
     pub(crate) fn sizes(&self) -> Matrix {
         let share = 1.0 / crate::structure::count(SHARE * self.events.max(1));
         Matrix::from_fn(self.value.rows(), self.value.columns(), |row, column| self.value[(row, column)].abs().max(self.terms[(row, column)] * share))
     }
 
-    /// So many roundings of the [`sizes`](Self::sizes) cover all errors.
+    /// The number of roundings of the [`sizes`](Self::sizes) cover all errors.
     pub(crate) const fn roundings(&self) -> usize {
         SHARE * TICK * self.events
     }

@@ -1,6 +1,6 @@
 //! When samples arrive if nothing is left to chance.
 //!
-//! A link that only delays gives its delay at once. From any other what is random is replaced by something stated; if it still does more than delay, the
+//! A link that only delays gives its delay at once. In any other a random part is replaced by a stated one; if it still does more than delay, the
 //! scene's own samples are sent through the emulator until what becomes of them repeats. Links that share no access line are looked at once for each
 //! configuration and each way of sampling, so that very many equal peers cost as much as two.
 

@@ -1,4 +1,4 @@
-//! A link with nothing left to chance: what is random is replaced by something stated.
+//! A link with nothing left to chance: each random part is replaced by a stated one.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! What is nominal, in words.
+//! The nominal parts of a link, in words.
 
 use std::collections::BTreeMap;
 

@@ -12,11 +12,11 @@ use super::timing::LinkTiming;
 /// The longest pattern, of all links together \[samples\].
 pub(crate) const MOST_SAMPLES: usize = 64;
 
-/// A probe gives up after so many samples of a peer, or so many packets in all.
+/// A probe gives up after that number of samples of a peer, or of packets in all.
 const MOST_SENT: u64 = 16_384;
 const MOST_PACKETS: u64 = 1 << 24;
 
-/// The first look at what came out, after so many samples. Twice as many for every further look.
+/// The number of samples before the first look at what came out. Twice as many for every further look.
 const FIRST_LOOK: u64 = 256;
 
 const PENDING: u64 = u64::MAX;
@@ -100,7 +100,7 @@ impl Probe {
         line.paths.iter().map(|(from, to)| fraction(*from, *to) * self.senders[*from].per_second() * line.bits).sum()
     }
 
-    /// Goes on until everybody has sent so many samples.
+    /// Goes on until every peer has sent that number of samples.
     fn send(&mut self, samples: u64) {
         let mut waiting = Vec::new();
         while let Some((now, place)) = self.next.pop_first() {

@@ -16,7 +16,7 @@ pub(crate) struct Sampling {
     period: Duration,
     /// Parts per billion.
     drift: i64,
-    /// What is sent is on its way for so long before the link.
+    /// The time that a sample is under way before the link.
     ahead: Duration,
 }
 

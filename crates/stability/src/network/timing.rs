@@ -38,7 +38,7 @@ impl LinkTiming {
         }
     }
 
-    /// The same, with every sample so much later.
+    /// The timing with every sample later by that.
     pub(crate) fn later(&self, by: Duration) -> Self {
         match self {
             Self::Constant(delay) => Self::Constant(delay.saturating_add(by)),

@@ -9,7 +9,7 @@ use super::triangle::precise;
 /// Sweeps for one eigenvalue before the iteration is given up. Two to four are usual; several eigenvalues near zero in a badly scaled matrix took 150.
 const SWEEPS: u32 = 400;
 
-/// Sweeps for one eigenvalue after which an entry counts as zero beside the whole matrix.
+/// Sweeps for one eigenvalue after which an entry counts as zero compared with the whole matrix.
 const PATIENCE: u32 = 6;
 
 /// Turns a Hessenberg matrix into a quasi-triangular one: blocks of one and two rows on the diagonal, zeros below.

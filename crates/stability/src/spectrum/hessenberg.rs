@@ -16,7 +16,7 @@ pub(super) fn reduce<S: Square>(matrix: &mut S) {
             below += matrix.at(row, column) * matrix.at(row, column);
         }
         if below < TINY_SQUARE {
-            // Entries below 1e-140 beside a matrix of about unit size: zero.
+            // Entries below 1e-140 compared with a matrix of about unit size: zero.
             for row in pivot + 1..size {
                 matrix.put(row, column, 0.0);
             }

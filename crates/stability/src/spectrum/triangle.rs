@@ -170,7 +170,7 @@ impl Triangle {
         for q in start..end {
             for row in (0..start).rev() {
                 let (mut value, mut carried, mut magnitude) = (-self.at(row, q), 0.0, self.weights[row * size + q]);
-                // Rows of T₁₁ to the right of this one with a minus; what is solved for in this column is kept in a row of its own.
+                // Rows of T₁₁ to the right of this one with a minus; the solution in this column is kept in a row of its own.
                 let (beyond, column) = (row * size + row + 1..row * size + start, q * size + row + 1..q * size + start);
                 let known = self.solution[column.clone()].iter().zip(&self.doubt[column.clone()]).zip(&self.solved[column]);
                 for ((entry, weight), ((known, doubt), size)) in self.entries[beyond.clone()].iter().zip(&self.weights[beyond]).zip(known) {
@@ -242,7 +242,7 @@ impl Triangle {
         let limit = limit * (1.0 - 1e-12);
         let blocks = 0..self.amplification.len();
         let single = |starts: &[usize], block: usize| starts[block + 1] - starts[block] == 1;
-        // What is cheap first: it often is too much alone.
+        // The cheap part first: it often is too much alone.
         let mut total = 0.0;
         for block in blocks.clone().filter(|block| single(&self.starts, *block)) {
             total += self.amplification[block] / distances[self.starts[block]];

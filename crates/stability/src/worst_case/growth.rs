@@ -6,7 +6,7 @@
 //! Mᵏ·M, Mᵏ·M², …, Mᵏ·Mⁿ cannot all cancel (Turán 1953, second main theorem).
 //!
 //! Rounding: the exact power is 2^s·(N + E), N computed, ‖E‖₂ <= e. Its square is N² + NE + EN + E², and N² is computed to within γₙ‖N‖_F², so that
-//! e' = 2‖N‖₂e + e² + γₙ‖N‖_F². The trace of N + E is within n·e of that of N, beside the rounding of its own sum. Relative to N the error doubles with
+//! e' = 2‖N‖₂e + e² + γₙ‖N‖_F². The trace of N + E is within n·e of that of N, in addition to the rounding of its own sum. Relative to N the error doubles with
 //! every squaring, but its root of order k does not grow.
 
 use super::norm::{Sharpness, frobenius_norm, norm_above};

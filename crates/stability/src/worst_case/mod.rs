@@ -14,7 +14,7 @@
 //! over and over, multiply it by 0.5·1.5³ = 1.69 in four frames: as a pattern that may repeat for ever it is unstable. That pattern has probability
 //! zero for ever, which is why both can be true; a jammer, or a schedule that beats with the sampling, does not know about probabilities.
 //!
-//! What is certified is certified in floating point: every bound carries the rounding errors of its own computation, with no trust in the search that
+//! Certificates are computed in floating point: every bound carries the rounding errors of its own computation, with no trust in the search that
 //! led to it. Only sums, products, quotients and roots of this crate's own are used, so that the answer is the same on every machine.
 
 mod automaton;

@@ -3,7 +3,7 @@
 //! With G = MᵀM the 2-norm is ‖G^m‖₂^(1/2m) <= ‖G^m‖_F^(1/2m), and the Frobenius norm is above the 2-norm by at most √n, so that the bound is sharp to
 //! n^(1/4m). Squaring G over and over doubles m each time.
 //!
-//! The Frobenius norm of M itself and its longest row, which cost nothing beside a product, come first: most products are decided by them.
+//! The Frobenius norm of M itself and its longest row, which cost nothing compared with a product, come first: most products are decided by them.
 //!
 //! Rounding: write Ĝ for the computed G^m, m = 2^j, and δⱼ = ‖Ĝ − G^m‖_F / ‖G^m‖₂. A product of computed matrices is within γₙ‖·‖_F‖·‖_F of the exact
 //! one, and ‖·‖_F² <= n‖·‖₂², so δ₀ <= nγₙ and δ₍ⱼ₊₁₎ <= 2δⱼ + δⱼ² + nγₙ(1 + δⱼ)². While δⱼ <= 1/8 this gives δⱼ <= 2^(j+1)·nγₙ·(5/4) + …; the worst case

@@ -68,7 +68,7 @@ pub enum CertificateError {
 impl Certificate {
     /// Checks shapes, one per node, against a rate.
     ///
-    /// What is within rounding of failing fails: the margin is about n²·10⁻¹⁶, relative to the terms that cancel.
+    /// A certificate within rounding of failing fails: the margin is about n²·10⁻¹⁶, relative to the terms that cancel.
     ///
     /// # Errors
     ///

@@ -29,7 +29,7 @@ pub(super) fn replace(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), 
     let (new, old) = (beside("new"), beside("old"));
     let written = write_all(&new, files).and_then(|()| put(&new, folder, &old));
     if written.is_err() {
-        // What is left of it is of no use; that it cannot be removed is of no interest beside why it was not written.
+        // The rest of it is of no use. The reason why it was not written is reported, and not that it cannot be removed.
         let _ = fs::remove_dir_all(&new);
     }
     written

@@ -234,7 +234,7 @@ impl Testbed {
     ///
     /// # Panics
     ///
-    /// As [`Testbed::run`]; and if the two runs are not the same, with the first difference and its time.
+    /// As [`Testbed::run`]; and if the two runs differ, with the first difference and its time.
     #[track_caller]
     #[expect(clippy::panic, reason = "what it was asked to find out")]
     pub fn run_twice<T, F>(mut self, program: impl Fn(Bed) -> F) -> T

@@ -119,7 +119,7 @@ impl Bed {
         self.shared.lock().wire.mend_all();
     }
 
-    /// The link from one host to another is another one from now on. What is in it follows the rules of [`cohaptic_wan::Link::set_model`].
+    /// The link from one host to another is another one from now on. Packets in it follow the rules of [`cohaptic_wan::Link::set_model`].
     ///
     /// # Panics
     ///

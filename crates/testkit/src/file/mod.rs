@@ -18,7 +18,7 @@ use crate::words::{self, WordsError};
 /// Hosts and the links between them, read from a file.
 ///
 /// A file that ends in `.toml` is a relay file, whose programs are the hosts (feature `files`), or a scene file, whose peers are (feature `scenes`): its links are as it says, also
-/// those that change while the run goes on, and its seed is that of the run. What is said of devices, objects and expectations means nothing here.
+/// those that change while the run goes on, and its seed is that of the run. Devices, objects and expectations mean nothing here.
 ///
 /// Any other file is of plain words, a line each:
 ///

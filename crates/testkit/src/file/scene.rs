@@ -8,7 +8,7 @@ use cohaptic_scene::{ChangeKind, Scene};
 
 use super::{LinkChange, LinkFile, LinkFileError};
 
-/// Whether a text is a relay file. What is no TOML at all is refused as a scene, with the place.
+/// Whether a text is a relay file. Text that is no TOML is refused as a scene, with the place.
 pub(super) fn is_relay(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("programs") || table.contains_key("relay"))
 }
@@ -28,7 +28,7 @@ impl LinkFile {
                     let link = table.between(from, to).clone();
                     LinkChange { at, from, to, link }
                 })),
-                // They change what is at the ends of the links.
+                // They change the ends of the links.
                 ChangeKind::Contact { .. } | ChangeKind::Hand { .. } | ChangeKind::Coordination(_) => {}
             }
         }

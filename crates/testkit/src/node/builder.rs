@@ -172,7 +172,7 @@ impl Nodes {
     ///
     /// # Panics
     ///
-    /// If the two runs are not the same, with the first difference and its time.
+    /// If the two runs differ, with the first difference and its time.
     #[expect(clippy::panic, reason = "what it was asked to find out")]
     pub fn run_twice<T>(build: impl Fn() -> Self, program: impl Fn(&mut NodeRun) -> T) -> T {
         let run = || -> (T, Record) {

@@ -46,7 +46,7 @@ impl NodeRun {
         self.wire.mend_all();
     }
 
-    /// The link from one node to another is another one from now on. What is in it follows the rules of [`cohaptic_wan::Link::set_model`].
+    /// The link from one node to another is another one from now on. Packets in it follow the rules of [`cohaptic_wan::Link::set_model`].
     ///
     /// # Panics
     ///

@@ -55,7 +55,7 @@ impl NodeRun {
             self.count(if sent > self.patience / 2 { Does::Sends } else { because }, id);
             self.send(id, transmit);
         }
-        // What is late is due now: so that nodes are woken in their order, however late they are.
+        // Late events are due now: so that nodes are woken in their order, however late they are.
         let deadline = node.poll_timeout().map(|deadline| deadline.max(self.now()));
         self.deadlines.set(id.index(), deadline);
         self.nodes[id.index()] = Some(node);

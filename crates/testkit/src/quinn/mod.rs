@@ -27,7 +27,7 @@
 //! assert_eq!(answer, b"how are you");
 //! ```
 //!
-//! # What is random, and what of it shows
+//! # Randomness, and where it shows
 //!
 //! | what | where it comes from | what it changes |
 //! | --- | --- | --- |
@@ -47,14 +47,14 @@
 //! # Which clocks are read
 //!
 //! Quinn asks its runtime for the time, and its server's time source for that of tokens; both are virtual, as is the time provider of the TLS configurations of
-//! this module. What is left are features that are not built here (`qlog`, `lock_tracking`), and rustls outside of those configurations: the validity of certificates is
+//! this module. The rest are features that are not built here (`qlog`, `lock_tracking`), and rustls outside of those configurations: the validity of certificates is
 //! checked against the day's date then, and `Ticketer`s change their keys by it. None of this has a part in when a packet is sent.
 //!
 //! # What differs from a real socket
 //!
 //! - A datagram is sent alone (no segmentation offload), and never fragmented, so that quinn searches the path's MTU.
 //! - Datagrams that the host cannot send are lost without an error, as `quinn-udp` does it: to an address that no host has, or from one that it has no longer.
-//! - What is sent as ECT(1) arrives as ECT(0): links know capable and marked, no more. Quinn sends ECT(0).
+//! - A packet sent as ECT(1) arrives as ECT(0): links know capable and marked, no more. Quinn sends ECT(0).
 //! - An endpoint at `[::]` hears IPv6 only.
 //! - The day is the first of 2027 when the run begins, for certificates and tokens.
 //! - When a host crashes, its endpoints are gone without a word, and their peers find out by their timeouts. Spawn what uses them on that host.

@@ -154,7 +154,7 @@ impl LinkBounds {
                 return self.refuse(BoundsError::Rate { found });
             }
         }
-        // What is rounded to whole bytes must stay inside.
+        // A size rounded to whole bytes must stay inside.
         let (low, high) = (range.start().next_multiple_of(8), range.end() - range.end() % 8);
         if low > high {
             let (low, high) = (format!("{}bit", range.start()), format!("{}bit", range.end()));

@@ -24,7 +24,7 @@ fn next_above(value: u64, digits: u32, step: u64) -> Option<u64> {
     (count / unit).checked_add(1)?.checked_mul(unit)?.checked_mul(step)
 }
 
-/// What the last of so many digits of a count is worth.
+/// The value of the last of that number of digits of a count.
 fn unit(count: u64, digits: u32) -> u64 {
     let places = count.checked_ilog10().map_or(1, |log| log + 1);
     10_u64.pow(places.saturating_sub(digits))

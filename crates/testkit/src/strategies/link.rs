@@ -41,7 +41,7 @@ pub enum LinkError {
     Words {
         /// The words and the mark.
         excerpt: String,
-        /// What is wrong.
+        /// The fault.
         reason: NetemError,
     },
     /// They ask for what cannot be. Tables of distributions are not read from files here.
@@ -100,7 +100,7 @@ impl ImpairedLink {
         LinkModel::from(self.config())
     }
 
-    /// Its impairments, in the order of the words. A delay counts as one only without jitter and reordering, which it serves; what is zero, and `seed`, are none.
+    /// Its impairments, in the order of the words. A delay counts as one only without jitter and reordering, which it serves; a zero, and `seed`, are none.
     #[must_use]
     pub fn stages(&self) -> Vec<Stage> {
         Stage::ALL.into_iter().filter(|stage| stage::has(&self.netem, *stage)).collect()

@@ -31,7 +31,7 @@ const MOST: usize = 1_000;
 #[derive(Clone, PartialEq)]
 pub struct ImpairedNetwork {
     hosts: usize,
-    /// By sender, then receiver; what is not there is ideal.
+    /// By sender, then receiver; a link that is not there is ideal.
     links: BTreeMap<(NodeId, NodeId), ImpairedLink>,
     ideal: ImpairedLink,
 }

@@ -23,7 +23,7 @@ pub(super) fn units(percent: f64) -> u64 {
     units.min(ALL)
 }
 
-/// The percentage of so many ten-thousandths: the decimal fraction that prints with at most four places.
+/// The percentage of that number of ten-thousandths: the decimal fraction that prints with at most four places.
 pub(super) fn percent(units: u64) -> Percent {
     let units = u32::try_from(units.min(ALL)).unwrap_or(u32::MAX);
     Percent::new(f64::from(units) / 10_000.0).unwrap_or_default()

@@ -70,7 +70,7 @@ impl Space for LinkSpace {
 #[derive(Clone, Debug)]
 pub(super) struct NetworkSpace(pub(super) LinkSpace);
 
-/// From whom to whom.
+/// Sender and receiver.
 pub(super) type Pair = (NodeId, NodeId);
 
 /// A part of a network.

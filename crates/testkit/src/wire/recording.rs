@@ -1,4 +1,4 @@
-//! What is recorded of a run.
+//! The record of a run.
 
 use bytes::Bytes;
 use cohaptic_units::Instant;
@@ -7,7 +7,7 @@ use cohaptic_wan::{Network, PacketEvent, PacketRecord, Path};
 use super::{Parcel, Settings};
 use crate::trace::{Happening, Trace};
 
-/// What is recorded of a run, as far as it is asked for.
+/// The record of a run, as far as it is asked for.
 #[derive(Debug)]
 pub(crate) struct Recording {
     trace: Trace,

@@ -11,7 +11,7 @@ pub struct LinkStats {
     pub(crate) seldom: Seldom,
 }
 
-/// What is counted for every packet. Apart, so that the links of a large mesh touch little memory.
+/// The counts of every packet. Apart, so that the links of a large mesh touch little memory.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Flow {
     pub(crate) offered: u64,
@@ -19,7 +19,7 @@ pub(crate) struct Flow {
     pub(crate) delay_nanos: u128,
 }
 
-/// What is counted for some packets.
+/// The counts of some packets.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Seldom {
     pub(crate) duplicated: u64,

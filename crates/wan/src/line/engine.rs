@@ -1,4 +1,4 @@
-//! What is behind a link that cannot say at once what becomes of a packet.
+//! The state machine of a link that cannot say at once what becomes of a packet.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;

@@ -25,7 +25,7 @@ pub enum LinkModel {
     Fixed(LinkConfig),
     /// A configuration for each state of a modulator.
     Modulated(Modulated),
-    /// The n-th packet meets the fate of the n-th packet of the log, as long after it was offered. What is offered after the log has ended is dropped.
+    /// The n-th packet meets the fate of the n-th packet of the log, as long after it was offered. A packet offered after the log has ended is dropped.
     Replay(Arc<FateLog>),
     /// What Linux 6.6 does with these words: see [`crate::netem::kernel`].
     Kernel(KernelNetem),

@@ -12,13 +12,13 @@ use super::Contradiction;
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{kind}")]
 pub struct NetemError {
-    /// What is wrong.
+    /// The fault.
     pub kind: NetemErrorKind,
     /// The bytes of the word to blame in the text that was read.
     pub span: Range<usize>,
 }
 
-/// What is wrong with the words of a netem.
+/// A fault in the words of a netem.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum NetemErrorKind {
     /// A word where an option was expected.

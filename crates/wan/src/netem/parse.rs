@@ -123,7 +123,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
             "duplicate" => self.netem.duplicate = Some(self.chance(option)?),
             "distribution" => self.distribution = Some(self.value(option, NAME, Distribution::named)?),
             "rate" => self.netem.rate = Some(self.rate()?),
-            // What is left of the table.
+            // The rest of the table.
             _ => self.netem.slot = Some(self.slot()?),
         }
         Ok(())

@@ -198,7 +198,7 @@ pub struct ReorderSpec {
 pub struct RateSpec {
     /// The rate \[bytes/s\], rounded down as `tc` does.
     pub bytes_per_sec: NonZeroU64,
-    /// What is added to a packet's length.
+    /// The bytes added to a packet's length.
     pub framing: Option<FramingSpec>,
 }
 

@@ -70,7 +70,7 @@ pub struct ExtraDelay {
 pub struct Refusal {
     /// The parameter to blame.
     pub key: &'static str,
-    /// What is wrong, and what was expected.
+    /// The fault, and what was expected.
     pub message: String,
 }
 

@@ -39,7 +39,7 @@ pub enum Displacement {
         /// How long it is held at most.
         at_most: Duration,
     },
-    /// It takes so much longer than its delay.
+    /// The time that it takes in addition to its delay.
     Later {
         /// How much.
         by: Duration,
@@ -53,7 +53,7 @@ pub(crate) enum Placed<T> {
     InOrder(Carried<T>),
     /// It takes no delay.
     Jumps(Carried<T>),
-    /// It takes so much longer.
+    /// The additional time that it takes.
     Late(Carried<T>, Duration),
     /// It is held back.
     Held,
@@ -169,7 +169,7 @@ static REORDER_TABLE: Table = Table::of(&[
         usual("gap", Form::Integer(1, MOST_OF_32_BITS), "1", "Such a packet jumps ahead, at most one in this number of packets"),
         optional("behind", Form::Integer(1, MOST_OF_32_BITS), "Such a packet is held until this number of others has passed it; needs at-most"),
         optional("at-most", Form::Duration, "How long a packet is held behind others at most"),
-        optional("later", Form::Duration, "Such a packet takes so much longer"),
+        optional("later", Form::Duration, "Such a packet takes this much longer"),
     ],
 ]);
 

@@ -179,7 +179,7 @@ pub(crate) const KEYS: [Key; 1] = [usual(
     "slots",
     Form::AnyOf(const { &[Form::Table(&SLOTS), NONE] }),
     "\"none\"",
-    "The line sends only now and then, all that has gathered or so much of it",
+    "The line sends only now and then, all that has gathered or a part of it",
 )];
 static SLOTS: Table = Table::of(&[&[
     optional("min", Form::Duration, "The shortest time from slot to slot"),

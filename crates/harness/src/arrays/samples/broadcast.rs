@@ -13,13 +13,13 @@ use super::{Sample, others};
 use crate::arrays::blocks::Blocks;
 use crate::arrays::lead::mean_lead;
 
-/// What is on the way, and what is held from each sender.
+/// The samples in flight, and those held from each sender.
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
     delay_ticks: u64,
     on_the_way: VecDeque<Sent<A, L>>,
     peers: usize,
-    /// What is held from each sender but the first, by axis, as the first peer holds it; and from the first.
+    /// The samples held from each sender but the first, by axis, as the first peer holds it; and from the first.
     held: [Vec<Quad<L>>; A],
     first: Sample<A, L>,
     /// How many samples of each sender have arrived.
@@ -102,7 +102,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         mean_lead((0..self.peers).filter(|sender| *sender != peer).map(moving), now, horizon, others(self.peers))
     }
 
-    /// The means are those of what is held.
+    /// The means are those of the samples held.
     #[inline(always)]
     pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks<A>) {
         if !std::mem::take(&mut self.changed) {

@@ -1,7 +1,7 @@
 //! Samples that each arrive at an instant of their own: links that differ, jitter, loss, bursts, outages.
 //!
-//! Peers look at what has arrived at their ticks alone, and all tick together. So what is on the way lies in a wheel, by the tick at which it is in force, and
-//! nothing is sorted but what is due together after one overtook another on its link.
+//! Peers look at what has arrived at their ticks alone, and all tick together. So samples in flight lie in a wheel, by the tick at which it is in force, and
+//! nothing is sorted but the samples that are due together after one overtook another on its link.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ fn slot(tick: u64) -> usize {
     usize::from(tick.to_le_bytes()[0])
 }
 
-/// The links, what is on the way, and what each peer holds of each other.
+/// The links, the samples in flight, and those that each peer holds of each other.
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     peers: usize,
@@ -38,14 +38,14 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     emptied: Vec<Vec<Packet<A>>>,
     /// Samples held, by axis, then receiver, then sender with the receiver left out. Each receiver has [`row_of`] places, of which the last may be empty.
     held: [Vec<Quad<L>>; A],
-    /// By place, then run: the lowest sequence number that is newer than what is held.
+    /// By place, then run: the lowest sequence number that is newer than the sample held.
     next: Vec<u64>,
     changed: Vec<bool>,
     /// By receiver, then run: samples that arrived after a newer one.
     stale: Vec<u64>,
 }
 
-/// What is in force at a tick.
+/// The samples in force at a tick.
 #[derive(Clone, Debug)]
 struct Bucket<const A: usize> {
     packets: Vec<Packet<A>>,
@@ -199,7 +199,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         mean_lead((0..self.peers - 1).map(moving), now, horizon, others(self.peers))
     }
 
-    /// The means are those of what is held.
+    /// The means are those of the samples held.
     #[inline(always)]
     pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks<A>) {
         let count = others(self.peers);
@@ -220,7 +220,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         self.take_in(tick, self.end);
     }
 
-    /// Takes in what is due at that tick and arrived by `until`.
+    /// Takes in the samples that are due at that tick and arrived by `until`.
     #[inline(never)]
     fn take_in(&mut self, tick: u64, until: Instant) {
         let place = slot(tick);
@@ -242,7 +242,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         self.emptied.push(bucket.packets);
     }
 
-    /// What is due at that tick and was sent long ago.
+    /// The samples that are due at that tick and were sent long ago.
     #[cold]
     fn come_near(&mut self, tick: u64) {
         if let Some(bucket) = self.beyond.remove(&tick) {
@@ -267,7 +267,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         self.changed[usize::from(packet.receiver)] = true;
     }
 
-    /// A run ends before the end of the scene: what is still on the way in it never arrives.
+    /// A run ends before the end of the scene: samples still in flight in it never arrive.
     ///
     /// `sent` says when a packet of a sender was sent.
     pub(in crate::arrays) fn end_early(&mut self, run: usize, sent: impl Fn(usize, u64) -> Instant) {

@@ -9,7 +9,7 @@ pub(super) type Quad<const L: usize> = [[f64; L]; 8];
 /// What lies where there is no sender. Adding it changes no sum, of whatever sign its zero is.
 const NOBODY: f64 = -0.0;
 
-/// Quads of so many samples of nobody.
+/// Quads of that number of empty samples.
 pub(super) fn empty<const L: usize>(samples: usize) -> Vec<Quad<L>> {
     vec![[[NOBODY; L]; 8]; samples.div_ceil(4)]
 }

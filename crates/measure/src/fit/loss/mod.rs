@@ -52,7 +52,7 @@ pub enum LossModel {
 pub struct LossFit {
     /// The model.
     pub model: LossModel,
-    /// Standard errors of the first and second parameter of the model, where there is a closed form: of a share p of n, √(p(1−p)/n), or so much more that
+    /// Standard errors of the first and second parameter of the model, where there is a closed form: of a share p of n, √(p(1−p)/n), or enough more that
     /// 1.96 of them reach the farther end of Wilson's interval, which matters where little happened.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_errors: Option<[f64; 2]>,

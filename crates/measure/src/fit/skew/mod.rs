@@ -7,14 +7,14 @@
 //! taken off before the location is.)
 //!
 //! Which location is the most certain depends on the law: the mean for a normal one, the median for long tails on both sides, the least for those that begin
-//! with an edge, as behind a queue (segment minima: Paxson 1998, SIGMETRICS, "On calibrating measurements of packet transit times"), the lower eighth
-//! for those that begin gently and end far out. All four are computed, and the one with the least standard error is taken. That choice favours a location
+//! with an edge, as behind a queue, the lower eighth for those that begin gently and end far out. (Segment minima: Paxson 1998, SIGMETRICS, "On calibrating
+//! measurements of packet transit times".) All four are computed, and the one with the least standard error is taken. That choice favours a location
 //! whose error came out too small, so each is judged at a quarter of the level (Bonferroni): whichever is taken, a drift that is not there is found in at
 //! most 1 % of all measurements.
 //!
 //! The line below all points of least distance (Moon, Skelly & Towsley 1999, INFOCOM) needs no blocks, and is 2.5 times as close for independent delays
-//! of laws with an edge; but how close it is depends on the law and the memory of the delays near the edge, so that no error can be stated with it, and
-//! without an edge it follows single points.
+//! of laws with an edge. But how close it is depends on the law and the memory of the delays near the edge, so that no error can be stated with it. Without an
+//! edge it follows single points.
 
 mod blocks;
 

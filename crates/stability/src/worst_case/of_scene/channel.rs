@@ -20,7 +20,7 @@ pub(super) struct Way {
     pub delay: Duration,
 }
 
-/// Links of which all or none lose what is due in a frame, and which delay it by as much more than their least delays.
+/// Links of which all or none lose the samples due in a frame, and which delay it by as much more than their least delays.
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     pub links: Vec<Link>,
@@ -65,12 +65,12 @@ pub(super) struct Symbol {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Fate {
     Lost,
-    /// Received with a delay of at most so much more than the least one.
+    /// Received with a delay that exceeds the least one by at most this.
     Received(Duration),
 }
 
 impl Channel {
-    /// The links of a channel between nodes with those clocks, which tick a whole number of times in a frame. At most `most` frames in a row lose what is due
+    /// The links of a channel between nodes with those clocks, which tick a whole number of times in a frame. At most `most` frames in a row lose the samples due
     /// in them; delays are up to `width` beyond the least ones, less than a frame.
     pub(super) fn new(ways: &[Way], clocks: &[NodeClock], width: Duration, most: u32) -> Result<Self, PatternError> {
         let ticks = |way: &Way| usize::try_from(clocks[way.to].every).unwrap_or(usize::MAX);

@@ -56,9 +56,9 @@ pub enum SceneWorstCaseError {
     /// A link does more than delay.
     #[error("what becomes of samples from {from} to {to} follows a pattern of its own: expected a link of constant delay, or an interval of delays")]
     Pattern {
-        /// Who sends.
+        /// The sender.
         from: String,
-        /// Who receives.
+        /// The receiver.
         to: String,
     },
     /// There are too many kinds of frame.

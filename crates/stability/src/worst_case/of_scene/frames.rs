@@ -2,7 +2,7 @@
 //!
 //! A frame is that of the nominal analysis: the same nodes, ticks and samplings. Only what a receiver is given, and when, follows from the symbol; and what
 //! it holds at the beginning is an unknown of its own, because it may be of any age. The state is that of the nominal analysis, the newest samples of each
-//! node first, with what is held on each link after it.
+//! node first, with the sample held on each link after it.
 
 use super::channel::{Channel, Link};
 use crate::Matrix;
@@ -11,7 +11,7 @@ use crate::timetable::{Event, Timetable};
 
 /// One part of a scene: nodes, and the links between them that can lose and delay.
 pub(super) struct Block<'a> {
-    /// With the timetable of a frame in which what is delivered does not matter.
+    /// With the timetable of a frame in which deliveries do not matter.
     pub lifted: Lifted<'a>,
     /// For each channel, the place of each of its links that is in this part, and the nodes at its ends.
     pub links: Vec<Vec<(usize, Link)>>,
@@ -58,7 +58,7 @@ impl Block<'_> {
                 deliveries.extend(symbol.now[*place].map(|tick| delivery(tick, link.age)));
             }
         }
-        // What is held at the beginning stands with the samples of its sender, as if of an age beyond all that are used.
+        // The sample held at the beginning stands with the samples of its sender, as if of an age beyond all that are used.
         let timetable = timetable(self.lifted.timetable, &links, &deliveries, &depth);
         let frame = Lifted { timetable: &timetable, ..self.lifted }.frame(&mut Autonomous);
         if self.lifted.sampling.is_silent(self.lifted.time) {

@@ -1,7 +1,7 @@
-//! The worst case of a scene: at most so many samples lost in a row, delays anywhere in an interval, and nothing else known about the network.
+//! The worst case of a scene: a bounded number of samples lost in a row, delays anywhere in an interval, and nothing else known about the network.
 //!
 //! A step is one period of sending. What the network can do in it are the symbols of a pattern; each stands for the matrix of such a frame, made from the same
-//! nodes and ticks as the nominal analysis. A receiver that is given nothing goes on with what it holds, so that what is held is part of the state.
+//! nodes and ticks as the nominal analysis. A receiver that is given nothing goes on with what it holds, so that the samples held are part of the state.
 //!
 //! Where all links lose together (an outage of something that all share), equal peers stay equal, and the scene falls into the parts of the nominal
 //! analysis. In coordinates in which these parts are separate, every frame's matrix is block-diagonal, with one sequence of symbols for all blocks; so is

@@ -49,7 +49,7 @@ fn one_frame(fates: &[Fate], channels: &[Channel], delay: Option<Duration>, name
     each.join(" and ")
 }
 
-/// Begins after the last loss of a run, so that what arrives is said before what is lost.
+/// Begins after the last loss of a run, so that arrivals are said before losses.
 fn rotated(fates: &[Vec<Fate>], mut said: Vec<String>) -> Vec<String> {
     let losses = |frame: usize| fates[frame % fates.len()].iter().filter(|fate| **fate == Fate::Lost).count();
     let start = (0..fates.len()).find(|frame| losses(*frame) == 0 && losses(frame + fates.len() - 1) > 0);

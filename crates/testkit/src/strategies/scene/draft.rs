@@ -40,7 +40,7 @@ pub struct Draft {
     pub update: u64,
     /// Which integrator with how many steps; `None` is the exact one.
     pub integrator: Option<(&'static str, u32)>,
-    /// Who takes part.
+    /// The peers.
     pub peers: Vec<DraftPeer>,
     /// Keys of all links, as TOML: `delay = "8ms", loss = 0.1`.
     pub link: String,

@@ -5,7 +5,7 @@ use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, E
 use super::draft::{Draft, DraftHand, DraftPeer, Place};
 use crate::strategies::grid::{Dice, Span};
 
-/// So many thousandths as a number.
+/// A number of thousandths as a number.
 fn thousandths(count: u64) -> f64 {
     f64::from(u32::try_from(count).unwrap_or(u32::MAX)) / 1e3
 }
@@ -15,7 +15,7 @@ fn number(low: u64, high: u64, dice: &mut Dice<'_>) -> f64 {
     thousandths(dice.number(Span { low, high, step: 1 }))
 }
 
-/// Components up to so many thousandths, either way; zero now and then.
+/// Components up to that number of thousandths, either way; zero now and then.
 fn place(most: u64, dice: &mut Dice<'_>) -> Place {
     [(); 3].map(|()| {
         let size = if dice.one_in(4) { 0.0 } else { number(0, most, dice) };

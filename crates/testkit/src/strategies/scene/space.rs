@@ -8,7 +8,7 @@ use super::knobs::{self, Knob};
 use crate::strategies::shrink::{Number, Space};
 use crate::strategies::space::{NetworkPart, NetworkSpace};
 
-/// Scenes of at least so many peers with such links.
+/// Scenes of at least that number of peers with such links.
 #[derive(Clone, Debug)]
 pub(super) struct SceneSpace {
     pub(super) least: usize,

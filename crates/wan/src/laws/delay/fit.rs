@@ -19,7 +19,7 @@ pub(super) struct Fit {
     pub(super) delivered: Moments,
 }
 
-/// What is asked for. `sd` is above zero, `mean` at or above `floor`, and all are finite.
+/// The moments asked for. `sd` is above zero, `mean` at or above `floor`, and all are finite.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Asked {
     pub(super) mean: f64,

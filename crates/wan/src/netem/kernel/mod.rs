@@ -27,7 +27,7 @@
 //! of whole ticks of 64 ns, both rounded down, jitter of at most 2.147483647 s. It forgets the correlation of `duplicate` unless delay, random
 //! loss, corrupt or reorder has one too.
 //!
-//! # What is not here
+//! # Parts left out
 //!
 //! Segmentation offload (a packet is a packet), a child or parent qdisc, a device that is slow or stops, timers that are late.
 

@@ -104,7 +104,7 @@ pub struct Dequeued<T> {
     pub copy: u8,
     /// Whether it got a congestion mark in place of a loss. The kernel counts this as a drop.
     pub marked: bool,
-    /// The bit that was flipped. The checksums were completed before, so whoever checks them drops the packet.
+    /// The bit that was flipped. The checksums were completed before, so a host that checks them drops the packet.
     pub corrupted: Option<FlippedBit>,
     /// Whether it left before those that waited.
     pub reordered: bool,

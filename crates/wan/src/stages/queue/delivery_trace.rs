@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use cohaptic_units::{Bytes, Instant};
 
-/// Opportunities to deliver. At each, up to [`DeliveryTrace::bytes`] leave: of one packet or of several, and a packet may need several. What is not used is
+/// Opportunities to deliver. At each, up to [`DeliveryTrace::bytes`] leave: of one packet or of several, and a packet may need several. Unused bytes are
 /// lost. A packet that is offered at the very instant of an opportunity waits for the next.
 ///
 /// The recording repeats for ever: after its last line it begins anew, with its end as the new zero.

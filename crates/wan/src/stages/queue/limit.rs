@@ -8,7 +8,7 @@ use core::time::Duration;
 use crate::parameters::Form;
 use cohaptic_units::Bytes;
 
-/// How much may wait in a queue. What is being sent does not count.
+/// The size that may wait in a queue. A packet being sent does not count.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum QueueLimit {
     /// At most this number of packets waits; with 0, a packet that finds the line busy is dropped.

@@ -1,0 +1,28 @@
+//! The commands that need Linux, on other systems: each takes its arguments, says that it needs Linux, and ends with status 3.
+
+/// A module for each command, with the function that stands in for the command.
+macro_rules! need_linux {
+    ($($command:ident: $arguments:ident),* $(,)?) => {
+        $(
+            pub(crate) mod $command {
+                use std::process::ExitCode;
+
+                use crate::arguments::$arguments;
+                use crate::failure::Failure;
+
+                pub(crate) fn $command(_: &$arguments) -> Result<ExitCode, Failure> {
+                    let command = stringify!($command);
+                    Err(Failure::System(format!("cohaptic {command} needs Linux: its clocks, sockets or devices are those of Linux")))
+                }
+            }
+        )*
+    };
+}
+
+need_linux! {
+    accuracy: AccuracyArguments,
+    falcon: FalconArguments,
+    live: LiveArguments,
+    relay: RelayArguments,
+    router: RouterArguments,
+}
