@@ -10,13 +10,13 @@ fn links(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("link");
     group.throughput(Throughput::Elements(PACKETS)).sample_size(20);
     for (name, config) in stages() {
-        group.bench_function(name, |bencher| bencher.iter(|| drive(&config, PACKETS)));
+        group.bench_function(name, |bencher| bencher.iter(|| drive(&config, PACKETS, |_| ())));
     }
     for (name, config) in ["str0m-netem: delay", "str0m-netem: jitter and loss", "str0m-netem: full"].into_iter().zip(str0m_configs()) {
         group.bench_function(name, |bencher| bencher.iter(|| str0m(config, PACKETS)));
     }
-    group.bench_function("a bare ring", |bencher| bencher.iter(|| ring(PACKETS)));
-    group.bench_function("a bare heap", |bencher| bencher.iter(|| heap(PACKETS)));
+    group.bench_function("a bare ring", |bencher| bencher.iter(|| ring(PACKETS, |_| ())));
+    group.bench_function("a bare heap", |bencher| bencher.iter(|| heap(PACKETS, |_| ())));
     group.bench_function("a bare heap, hold model", |bencher| bencher.iter(|| hold(PACKETS)));
     group.finish();
 }

@@ -14,7 +14,7 @@ fn mesh(criterion: &mut Criterion) {
         let size = format!("{}-{}", mesh.peers, if mesh.impaired { "jitter-and-loss" } else { "constant" });
         // Elements are simulated milliseconds: "1 Melem/s" is 1000 times real time.
         group.throughput(Throughput::Elements(seconds * 1000));
-        let scene = mesh.scene(seconds);
+        let scene = mesh.scene(seconds * 1000, 1);
         group.bench_function(BenchmarkId::new("cohaptic", &size), |bencher| bencher.iter(|| Mesh::run(&scene)));
         group.bench_function(BenchmarkId::new("bare-loop", &size), |bencher| bencher.iter(|| bare::run(mesh, seconds * 1000)));
     }

@@ -7,10 +7,11 @@
 
 use std::collections::VecDeque;
 
+use cohaptic_benches_common::mesh::{COUPLING, DELAY_NANOS, DEVICE, HAND_FORCE, LOSS, Mesh, OBJECT_MASS, SD_NANOS, TICK_NANOS, TICKS_A_FRAME};
 use cohaptic_wan::random::{Purpose, Stream};
 use cohaptic_wan::{LinkName, standard_normal};
 
-use crate::{COPY_DAMPING, COUPLING, DELAY_NANOS, DEVICE, LOSS, Mesh, OBJECT_MASS, SD_NANOS, TICK_NANOS, TICKS_A_FRAME};
+use crate::COPY_DAMPING;
 
 /// What the loop ends with.
 #[derive(Clone, PartialEq, Debug)]
@@ -85,7 +86,7 @@ pub fn run(mesh: Mesh, ticks: u64) -> Outcome {
     let (mut xh, mut vh) = (vec![0.0; n], vec![0.0; n]);
     let (mut xo, mut vo) = (vec![0.0; n], vec![0.0; n]);
     let mut hand = vec![0.0; n];
-    hand[0] = crate::HAND_FORCE;
+    hand[0] = HAND_FORCE;
     let mut held = vec![Held { x: 0.0, v: 0.0, next: 0 }; n * n];
     let (mut mean_x, mut mean_v, mut stale) = (vec![0.0; n], vec![0.0; n], vec![false; n]);
     let mut counters = vec![Counters::default(); n * n];

@@ -38,13 +38,13 @@ fn beside_others(work: Work) {
     let [plain, jittery, full] = str0m_configs();
     let (_, all) = stages().pop().expect("there are stages");
     let subjects: Vec<Subject> = vec![
-        ("cohaptic", Box::new(move || drive(&constant(), packets))),
+        ("cohaptic", Box::new(move || drive(&constant(), packets, |_| ()))),
         ("str0m-netem 0.4", Box::new(move || str0m(plain, packets))),
-        ("a bare ring", Box::new(move || ring(packets))),
-        ("cohaptic", Box::new(move || drive(&jitter_and_loss(), packets))),
+        ("a bare ring", Box::new(move || ring(packets, |_| ()))),
+        ("cohaptic", Box::new(move || drive(&jitter_and_loss(), packets, |_| ()))),
         ("str0m-netem 0.4 (uniform jitter)", Box::new(move || str0m(jittery, packets))),
-        ("a bare binary heap, same draws", Box::new(move || heap(packets))),
-        ("cohaptic", Box::new(move || drive(&all, packets))),
+        ("a bare binary heap, same draws", Box::new(move || heap(packets, |_| ()))),
+        ("cohaptic", Box::new(move || drive(&all, packets, |_| ()))),
         ("str0m-netem 0.4 (jitter, loss, duplication, reordering, rate)", Box::new(move || str0m(full, packets))),
         ("a bare binary heap: taking one of 10⁴ events, pushing it again", Box::new(move || hold(packets))),
     ];
@@ -66,9 +66,9 @@ fn stage_by_stage(work: Work) {
         "A constant delay and one stage beside it. A stage that is not configured is not there: the first row is a link with none, next to a ring that is"
     );
     println!("written by hand.\n");
-    let mut subjects: Vec<Subject> = vec![("a bare ring", Box::new(move || ring(packets)))];
+    let mut subjects: Vec<Subject> = vec![("a bare ring", Box::new(move || ring(packets, |_| ())))];
     for (name, config) in stages() {
-        subjects.push((name, Box::new(move || drive(&config, packets))));
+        subjects.push((name, Box::new(move || drive(&config, packets, |_| ()))));
     }
     let (names, works): (Vec<_>, Vec<_>) = subjects.into_iter().unzip();
     let times = medians_in_turn(&works, work.rounds);

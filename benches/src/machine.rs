@@ -4,33 +4,14 @@ use std::hint::black_box;
 use std::process::Command;
 use std::time::Duration;
 
-use rustix::time::{ClockId, clock_gettime};
+use cohaptic_benches_common::machine::field;
+pub use cohaptic_benches_common::machine::{process_time, thread_time};
 
 /// The processor time of this thread that the work takes: what else the machine does counts less.
 pub fn time(work: impl FnOnce()) -> Duration {
-    let start = processor_time();
+    let start = thread_time();
     work();
-    processor_time() - start
-}
-
-/// The processor time that this thread has used.
-///
-/// # Panics
-///
-/// Never: processor time is not negative.
-#[must_use]
-pub fn processor_time() -> Duration {
-    clock_gettime(ClockId::ThreadCPUTime).try_into().expect("processor time is not negative")
-}
-
-/// The processor time that all threads of this process have used.
-///
-/// # Panics
-///
-/// Never: processor time is not negative.
-#[must_use]
-pub fn process_time() -> Duration {
-    clock_gettime(ClockId::ProcessCPUTime).try_into().expect("processor time is not negative")
+    thread_time() - start
 }
 
 /// The date, the processor, its cores, the system, the compiler and the program: what a figure is of. What cannot be found out is left out.
@@ -101,10 +82,4 @@ pub fn medians_in_turn<T>(works: &[impl Fn() -> T], rounds: usize) -> Vec<Durati
 pub fn median(mut times: Vec<Duration>) -> Duration {
     times.sort();
     times[times.len() / 2]
-}
-
-fn field(file: &str, name: &str) -> Option<String> {
-    let text = std::fs::read_to_string(file).ok()?;
-    let line = text.lines().find(|line| line.starts_with(name))?;
-    Some(line.split_once(':')?.1.trim().to_owned())
 }

@@ -1,26 +1,19 @@
 //! The work that is measured of one link: a steady stream of packets through it, some 10⁴ of them in flight.
 
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, VecDeque};
+use std::collections::BinaryHeap;
 use std::num::NonZeroU32;
-use std::time::{Duration, Instant as StdInstant};
+use std::time::Duration;
 
-use cohaptic_units::{Bytes, Instant, Probability, Rate};
+use cohaptic_benches_common::one_link::{DELAY, JITTER, LOSS, RATE, SPACING_NANOS};
+pub use cohaptic_benches_common::one_link::{drive, heap, ring, str0m};
+use cohaptic_units::{Bytes, Probability, Rate};
 use cohaptic_wan::random::{Purpose, Stream};
 use cohaptic_wan::{
-    Bottleneck, Chance, Checksum, CoDel, Corruption, Delay, Discipline, Displacement, Distribution, Flips, IdleOutages, Jitter, Link, LinkConfig,
-    LinkName, Loss, Order, Outages, QueueLimit, Reorder, Slots, TokenBucket,
+    Bottleneck, Chance, Checksum, CoDel, Corruption, Delay, Discipline, Displacement, Distribution, Flips, IdleOutages, Jitter, LinkConfig, Loss,
+    Order, Outages, QueueLimit, Reorder, Slots, TokenBucket,
 };
-use str0m_netem::{Bitrate, DataSize, Input, Netem, NetemConfig, Output, RandomLoss, WithLen};
-
-/// Packets are a microsecond apart, and the delay is 10 ms: 10⁴ packets are in flight.
-pub const SPACING_NANOS: u64 = 1_000;
-/// The mean delay.
-pub const DELAY: Duration = Duration::from_millis(10);
-/// Every packet has this size.
-pub const SIZE: u64 = 64;
-/// Far more than the stream needs, so that the stages work and seldom hold anything up: 1 Gbit/s for 0.5 Gbit/s.
-const RATE: u64 = 1_000_000_000;
+use str0m_netem::{Bitrate, DataSize, NetemConfig, RandomLoss};
 
 fn p(value: f64) -> Probability {
     Probability::new(value).expect("a probability")
@@ -43,8 +36,8 @@ pub fn constant() -> LinkConfig {
 /// Never: these parameters are sound.
 #[must_use]
 pub fn jitter_and_loss() -> LinkConfig {
-    let delay = Delay::with_jitter(DELAY, Jitter::new(DELAY / 10, Distribution::Normal)).expect("sound");
-    LinkConfig { delay, loss: Loss::Independent(p(0.01)), ..LinkConfig::default() }
+    let delay = Delay::with_jitter(DELAY, Jitter::new(JITTER, Distribution::Normal)).expect("sound");
+    LinkConfig { delay, loss: Loss::Independent(p(LOSS)), ..LinkConfig::default() }
 }
 
 /// One stage more than a constant delay, or all of them, by name.
@@ -88,100 +81,16 @@ pub fn stages() -> Vec<(&'static str, LinkConfig)> {
     ]
 }
 
-/// Drives a link with a steady stream; gives how many packets came out.
-///
-/// # Panics
-///
-/// Never: time goes on.
-#[must_use]
-pub fn drive(config: &LinkConfig, packets: u64) -> u64 {
-    let mut link = Link::new(1, &LinkName::between("a", "b"), config.clone());
-    let mut out = 0;
-    for number in 0..packets {
-        let now = Instant::from_nanos(number * SPACING_NANOS);
-        link.handle_packet(now, Bytes::new(SIZE), number).expect("time goes on");
-        while let Some(event) = link.poll_event() {
-            out += u64::from(matches!(event.fate, cohaptic_wan::Fate::Delivered(_)));
-        }
-    }
-    out
-}
-
-/// A packet of str0m-netem.
-#[derive(Clone, Copy, Debug)]
-struct Packet(#[expect(dead_code, reason = "it is carried, as ours is")] u64);
-
-impl WithLen for Packet {
-    fn len(&self) -> usize {
-        SIZE as usize
-    }
-}
-
-/// The same work for str0m-netem, which has a table of 1 % steps instead of a normal law: its jitter is uniform.
-#[must_use]
-pub fn str0m(config: NetemConfig, packets: u64) -> u64 {
-    let begin = StdInstant::now();
-    let mut netem = Netem::new(config);
-    let mut out = 0;
-    for number in 0..packets {
-        netem.handle_input(Input::Packet(begin + Duration::from_nanos(number * SPACING_NANOS), Packet(number)));
-        while let Some(output) = netem.poll_output() {
-            match output {
-                Output::Packet(_) => out += 1,
-                Output::Timeout(_) => break,
-            }
-        }
-    }
-    out
-}
-
-/// str0m-netem with a constant delay; with jitter and loss; with jitter, loss, duplication, reordering and a rate.
+/// str0m-netem with a constant delay; with jitter and loss; with jitter, loss, duplication, reordering and a rate. It has a table of 1 % steps instead of a normal
+/// law: its jitter is uniform.
 #[must_use]
 pub fn str0m_configs() -> [NetemConfig; 3] {
     let constant = NetemConfig::new().latency(DELAY).seed(1);
     let one_percent = RandomLoss::new(str0m_netem::Probability::new(0.01));
-    let jitter = constant.jitter(DELAY / 10).loss(one_percent);
+    let jitter = constant.jitter(JITTER).loss(one_percent);
     let buffer = DataSize::bytes(10_000_000);
     let full = jitter.duplicate(str0m_netem::Probability::new(0.001)).reorder_gap(1000).link(Bitrate::bps(RATE), buffer);
     [constant, jitter, full]
-}
-
-/// A ring: what a constant delay needs at least.
-#[must_use]
-pub fn ring(packets: u64) -> u64 {
-    let mut ring = VecDeque::new();
-    let mut out = 0;
-    for number in 0..packets {
-        let now = number * SPACING_NANOS;
-        while ring.front().is_some_and(|&(at, _)| at <= now) {
-            out += u64::from(ring.pop_front().is_some_and(|(_, number)| number < packets));
-        }
-        ring.push_back((now + DELAY.as_nanos() as u64, number));
-    }
-    out
-}
-
-/// A binary heap with the same jitter and loss, drawn from the same addresses: what others build on.
-#[must_use]
-pub fn heap(packets: u64) -> u64 {
-    let stream = Stream::new(1, b"a->b");
-    let mut heap = BinaryHeap::new();
-    let mut out = 0;
-    for number in 0..packets {
-        let now = number * SPACING_NANOS;
-        while heap.peek().is_some_and(|&Reverse((at, _))| at <= now) {
-            out += u64::from(heap.pop().is_some());
-        }
-        let draws = stream.packet(number);
-        let [loss, jitter] = draws.loss_and_jitter();
-        if !p(0.01).happens(loss) {
-            let mut more = draws.more(Purpose::Jitter);
-            let z = cohaptic_wan::standard_normal(jitter, || more.next_word());
-            let delay = (DELAY.as_nanos() as u64).saturating_add_signed((z * 1e6).round_ties_even() as i64);
-            heap.push(Reverse((now + delay, number)));
-        }
-    }
-    out
 }
 
 /// The hold model: 10⁴ pending events, each taken is pushed again later.
@@ -208,10 +117,10 @@ mod tests {
     #[test]
     fn all_do_the_same_work() {
         const PACKETS: u64 = 50_000;
-        assert_eq!(drive(&jitter_and_loss(), PACKETS), heap(PACKETS));
-        assert_eq!(drive(&constant(), PACKETS), ring(PACKETS + 1) - 1);
+        assert_eq!(drive(&jitter_and_loss(), PACKETS, |_| ()), heap(PACKETS, |_| ()));
+        assert_eq!(drive(&constant(), PACKETS, |_| ()), ring(PACKETS, |_| ()));
         for (name, config) in stages() {
-            let out = drive(&config, PACKETS);
+            let out = drive(&config, PACKETS, |_| ());
             assert!((35_500..41_000).contains(&out), "{name}: {out}");
         }
         for config in str0m_configs() {

@@ -74,7 +74,7 @@ fn one_run(work: Work) {
     println!("median of {} rounds in which all of them alternate.\n", work.rounds);
     println!("| peers | links | cohaptic | asked for | bare loop | ratio | asked for |");
     println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: |");
-    let scenes = Mesh::ALL.map(|mesh| mesh.scene(work.seconds(mesh)));
+    let scenes = Mesh::ALL.map(|mesh| mesh.scene(work.seconds(mesh) * 1000, 1));
     let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
     for (mesh, scene) in Mesh::ALL.into_iter().zip(&scenes) {
         works.push(Box::new(|| drop(black_box(Mesh::run(scene)))));
@@ -108,7 +108,7 @@ fn many_runs(work: Work) {
     println!("processor time, the median of {} rounds in which all of them alternate.\n", work.rounds);
     println!("| peers | links | one at a time | {SIDE_BY_SIDE} side by side | gain |");
     println!("| ---: | --- | ---: | ---: | ---: |");
-    let all = Mesh::ALL.map(|mesh| -> Vec<Scene> { (1..=SIDE_BY_SIDE).map(|seed| mesh.scene_with_seed(seconds_a_run, seed)).collect() });
+    let all = Mesh::ALL.map(|mesh| -> Vec<Scene> { (1..=SIDE_BY_SIDE).map(|seed| mesh.scene(seconds_a_run * 1000, seed)).collect() });
     let repetitions = |mesh: Mesh| (work.seconds(mesh) / (SIDE_BY_SIDE * seconds_a_run)).max(1);
     let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
     for (mesh, scenes) in Mesh::ALL.into_iter().zip(&all) {
@@ -135,7 +135,7 @@ type MemoryRow = (&'static str, Duration, String);
 
 fn memory(work: Work) -> Vec<MemoryRow> {
     let row = |&(name, seconds)| {
-        let scene = Mesh { peers: 3, impaired: true }.scene(seconds);
+        let scene = Mesh { peers: 3, impaired: true }.scene(seconds * 1000, 1);
         let took = time(|| drop(black_box(Mesh::run(&scene))));
         (name, took, peak_memory())
     };

@@ -3,28 +3,13 @@
 pub mod link;
 pub mod mesh;
 
-/// The processor and the system, as Linux names them.
-#[must_use]
-pub fn machine() -> String {
-    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
-    let processor = model.map_or("an unnamed processor", |(_, name)| name);
-    let cores = std::thread::available_parallelism().map_or(0, std::num::NonZero::get);
-    let system = std::fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
-    format!("{processor}, {cores} cores, Linux {}", system.trim())
-}
+pub use cohaptic_benches_common::machine::{name as machine, process_time as processor_time};
 
 /// The middle one of an odd number of values.
 #[must_use]
 pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
-}
-
-/// The processor time that this process has used: what others do on the machine does not count.
-#[must_use]
-pub fn processor_time() -> std::time::Duration {
-    rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime).try_into().unwrap_or_default()
 }
 
 /// The processor time that some work takes \[s\].

@@ -1,28 +1,14 @@
 //! One link alone: a steady stream of packets through it, some 10⁴ of them on the way.
 
-use std::cmp::Reverse;
-use std::collections::{BinaryHeap, VecDeque};
 use std::time::{Duration, Instant as StdInstant};
 
-use cohaptic_units::{Bytes, Instant, Probability, Rate};
-use cohaptic_wan::random::{Purpose, Stream};
-use cohaptic_wan::{
-    Bottleneck, Delay, Distribution, Fate, GilbertElliott, Jitter, Link, LinkConfig, LinkName, Loss, Order, QueueLimit, standard_normal,
-};
-use str0m_netem::{Bitrate, DataSize, GilbertElliot, Input, Netem, NetemConfig, Output, RandomLoss, WithLen};
+use cohaptic_benches_common::one_link::{DELAY, JITTER, LOSS, Packet, RATE, SPACING_NANOS, drive, heap, ring, str0m};
+use cohaptic_units::{Bytes, Probability, Rate};
+use cohaptic_wan::{Bottleneck, Delay, Distribution, GilbertElliott, Jitter, LinkConfig, Loss, Order, QueueLimit};
+use str0m_netem::{Bitrate, DataSize, GilbertElliot, Input, Netem, NetemConfig, Output, RandomLoss};
 
-/// Packets are a microsecond apart, and the mean delay is 10 ms.
-const SPACING_NANOS: u64 = 1_000;
-const DELAY: Duration = Duration::from_millis(10);
-/// The deviation of normal jitter, and half the width of uniform jitter.
-const JITTER: Duration = Duration::from_millis(1);
-/// Every packet has this size.
-const SIZE: u64 = 64;
-const LOSS: f32 = 0.01;
 /// Bursts of three packets, one after a hundred.
 const BURSTS: [f32; 2] = [100.0, 3.0];
-/// Twice what the stream needs.
-const RATE: u64 = 1_000_000_000;
 const BUFFER: u32 = 10_000_000;
 
 /// What came out of a link.
@@ -112,13 +98,13 @@ impl Kind {
     /// Never: these parameters are sound.
     #[must_use]
     pub fn config(self) -> LinkConfig {
-        let p = |value: f32| Probability::new(f64::from(value)).expect("a probability");
+        let p = |value: f64| Probability::new(value).expect("a probability");
         // A uniform law of deviation σ is √3·σ wide to each side.
         let uniform = Jitter::new(JITTER.div_f64(3.0_f64.sqrt()), Distribution::Uniform);
         let jittery = |jitter| Delay::with_jitter(DELAY, jitter).expect("sound");
         let constant = LinkConfig { delay: Delay::constant(DELAY), ..LinkConfig::default() };
         let independent = Loss::Independent(p(LOSS));
-        let [good, bad] = BURSTS.map(|packets| p(1.0 / packets));
+        let [good, bad] = BURSTS.map(|packets| p(1.0 / f64::from(packets)));
         let chain = GilbertElliott { p: good, r: bad, h: Probability::ZERO, k: Probability::ONE };
         let rate = Rate::bits_per_sec(RATE).expect("not zero");
         let limit = Some(QueueLimit::Bytes(Bytes::new(BUFFER.into())));
@@ -140,7 +126,7 @@ impl Kind {
     /// As str0m-netem takes it; it has no normal law.
     fn str0m(self) -> NetemConfig {
         let constant = NetemConfig::new().latency(DELAY).seed(1);
-        let independent = RandomLoss::new(str0m_netem::Probability::new(LOSS));
+        let independent = RandomLoss::new(str0m_netem::Probability::new(LOSS as f32));
         match self {
             Self::Constant => constant,
             Self::Uniform => constant.jitter(JITTER),
@@ -167,7 +153,7 @@ impl By {
     #[must_use]
     pub fn drive(self, kind: Kind, packets: u64) -> u64 {
         match (self, kind) {
-            (Self::Cohaptic, _) => cohaptic(&kind.config(), packets, |_| ()),
+            (Self::Cohaptic, _) => drive(&kind.config(), packets, |_| ()),
             (Self::Str0m, _) => str0m(kind.str0m(), packets),
             (Self::Bare, Kind::Constant) => ring(packets, |_| ()),
             (Self::Bare, _) => heap(packets, |_| ()),
@@ -180,7 +166,7 @@ impl By {
         let mut seen = Seen::default();
         match (self, kind) {
             (Self::Cohaptic, _) => {
-                cohaptic(&kind.config(), packets, |delay| seen.add(delay));
+                drive(&kind.config(), packets, |delay| seen.add(delay));
             }
             (Self::Str0m, _) => seen = watch_str0m(kind.str0m(), packets),
             (Self::Bare, Kind::Constant) => {
@@ -192,48 +178,6 @@ impl By {
         }
         seen
     }
-}
-
-fn cohaptic(config: &LinkConfig, packets: u64, mut look: impl FnMut(u64)) -> u64 {
-    let mut link = Link::new(1, &LinkName::between("a", "b"), config.clone());
-    let mut out = 0;
-    for number in 0..packets {
-        let now = Instant::from_nanos(number * SPACING_NANOS);
-        link.handle_packet(now, Bytes::new(SIZE), number).expect("time goes on");
-        while let Some(event) = link.poll_event() {
-            if matches!(event.fate, Fate::Delivered(_)) {
-                out += 1;
-                look(event.at.as_nanos() - event.offered.as_nanos());
-            }
-        }
-    }
-    out
-}
-
-/// A packet of str0m-netem.
-#[derive(Clone, Copy, Debug)]
-struct Packet(u64);
-
-impl WithLen for Packet {
-    fn len(&self) -> usize {
-        SIZE as usize
-    }
-}
-
-fn str0m(config: NetemConfig, packets: u64) -> u64 {
-    let begin = StdInstant::now();
-    let mut netem = Netem::new(config);
-    let mut out = 0;
-    for number in 0..packets {
-        netem.handle_input(Input::Packet(begin + Duration::from_nanos(number * SPACING_NANOS), Packet(number)));
-        while let Some(output) = netem.poll_output() {
-            match output {
-                Output::Packet(_) => out += 1,
-                Output::Timeout(_) => break,
-            }
-        }
-    }
-    out
 }
 
 /// With all its timeouts, so that each packet is seen at its own instant.
@@ -254,46 +198,6 @@ fn watch_str0m(config: NetemConfig, packets: u64) -> Seen {
         netem.handle_input(Input::Packet(now, Packet(number)));
     }
     seen
-}
-
-fn ring(packets: u64, mut look: impl FnMut(u64)) -> u64 {
-    let mut ring = VecDeque::new();
-    let mut out = 0;
-    for number in 0..packets {
-        let now = number * SPACING_NANOS;
-        ring.push_back((now + DELAY.as_nanos() as u64, number));
-        while let Some((at, number)) = ring.pop_front_if(|(at, _)| *at <= now) {
-            out += 1;
-            look(at - number * SPACING_NANOS);
-        }
-    }
-    out
-}
-
-/// Normal jitter and loss, drawn from the same addresses as the link's.
-fn heap(packets: u64, mut look: impl FnMut(u64)) -> u64 {
-    let stream = Stream::new(1, LinkName::between("a", "b").as_str().as_bytes());
-    let lost = Probability::new(f64::from(LOSS)).expect("a probability");
-    let mut heap = BinaryHeap::new();
-    let mut out = 0;
-    for number in 0..packets {
-        let now = number * SPACING_NANOS;
-        let draws = stream.packet(number);
-        let [loss, jitter] = draws.loss_and_jitter();
-        if !lost.happens(loss) {
-            let mut more = draws.more(Purpose::Jitter);
-            let z = standard_normal(jitter, || more.next_word());
-            let delay = (DELAY.as_nanos() as u64).saturating_add_signed((z * JITTER.as_secs_f64() * 1e9).round_ties_even() as i64);
-            heap.push(Reverse((now + delay, number)));
-        }
-        while heap.peek().is_some_and(|&Reverse((at, _))| at <= now) {
-            if let Some(Reverse((at, number))) = heap.pop() {
-                out += 1;
-                look(at - number * SPACING_NANOS);
-            }
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -2,16 +2,8 @@
 
 use std::time::Duration;
 
-use rustix::time::{ClockId, clock_gettime};
-
-/// The processor and the system, as Linux names them.
-#[must_use]
-pub fn name() -> String {
-    let processor = field("/proc/cpuinfo", "model name").unwrap_or_else(|| "an unnamed processor".into());
-    let cores = std::thread::available_parallelism().map_or(0, std::num::NonZero::get);
-    let system = std::fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
-    format!("{processor}, {cores} cores, Linux {}", system.trim())
-}
+use cohaptic_benches_common::machine::field;
+pub use cohaptic_benches_common::machine::{name, process_time, thread_time};
 
 /// The memory that this process holds now \[kB\].
 #[must_use]
@@ -30,22 +22,4 @@ pub fn open_files() -> usize {
         count()
     };
     (0..3).map(look).min().unwrap_or(0)
-}
-
-/// The processor time that this thread has used.
-#[must_use]
-pub fn thread_time() -> Duration {
-    clock_gettime(ClockId::ThreadCPUTime).try_into().unwrap_or_default()
-}
-
-/// The processor time that all threads of this process have used.
-#[must_use]
-pub fn process_time() -> Duration {
-    clock_gettime(ClockId::ProcessCPUTime).try_into().unwrap_or_default()
-}
-
-fn field(file: &str, name: &str) -> Option<String> {
-    let text = std::fs::read_to_string(file).ok()?;
-    let line = text.lines().find(|line| line.starts_with(name))?;
-    Some(line.split_once(':')?.1.trim().to_owned())
 }

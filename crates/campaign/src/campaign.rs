@@ -1,4 +1,4 @@
-//! A campaign in its folder.
+//! A campaign in its folder, and its watcher.
 
 use std::fs::File;
 use std::path::Path;
@@ -12,7 +12,6 @@ use crate::plan::{CampaignPlan, Parts};
 use crate::report::{Report, Tally};
 use crate::table::{Column, Head, Row, TableError, columns};
 use crate::verdicts::{Journal, Judge, Judgement, judge, read_whole, write_all};
-use crate::watch::Watch;
 use crate::work::Work;
 
 /// A campaign in its folder, which no other process works on as long as this value lives.
@@ -235,3 +234,26 @@ fn unread(path: &Path, error: TableError, way_out: &'static str) -> CampaignErro
         }
     }
 }
+
+/// Is told how far a campaign has come, and can end it. Called from many threads.
+pub trait Watch: Sync {
+    /// Whether to go on. PlanSpec before every few combinations that are checked, before each that is judged, and before every few runs.
+    fn keep_going(&self) -> bool {
+        true
+    }
+
+    /// This number of combinations was checked since the last call.
+    fn checked(&self, _combinations: u64) {}
+
+    /// A number of combinations more have been judged.
+    fn judged(&self, _combinations: u64) {}
+
+    /// This number of runs was done since the last call.
+    fn ran(&self, _runs: u64) {}
+}
+
+/// Nobody looks on.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoWatch;
+
+impl Watch for NoWatch {}

@@ -10,11 +10,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use cohaptic_harness::run_side_by_side;
 use cohaptic_scene::Scene;
 
+use crate::campaign::Watch;
 use crate::error::CampaignError;
 use crate::plan::{CHUNK, CampaignPlan, Parts};
 use crate::table::{Roster, Row, RunId, row};
 use crate::verdicts::Judgement;
-use crate::watch::Watch;
 
 /// Keeps the rows of the part of that number.
 pub(crate) type Keep<'a> = dyn Fn(u64, &[Row]) -> Result<(), CampaignError> + Sync + 'a;

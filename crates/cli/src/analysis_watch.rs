@@ -59,8 +59,9 @@ impl Watch for AnalysisWatch {
         shown.expected += operations;
         let all = estimate(shown.expected);
         if shown.bar.is_some() || operations / OPERATIONS_A_SECOND > SHORT {
+            // Its length comes on the way.
             let bar = shown.bar.get_or_insert_with(|| {
-                let bar = Progress::through_operations();
+                let bar = Progress::new(0, "{bar:30} {percent:>3} %  {elapsed} passed, {msg}");
                 bar.tick();
                 bar
             });

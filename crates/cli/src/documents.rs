@@ -20,38 +20,6 @@ enum Components {
     More(Vec<f64>),
 }
 
-/// A link between two peers at the end of a run.
-#[derive(Serialize)]
-pub(crate) struct LinkDocument {
-    pub(crate) from: String,
-    pub(crate) to: String,
-    #[serde(flatten)]
-    pub(crate) counters: Counters,
-}
-
-/// What a link or an access line did.
-#[derive(Serialize)]
-pub(crate) struct Counters {
-    offered: u64,
-    duplicated: u64,
-    delivered: u64,
-    dropped: BTreeMap<&'static str, u64>,
-    in_flight: u64,
-    marked: u64,
-    damaged: u64,
-    mean_delay_s: Option<f64>,
-}
-
-/// How late things were, in microseconds.
-#[derive(Serialize)]
-pub(crate) struct LatenessDocument {
-    count: u64,
-    p50: f64,
-    p99: f64,
-    p999: f64,
-    max: f64,
-}
-
 /// A peer at the end of a run.
 pub(crate) fn peer(peer: &PeerSummary) -> impl Serialize {
     document! {
@@ -72,10 +40,19 @@ impl Components {
     }
 }
 
-impl LinkDocument {
-    pub(crate) fn new(scene: &Scene, link: &LinkSummary) -> Self {
-        let name = |peer: usize| scene.peers[peer].name.clone();
-        Self { from: name(link.from), to: name(link.to), counters: Counters::new(&link.stats) }
+/// A link between two peers at the end of a run.
+pub(crate) fn peer_link(scene: &Scene, link: &LinkSummary) -> impl Serialize + use<> {
+    let name = |peer: usize| scene.peers[peer].name.clone();
+    self::link(name(link.from), name(link.to), &link.stats)
+}
+
+/// A link with its ends.
+pub(crate) fn link(from: String, to: String, stats: &LinkStats) -> impl Serialize + use<> {
+    document! {
+        from: from,
+        to: to,
+        #[serde(flatten)]
+        counters: counters(stats),
     }
 }
 
@@ -85,31 +62,29 @@ pub(crate) fn access_line(scene: &Scene, line: &AccessSummary) -> impl Serialize
         peer: scene.peers[line.peer].name.clone(),
         line: if line.uplink { "uplink" } else { "downlink" },
         #[serde(flatten)]
-        counters: Counters::new(&line.stats),
+        counters: counters(&line.stats),
     }
 }
 
-impl Counters {
-    pub(crate) fn new(stats: &LinkStats) -> Self {
-        Self {
-            offered: stats.offered(),
-            duplicated: stats.duplicated(),
-            delivered: stats.delivered(),
-            dropped: DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause))).collect(),
-            in_flight: stats.in_flight(),
-            marked: stats.marked(),
-            damaged: stats.damaged(),
-            mean_delay_s: stats.mean_delay().map(|delay| delay.as_secs_f64()),
-        }
+/// What a link or an access line did.
+fn counters(stats: &LinkStats) -> impl Serialize + use<> {
+    document! {
+        offered: stats.offered(),
+        duplicated: stats.duplicated(),
+        delivered: stats.delivered(),
+        dropped: DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause))).collect::<BTreeMap<_, _>>(),
+        in_flight: stats.in_flight(),
+        marked: stats.marked(),
+        damaged: stats.damaged(),
+        mean_delay_s: stats.mean_delay().map(|delay| delay.as_secs_f64()),
     }
 }
 
+/// How late things were, in microseconds.
 #[cfg(target_os = "linux")]
-impl LatenessDocument {
-    pub(crate) fn new(lateness: &LatenessSummary) -> Self {
-        let LatenessSummary { count, p50, p99, p999, max, sum: _ } = *lateness;
-        Self { count, p50: micros(p50), p99: micros(p99), p999: micros(p999), max: micros(max) }
-    }
+pub(crate) fn lateness(summary: &LatenessSummary) -> impl Serialize + use<> {
+    let LatenessSummary { count, p50, p99, p999, max, sum: _ } = *summary;
+    document! { count: count, p50: micros(p50), p99: micros(p99), p999: micros(p999), max: micros(max) }
 }
 
 /// A span in microseconds.

@@ -28,6 +28,13 @@ pub(crate) fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), F
     write_whole(path, |file| file.write_all(content.as_ref())).map_err(unwritten(path))
 }
 
+/// Writes a whole file into a folder, and gives its path.
+pub(crate) fn write_into(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> Result<String, Failure> {
+    let path = folder.join(name);
+    write_file(&path, content)?;
+    Ok(output::path(&path))
+}
+
 /// That a file cannot be written.
 pub(crate) fn unwritten(path: &Path) -> impl Fn(io::Error) -> Failure {
     |error| Failure::File { verb: "write", path: path.to_path_buf(), error }

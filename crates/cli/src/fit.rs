@@ -10,23 +10,10 @@ use cohaptic_wan::{FateLog, FateRow};
 use serde::Serialize;
 
 use crate::arguments::FitArguments;
-use crate::document_schema::DocumentSchema;
+use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 use crate::file::write_file;
 use crate::{file, output};
-
-/// What `cohaptic fit --json` prints.
-#[derive(Serialize)]
-struct FitDocument<'a> {
-    #[serde(flatten)]
-    fitted: &'a Fitted,
-    /// The keys of a scene.
-    scene: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    skew: Option<Skew>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    matched: Option<Matched>,
-}
 
 /// What was left over of a pair of captures.
 #[derive(Clone, Copy, Serialize)]
@@ -54,7 +41,16 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     output::answer(
         arguments.json,
         DocumentSchema::FIT,
-        &FitDocument { fitted: &fitted, scene: &scene, skew, matched },
+        &document! {
+            #[serde(flatten)]
+            fitted: &fitted,
+            // The keys of a scene.
+            scene: scene.as_str(),
+            #[serde(flatten)]
+            skew: skew.map(|skew| document! { skew: skew }),
+            #[serde(flatten)]
+            matched: matched.map(|matched| document! { matched: matched }),
+        },
         || describe(&fitted, &scene, skew, matched),
         &arguments.out,
     )?;

@@ -31,7 +31,6 @@ mod interrupt;
 mod link;
 #[cfg(target_os = "linux")]
 mod live;
-mod man;
 mod output;
 mod paper;
 mod progress;
@@ -43,9 +42,9 @@ mod report;
 #[cfg(target_os = "linux")]
 mod router;
 mod run;
-mod schema;
 mod stability;
 mod terminal_plot;
+mod texts;
 mod variants;
 
 use std::process::ExitCode;
@@ -81,9 +80,9 @@ fn main() -> ExitCode {
         Command::Paper(arguments) => paper::paper(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::Init(arguments) => init::init(&arguments),
-        Command::Schema(arguments) => schema::schema(&arguments),
-        Command::Completions(arguments) => man::completions(&arguments),
-        Command::Man(arguments) => man::man(&arguments),
+        Command::Schema(arguments) => texts::schema(&arguments),
+        Command::Completions(arguments) => texts::completions(&arguments),
+        Command::Man(arguments) => texts::man(&arguments),
     };
     match done {
         // What was asked to end has ended, whatever came of it.

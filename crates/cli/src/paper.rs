@@ -34,7 +34,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
         // A folder that cannot be had is found out before the work, not after it.
         std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
     }
-    let bar = Bar(Progress::through_steps(steps(options)));
+    let bar = Bar(Progress::new(steps(options) as u64, "{bar:30} {percent:>3} %  {elapsed} passed, {eta} left"));
     let start = Clock::now();
     let reproduction = match reproduce(options, &bar) {
         Ok(reproduction) => reproduction,

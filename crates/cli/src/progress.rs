@@ -9,7 +9,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 pub(crate) struct Progress(ProgressBar);
 
 impl Progress {
-    fn new(length: u64, template: &str) -> Self {
+    /// Progress up to a length, zero where nobody knows it, shown as a template of indicatif says.
+    pub(crate) fn new(length: u64, template: &str) -> Self {
         let target = if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         Self(ProgressBar::with_draw_target(Some(length), target).with_style(style))
@@ -25,57 +26,12 @@ impl Progress {
         Self::new(length, "{prefix} {bar:30} {percent:>3} %  {elapsed} passed, {eta} left{msg}").titled(title)
     }
 
-    /// Progress through a number of scenes.
-    pub(crate) fn through_scenes(count: usize) -> Self {
-        Self::new(count as u64, "checking scenes {bar:30} {pos}/{len}")
-    }
-
-    /// Progress through a number of packets.
-    pub(crate) fn through_packets(count: u64) -> Self {
-        Self::new(count, "{bar:30} {percent:>3} %  {pos}/{len} packets, {eta} left")
-    }
-
-    /// Progress through the rows of maps.
-    pub(crate) fn through_rows(count: usize) -> Self {
-        Self::new(count as u64, "{bar:30} {percent:>3} %  {pos}/{len} rows, {eta} left{msg}")
-    }
-
-    /// Progress through the combinations of a campaign that are checked.
-    pub(crate) fn through_combinations(count: u64) -> Self {
-        Self::new(count, "checking combinations {bar:30} {pos}/{len}, {eta} left")
-    }
-
-    /// Progress through the combinations of a campaign that are judged.
-    pub(crate) fn through_verdicts(count: u64) -> Self {
-        Self::new(count, "judging combinations {bar:30} {pos}/{len}, {eta} left")
-    }
-
     /// Progress through the runs of a campaign, some of which are done already.
     pub(crate) fn through_runs(count: u64, done: u64) -> Self {
         let progress = Self::new(count, "{bar:30} {percent:>3} %  {pos}/{len} runs, {per_sec}, {eta} left");
         progress.reach_number(done);
         progress.0.reset_eta();
         progress
-    }
-
-    /// Progress through values of which nobody knows how many there will be.
-    pub(crate) fn through_values() -> Self {
-        Self::new(0, "{spinner} {pos} values looked at, {elapsed} passed{msg}")
-    }
-
-    /// Progress through measurements of which nobody knows how many there will be.
-    pub(crate) fn through_measurements() -> Self {
-        Self::new(0, "{spinner} {pos} rows measured, {elapsed} passed: {msg}")
-    }
-
-    /// Progress through a number of steps.
-    pub(crate) fn through_steps(count: usize) -> Self {
-        Self::new(count as u64, "{bar:30} {percent:>3} %  {elapsed} passed, {eta} left")
-    }
-
-    /// Progress through operations of a computation whose estimate comes on the way; nothing is shown of one that takes seconds.
-    pub(crate) fn through_operations() -> Self {
-        Self::new(0, "{bar:30} {percent:>3} %  {elapsed} passed, {msg}")
     }
 
     /// Shows the elapsed time anew, for work that cannot say how far it is.
@@ -112,6 +68,22 @@ impl Progress {
 
     pub(crate) fn more(&self, number: u64) {
         self.0.inc(number);
+    }
+
+    /// Shows one line, which is written again and again.
+    pub(crate) fn show(&self, line: String) {
+        self.0.set_message(line);
+        self.0.tick();
+    }
+
+    /// Whether anybody sees it.
+    pub(crate) fn is_seen(&self) -> bool {
+        !self.0.is_hidden()
+    }
+
+    /// Does something else to the terminal.
+    pub(crate) fn aside(&self, work: impl FnOnce()) {
+        self.0.suspend(work);
     }
 
     pub(crate) fn clear(&self) {

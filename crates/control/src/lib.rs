@@ -40,7 +40,6 @@
 
 mod board;
 mod description;
-mod editor;
 mod http;
 mod metrics;
 mod server;
@@ -49,9 +48,8 @@ mod token;
 mod typed;
 mod views;
 
-pub use board::{Board, Latest};
+pub use board::{Board, Latest, LinkEditor};
 pub use description::{Description, Kind, LinkName, PeerName};
-pub use editor::LinkEditor;
 pub use server::{ServeError, Server, ServerConfig, serve};
 pub use snapshot::{LinkCounters, PeerView, Presence, Quantiles, Snapshot};
 pub use token::{Token, TokenError};

@@ -157,7 +157,7 @@ pub(crate) fn quantile_interval(sorted: &[u64], series: &[u64], probability: f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_rng::{TestRng, autoregressive};
+    use crate::tests::{TestRng, autoregressive};
 
     #[test]
     fn a_longer_memory_makes_fewer_batches() {

@@ -37,8 +37,6 @@
 pub mod achieved;
 pub mod asked;
 mod batches;
-#[cfg(test)]
-mod calibration;
 pub mod comparison;
 pub mod fates;
 pub mod fit;
@@ -46,4 +44,4 @@ pub mod pcapng;
 mod series;
 pub mod steady;
 #[cfg(test)]
-mod test_rng;
+mod tests;

@@ -94,7 +94,7 @@ pub(crate) const fn floor(place: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_rng::{TestRng, autoregressive};
+    use crate::tests::{TestRng, autoregressive};
 
     #[test]
     fn autocorrelation_is_found_through_gaps() {

@@ -6,9 +6,8 @@
 use cohaptic_stability::Verdict;
 use rayon::prelude::*;
 
-use crate::PaperError;
 use crate::case::{Case, Mass, Strategy};
-use crate::watch::Watch;
+use crate::{PaperError, Watch};
 
 /// The numbers of peers that are tried.
 pub(crate) const PEERS: [usize; 5] = [2, 3, 4, 5, 8];

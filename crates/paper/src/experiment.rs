@@ -9,9 +9,8 @@ use cohaptic_scene::Scene;
 use cohaptic_stability::{Admittance, Analysis, Method, PartKind, Radius, Verdict, analyse};
 use cohaptic_units::Instant;
 
-use crate::PaperError;
 use crate::case::Strategy;
-use crate::watch::Watch;
+use crate::{PaperError, Watch};
 
 /// The record of one peer: one entry for each time.
 #[derive(Clone, PartialEq, Debug, Default)]

@@ -19,20 +19,17 @@
 mod case;
 mod claims;
 mod counter;
-mod error;
 mod experiment;
 mod figures;
 pub mod page;
 mod region;
-mod text;
-mod watch;
 
 use cohaptic_picture::Size;
+use cohaptic_scene::SceneError;
+use cohaptic_stability::{AdmittanceError, AnalysisError, FamilyError, KeyRangeError, MapError};
 
 pub use claims::{Claim, Verdict};
-pub use error::PaperError;
 pub use figures::{Figure, Table};
-pub use watch::{Unwatched, Watch};
 
 /// How closely everything is looked at, and how large it is drawn.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -71,4 +68,51 @@ pub fn reproduce(options: Options, watch: &dyn Watch) -> Result<Reproduction, Pa
     let figures = figures::all(&atlas, &responses, &tests, &travels, options.size);
     let claims = claims::all(&atlas, &responses, &tests, &travels, options, watch)?;
     Ok(Reproduction { claims, figures })
+}
+
+/// Sees how far the work is, and may end it.
+pub trait Watch: Sync {
+    /// One of the [`crate::steps`] is done.
+    fn one_more(&self);
+
+    /// Whether the work is to be given up.
+    fn stops(&self) -> bool;
+}
+
+/// Nobody watches.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Unwatched;
+
+impl Watch for Unwatched {
+    fn one_more(&self) {}
+
+    fn stops(&self) -> bool {
+        false
+    }
+}
+
+/// Why there is no reproduction.
+#[derive(Debug, thiserror::Error)]
+pub enum PaperError {
+    /// The watcher asked for an end.
+    #[error("given up before the end")]
+    Stopped,
+    /// A scene of the paper is refused.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A scene of the paper cannot be analysed.
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
+    /// A scene of the paper has no admittance.
+    #[error(transparent)]
+    Admittance(#[from] AdmittanceError),
+    /// A stability region cannot be computed.
+    #[error(transparent)]
+    Map(#[from] MapError),
+    /// A stability region cannot be computed.
+    #[error(transparent)]
+    Family(#[from] FamilyError),
+    /// The gains of a stability region make no range.
+    #[error(transparent)]
+    Range(#[from] KeyRangeError),
 }

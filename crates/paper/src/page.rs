@@ -49,3 +49,19 @@ fn figure_on_page(figure: &Figure) -> Html {
         Html::heading(3, figure.title.as_str()).and(Html::picture(&figure.svg)).and(Html::caption(figure.caption.as_str())).and(Html::table(&table));
     Html::figure(&figure.id, content)
 }
+
+/// A share as a percentage.
+pub(crate) fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+/// Shares as percentages, one after the other.
+pub(crate) fn percents(shares: &[f64]) -> String {
+    let all: Vec<String> = shares.iter().map(|share| format!("{:.1}", 100.0 * share)).collect();
+    format!("{} %", all.join(", "))
+}
+
+/// A time [s], or that there is none.
+pub(crate) fn seconds(time: Option<f64>) -> String {
+    time.map_or_else(|| "not reached".to_owned(), |time| format!("{time:.3} s"))
+}

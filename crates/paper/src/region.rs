@@ -7,8 +7,8 @@ use std::path::Path;
 
 use cohaptic_stability::{Family, Grid, KeyRange, Map};
 
+use crate::Watch;
 use crate::case::{Case, Mass, Strategy};
-use crate::watch::Watch;
 use crate::{Options, PaperError};
 
 /// The numbers of peers in the figures.

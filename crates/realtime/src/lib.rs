@@ -42,11 +42,9 @@ mod clock;
 mod lateness;
 mod pacer;
 mod thread;
-mod tolerance;
 pub mod udp;
 
 pub use clock::{Clock, KernelStamps, MonotonicClock};
-pub use lateness::{Lateness, LatenessSummary};
+pub use lateness::{Lateness, LatenessSummary, Tolerance, Validity};
 pub use pacer::{Pacer, Pacing, Woken};
 pub use thread::{Prepared, Refused, Wish, Wishes, prepare_thread};
-pub use tolerance::{Tolerance, Validity};

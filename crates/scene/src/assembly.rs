@@ -1,8 +1,8 @@
-//! What the parts of a peer are made from, with every scaling applied.
+//! What the parts of a peer are made from, with every scaling applied: how masses and gains depend on the number of peers.
 
 use cohaptic_peer::{CopyConfig, PeerConfig, State};
 
-use crate::Scene;
+use crate::{Scaling, Scene};
 
 impl Scene {
     /// The peer in that place, apart from its device, copy and strategy.
@@ -41,5 +41,65 @@ impl Scene {
         let spec = &self.peers[place];
         let take = |values: &[f64; 3]| core::array::from_fn(|axis| values.get(axis).copied().unwrap_or(0.0));
         State { position: take(&spec.position), velocity: take(&spec.velocity) }
+    }
+}
+
+impl Scaling {
+    /// What the coordination gains are multiplied by among that many peers: 4(N−1)/N² for [`Scaling::InverseN`].
+    ///
+    /// Over an ideal network the difference modes of average-position coordination with split mass have the squared frequency (N/mO)·KT·N/(N−1)
+    /// (Rakhsha & Constantinescu 2015, equation 6); scaled, it is 4·KT/mO for every N.
+    #[must_use]
+    pub fn coordination_factor(self, peers: usize) -> f64 {
+        let n = count(peers);
+        match self {
+            Self::None => 1.0,
+            Self::InverseN => 4.0 * (n - 1.0) / (n * n),
+        }
+    }
+
+    /// What the coupling gains are multiplied by among that many peers: 2/N for [`Scaling::InverseN`].
+    #[must_use]
+    pub fn coupling_factor(self, peers: usize) -> f64 {
+        match self {
+            Self::None => 1.0,
+            Self::InverseN => 2.0 / count(peers),
+        }
+    }
+}
+
+impl Scene {
+    /// The mass of each copy of the object \[kg\].
+    #[must_use]
+    pub fn copy_mass(&self) -> f64 {
+        if self.object.split_mass { self.object.mass / count(self.peers.len()) } else { self.object.mass }
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
+fn count(peers: usize) -> f64 {
+    peers as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_peers_are_left_unchanged() {
+        for scaling in [Scaling::None, Scaling::InverseN] {
+            assert!((scaling.coordination_factor(2) - 1.0).abs() < f64::EPSILON);
+            assert!((scaling.coupling_factor(2) - 1.0).abs() < f64::EPSILON);
+        }
+    }
+
+    /// (N/m)·factor·N/(N−1) = 4/m: the coordination mode of every N has the frequency of N = 2.
+    #[test]
+    fn scaled_modes_have_one_frequency() {
+        for peers in [2, 3, 5, 8, 50] {
+            let n = count(peers);
+            let stiffness = n * Scaling::InverseN.coordination_factor(peers) * n / (n - 1.0);
+            assert!((stiffness - 4.0).abs() < 1e-12, "N = {peers}");
+        }
     }
 }

@@ -37,7 +37,6 @@ mod link_keys;
 mod model;
 mod quantities;
 mod read;
-mod scaling;
 pub mod schema;
 mod sections;
 mod strategies;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cohaptic_peer::{Gains, Integrator, Plant};
 
-use super::{COUPLING, DEVICE, GAINS, HAND_FORCE, Mesh, OBJECT_MASS, Packet, TICK_NANOS};
+use super::{COUPLING, DEVICE, HAND_FORCE, Mesh, OBJECT_MASS, Packet, TICK_NANOS};
 
 /// How a body that nothing ties to ground moves in a tick: the rows of the exact step.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
@@ -52,7 +52,7 @@ impl Numbers {
             device: Motion::new(DEVICE.mass, DEVICE.damping),
             copy: Motion::new(OBJECT_MASS / n, 0.0),
             coupling: COUPLING,
-            gains: GAINS.scaled(4.0 * (n - 1.0) / (n * n)),
+            gains: mesh.scaled_gains(),
         }
     }
 }

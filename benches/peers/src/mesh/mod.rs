@@ -14,63 +14,9 @@ pub mod on_nexosim;
 pub mod on_turmoil;
 pub mod program;
 
-use cohaptic_peer::{DeviceConfig, Gains};
-
-/// The control period.
-pub const TICK_NANOS: u64 = 1_000_000;
-/// Ticks between two samples.
-pub const TICKS_A_FRAME: u64 = 8;
-/// The delay one way, the mean of it if it varies.
-pub const DELAY_NANOS: u64 = 24_000_000;
-/// The deviation of the jitter, where there is jitter.
-pub const SD_NANOS: f64 = 2e6;
-/// The fraction of packets lost, where packets are lost.
-pub const LOSS: f64 = 0.01;
-/// The seed of all draws.
-pub const SEED: u64 = 1;
-/// The device of every peer.
-pub const DEVICE: DeviceConfig = DeviceConfig { mass: 0.1, damping: 5.0 };
-/// The coupling of every peer.
-pub const COUPLING: Gains = Gains { stiffness: 3500.0, damping: 5.0 };
-/// The mass of the whole object \[kg\]; every copy has its share.
-pub const OBJECT_MASS: f64 = 0.45;
-/// KT and BT before scaling.
-pub const GAINS: Gains = Gains { stiffness: 200.0, damping: 5.0 };
-/// The force of the first peer's hand \[N\].
-pub const HAND_FORCE: f64 = 1.5;
-
-/// One cell of the table: a number of peers, with or without jitter and loss.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Mesh {
-    /// The number of peers, 2 at least.
-    pub peers: usize,
-    /// 2 ms of normal jitter and 1 % of loss.
-    pub impaired: bool,
-}
-
-impl Mesh {
-    /// The cells of the table.
-    pub const ALL: [Self; 6] = [
-        Self { peers: 3, impaired: false },
-        Self { peers: 3, impaired: true },
-        Self { peers: 10, impaired: false },
-        Self { peers: 10, impaired: true },
-        Self { peers: 50, impaired: false },
-        Self { peers: 50, impaired: true },
-    ];
-
-    /// How the links are called in a table.
-    #[must_use]
-    pub const fn links(self) -> &'static str {
-        if self.impaired { "24 ms ± 2 ms normal, 1 % loss" } else { "24 ms" }
-    }
-
-    /// The packets offered to links in a number of ticks.
-    #[must_use]
-    pub const fn offered(self, ticks: u64) -> u64 {
-        (self.peers * (self.peers - 1)) as u64 * ticks.div_ceil(TICKS_A_FRAME)
-    }
-}
+pub use cohaptic_benches_common::mesh::{
+    COUPLING, DELAY_NANOS, DEVICE, HAND_FORCE, LOSS, Mesh, OBJECT_MASS, SD_NANOS, SEED, TICK_NANOS, TICKS_A_FRAME,
+};
 
 /// What a run ends with.
 #[derive(Clone, PartialEq, Debug)]

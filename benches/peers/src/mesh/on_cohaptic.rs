@@ -2,64 +2,21 @@
 
 use std::convert::Infallible;
 
-use cohaptic_harness::{Model, NoObserver, Observer, PacketRow, Simulation, Summary};
+use cohaptic_harness::{Model, Observer, PacketRow, Simulation, Summary};
 use cohaptic_scene::Scene;
 
-use super::{COUPLING, DEVICE, GAINS, HAND_FORCE, Mesh, OBJECT_MASS, Outcome, SEED};
+use super::{Mesh, Outcome, SEED};
 
 /// The scene, of a number of ticks.
-///
-/// # Panics
-///
-/// If [`text`] is no scene, which a test would show.
 #[must_use]
 pub fn scene(mesh: Mesh, ticks: u64) -> Scene {
-    Scene::parse(&text(mesh, ticks), "mesh.toml".as_ref(), &[]).expect("the mesh is a scene")
-}
-
-/// The scene as a file.
-#[must_use]
-pub fn text(mesh: Mesh, ticks: u64) -> String {
-    let impairments = if mesh.impaired { "jitter = \"2ms\"\nloss = \"1%\"" } else { "" };
-    format!(
-        r#"
-        [scene]
-        duration = "{ticks}ms"
-        seed = {SEED}
-        count = {peers}
-        [object]
-        mass = {OBJECT_MASS}
-        [coordination]
-        strategy = "average-position"
-        scaling = "inverse-n"
-        stiffness = {}
-        damping = {}
-        update = "8ms"
-        [peer]
-        device = {{ mass = {}, damping = {} }}
-        coupling = {{ stiffness = {}, damping = {} }}
-        [[peers]]
-        name = "peer1"
-        hand = {{ force = {HAND_FORCE} }}
-        [link]
-        delay = "24ms"
-        {impairments}
-        "#,
-        GAINS.stiffness,
-        GAINS.damping,
-        DEVICE.mass,
-        DEVICE.damping,
-        COUPLING.stiffness,
-        COUPLING.damping,
-        peers = mesh.peers,
-    )
+    mesh.scene(ticks, SEED)
 }
 
 /// Runs it.
 #[must_use]
 pub fn run(scene: &Scene) -> Outcome {
-    let Ok(summary) = Simulation::new(scene, Model::Least).run(&mut NoObserver);
-    outcome(&summary)
+    outcome(&Mesh::run(scene))
 }
 
 /// Runs it with an observer of every packet, so that it runs event by event.

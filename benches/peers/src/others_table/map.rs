@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use cohaptic_benches_peers::median;
-use cohaptic_benches_peers::mesh::{Mesh, on_cohaptic};
+use cohaptic_benches_peers::mesh::{Mesh, SEED};
 use serde::Deserialize;
 
 use crate::foreign::{Ran, answer, python};
@@ -56,7 +56,7 @@ pub fn table(folder: &Path) {
     for (peers, grid) in MAPS {
         let mesh = Mesh { peers, impaired: false };
         let (toml, text) = (folder.join("map.toml"), folder.join("map"));
-        std::fs::write(&toml, on_cohaptic::text(mesh, 1_000)).expect("a temporary file");
+        std::fs::write(&toml, mesh.text(1_000, SEED)).expect("a temporary file");
         std::fs::write(&text, of_map(mesh, grid)).expect("a temporary file");
         rows(&cohaptic, peers, grid, &toml, &text, &mut notes);
     }

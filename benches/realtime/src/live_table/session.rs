@@ -1,50 +1,21 @@
 //! The loop of `cohaptic live`.
 
 use std::error::Error;
-use std::fmt::Write as _;
 use std::net::SocketAddr;
-use std::path::Path;
 use std::time::Duration;
 
 use cohaptic_benches_realtime::machine;
+use cohaptic_benches_realtime::scene::scene;
 use cohaptic_benches_realtime::visitor::{Invitation, Visitor};
 use cohaptic_harness::Ending;
 use cohaptic_live::{Conductor, LinkChange, Session, SessionConfig, SessionKey, Status, SystemEntropy};
 use cohaptic_realtime::{Pacing, Wishes};
-use cohaptic_scene::{Scene, SceneError};
 
 use crate::Loop;
 
-/// Soft enough to stand the delay.
-const COMMON: &str = r#"
-[scene]
-title = "The loop"
-duration = "1s"
-seed = 21
-
-[object]
-mass = 0.45
-
-[coordination]
-strategy = "average-position"
-stiffness = 30.0
-damping = 2.0
-update = "8ms"
-
-[peer]
-contact = "grasp"
-device = { mass = 0.1, damping = 5.0 }
-coupling = { stiffness = 1000.0, damping = 5.0 }
-
-[link]
-delay = "24ms"
-jitter = "2ms"
-loss = "1%"
-"#;
-
 /// Runs a session of a number of peers, the last of them in another program, to the end of its scene.
 pub(crate) fn run(peers: usize, pacing: Pacing, wishes: Wishes, span: Duration) -> Result<Loop, Box<dyn Error>> {
-    let scene = scene(peers, span)?;
+    let scene = scene("The loop", 21, peers, span)?;
     let key = SessionKey::generate(&mut SystemEntropy)?;
     let listen = SocketAddr::from(([127, 0, 0, 1], 0));
     let config = SessionConfig { key: Some(key.clone()), pacing, wishes, ..SessionConfig::new(listen) };
@@ -64,18 +35,6 @@ pub(crate) fn run(peers: usize, pacing: Pacing, wishes: Wishes, span: Duration) 
     }
     let refused = report.prepared.refused.iter().map(ToString::to_string).collect();
     Ok(Loop { ticks: report.ticks, releases: Some(report.releases), processor, refused })
-}
-
-fn scene(peers: usize, span: Duration) -> Result<Scene, SceneError> {
-    let mut text = COMMON.to_owned();
-    for place in 1..peers {
-        // Writing to a text does not fail.
-        let _ = write!(text, "\n[[peers]]\nname = \"peer-{place}\"\n");
-    }
-    text.push_str("\n[[peers]]\nname = \"program\"\nkind = \"udp\"\n");
-    let mut scene = Scene::parse_live(&text, Path::new("live-table.toml"), &[])?;
-    scene.duration = span;
-    Ok(scene)
 }
 
 /// Nobody looks on, as in `cohaptic live` without live control.

@@ -13,9 +13,9 @@ use cohaptic_realtime::{Clock as _, MonotonicClock, Wishes};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use super::account::Account;
 use super::probe::{Asked, Probe, probe};
-use super::scene::{PEERS, TICK, VISITOR};
+use super::verdict::Account;
+use super::{PEERS, TICK, VISITOR};
 use crate::visitor::Visits;
 
 /// How far logical time was from the clock on the wall, over the looks since the sample before. `CLOCK_MONOTONIC`, read by the thread that looks on.

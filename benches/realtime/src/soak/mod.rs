@@ -2,11 +2,9 @@
 //!
 //! What must not happen in an hour: memory or open files grow, logical time parts from the clock on the wall, or something is lost without being counted.
 
-mod account;
 mod live;
 mod probe;
 mod row;
-mod scene;
 mod stream;
 mod verdict;
 
@@ -18,14 +16,23 @@ use cohaptic_live::{SessionKey, SystemEntropy};
 use cohaptic_realtime::{Clock as _, MonotonicClock, Pacer, Pacing, Wishes};
 use cohaptic_units::Instant;
 
-pub use account::Account;
 pub use live::Lag;
 pub use row::{HEADER, Row};
-pub use verdict::{Judgement, MEMORY_BOUND, Verdict, judge};
+pub use verdict::{Account, Judgement, MEMORY_BOUND, Verdict, judge};
 
+use crate::scene::scene;
 use crate::visitor::{Invitation, Visitor, Visits};
 use live::{Live, LiveLook};
 use stream::{Stream, StreamLook};
+
+/// The place of the peer in another program: the last.
+const VISITOR: u32 = 3;
+
+/// How many peers there are.
+const PEERS: usize = 4;
+
+/// Of the control loop.
+const TICK: Duration = Duration::from_millis(1);
 
 /// What to do.
 #[derive(Clone, Copy, Debug)]
@@ -89,11 +96,10 @@ const SETTLING: Duration = Duration::from_secs(20);
 ///
 /// If something cannot be had or has to give up: a socket, random bytes, a thread.
 pub fn run(plan: &SoakPlan, interrupted: &AtomicBool, mut show: impl FnMut(&Row)) -> Result<Outcome, Box<dyn Error>> {
-    let scene = scene::scene(plan.duration * 2 + Duration::from_secs(3600))?;
+    let scene = scene("A soak", 11, PEERS, plan.duration * 2 + Duration::from_secs(3600))?;
     let key = SessionKey::generate(&mut SystemEntropy)?;
     let (live, stream) = (Live::start(&scene, key.clone(), plan.wishes)?, Stream::start(scene.links.between(0, 1), plan.wishes)?);
-    let visitor =
-        Visitor::start(Invitation { door: live.address, session: scene.seed, place: scene::VISITOR, key, stay: plan.stay, away: plan.away });
+    let visitor = Visitor::start(Invitation { door: live.address, session: scene.seed, place: VISITOR, key, stay: plan.stay, away: plan.away });
     let clock = MonotonicClock::start();
     let mut looks = Looks { live: &live, stream: &stream, clock, rows: Vec::new(), unbalanced: Vec::new() };
     let (end, mut next) = (Instant::ZERO + plan.duration, Instant::ZERO + plan.every);

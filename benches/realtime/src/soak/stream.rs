@@ -15,8 +15,8 @@ use cohaptic_realtime::{Clock as _, LatenessSummary, MonotonicClock, Pacer, Paci
 use cohaptic_relay::{Form, IntakeCounts, Limits, Proxy, Relay, RelayConfig, RelayError, Report, RunOptions, View};
 use cohaptic_wan::LinkModel;
 
-use super::account::Account;
 use super::probe::{Probe, probe};
+use super::verdict::Account;
 
 /// Packets a second.
 const RATE: u64 = 1000;

@@ -1,7 +1,6 @@
 //! The plan of a campaign: which runs there are, and the scene of each.
 
 mod check;
-mod fingerprint;
 mod parts;
 #[cfg(test)]
 mod tests;

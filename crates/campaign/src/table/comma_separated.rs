@@ -6,7 +6,7 @@ use std::path::Path;
 
 use cohaptic_files::WholeFile;
 
-use super::file::{GIST, Gist, Gists, TableError, rows_missing};
+use super::format::{GIST, Gist, Gists, TableError, rows_missing};
 use super::{Column, Row, Value};
 
 pub(super) fn write(file: &mut WholeFile, columns: &[Column], rows: &[Row]) -> io::Result<()> {

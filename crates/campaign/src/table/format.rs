@@ -1,12 +1,12 @@
-//! As what the table is written.
+//! A table as a file in either format: its head, the figures that sum a run up, and the failure to write or read it.
 
 use std::fs::File;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use cohaptic_files::WholeFile;
 
-use super::file::{Gists, Head, TableError};
-use super::{Row, comma_separated, parquet_file};
+use super::{Column, Row, comma_separated, parquet_file};
 
 /// As what the table is written.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -51,4 +51,51 @@ impl Format {
             Self::Csv => comma_separated::read_gists(file, each),
         }
     }
+}
+
+/// What goes into every file of a table.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Head<'a> {
+    pub(crate) columns: &'a [Column],
+    /// What the table belongs to, for formats that have room for it.
+    pub(crate) about: &'a str,
+    /// The program that writes it.
+    pub(crate) program: &'a str,
+}
+
+/// The figures that sum a run up.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Gist {
+    pub(crate) diverged: bool,
+    pub(crate) max_discrepancy: f64,
+}
+
+/// The names of the columns that a [`Gist`] comes from.
+pub(super) const GIST: [&str; 2] = ["ending", "max_discrepancy_m"];
+
+/// Takes the gist of each row, in order.
+pub(crate) type Gists<'a> = &'a mut dyn FnMut(Gist);
+
+/// Why a table cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum TableError {
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// The content of a file is not the content that was written.
+    #[error("{0}")]
+    Content(String),
+    /// Of the parts that are put together, this one cannot be read.
+    #[error("{}: {error}", path.display())]
+    Part { path: PathBuf, error: Box<Self> },
+}
+
+impl TableError {
+    pub(super) fn of_part(path: &Path) -> impl Fn(Self) -> Self + Copy {
+        |error| Self::Part { path: path.to_path_buf(), error: Box::new(error) }
+    }
+}
+
+/// What to say of a file with another number of rows than were written.
+pub(super) fn rows_missing(found: u64, expected: u64) -> TableError {
+    TableError::Content(format!("{found} rows: expected {expected}"))
 }

@@ -2,19 +2,16 @@
 
 mod columns;
 mod comma_separated;
-mod file;
 mod format;
 mod parquet_file;
-mod roster;
 mod row;
 
 use std::sync::Arc;
 
-pub(crate) use columns::columns;
+pub(crate) use columns::{Roster, columns};
 pub(crate) use comma_separated::{number_text, text as value_text};
-pub(crate) use file::{Gist, Head, TableError};
 pub use format::Format;
-pub(crate) use roster::Roster;
+pub(crate) use format::{Gist, Head, TableError};
 pub(crate) use row::{RunId, row};
 
 /// What a column holds.

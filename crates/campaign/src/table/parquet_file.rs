@@ -18,7 +18,7 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 
-use super::file::{GIST, Gist, Gists, Head, TableError, rows_missing};
+use super::format::{GIST, Gist, Gists, Head, TableError, rows_missing};
 use super::{Column, Kind, Row, Value};
 
 /// Under which key a file says what it belongs to.

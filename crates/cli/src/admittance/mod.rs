@@ -1,21 +1,19 @@
 //! `cohaptic admittance`.
 
-mod bode;
+mod answer;
 mod curve;
-mod document;
 mod files;
-mod frequencies;
-mod words;
 
 use std::process::ExitCode;
 
-use curve::Curve;
+use cohaptic_units::print::{Counted, Number};
 
 use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::AdmittanceArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::output;
+use curve::Curve;
 
 /// Says what the hand of one peer feels.
 pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Failure> {
@@ -26,7 +24,7 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     }
     let subjects = subjects?;
     let highest = subjects.iter().map(|subject| subject.admittance.highest_frequency()).fold(f64::INFINITY, f64::min);
-    let frequencies = frequencies::of(arguments, highest)?;
+    let frequencies = frequencies(arguments, highest)?;
     let curves = subjects.into_iter().map(|subject| Curve::of(subject, &frequencies, &watch));
     let curves = curves.collect::<Result<Vec<Curve>, Failure>>();
     watch.clear();
@@ -45,12 +43,54 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     output::answer(
         arguments.scene.json,
         DocumentSchema::ADMITTANCE,
-        &document::of(&arguments.peer, &curves, &files, is_interrupted),
-        || words::describe(&arguments.peer, &curves),
+        &answer::of(&arguments.peer, &curves, &files, is_interrupted),
+        || answer::describe(&arguments.peer, &curves),
         &files,
     )?;
     if is_interrupted {
         return Err(Failure::Interrupted(format!("these are the first {finished} of {wanted} points")));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+const LOWEST: f64 = 0.01;
+const HIGHEST: f64 = 100.0;
+const POINTS: usize = 60;
+/// More points than this are refused: a table of them fills a small machine.
+const MOST: usize = 1_000_000;
+
+/// The frequencies that were asked for \[Hz\], none above `highest`.
+fn frequencies(arguments: &AdmittanceArguments, highest: f64) -> Result<Vec<f64>, Failure> {
+    if !arguments.at.is_empty() {
+        return arguments.at.iter().map(|hz| checked("--at", *hz, highest)).collect();
+    }
+    let from = checked("--from", arguments.from.unwrap_or(LOWEST), highest)?;
+    let to = checked("--to", arguments.to.unwrap_or_else(|| HIGHEST.min(highest)), highest)?;
+    let points = arguments.points.map_or(POINTS, std::num::NonZeroUsize::get);
+    if points == 1 || from >= to {
+        return Err(Failure::Input(format!(
+            "{} from {} Hz to {} Hz: expected at least 2, the first below the last; --at takes one alone",
+            Counted(points, "frequency"),
+            Number(from),
+            Number(to)
+        )));
+    }
+    if points > MOST {
+        return Err(Failure::Input(format!("--points {points}: expected at most {MOST}")));
+    }
+    #[expect(clippy::cast_precision_loss, reason = "at most a million points")]
+    let share = |place: usize| place as f64 / (points - 1) as f64;
+    let between = |place: usize| if place + 1 == points { to } else { from * (to / from).powf(share(place)) };
+    Ok((0..points).map(between).collect())
+}
+
+fn checked(option: &str, hz: f64, highest: f64) -> Result<f64, Failure> {
+    if hz > 0.0 && hz <= highest {
+        return Ok(hz);
+    }
+    Err(Failure::Input(format!(
+        "{option} {}: expected a frequency above 0 and at most {} Hz, half the rate of the peer's ticks",
+        Number(hz),
+        Number(highest)
+    )))
 }

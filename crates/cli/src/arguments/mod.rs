@@ -1,19 +1,12 @@
 //! What can be said on the command line.
 
-mod accuracy;
-mod address;
-mod admittance;
-mod campaign;
 mod examples;
 mod falcon;
 mod links;
 mod numbers;
 mod pages;
 mod paper;
-mod pictures;
 mod realtime;
-mod relay;
-mod router;
 mod scenes;
 mod stability;
 #[cfg(test)]
@@ -22,22 +15,19 @@ mod tests;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use cohaptic_picture::{Size, SizeError};
 
-pub(crate) use accuracy::AccuracyArguments;
-pub(crate) use admittance::AdmittanceArguments;
-pub(crate) use campaign::{CampaignArguments, TableFormat};
 pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
 };
 pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArguments, SchemaArguments};
-pub(crate) use paper::PaperArguments;
-pub(crate) use pictures::PictureArguments;
-pub(crate) use realtime::{LiveArguments, RealTimeArguments};
-pub(crate) use relay::RelayArguments;
-pub(crate) use router::RouterArguments;
-pub(crate) use scenes::{CheckArguments, ExplainArguments, RunArguments};
-pub(crate) use stability::{BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, StabilityArguments, StabilityCommand};
+pub(crate) use paper::{AccuracyArguments, PaperArguments};
+pub(crate) use realtime::{LiveArguments, RealTimeArguments, RelayArguments, RouterArguments};
+pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, RunArguments, TableFormat};
+pub(crate) use stability::{
+    AdmittanceArguments, BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, StabilityArguments, StabilityCommand,
+};
 
 /// Several people feel and move one virtual object together, over a bad network.
 ///
@@ -107,4 +97,38 @@ pub(crate) struct Overrides {
     /// --set peers.left.contact=none
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PictureArguments {
+    /// The size of pictures: one-column or two-columns of a paper, page, WIDTHxHEIGHT in pixels (960x400) or millimetres (85x60mm) [default: page]
+    #[arg(long, value_name = "SIZE", requires = "out")]
+    size: Option<NamedSize>,
+}
+
+/// A size with the word that named it.
+#[derive(Clone, Debug)]
+struct NamedSize {
+    word: String,
+    size: Size,
+}
+
+impl std::str::FromStr for NamedSize {
+    type Err = SizeError;
+
+    fn from_str(word: &str) -> Result<Self, SizeError> {
+        Ok(Self { word: word.to_owned(), size: word.parse()? })
+    }
+}
+
+impl PictureArguments {
+    /// The size that was asked for.
+    pub(crate) fn size(&self) -> Size {
+        self.size.as_ref().map(|asked| asked.size).unwrap_or_default()
+    }
+
+    /// The word that asked for it, if one did.
+    pub(crate) fn word(&self) -> Option<&str> {
+        self.size.as_ref().map(|asked| asked.word.as_str())
+    }
 }

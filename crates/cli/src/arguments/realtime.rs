@@ -1,17 +1,19 @@
-//! What all commands that run in real time take, and `live`.
+//! `live`, `relay` and `router`, and what they share.
 
-use std::net::SocketAddr;
+use std::ffi::OsString;
+use std::net::{SocketAddr, ToSocketAddrs as _};
 use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use cohaptic_units::parse;
+use cohaptic_linkfile::{AddressError, address};
+use cohaptic_units::{Bytes, parse};
 
 use super::Overrides;
-use super::address::looked_up;
 use super::examples::{self, after};
+use super::numbers::integer;
 
-/// How to be on time, and who may look.
+/// How to be on time, and live control.
 #[derive(Debug, Args)]
 pub(crate) struct RealTimeArguments {
     /// Spin the last 120 µs before each deadline: a hundred times closer to it, for a core that is busy meanwhile
@@ -66,4 +68,85 @@ pub(crate) struct LiveArguments {
     /// lateness.csv
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = after(examples::RELAY), override_usage = USAGE)]
+pub(crate) struct RelayArguments {
+    /// A relay file: the programs, and the links between them; - reads it from standard input. With --listen in its place the impairments of the link, as for cohaptic link: words of tc-netem
+    /// (delay 20ms 5ms 25% loss 1%), or keys of the link table of a scene (delay=24ms loss=1%)
+    #[arg(required_unless_present = "listen", value_name = "FILE | SPEC", allow_negative_numbers = true)]
+    pub(crate) words: Vec<OsString>,
+    /// Override a key of the relay file by its dotted path, again and again: --set relay.forget-after=10s --set link.delay=8ms
+    /// --set links.left.right.loss=5% --set programs.left.port=127.0.0.1:7101
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Where clients send datagrams for --to; port 0 is a free one
+    #[arg(long, value_name = "ADDRESS", value_parser = looked_up, requires = "to", conflicts_with = "set")]
+    pub(crate) listen: Option<SocketAddr>,
+    /// The program that clients speak to
+    #[arg(long, value_name = "ADDRESS", value_parser = looked_up, requires = "listen")]
+    pub(crate) to: Option<SocketAddr>,
+    /// The link from there to the clients, up to the next option [default: the same in both directions]
+    #[arg(long, value_name = "SPEC", num_args = 1.., requires = "listen", allow_negative_numbers = true)]
+    pub(crate) back: Option<Vec<OsString>>,
+    #[command(flatten)]
+    pub(crate) real_time: RealTimeArguments,
+    /// End by itself after this time [default: on Ctrl-C]
+    #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
+    pub(crate) length: Option<Duration>,
+    /// The seed of all random numbers [default: that of the file, or 0]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(0, i64::MAX.unsigned_abs()))]
+    pub(crate) seed: Option<u64>,
+    /// The most datagrams in flight at once; those beyond are dropped [default: that of the file, or 262144]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(1, 1 << 24))]
+    pub(crate) packets: Option<u64>,
+    /// The most bytes of them [default: that of the file, or 64MB]
+    #[arg(long, value_name = "SIZE", value_parser = room)]
+    pub(crate) bytes: Option<Bytes>,
+}
+
+const USAGE: &str = "cohaptic relay [OPTIONS] <FILE>\n       cohaptic relay [OPTIONS] --listen <ADDRESS> --to <ADDRESS> [SPEC]... [--back <SPEC>...]";
+
+/// One datagram at least.
+fn room(text: &str) -> Result<Bytes, String> {
+    let size = parse::size(text).map_err(|error| error.to_string())?;
+    if size.get() < 65_535 { Err("expected at least 65535B, one datagram".to_owned()) } else { Ok(size) }
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = after(examples::ROUTER))]
+pub(crate) struct RouterArguments {
+    /// A router file: two devices, the links between them, and rules that say which packets take which link; - reads it from
+    /// standard input
+    pub(crate) file: PathBuf,
+    /// Override a key of the router file by its dotted path, again and again: --set links.wan.delay=8ms --set router.default=drop
+    /// --set router.memory.packets=1000
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Print one JSON document and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) real_time: RealTimeArguments,
+    /// End by itself after this time [default: on Ctrl-C]
+    #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
+    pub(crate) length: Option<Duration>,
+}
+
+/// An address with a port. Of several that a name has, the first of IPv4 is taken, or else the first: both ends of a relay are then of one kind.
+fn looked_up(text: &str) -> Result<SocketAddr, String> {
+    const EXPECTED: &str = "expected an address with a port, such as 127.0.0.1:7000, [::1]:7000 or localhost:7000";
+    match address(text) {
+        Ok(address) => Ok(address),
+        Err(AddressError::Name) => {
+            let found: Vec<SocketAddr> = text.to_socket_addrs().map_err(|error| format!("the name is not known ({error}): {EXPECTED}"))?.collect();
+            let first = found.iter().find(|address| address.is_ipv4()).or_else(|| found.first());
+            first.copied().ok_or_else(|| format!("the name has no address: {EXPECTED}"))
+        }
+        Err(other) => Err(format!("{other}: {EXPECTED}")),
+    }
 }

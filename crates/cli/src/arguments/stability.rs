@@ -1,5 +1,6 @@
-//! `stability` and its commands.
+//! `stability` and `admittance`.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -7,7 +8,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use cohaptic_stability::Method;
 
 use super::examples::{self, after};
-use super::numbers::{any_integer, integer, real, threads};
+use super::numbers::{any_integer, integer, real, some, threads};
 use super::{PictureArguments, SceneArguments};
 
 #[derive(Debug, Args)]
@@ -40,7 +41,7 @@ pub(crate) struct PointArguments {
     /// be equal
     #[arg(long, value_name = "GRAPH", conflicts_with_all = ["method", "losses_in_a_row", "delay_within"])]
     pub(crate) graph: Option<String>,
-    /// The worst case too: at most so many samples lost in a row
+    /// The worst case too: at most this number of samples lost in a row
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u32>(0, u32::MAX.into()))]
     pub(crate) losses_in_a_row: Option<u32>,
     /// The worst case too: every sample takes any time from LO to HI, such as 20ms..26ms
@@ -111,7 +112,7 @@ pub(crate) struct MapArguments {
     /// Another map in the same picture, with this key overridden too; said again, all for the same map
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) against: Vec<String>,
-    /// Write map.csv, map-2.csv ... and map.svg into this folder, and keep there what is done if it is interrupted
+    /// Write map.csv, map-2.csv ... and map.svg into this folder, and keep the finished part there if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
@@ -135,7 +136,7 @@ pub(crate) struct BoundaryArguments {
     /// How many values are looked at first, the ends among them [default: 400]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(0, u64::MAX))]
     pub(crate) samples: Option<usize>,
-    /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep there what is done if it is interrupted
+    /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep the finished part there if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
@@ -172,4 +173,35 @@ impl std::fmt::Display for GridSize {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}x{}", self.width, self.height)
     }
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = after(examples::ADMITTANCE))]
+pub(crate) struct AdmittanceArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+    /// The peer whose device is pushed
+    #[arg(long, value_name = "NAME")]
+    pub(crate) peer: String,
+    /// The lowest frequency [default: 0.01]
+    #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
+    pub(crate) from: Option<f64>,
+    /// The highest frequency, at most half the rate of the peer's ticks [default: 100, or less if that is too high]
+    #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
+    pub(crate) to: Option<f64>,
+    /// How many frequencies from the lowest to the highest, each the same factor above the one before [default: 60]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = some)]
+    pub(crate) points: Option<NonZeroUsize>,
+    /// These frequencies instead: --at 0.01,1,10
+    #[arg(long, value_name = "HZ,...", value_parser = real, value_delimiter = ',', allow_negative_numbers = true, conflicts_with_all = ["from", "to", "points"])]
+    pub(crate) at: Vec<f64>,
+    /// Another curve beside it, with these keys overridden too, again and again:
+    /// --curve scene.count=3,coordination.strategy=proportional-derivative
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    pub(crate) curve: Vec<String>,
+    /// Write admittance.csv and a Bode plot, admittance.svg, into this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pictures: PictureArguments,
 }

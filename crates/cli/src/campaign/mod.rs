@@ -1,26 +1,24 @@
 //! `cohaptic campaign`.
 
-mod document;
+mod answer;
 mod judge;
 mod picture;
-mod refusal;
-mod watch;
-mod words;
 
 use std::num::NonZeroU64;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_campaign::{Campaign, CampaignError, CampaignPlan, Format, Outcome, PlanSpec, Report, Variation};
+use cohaptic_campaign::{Campaign, CampaignError, CampaignPlan, Format, Outcome, PlanSpec, Report, Variation, Watch};
+use cohaptic_scene::Diagnostic;
 
 use crate::arguments::{CampaignArguments, TableFormat};
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
-use crate::{input, output};
+use crate::progress::Progress;
+use crate::{input, interrupt, output};
 use judge::ByAnalysis;
 use picture::Drawn;
-use watch::Shown;
 
 /// The program, as a campaign remembers it.
 const PROGRAM: &str = concat!("cohaptic ", env!("CARGO_PKG_VERSION"));
@@ -60,15 +58,15 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     output::answer(
         arguments.scene.json,
         DocumentSchema::CAMPAIGN,
-        &document::of(&finished, &arguments.out),
-        || words::describe(&finished),
+        &answer::of(&finished, &arguments.out),
+        || answer::describe(&finished),
         &finished.files,
     )?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn plan(arguments: &CampaignArguments) -> Result<CampaignPlan, Failure> {
-    let refused = |error: CampaignError| refusal::failure(error, arguments);
+    let refused = |error: CampaignError| failure(error, arguments);
     let variations =
         arguments.vary.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<Variation>, _>>().map_err(|error| refused(error.into()))?;
     let (file, set) = (&arguments.scene.scene, &arguments.scene.overrides.set);
@@ -84,7 +82,7 @@ fn plan(arguments: &CampaignArguments) -> Result<CampaignPlan, Failure> {
 }
 
 fn execute(arguments: &CampaignArguments, plan: CampaignPlan) -> Result<Report, Failure> {
-    let refused = |error: CampaignError| refusal::failure(error, arguments);
+    let refused = |error: CampaignError| failure(error, arguments);
     let (runs, combinations) = (plan.runs(), plan.combinations());
     let checking = Shown::checking(combinations);
     let opened = Campaign::open(plan, &arguments.out, &checking);
@@ -113,5 +111,71 @@ fn execute(arguments: &CampaignArguments, plan: CampaignPlan) -> Result<Report, 
             Err(Failure::System(format!("{error}\n{kept} of {runs} runs are kept: once that can be done, the same command goes on from there")))
         }
         Err(error) => Err(refused(error)),
+    }
+}
+
+/// Why there is no campaign, in the words of the user's options.
+fn failure(error: CampaignError, arguments: &CampaignArguments) -> Failure {
+    match error {
+        CampaignError::Scene { error, varied } => {
+            let culprit = error.diagnostic().and_then(Diagnostic::override_text).map(str::to_owned);
+            let is_varied = culprit.is_some_and(|culprit| varied.contains(&culprit));
+            Failure::Combination { error, is_varied, combination: combination(&varied) }
+        }
+        CampaignError::NotRun { message, varied } => {
+            Failure::Input(format!("{}: {message}{}", output::path(&arguments.scene.scene), combination(&varied)))
+        }
+        error @ (CampaignError::Vary(_) | CampaignError::SameKey { .. }) => Failure::Input(format!("--vary: {error}")),
+        error @ CampaignError::Seeds { .. } => Failure::Input(format!("--runs: {error}")),
+        error @ CampaignError::Size(_) => Failure::Input(error.to_string()),
+        error @ (CampaignError::NoFolder { .. } | CampaignError::Foreign { .. } | CampaignError::Other { .. }) => {
+            Failure::Input(format!("--out: {error}"))
+        }
+        error @ CampaignError::Stopped => Failure::Interrupted(error.to_string()),
+        error @ (CampaignError::Damaged { .. } | CampaignError::Busy { .. } | CampaignError::File { .. } | _) => Failure::System(error.to_string()),
+    }
+}
+
+/// A line on which combination it is; empty if there is but one.
+fn combination(varied: &[String]) -> String {
+    if varied.is_empty() { String::new() } else { format!("\nnote: in the combination {}", varied.join(", ")) }
+}
+
+/// Shows how far it came on the terminal, and ends it when the user asks for it.
+struct Shown(Progress);
+
+impl Shown {
+    fn checking(combinations: u64) -> Self {
+        Self(Progress::new(combinations, "checking combinations {bar:30} {pos}/{len}, {eta} left"))
+    }
+
+    fn judging(combinations: u64) -> Self {
+        Self(Progress::new(combinations, "judging combinations {bar:30} {pos}/{len}, {eta} left"))
+    }
+
+    fn running(runs: u64, kept: u64) -> Self {
+        Self(Progress::through_runs(runs, kept))
+    }
+
+    fn clear(&self) {
+        self.0.clear();
+    }
+}
+
+impl Watch for Shown {
+    fn keep_going(&self) -> bool {
+        !interrupt::requested()
+    }
+
+    fn checked(&self, combinations: u64) {
+        self.0.more(combinations);
+    }
+
+    fn judged(&self, combinations: u64) {
+        self.0.more(combinations);
+    }
+
+    fn ran(&self, runs: u64) {
+        self.0.more(runs);
     }
 }

@@ -17,17 +17,12 @@ use serde::Serialize;
 
 use crate::analysis_watch::{Interruptible, OPERATIONS_A_SECOND};
 use crate::arguments::CheckArguments;
-use crate::document_schema::DocumentSchema;
+use crate::document_schema::{DocumentSchema, document};
 use crate::expectations::OutcomeDocument;
 use crate::failure::{self, EXPECTATION, Failure, INTERRUPTED, scene_status};
 use crate::file::write_file;
 use crate::progress::Progress;
 use crate::{input, interrupt, output};
-
-#[derive(Serialize)]
-struct CheckDocument {
-    scenes: Vec<Checked>,
-}
 
 #[derive(Clone, Serialize)]
 struct Checked {
@@ -60,7 +55,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     if let Some(error) = first_error.filter(|_| files.iter().all(Result::is_err)) {
         return Err(error.into());
     }
-    let progress = Progress::through_scenes(files.len());
+    let progress = Progress::new(files.len() as u64, "checking scenes {bar:30} {pos}/{len}");
     let model = if arguments.general { Model::General } else { Model::Least };
     // A scene that is not finished in time was interrupted.
     let begun = files.iter().map(|file| file.as_ref().map_or_else(Clone::clone, |file| Checked::interrupted(file))).collect();
@@ -106,7 +101,7 @@ fn finished(scenes: &[Checked]) -> String {
 }
 
 fn print(scenes: Vec<Checked>, json: bool) -> Result<(), Failure> {
-    if json { output::json(DocumentSchema::CHECK, &CheckDocument { scenes }) } else { output::text(&describe(&scenes)) }
+    if json { output::json(DocumentSchema::CHECK, &document! { scenes: scenes }) } else { output::text(&describe(&scenes)) }
 }
 
 /// The scenes that a path means; standard input means itself.

@@ -6,7 +6,7 @@ use cohaptic_falcon::driver::{Driver, DriverConfig, DriverError, Setpoint, Stati
 use cohaptic_falcon::kinematics::Triple;
 use cohaptic_units::Instant;
 
-use super::any_transport::AnyTransport;
+use super::reach::AnyTransport;
 use crate::failure::Failure;
 use crate::interrupt;
 

@@ -8,17 +8,17 @@ use cohaptic_falcon::kinematics::Triple;
 use cohaptic_units::print::Span;
 use serde::Serialize;
 
+use super::answer;
+use super::answer::{Identity, Seen, Traffic};
 use super::bench::{Bench, End, Go, Task};
-use super::document::{Identity, Seen, Traffic};
 use super::homing_guide::Guide;
-use super::line::StatusLine;
 use super::probe::WITHOUT_FORCE;
 use super::reach::{self, FirmwareState};
-use super::words;
 use crate::arguments::HomeArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
+use crate::progress::Progress;
 
 #[derive(Serialize)]
 struct HomeDocument {
@@ -43,7 +43,7 @@ pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
     let mut way = target.open().map_err(|error| Failure::System(error.to_string()))?;
     let state = reach::make_ready(&mut way, firmware.as_ref()).map_err(Failure::System)?;
     let mut bench = Bench::open(way, WITHOUT_FORCE).map_err(|error| Failure::System(error.to_string()))?;
-    let mut homing = Homing { guide: Guide::new(true), line: StatusLine::new(), last: *bench.status(), until: Duration::ZERO };
+    let mut homing = Homing { guide: Guide::new(true), line: Progress::new(0, "{msg}"), last: *bench.status(), until: Duration::ZERO };
     let end = bench.run(Some(arguments.length), &mut homing);
     homing.line.clear();
     let (end, traffic) = (end?, Traffic::of(&bench, homing.until));
@@ -81,16 +81,16 @@ impl HomeDocument {
             (true, false) => format!("homed, and not active after {seconds:.1} s"),
             (false, false) => format!("not homed after {seconds:.1} s"),
         });
-        lines.extend(self.seen.position_m.map(|position| format!("the grip is at {} from the origin", words::place(position))));
-        lines.extend(words::seen(&self.seen));
-        lines.extend(words::traffic(&self.traffic));
-        words::block(name, &lines)
+        lines.extend(self.seen.position_m.map(|position| format!("the grip is at {} from the origin", answer::place(position))));
+        lines.extend(answer::seen(&self.seen));
+        lines.extend(answer::traffic(&self.traffic));
+        answer::block(name, &lines)
     }
 }
 
 struct Homing {
     guide: Guide,
-    line: StatusLine,
+    line: Progress,
     last: Status,
     until: Duration,
 }

@@ -2,8 +2,8 @@
 
 use cohaptic_falcon::driver::{Phase, Status};
 
-use super::line::StatusLine;
 use super::reach::say;
+use crate::progress::Progress;
 
 /// Says what to do whenever something else is to be done.
 #[derive(Debug)]
@@ -19,7 +19,7 @@ impl Guide {
     }
 
     /// Says what to do in this phase, unless it is what was said last.
-    pub(super) fn look(&mut self, status: &Status, line: &StatusLine) {
+    pub(super) fn look(&mut self, status: &Status, line: &Progress) {
         if self.said == Some(status.phase) {
             return;
         }

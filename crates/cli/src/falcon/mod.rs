@@ -10,19 +10,15 @@
 //!             way                bytes and a clock, whichever it is
 //! ```
 
-mod any_transport;
+mod answer;
 mod bench;
-mod document;
 mod home;
 mod homing_guide;
-mod line;
 mod probe;
 mod reach;
 mod samples;
 mod simulate;
-mod truth;
 mod watch;
-mod words;
 
 use std::process::ExitCode;
 

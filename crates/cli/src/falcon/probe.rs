@@ -9,10 +9,10 @@ use cohaptic_falcon::kinematics::Triple;
 use cohaptic_falcon::safety::Limits;
 use serde::Serialize;
 
+use super::answer;
+use super::answer::{Identity, Seen, Traffic};
 use super::bench::{Bench, End, Go, Task};
-use super::document::{Identity, Seen, Traffic};
 use super::reach::{self, FirmwareState, Target};
-use super::words;
 use crate::arguments::ProbeArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INPUT_OUTPUT, INTERRUPTED};
@@ -109,11 +109,11 @@ impl Entry {
             if firmware == FirmwareState::Loaded.name() { "its firmware was loaded just now" } else { "its firmware runs" }.to_owned()
         }));
         if let Some(Answered { traffic, seen }) = &self.answered {
-            lines.extend(words::traffic(traffic));
-            lines.extend(words::seen(seen));
+            lines.extend(answer::traffic(traffic));
+            lines.extend(answer::seen(seen));
         }
         lines.extend(self.error.as_ref().map(|error| format!("ERROR: {error}")));
-        words::block(&self.name, &lines)
+        answer::block(&self.name, &lines)
     }
 }
 

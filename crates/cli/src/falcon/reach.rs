@@ -1,17 +1,19 @@
 //! From a name on the command line to a device whose firmware runs.
 
+use std::fmt;
 use std::io::{self, Write as _};
 use std::path::Path;
 use std::time::Duration;
 
 use cohaptic_falcon::boot::{self, BootOptions, Firmware, FirmwareError, Progress};
 use cohaptic_falcon::simulator::{SimulatedTransport, Simulator, SimulatorConfig, Waypoints};
+use cohaptic_falcon::transport::{Request, Transport, TransportError};
 use cohaptic_falcon::usb::{self, Listed, UsbError, UsbTransport};
+use cohaptic_units::Instant;
 
-use super::any_transport::AnyTransport;
-use super::line::LoadingBar;
 use crate::arguments::WhichFalcon;
 use crate::failure::Failure;
+use crate::progress::Progress as Bar;
 use crate::realtime::loading;
 
 /// How far the simulated hand sways \[m\], and how fast \[Hz\].
@@ -120,10 +122,10 @@ pub(super) fn make_ready(way: &mut AnyTransport, firmware: Option<&Firmware>) ->
         let missing = "it does not answer: it has no firmware yet, or no power. Give the path of the firmware that came with it with --firmware FILE";
         return if runs { Ok(FirmwareState::Running) } else { Err(format!("{missing} (docs/falcon.md)")) };
     };
-    let bar = LoadingBar::new(firmware.bytes().len());
+    let bar = Bar::new(firmware.bytes().len() as u64, "loading {bar:30} {percent:>3} %  {pos}/{len} bytes");
     let outcome = boot::ensure_loaded(way, firmware, &options, &mut |progress| {
         if let Progress::Loaded { done, .. } = progress {
-            bar.reach(done);
+            bar.reach_number(done as u64);
         }
         if let Some(said) = loading(progress) {
             bar.aside(|| say(&said));
@@ -137,6 +139,43 @@ pub(super) fn make_ready(way: &mut AnyTransport, firmware: Option<&Firmware>) ->
 pub(super) fn say(line: &str) {
     // What cannot be said does not keep anything from being done.
     let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// USB or simulated: the device behind it does not know which.
+pub(super) struct AnyTransport(Box<dyn Transport>);
+
+impl AnyTransport {
+    pub(super) fn new(transport: impl Transport + 'static) -> Self {
+        Self(Box::new(transport))
+    }
+}
+
+impl Transport for AnyTransport {
+    fn now(&self) -> Instant {
+        self.0.now()
+    }
+
+    fn sleep_until(&mut self, until: Instant) {
+        self.0.sleep_until(until);
+    }
+
+    fn control(&mut self, request: Request, value: u16) -> Result<(), TransportError> {
+        self.0.control(request, value)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        self.0.write(bytes)
+    }
+
+    fn read(&mut self, into: &mut [u8], patience: Duration) -> Result<usize, TransportError> {
+        self.0.read(into, patience)
+    }
+}
+
+impl fmt::Debug for AnyTransport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Way").field("now", &self.now()).finish_non_exhaustive()
+    }
 }
 
 #[cfg(test)]

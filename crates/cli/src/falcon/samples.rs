@@ -7,7 +7,7 @@ use std::time::Duration;
 use cohaptic_falcon::driver::Status;
 use cohaptic_files::WholeFile;
 
-use super::document::buttons;
+use super::answer::buttons;
 use crate::failure::Failure;
 use crate::file::unwritten;
 use crate::output;

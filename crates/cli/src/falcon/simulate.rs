@@ -7,18 +7,15 @@ use clap::ValueEnum as _;
 use cohaptic_falcon::driver::{DriverConfig, Phase, Status};
 use cohaptic_falcon::kinematics::Triple;
 use cohaptic_falcon::safety::Limits;
-use cohaptic_falcon::simulator::{Faults, Hand, SharedSimulator, SimulatedTransport, Simulator, SimulatorConfig, StillHand, Waypoints};
+use cohaptic_falcon::simulator::{Faults, Hand, Observed, SharedSimulator, SimulatedTransport, Simulator, SimulatorConfig, StillHand, Waypoints};
 use cohaptic_units::Probability;
+use cohaptic_units::print::Counted;
 use serde::Serialize;
 
-use super::any_transport::AnyTransport;
+use super::answer;
+use super::answer::{Forces, Seen, Traffic, light};
 use super::bench::{Bench, End, Go, Task};
-use super::document::{Forces, Seen, Traffic, light};
-use super::reach::SWAY;
-use super::truth::{DeviceDocument, Truth};
-use super::words;
-use cohaptic_units::print::Counted;
-
+use super::reach::{AnyTransport, SWAY};
 use crate::arguments::{Force, HandName, SimulateArguments};
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
@@ -97,23 +94,23 @@ impl SimulateDocument {
             Some(error) => format!("the driver gave up after {:.3} s: {error}", self.traffic.seconds),
             None => format!("the driver ran for {:.3} s", self.traffic.seconds),
         });
-        lines.extend(words::traffic(&self.traffic));
-        lines.extend(words::seen(&self.seen));
+        lines.extend(answer::traffic(&self.traffic));
+        lines.extend(answer::seen(&self.seen));
         if let (Some(position), Some(error)) = (self.seen.position_m, self.largest_position_error_m) {
             lines.push(format!(
                 "the driver sees the grip at {} from the origin, {:.3} mm off the truth at most",
-                words::place(position),
+                answer::place(position),
                 1e3 * error
             ));
         }
-        lines.push(words::forces(&self.forces));
+        lines.push(answer::forces(&self.forces));
         lines.push(format!(
             "the motors pushed with {:.3} N at most, and with {:.3} N at the end",
             self.largest_motor_force_n,
-            words::length(self.motor_force_n)
+            answer::length(self.motor_force_n)
         ));
         lines.push(self.device.describe());
-        words::block(&format!("simulated Falcon, hand {}, seed {}", self.hand, self.seed), &lines)
+        answer::block(&format!("simulated Falcon, hand {}, seed {}", self.hand, self.seed), &lines)
     }
 }
 
@@ -207,8 +204,61 @@ impl Task for Simulating {
     fn look(&mut self, at: Duration, status: &Status) -> Result<Go, Failure> {
         (self.last, self.until) = (*status, at);
         self.change(at, status.phase);
-        self.largest_force = self.largest_force.max(words::length(status.force));
+        self.largest_force = self.largest_force.max(answer::length(status.force));
         self.truth.look(&self.simulator, status, self.origin);
         Ok(Go::On)
+    }
+}
+
+/// The largest of what was seen of a device behind its driver's back.
+#[derive(Clone, Copy, Debug, Default)]
+struct Truth {
+    /// In the frame of the device \[m\].
+    position: Triple,
+    /// \[N\]
+    motor_force: Triple,
+    largest_motor_force: f64,
+    /// How far the driver's position was from the true one at most \[m\]; `None` if it never had one.
+    largest_error: Option<f64>,
+    observed: Observed,
+}
+
+impl Truth {
+    /// Looks; `origin`: where the driver's positions count from.
+    fn look(&mut self, simulator: &SharedSimulator, status: &Status, origin: Triple) {
+        let look = |device: &mut Simulator| (device.position(), device.motor_force(), *device.observed());
+        (self.position, self.motor_force, self.observed) = simulator.with(look);
+        self.largest_motor_force = self.largest_motor_force.max(answer::length(self.motor_force));
+        if let Some(reading) = status.reading {
+            let off = answer::length(std::array::from_fn(|axis| reading.position[axis] + origin[axis] - self.position[axis]));
+            self.largest_error = Some(self.largest_error.unwrap_or(0.0).max(off));
+        }
+    }
+}
+
+/// What the device has seen of its host.
+#[derive(Serialize)]
+struct DeviceDocument {
+    commands: u64,
+    garbage_bytes: u64,
+    misheard_bytes: u64,
+    largest_count: u16,
+    largest_count_unhomed: u16,
+    saturated: u64,
+    torque_timeouts: u64,
+}
+
+impl DeviceDocument {
+    const fn of(observed: &Observed) -> Self {
+        let Observed { commands, garbage, misheard, largest_count, largest_count_unhomed, saturated, torque_timeouts } = *observed;
+        Self { commands, garbage_bytes: garbage, misheard_bytes: misheard, largest_count, largest_count_unhomed, saturated, torque_timeouts }
+    }
+
+    /// In words.
+    fn describe(&self) -> String {
+        let Self { commands, garbage_bytes, misheard_bytes, largest_count, largest_count_unhomed, saturated, torque_timeouts } = self;
+        format!(
+            "the device took {commands} packets, {garbage_bytes} bytes of garbage and {misheard_bytes} at the wrong time; motor counts up to {largest_count}, {largest_count_unhomed} before it was homed; {saturated} saturated, {torque_timeouts} torque time-outs"
+        )
     }
 }

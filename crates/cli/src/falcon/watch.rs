@@ -9,17 +9,17 @@ use cohaptic_falcon::kinematics::Triple;
 use cohaptic_falcon::safety::Limits;
 use serde::Serialize;
 
+use super::answer;
+use super::answer::{Forces, Identity, Seen, Traffic};
 use super::bench::{Bench, End, Go, Task};
-use super::document::{Forces, Identity, Seen, Traffic};
 use super::homing_guide::Guide;
-use super::line::StatusLine;
 use super::reach;
 use super::samples::{self, SamplesFile};
-use super::words;
 use crate::arguments::{Force, WatchArguments};
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
+use crate::progress::Progress;
 
 /// From one row on standard output to the next, or one look of a person to the next.
 const READABLE: Duration = Duration::from_millis(100);
@@ -90,14 +90,14 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
 impl WatchDocument {
     fn describe(&self, name: &str) -> String {
         let mut lines = Vec::new();
-        lines.extend(words::traffic(&self.traffic));
-        lines.extend(self.seen.position_m.map(|position| format!("the grip is at {} from the origin", words::place(position))));
+        lines.extend(answer::traffic(&self.traffic));
+        lines.extend(self.seen.position_m.map(|position| format!("the grip is at {} from the origin", answer::place(position))));
         if let (Some(lowest), Some(highest)) = (self.lowest_m, self.highest_m) {
-            lines.push(format!("it was between {} and {}; at most {:.3} m/s fast", words::place(lowest), words::place(highest), self.fastest_m_s));
+            lines.push(format!("it was between {} and {}; at most {:.3} m/s fast", answer::place(lowest), answer::place(highest), self.fastest_m_s));
         }
-        lines.extend(words::seen(&self.seen));
-        lines.push(words::forces(&self.forces));
-        words::block(name, &lines)
+        lines.extend(answer::seen(&self.seen));
+        lines.push(answer::forces(&self.forces));
+        answer::block(name, &lines)
     }
 }
 
@@ -113,7 +113,7 @@ impl Push {
     fn of(arguments: &WatchArguments) -> Result<Self, Failure> {
         match (arguments.force, arguments.spring) {
             (Some(Force(force)), _) => {
-                let length = words::length(force);
+                let length = answer::length(force);
                 if length > arguments.limit {
                     return Err(Failure::Input(format!(
                         "the force of {length} N is above the limit of {} N: ask for less, or raise --limit (docs/falcon.md says what is uncertain about newtons)",
@@ -142,7 +142,7 @@ impl Push {
 struct Watching {
     push: Push,
     guide: Guide,
-    line: StatusLine,
+    line: Progress,
     file: Option<SamplesFile>,
     /// Rows go to standard output: it is no terminal, and nobody wants a document.
     prints_rows: bool,
@@ -164,7 +164,7 @@ impl Watching {
         Ok(Self {
             push,
             guide: Guide::new(push != Push::Nothing),
-            line: StatusLine::new(),
+            line: Progress::new(0, "{msg}"),
             file: arguments.csv.as_deref().map(SamplesFile::create).transpose()?,
             prints_rows,
             next_look: Duration::ZERO,
@@ -182,13 +182,13 @@ impl Watching {
         if status.phase == Phase::Active {
             self.active_after.get_or_insert(at);
         }
-        self.largest_force = self.largest_force.max(words::length(status.force));
+        self.largest_force = self.largest_force.max(answer::length(status.force));
         if let Some(reading) = status.reading {
             let (lowest, highest) = self.range.get_or_insert((reading.position, reading.position));
             for (axis, part) in reading.position.into_iter().enumerate() {
                 (lowest[axis], highest[axis]) = (lowest[axis].min(part), highest[axis].max(part));
             }
-            self.fastest = self.fastest.max(words::length(reading.velocity));
+            self.fastest = self.fastest.max(answer::length(reading.velocity));
         }
     }
 }
@@ -221,7 +221,7 @@ impl Task for Watching {
 fn shown(at: Duration, status: &Status) -> String {
     let seen = Seen::of(status);
     let place = match (seen.position_m, seen.velocity_m_s) {
-        (Some(position), Some(velocity)) => format!("{}, {:.3} m/s", words::place(position), words::length(velocity)),
+        (Some(position), Some(velocity)) => format!("{}, {:.3} m/s", answer::place(position), answer::length(velocity)),
         _ => format!("encoders {:?}", seen.encoders),
     };
     let [x, y, z] = seen.force_n;

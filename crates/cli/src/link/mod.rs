@@ -9,17 +9,15 @@ use std::process::ExitCode;
 use std::time::Instant as Clock;
 
 use cohaptic_files::WholeFile;
-use cohaptic_measure::achieved::{Accumulator, Achieved, FateCounts};
-use cohaptic_measure::asked::Asked;
+use cohaptic_measure::achieved::{Accumulator, Achieved};
 use cohaptic_measure::comparison::{Comparison, Figure};
 use cohaptic_measure::fates::FateWriter;
 use cohaptic_measure::pcapng::CaptureWriter;
 use cohaptic_measure::steady::SteadyStream;
 use cohaptic_wan::{Link, LinkName, PacketInfo, PacketRecord};
-use serde::Serialize;
 
 use crate::arguments::LinkArguments;
-use crate::document_schema::DocumentSchema;
+use crate::document_schema::{DocumentSchema, document};
 use crate::failure::{Failure, INTERRUPTED};
 use crate::file::unwritten;
 use crate::progress::Progress;
@@ -29,25 +27,6 @@ pub(crate) use spec::link_and_keys;
 
 /// Without `--packets`.
 const PACKETS: u64 = 100_000;
-
-/// What `cohaptic link --json` prints.
-#[derive(Serialize)]
-struct LinkDocument<'a> {
-    asked: AskedDocument<'a>,
-    achieved: &'a Achieved,
-    compared: &'a [Figure],
-    fates: &'a FateCounts,
-    packets_per_s: f64,
-    interrupted: bool,
-    files: &'a [String],
-}
-
-#[derive(Serialize)]
-struct AskedDocument<'a> {
-    spec: &'a str,
-    #[serde(flatten)]
-    figures: &'a Asked,
-}
 
 /// What came of the stream.
 struct Measured {
@@ -67,14 +46,18 @@ pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     if arguments.json {
         output::json(
             DocumentSchema::LINK,
-            &LinkDocument {
-                asked: AskedDocument { spec: &spec.said, figures: &spec.asked },
+            &document! {
+                asked: document! {
+                    spec: spec.said.as_str(),
+                    #[serde(flatten)]
+                    figures: &spec.asked,
+                },
                 achieved: &measured.achieved,
-                compared: &measured.figures,
+                compared: measured.figures.as_slice(),
                 fates: &measured.achieved.fates,
                 packets_per_s: measured.packets_per_s,
                 interrupted: measured.interrupted,
-                files: &measured.files,
+                files: measured.files.as_slice(),
             },
         )?;
     } else {
@@ -96,7 +79,7 @@ fn drive(arguments: &LinkArguments, spec: &Spec) -> Result<Measured, Failure> {
     let mut sinks = Sinks::create(arguments)?;
     let mut accumulator = Accumulator::new();
     let mut beside = Comparison::default();
-    let progress = Progress::through_packets(wanted);
+    let progress = Progress::new(wanted, "{bar:30} {percent:>3} %  {pos}/{len} packets, {eta} left");
     let start = Clock::now();
     let sent = stream.over(
         &mut link,

@@ -1,35 +1,35 @@
 //! `cohaptic live`.
 
-mod conductor;
-mod document;
-mod prepare;
-mod status;
+mod answer;
+mod onlookers;
 mod timeline;
-mod words;
 
 use std::fmt::Write as _;
+use std::net::SocketAddr;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::mpsc::channel;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant as Clock};
 
+use cohaptic_falcon::boot;
+use cohaptic_live::falcons::{Falcons, SIMULATED_HOMING};
 use cohaptic_live::{Report, Session, SessionConfig, SessionError, SessionKey, SystemEntropy};
-use cohaptic_scene::{KeysOfLinks, Scene, SceneContent, link_key_changes_of_text, link_keys_of_text, scene_content_of_text};
+use cohaptic_realtime::Wishes;
+use cohaptic_scene::{KeysOfLinks, PeerKind, Scene, SceneContent, link_key_changes_of_text, link_keys_of_text, scene_content_of_text};
 use cohaptic_units::Instant;
-use cohaptic_units::print::Span;
+use cohaptic_units::print::{Counted, Span};
 
 use crate::arguments::LiveArguments;
 use crate::document_schema::DocumentSchema;
-use crate::failure::{Failure, INTERRUPTED};
+use crate::failure::{self, Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::realtime::{KeyedLinks, LiveControl};
-use crate::{failure, input, interrupt, output};
-use conductor::SessionConductor;
-use prepare::ready_falcons;
+use crate::realtime::{KeyedLinks, LiveControl, loading, say};
+use crate::{input, interrupt, output};
+use onlookers::SessionConductor;
 use timeline::{Elapsed, Planned, TimedLinks};
 
-/// Runs a scene by the wall clock with whoever is attached, and says how it went.
+/// Runs a scene by the wall clock with the peers that are attached, and says how it went.
 pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {
     let (path, new_key) = (arguments.scene.as_deref(), arguments.new_key.as_deref());
     match (path, new_key) {
@@ -41,7 +41,7 @@ pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {
 
 fn make_key(file: &Path) -> Result<ExitCode, Failure> {
     SessionKey::generate_to(file, &mut SystemEntropy).map_err(|error| Failure::System(error.to_string()))?;
-    output::text("a new session key; only its owner can read it. Whoever has it can take part\n")?;
+    output::text("a new session key; only its owner can read it. Anybody who has it can take part\n")?;
     output::wrote([file]);
     Ok(ExitCode::SUCCESS)
 }
@@ -57,7 +57,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     if let Some(error) = failure::too_large(&scene, overrides) {
         return Err(error.into());
     }
-    let pairs = status::pairs(&scene);
+    let pairs = onlookers::pairs(&scene);
     let number = |pair| pairs.iter().position(|known| *known == pair).expect("a pair of peers is a link");
     let numbered = |links: KeysOfLinks| links.into_iter().map(|(pair, keys)| (number(pair), keys)).collect();
     let planned: Planned = input::with(path, |text, file| link_key_changes_of_text(text, file, overrides))?
@@ -72,14 +72,14 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
     let session = open(arguments, &scene, content)?;
     let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
-    prepare::announce(&scene, session.address(), arguments.key_file.is_some());
-    let control = LiveControl::open(&arguments.real_time, status::description(&scene, &pairs), Box::new(editor))?;
+    announce(&scene, session.address(), arguments.key_file.is_some());
+    let control = LiveControl::open(&arguments.real_time, onlookers::description(&scene, &pairs), Box::new(editor))?;
     let host = SessionConductor::new(control.look(), wanted, pairs, elapsed, scene.axes.count());
     let report = conduct(&scene, session, host, &control)?;
     if arguments.json {
-        output::json(DocumentSchema::LIVE, &document::of(&scene, &report))?;
+        output::json(DocumentSchema::LIVE, &answer::of(&scene, &report))?;
     } else {
-        let mut text = words::describe(&scene, &report);
+        let mut text = answer::describe(&scene, &report);
         if let Some(folder) = &arguments.out {
             let set: String = overrides.iter().map(|key| format!(" --set '{key}'")).collect();
             let _ = writeln!(text, "  replay: cohaptic run {}{set} --inputs {}", path.display(), folder.join("inputs.csv").display());
@@ -121,7 +121,7 @@ fn conduct(scene: &Scene, session: Session, mut host: SessionConductor, control:
             thread::sleep(Duration::from_millis(50));
             let latest = control.latest();
             progress.reach(Instant::ZERO.saturating_add(latest.elapsed));
-            progress.note(status::note(scene, &latest));
+            progress.note(onlookers::note(scene, &latest));
         }
         running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(refused)
     });
@@ -135,4 +135,49 @@ fn refused(error: SessionError) -> Failure {
     }
     let is_of_system = matches!(error, SessionError::Bind(_) | SessionError::System(_));
     if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
+}
+
+/// Opens the Falcons of the scene and waits until the hands of simulated ones have homed them; `None` if the user did not want to wait.
+fn ready_falcons(scene: &Scene, firmware: Option<&Path>, wishes: Wishes) -> Result<Option<Falcons>, Failure> {
+    let told = |peer: &str, progress: boot::Progress| {
+        if let Some(said) = loading(progress) {
+            say(&format!("the Falcon of {peer}: {said}"));
+        }
+    };
+    let falcons = Falcons::open(scene, firmware, wishes, told).map_err(|fault| Failure::System(fault.to_string()))?;
+    for stopper in falcons.stoppers() {
+        interrupt::before_exit(move || stopper.stop());
+    }
+    let names = |simulated: bool| -> Vec<&str> {
+        falcons.readiness().filter(|(_, at)| at.is_simulated == simulated).map(|(peer, _)| scene.peers[peer].name.as_str()).collect()
+    };
+    let simulated = names(true);
+    if !simulated.is_empty() {
+        say(&format!("homing the simulated Falcons of {}", simulated.join(", ")));
+        let start = Clock::now();
+        while !falcons.simulated_are_ready() {
+            if interrupt::requested() {
+                return Ok(None);
+            }
+            if start.elapsed() > SIMULATED_HOMING {
+                return Err(Failure::System(
+                    "a simulated Falcon could not be homed: this machine is too slow to simulate it in real time".to_owned(),
+                ));
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+    for peer in names(false) {
+        say(&format!("the Falcon of {peer}: pull the grip fully out, push it fully in, pull it out again; {peer} joins when its light is green"));
+    }
+    Ok(Some(falcons))
+}
+
+/// Says where whom the session waits for is to send.
+fn announce(scene: &Scene, address: Option<SocketAddr>, has_key: bool) {
+    let Some(address) = address else { return };
+    let peers = scene.peers.iter().enumerate().filter(|(_, peer)| matches!(peer.kind, PeerKind::Udp(_)));
+    let peers: Vec<String> = peers.map(|(place, peer)| format!("{} at place {place}", peer.name)).collect();
+    let key = if has_key { "with its key" } else { "without a key" };
+    say(&format!("listening on {address} for {}: session {}, {}, {key}", peers.join(", "), scene.seed, Counted(scene.axes.count(), "axis")));
 }

@@ -1,9 +1,15 @@
-//! Live control, if it is asked for, and what the terminal shows meanwhile.
+//! Live control, if it is asked for: its server, changes of links by their keys, and the numbers of a run as it shows them; and what the terminal shows meanwhile.
 
 use std::io::{self, IsTerminal as _, Write as _};
+use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::time::Duration;
 
-use cohaptic_control::{Board, Description, LinkEditor, ServeError, Server, ServerConfig, Snapshot, serve};
+use cohaptic_control::{Board, Description, LinkCounters, LinkEditor, Quantiles, ServeError, Server, ServerConfig, Snapshot, serve};
+use cohaptic_realtime::LatenessSummary;
+use cohaptic_scene::LinkKeys;
+use cohaptic_wan::{DropCause, LinkModel, LinkStats};
 
 use crate::arguments::RealTimeArguments;
 use crate::failure::Failure;
@@ -56,5 +62,113 @@ impl Look {
     /// Puts it up unless somebody is reading at this very moment; the next one comes soon.
     pub(crate) fn publish(&self, snapshot: Snapshot) {
         let _ = self.0.publish(Arc::new(snapshot));
+    }
+}
+
+/// A link from now on.
+#[derive(Debug)]
+pub(crate) struct Edit {
+    /// Its number in the description of the run.
+    pub(crate) link: usize,
+    pub(crate) keys: LinkKeys,
+    pub(crate) model: LinkModel,
+}
+
+/// The links of a run by their keys. A change is checked here; what makes sense goes to the run.
+#[derive(Debug)]
+pub(crate) struct KeyedLinks {
+    pub(crate) keys: Vec<LinkKeys>,
+    /// Where files that keys name are looked for.
+    pub(crate) folder: PathBuf,
+    pub(crate) changes: Sender<Edit>,
+}
+
+impl LinkEditor for KeyedLinks {
+    fn keys(&self, link: usize) -> Vec<(String, String)> {
+        self.keys.get(link).map_or_else(Vec::new, |keys| keys.iter().map(|(key, value)| (key.to_owned(), value.to_owned())).collect())
+    }
+
+    fn change(&mut self, links: &[usize], keys: &[(String, String)]) -> Result<(), String> {
+        // All are checked before the first is changed.
+        let edits = links.iter().map(|link| {
+            let old = self.keys.get(*link).ok_or_else(|| format!("there is no link {link}"))?;
+            let new = keys.iter().fold(old.clone(), |laid, (key, value)| laid.with(key, value));
+            let model = new.model(&self.folder).map_err(|error| {
+                let said = error.diagnostic().map_or_else(|| error.to_string(), |diagnostic| diagnostic.message().to_owned());
+                let text = error.diagnostic().and_then(cohaptic_scene::Diagnostic::override_text).unwrap_or_default();
+                let at = text.strip_prefix("link.").unwrap_or(text);
+                if at.is_empty() { said } else { format!("{at}: {said}") }
+            })?;
+            Ok(Edit { link: *link, keys: new, model })
+        });
+        let edits: Vec<Edit> = edits.collect::<Result<_, String>>()?;
+        for edit in edits {
+            self.keys[edit.link] = edit.keys.clone();
+            self.changes.send(edit).map_err(|_| "the run has ended".to_owned())?;
+        }
+        Ok(())
+    }
+}
+
+/// What a link did, without what only some commands know.
+pub(crate) fn counters(stats: &LinkStats) -> LinkCounters {
+    LinkCounters {
+        offered: stats.offered(),
+        duplicated: stats.duplicated(),
+        delivered: stats.delivered(),
+        dropped: DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause))).collect(),
+        marked: stats.marked(),
+        damaged: stats.damaged(),
+        in_flight: stats.in_flight(),
+        mean_delay: stats.mean_delay(),
+        ..LinkCounters::default()
+    }
+}
+
+/// How late things were.
+pub(crate) fn quantiles(summary: &LatenessSummary) -> Quantiles {
+    let LatenessSummary { count, sum, p50, p99, p999, max } = *summary;
+    Quantiles { count, sum, p50, p99, p999, max }
+}
+
+/// The quantiles of some spans, in any order.
+pub(crate) fn quantiles_of(spans: &[Duration]) -> Quantiles {
+    let mut sorted = spans.to_vec();
+    sorted.sort_unstable();
+    let at = |thousandths: usize| sorted.get((sorted.len() * thousandths).div_ceil(1000).saturating_sub(1)).copied().unwrap_or_default();
+    Quantiles {
+        count: sorted.len() as u64,
+        sum: sorted.iter().sum(),
+        p50: at(500),
+        p99: at(990),
+        p999: at(999),
+        max: sorted.last().copied().unwrap_or_default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+
+    #[test]
+    fn a_change_of_several_links_is_made_whole_or_not_at_all() {
+        let (changes, made) = channel();
+        let keys = vec![LinkKeys::default().with("delay", "\"8ms\""), LinkKeys::default().with("netem", "\"delay 3ms\"")];
+        let mut links = KeyedLinks { keys, folder: PathBuf::new(), changes };
+        let loss = |value: &str| vec![("loss".to_owned(), value.to_owned())];
+        // The second link is written in words of tc-netem, which no other key stands beside.
+        let error = links.change(&[0, 1], &loss("\"1%\"")).unwrap_err();
+        assert!(error.contains("netem"), "{error}");
+        assert_eq!(links.keys(0), [("delay".to_owned(), "\"8ms\"".to_owned())]);
+        assert!(made.try_recv().is_err());
+        links.change(&[0], &loss("\"1%\"")).unwrap();
+        let edit = made.try_recv().unwrap();
+        assert_eq!((edit.link, edit.keys.to_string().as_str()), (0, "{ delay = \"8ms\", loss = \"1%\" }"));
+        assert_eq!(edit.model, edit.keys.model(std::path::Path::new("")).unwrap());
+        let error = links.change(&[0], &loss("\"1.5\"")).unwrap_err();
+        assert!(error.starts_with("loss=") && error.contains("expected"), "{error}");
+        assert!(links.change(&[7], &loss("0.1")).is_err());
     }
 }

@@ -1,10 +1,6 @@
 //! What the commands that run in real time share.
 
-mod configured;
 mod control;
-mod editor;
-mod snapshot;
-mod traffic;
 mod words;
 
 use std::time::Duration;
@@ -13,12 +9,8 @@ use cohaptic_realtime::{Pacing, Tolerance, Wishes};
 
 use crate::arguments::RealTimeArguments;
 
-pub(crate) use configured::ConfiguredDelay;
-pub(crate) use control::{LiveControl, Look};
-pub(crate) use editor::{Edit, KeyedLinks};
-pub(crate) use snapshot::{counters, quantiles, quantiles_of};
-pub(crate) use traffic::{Publisher, carried, counts, lasted, say, some_length, status};
-pub(crate) use words::{late, loading, notes};
+pub(crate) use control::{Edit, KeyedLinks, LiveControl, Look, counters, quantiles, quantiles_of};
+pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, lasted, late, loading, notes, say, some_length, status};
 
 impl RealTimeArguments {
     pub(crate) const fn pacing(&self) -> Pacing {

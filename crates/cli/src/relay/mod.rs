@@ -1,23 +1,27 @@
 //! `cohaptic relay`.
 
-mod conduct;
-mod document;
+mod answer;
 mod setup;
-mod status;
-mod words;
 
 use std::process::ExitCode;
-use std::sync::mpsc::channel;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
 
+use cohaptic_control::{Description, Kind, LinkCounters, LinkName, Snapshot};
+use cohaptic_realtime::Tolerance;
 use cohaptic_realtime::udp::EndpointConfig;
-use cohaptic_relay::{Relay, RelayError, RunOptions};
+use cohaptic_relay::{Control, LinkReport, Relay, RelayError, Report, RunOptions, View};
+use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
 
 use crate::arguments::RelayArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
-use crate::realtime::{KeyedLinks, LiveControl, say, some_length};
+use crate::progress::Progress;
+use crate::realtime::{self, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, quantiles_of, say, some_length};
 use crate::{interrupt, output};
-use document::RelayDocument;
 use setup::Setup;
 
 /// Puts the emulator between programs, and says what it did.
@@ -28,7 +32,7 @@ pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     setup.opened(relay.ports()).iter().for_each(|line| say(line));
     let (changes, wanted) = channel();
     let editor = KeyedLinks { keys: std::mem::take(&mut setup.keys), folder: setup.folder.clone(), changes };
-    let control = LiveControl::open(&arguments.real_time, status::description(&setup), Box::new(editor))?;
+    let control = LiveControl::open(&arguments.real_time, description(&setup), Box::new(editor))?;
     let options = RunOptions {
         pacing: arguments.real_time.pacing(),
         wishes: arguments.real_time.wishes(),
@@ -36,17 +40,116 @@ pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
         duration: length,
         ..RunOptions::default()
     };
-    let (report, edits) = conduct::conduct(relay, &setup, &options, &control, &wanted)?;
+    let (report, edits) = conduct(relay, &setup, &options, &control, &wanted)?;
     let asked = setup.asked(&edits, report.elapsed);
     let is_interrupted = interrupt::requested();
     if arguments.json {
-        output::json(DocumentSchema::RELAY, &RelayDocument::new(&setup, &report, &asked, is_interrupted))?;
+        output::json(DocumentSchema::RELAY, &answer::document(&setup, &report, &asked, is_interrupted))?;
     } else {
-        output::text(&words::describe(&setup, &report, &asked))?;
+        output::text(&answer::describe(&setup, &report, &asked))?;
     }
     Ok(if is_interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
 fn failure(error: RelayError) -> Failure {
     if matches!(error, RelayError::Config(_)) { Failure::Input(error.to_string()) } else { Failure::System(error.to_string()) }
+}
+
+/// Runs until its end, or until the user asks for it. Says too how often each link was changed from outside.
+fn conduct(relay: Relay, setup: &Setup, options: &RunOptions, control: &LiveControl, wanted: &Receiver<Edit>) -> Result<(Report, Vec<u64>), Failure> {
+    const GLANCE: Duration = Duration::from_millis(50);
+    let mut publisher = Publisher::new(control.look(), publish_every(setup.pairs.len()));
+    let (say, heard) = channel();
+    let stop = AtomicBool::new(false);
+    let mut edits = vec![0; setup.pairs.len()];
+    let progress = Progress::of_traffic(&setup.title);
+    let report = thread::scope(|scope| {
+        let running = thread::Builder::new().name("relay".to_owned()).spawn_scoped(scope, || {
+            // Moved, so that it is this thread's alone.
+            let heard = heard;
+            relay.run(options, &heard, &stop, |view| publisher.offer(|| snapshot(view, &setup.pairs, options.tolerance)))
+        });
+        let running = running.map_err(|error| Failure::System(format!("the relay gets no thread: {error}")))?;
+        while !running.is_finished() {
+            match wanted.recv_timeout(GLANCE) {
+                Ok(Edit { link, model, .. }) => {
+                    if let (Some((from, to)), Some(edits)) = (setup.pairs.get(link), edits.get_mut(link)) {
+                        // If it has ended meanwhile, so has what could be changed.
+                        let is_heard = say.send(Control::SetLink { from: *from, to: *to, model: Box::new(model) }).is_ok();
+                        *edits += u64::from(is_heard);
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                // Nobody can change anything.
+                Err(RecvTimeoutError::Disconnected) => thread::sleep(GLANCE),
+            }
+            stop.store(interrupt::requested(), Ordering::Relaxed);
+            progress.note(realtime::status(&control.latest()));
+        }
+        running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(failure)
+    });
+    progress.clear();
+    Ok((report?, edits))
+}
+
+fn description(setup: &Setup) -> Description {
+    let link = |(from, to)| {
+        let (from, to) = (setup.name(from).to_owned(), setup.name(to).to_owned());
+        LinkName { name: format!("{from}->{to}"), from, to }
+    };
+    Description {
+        kind: Kind::Relay,
+        title: setup.title.clone(),
+        links: setup.pairs.iter().copied().map(link).collect(),
+        peers: Vec::new(),
+        clocks: vec!["release".to_owned()],
+    }
+}
+
+/// How often a relay with that number of links is looked at: a snapshot of a large mesh takes milliseconds, and packets wait meanwhile.
+fn publish_every(links: usize) -> Duration {
+    const LINKS_IN_A_MOMENT: usize = 500;
+    let moments = u32::try_from(links.div_ceil(LINKS_IN_A_MOMENT)).unwrap_or(u32::MAX).clamp(1, 50);
+    Duration::from_millis(100) * moments
+}
+
+/// `pairs` are the links in the order of the description.
+fn snapshot(view: &View<'_>, pairs: &[(NodeId, NodeId)], tolerance: Tolerance) -> Snapshot {
+    let links = view.links();
+    let validity = tolerance.judge(view.release());
+    Snapshot {
+        elapsed: view.now().saturating_duration_since(Instant::ZERO),
+        invalid: (!validity.is_valid()).then(|| validity.to_string()),
+        lateness: vec![quantiles(&view.release().summary())],
+        links: links.iter().zip(pairs).map(|(report, (from, to))| link(report, view.recent_delays(*from, *to))).collect(),
+        peers: Vec::new(),
+        refused: refused(view, &links),
+    }
+}
+
+fn link(report: &LinkReport, recent: &[Duration]) -> LinkCounters {
+    LinkCounters { delivered_bytes: report.counts.delivered_bytes, recent_delay: quantiles_of(recent), ..counters(&report.stats) }
+}
+
+fn refused(view: &View<'_>, links: &[LinkReport]) -> Vec<(&'static str, u64)> {
+    let intake = view.intake();
+    let undeliverable = links.iter().map(|link| link.counts.undeliverable).sum();
+    let all = [
+        ("stranger", intake.strangers),
+        ("to-itself", intake.to_itself),
+        ("no-room", intake.no_room),
+        ("overload", intake.overload),
+        ("undeliverable", undeliverable),
+    ];
+    all.into_iter().filter(|(_, count)| *count > 0).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_large_mesh_is_looked_at_less_often() {
+        assert_eq!([2, 500, 501, 65_280].map(publish_every), [100, 100, 200, 5000].map(Duration::from_millis));
+    }
 }

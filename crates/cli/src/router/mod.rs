@@ -1,25 +1,26 @@
 //! `cohaptic router`.
 
-mod conduct;
-mod document;
-mod status;
-mod words;
+mod answer;
 
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::mpsc::channel;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::Duration;
 
+use cohaptic_control::{Description, Kind, LinkCounters, LinkName, Snapshot};
 use cohaptic_linkfile::router::{RouterFile, Side};
-use cohaptic_router::Router;
+use cohaptic_realtime::{Prepared, Validity, prepare_thread};
+use cohaptic_router::{LaneSnapshot, Report, Router, RunError, Written};
 use cohaptic_units::Instant;
 
 use crate::arguments::RouterArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
-use crate::realtime::{KeyedLinks, LiveControl, say, some_length};
+use crate::progress::Progress;
+use crate::realtime::{self, ConfiguredDelay, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, say, some_length};
 use crate::{input, interrupt, output};
-use conduct::{Ending, RouterRun};
-use document::RouterDocument;
 
 /// Puts the emulator between two devices, and says what it did.
 pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
@@ -32,12 +33,12 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     // Each direction has keys of its own: it can be changed by itself.
     let keys = file.links.iter().flat_map(|link| [link.keys.clone(), link.keys.clone()]).collect();
     let folder = arguments.file.parent().map(Path::to_path_buf).unwrap_or_default();
-    let control = LiveControl::open(real_time, status::description(&file), Box::new(KeyedLinks { keys, folder, changes }))?;
-    let ran = conduct::conduct(router, &file, arguments, until, &control, wanted)?;
+    let control = LiveControl::open(real_time, description(&file), Box::new(KeyedLinks { keys, folder, changes }))?;
+    let ran = conduct(router, &file, arguments, until, &control, wanted)?;
     if arguments.json {
-        output::json(DocumentSchema::ROUTER, &RouterDocument::new(&file, &ran))?;
+        output::json(DocumentSchema::ROUTER, &answer::document(&file, &ran))?;
     } else {
-        output::text(&words::describe(&file, &ran))?;
+        output::text(&answer::describe(&file, &ran))?;
     }
     match ran {
         RouterRun { ending: Ending::Failed(error), .. } => Err(Failure::System(error.to_string())),
@@ -60,4 +61,131 @@ fn attached(file: &RouterFile, side: Side) -> String {
     };
     let within = attachment.namespace().map_or_else(String::new, |namespace| format!(" in the namespace {namespace}"));
     format!("{} ({kind} {}{within})", side.name(), attachment.device())
+}
+
+/// What a router did.
+struct RouterRun {
+    report: Report,
+    prepared: Prepared,
+    validity: Validity,
+    /// What each link was asked for, from the left and then from the right.
+    asked: Vec<ConfiguredDelay>,
+    ending: Ending,
+}
+
+/// How it came to its end.
+#[derive(Debug)]
+enum Ending {
+    Complete,
+    Interrupted,
+    /// A device is gone.
+    Failed(RunError),
+}
+
+/// Runs until its end, or until the user asks for it.
+fn conduct(
+    router: Router,
+    file: &RouterFile,
+    arguments: &RouterArguments,
+    until: Option<Instant>,
+    control: &LiveControl,
+    wanted: Receiver<Edit>,
+) -> Result<RouterRun, Failure> {
+    const GLANCE: Duration = Duration::from_millis(50);
+    let stop = AtomicBool::new(false);
+    let progress = Progress::of_traffic(&input::named(&arguments.file).display().to_string());
+    let publisher = Publisher::new(control.look(), Duration::from_millis(100));
+    let ran = thread::scope(|scope| {
+        let running = thread::Builder::new()
+            .name("router".to_owned())
+            .spawn_scoped(scope, || route(router, file, arguments, until, &stop, wanted, publisher))
+            .map_err(|error| Failure::System(format!("the router gets no thread: {error}")))?;
+        while !running.is_finished() {
+            thread::sleep(GLANCE);
+            stop.store(interrupt::requested(), Ordering::Relaxed);
+            progress.note(realtime::status(&control.latest()));
+        }
+        Ok(running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    });
+    progress.clear();
+    ran
+}
+
+/// The thread that has to be on time.
+fn route(
+    mut router: Router,
+    file: &RouterFile,
+    arguments: &RouterArguments,
+    until: Option<Instant>,
+    stop: &AtomicBool,
+    wanted: Receiver<Edit>,
+    mut publisher: Publisher,
+) -> RouterRun {
+    /// So soon is a change taken up.
+    const LOOK: Duration = Duration::from_millis(20);
+    let prepared = prepare_thread(&arguments.real_time.wishes());
+    let tolerance = arguments.real_time.tolerance();
+    let mut asked: Vec<ConfiguredDelay> = file.links.iter().flat_map(|link| [ConfiguredDelay::of(&link.model); 2]).collect();
+    let ended = router.run(stop, until, LOOK, |router| {
+        for Edit { link: lane, model, .. } in wanted.try_iter() {
+            let (Some(link), Some(asked)) = (file.links.get(lane / 2), asked.get_mut(lane)) else { continue };
+            let changed = router.set_link(&link.name, Some(Side::BOTH[lane % 2]), &model);
+            asked.changes += u64::from(changed.is_ok());
+        }
+        publisher.offer(|| {
+            let validity = tolerance.judge(router.lateness());
+            snapshot(&router.report(), validity)
+        });
+    });
+    let ending = match ended {
+        Err(error) => Ending::Failed(error),
+        Ok(()) if interrupt::requested() => Ending::Interrupted,
+        Ok(()) => Ending::Complete,
+    };
+    RouterRun { report: router.report(), prepared, validity: tolerance.judge(router.lateness()), asked, ending }
+}
+
+/// Every link twice: from the left and from the right.
+fn description(file: &RouterFile) -> Description {
+    let lanes = file.links.iter().flat_map(|link| {
+        Side::BOTH.map(|from| {
+            let (from, to) = (from.name(), from.opposite().name());
+            // As its random streams are called.
+            LinkName { name: format!("{0}.{from}->{0}.{to}", link.name), from: from.to_owned(), to: to.to_owned() }
+        })
+    });
+    Description { kind: Kind::Router, title: output::path(&file.file), links: lanes.collect(), peers: Vec::new(), clocks: vec!["release".to_owned()] }
+}
+
+fn snapshot(report: &Report, validity: Validity) -> Snapshot {
+    Snapshot {
+        elapsed: elapsed(report),
+        invalid: (!validity.is_valid()).then(|| validity.to_string()),
+        lateness: vec![quantiles(&report.release)],
+        links: report.counters.lanes.iter().map(link).collect(),
+        peers: Vec::new(),
+        refused: refused(report).into_iter().filter(|(_, count)| *count > 0).collect(),
+    }
+}
+
+fn elapsed(report: &Report) -> Duration {
+    report.elapsed.saturating_duration_since(Instant::ZERO)
+}
+
+fn link(lane: &LaneSnapshot) -> LinkCounters {
+    LinkCounters { delivered_bytes: lane.delivered_bytes, recent_delay: quantiles(&lane.recent_delay), ..counters(&lane.stats) }
+}
+
+/// What was dropped outside of links, by cause.
+fn refused(report: &Report) -> [(&'static str, u64); 6] {
+    let [left, right] = &report.counters.received;
+    let written = |count: fn(&Written) -> u64| report.written.iter().map(count).sum();
+    [
+        ("malformed", left.malformed + right.malformed),
+        ("rule", left.dropped + right.dropped),
+        ("overload", report.counters.lanes.iter().map(|lane| lane.overload).sum()),
+        ("full", written(|written| written.full)),
+        ("too-long", written(|written| written.too_long)),
+        ("refused", written(|written| written.refused)),
+    ]
 }

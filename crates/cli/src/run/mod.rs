@@ -1,13 +1,11 @@
 //! `cohaptic run`.
 
-mod command;
-mod document;
+pub(crate) mod answer;
 mod page;
 mod replayed;
-pub(crate) mod words;
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
@@ -20,11 +18,11 @@ use cohaptic_units::Instant;
 
 use crate::arguments::RunArguments;
 use crate::document_schema::DocumentSchema;
-use crate::failure::{Failure, INTERRUPTED};
+use crate::failure::{self, Failure, INTERRUPTED};
 use crate::file::write_file;
 use crate::progress::Progress;
-use crate::{failure, input, interrupt, output};
-use words::describe;
+use crate::{input, interrupt, output};
+use answer::describe;
 
 /// Runs a scene, or a scene and a variant of it, and says what happened.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
@@ -63,8 +61,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         _ => None,
     };
     if arguments.scene.json {
-        let against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| document::of(variant, run, &[], None::<()>));
-        output::json(DocumentSchema::RUN, &document::of(&scene, &first, &replayed_otherwise.unwrap_or_default(), against))?;
+        let against = variant.as_ref().zip(second.as_ref()).map(|(variant, run)| answer::of(variant, run, &[], None::<()>));
+        output::json(DocumentSchema::RUN, &answer::of(&scene, &first, &replayed_otherwise.unwrap_or_default(), against))?;
     } else {
         let mut text = format!("{}\n{}", scene.title, describe(&scene, &first));
         if let Some((variant, run)) = variant.as_ref().zip(second.as_ref()) {
@@ -166,5 +164,55 @@ impl Observer for &mut Watch<'_> {
     fn keep_going(&mut self, now: Instant) -> bool {
         self.progress.reach(now);
         !interrupt::requested()
+    }
+}
+
+/// The folder of the records in such a line. Records do not depend on their folder, and neither does what they say.
+const FOLDER: &str = "DIR";
+
+/// The command that makes a run again, as a line for a shell, with the options that have an effect on records.
+fn command_line(arguments: &RunArguments) -> String {
+    let scene = &arguments.scene.scene;
+    let mut words = vec!["cohaptic run".to_owned(), path(scene)];
+    words.extend(arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key))));
+    words.extend(arguments.seed.map(|seed| format!("--seed {seed}")));
+    words.extend(arguments.against.iter().map(|key| format!("--against {}", quoted(key))));
+    words.extend(arguments.inputs.as_deref().map(|file| format!("--inputs {}", path(file))));
+    words.extend(arguments.force.then(|| "--force".to_owned()));
+    words.extend(arguments.general.then(|| "--general".to_owned()));
+    words.push(format!("--out {FOLDER}"));
+    words.extend(arguments.pictures.word().map(|size| format!("--size {}", quoted(size))));
+    if input::is_standard_input(scene) {
+        words.push("< scene.toml".to_owned());
+    }
+    words.join(" ")
+}
+
+fn path(path: &Path) -> String {
+    quoted(&output::path(path))
+}
+
+/// A word as POSIX shells read it.
+fn quoted(word: &str) -> String {
+    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=:,%+@".contains(letter);
+    if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_where_a_shell_would_read_them_otherwise() {
+        for (word, expected) in [
+            ("link.delay=24ms", "link.delay=24ms"),
+            ("", "''"),
+            ("scene.title=\"a b\"", "'scene.title=\"a b\"'"),
+            ("it's", "'it'\\''s'"),
+            ("$HOME", "'$HOME'"),
+            ("a\nb", "'a\nb'"),
+        ] {
+            assert_eq!(quoted(word), expected);
+        }
     }
 }

@@ -10,8 +10,8 @@ use cohaptic_scene::{Scene, scene_content_of_text};
 use cohaptic_units::print::{Counted, Span};
 use cohaptic_wan::{DropCause, LinkName, LinkStats};
 
-use super::command;
-use super::words::{length, packets};
+use super::answer::{length, packets};
+use super::command_line;
 use crate::arguments::RunArguments;
 use crate::expectations::{BARS, OutcomeDocument, columns};
 use crate::failure::Failure;
@@ -33,7 +33,7 @@ pub(super) fn html(
     let text = input::text(path)?;
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
     let mut page = Page::new(scene.title.as_str()).with(ending(scene, summary)).with(Html::facts(facts(arguments, scene, overrides, summary)));
-    page = page.with(Html::heading(2, "Made by")).with(Html::preformatted(&command::line(arguments)));
+    page = page.with(Html::heading(2, "Made by")).with(Html::preformatted(&command_line(arguments)));
     page = page.with(expectations(scene, outcomes)).with(Html::heading(2, "Pictures"));
     for (file, svg) in pictures {
         page = page.with(Html::figure(file, Html::picture(svg)));

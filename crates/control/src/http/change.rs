@@ -10,8 +10,8 @@ use axum::response::Response;
 use serde_json::{Map, Value, json};
 
 use super::App;
-use super::answer::{Refusal, json as answer};
 use super::read::{named, with_keys};
+use super::{Refusal, json as answer};
 use crate::typed;
 
 /// Bodies beyond this are refused \[bytes\]. Every key of a link at its longest is a hundredth of it.

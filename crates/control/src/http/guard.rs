@@ -8,8 +8,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 
-use super::answer::Refusal;
-use super::{App, page};
+use super::{App, Refusal, page};
 
 /// What every answer says about itself, unless it says something else.
 const HEADERS: [(HeaderName, &str); 7] = [

@@ -1,15 +1,20 @@
-//! Answers that change nothing.
+//! Answers that change nothing: JSON, metrics, and server-sent events with the state whenever a new one was published.
 
+use core::convert::Infallible;
+use core::time::Duration;
 use std::sync::Arc;
 
 use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, State};
 use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::sse::{Event, Sse};
 use axum::response::{IntoResponse as _, Response};
+use futures_util::Stream;
+use futures_util::stream::unfold;
 use serde_json::{Map, Value, json};
+use tokio::time::{Interval, MissedTickBehavior, interval};
 
-use super::App;
-use super::answer::{Refusal, json as answer};
+use super::{App, Refusal, json as answer};
 use crate::{metrics, typed, views};
 
 /// Everything that changes by itself.
@@ -65,4 +70,48 @@ pub(super) fn with_keys(app: &App, links: &[usize]) -> Vec<Value> {
         view
     };
     links.iter().map(view).collect()
+}
+
+/// How often it is looked whether there is something new.
+const EVERY: Duration = Duration::from_millis(100);
+/// After this number of looks without anything new a comment says that the server is still there: 1 s.
+const QUIET: u32 = 10;
+
+struct Listener {
+    app: Arc<App>,
+    ticks: Interval,
+    sent: Option<u64>,
+    quiet: u32,
+}
+
+/// The state at once, then each time that it was published anew, at most ten times a second.
+pub(super) async fn events(State(app): State<Arc<App>>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
+    let mut ticks = interval(EVERY);
+    // A slow reader gets less, not the past.
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let listener = Listener { app, ticks, sent: None, quiet: 0 };
+    Sse::new(unfold(listener, |mut listener| async {
+        let event = listener.next().await;
+        Some((Ok(event), listener))
+    }))
+}
+
+impl Listener {
+    async fn next(&mut self) -> Event {
+        loop {
+            self.ticks.tick().await;
+            let latest = self.app.board.latest();
+            if self.sent != Some(latest.number) {
+                self.sent = Some(latest.number);
+                self.quiet = 0;
+                let state = views::state(self.app.board.description(), &latest);
+                return Event::default().event("state").id(latest.number.to_string()).data(state.to_string());
+            }
+            self.quiet += 1;
+            if self.quiet >= QUIET {
+                self.quiet = 0;
+                return Event::default().comment("nothing new");
+            }
+        }
+    }
 }

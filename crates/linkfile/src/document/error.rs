@@ -4,9 +4,7 @@ use core::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use cohaptic_units::Excerpt;
-
-use super::text::{escape, shorten};
+use cohaptic_units::{Excerpt, Visible};
 
 /// Why a file is refused.
 #[derive(Debug, thiserror::Error)]
@@ -60,7 +58,7 @@ fn unreadable(path: &Path, source: &io::Error, place: Option<&Diagnostic>) -> St
     }
 }
 
-/// One fault: where it is, what is wrong, what was expected, and the line it stands in.
+/// One fault: its place, the fault itself, the expected text, and the line it stands in.
 ///
 /// Its display form spans several lines and holds no control characters:
 ///
@@ -124,7 +122,7 @@ impl Diagnostic {
         &self.key
     }
 
-    /// What is wrong and what was expected.
+    /// The fault, and what was expected.
     #[must_use]
     pub fn message(&self) -> &str {
         &self.message
@@ -152,5 +150,26 @@ impl fmt::Display for Diagnostic {
             Some(note) => write!(f, "\nnote: {}", escape(note)),
             None => Ok(()),
         }
+    }
+}
+
+/// A text as it is shown.
+pub(super) fn escape(text: &str) -> String {
+    Visible(text).to_string()
+}
+
+/// A text of the document within a message: in quotes, and not longer than anyone wants to read.
+#[must_use]
+pub fn quote(text: &str) -> String {
+    format!("\"{}\"", shorten(text))
+}
+
+/// The beginning of a text that is too long for a message.
+#[must_use]
+pub fn shorten(text: &str) -> String {
+    const LONGEST: usize = 80;
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
     }
 }

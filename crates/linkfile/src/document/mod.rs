@@ -2,13 +2,11 @@
 
 mod error;
 mod source;
-mod text;
 mod toml_text;
 mod tree;
 
 pub(crate) use error::Origin;
-pub use error::{Diagnostic, FileError};
+pub use error::{Diagnostic, FileError, quote, shorten};
 pub use source::{BEGINNING, Place, Sources};
-pub use text::{quote, shorten};
 pub use toml_text::{key_text, value_text};
 pub use tree::{Entry, Node, Table, TooDeep, Value, join};

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use cohaptic_units::Excerpt;
 
-use super::error::{Diagnostic, Origin};
-use super::text::shorten;
+use super::error::{Diagnostic, Origin, shorten};
 
 /// A span of bytes in one of the texts. The order is that in which they are read: the file from its beginning, then the overrides.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use toml::de::{DeTable, DeValue};
 
+use super::error::{quote, shorten};
 use super::source::{BEGINNING, Place};
-use super::text::{quote, shorten};
 
 /// No file needs more; it keeps the walk over the tree from using up the stack.
 const DEEPEST: usize = 16;

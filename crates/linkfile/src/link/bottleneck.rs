@@ -1,12 +1,11 @@
-//! `rate`, `queue`, `overhead` and `cells`: the serialiser and the queue before it.
+//! `rate`, `queue`, `overhead`, `cells` and `token-bucket`: the serialiser, the queue before it, and how much may leave in bursts.
 
 use core::num::NonZeroU32;
 
-use cohaptic_units::Rate;
-use cohaptic_wan::{Bottleneck, Cells, DeliveryTrace, Discipline, Framing, Service};
+use cohaptic_wan::{Bottleneck, Cells, DeliveryTrace, Discipline, Framing, Peak, Service, TokenBucket};
 
-use super::queue::{Queue, read_queue};
-use super::{is_none, is_unlimited, written_together};
+use super::queue::{Queue, read_limit, read_queue};
+use super::{NONE, UNLIMITED, read_two, unless, written_together};
 use crate::document::Node;
 use crate::reading::{Context, TableReader, values};
 
@@ -14,12 +13,12 @@ use crate::reading::{Context, TableReader, values};
 pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<DeliveryTrace>, context: Context<'_>) -> Option<Option<Bottleneck>> {
     let (rate_entry, trace_entry) = (table.entry("rate"), table.entry("trace"));
     let parts = [table.entry("queue"), table.entry("overhead"), table.entry("cells")];
-    let rate = table.maybe("rate", read_rate);
+    let rate = table.optional("rate", None, unless(UNLIMITED, values::rate));
     let none = Queue { limit: None, discipline: Discipline::TailDrop };
     let queue = table.optional("queue", none, read_queue);
     let overhead = table.optional("overhead", 0, values::signed_size);
-    let cells = table.optional("cells", None, read_cells);
-    let (rate, queue, overhead, cells) = (rate?.flatten(), queue?, overhead?, cells?);
+    let cells = table.optional("cells", None, unless(NONE, read_cells));
+    let (rate, queue, overhead, cells) = (rate?, queue?, overhead?, cells?);
     let service = match (rate, recorded) {
         (None, None) => None,
         (Some(rate), None) => Some(Service::Rate(rate)),
@@ -56,16 +55,7 @@ pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<Deli
     Some(None)
 }
 
-/// `None` for "unlimited".
-fn read_rate(node: &Node, context: Context<'_>) -> Option<Option<Rate>> {
-    if is_unlimited(node) { Some(None) } else { values::rate(node, context).map(Some) }
-}
-
-/// `None` for "none".
-fn read_cells(node: &Node, context: Context<'_>) -> Option<Option<Cells>> {
-    if is_none(node) {
-        return Some(None);
-    }
+fn read_cells(node: &Node, context: Context<'_>) -> Option<Cells> {
     const EXPECTED: &str = "a table such as { payload = \"48B\", overhead = \"5B\" }";
     let mut table = TableReader::new(node, context, EXPECTED)?;
     let size = |least: u32| {
@@ -81,5 +71,24 @@ fn read_cells(node: &Node, context: Context<'_>) -> Option<Option<Cells>> {
     let payload = table.required("payload", "what a cell carries, a size such as \"48B\"", size(1));
     let overhead = table.optional("overhead", 0, size(0));
     table.finish();
-    Some(Some(Cells { payload: NonZeroU32::new(payload?)?, overhead: overhead? }))
+    Some(Cells { payload: NonZeroU32::new(payload?)?, overhead: overhead? })
+}
+
+pub(super) fn read_token_bucket(node: &Node, context: Context<'_>) -> Option<TokenBucket> {
+    let mut table = TableReader::new(node, context, "\"none\" or a table such as { rate = \"1Mbit\", burst = \"10kB\" }")?;
+    let rate = table.required("rate", "how fast the bucket fills, a rate such as \"1Mbit\"", values::rate);
+    let burst = table.required("burst", "what the bucket holds, a size such as \"10kB\"", values::size);
+    let peak = table.maybe("peak", read_peak);
+    let limit = table.optional("limit", None, unless(UNLIMITED, read_limit));
+    let overhead = table.optional("overhead", 0, values::signed_size);
+    table.finish();
+    let framing = Framing { overhead: overhead?, cells: None };
+    Some(TokenBucket { rate: rate?, burst: burst?, peak: peak?, framing, limit: limit? })
+}
+
+fn read_peak(node: &Node, context: Context<'_>) -> Option<Peak> {
+    let rate = ("rate", "how fast a burst leaves, a rate such as \"2Mbit\"", values::rate);
+    let burst = ("burst", "at least the largest packet, a size such as \"1500B\"", values::size);
+    let (rate, burst) = read_two(node, context, "a table such as { rate = \"2Mbit\", burst = \"1500B\" }", rate, burst)?;
+    Some(Peak { rate, burst })
 }

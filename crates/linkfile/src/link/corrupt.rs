@@ -2,8 +2,8 @@
 
 use cohaptic_wan::{Chance, Checksum, Corruption, Flips};
 
-use super::chance::read_chance_in;
 use super::loss_pattern::read_range;
+use super::read_chance_in;
 use crate::document::{Node, quote};
 use crate::reading::{Context, TableReader, values};
 

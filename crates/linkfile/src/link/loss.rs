@@ -3,8 +3,8 @@
 use cohaptic_units::Probability;
 use cohaptic_wan::{Bursts, FourState, GilbertElliott, GilbertElliottInTime, Loss};
 
-use super::chance::read_chance;
 use super::loss_pattern::{read_lost_packets, read_lost_times};
+use super::read_chance;
 use crate::document::Node;
 use crate::reading::values::{self, PACKETS, ReadNumber as _};
 use crate::reading::{Context, TableReader, only_one};

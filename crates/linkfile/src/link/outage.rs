@@ -1,10 +1,10 @@
-//! `outage`: when a link is down.
+//! `outage`: when a link is down; and the laws of how long something lasts.
 
-use cohaptic_wan::{IdleOutages, Outage, Outages, RandomOutages};
+use cohaptic_wan::{IdleOutages, Outage, Outages, RandomOutages, Sojourn};
 
-use super::sojourn::{SOJOURN, read_sojourn};
+use super::read_two;
 use crate::document::Node;
-use crate::reading::{Context, TableReader, values};
+use crate::reading::{Context, TableReader, only_one, values};
 
 /// A list of spans, or `{ scheduled, random, idle }`.
 pub(super) fn read_outages(node: &Node, context: Context<'_>) -> Option<Outages> {
@@ -28,19 +28,16 @@ pub(super) fn read_outages(node: &Node, context: Context<'_>) -> Option<Outages>
 }
 
 fn read_random(node: &Node, context: Context<'_>) -> Option<RandomOutages> {
-    let mut table = TableReader::new(node, context, "a table such as { up = \"30s\", down = \"1s\" }")?;
-    let up = table.required("up", SOJOURN, read_sojourn);
-    let down = table.required("down", SOJOURN, read_sojourn);
-    table.finish();
-    Some(RandomOutages { up: up?, down: down? })
+    let (up, down) = (("up", SOJOURN, read_sojourn), ("down", SOJOURN, read_sojourn));
+    let (up, down) = read_two(node, context, "a table such as { up = \"30s\", down = \"1s\" }", up, down)?;
+    Some(RandomOutages { up, down })
 }
 
 fn read_idle(node: &Node, context: Context<'_>) -> Option<IdleOutages> {
-    let mut table = TableReader::new(node, context, "a table such as { after = \"10s\", down = \"2s\" }")?;
-    let after = table.required("after", "how long nothing must be sent, a duration such as \"10s\"", values::positive_duration);
-    let down = table.required("down", "how long the link is down then, a duration such as \"2s\"", values::positive_duration);
-    table.finish();
-    Some(IdleOutages { after: after?, down: down? })
+    let after = ("after", "how long nothing must be sent, a duration such as \"10s\"", values::positive_duration);
+    let down = ("down", "how long the link is down then, a duration such as \"2s\"", values::positive_duration);
+    let (after, down) = read_two(node, context, "a table such as { after = \"10s\", down = \"2s\" }", after, down)?;
+    Some(IdleOutages { after, down })
 }
 
 fn read_scheduled(node: &Node, context: Context<'_>) -> Option<Outages> {
@@ -63,9 +60,49 @@ fn read_scheduled(node: &Node, context: Context<'_>) -> Option<Outages> {
 
 /// A span of time.
 pub(super) fn read_span(node: &Node, context: Context<'_>) -> Option<Outage> {
-    let mut table = TableReader::new(node, context, "a table such as { from = \"1s\", to = \"2s\" }")?;
-    let from = table.required("from", "a time such as \"1s\"", values::instant);
-    let to = table.required("to", "a time such as \"2s\"", values::instant);
+    let (from, to) = (("from", "a time such as \"1s\"", values::instant), ("to", "a time such as \"2s\"", values::instant));
+    let (from, to) = read_two(node, context, "a table such as { from = \"1s\", to = \"2s\" }", from, to)?;
+    Some(Outage { from, to })
+}
+
+/// What stands in place of a sojourn where something else was found.
+pub(super) const SOJOURN: &str =
+    "a mean such as \"2s\" (exponential), { fixed = \"2s\" }, { uniform = [\"1s\", \"3s\"] } or { erlang = { mean = \"2s\", stages = 4 } }";
+
+/// The law of a span of time, which comes to an end.
+pub(super) fn read_sojourn(node: &Node, context: Context<'_>) -> Option<Sojourn> {
+    let sojourn = if node.as_text().is_some() { Sojourn::Exponential(values::duration(node, context)?) } else { read_law(node, context)? };
+    if !sojourn.is_sound() {
+        context.fault_at(node, "a span that cannot be drawn or takes no time: expected times above zero, the longest not below the shortest");
+        return None;
+    }
+    Some(sojourn)
+}
+
+fn read_law(node: &Node, context: Context<'_>) -> Option<Sojourn> {
+    let mut table = TableReader::new(node, context, SOJOURN)?;
+    let laws = [table.entry("fixed"), table.entry("uniform"), table.entry("erlang"), table.entry("exponential")];
     table.finish();
-    Some(Outage { from: from?, to: to? })
+    let law = only_one(node, context, &laws, SOJOURN)?;
+    match law.name.as_str() {
+        "fixed" => values::duration(&law.node, context).map(Sojourn::Fixed),
+        "exponential" => values::duration(&law.node, context).map(Sojourn::Exponential),
+        "uniform" => {
+            const EXPECTED: &str = "a list of the shortest and the longest span such as [\"1s\", \"3s\"]";
+            let ends = values::list(&law.node, context, EXPECTED)?;
+            let [from, to] = ends.as_slice() else {
+                context.fault_at(&law.node, format!("a list of {}: expected {EXPECTED}", ends.len()));
+                return None;
+            };
+            let (from, to) = (values::duration(from, context), values::duration(to, context));
+            Some(Sojourn::Uniform(from?, to?))
+        }
+        _ => {
+            const STAGES: &str = "a number of stages from 1 to 1000";
+            let mean = ("mean", "the mean of all stages together, a duration", values::duration);
+            let stages = ("stages", STAGES, |node, context| values::integer(node, context, 1..=1000, STAGES));
+            let (mean, stages) = read_two(&law.node, context, "a table such as { mean = \"2s\", stages = 4 }", mean, stages)?;
+            Some(Sojourn::Erlang(mean, u32::try_from(stages).ok()?))
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use cohaptic_units::{Bytes, Probability};
 use cohaptic_wan::{CoDel, Discipline, QueueLimit, Red};
 
-use super::is_unlimited;
+use super::{UNLIMITED, unless};
 use crate::document::{Node, quote};
 use crate::reading::values::{self, FRACTION, ReadNumber as _};
 use crate::reading::{Context, TableReader, only_one};
@@ -20,17 +20,14 @@ const LIMIT: &str = "a limit such as \"100 packets\", \"64kB\" or \"50ms\"";
 
 pub(super) fn read_queue(node: &Node, context: Context<'_>) -> Option<Queue> {
     let mut table = TableReader::new(node, context, "a table such as { limit = \"100 packets\" }")?;
-    let limit = table.required("limit", LIMIT, read_limit);
+    let limit = table.required("limit", LIMIT, unless(UNLIMITED, read_limit));
     let discipline = table.optional("discipline", Discipline::TailDrop, |node, context| read_discipline(node, context, limit.flatten()));
     table.finish();
     Some(Queue { limit: limit?, discipline: discipline? })
 }
 
-/// How much may wait; `None` for "unlimited".
-pub(super) fn read_limit(node: &Node, context: Context<'_>) -> Option<Option<QueueLimit>> {
-    if is_unlimited(node) {
-        return Some(None);
-    }
+/// How much may wait.
+pub(super) fn read_limit(node: &Node, context: Context<'_>) -> Option<QueueLimit> {
     let text = values::text(node, context, LIMIT)?;
     let packets = || values::packets(text).map(QueueLimit::Packets);
     let bytes = || cohaptic_units::parse::size(text).ok().map(QueueLimit::Bytes);
@@ -39,21 +36,18 @@ pub(super) fn read_limit(node: &Node, context: Context<'_>) -> Option<Option<Que
     if limit.is_none() {
         context.fault_at(node, format!("{} is no limit of a queue: expected {LIMIT}", quote(text)));
     }
-    limit.map(Some)
+    limit
 }
 
-/// A number of packets: `limit` of a link. `None` for "unlimited".
-pub(super) fn read_packets(node: &Node, context: Context<'_>) -> Option<Option<u64>> {
+/// A number of packets: `limit` of a link.
+pub(super) fn read_packets(node: &Node, context: Context<'_>) -> Option<u64> {
     const EXPECTED: &str = "a number of packets such as \"1000 packets\"";
-    if is_unlimited(node) {
-        return Some(None);
-    }
     let text = values::text(node, context, EXPECTED)?;
     let packets = values::packets(text);
     if packets.is_none() {
         context.fault_at(node, format!("{} is no number of packets: expected {EXPECTED}", quote(text)));
     }
-    packets.map(Some)
+    packets
 }
 
 fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>) -> Option<Discipline> {

@@ -5,15 +5,10 @@ use core::num::NonZeroU64;
 use cohaptic_wan::Slots;
 
 use super::delay::read_delay;
-use super::is_none;
 use crate::document::Node;
 use crate::reading::{Context, TableReader, values};
 
-/// `None` for "none".
-pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Option<Slots>> {
-    if is_none(node) {
-        return Some(None);
-    }
+pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {
     let mut table = TableReader::new(node, context, "\"none\" or a table such as { min = \"10ms\", max = \"20ms\" }")?;
     let ends = [table.entry("min"), table.entry("max")];
     let law = [table.entry("delay"), table.entry("jitter")];
@@ -41,7 +36,7 @@ pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Option<Slo
     table.finish();
     let mut slots = slots?;
     (slots.packets, slots.bytes) = (packets?, bytes?);
-    Some(Some(slots))
+    Some(slots)
 }
 
 /// Gaps that are uniform between two spans.

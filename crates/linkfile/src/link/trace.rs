@@ -1,7 +1,9 @@
-//! `trace`: a recorded line, or a recorded path.
+//! Recordings: `trace`, a recorded line or a recorded path, and `replay`, a link that does what a log says.
+
+use std::sync::Arc;
 
 use cohaptic_units::Bytes;
-use cohaptic_wan::{Between, DeliveryTrace, DeliveryTraceError, MAHIMAHI_BYTES, PathTrace, PathTraceError};
+use cohaptic_wan::{Between, DeliveryTrace, DeliveryTraceError, FateLog, FateLogError, MAHIMAHI_BYTES, PathTrace, PathTraceError};
 
 use super::is_none;
 use crate::document::Node;
@@ -47,7 +49,7 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     table.finish();
     let (bytes, between, repeat) = (bytes?, between?, repeat?);
     let Some(file) = file else {
-        // What is missing was said above, and in a part of a scene nothing is.
+        // A missing key was reported above, and in a part of a scene none is missing.
         return context.partial.then_some(None);
     };
     let trace = load(file, context, bytes, between, repeat)?;
@@ -102,4 +104,25 @@ fn header_span(text: &str) -> core::ops::Range<usize> {
     let content = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
     let line = text.lines().position(content).map_or(1, |place| place + 1);
     crate::reading::named_file::line_span(text, line)
+}
+
+pub(super) fn read_replay(node: &Node, context: Context<'_>) -> Option<Arc<FateLog>> {
+    let path = file_path(node, context, "the name of a log of fates, relative to the folder of the scene")?;
+    read_file(node, context, &path, "fates", |text| FateLog::parse(text).map(Arc::new).map_err(|error| fault(text, &error)))
+}
+
+fn fault(text: &str, error: &FateLogError) -> Fault {
+    let line = match error {
+        FateLogError::Header { .. } => Some(1),
+        FateLogError::Cells { line, .. }
+        | FateLogError::Cell { line, .. }
+        | FateLogError::UnknownFate { line, .. }
+        | FateLogError::Missing { line, .. }
+        | FateLogError::OfferedBefore { line, .. }
+        | FateLogError::ImpossibleTime { line, .. }
+        | FateLogError::Contradiction { line, .. }
+        | FateLogError::TwoEnds { line, .. } => Some(*line),
+        FateLogError::NoEnd { .. } | FateLogError::CopyFromNowhere { .. } => None,
+    };
+    Fault::in_line(text, line.and_then(|line| usize::try_from(line).ok()), error)
 }

@@ -1,15 +1,17 @@
 //! The state of a reader: the texts, the names that are known so far, and the faults.
 
+use core::any::Any;
 use core::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use cohaptic_wan::Modulator;
 
-use super::files::Files;
 use super::names::Names;
 use crate::document::{Diagnostic, FileError, Node, Place, Sources};
+use crate::fingerprint::Fingerprint;
 
 /// The first fault in the order of the texts. Readers go on after a fault, so that a later part of the walk can find one that stands earlier.
 #[derive(Debug, Default)]
@@ -97,5 +99,22 @@ impl<'a> Context<'a> {
     pub(super) fn fault_in_file(&self, node: &Node, diagnostic: Diagnostic) {
         let note = format!("this file is named at {}, by the key {}", self.sources.describe(node.place), node.path);
         self.faults.report(node.place, || FileError::Invalid(Box::new(Diagnostic { note: Some(note), ..diagnostic })));
+    }
+}
+
+/// What has been learnt from files, by path and by what they were read as: each is read once. `None`: it was refused.
+#[derive(Debug, Default)]
+pub(crate) struct Files {
+    pub(super) known: RefCell<BTreeMap<(PathBuf, String), Known>>,
+    /// What was in each file that could be read.
+    pub(super) held: RefCell<BTreeMap<PathBuf, Fingerprint>>,
+}
+
+pub(super) type Known = Option<Rc<dyn Any>>;
+
+impl Files {
+    /// What was in each file that could be read.
+    pub(super) fn into_held(self) -> BTreeMap<PathBuf, Fingerprint> {
+        self.held.into_inner()
     }
 }

@@ -4,7 +4,6 @@
 //! fault, and it goes on after a fault, so that of several faults the one that stands first in the text is found.
 
 mod context;
-mod files;
 pub mod named_file;
 mod names;
 mod overrides;

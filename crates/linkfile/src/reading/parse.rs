@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 
 use toml::de::DeTable;
 
-use super::context::{Context, Faults};
-use super::files::Files;
+use super::context::{Context, Faults, Files};
 use super::overrides;
 use crate::document::{BEGINNING, Diagnostic, FileError, Node, Place, Sources, TooDeep, join};
 use crate::fingerprint::Fingerprint;

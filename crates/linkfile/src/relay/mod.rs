@@ -1,7 +1,6 @@
-//! Relay files: who talks to whom through which link in real time, and through which ports.
+//! Relay files: which programs talk to each other in real time, through which links and ports.
 
 mod programs;
-mod timeline;
 
 use core::time::Duration;
 use std::net::SocketAddr;
@@ -11,7 +10,7 @@ use cohaptic_units::{Bytes, Instant};
 
 use crate::document::{FileError, Node, Sources};
 use crate::link::read_modulators;
-use crate::mesh::{KeysOfLinks, LinkChange, LinkClasses, LinkSelector, LinkTable, read_links};
+use crate::mesh::{KeysOfLinks, LinkChange, LinkClasses, LinkSelector, LinkTable, pairs, read_key_changes, read_links, read_links_between};
 use crate::reading::{Context, TableReader, default_title, parse, values, with_text};
 
 /// What `cohaptic relay FILE` does. Every number in it has been checked.
@@ -59,7 +58,7 @@ pub struct RelayFile {
 pub struct RelayProgram {
     /// Its name, which names its links too.
     pub name: String,
-    /// The port that stands for it: whoever sends there speaks to it. Port 0 is a free one.
+    /// The port that stands for it: a program that sends there speaks to it. Port 0 is a free one.
     pub port: SocketAddr,
     /// Where it sends from and listens; `None`: learnt from the first datagram that it sends.
     pub address: Option<SocketAddr>,
@@ -77,9 +76,9 @@ pub struct RelayChange {
 /// What a relay may take, and how late it may be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct RelayLimits {
-    /// So many datagrams may be on their way at once; what comes beyond is dropped.
+    /// The most datagrams in flight at once; those beyond are dropped.
     pub packets: u64,
-    /// So many bytes of them.
+    /// The most bytes of them.
     pub bytes: Bytes,
     /// An address that was learnt, or a client, is forgotten when it has been silent for so long.
     pub forget_after: Duration,
@@ -156,7 +155,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<(RelayFile, Li
     let modulators = read_modulators(root.get("modulators"), context);
     let context = context.with_modulators(modulators.as_ref());
     let links = read_links(root.get("link"), root.get("links"), context);
-    let timeline = timeline::read_timeline(root.get("timeline"), links.as_ref(), context);
+    let timeline = read_timeline(root.get("timeline"), links.as_ref(), context);
     root.finish();
     if let (Some(names), Some(node)) = (&names, programs_node) {
         programs::check_enough(names, node, context);
@@ -204,3 +203,36 @@ fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
 const MOST_PACKETS: u64 = 1 << 24;
 
 const LEAST_BYTES: u64 = 65_535;
+
+/// Reads `[\[timeline\]]`, the links that become other ones while the relay runs, and puts the changes in order of time. `links`: how things stand at the beginning; `None` if they were refused.
+fn read_timeline(node: Option<&Node>, links: Option<&LinkClasses>, context: Context<'_>) -> Option<Vec<RelayChange>> {
+    let Some(node) = node else { return Some(Vec::new()) };
+    let entries = values::list(node, context, "entries [[timeline]]")?;
+    let planned: Vec<_> = entries.iter().map(|entry| read_entry(entry, context)).collect();
+    let mut planned: Vec<(Instant, LinkSelector, &Node)> = planned.into_iter().collect::<Option<_>>()?;
+    // Stable: equal instants stay in the order of the file.
+    planned.sort_by_key(|(at, ..)| *at);
+    let mut links = links?.clone();
+    let mut changes = Vec::new();
+    for (at, selector, set) in planned {
+        if let LinkSelector::Between { from, to } = selector {
+            changes.push(RelayChange { at, link: links.change((from, to), set, context)? });
+            continue;
+        }
+        let table = links.change_all(set, context)?;
+        let all = pairs(table.peers()).map(|(from, to)| LinkChange { from, to, config: table.configs()[table.config_between(from, to)].clone() });
+        changes.extend(all.map(|link| RelayChange { at, link }));
+    }
+    Some(changes)
+}
+
+fn read_entry<'a>(entry: &'a Node, context: Context<'a>) -> Option<(Instant, LinkSelector, &'a Node)> {
+    let mut table = TableReader::new(entry, context, "a table with at, link and set")?;
+    let at = table.required("at", "a time such as \"3s\"", values::instant);
+    let selector = table.required("link", "\"all\" or a table such as { from = \"left\", to = \"right\" }", read_links_between);
+    let set = table.required("set", "a table of the keys that change", |node, _| Some(node));
+    table.finish();
+    let set = set?;
+    read_key_changes(set, context)?;
+    Some((at?, selector?, set))
+}

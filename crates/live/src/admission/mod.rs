@@ -22,7 +22,6 @@
 mod config;
 mod refusal;
 mod seats;
-mod window;
 
 use core::time::Duration;
 use std::net::SocketAddr;
@@ -37,11 +36,9 @@ use crate::{Entropy, Nonce, SessionKey};
 
 pub use config::{AdmissionConfig, AdmissionConfigError, Limits, Place, Seat};
 pub use refusal::{AdmissionStats, Refusal};
-pub use seats::SeatStatus;
-pub use window::WINDOW;
+pub use seats::{SeatStatus, WINDOW};
 
 use seats::{Occupant, SeatState};
-use window::Window;
 
 /// The numbers that a peer may give its samples are below this.
 pub const SEQUENCE_END: u64 = 1 << SEQUENCE_BITS;

@@ -4,10 +4,9 @@
 //! either: that at which it was due, or that at which the kernel saw it. Files, live control and the terminal have threads of their own.
 
 mod config;
-mod lateness_file;
+mod files;
 mod outside;
 mod recording;
-mod releases;
 mod rows;
 mod status;
 mod watch;

@@ -10,7 +10,7 @@ use cohaptic_realtime::{Clock as _, MonotonicClock};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::Instant;
 
-use super::releases::Release;
+use super::files::Release;
 use super::status::SocketCounts;
 use super::{SessionConfig, SessionError};
 use crate::{Admission, AdmissionConfig, AdmissionControl, AdmissionStats, Limits, MAX_DATAGRAM, Place, Seat, SystemEntropy};

@@ -13,8 +13,7 @@ use cohaptic_harness::{Observer as _, PacketRow, Summary, TickRow};
 use cohaptic_realtime::Lateness;
 use cohaptic_scene::{Scene, SceneContent};
 
-use super::lateness_file;
-use super::releases::{Release, Releases};
+use super::files::{Release, Releases, write_lateness};
 use super::rows::{InputCopy, TickCopy};
 
 /// How many rows may wait: of three peers, ten seconds.
@@ -74,7 +73,7 @@ impl Recording {
         let mut written = files.recorder.finish(summary)?;
         written.push(files.inputs.finish()?);
         written.push(files.releases.finish()?);
-        written.push(lateness_file::write(&self.folder, ticks, releases)?);
+        written.push(write_lateness(&self.folder, ticks, releases)?);
         Ok(written)
     }
 

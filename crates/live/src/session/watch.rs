@@ -8,8 +8,8 @@ use cohaptic_realtime::Lateness;
 use cohaptic_units::Instant;
 use cohaptic_wan::Fate;
 
+use super::files::Release;
 use super::recording::{Recording, Stopped};
-use super::releases::Release;
 
 /// Sees every tick and packet: how late ticks were, what links have carried of late, and the record if there is one.
 #[derive(Debug)]

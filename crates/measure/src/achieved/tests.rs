@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use rand_distr::{Distribution, Gamma};
 
 use super::*;
-use crate::test_rng::TestRng;
+use crate::tests::TestRng;
 
 const MS: u64 = 1_000_000;
 

@@ -108,7 +108,7 @@ mod tests {
     use rand_distr::{Distribution, Exp1, StandardNormal};
 
     use super::*;
-    use crate::test_rng::TestRng;
+    use crate::tests::TestRng;
 
     /// An Ornstein–Uhlenbeck process of correlation time `time` at random or even gaps of mean 8 ms, a tenth of it lost; seen through a skewed law.
     fn arrivals(seed: u64, time: f64, even: bool) -> Vec<(f64, f64)> {

@@ -108,7 +108,7 @@ fn round(lost: &[bool], chain: [f64; 4], room: &mut Vec<([f64; 2], f64)>) -> (f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_rng::TestRng;
+    use crate::tests::TestRng;
 
     /// The likelihood by the sum over all sequences of states.
     fn brute_force(lost: &[bool], [p, r, h, k]: [f64; 4]) -> f64 {

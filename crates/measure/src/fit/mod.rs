@@ -19,7 +19,6 @@
 
 pub mod captures;
 mod correlation;
-mod decimal;
 mod distribution;
 mod hidden_markov;
 mod law;

@@ -1,7 +1,7 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::test_rng::TestRng;
+use crate::tests::TestRng;
 
 /// A link with a gamma law through a Gaussian copula of correlation time τ, and Gilbert–Elliott losses, made without the emulator.
 fn measured(seed: u64, n: usize, gap: impl Fn(&mut TestRng) -> f64) -> Measurements {

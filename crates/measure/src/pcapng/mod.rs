@@ -13,7 +13,6 @@
 //! identification. A mark of congestion is the CE codepoint. Time zero is 1970-01-01 00:00 UTC, timestamps count nanoseconds.
 
 mod block;
-mod datagram;
 
 use std::fmt;
 use std::io::{self, Write};
@@ -50,7 +49,7 @@ impl<W: Write> CaptureWriter<W> {
     /// Those of the writer.
     pub fn write(&mut self, record: &PacketRecord, payload: &[u8]) -> io::Result<()> {
         let size = usize::try_from(record.size.get()).unwrap_or(usize::MAX);
-        let datagram = datagram::build(record.sequence, record.marked, payload, size);
+        let datagram = block::build(record.sequence, record.marked, payload, size);
         self.block.clear();
         block::enhanced_packet(&mut self.block, record.at.as_nanos(), &datagram, &Comment(record).to_string());
         self.to.write_all(&self.block)

@@ -3,7 +3,7 @@
 use super::{Claim, Verdict};
 use crate::case::Strategy;
 use crate::experiment::{StabilityTest, Travel, stability_text, travel_text};
-use crate::text::seconds;
+use crate::page::seconds;
 
 pub(super) fn claims(tests: &[StabilityTest], travels: &[Travel]) -> Vec<Claim> {
     vec![outcomes(tests), less_time(travels), times(travels), both_stable(travels)]

@@ -1,16 +1,17 @@
 //! What the paper claims, and what came out.
 
 mod experiments;
-mod many;
 mod performance;
 mod regions;
 mod stiffness;
 
-use crate::case::Case;
+use cohaptic_stability::{Method, analyse};
+
+use crate::Watch;
+use crate::case::{Case, Strategy};
 use crate::experiment::{StabilityTest, Travel};
 use crate::figures::admittance::Responses;
 use crate::region::Atlas;
-use crate::watch::Watch;
 use crate::{Options, PaperError};
 
 /// A claim of the paper with what came out.
@@ -77,7 +78,40 @@ pub(crate) fn all(
     claims.extend(regions::claims(atlas, watch)?);
     claims.extend(performance::claims(responses, options, watch)?);
     claims.extend(experiments::claims(tests, travels));
-    claims.extend(many::claims()?);
+    claims.extend(many_peers()?);
     watch.one_more();
     Ok(claims)
+}
+
+const PEERS: [usize; 4] = [3, 5, 50, 1000];
+
+/// Beyond the paper: many peers.
+fn many_peers() -> Result<Vec<Claim>, PaperError> {
+    let mut lines = Vec::new();
+    let mut same = true;
+    for strategy in Strategy::BOTH {
+        for scaled in [false, true] {
+            let mut radii = Vec::new();
+            let mut sizes = Vec::new();
+            for peers in PEERS {
+                let case = Case { touching: 1, scaled, ..Case::paper(strategy, peers) };
+                let analysis = analyse(&case.scene()?, Method::Reduced)?;
+                let largest = analysis.modes.iter().flat_map(|mode| &mode.parts).map(|part| part.size).max().unwrap_or(0);
+                sizes.push(largest);
+                radii.push(format!("{} (N = {peers}, {} states)", short(analysis.radius.value), analysis.dimension));
+            }
+            same &= sizes.iter().all(|size| *size == sizes[0]);
+            let gains = if scaled { "all gains scaled with N" } else { "gains as they are" };
+            lines.push(format!("{}, {gains}: {}; the largest block has {} states", strategy.word(), radii.join(", "), sizes[0]));
+        }
+    }
+    let ours = format!("Spectral radius, one touching, Td = Tn = 8 ms. {}.", lines.join(". "));
+    let verdict = if same { Verdict::Holds } else { Verdict::FailsAt("a block that grows with N".to_owned()) };
+    let claim = "Stability of any number of equal peers is known at the cost of a few";
+    Ok(vec![Claim::new("any-number", claim, "beyond the paper: up to five users, “arbitrary N” is future work", ours, verdict)])
+}
+
+/// A radius, in few letters where it is large.
+fn short(radius: f64) -> String {
+    if radius < 1000.0 { format!("{radius:.4}") } else { format!("{radius:.1e}") }
 }

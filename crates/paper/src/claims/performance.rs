@@ -2,11 +2,11 @@
 
 use super::regions::without_strategy;
 use super::{Claim, Verdict};
+use crate::Watch;
 use crate::case::{Case, Mass, Strategy};
 use crate::counter::smallest;
 use crate::figures::admittance::{Fit, Responses};
-use crate::text::percent;
-use crate::watch::Watch;
+use crate::page::percent;
 use crate::{Options, PaperError};
 
 pub(super) fn claims(responses: &Responses, _options: Options, watch: &dyn Watch) -> Result<Vec<Claim>, PaperError> {

@@ -1,12 +1,11 @@
 //! The stability regions: Figures 3 and 4.
 
 use super::{Claim, Verdict};
-use crate::PaperError;
 use crate::case::{Case, Strategy};
 use crate::counter::{is_stable, is_unstable, one_more_peer, smallest};
+use crate::page::{percent, percents};
 use crate::region::{Atlas, PEERS, Setting};
-use crate::text::{percent, percents};
-use crate::watch::Watch;
+use crate::{PaperError, Watch};
 
 /// "Largely unaffected" is taken to mean: an area within this share of that of two peers.
 const UNAFFECTED: f64 = 0.2;

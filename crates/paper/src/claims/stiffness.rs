@@ -8,9 +8,8 @@ use cohaptic_scene::Scene;
 use cohaptic_stability::{Matrix, eigenvalues};
 
 use super::{Claim, Verdict};
-use crate::PaperError;
 use crate::case::{Case, Strategy};
-use crate::watch::Watch;
+use crate::{PaperError, Watch};
 
 /// The numbers of peers that are looked at.
 const PEERS: [usize; 8] = [2, 3, 4, 5, 8, 16, 32, 50];

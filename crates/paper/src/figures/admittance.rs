@@ -3,8 +3,8 @@
 use cohaptic_stability::{Admittance, AdmittancePoint, Verdict, ideal};
 use rayon::prelude::*;
 
+use crate::Watch;
 use crate::case::{Case, Strategy};
-use crate::watch::Watch;
 use crate::{Options, PaperError};
 
 /// The admittance of one peer's device.

@@ -6,8 +6,8 @@ use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
 
 use super::{Figure, Table};
 use crate::case::Strategy;
+use crate::page::{percent, percents};
 use crate::region::{Atlas, HIGHEST, PEERS, Setting};
-use crate::text::{percent, percents};
 
 pub(super) fn figures(atlas: &Atlas, size: Size) -> Vec<Figure> {
     let of = |id: &str, number: &str, damping: f64| {

@@ -7,7 +7,7 @@ use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
 use super::{Figure, Table};
 use crate::case::Strategy;
 use crate::experiment::{DISTANCE, PeerTrace, Travel};
-use crate::text::seconds;
+use crate::page::seconds;
 
 /// What the paper measured for 20 mm [s].
 const PAPER: [(Strategy, &str); 2] = [(Strategy::Pd, "1.514 s"), (Strategy::Ap, "1.22 s")];

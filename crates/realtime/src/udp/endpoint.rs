@@ -1,19 +1,20 @@
-//! The socket.
+//! The socket, and where datagrams are put when they are read, many at a time.
 
-use std::io::{self, ErrorKind};
+use core::fmt;
+use std::io::{self, ErrorKind, IoSliceMut};
 use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::{AsFd, BorrowedFd};
 
 use cohaptic_units::Instant;
 use nix::sys::socket::setsockopt;
 use nix::sys::socket::sockopt::{Ipv4PacketInfo, Ipv6RecvPacketInfo};
-use quinn_udp::{Transmit, UdpSockRef, UdpSocketState};
+use quinn_udp::{BATCH_SIZE, RecvMeta, Transmit, UdpSockRef, UdpSocketState};
 use rustix::io::Errno;
 use rustix::net::{AddressFamily, SocketFlags, SocketType, bind, ipproto, socket_with, sockopt};
 
-use super::kernel_drops::kernel_drops;
+use super::counts::kernel_drops;
 use super::outbox::{Outbox, Run};
-use super::{Ecn, EndpointCounts, ReceiveBuffers};
+use super::{Ecn, EndpointCounts};
 use crate::MonotonicClock;
 
 /// What to ask for.
@@ -24,7 +25,7 @@ pub struct EndpointConfig {
     pub receive_buffer: usize,
     /// Longer datagrams are dropped when they come in, and counted.
     pub largest: usize,
-    /// So many datagrams may wait to be sent when the kernel's buffer is full; beyond, new ones are dropped and counted.
+    /// The number of datagrams that may wait to be sent when the kernel's buffer is full; beyond, new ones are dropped and counted.
     pub waiting: usize,
 }
 
@@ -166,8 +167,8 @@ impl UdpEndpoint {
         Ok(count)
     }
 
-    /// So many are read at once.
-    pub const BATCH: usize = quinn_udp::BATCH_SIZE;
+    /// The number of datagrams that are read at once.
+    pub const BATCH: usize = BATCH_SIZE;
 
     #[cold]
     fn cannot_receive(&mut self, error: io::Error) -> io::Result<usize> {
@@ -203,8 +204,8 @@ impl UdpEndpoint {
     /// counted, and the others go on.
     ///
     /// Datagrams to one address, of one length, that were queued one after the other go in one call, which the kernel or the far end cuts (segmentation
-    /// offload): on loopback a datagram of 64 bytes took 1.9 µs alone, 1.1 µs of two together, 0.5 µs of eight, 0.3 µs of sixteen; with `sendmmsg`, which
-    /// takes any datagrams, 1.5 µs of sixteen, which is why that is not used beside it.
+    /// offload). On loopback a datagram of 64 bytes took 1.9 µs alone, 1.1 µs of two together, 0.5 µs of eight, 0.3 µs of sixteen. With `sendmmsg`, which
+    /// takes any datagrams, it took 1.5 µs of sixteen: that is why it is not used.
     pub fn flush(&mut self) {
         self.flush_with(|| (), |(), _| ());
     }
@@ -267,4 +268,46 @@ fn send(socket: &UdpSocket, state: &UdpSocketState, run: &Run<'_>) -> io::Result
     let segment_size = (run.count > 1).then_some(run.segment);
     let transmit = Transmit { destination: run.to, ecn: run.ecn, contents: run.bytes, segment_size, src_ip: None };
     state.try_send(UdpSockRef::from(socket), &transmit)
+}
+
+/// Room for one batch, to be shared by all sockets of a thread: 2 MB, of which the kernel gives the touched pages.
+pub struct ReceiveBuffers {
+    bytes: Vec<u8>,
+    pub(super) told: [RecvMeta; BATCH_SIZE],
+}
+
+/// No datagram is longer than 65,527 bytes (that is IPv6), nor are segments that the kernel has put together: nothing is ever cut off. Not a power of two,
+/// so that the beginnings of all datagrams of a batch do not share one set of the processor's cache.
+const ROOM: usize = 65_536 + 256;
+
+impl Default for ReceiveBuffers {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl ReceiveBuffers {
+    /// Empty ones.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { bytes: vec![0; ROOM * BATCH_SIZE], told: [RecvMeta::default(); BATCH_SIZE] }
+    }
+
+    /// The rooms, one for each datagram, and what will be told of each.
+    pub(super) fn rooms(&mut self) -> ([IoSliceMut<'_>; BATCH_SIZE], &mut [RecvMeta; BATCH_SIZE]) {
+        let mut rooms = self.bytes.chunks_exact_mut(ROOM);
+        (core::array::from_fn(|_| IoSliceMut::new(rooms.next().unwrap_or_default())), &mut self.told)
+    }
+
+    /// What was read into that room.
+    pub(super) fn room(&self, place: usize, len: usize) -> &[u8] {
+        let start = place * ROOM;
+        self.bytes.get(start..start + len.min(ROOM)).unwrap_or_default()
+    }
+}
+
+impl fmt::Debug for ReceiveBuffers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ReceiveBuffers").finish_non_exhaustive()
+    }
 }

@@ -9,14 +9,11 @@
 //!
 //! A datagram came in when the kernel saw it, not when the program got round to reading it: [`Datagram::at`].
 
-mod buffers;
 mod counts;
 mod endpoint;
-mod kernel_drops;
 mod outbox;
 
-pub use buffers::ReceiveBuffers;
 pub use counts::{EndpointCounts, SendFailures};
-pub use endpoint::{BindError, Datagram, EndpointConfig, UdpEndpoint};
+pub use endpoint::{BindError, Datagram, EndpointConfig, ReceiveBuffers, UdpEndpoint};
 /// The two bits of a datagram's IP header that say whether its ends understand congestion marks, and whether it carries one (RFC 3168).
 pub use quinn_udp::EcnCodepoint as Ecn;

@@ -8,12 +8,14 @@
 //! Nothing here believes what a packet says of itself: any bytes are read without a panic, and what makes no sense is [`Content::Malformed`].
 
 mod checksum;
-mod damage;
-mod frame;
 mod headers;
 
+use cohaptic_linkfile::router::Protocol;
 use cohaptic_units::Bytes;
 use cohaptic_wan::{Damage, PacketInfo};
+
+use checksum::{change, sum, transport_field};
+use headers::V4_CHECKSUM;
 
 pub use headers::{Ecn, Headers, Malformed};
 
@@ -55,7 +57,7 @@ impl Packet {
     pub fn new(mut bytes: Vec<u8>, framing: Framing) -> Self {
         let at = match framing {
             Framing::Ip => Some(0),
-            Framing::Ethernet => frame::network_layer(&bytes),
+            Framing::Ethernet => network_layer(&bytes),
         };
         let Some(at) = at else { return Self { bytes, content: Content::NotIp } };
         let content = match Headers::read(&bytes[at..]) {
@@ -101,7 +103,103 @@ impl Packet {
     pub fn damage(&mut self, damage: &Damage) {
         if let Content::Ip { at, headers } = &self.content {
             let end = at + headers.length();
-            damage::apply(&mut self.bytes[*at..end], headers, damage);
+            apply(&mut self.bytes[*at..end], headers, damage);
         }
+    }
+}
+
+/// The tags of VLANs (IEEE 802.1Q) in frames of Ethernet (IEEE 802.3).
+const TAGGED: [u16; 2] = [0x8100, 0x88a8];
+const IPV4: u16 = 0x0800;
+const IPV6: u16 = 0x86dd;
+
+/// Two addresses of six bytes.
+const ADDRESSES: usize = 12;
+
+/// A tag within a tag is what providers use; more are not in use.
+const MOST_TAGS: usize = 2;
+
+/// Where the packet of IP begins; `None` if the frame carries something else.
+fn network_layer(frame: &[u8]) -> Option<usize> {
+    let mut at = ADDRESSES;
+    for _ in 0..=MOST_TAGS {
+        let kind = u16::from_be_bytes([*frame.get(at)?, *frame.get(at + 1)?]);
+        at += 2;
+        match kind {
+            IPV4 | IPV6 => return Some(at),
+            // The tag itself, and then the kind again.
+            kind if TAGGED.contains(&kind) => at += 2,
+            _ => return None,
+        }
+    }
+    None
+}
+
+/// Flips the bits of a packet. A checksum that was right is right afterwards, and one that was wrong is as wrong as before: a flipped bit of a checksum is
+/// therefore flipped back.
+///
+/// Of a header the checksum is set right and nothing else: a packet whose addresses were hit goes where they say now. A fragment that is not the first
+/// has no checksum that could be set right.
+fn apply(packet: &mut [u8], headers: &Headers, damage: &Damage) {
+    let covered = headers.covered();
+    let is_v4 = headers.source().is_ipv4();
+    let field = transport_field(packet, headers);
+    let begin = headers.transport().unwrap_or(packet.len());
+    // The addresses are part of the pseudo-header.
+    let addresses = if is_v4 { 12..20 } else { 8..40 };
+    let of_transport = |packet: &[u8]| [sum(&packet[addresses.clone()]), sum(&packet[begin..])];
+    let before = (sum(&packet[..covered]), of_transport(packet));
+    damage.apply(packet);
+    if is_v4 {
+        let now = sum(&packet[..covered]);
+        change(packet, V4_CHECKSUM, before.0, now);
+    }
+    if let Some(field) = field {
+        let now = of_transport(packet);
+        if headers.protocol() != Protocol::ICMP {
+            change(packet, field, before.1[0], now[0]);
+        }
+        change(packet, field, before.1[1], now[1]);
+        // Zero would say that there is no checksum; both are zero in ones' complement.
+        if headers.protocol() == Protocol::UDP && packet[field..field + 2] == [0, 0] {
+            packet[field..field + 2].fill(0xff);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use etherparse::{EtherType, PacketBuilder, VlanId};
+
+    use super::*;
+
+    fn frame(tags: u8) -> Vec<u8> {
+        let builder = PacketBuilder::ethernet2([2, 0, 0, 0, 0, 1], [2, 0, 0, 0, 0, 2]);
+        let mut frame = Vec::new();
+        let vlan = VlanId::try_new(7).unwrap();
+        match tags {
+            0 => builder.ipv4([10, 0, 0, 1], [10, 0, 0, 2], 64).udp(1, 2).write(&mut frame, &[]).unwrap(),
+            1 => builder.single_vlan(vlan).ipv6([1; 16], [2; 16], 64).udp(1, 2).write(&mut frame, &[]).unwrap(),
+            _ => builder.double_vlan(vlan, vlan).ipv4([10, 0, 0, 1], [10, 0, 0, 2], 64).udp(1, 2).write(&mut frame, &[]).unwrap(),
+        }
+        frame
+    }
+
+    #[test]
+    fn packets_are_found_behind_tags() {
+        assert_eq!([0, 1, 2].map(|tags| network_layer(&frame(tags))), [Some(14), Some(18), Some(22)]);
+    }
+
+    #[test]
+    fn what_carries_no_packet_is_told() {
+        let mut arp = frame(0);
+        arp[12..14].copy_from_slice(&EtherType::ARP.0.to_be_bytes());
+        assert_eq!(network_layer(&arp), None);
+        for length in 0..14 {
+            assert_eq!(network_layer(&frame(0)[..length]), None);
+        }
+        let mut tags = vec![0; 12];
+        tags.extend([0x81, 0x00, 0, 7].repeat(9));
+        assert_eq!(network_layer(&tags), None);
     }
 }

@@ -1,13 +1,11 @@
 //! The hosts, their sockets and the network between them, as one state machine: it is told the time.
 
-mod arrival;
 #[cfg(feature = "quinn")]
 mod entropy;
-mod hosts;
-mod sending;
+mod passing;
 mod sockets;
-mod timers;
 
+use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 
@@ -15,16 +13,14 @@ use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 use cohaptic_wan::{LinkModel, NodeId, Path};
 
-pub(crate) use sending::Outgoing;
-pub(crate) use sockets::{Datagram, SocketId};
-pub(crate) use timers::TimerId;
-
-use crate::address::AddressPlan;
+use crate::address::{self, AddressPlan};
 use crate::file::LinkChange;
+use crate::trace::Happening;
 use crate::wire::{self, Settings, Wire};
-use hosts::HostState;
 use sockets::Sockets;
-use timers::Timers;
+
+pub(crate) use passing::Outgoing;
+pub(crate) use sockets::{Datagram, SocketId};
 
 pub(crate) struct Core {
     pub(crate) plan: AddressPlan,
@@ -130,7 +126,7 @@ impl Core {
     #[cold]
     #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
     fn lose_patience(&mut self) -> ! {
-        // What is dropped while it unwinds may ask again.
+        // A value that is dropped while it unwinds may ask again.
         self.calls = 0;
         panic!(
             "time stands still at {} s: a task asks for the time, sends or tries to receive again and again and never waits; `sleep(..).await` lets it pass",
@@ -224,5 +220,88 @@ impl Drop for Guard<'_> {
         let woken = std::mem::take(&mut core.woken);
         drop(core);
         woken.into_iter().for_each(Waker::wake);
+    }
+}
+
+/// A timer: its deadline, and a number that makes it different from others with the same one.
+pub(crate) type TimerId = (Instant, u64);
+
+/// Timers, in the order in which they go off: by deadline, then by when they were set.
+#[derive(Debug, Default)]
+pub(crate) struct Timers {
+    wakers: BTreeMap<TimerId, Waker>,
+    set: u64,
+}
+
+impl Timers {
+    pub(crate) fn set(&mut self, deadline: Instant, waker: Waker) -> TimerId {
+        let id = (deadline, self.set);
+        self.set += 1;
+        self.wakers.insert(id, waker);
+        id
+    }
+
+    /// Sees to it that another one is woken.
+    pub(crate) fn renew(&mut self, id: TimerId, waker: &Waker) {
+        if let Some(known) = self.wakers.get_mut(&id) {
+            known.clone_from(waker);
+        }
+    }
+
+    pub(crate) fn cancel(&mut self, id: TimerId) {
+        self.wakers.remove(&id);
+    }
+
+    pub(crate) fn next(&self) -> Option<Instant> {
+        self.wakers.first_key_value().map(|((deadline, _), _)| *deadline)
+    }
+
+    /// Takes out those that are due.
+    pub(crate) fn fire(&mut self, now: Instant, woken: &mut Vec<Waker>) {
+        while let Some(first) = self.wakers.first_entry().filter(|first| first.key().0 <= now) {
+            woken.push(first.remove());
+        }
+    }
+}
+
+/// A host.
+#[derive(Debug, Default)]
+struct HostState {
+    is_down: bool,
+    /// The sockets of a port, by version (6 or not) and port.
+    ports: BTreeMap<(bool, u16), Vec<SocketId>>,
+    /// The port that is given next to a socket that asks for none.
+    next_port: u16,
+}
+
+impl Core {
+    pub(crate) fn is_up(&self, host: NodeId) -> bool {
+        !self.hosts[host.index()].is_down
+    }
+
+    /// The host is gone with all its sockets. What it has sent is on its way still.
+    pub(crate) fn crash(&mut self, host: NodeId) {
+        let state = &mut self.hosts[host.index()];
+        if std::mem::replace(&mut state.is_down, true) {
+            return;
+        }
+        state.ports.clear();
+        let now = self.now();
+        for socket in self.sockets.all_of(host) {
+            socket.die(now, &mut self.woken);
+        }
+        self.wire.note(Happening::Crashed(host));
+    }
+
+    pub(crate) fn restart(&mut self, host: NodeId) {
+        if std::mem::replace(&mut self.hosts[host.index()].is_down, false) {
+            self.wire.note(Happening::Restarted(host));
+        }
+    }
+
+    /// The host has other addresses from now on.
+    pub(crate) fn change_addresses(&mut self, host: NodeId) -> address::Addresses {
+        self.wire.note(Happening::Readdressed(host));
+        self.plan.change(host)
     }
 }

@@ -42,20 +42,19 @@
 mod address;
 mod builder;
 mod deadlines;
-mod epoch;
 mod faults;
 mod passing;
 mod run;
 
 use std::any::Any;
 use std::net::SocketAddr;
+use std::time::Instant as StdInstant;
 
 use bytes::Bytes;
 use cohaptic_units::Instant;
 
 pub use address::{address, place_of};
 pub use builder::Nodes;
-pub use epoch::Epoch;
 pub use run::{NodeCounts, NodeRun};
 
 /// A program as a state machine: it is handed packets and the time, and asked what it wants.
@@ -83,7 +82,7 @@ pub trait Node: Any {
 pub struct Packet {
     /// The sender: the address of a node, with the port that [`Transmit::from_port`] said.
     pub from: SocketAddr,
-    /// To whom: an address of the node that gets it.
+    /// The receiver: an address of the node that gets it.
     pub to: SocketAddr,
     /// What it carries. If the link damages packets, the damage is in it.
     pub bytes: Bytes,
@@ -101,7 +100,7 @@ impl Packet {
     /// The place of the node that sent it, from 0.
     #[must_use]
     pub fn from_place(&self) -> usize {
-        // What is handed to a node comes from one.
+        // A packet that is handed to a node comes from one.
         place_of(self.from.ip()).unwrap_or(usize::MAX)
     }
 }
@@ -109,7 +108,7 @@ impl Packet {
 /// A packet that a node sends.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Transmit {
-    /// To whom: see [`address()`]. What is sent to an address that no node has is [counted](NodeCounts::unroutable), and lost.
+    /// The receiver: see [`address()`]. A packet to an address that no node has is [counted](NodeCounts::unroutable), and lost.
     pub to: SocketAddr,
     /// The port from which it is sent. The receiver sees it; otherwise it means nothing.
     pub from_port: u16,
@@ -124,5 +123,36 @@ impl Transmit {
     #[must_use]
     pub fn to(place: usize, bytes: impl Into<Bytes>) -> Self {
         Self { to: address(place, 0), from_port: 0, bytes: bytes.into(), ecn_capable: false }
+    }
+}
+
+/// The time of a run for libraries that want [`std::time::Instant`]: the instant that stands for the run's beginning. Which one it is does not matter, as long as
+/// all nodes take the same.
+///
+/// ```
+/// use cohaptic_testkit::{Instant, node::Epoch};
+///
+/// let epoch = Epoch(std::time::Instant::now());
+/// let deadline = epoch.to_std(Instant::from_nanos(1_500_000_000));
+/// assert_eq!(epoch.from_std(deadline), Instant::from_nanos(1_500_000_000));
+/// ```
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Epoch(pub StdInstant);
+
+impl Epoch {
+    /// The instant in the clock of the system.
+    ///
+    /// # Panics
+    ///
+    /// If the system's clock does not reach so far.
+    #[must_use]
+    pub fn to_std(self, at: Instant) -> StdInstant {
+        self.0 + at.saturating_duration_since(Instant::ZERO)
+    }
+
+    /// The instant in the time of the run; its beginning if it was before.
+    #[must_use]
+    pub fn from_std(self, at: StdInstant) -> Instant {
+        Instant::ZERO.saturating_add(at.saturating_duration_since(self.0))
     }
 }

@@ -1,6 +1,5 @@
 //! The strategies.
 
-use core::fmt;
 use std::sync::Arc;
 
 use cohaptic_wan::NodeId;
@@ -30,7 +29,7 @@ pub fn links_like(bounds: LinkBounds) -> Links {
     Links { bounds: checked(bounds) }
 }
 
-/// Any network of so many hosts: [`networks_like`] with [`LinkBounds::any`].
+/// Any network of that number of hosts: [`networks_like`] with [`LinkBounds::any`].
 ///
 /// # Panics
 ///
@@ -40,7 +39,7 @@ pub fn any_network(hosts: usize) -> Networks {
     networks_like(hosts, LinkBounds::any())
 }
 
-/// Networks of so many hosts whose links are within bounds, shrinking to the least impaired one that still fails. In a third each of all networks
+/// Networks of that number of hosts whose links are within bounds, shrinking to the least impaired one that still fails. In a third each of all networks
 /// about a quarter, half and all of the links are impaired.
 ///
 /// # Panics
@@ -77,19 +76,11 @@ pub struct Networks {
 
 #[cfg(feature = "scenes")]
 impl Networks {
-    /// Networks of so many hosts within bounds that were checked.
+    /// Networks of that number of hosts within bounds that were checked.
     pub(super) fn within(hosts: usize, bounds: &Arc<LinkBounds>) -> Self {
         Self { ideal: ImpairedNetwork::ideal(hosts), bounds: Arc::clone(bounds) }
     }
 }
-
-/// A link and the way to less impaired ones.
-#[derive(Clone)]
-pub struct LinkTree(Search<LinkSpace>);
-
-/// A network and the way to less impaired ones.
-#[derive(Clone)]
-pub struct NetworkTree(Search<NetworkSpace>);
 
 /// How often a link is drawn anew where models with bursts cannot lose as little or as much as the bounds say.
 const ATTEMPTS: u32 = 100;
@@ -100,17 +91,17 @@ fn link(bounds: &LinkBounds, is_ideal: bool, runner: &mut TestRunner) -> Result<
 }
 
 impl Strategy for Links {
-    type Tree = LinkTree;
+    type Tree = Box<dyn ValueTree<Value = ImpairedLink>>;
     type Value = ImpairedLink;
 
     fn new_tree(&self, runner: &mut TestRunner) -> NewTree<Self> {
         let link = link(&self.bounds, false, runner)?;
-        Ok(LinkTree(Search::new(LinkSpace(Arc::clone(&self.bounds)), link)))
+        Ok(Box::new(Search::new(LinkSpace(Arc::clone(&self.bounds)), link)))
     }
 }
 
 impl Strategy for Networks {
-    type Tree = NetworkTree;
+    type Tree = Box<dyn ValueTree<Value = ImpairedNetwork>>;
     type Value = ImpairedNetwork;
 
     fn new_tree(&self, runner: &mut TestRunner) -> NewTree<Self> {
@@ -122,50 +113,6 @@ impl Strategy for Networks {
             let is_ideal = Dice(runner.rng()).below(4) >= impaired;
             network = network.with_link(from, to, link(&self.bounds, is_ideal, runner)?);
         }
-        Ok(NetworkTree(Search::new(NetworkSpace(LinkSpace(Arc::clone(&self.bounds))), network)))
-    }
-}
-
-impl ValueTree for LinkTree {
-    type Value = ImpairedLink;
-
-    fn current(&self) -> ImpairedLink {
-        self.0.current()
-    }
-
-    fn simplify(&mut self) -> bool {
-        self.0.simplify()
-    }
-
-    fn complicate(&mut self) -> bool {
-        self.0.complicate()
-    }
-}
-
-impl ValueTree for NetworkTree {
-    type Value = ImpairedNetwork;
-
-    fn current(&self) -> ImpairedNetwork {
-        self.0.current()
-    }
-
-    fn simplify(&mut self) -> bool {
-        self.0.simplify()
-    }
-
-    fn complicate(&mut self) -> bool {
-        self.0.complicate()
-    }
-}
-
-impl fmt::Debug for LinkTree {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("LinkTree").field(&self.current()).finish()
-    }
-}
-
-impl fmt::Debug for NetworkTree {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("NetworkTree").field(&self.current()).finish()
+        Ok(Box::new(Search::new(NetworkSpace(LinkSpace(Arc::clone(&self.bounds))), network)))
     }
 }

@@ -7,8 +7,8 @@ use cohaptic_wan::netem::{
     ChanceSpec, DelaySpec, Distribution, GemodelSpec, JitterSpec, LossSpec, Netem, RateSpec, ReorderSpec, SlotGap, SlotSpec, StateSpec,
 };
 
+use super::admits::fitting;
 use super::bounds::{LinkBounds, LossModel, Presence};
-use super::chain::fitting;
 use super::grid::{Dice, Span};
 use super::link::ImpairedLink;
 use super::numbers::{ALL, percent};

@@ -2,9 +2,8 @@
 
 use cohaptic_wan::netem::{ChanceSpec, GemodelSpec, JitterSpec, LossSpec, Netem, SlotGap, StateSpec};
 
-use super::admits::long_run;
+use super::admits::{fitting, long_run};
 use super::bounds::LinkBounds;
-use super::chain::fitting;
 use super::link::ImpairedLink;
 use super::numbers::{ALL, jitter_mut, percent, random_mut, reorder_mut, whole};
 use super::stage::{self, Stage};

@@ -1,9 +1,7 @@
 //! The pictures of a campaign: quantiles of the discrepancy, which runs diverged, and verdicts, over the keys that are varied.
 
 mod arranged;
-mod bands;
-mod cells;
-mod names;
+mod panels;
 mod scale;
 mod verdicts;
 
@@ -108,18 +106,18 @@ impl Sheet<'_> {
 
     fn quantiles(&self, facet: usize, scale: &Scale) -> Panel {
         match &self.arranged.keys {
-            Keys::Names(along) => names::quantiles(self, along, facet, scale),
-            Keys::Line(along) => bands::quantiles(self, along, facet, scale),
-            Keys::Grid(both) => cells::medians(self, (&both.0, &both.1), facet, scale),
+            Keys::Names(along) => panels::quantiles_by_name(self, along, facet, scale),
+            Keys::Line(along) => panels::quantiles_along(self, along, facet, scale),
+            Keys::Grid(both) => panels::medians_of_cells(self, (&both.0, &both.1), facet, scale),
         }
     }
 
     /// Which share of the runs diverged.
     fn shares(&self, facet: usize) -> Panel {
         match &self.arranged.keys {
-            Keys::Names(along) => names::shares(self, along, facet),
-            Keys::Line(along) => bands::shares(self, along, facet),
-            Keys::Grid(both) => cells::shares(self, (&both.0, &both.1), facet),
+            Keys::Names(along) => panels::shares_by_name(self, along, facet),
+            Keys::Line(along) => panels::shares_along(self, along, facet),
+            Keys::Grid(both) => panels::shares_of_cells(self, (&both.0, &both.1), facet),
         }
     }
 

@@ -6,8 +6,7 @@ use cohaptic_stability::{Criterion, Verdict};
 
 use super::Sheet;
 use super::arranged::{Along, Keys};
-use super::bands::marked;
-use super::cells::with_cells;
+use super::panels::{marked, with_cells};
 use crate::campaign::judge::{is_nominal, is_spectral};
 use crate::stability::source;
 

@@ -1,9 +1,7 @@
 //! `cohaptic stability boundary`.
 
-mod document;
+mod answer;
 mod files;
-mod picture;
-mod words;
 
 use std::process::ExitCode;
 
@@ -64,8 +62,8 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_BOUNDARY,
-        &document::of(&order, &found, &written),
-        || words::describe(&order, &found),
+        &answer::of(&order, &found, &written),
+        || answer::describe(&order, &found),
         &written,
     )?;
     Ok(ExitCode::SUCCESS)
@@ -110,7 +108,7 @@ fn notes(found: &Boundary) -> Vec<String> {
 fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic_stability::FamilyError>> {
     let cell = |row: &[f64]| Some(Cell { radius: Radius { value: *row.get(1)?, error: *row.get(2)? }, is_nominal: *row.get(3)? != 0.0 });
     let known: Vec<(f64, Cell)> = known.iter().filter_map(|(_, row)| Some((*row.first()?, cell(row)?))).collect();
-    let progress = Progress::through_values();
+    let progress = Progress::new(0, "{spinner} {pos} values looked at, {elapsed} passed{msg}");
     progress.tick();
     let watch = CellWatch::new(&progress, "value", &interrupt::requested);
     let found = Boundary::find_watched(&order.family, order.options, &known, |count| progress.reach_number(count as u64), &watch);

@@ -81,7 +81,7 @@ impl Keeper {
 fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper) -> Result<(Vec<Map>, usize), (usize, MapError)> {
     let (columns, rows) = (order.grid.columns(), order.grid.rows());
     let there: usize = known.iter().flatten().filter(|row| !row.radius.is_empty()).count();
-    let progress = Progress::through_rows(rows * order.families.len());
+    let progress = Progress::new((rows * order.families.len()) as u64, "{bar:30} {percent:>3} %  {pos}/{len} rows, {eta} left{msg}");
     progress.reach_number(there as u64);
     progress.tick();
     let mut maps = Vec::new();

@@ -1,21 +1,20 @@
 //! `cohaptic stability point`.
 
-mod document;
-mod graph;
+mod answer;
 mod speed;
-mod words;
 mod worst;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{AnalysisError, Limits, judge_watched};
+use cohaptic_stability::{AnalysisError, Graph, GraphError, Judgement, Limits, Matrix, analyse_on_watched, has_chance, judge_watched};
 
 use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::PointArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, not_analysed};
-use crate::{input, output};
+use crate::{file, input, output};
 
 /// The user asked for the end.
 fn ended() -> Failure {
@@ -27,7 +26,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let path = &arguments.scene.scene;
     let scene = input::with(path, |text, file| Scene::parse(text, file, &arguments.scene.overrides.set))?;
     let judgement = match &arguments.graph {
-        Some(graph) => graph::on(&scene, graph, path)?,
+        Some(graph) => on_graph(&scene, graph, path)?,
         None => {
             let watch = AnalysisWatch::new();
             let judged = judge_watched(&scene, arguments.method.into(), &Limits { watch: &watch, ..Limits::of_unknowns(usize::MAX) });
@@ -39,9 +38,60 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     output::answer(
         arguments.scene.json,
         DocumentSchema::STABILITY_POINT,
-        &document::of(&scene, &judgement, worst.as_ref()),
-        || words::describe(&scene, &judgement, worst.as_ref()),
+        &answer::of(&scene, &judgement, worst.as_ref()),
+        || answer::describe(&scene, &judgement, worst.as_ref()),
         output::NO_FILES,
     )?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// What the verdict leaves out where links leave something to chance.
+const NOMINAL: &str = "the verdict is nominal, with every delay its mean and nothing lost: the second moment is not followed on a graph";
+
+/// The verdict if each peer hears only its neighbours. Links that leave something to chance count as if they did not, and a note says so.
+fn on_graph(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failure> {
+    let refused = |message: String| Failure::Input(format!("{}: --graph {graph}: {message}", input::named(path).display()));
+    let graph = match graph {
+        "complete" => Graph::Complete,
+        "ring" => Graph::Ring,
+        "star" => Graph::Star,
+        file => weights(Path::new(file))?,
+    };
+    let watch = AnalysisWatch::new();
+    let found = analyse_on_watched(scene, &graph, &watch);
+    watch.clear();
+    let mut analysis = found.map_err(|error| match error {
+        GraphError::Analysis(AnalysisError::Stopped) => ended(),
+        error @ (GraphError::Analysis(_)
+        | GraphError::Unequal { .. }
+        | GraphError::Weight { .. }
+        | GraphError::Alone { .. }
+        | GraphError::Irregular
+        | GraphError::NotLinear) => refused(error.to_string()),
+    })?;
+    if has_chance(scene) {
+        analysis.notes.push(NOMINAL.to_owned());
+    }
+    Ok(Judgement { verdict: analysis.verdict(), analysis, mean_square: None })
+}
+
+/// A file of weights: one line a peer, numbers between commas.
+fn weights(file: &Path) -> Result<Graph, Failure> {
+    let text = file::read_text(file)?;
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let entry = |entry: &str| {
+            entry
+                .trim()
+                .parse()
+                .map_err(|_| Failure::Input(format!("{}:{}: found {:?}, expected numbers between commas", file.display(), number + 1, entry.trim())))
+        };
+        rows.push(line.split(',').map(entry).collect::<Result<_, _>>()?);
+    }
+    let columns = rows.first().map_or(0, Vec::len);
+    if let Some(row) = rows.iter().position(|row| row.len() != columns) {
+        let found = rows[row].len();
+        return Err(Failure::Input(format!("{}: row {} has {found} weights and the first has {columns}", file.display(), row + 1)));
+    }
+    Ok(Graph::Weighted(Matrix::from_fn(rows.len(), columns, |row, column| rows[row][column])))
 }

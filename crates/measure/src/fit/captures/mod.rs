@@ -18,7 +18,7 @@ use std::io::Read;
 use cohaptic_units::print::Counted;
 
 use self::frame::Datagram;
-use super::decimal::Attoseconds;
+use super::table::Attoseconds;
 use super::{Measurement, Measurements, MeasurementsError};
 
 /// What two captures say together.

@@ -1,7 +1,7 @@
 use rand_distr::{Distribution, Gamma, LogNormal, Normal, StandardUniform, Weibull};
 
 use super::*;
-use crate::test_rng::TestRng;
+use crate::tests::TestRng;
 
 const N: usize = 20_000;
 const FLOOR: f64 = 20.0;

@@ -1,7 +1,7 @@
 use rand_distr::{Distribution, Exp1};
 
 use super::*;
-use crate::test_rng::TestRng;
+use crate::tests::TestRng;
 
 const N: usize = 50_000;
 

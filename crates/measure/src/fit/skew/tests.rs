@@ -4,7 +4,7 @@ use cohaptic_wan::law::{DistTable, Distribution, Empirical, Law};
 use rand_distr::{Distribution as _, Exp1, StandardNormal};
 
 use super::*;
-use crate::test_rng::TestRng;
+use crate::tests::TestRng;
 
 /// Drifts \[µs/s\].
 const DRIFTS: [f64; 7] = [0.0, 20.0, -20.0, 100.0, -100.0, 1000.0, -1000.0];

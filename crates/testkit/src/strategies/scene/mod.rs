@@ -112,7 +112,7 @@ pub fn any_scene() -> Scenes {
     scenes_like(2..=6, LinkBounds::any())
 }
 
-/// Scenes of so many peers with such links.
+/// Scenes of that number of peers with such links.
 ///
 /// # Panics
 ///
@@ -133,12 +133,8 @@ pub struct Scenes {
     bounds: Arc<LinkBounds>,
 }
 
-/// A scene and the way to calmer ones.
-#[derive(Clone)]
-pub struct SceneTree(Search<SceneSpace>);
-
 impl Strategy for Scenes {
-    type Tree = SceneTree;
+    type Tree = Box<dyn ValueTree<Value = AnyScene>>;
     type Value = AnyScene;
 
     fn new_tree(&self, runner: &mut TestRunner) -> NewTree<Self> {
@@ -149,28 +145,6 @@ impl Strategy for Scenes {
         let scene = AnyScene { draft, network };
         scene.read().map_err(|error| error.to_string())?;
         let space = SceneSpace { least: self.least, network: NetworkSpace(LinkSpace(Arc::clone(&self.bounds))) };
-        Ok(SceneTree(Search::new(space, scene)))
-    }
-}
-
-impl ValueTree for SceneTree {
-    type Value = AnyScene;
-
-    fn current(&self) -> AnyScene {
-        self.0.current()
-    }
-
-    fn simplify(&mut self) -> bool {
-        self.0.simplify()
-    }
-
-    fn complicate(&mut self) -> bool {
-        self.0.complicate()
-    }
-}
-
-impl fmt::Debug for SceneTree {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("SceneTree").field(&self.current()).finish()
+        Ok(Box::new(Search::new(space, scene)))
     }
 }

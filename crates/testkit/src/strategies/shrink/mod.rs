@@ -11,15 +11,14 @@
 //! If anything was accepted, it begins again, with numbers now tried one step further only, until nothing changes. What has been tried is not tried again.
 
 mod numbers;
-mod parts;
 
 use core::fmt;
 
 use proptest::strategy::ValueTree;
 
-pub(super) use numbers::Number;
 use numbers::Numbers;
-use parts::Parts;
+
+pub(super) use numbers::Number;
 
 /// What can be made of a value.
 pub(super) trait Space: fmt::Debug {
@@ -63,7 +62,7 @@ pub(super) struct Search<S: Space> {
     space: S,
     /// The least value that failed.
     best: S::Value,
-    /// What is being tried.
+    /// The candidate that is tried now.
     trial: Option<S::Value>,
     phase: Phase<S>,
     /// What passed.
@@ -165,5 +164,43 @@ impl<S: Space> ValueTree for Search<S> {
         // With nothing left to try the current value is the best again.
         self.advance();
         true
+    }
+}
+
+/// Heaps of parts that may go together, the next to try at the end.
+#[derive(Clone, Debug)]
+struct Parts<P> {
+    heaps: Vec<Vec<P>>,
+    tried: Option<Vec<P>>,
+}
+
+impl<P> Parts<P> {
+    fn new(all: Vec<P>) -> Self {
+        Self { heaps: vec![all], tried: None }
+    }
+
+    /// The value without the next heap.
+    fn propose<V>(&mut self, without: impl Fn(&[P]) -> Option<V>) -> Option<V> {
+        while let Some(heap) = self.heaps.pop() {
+            if heap.is_empty() {
+                continue;
+            }
+            let candidate = without(&heap);
+            self.tried = Some(heap);
+            if candidate.is_some() {
+                return candidate;
+            }
+            self.answer(false);
+        }
+        None
+    }
+
+    /// Halves the heap that cannot go as a whole.
+    fn answer(&mut self, went: bool) {
+        let Some(mut first) = self.tried.take() else { return };
+        if !went && first.len() > 1 {
+            let second = first.split_off(first.len() / 2);
+            self.heaps.extend([second, first]);
+        }
     }
 }

@@ -1,0 +1,165 @@
+//! An admittance as a JSON document and in words.
+
+use std::fmt::Write as _;
+
+use cohaptic_stability::{Estimate, Verdict};
+use serde::Serialize;
+
+use super::curve::Curve;
+use crate::document_schema::document;
+use crate::output::figure;
+
+/// The answer of `cohaptic admittance --json`. `interrupted`: whether points at the end of the frequencies are missing because the user asked for the end.
+pub(super) fn of(peer: &str, curves: &[Curve], files: &[String], interrupted: bool) -> impl Serialize {
+    let named = curves.iter().skip(1).map(|curve| {
+        document! {
+            name: curve.name.as_str(),
+            overrides: curve.overrides.as_slice(),
+            #[serde(flatten)]
+            curve: of_curve(curve),
+        }
+    });
+    document! {
+        title: curves.first().map_or("", |curve| &curve.title),
+        peer: peer,
+        #[serde(flatten)]
+        scene: curves.first().map(of_curve),
+        // Those of `--curve`.
+        curves: named.collect::<Vec<_>>(),
+        files: files,
+        interrupted: interrupted,
+    }
+}
+
+fn of_curve(curve: &Curve) -> impl Serialize + use<> {
+    // A number that was extrapolated, and about how far it may be off.
+    let limit = |Estimate { value, error }: Estimate| document! { value: value, error: error };
+    let radius = curve.admittance.radius();
+    let points = curve.response.points.iter().map(|point| {
+        document! { hz: point.hz, magnitude_db: point.magnitude_db(), phase_deg: point.phase_deg(), ideal_db: curve.ideal_db(point.hz) }
+    });
+    let moment = curve.chance.as_ref().and_then(|chance| chance.as_ref().ok());
+    document! {
+        verdict: radius.verdict().word(),
+        spectral_radius: radius.value,
+        error_bound: radius.error,
+        warning: curve.warning(),
+        viscosity: limit(curve.fit.viscosity),
+        inertia: limit(curve.fit.inertia),
+        stiffness: limit(curve.fit.stiffness),
+        object_mass_kg: curve.mass,
+        points: points.collect::<Vec<_>>(),
+        // The growth of the second moment in a frame, where links leave something to chance and it can be followed.
+        #[serde(flatten)]
+        moment: moment.map(|moment| document! {
+            mean_square: document! { verdict: moment.verdict().word(), radius: moment.radius.value, error_bound: moment.radius.error },
+        }),
+        notes: curve.notes(),
+    }
+}
+
+/// All curves in words, each with its table.
+pub(super) fn describe(peer: &str, curves: &[Curve]) -> String {
+    let mut text = String::new();
+    for (number, curve) in curves.iter().enumerate() {
+        // Writing to a string does not fail.
+        let _ = if number == 0 { writeln!(text, "{}", curve.title) } else { writeln!(text, "\nWith {}", curve.name) };
+        if let Some(warning) = curve.warning() {
+            let _ = writeln!(text, "  WARNING: {warning}");
+        }
+        let _ = writeln!(
+            text,
+            "\n  velocity over force at the device of {peer}, compared with that of a free mass of {} kg",
+            cohaptic_units::print::Number(curve.mass)
+        );
+        table(&mut text, curve);
+        let _ = writeln!(text, "\n  moved slowly, {peer} feels");
+        felt(&mut text, curve);
+        let _ = writeln!(text, "  {}", verdict(curve));
+        for note in curve.notes() {
+            let _ = writeln!(text, "  note: {note}");
+        }
+    }
+    text
+}
+
+fn table(text: &mut String, curve: &Curve) {
+    let _ = writeln!(text, "{:>14}{:>14}{:>14}{:>14}", "Hz", "dB", "degrees", "free mass dB");
+    for point in &curve.response.points {
+        let (magnitude, phase) = (point.magnitude_db(), point.phase_deg());
+        let _ = writeln!(text, "{:>14}{magnitude:>14.3}{phase:>14.2}{:>14.3}", significant(point.hz), curve.ideal_db(point.hz));
+    }
+}
+
+/// Five significant digits, without zeros at the end of decimals.
+fn significant(hz: f64) -> String {
+    if !(1e-4..1e6).contains(&hz) {
+        return format!("{hz:.4e}");
+    }
+    let whole = format!("{hz:.0}").len();
+    let decimals = if hz >= 1.0 { 5_usize.saturating_sub(whole) } else { 8 };
+    let text = format!("{hz:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// What a slow hand feels: a spring only where something ties the object to ground.
+fn felt(text: &mut String, curve: &Curve) {
+    let fit = curve.fit;
+    let tied = fit.stiffness.value != 0.0 || fit.stiffness.error != 0.0;
+    let rows =
+        [("a spring of", fit.stiffness, "N/m", tied), ("a viscosity of", fit.viscosity, "N·s/m", true), ("an inertia of", fit.inertia, "kg", true)];
+    for (what, estimate, unit, _) in rows.into_iter().filter(|(.., shown)| *shown) {
+        let _ = writeln!(text, "    {what:<16}{}", limit(estimate, unit));
+    }
+}
+
+fn limit(Estimate { value, error }: Estimate, unit: &str) -> String {
+    if value.is_finite() && error.is_finite() { format!("{} +- {error:.1e} {unit}", figure(value, 6)) } else { "no definite size".to_owned() }
+}
+
+/// A verdict as it is printed: one that people must not overlook in capitals.
+fn shown(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Stable => "stable",
+        Verdict::Marginal => "MARGINAL",
+        Verdict::Overflow => "OVERFLOW",
+        Verdict::Unstable => "UNSTABLE",
+    }
+}
+
+fn verdict(curve: &Curve) -> String {
+    let radius = curve.admittance.radius();
+    let word = shown(radius.verdict());
+    let nominal = format!("spectral radius {} +- {:.1e}", figure(radius.value, 12), radius.error);
+    match &curve.chance {
+        None => format!("the scene is {word}: {nominal}"),
+        Some(Err(_)) => format!("with nothing left to chance the scene is {word}: {nominal}"),
+        Some(Ok(moment)) => format!(
+            "in the mean square the scene is {}: mean-square radius {} +- {:.1e}\n  with nothing left to chance it is {word}: {nominal}",
+            shown(moment.verdict()),
+            figure(moment.radius.value, 12),
+            moment.radius.error
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frequencies_have_five_digits_or_all_that_they_have() {
+        for (hz, shown) in [
+            (0.01, "0.01"),
+            (1.0, "1"),
+            (62.5, "62.5"),
+            (12.345_678, "12.346"),
+            (100.0, "100"),
+            (123_456.7, "123457"),
+            (0.011_689_3, "0.0116893"),
+            (1e-7, "1.0000e-7"),
+        ] {
+            assert_eq!(significant(hz), shown);
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! A campaign as a JSON document and in words.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use cohaptic_campaign::{CombinationReport, Judgement};
+use cohaptic_units::print::Counted;
+use serde::Serialize;
+
+use super::Finished;
+use crate::document_schema::document;
+use crate::output;
+use crate::run::answer::length;
+
+/// The answer of `cohaptic campaign --json`.
+pub(super) fn of(finished: &Finished, out: &Path) -> impl Serialize {
+    let report = &finished.report;
+    let combinations = report.combinations.iter().enumerate().map(|(number, combination)| {
+        document! {
+            vary: finished.plan.varied(number as u64),
+            runs: combination.runs,
+            diverged: combination.diverged,
+            mean_discrepancy_m: combination.mean_discrepancy,
+            largest_discrepancy_m: combination.largest_discrepancy,
+            worst_run: combination.worst_run,
+            // Nothing unless verdicts are asked for.
+            #[serde(flatten)]
+            judgement: report.judgements.get(number).map(of_judgement),
+        }
+    });
+    document! {
+        title: finished.title.clone(),
+        runs: report.runs,
+        runs_computed: report.computed,
+        wall_s: finished.wall_s,
+        runs_per_s: finished.runs_per_s(),
+        out: output::path(out),
+        file: output::path(&report.file),
+        // The table, verdicts, pictures.
+        files: finished.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
+        diverged: report.diverged(),
+        combinations: combinations.collect::<Vec<_>>(),
+        notes: finished.notes.as_slice(),
+    }
+}
+
+/// All but the reason is `null` where there is no verdict.
+fn of_judgement(judgement: &Judgement) -> impl Serialize {
+    let (verdict, reason) = match judgement {
+        Judgement::Known(verdict) => (Some(verdict), None),
+        Judgement::Refused(reason) => (None, Some(&**reason)),
+    };
+    document! {
+        verdict: verdict.map(|verdict| &*verdict.word),
+        judged: verdict.map(|verdict| &*verdict.judged),
+        radius: verdict.map(|verdict| verdict.radius),
+        error_bound: verdict.map(|verdict| verdict.error),
+        reason: reason,
+    }
+}
+
+impl Finished {
+    /// Of those of this time.
+    #[expect(clippy::cast_precision_loss, reason = "fewer runs than 2^52")]
+    fn runs_per_s(&self) -> f64 {
+        self.report.computed as f64 / self.wall_s
+    }
+}
+
+/// The number of combinations that are named; all are in the table.
+const MOST_COMBINATIONS: usize = 20;
+
+pub(super) fn describe(finished: &Finished) -> String {
+    let Finished { plan, title, report, wall_s, notes, .. } = finished;
+    let (combinations, each) = (plan.combinations(), plan.runs_of_each());
+    let mut text = format!("{title}\n");
+    // Writing to a string does not fail.
+    let mut line = |line: &str| {
+        let _ = writeln!(text, "{line}");
+    };
+    line(&format!("  {} of {}, {each} of each", Counted(report.runs, "run"), Counted(combinations, "combination")));
+    if report.computed == 0 {
+        line("  all of them were there already: nothing was run");
+    } else {
+        let before = report.runs - report.computed;
+        let kept = if before > 0 { format!(", {before} {} there already", if before == 1 { "was" } else { "were" }) } else { String::new() };
+        line(&format!("  {} run in {wall_s:.3} s: {:.0} a second{kept}", report.computed, finished.runs_per_s()));
+    }
+    match report.worst() {
+        Some(CombinationReport { largest_discrepancy: Some(largest), worst_run: Some(run), .. }) => {
+            let others = if report.diverged() > 0 { " of the others" } else { "" };
+            line(&format!("  {} diverged; the largest discrepancy{others} is {}, in run {run}", report.diverged(), length(*largest)));
+        }
+        Some(_) | None => line(&format!("  all {} diverged", report.runs)),
+    }
+    if !plan.variations().is_empty() || !report.judgements.is_empty() {
+        line("");
+        table(finished).iter().for_each(|row| line(row));
+        if report.combinations.len() > MOST_COMBINATIONS {
+            line(&format!("  ... and {}", Counted(report.combinations.len() - MOST_COMBINATIONS, "more combination")));
+        }
+    }
+    notes.iter().for_each(|note| line(&format!("note: {note}")));
+    text
+}
+
+/// A row for each combination, with its values and what became of its runs.
+fn table(finished: &Finished) -> Vec<String> {
+    let keys: Vec<String> = finished.plan.variations().iter().map(|vary| vary.key().to_owned()).collect();
+    let judgements = &finished.report.judgements;
+    let heads: &[&str] = if judgements.is_empty() { &[] } else { &["verdict", "judged", "radius"] };
+    let heads = heads.iter().chain(&["diverged", "mean discrepancy", "largest"]).map(|head| (*head).to_owned());
+    let mut rows: Vec<Vec<String>> = vec![keys.iter().cloned().chain(heads).collect()];
+    for (number, combination) in finished.report.combinations.iter().enumerate().take(MOST_COMBINATIONS) {
+        let varied = finished.plan.varied(number as u64);
+        let values = varied.iter().map(|text| text.split_once('=').map_or_else(String::new, |(_, value)| value.to_owned()));
+        let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), length);
+        let figures = [combination.diverged.to_string(), metres(combination.mean_discrepancy), metres(combination.largest_discrepancy)];
+        rows.push(values.chain(judgements.get(number).into_iter().flat_map(judged)).chain(figures).collect());
+    }
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
+    rows.iter().map(|row| row.iter().zip(&widths).map(|(cell, width)| format!("  {cell:>width$}")).collect()).collect()
+}
+
+/// The cells of a verdict.
+fn judged(judgement: &Judgement) -> [String; 3] {
+    match judgement.verdict() {
+        Some(verdict) => [verdict.word.to_string(), verdict.judged.to_string(), format!("{:.6}", verdict.radius)],
+        None => [const { "-" }; 3].map(str::to_owned),
+    }
+}

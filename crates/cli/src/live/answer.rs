@@ -1,0 +1,121 @@
+//! What came of a session, as a JSON document and in words.
+
+use std::collections::BTreeMap;
+
+use cohaptic_harness::Ending;
+use cohaptic_harness::live::SeatStats;
+use cohaptic_live::session::SocketCounts;
+use cohaptic_live::{AdmissionStats, Report};
+use cohaptic_realtime::Wish;
+use cohaptic_scene::Scene;
+use cohaptic_units::print::{Counted, Span};
+use serde::Serialize;
+
+use crate::document_schema::document;
+use crate::documents::{access_line, ending_name, lateness, micros, peer, peer_link};
+use crate::output;
+use crate::realtime::{late, notes};
+use crate::run::answer::{length, packets};
+
+/// The answer of `cohaptic live --json`.
+pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
+    let summary = &report.summary;
+    let peers = summary.peers.iter().enumerate().map(|(place, summary)| {
+        document! {
+            kind: scene.peers[place].kind.name(),
+            #[serde(flatten)]
+            peer: peer(summary),
+            #[serde(flatten)]
+            seat: report.seats[place].as_ref().map(|seat| document! { seat: of_seat(seat) }),
+        }
+    });
+    document! {
+        title: scene.title.as_str(),
+        duration_s: summary.duration.as_secs_f64(),
+        ending: ending_name(summary.ending),
+        valid: report.validity.is_valid(),
+        ticks: summary.ticks,
+        late_ticks: report.late_ticks,
+        lateness_us: lateness(&report.ticks),
+        release_lateness_us: lateness(&report.releases),
+        behind_us: micros(report.behind),
+        peers: peers.collect::<Vec<_>>(),
+        links: summary.links.iter().map(|link| peer_link(scene, link)).collect::<Vec<_>>(),
+        access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
+        max_discrepancy_m: summary.max_discrepancy,
+        #[serde(flatten)]
+        admission: report.admission.as_ref().map(|(stats, socket)| document! { door: of_admission(stats, socket) }),
+        granted: report.prepared.granted.iter().copied().map(Wish::name).collect::<Vec<_>>(),
+        refused_wishes: report.prepared.refused.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        files: report.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
+    }
+}
+
+/// The arrivals from a remote peer.
+fn of_seat(seat: &SeatStats) -> impl Serialize + use<> {
+    let SeatStats { taken, joined, refused, out_of_order, late, most_late } = *seat;
+    document! { taken: taken, joined: joined, refused: refused, out_of_order: out_of_order, late: late, most_late_us: micros(most_late) }
+}
+
+fn of_admission(stats: &AdmissionStats, socket: &SocketCounts) -> impl Serialize + use<> {
+    document! {
+        address: socket.address.to_string(),
+        handled: stats.handled,
+        admitted: stats.admitted,
+        welcomed: stats.welcomed,
+        joinings: stats.joinings,
+        refused: stats.refusals().map(|(cause, count)| (cause.name(), count)).collect::<BTreeMap<_, _>>(),
+        sent: stats.sent,
+        nobody_there: stats.nobody_there,
+        send_failures: socket.counts.failures.by_reason().into_iter().collect::<BTreeMap<_, _>>(),
+        oversized: socket.counts.oversized,
+        kernel_drops: socket.kernel_drops,
+    }
+}
+
+pub(super) fn describe(scene: &Scene, report: &Report) -> String {
+    let mut text = format!("{}\n", scene.title);
+    let mut line = |line: String| text.push_str(&format!("  {line}\n"));
+    let summary = &report.summary;
+    let lasted = Span(summary.duration);
+    match summary.ending {
+        Ending::Complete => line(format!("{lasted}, {}", Counted(summary.ticks, "tick"))),
+        Ending::Diverged(at) => line(format!("DIVERGED: at {at} a position or a velocity is no finite number any more")),
+        Ending::Interrupted(_) => line(format!("ended after {lasted} of {}, {}", Span(scene.duration), Counted(summary.ticks, "tick"))),
+    }
+    line(format!("the run is {}", report.validity));
+    line(format!("lateness of ticks: {}", late(&report.ticks)));
+    if report.releases.count > 0 {
+        line(format!("lateness of {} to other programs: {}", Counted(report.releases.count, "datagram"), late(&report.releases)));
+    }
+    line(format!("at the end logical time was {:.1} µs behind the clock", micros(report.behind)));
+    line(format!("largest discrepancy between two copies: {}", length(summary.max_discrepancy)));
+    for ((peer, spec), seat) in summary.peers.iter().zip(&scene.peers).zip(&report.seats) {
+        let position: Vec<String> = peer.position.iter().map(|x| length(*x)).collect();
+        let seat = seat.as_ref().map(came).unwrap_or_default();
+        line(format!("{} ({}) ends at {}{seat}", peer.name, spec.kind.name(), position.join(", ")));
+    }
+    line(packets(summary));
+    if let Some((door, socket)) = &report.admission {
+        line(format!("session at {}: {} let in, {} sent", socket.address, Counted(door.admitted, "sample"), door.sent));
+        let refused: Vec<String> = door.refusals().filter(|(_, count)| *count > 0).map(|(cause, count)| format!("{count} {cause}")).collect();
+        if !refused.is_empty() {
+            line(format!("refused: {}", refused.join(", ")));
+        }
+        let lost = socket.counts.failures.in_all() + socket.counts.oversized + socket.kernel_drops.unwrap_or(0);
+        if lost > 0 {
+            line(format!("lost at the socket: {}", Counted(lost, "datagram")));
+        }
+    }
+    text.push_str(&notes(&report.prepared));
+    text
+}
+
+fn came(seat: &SeatStats) -> String {
+    let late = if seat.late > 0 { format!(", {} of them {:.0} µs late at most", seat.late, micros(seat.most_late)) } else { String::new() };
+    match seat.joined {
+        0 => "; it never came".to_owned(),
+        1 => format!("; {} taken{late}", Counted(seat.taken, "sample")),
+        joined => format!("; it came {joined} times, {} taken{late}", Counted(seat.taken, "sample")),
+    }
+}

@@ -1,0 +1,108 @@
+//! A run as a JSON document and in words.
+
+use cohaptic_harness::record::SANE_POSITION;
+use cohaptic_harness::{Ending, Summary};
+use cohaptic_scene::Scene;
+use cohaptic_units::print::{Counted, Span};
+use cohaptic_wan::DropCause;
+use serde::Serialize;
+
+use super::Run;
+use crate::document_schema::document;
+use crate::documents::{access_line, ending_name, peer, peer_link};
+use crate::{output, terminal_plot};
+
+/// The answer of `cohaptic run --json`. `otherwise`: the differences of the scene from that of the session that is replayed. `against`: the document of the
+/// variant.
+pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option<impl Serialize>) -> impl Serialize {
+    let summary = &run.summary;
+    let duration_s = summary.duration.as_secs_f64();
+    document! {
+        title: scene.title.as_str(),
+        duration_s: duration_s,
+        ticks: summary.ticks,
+        ending: ending_name(summary.ending),
+        wall_s: run.wall_s,
+        realtime_factor: duration_s / run.wall_s,
+        peers: summary.peers.iter().map(peer).collect::<Vec<_>>(),
+        links: summary.links.iter().map(|link| peer_link(scene, link)).collect::<Vec<_>>(),
+        access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
+        max_discrepancy_m: summary.max_discrepancy,
+        files: run.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
+        #[serde(flatten)]
+        otherwise: (!otherwise.is_empty()).then(|| document! { replayed_otherwise: otherwise }),
+        #[serde(flatten)]
+        variant: against.map(|against| document! { against: against }),
+    }
+}
+
+/// A run in words.
+pub(super) fn describe(scene: &Scene, run: &Run) -> String {
+    let mut text = String::new();
+    let summary = &run.summary;
+    let mut line = |line: String| text.push_str(&format!("{line}\n"));
+    if let Some(positions) = &run.positions {
+        line(format!("position of each copy of the object{}", if scene.axes.count() > 1 { ", along x" } else { "" }));
+        line(terminal_plot::draw(positions, 100.0, "cm").trim_end().to_owned());
+    }
+    let simulated = Span(summary.duration);
+    match summary.ending {
+        Ending::Complete => {}
+        Ending::Diverged(at) => line(format!("  DIVERGED: at {at} a position or a velocity is no finite number any more")),
+        Ending::Interrupted(_) => line(format!("  INTERRUPTED after {simulated} of {}", Span(scene.duration))),
+    }
+    let factor = summary.duration.as_secs_f64() / run.wall_s;
+    line(format!("  {simulated} simulated, {}, in {:.3} s: {factor:.0} times real time", Counted(summary.ticks, "tick"), run.wall_s));
+    let apart = if summary.max_discrepancy > SANE_POSITION { ": they came apart" } else { "" };
+    line(format!("  largest discrepancy between two copies: {}{apart}", length(summary.max_discrepancy)));
+    for peer in summary.peers.iter().take(MOST_PEERS) {
+        let position: Vec<String> = peer.position.iter().map(|x| length(*x)).collect();
+        line(format!("  {} ends at {}", peer.name, position.join(", ")));
+    }
+    if summary.peers.len() > MOST_PEERS {
+        line(format!("  ... and {}", Counted(summary.peers.len() - MOST_PEERS, "more peer")));
+    }
+    line(format!("  {}", packets(summary)));
+    text
+}
+
+/// The summary for people names this many peers at most.
+const MOST_PEERS: usize = 8;
+
+pub(crate) fn length(metres: f64) -> String {
+    if metres.abs() < 1e4 { format!("{:.3} mm", metres * 1e3) } else { format!("{metres:.3e} m") }
+}
+
+/// What became of all packets, end to end.
+pub(crate) fn packets(summary: &Summary) -> String {
+    let has_line = |peer: usize, uplink: bool| summary.access_lines.iter().any(|line| line.peer == peer && line.uplink == uplink);
+    let lines = |uplink: bool| summary.access_lines.iter().filter(move |line| line.uplink == uplink).map(|line| line.stats);
+    // A packet enters at the uplink of its sender, or at the link, and leaves at the downlink of its receiver, or at the link.
+    let sent: u64 = lines(true).map(|stats| stats.offered()).sum::<u64>()
+        + summary.links.iter().filter(|link| !has_line(link.from, true)).map(|link| link.stats.offered()).sum::<u64>();
+    let delivered: u64 = lines(false).map(|stats| stats.delivered()).sum::<u64>()
+        + summary.links.iter().filter(|link| !has_line(link.to, false)).map(|link| link.stats.delivered()).sum::<u64>();
+    let stats = || summary.links.iter().map(|link| link.stats).chain(summary.access_lines.iter().map(|line| line.stats));
+    let mut parts = vec![format!("{} sent over {}", Counted(sent, "packet"), Counted(summary.links.len(), "link")), format!("{delivered} delivered")];
+    let copies: u64 = stats().map(|stats| stats.duplicated()).sum();
+    if copies > 0 {
+        parts.push(format!("{} made", Counted(copies, "copy")));
+    }
+    for cause in DropCause::ALL {
+        let dropped: u64 = stats().map(|stats| stats.dropped(cause)).sum();
+        if dropped > 0 {
+            parts.push(format!("{dropped} dropped ({})", cause.name()));
+        }
+    }
+    let on_the_way: u64 = stats().map(|stats| stats.in_flight()).sum();
+    parts.push(format!("{on_the_way} on the way at the end"));
+    let stale: u64 = summary.peers.iter().map(|peer| peer.stale_samples).sum();
+    if stale > 0 {
+        parts.push(format!("{stale} of those delivered too late to be used"));
+    }
+    let refused: u64 = summary.peers.iter().map(|peer| peer.refused_samples).sum();
+    if refused > 0 {
+        parts.push(format!("{refused} delivered damaged and refused"));
+    }
+    parts.join(", ")
+}

@@ -1,0 +1,74 @@
+//! A boundary as a JSON document and in words.
+
+use cohaptic_stability::{Boundary, Criterion, Crossing, KeyRange};
+use cohaptic_units::print::Counted;
+use serde::Serialize;
+
+use super::Order;
+use crate::document_schema::document;
+
+/// The answer of `cohaptic stability boundary --json`.
+pub(super) fn of(order: &Order, found: &Boundary, files: &[String]) -> impl Serialize {
+    let crossings = found.crossings.iter();
+    document! {
+        title: order.title.as_str(),
+        key: order.range.key.as_str(),
+        unit: order.range.unit.as_str(),
+        low: order.range.low,
+        high: order.range.high,
+        // By which radius the scene is judged.
+        criterion: order.family.criterion().word(),
+        // The verdict at the lower end.
+        first: found.first.word(),
+        crossings: crossings.map(|crossing| document! { value: crossing.value, from: crossing.from.word(), to: crossing.to.word() }).collect::<Vec<_>>(),
+        marginal: found.marginal.iter().map(|stretch| document! { low: stretch.low, high: stretch.high }).collect::<Vec<_>>(),
+        tolerance: order.options.tolerance,
+        samples: found.samples,
+        finest: found.finest,
+        coarsest: found.coarsest,
+        settled: found.is_settled(),
+        // How many of the values looked at are nominal.
+        nominal: found.nominal(),
+        notes: super::notes(found),
+        files: files,
+    }
+}
+
+pub(super) fn describe(order: &Order, found: &Boundary) -> String {
+    let range = &order.range;
+    let mut text = format!("{}\n\n", order.title);
+    let mut line = |line: String| text.push_str(&format!("  {line}\n"));
+    let judged = if order.family.criterion() == Criterion::MeanSquare { " in the mean square" } else { "" };
+    line(format!("{}{judged} from {}", found.first.word(), range.text(range.low)));
+    for crossing in &found.crossings {
+        line(crossing_in_words(range, crossing));
+    }
+    if found.crossings.is_empty() {
+        line(format!("no crossing up to {}", range.text(range.high)));
+    }
+    for stretch in &found.marginal {
+        if stretch.low < stretch.high {
+            line(format!("cannot be told from 1 from {} to {}", range.text(stretch.low), range.text(stretch.high)));
+        } else {
+            line(format!("touches 1, or comes closer than can be told, at {}", range.text(stretch.low)));
+        }
+    }
+    let unit = &range.unit;
+    line(format!(
+        "{} looked at, {:.3e}{unit} to {:.3e}{unit} apart; crossings to {:.1e}{unit}. What comes and goes between two of them without a trace is not seen",
+        Counted(found.samples, "value"),
+        found.finest,
+        found.coarsest,
+        order.options.tolerance
+    ));
+    if !found.is_settled() {
+        line("NOT SETTLED: it ended after the most values that it may look at; a larger tolerance or a shorter range decides".to_owned());
+    }
+    super::notes(found).iter().for_each(|note| line(format!("note: {note}")));
+    text
+}
+
+/// One crossing.
+pub(super) fn crossing_in_words(range: &KeyRange, crossing: &Crossing) -> String {
+    format!("{} from {} (before: {})", crossing.to.word(), range.text(crossing.value), crossing.from.word())
+}

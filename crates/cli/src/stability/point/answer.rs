@@ -1,0 +1,210 @@
+//! A verdict as a JSON document and in words.
+
+use cohaptic_scene::Scene;
+use cohaptic_stability::{Analysis, ContactMode, Judgement, Method, Part, PartKind, Radius, SceneWorstCase, Verdict, WorstVerdict};
+use cohaptic_units::print::Span;
+use serde::Serialize;
+
+use super::speed::{self, Bounded, per_second, time_constant};
+use super::worst;
+use crate::document_schema::document;
+use crate::output::figure;
+
+/// The answer of `cohaptic stability point --json`.
+pub(super) fn of(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>) -> impl Serialize {
+    let Judgement { verdict, analysis, mean_square } = judgement;
+    let radius = mean_square.as_ref().map(|mean_square| mean_square.radius);
+    let constant = time_constant(analysis);
+    let modes = analysis.modes.iter().map(|mode| {
+        document! {
+            contacts: mode.contacts.as_str(),
+            verdict: mode.radius.verdict().word(),
+            spectral_radius: mode.radius.value,
+            error_bound: mode.radius.error,
+            parts: parts(scene, mode),
+        }
+    });
+    document! {
+        title: scene.title.as_str(),
+        // In the mean square where links leave something to chance.
+        verdict: verdict.word(),
+        spectral_radius: analysis.radius.value,
+        error_bound: analysis.radius.error,
+        #[serde(flatten)]
+        mean_square: radius.map(|radius| document! { mean_square_radius: radius.value, mean_square_error_bound: radius.error }),
+        rigid_modes: analysis.rigid_modes,
+        dimension: analysis.dimension,
+        method: analysis.method.word(),
+        frame_s: analysis.frame.as_secs_f64(),
+        // Both `null` where the bounds of the radius leave more than a percent of them open.
+        per_second: per_second(analysis).known(),
+        time_constant_s: constant.and_then(|constant| constant.known()).filter(|seconds| *seconds != 0.0),
+        // The least and the most that the bounds of the radius allow.
+        time_constant_bounds_s: constant.map(|Bounded { low, high, .. }| [low, high]),
+        // Of the mode of contact with the largest radius.
+        parts: worst_mode(analysis).map(|mode| parts(scene, mode)).into_iter().flatten().collect::<Vec<_>>(),
+        modes: modes.collect::<Vec<_>>(),
+        #[serde(flatten)]
+        worst: worst.map(|worst| document! { worst_case: worst::document(worst) }),
+        notes: notes(judgement),
+    }
+}
+
+fn parts(scene: &Scene, mode: &ContactMode) -> Vec<impl Serialize + use<>> {
+    let parts = mode.parts.iter().map(|part| {
+        let (kind, peer) = match part.kind {
+            PartKind::Whole => ("whole", None),
+            PartKind::Together => ("together", None),
+            PartKind::Apart { peer } => ("apart", Some(peer)),
+            PartKind::Mode { .. } => ("mode", None),
+            PartKind::LooseDevice { peer } => ("loose-device", Some(peer)),
+        };
+        document! {
+            kind: kind,
+            // The first peer that it is about; absent where it is about all peers.
+            #[serde(flatten)]
+            peer: peer.map(|peer| document! { peer: scene.peers[peer].name.clone() }),
+            dimension: part.size,
+            multiplicity: part.copies,
+            spectral_radius: part.radius.value,
+            error_bound: part.radius.error,
+        }
+    });
+    parts.collect()
+}
+
+/// The simplifications of the analysis and of the mean square, each once. Where there are both figures, a note says which of them it is about.
+pub(super) fn notes(judgement: &Judgement) -> Vec<String> {
+    let Some(mean_square) = &judgement.mean_square else {
+        return judgement.analysis.notes.clone();
+    };
+    let nominal = &judgement.analysis.notes;
+    let of_nominal = nominal.iter().map(|note| match mean_square.notes.contains(note) {
+        true => format!("both radii: {note}"),
+        false => format!("the spectral radius, with nothing left to chance: {note}"),
+    });
+    let of_mean_square = mean_square.notes.iter().filter(|note| !nominal.contains(note)).map(|note| format!("the mean-square radius: {note}"));
+    of_nominal.chain(of_mean_square).collect()
+}
+
+/// The mode of contact with the largest radius.
+fn worst_mode(analysis: &Analysis) -> Option<&ContactMode> {
+    analysis.modes.iter().max_by(|one, other| one.radius.value.total_cmp(&other.radius.value))
+}
+
+/// The modes of contact that are listed at most; the worst is always among them.
+const MOST_MODES: usize = 16;
+
+pub(super) fn describe(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>) -> String {
+    let Judgement { verdict, analysis, mean_square } = judgement;
+    let mut text = format!("{}\n\n{}\n", scene.title, sentence(*verdict, mean_square.is_some()));
+    let mut line = |line: String| text.push_str(&format!("  {line}\n"));
+    if let Some(mean_square) = mean_square {
+        line(format!("mean-square radius {} over a frame of {}", number(mean_square.radius), Span(mean_square.frame)));
+        line(format!("with nothing left to chance: {}", analysis.verdict().word()));
+    }
+    line(format!("spectral radius {} over a frame of {}", number(analysis.radius), Span(analysis.frame)));
+    line(speed::words(analysis));
+    let rigid = match analysis.rigid_modes {
+        0 => "no rigid-body mode to remove".to_owned(),
+        1 => "1 rigid-body mode removed".to_owned(),
+        count => format!("{count} rigid-body modes removed"),
+    };
+    let states = if analysis.dimension == 1 { "state" } else { "states" };
+    line(format!("{} {states}, {rigid}; method: {}", analysis.dimension, method(analysis.method)));
+    if analysis.modes.len() > 1 {
+        modes(analysis, &mut line);
+    }
+    if let Some(mode) = worst_mode(analysis).filter(|mode| mode.parts.len() > 1) {
+        line(String::new());
+        line(if mode.contacts.is_empty() { "parts that do not mix".to_owned() } else { format!("parts that do not mix, {}", mode.contacts) });
+        for part in &mode.parts {
+            line(format!("  {:<44}{:>4} states, {:>4} times  {}", name(scene, part), part.size, part.copies, number(part.radius)));
+        }
+    }
+    let notes = notes(judgement);
+    if let Some(worst) = worst {
+        worst_case(worst, &notes, &mut line);
+    }
+    if !notes.is_empty() {
+        line(String::new());
+        notes.iter().for_each(|note| line(format!("note: {note}")));
+    }
+    // Lines that are empty but for the indentation.
+    text.replace("\n  \n", "\n\n")
+}
+
+fn sentence(verdict: Verdict, mean_square: bool) -> &'static str {
+    match (verdict, mean_square) {
+        (Verdict::Stable, false) => "STABLE: every disturbance of the relative motion dies out",
+        (Verdict::Marginal, false) => "MARGINAL: the spectral radius cannot be told from 1 within its error",
+        (Verdict::Overflow, false) => {
+            "OVERFLOW: nothing is known of the spectral radius, because the numbers, or their errors, left the range of the computation"
+        }
+        (Verdict::Unstable, false) => "UNSTABLE: some disturbance of the relative motion grows without end",
+        (Verdict::Stable, true) => "STABLE in the mean square: the variance of every disturbance of the relative motion dies out",
+        (Verdict::Marginal, true) => "MARGINAL: the mean-square radius cannot be told from 1 within its error",
+        (Verdict::Overflow, true) => {
+            "OVERFLOW: nothing is known of the mean-square radius, because the numbers, or their errors, left the range of the computation"
+        }
+        (Verdict::Unstable, true) => "UNSTABLE in the mean square: the variance of some disturbance of the relative motion grows without end",
+    }
+}
+
+/// The worst case, with the pattern that makes it.
+fn worst_case(worst: &SceneWorstCase, said: &[String], line: &mut impl FnMut(String)) {
+    let verdict = match worst.verdict() {
+        WorstVerdict::Stable => "stable whatever the network does within these bounds",
+        WorstVerdict::Undecided => "not decided: 1 is between the bounds; --products and --accuracy may tell",
+        WorstVerdict::Unstable => "unstable under some pattern within these bounds",
+    };
+    line(String::new());
+    line(format!("worst case: {verdict}"));
+    line(format!("  growth a sending period between {} and {}", figure(worst.lower, 6), figure(worst.upper, 6)));
+    if let Some(rate) = worst.certificate {
+        line(format!("  a quadratic certificate, checked, proves {}", figure(rate, 6)));
+    }
+    let part = worst.worst();
+    if !part.sequence.is_empty() {
+        line(format!("  the pattern that grows as the lower bound: {}", part.sequence));
+    }
+    worst.notes.iter().filter(|note| !said.contains(note)).for_each(|note| line(format!("  note: {note}")));
+}
+
+fn modes(analysis: &Analysis, line: &mut impl FnMut(String)) {
+    line(String::new());
+    line(format!("{} combinations of contacts, the worst first", analysis.modes.len()));
+    let mut sorted: Vec<&ContactMode> = analysis.modes.iter().collect();
+    sorted.sort_by(|one, other| other.radius.value.total_cmp(&one.radius.value));
+    for mode in sorted.iter().take(MOST_MODES) {
+        let contacts = if mode.contacts.is_empty() { "away from the walls" } else { &mode.contacts };
+        line(format!("  {contacts:<44}{:<9} {}", mode.radius.verdict().word(), number(mode.radius)));
+    }
+    if sorted.len() > MOST_MODES {
+        line(format!("  ... and {} more", sorted.len() - MOST_MODES));
+    }
+}
+
+fn name(scene: &Scene, part: &Part) -> String {
+    let peer = |peer: usize| &scene.peers[peer].name;
+    match part.kind {
+        PartKind::Whole => "the whole scene".to_owned(),
+        PartKind::Together => "all, equal peers as their average".to_owned(),
+        PartKind::Apart { peer: first } => format!("differences of peers equal to {}", peer(first)),
+        PartKind::Mode { weight } => format!("neighbours that do {weight:.6} of the same"),
+        PartKind::LooseDevice { peer: first } => format!("the device of {}, which touches nothing", peer(first)),
+    }
+}
+
+fn method(method: Method) -> &'static str {
+    match method {
+        Method::Reduced => "reduced (equal peers taken together)",
+        Method::Determinant => "determinant (long delays as roots of a small determinant)",
+        Method::Full => "full (the whole state, through the code that simulates)",
+    }
+}
+
+fn number(radius: Radius) -> String {
+    let Radius { value, error } = radius;
+    format!("{} +- {error:.1e}", figure(value, 12))
+}

@@ -1,0 +1,71 @@
+//! Texts for other programs: manual pages (`cohaptic man`) and completions of shells (`cohaptic completions`), made of the arguments themselves, and JSON Schemas of files (`cohaptic schema`).
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Command, CommandFactory as _};
+use clap_mangen::Man;
+use cohaptic_scene::schema::FileSchema;
+
+use crate::arguments::{Arguments, CompletionsArguments, FileKind, ManArguments, SchemaArguments};
+use crate::failure::Failure;
+use crate::file::write_file;
+use crate::output;
+
+/// Prints the JSON Schema of a kind of file.
+pub(crate) fn schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
+    let kind = match arguments.kind {
+        FileKind::Scene => FileSchema::Scene,
+        FileKind::Relay => FileSchema::Relay,
+        FileKind::Router => FileSchema::Router,
+    };
+    output::raw(format!("{}\n", kind.json()).as_bytes())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Prints the page of a command, or writes all pages into a folder.
+pub(crate) fn man(arguments: &ManArguments) -> Result<ExitCode, Failure> {
+    let mut program = Arguments::command().disable_help_subcommand(true);
+    // Gives the commands their full names.
+    program.build();
+    let Some(folder) = &arguments.out else {
+        output::raw(&page(find(&program, &arguments.command)?)?)?;
+        return Ok(ExitCode::SUCCESS);
+    };
+    std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.clone(), error })?;
+    let mut written: Vec<PathBuf> = Vec::new();
+    let mut left = vec![&program];
+    while let Some(command) = left.pop() {
+        let path = folder.join(Man::new(command.clone()).get_filename());
+        write_file(&path, page(command)?)?;
+        written.push(path);
+        left.extend(command.get_subcommands());
+    }
+    written.sort();
+    output::wrote(&written);
+    Ok(ExitCode::SUCCESS)
+}
+
+fn find<'a>(program: &'a Command, names: &[String]) -> Result<&'a Command, Failure> {
+    names.iter().try_fold(program, |command, name| {
+        command.find_subcommand(name).ok_or_else(|| {
+            let there: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
+            let expected = if there.is_empty() { "no further word".to_owned() } else { format!("one of {}", there.join(", ")) };
+            Failure::Input(format!("there is no command {name:?} of {}: expected {expected}", command.get_name()))
+        })
+    })
+}
+
+fn page(command: &Command) -> Result<Vec<u8>, Failure> {
+    let mut page = Vec::new();
+    Man::new(command.clone()).render(&mut page).map_err(Failure::StandardOutput)?;
+    Ok(page)
+}
+
+/// Prints what a shell needs to complete commands and options.
+pub(crate) fn completions(arguments: &CompletionsArguments) -> Result<ExitCode, Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Arguments::command(), "cohaptic", &mut script);
+    output::raw(&script)?;
+    Ok(ExitCode::SUCCESS)
+}
