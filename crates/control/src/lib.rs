@@ -39,7 +39,6 @@
 //! ```
 
 mod board;
-mod description;
 mod http;
 mod metrics;
 mod server;
@@ -49,7 +48,7 @@ mod typed;
 mod views;
 
 pub use board::{Board, Latest, LinkEditor};
-pub use description::{Description, Kind, LinkName, PeerName};
 pub use server::{ServeError, Server, ServerConfig, serve};
+pub use snapshot::{Description, Kind, LinkName, PeerName};
 pub use snapshot::{LinkCounters, PeerView, Presence, Quantiles, Snapshot};
 pub use token::{Token, TokenError};

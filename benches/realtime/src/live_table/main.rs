@@ -3,14 +3,13 @@
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 
 mod admission;
-mod bare;
 mod session;
 
 use std::error::Error;
 use std::time::Duration;
 
 use cohaptic_benches_realtime::machine;
-use cohaptic_realtime::{LatenessSummary, Pacing, Wishes};
+use cohaptic_realtime::{Clock as _, Lateness, LatenessSummary, MonotonicClock, Pacer, Pacing, Wishes, prepare_thread};
 
 /// Of every loop here.
 const TICK: Duration = Duration::from_millis(1);
@@ -72,10 +71,10 @@ fn loops(span: Duration) -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    row("bare: `tokio::time::interval`", Wishes::NONE, &bare::tokio_interval(span)?);
+    row("bare: `tokio::time::interval`", Wishes::NONE, &tokio_interval(span)?);
     for (pacing, how) in [(Pacing::Sleep, "bare: `clock_nanosleep`"), (Pacing::SPIN, "bare: spinning")] {
         for wishes in [Wishes::NONE, with_priority()] {
-            let run = bare::thread(pacing, wishes, span)?;
+            let run = bare_thread(pacing, wishes, span)?;
             row(how, wishes, &run);
             refused.extend(run.refused);
         }
@@ -121,4 +120,47 @@ fn quantiles(summary: LatenessSummary) -> [String; 4] {
 fn micros(span: Duration) -> String {
     let micros = span.as_secs_f64() * 1e6;
     if micros < 10.0 { format!("{micros:.2}") } else { format!("{micros:.0}") }
+}
+
+/// A thread that waits for each tick's time: with `clock_nanosleep`, and spins the last of it if asked.
+pub(crate) fn bare_thread(pacing: Pacing, wishes: Wishes, span: Duration) -> Result<Loop, Box<dyn Error>> {
+    let thread = std::thread::spawn(move || -> std::io::Result<Loop> {
+        let prepared = prepare_thread(&wishes);
+        let (clock, mut pacer, mut ticks) = (MonotonicClock::start(), Pacer::new(pacing), Lateness::new());
+        let (mut due, before) = (clock.now(), machine::thread_time());
+        let end = due + span;
+        while due < end {
+            due += TICK;
+            match pacing {
+                // Without what a pacer does to be on time all the same.
+                Pacing::Sleep => _ = clock.block(Some(due), &[])?,
+                Pacing::Spin { .. } => _ = pacer.wait(&clock, Some(due), &[])?,
+            }
+            ticks.record(clock.now().saturating_duration_since(due));
+        }
+        let refused = prepared.refused.iter().map(ToString::to_string).collect();
+        Ok(Loop { ticks: ticks.summary(), releases: None, processor: machine::thread_time() - before, refused })
+    });
+    Ok(thread.join().map_err(|_| "the thread panicked")??)
+}
+
+/// An interval of tokio, on a runtime of one thread that has nothing else to do.
+pub(crate) fn tokio_interval(span: Duration) -> Result<Loop, Box<dyn Error>> {
+    let thread = std::thread::spawn(move || -> std::io::Result<Loop> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build()?;
+        let before = machine::thread_time();
+        let mut ticks = Lateness::new();
+        runtime.block_on(async {
+            let mut interval = tokio::time::interval(TICK);
+            // The first is due at once.
+            let mut due = interval.tick().await;
+            let end = due + span;
+            while due < end {
+                due = interval.tick().await;
+                ticks.record(due.elapsed());
+            }
+        });
+        Ok(Loop { ticks: ticks.summary(), releases: None, processor: machine::thread_time() - before, refused: Vec::new() })
+    });
+    Ok(thread.join().map_err(|_| "the thread panicked")??)
 }

@@ -6,34 +6,17 @@ use std::time::Duration;
 use cohaptic_falcon::driver::{Phase, Status};
 use cohaptic_falcon::kinematics::Triple;
 use cohaptic_units::print::Span;
-use serde::Serialize;
 
-use super::answer;
-use super::answer::{Identity, Seen, Traffic};
+use super::answer::{self, Identity, Seen, Traffic};
 use super::bench::{Bench, End, Go, Task};
 use super::homing_guide::Guide;
 use super::probe::WITHOUT_FORCE;
 use super::reach::{self, FirmwareState};
 use crate::arguments::HomeArguments;
-use crate::document_schema::DocumentSchema;
+use crate::document_schema::{DocumentSchema, document};
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
 use crate::progress::Progress;
-
-#[derive(Serialize)]
-struct HomeDocument {
-    #[serde(flatten)]
-    identity: Identity,
-    firmware: &'static str,
-    /// Whether it was homed at the end, beyond doubt.
-    is_homed: bool,
-    is_active: bool,
-    ending: &'static str,
-    #[serde(flatten)]
-    traffic: Traffic,
-    #[serde(flatten)]
-    seen: Seen,
-}
 
 /// Waits until a user has homed a device and pulled its grip out.
 pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
@@ -47,16 +30,22 @@ pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
     let end = bench.run(Some(arguments.length), &mut homing);
     homing.line.clear();
     let (end, traffic) = (end?, Traffic::of(&bench, homing.until));
-    let document = HomeDocument {
+    let (seen, is_homed, is_active) = (Seen::of(&homing.last), homing.last.reading.is_some(), homing.last.phase == Phase::Active);
+    let document = document! {
+        #[serde(flatten)]
         identity: Identity::of(&target),
         firmware: state.name(),
-        is_homed: homing.last.reading.is_some(),
-        is_active: homing.last.phase == Phase::Active,
+        // Whether it was homed at the end, beyond doubt.
+        is_homed: is_homed,
+        is_active: is_active,
         ending: end.name(),
-        traffic,
-        seen: Seen::of(&homing.last),
+        #[serde(flatten)]
+        traffic: &traffic,
+        #[serde(flatten)]
+        seen: &seen,
     };
-    output::answer(which.json, DocumentSchema::FALCON_HOME, &document, || document.describe(&target.name(), state), output::NO_FILES)?;
+    let words = || describe(&target.name(), state, (is_homed, is_active), &traffic, &seen);
+    output::answer(which.json, DocumentSchema::FALCON_HOME, &document, words, output::NO_FILES)?;
     match end {
         End::Enough => Ok(ExitCode::SUCCESS),
         End::Interrupted => Ok(ExitCode::from(INTERRUPTED)),
@@ -64,28 +53,26 @@ pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
         End::Over => Err(Failure::System(format!(
             "after {} the device is {}: pull the grip fully out, push it fully in, and pull it out again; --for gives more time",
             Span(arguments.length),
-            if document.is_homed { "homed, but its grip was not pulled out beyond 170 mm" } else { "not homed" }
+            if is_homed { "homed, but its grip was not pulled out beyond 170 mm" } else { "not homed" }
         ))),
     }
 }
 
-impl HomeDocument {
-    fn describe(&self, name: &str, firmware: FirmwareState) -> String {
-        let mut lines = Vec::new();
-        if firmware == FirmwareState::Loaded {
-            lines.push("its firmware was loaded just now".to_owned());
-        }
-        let seconds = self.traffic.seconds;
-        lines.push(match (self.is_homed, self.is_active) {
-            (_, true) => format!("homed and active after {seconds:.1} s"),
-            (true, false) => format!("homed, and not active after {seconds:.1} s"),
-            (false, false) => format!("not homed after {seconds:.1} s"),
-        });
-        lines.extend(self.seen.position_m.map(|position| format!("the grip is at {} from the origin", answer::place(position))));
-        lines.extend(answer::seen(&self.seen));
-        lines.extend(answer::traffic(&self.traffic));
-        answer::block(name, &lines)
+fn describe(name: &str, firmware: FirmwareState, homed_and_active: (bool, bool), traffic: &Traffic, seen: &Seen) -> String {
+    let mut lines = Vec::new();
+    if firmware == FirmwareState::Loaded {
+        lines.push("its firmware was loaded just now".to_owned());
     }
+    let seconds = traffic.seconds;
+    lines.push(match homed_and_active {
+        (_, true) => format!("homed and active after {seconds:.1} s"),
+        (true, false) => format!("homed, and not active after {seconds:.1} s"),
+        (false, false) => format!("not homed after {seconds:.1} s"),
+    });
+    lines.extend(seen.position_m.map(|position| format!("the grip is at {} from the origin", answer::place(position))));
+    lines.extend(answer::seen(seen));
+    lines.extend(answer::traffic(traffic));
+    answer::block(name, &lines)
 }
 
 struct Homing {

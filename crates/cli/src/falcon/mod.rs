@@ -16,7 +16,6 @@ mod home;
 mod homing_guide;
 mod probe;
 mod reach;
-mod samples;
 mod simulate;
 mod watch;
 

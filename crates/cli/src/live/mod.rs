@@ -2,7 +2,6 @@
 
 mod answer;
 mod onlookers;
-mod timeline;
 
 use std::fmt::Write as _;
 use std::net::SocketAddr;
@@ -27,7 +26,7 @@ use crate::progress::Progress;
 use crate::realtime::{KeyedLinks, LiveControl, loading, say};
 use crate::{input, interrupt, output};
 use onlookers::SessionConductor;
-use timeline::{Elapsed, Planned, TimedLinks};
+use onlookers::{Elapsed, Planned, TimedLinks};
 
 /// Runs a scene by the wall clock with the peers that are attached, and says how it went.
 pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {

@@ -3,7 +3,6 @@
 mod boundary;
 mod map;
 mod point;
-pub(crate) mod quantity;
 mod rows_file;
 pub(crate) mod source;
 

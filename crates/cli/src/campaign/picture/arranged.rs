@@ -3,7 +3,7 @@
 use cohaptic_campaign::{CampaignPlan, Variation};
 use cohaptic_picture::{Axis, cell_edges};
 
-use crate::stability::quantity::axis_of_key;
+use crate::stability::source::axis_of_key;
 
 /// The most panels beside each other.
 const MOST_PANELS: usize = 12;

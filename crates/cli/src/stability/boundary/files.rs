@@ -11,8 +11,8 @@ use super::answer::crossing_in_words;
 use crate::failure::Failure;
 use crate::file::write_into;
 use crate::output;
-use crate::stability::quantity::axis_of;
 use crate::stability::source;
+use crate::stability::source::axis_of;
 
 /// Writes `boundary.csv`, `samples.csv` and `boundary.svg`, and gives their paths.
 pub(super) fn write(folder: &Path, order: &Order, found: &Boundary, size: Size) -> Result<Vec<String>, Failure> {

@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::{Order, Speed, VariantMap, glance};
 use crate::document_schema::document;
 use crate::output::{are, figure};
-use crate::stability::quantity::label;
 use crate::stability::source;
+use crate::stability::source::label;
 
 /// The answer of `cohaptic stability map --json`.
 pub(super) fn of(order: &Order, maps: &[VariantMap], speed: Speed, files: &[String]) -> impl Serialize {

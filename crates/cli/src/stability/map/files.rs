@@ -9,8 +9,8 @@ use cohaptic_units::print::csv_field;
 use super::{Order, VariantMap};
 use crate::failure::Failure;
 use crate::file::write_into;
-use crate::stability::quantity::axis_of;
 use crate::stability::source;
+use crate::stability::source::axis_of;
 
 /// Writes `map.csv`, `map-2.csv` ... and `map.svg`, and gives their paths.
 pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap], size: Size) -> Result<Vec<String>, Failure> {
