@@ -5,7 +5,7 @@
 //! failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, 141 standard
 //! output was closed.
 #![expect(non_camel_case_types, reason = "`document!` makes a type parameter of each key")]
-#![cfg_attr(not(target_os = "linux"), allow(dead_code, reason = "the commands that need Linux use it"))]
+#![cfg_attr(not(target_os = "linux"), allow(dead_code, unused_imports, reason = "the commands that need Linux use them"))]
 
 #[cfg(target_os = "linux")]
 mod accuracy;
