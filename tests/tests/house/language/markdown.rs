@@ -168,5 +168,5 @@ fn code_is_left_out_and_lines_are_kept() {
     ];
     assert_eq!(found, expected.map(|(kind, line, text)| (kind, line, text.to_owned())));
     let paragraph = &blocks(page)[1];
-    assert_eq!([0, 9, 12, paragraph.text().find("four").unwrap()].map(|place| paragraph.line_at(place)), [3, 3, 4, 5]);
+    assert_eq!([0, 8, 12, paragraph.text().find("four").unwrap()].map(|place| paragraph.line_at(place)), [3, 3, 4, 5]);
 }
