@@ -242,13 +242,13 @@ pub trait Watch: Sync {
         true
     }
 
-    /// So many more combinations have been checked.
+    /// This number of combinations was checked since the last call.
     fn checked(&self, _combinations: u64) {}
 
     /// A number of combinations more have been judged.
     fn judged(&self, _combinations: u64) {}
 
-    /// So many more runs have been done.
+    /// This number of runs was done since the last call.
     fn ran(&self, _runs: u64) {}
 }
 

@@ -80,8 +80,8 @@ fn counters(stats: &LinkStats) -> impl Serialize + use<> {
     }
 }
 
-#[cfg(target_os = "linux")]
 /// How late things were, in microseconds.
+#[cfg(target_os = "linux")]
 pub(crate) fn lateness(summary: &LatenessSummary) -> impl Serialize + use<> {
     let LatenessSummary { count, p50, p99, p999, max, sum: _ } = *summary;
     document! { count: count, p50: micros(p50), p99: micros(p99), p999: micros(p999), max: micros(max) }

@@ -118,7 +118,7 @@ pub enum Validity {
     Valid,
     /// It was not: what it showed is not what was asked for.
     NotValid {
-        /// So many things were late,
+        /// The number of things that were late,
         late: u64,
         /// of this number,
         of: u64,

@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::CampaignError;
 use crate::table::Format;
+use lock::Lock;
 
 pub(crate) use manifest::Manifest;
 

@@ -69,7 +69,7 @@ pub(super) fn describe(peer: &str, curves: &[Curve]) -> String {
         }
         let _ = writeln!(
             text,
-            "\n  velocity over force at the device of {peer}, beside that of a free mass of {} kg",
+            "\n  velocity over force at the device of {peer}, compared with that of a free mass of {} kg",
             cohaptic_units::print::Number(curve.mass)
         );
         table(&mut text, curve);

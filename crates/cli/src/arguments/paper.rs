@@ -29,6 +29,10 @@ pub(crate) struct PaperArguments {
     pub(crate) json: bool,
 }
 
+/// Elsewhere the command is refused whatever its subjects are.
+#[cfg(not(target_os = "linux"))]
+type Subject = String;
+
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::ACCURACY))]
 pub(crate) struct AccuracyArguments {

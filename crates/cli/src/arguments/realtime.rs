@@ -13,7 +13,7 @@ use super::Overrides;
 use super::examples::{self, after};
 use super::numbers::integer;
 
-/// How to be on time, and who may look.
+/// How to be on time, and live control.
 #[derive(Debug, Args)]
 pub(crate) struct RealTimeArguments {
     /// Spin the last 120 µs before each deadline: a hundred times closer to it, for a core that is busy meanwhile
@@ -84,10 +84,10 @@ pub(crate) struct RelayArguments {
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
-    /// Where clients send to, what is meant for --to; port 0 is a free one
+    /// Where clients send datagrams for --to; port 0 is a free one
     #[arg(long, value_name = "ADDRESS", value_parser = looked_up, requires = "to", conflicts_with = "set")]
     pub(crate) listen: Option<SocketAddr>,
-    /// Whom clients speak to
+    /// The program that clients speak to
     #[arg(long, value_name = "ADDRESS", value_parser = looked_up, requires = "listen")]
     pub(crate) to: Option<SocketAddr>,
     /// The link from there to the clients, up to the next option [default: the same in both directions]
@@ -101,10 +101,10 @@ pub(crate) struct RelayArguments {
     /// The seed of all random numbers [default: that of the file, or 0]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(0, i64::MAX.unsigned_abs()))]
     pub(crate) seed: Option<u64>,
-    /// So many datagrams may be on their way at once; what comes beyond is dropped [default: that of the file, or 262144]
+    /// The most datagrams in flight at once; those beyond are dropped [default: that of the file, or 262144]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(1, 1 << 24))]
     pub(crate) packets: Option<u64>,
-    /// So many bytes of them [default: that of the file, or 64MB]
+    /// The most bytes of them [default: that of the file, or 64MB]
     #[arg(long, value_name = "SIZE", value_parser = room)]
     pub(crate) bytes: Option<Bytes>,
 }

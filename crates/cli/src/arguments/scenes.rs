@@ -81,7 +81,7 @@ pub(crate) struct CampaignArguments {
     /// How many runs there are of each combination: with the seed of the scene, with the next one, and so on
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 1)]
     pub(crate) runs: u64,
-    /// The folder of the campaign: the table, and until that is there the parts. The same command goes on with what is there
+    /// The folder of the campaign: the table, and until that is there the parts. The same command goes on from there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Judge each combination as stability point does, and write the verdict into the rows of its runs

@@ -41,7 +41,7 @@ pub(crate) struct PointArguments {
     /// be equal
     #[arg(long, value_name = "GRAPH", conflicts_with_all = ["method", "losses_in_a_row", "delay_within"])]
     pub(crate) graph: Option<String>,
-    /// The worst case too: at most so many samples lost in a row
+    /// The worst case too: at most this number of samples lost in a row
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u32>(0, u32::MAX.into()))]
     pub(crate) losses_in_a_row: Option<u32>,
     /// The worst case too: every sample takes any time from LO to HI, such as 20ms..26ms
@@ -112,7 +112,7 @@ pub(crate) struct MapArguments {
     /// Another map in the same picture, with this key overridden too; said again, all for the same map
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) against: Vec<String>,
-    /// Write map.csv, map-2.csv ... and map.svg into this folder, and keep there what is done if it is interrupted
+    /// Write map.csv, map-2.csv ... and map.svg into this folder, and keep the finished part there if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
@@ -136,7 +136,7 @@ pub(crate) struct BoundaryArguments {
     /// How many values are looked at first, the ends among them [default: 400]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(0, u64::MAX))]
     pub(crate) samples: Option<usize>,
-    /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep there what is done if it is interrupted
+    /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep the finished part there if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]

@@ -67,7 +67,7 @@ impl Finished {
     }
 }
 
-/// So many combinations are named; all are in the table.
+/// The number of combinations that are named; all are in the table.
 const MOST_COMBINATIONS: usize = 20;
 
 pub(super) fn describe(finished: &Finished) -> String {

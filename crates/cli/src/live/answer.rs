@@ -97,7 +97,7 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     }
     line(packets(summary));
     if let Some((door, socket)) = &report.admission {
-        line(format!("door at {}: {} let in, {} sent", socket.address, Counted(door.admitted, "sample"), door.sent));
+        line(format!("session at {}: {} let in, {} sent", socket.address, Counted(door.admitted, "sample"), door.sent));
         let refused: Vec<String> = door.refusals().filter(|(_, count)| *count > 0).map(|(cause, count)| format!("{count} {cause}")).collect();
         if !refused.is_empty() {
             line(format!("refused: {}", refused.join(", ")));

@@ -28,7 +28,7 @@ use crate::{input, interrupt, output};
 use onlookers::SessionConductor;
 use onlookers::{Elapsed, Planned, TimedLinks};
 
-/// Runs a scene by the wall clock with whoever is attached, and says how it went.
+/// Runs a scene by the wall clock with the peers that are attached, and says how it went.
 pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {
     let (path, new_key) = (arguments.scene.as_deref(), arguments.new_key.as_deref());
     match (path, new_key) {
@@ -40,7 +40,7 @@ pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {
 
 fn make_key(file: &Path) -> Result<ExitCode, Failure> {
     SessionKey::generate_to(file, &mut SystemEntropy).map_err(|error| Failure::System(error.to_string()))?;
-    output::text("a new session key; only its owner can read it. Whoever has it can take part\n")?;
+    output::text("a new session key; only its owner can read it. Anybody who has it can take part\n")?;
     output::wrote([file]);
     Ok(ExitCode::SUCCESS)
 }

@@ -66,7 +66,7 @@ fn port_document(port: &PortReport) -> impl Serialize + use<> {
     }
 }
 
-/// What was turned away at the door, by cause.
+/// Datagrams that were refused on arrival, by cause.
 pub(super) fn refused(report: &Report) -> [(&'static str, u64); 4] {
     let intake = &report.intake;
     [("stranger", intake.strangers), ("to-itself", intake.to_itself), ("no-room", intake.no_room), ("overload", intake.overload)]
@@ -101,10 +101,10 @@ impl Totals {
     }
 }
 
-/// So many links are named.
+/// The number of links that are named.
 const MOST_LINKS: usize = 64;
 
-/// So many of those over which nothing went.
+/// The number of links without traffic that are named.
 const MOST_IDLE: usize = 8;
 
 pub(super) fn describe(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]) -> String {
@@ -129,7 +129,7 @@ pub(super) fn describe(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]
     }
     links(&report.links, asked, &mut line);
     if let Some(refused) = counts(&refused(report)) {
-        line(format!("dropped at the door: {refused}"));
+        line(format!("dropped on arrival: {refused}"));
     }
     if report.without_socket > 0 {
         line(format!("sent away, because no socket could be had (`ulimit -n`): {}", Counted(report.without_socket, "client")));
@@ -180,7 +180,7 @@ fn at(port: &PortReport, line: &mut impl FnMut(String)) {
 
 /// What the system let wait at a port, where it is less than was asked for.
 fn small_buffer(ports: &[PortReport]) -> Option<String> {
-    // The kernel grants twice what is asked for.
+    // The kernel grants twice the size asked for.
     let wanted = 2 * cohaptic_realtime::udp::EndpointConfig::default().receive_buffer;
     let least = ports.iter().map(|port| port.receive_buffer).filter(|granted| *granted > 0).min()?;
     (least < wanted).then(|| {

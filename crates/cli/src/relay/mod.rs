@@ -106,7 +106,7 @@ fn description(setup: &Setup) -> Description {
     }
 }
 
-/// How often a relay with so many links is looked at: a snapshot of a large mesh takes milliseconds, and packets wait meanwhile.
+/// How often a relay with that number of links is looked at: a snapshot of a large mesh takes milliseconds, and packets wait meanwhile.
 fn publish_every(links: usize) -> Duration {
     const LINKS_IN_A_MOMENT: usize = 500;
     let moments = u32::try_from(links.div_ceil(LINKS_IN_A_MOMENT)).unwrap_or(u32::MAX).clamp(1, 50);

@@ -133,7 +133,7 @@ async fn answer(stream: TcpStream, router: Router, place: OwnedSemaphorePermit) 
     let _set: io::Result<()> = stream.set_nodelay(true);
     let mut builder = Builder::new();
     builder.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
-    // Whoever is at the other end has gone, or spoke no HTTP: nobody is left to be told.
+    // The program at the other end has gone, or spoke no HTTP: nobody is left to be told.
     let _ended: hyper::Result<()> = builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router)).await;
     drop(place);
 }

@@ -87,7 +87,7 @@ struct Listener {
 /// The state at once, then each time that it was published anew, at most ten times a second.
 pub(super) async fn events(State(app): State<Arc<App>>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
     let mut ticks = interval(EVERY);
-    // Whoever reads slowly gets less, not the past.
+    // A slow reader gets less, not the past.
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let listener = Listener { app, ticks, sent: None, quiet: 0 };
     Sse::new(unfold(listener, |mut listener| async {

@@ -58,7 +58,7 @@ fn unreadable(path: &Path, source: &io::Error, place: Option<&Diagnostic>) -> St
     }
 }
 
-/// One fault: where it is, what is wrong, what was expected, and the line it stands in.
+/// One fault: its place, the fault itself, the expected text, and the line it stands in.
 ///
 /// Its display form spans several lines and holds no control characters:
 ///
@@ -122,7 +122,7 @@ impl Diagnostic {
         &self.key
     }
 
-    /// What is wrong and what was expected.
+    /// The fault, and what was expected.
     #[must_use]
     pub fn message(&self) -> &str {
         &self.message

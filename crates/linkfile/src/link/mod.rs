@@ -178,7 +178,7 @@ fn read_chance_in(table: &mut TableReader<'_>, node: &Node, context: Context<'_>
     Chance::correlated(probability?, correlation?).map_err(|error| values::refuse(context, &nodes, node, &error)).ok()
 }
 
-/// The keys that hold: one that says everything takes away whatever it is laid over. What is written beside it, or laid over it, is a fault.
+/// The keys that hold: one that says everything takes away whatever it is laid over. A key next to it, or laid over it, is a fault.
 fn in_force<'a>(node: &'a Node, context: Context<'_>) -> Option<Cow<'a, Node>> {
     let table = node.as_table()?;
     // Entries stand in the order in which they were laid over each other.

@@ -40,7 +40,7 @@ pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<R
         Some(how) if how.name == "behind" => {
             let packets = count(&how.node);
             let at_most = at_most?;
-            // What is missing was said above, and in a part of a scene nothing is.
+            // A missing key was reported above, and in a part of a scene none is missing.
             let at_most = if context.partial { at_most.unwrap_or_default() } else { at_most? };
             Displacement::Behind { packets: packets?, at_most }
         }

@@ -49,7 +49,7 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     table.finish();
     let (bytes, between, repeat) = (bytes?, between?, repeat?);
     let Some(file) = file else {
-        // What is missing was said above, and in a part of a scene nothing is.
+        // A missing key was reported above, and in a part of a scene none is missing.
         return context.partial.then_some(None);
     };
     let trace = load(file, context, bytes, between, repeat)?;

@@ -1,4 +1,4 @@
-//! Relay files: who talks to whom through which link in real time, and through which ports.
+//! Relay files: which programs talk to each other in real time, through which links and ports.
 
 mod programs;
 
@@ -58,7 +58,7 @@ pub struct RelayFile {
 pub struct RelayProgram {
     /// Its name, which names its links too.
     pub name: String,
-    /// The port that stands for it: whoever sends there speaks to it. Port 0 is a free one.
+    /// The port that stands for it: a program that sends there speaks to it. Port 0 is a free one.
     pub port: SocketAddr,
     /// Where it sends from and listens; `None`: learnt from the first datagram that it sends.
     pub address: Option<SocketAddr>,
@@ -76,9 +76,9 @@ pub struct RelayChange {
 /// What a relay may take, and how late it may be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct RelayLimits {
-    /// So many datagrams may be on their way at once; what comes beyond is dropped.
+    /// The most datagrams in flight at once; those beyond are dropped.
     pub packets: u64,
-    /// So many bytes of them.
+    /// The most bytes of them.
     pub bytes: Bytes,
     /// An address that was learnt, or a client, is forgotten when it has been silent for so long.
     pub forget_after: Duration,

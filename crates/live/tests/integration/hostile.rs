@@ -8,7 +8,7 @@ use crate::support::{
     Counting, SEAT, SESSION, address, admitted, assert_counts, at, cases, joining, key, keyed_door, keyless_door, sample, sealed, shake_hands,
 };
 
-/// A door whose seat is taken from address 1, with the number 10.
+/// An admission control whose seat is taken from address 1, with the number 10.
 fn taken() -> (AdmissionControl, Joined) {
     let mut door = keyed_door();
     let joined = shake_hands(&mut door, at(0), address(1), &joining(1));

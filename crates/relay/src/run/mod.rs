@@ -238,7 +238,7 @@ const WINDOW: Duration = Duration::from_millis(1);
 const DENSE: u64 = 40;
 
 impl Density {
-    /// When it is dense, so much time passes between two looks, so that what leaves together goes in one call of the kernel. A datagram is later by as much at
+    /// The time between two looks when it is dense, so that datagrams that leave together go in one call of the kernel. A datagram is later by as much at
     /// most; of 250,000 a second, each took 2.1 µs of processor time in place of 3.3 µs.
     const REST: Duration = Duration::from_micros(50);
 
@@ -246,7 +246,7 @@ impl Density {
         Self { since: Instant::ZERO, work: 0, is_dense: false }
     }
 
-    /// So many came in or left.
+    /// That number came in or left.
     #[inline]
     fn note(&mut self, now: Instant, count: u64) {
         self.work += count;

@@ -126,7 +126,7 @@ impl Core {
     #[cold]
     #[expect(clippy::panic, reason = "time cannot pass; says why, and the way out")]
     fn lose_patience(&mut self) -> ! {
-        // What is dropped while it unwinds may ask again.
+        // A value that is dropped while it unwinds may ask again.
         self.calls = 0;
         panic!(
             "time stands still at {} s: a task asks for the time, sends or tries to receive again and again and never waits; `sleep(..).await` lets it pass",

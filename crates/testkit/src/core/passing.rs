@@ -16,7 +16,7 @@ const LONGEST: [usize; 2] = [65_507, 65_527];
 /// What a socket sends.
 #[derive(Clone, Debug)]
 pub(crate) struct Outgoing {
-    /// To whom; `None`: to the peer to which the socket is connected.
+    /// The receiver; `None`: the peer to which the socket is connected.
     pub(crate) to: Option<SocketAddr>,
     pub(crate) bytes: Bytes,
     pub(crate) ecn_capable: bool,

@@ -82,7 +82,7 @@ pub trait Node: Any {
 pub struct Packet {
     /// The sender: the address of a node, with the port that [`Transmit::from_port`] said.
     pub from: SocketAddr,
-    /// To whom: an address of the node that gets it.
+    /// The receiver: an address of the node that gets it.
     pub to: SocketAddr,
     /// What it carries. If the link damages packets, the damage is in it.
     pub bytes: Bytes,
@@ -100,7 +100,7 @@ impl Packet {
     /// The place of the node that sent it, from 0.
     #[must_use]
     pub fn from_place(&self) -> usize {
-        // What is handed to a node comes from one.
+        // A packet that is handed to a node comes from one.
         place_of(self.from.ip()).unwrap_or(usize::MAX)
     }
 }
@@ -108,7 +108,7 @@ impl Packet {
 /// A packet that a node sends.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Transmit {
-    /// To whom: see [`address()`]. What is sent to an address that no node has is [counted](NodeCounts::unroutable), and lost.
+    /// The receiver: see [`address()`]. A packet to an address that no node has is [counted](NodeCounts::unroutable), and lost.
     pub to: SocketAddr,
     /// The port from which it is sent. The receiver sees it; otherwise it means nothing.
     pub from_port: u16,

@@ -29,7 +29,7 @@ pub fn links_like(bounds: LinkBounds) -> Links {
     Links { bounds: checked(bounds) }
 }
 
-/// Any network of so many hosts: [`networks_like`] with [`LinkBounds::any`].
+/// Any network of that number of hosts: [`networks_like`] with [`LinkBounds::any`].
 ///
 /// # Panics
 ///
@@ -39,7 +39,7 @@ pub fn any_network(hosts: usize) -> Networks {
     networks_like(hosts, LinkBounds::any())
 }
 
-/// Networks of so many hosts whose links are within bounds, shrinking to the least impaired one that still fails. In a third each of all networks
+/// Networks of that number of hosts whose links are within bounds, shrinking to the least impaired one that still fails. In a third each of all networks
 /// about a quarter, half and all of the links are impaired.
 ///
 /// # Panics
@@ -76,7 +76,7 @@ pub struct Networks {
 
 #[cfg(feature = "scenes")]
 impl Networks {
-    /// Networks of so many hosts within bounds that were checked.
+    /// Networks of that number of hosts within bounds that were checked.
     pub(super) fn within(hosts: usize, bounds: &Arc<LinkBounds>) -> Self {
         Self { ideal: ImpairedNetwork::ideal(hosts), bounds: Arc::clone(bounds) }
     }

@@ -26,10 +26,10 @@
 //! 1. *Fewer links*: all links of the network to ideal ones at once, then the first half of them and the second, the halves of what could not go, and so on to
 //!    single links. By a link's number that is: the links of `a` first.
 //! 2. *Fewer stages*: the stages of all links that are left, in the same way, those of a link in the order of the words.
-//! 3. *Plainer stages*, link by link: reordering to its delay alone, then jitter to its delay, jitter without correlation, then without a
-//!    distribution; bursts to random loss that loses as much, else loss without correlation, chains with fewer probabilities that lose as much, four states to
-//!    two; corruption, duplication and reordering without correlation, reordering without gap; slots without distribution, of fixed length, without
-//!    limits.
+//! 3. *Plainer stages*, link by link. Reordering becomes its delay alone; jitter becomes its delay, jitter without correlation, or without a
+//!    distribution. Bursts become random loss that loses as much, else loss without correlation, chains with fewer probabilities that lose as much, or two
+//!    states in place of four. Corruption, duplication and reordering lose their correlation, reordering its gap. Slots lose their distribution, get a fixed
+//!    length, and lose their limits.
 //! 4. *Smaller numbers*, link by link: jitter, delay, loss, corruption, duplication, reordering, rate, limit, slots, each towards the end of its range
 //!    that impairs least: the upper end for rate and limit, the lower one for all others. That end comes first, then those of one significant digit by bisection,
 //!    then those of two; more digits only if the number drawn has more and none rounder fails. So it ends at `loss 3%`, `delay 11ms`, `rate 1500kbit`.

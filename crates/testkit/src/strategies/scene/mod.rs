@@ -112,7 +112,7 @@ pub fn any_scene() -> Scenes {
     scenes_like(2..=6, LinkBounds::any())
 }
 
-/// Scenes of so many peers with such links.
+/// Scenes of that number of peers with such links.
 ///
 /// # Panics
 ///

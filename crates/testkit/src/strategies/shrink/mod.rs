@@ -62,7 +62,7 @@ pub(super) struct Search<S: Space> {
     space: S,
     /// The least value that failed.
     best: S::Value,
-    /// What is being tried.
+    /// The candidate that is tried now.
     trial: Option<S::Value>,
     phase: Phase<S>,
     /// What passed.
