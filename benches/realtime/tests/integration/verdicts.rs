@@ -100,11 +100,11 @@ fn drift_is_found_and_lateness_is_none() {
 
 #[test]
 fn an_account_that_does_not_balance_is_found_at_any_look() {
-    breaks("what is counted", |outcome| outcome.accounts.push(account(5, 4, None)));
-    breaks("what is counted", |outcome| outcome.unbalanced.push((Duration::from_secs(60), account(5, 6, None))));
+    breaks("counts of one thing", |outcome| outcome.accounts.push(account(5, 4, None)));
+    breaks("counts of one thing", |outcome| outcome.unbalanced.push((Duration::from_secs(60), account(5, 6, None))));
     breaks_nothing(|outcome| outcome.accounts.push(account(5, 4, Some("not told"))));
     // To have counted nothing is not to have lost nothing.
-    breaks("what is counted", |outcome| outcome.accounts.clear());
+    breaks("counts of one thing", |outcome| outcome.accounts.clear());
     assert_eq!(account(5, 4, None).to_string(), "apples and pears: 5 ≠ 4");
 }
 

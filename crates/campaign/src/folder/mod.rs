@@ -18,7 +18,6 @@ use std::path::{Path, PathBuf};
 
 use crate::error::CampaignError;
 use crate::table::Format;
-use lock::Lock;
 
 pub(crate) use manifest::Manifest;
 
