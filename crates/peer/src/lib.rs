@@ -54,6 +54,7 @@
 //!     coupling: Gains { stiffness: 3500.0, damping: 5.0 },
 //!     tick,
 //!     compute_delay: false,
+//!     own_damping: 0.0,
 //!     enclosure: None,
 //! };
 //! // A copy at rest at 0, and another peer whose copy is 10 mm away.

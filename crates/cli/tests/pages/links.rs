@@ -29,7 +29,7 @@ fn place(page: &Path, target: &str) -> Option<(PathBuf, Option<String>)> {
     if path.is_empty() {
         return Some((page.to_owned(), anchor));
     }
-    let mut whole = page.parent().unwrap_or(Path::new("")).to_owned();
+    let mut whole = page.parent().unwrap_or_else(|| Path::new("")).to_owned();
     for part in Path::new(path).components() {
         if part == Component::ParentDir {
             whole.pop();

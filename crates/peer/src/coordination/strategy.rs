@@ -72,6 +72,7 @@ pub struct Command<const A: usize> {
 ///     coupling: Gains { stiffness: 3500.0, damping: 5.0 },
 ///     tick,
 ///     compute_delay: false,
+///     own_damping: 0.0,
 ///     enclosure: None,
 /// };
 /// // One other peer, whose copy begins 1 cm away.

@@ -20,7 +20,7 @@ fn all(command: &[String]) -> Vec<(String, Help)> {
     if help.parts.is_empty() {
         return vec![(command.join(" "), help)];
     }
-    help.parts.iter().flat_map(|part| all(&[command, &[part.clone()]].concat())).collect()
+    help.parts.iter().flat_map(|part| all(&[command, std::slice::from_ref(part)].concat())).collect()
 }
 
 fn row(entry: &Entry) -> Vec<String> {

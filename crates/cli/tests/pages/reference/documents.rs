@@ -312,7 +312,7 @@ const DOCUMENTS: [Document; 20] = [
                 "links[].asked_mean_delay_s, links[].changes",
                 "when the run began (`null` where only a recording knows); how often it was changed since",
             ),
-            ("links[].delivered_bytes, links[].overload, links[].undeliverable", "as in [the report](relay.md#what-is-dropped-and-by-whom)"),
+            ("links[].delivered_bytes, links[].overload, links[].undeliverable", "as in [the report](relay.md#dropped-datagrams)"),
             ("ports[].name, ports[].address, ports[].received, ports[].sent", "of a proxy: `listen`, and all `clients` together"),
             ("ports[].send_failures.NAME, ports[].oversized, ports[].receive_errors", "datagrams that were not sent or read; failures by reason"),
             ("ports[].receive_buffer_bytes, ports[].kernel_drops", "what the system granted; `null` if it does not tell"),

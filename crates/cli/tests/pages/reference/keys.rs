@@ -79,10 +79,12 @@ pub(super) fn pages() -> [(&'static str, String); 2] {
 
 /// How a table at the top of a file is written.
 fn head_of(key: &Key) -> String {
-    match &key.form {
-        Form::List(_) => format!("`[[{}]]`", key.name),
-        form if form.table().is_some_and(|table| table.others.is_some()) => format!("`[{}.NAME]`", key.name),
-        _ => format!("`[{}]`", key.name),
+    if matches!(key.form, Form::List(_)) {
+        format!("`[[{}]]`", key.name)
+    } else if key.form.table().is_some_and(|table| table.others.is_some()) {
+        format!("`[{}.NAME]`", key.name)
+    } else {
+        format!("`[{}]`", key.name)
     }
 }
 
