@@ -5,7 +5,7 @@
 
 use std::mem::discriminant;
 
-use cohaptic_peer::coordination::{BuiltIn, Law, Observation};
+use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor, Observation};
 use cohaptic_peer::tick::{forces, grasp, on_device, on_object};
 use cohaptic_peer::{Contact, Enclosure, Gains, HandForce, Motion, Plant, State, StepMap};
 use cohaptic_scene::Scene;
@@ -61,6 +61,57 @@ struct Block {
 struct Common {
     law: BuiltIn<Lanes>,
     object_map: StepMap<Lanes>,
+}
+
+/// A law of eight lanes, by its own type.
+trait LawOfLanes: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>> {}
+
+impl<L: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>> LawOfLanes for L {}
+
+/// A tick of all blocks.
+struct Step<'a, const A: usize, const L: usize> {
+    per_axis: usize,
+    blocks: &'a mut [Block],
+    object_map: &'a StepMap<Lanes>,
+    late: Option<&'a mut [Late]>,
+    walls: Option<&'a [Option<Enclosure>]>,
+}
+
+impl<const A: usize, const L: usize> LawVisitor<Lanes> for Step<'_, A, L> {
+    /// The largest distance between two copies of each run before they moved \[m\], and the sum of the sizes of everything that moved.
+    type Output = ([f64; L], Lanes);
+
+    #[inline(always)]
+    fn visit<W: LawOfLanes>(self, law: &W) -> ([f64; L], Lanes) {
+        let Self { per_axis, blocks, object_map, mut late, walls } = self;
+        let (mut discrepancy, mut size) = ([0.0; L], Lanes::ZERO);
+        for axis in 0..A {
+            let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
+            for place in axis * per_axis..(axis + 1) * per_axis {
+                let block = &mut blocks[place];
+                low = block.object.position.smaller(low);
+                high = block.object.position.larger(high);
+                if walls.is_none() && late.is_none() && block.contacts.is_none() {
+                    block.tick(law, object_map);
+                } else {
+                    let mut forces = block.forces(law);
+                    if let Some(walls) = walls {
+                        block.add_walls(walls, &mut forces.on_object);
+                    }
+                    if let Some(late) = &mut late {
+                        forces = late[place].exchange(forces);
+                    }
+                    block.advance(object_map, &forces);
+                }
+                size = size + block.size();
+            }
+            let distances = distances::<L>(low, high);
+            for run in 0..L {
+                discrepancy[run] = if distances[run] > discrepancy[run] { distances[run] } else { discrepancy[run] };
+            }
+        }
+        (discrepancy, size)
+    }
 }
 
 /// The forces of a tick on eight peers.
@@ -248,33 +299,10 @@ impl<const A: usize> Blocks<A> {
     /// Everybody computes forces and moves to the next tick.
     #[inline(always)]
     pub(super) fn advance<const L: usize>(&mut self) -> Moved<L> {
-        let (mut discrepancy, mut size) = ([0.0; L], Lanes::ZERO);
-        let per_axis = self.places.blocks();
-        for axis in 0..A {
-            let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
-            for place in axis * per_axis..(axis + 1) * per_axis {
-                let block = &mut self.blocks[place];
-                low = block.object.position.smaller(low);
-                high = block.object.position.larger(high);
-                if self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
-                    block.tick(&self.common);
-                } else {
-                    let mut forces = block.forces(&self.common.law);
-                    if let Some(walls) = &self.walls {
-                        block.add_walls(walls, &mut forces.on_object);
-                    }
-                    if let Some(late) = &mut self.late {
-                        forces = late[place].exchange(forces);
-                    }
-                    block.advance(&self.common.object_map, &forces);
-                }
-                size = size + block.size();
-            }
-            let distances = distances::<L>(low, high);
-            for run in 0..L {
-                discrepancy[run] = if distances[run] > discrepancy[run] { distances[run] } else { discrepancy[run] };
-            }
-        }
+        let Self { places, blocks, common, late, walls, .. } = self;
+        let step =
+            Step::<A, L> { per_axis: places.blocks(), blocks, object_map: &common.object_map, late: late.as_deref_mut(), walls: walls.as_deref() };
+        let (discrepancy, size) = common.law.visit(step);
         Moved { discrepancy, finite: self.finite(size) }
     }
 
@@ -316,7 +344,7 @@ fn distances<const L: usize>(mut low: Lanes, mut high: Lanes) -> [f64; L] {
 /// [`Block::tick`]. By references of their own the compiler knows that nothing that is written is read in another lane.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "each by a reference of its own")]
-fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool>(
+fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool, L: LawOfLanes>(
     devices: &mut Motions,
     objects: &mut Motions,
     (means, leads): (&Motions, &Lanes),
@@ -324,7 +352,7 @@ fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool>(
     hands: &Lanes,
     (coupling, grasps): (&Gains<Lanes>, &Mask),
     device_map: &StepMap<Lanes>,
-    common: &Common,
+    (law, object_map): (&L, &StepMap<Lanes>),
 ) {
     let remembered = memory.len() / WIDTH;
     for lane in 0..WIDTH {
@@ -333,7 +361,7 @@ fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool>(
         let touch = |apart| grasps.keep(lane, grasp(&gains, apart));
         let seen = Observation { own: object, mean: lane_of(means, lane), lead: leads.0[lane] };
         let memory = if REMEMBERS { &mut memory[lane * remembered..(lane + 1) * remembered] } else { &mut [] };
-        let law = common.law.map(|coefficient| coefficient.0[lane]);
+        let law = law.map(|coefficient| coefficient.0[lane]);
         let (coupling, on_object) = forces(device, touch, &seen, &law, memory);
         let map = device_map.map(|coefficient| coefficient.0[lane]);
         if TIED {
@@ -341,7 +369,7 @@ fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool>(
         } else {
             map.advance_free(&mut device, on_device(hands.0[lane], coupling));
         }
-        common.object_map.map(|coefficient| coefficient.0[lane]).advance_free(&mut object, on_object);
+        object_map.map(|coefficient| coefficient.0[lane]).advance_free(&mut object, on_object);
         set_lane(devices, lane, device);
         set_lane(objects, lane, object);
     }
@@ -385,20 +413,21 @@ impl Block {
 
     /// Forces and motion of a tick in one pass, where nothing but grasps and the law acts.
     #[inline(always)]
-    fn tick(&mut self, common: &Common) {
+    fn tick<L: LawOfLanes>(&mut self, law: &L, object_map: &StepMap<Lanes>) {
+        let common = (law, object_map);
         let Self { device, object, mean, lead, memory, hand, coupling, grasps, device_map, .. } = self;
         let (seen, touch) = ((&*mean, &*lead), (&*coupling, &*grasps));
         match (self.is_tied, memory.is_empty()) {
-            (true, true) => tick_of_lanes::<true, false>(device, object, seen, memory, hand, touch, device_map, common),
-            (false, true) => tick_of_lanes::<false, false>(device, object, seen, memory, hand, touch, device_map, common),
-            (true, false) => tick_of_lanes::<true, true>(device, object, seen, memory, hand, touch, device_map, common),
-            (false, false) => tick_of_lanes::<false, true>(device, object, seen, memory, hand, touch, device_map, common),
+            (true, true) => tick_of_lanes::<true, false, L>(device, object, seen, memory, hand, touch, device_map, common),
+            (false, true) => tick_of_lanes::<false, false, L>(device, object, seen, memory, hand, touch, device_map, common),
+            (true, false) => tick_of_lanes::<true, true, L>(device, object, seen, memory, hand, touch, device_map, common),
+            (false, false) => tick_of_lanes::<false, true, L>(device, object, seen, memory, hand, touch, device_map, common),
         }
     }
 
     /// The forces of a tick without walls.
     #[inline(always)]
-    fn forces(&mut self, law: &BuiltIn<Lanes>) -> Forces {
+    fn forces<L: LawOfLanes>(&mut self, law: &L) -> Forces {
         let mut coupling = Lanes::ZERO;
         for lane in 0..WIDTH {
             coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), self.apart(lane));

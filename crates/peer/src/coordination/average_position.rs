@@ -2,7 +2,7 @@
 //!
 //! Over an ideal network the difference modes of N copies have the stiffness N/(N−1)·KT (Rakhsha & Constantinescu 2015, equation 6): bounded in N.
 
-use super::{Law, LawKind, LawParameters, Observation};
+use super::{Coefficients, Law, LawKind, LawParameters, Observation};
 use crate::tick::coordinate;
 use crate::{Gains, Number};
 
@@ -19,9 +19,12 @@ impl LawKind for AveragePosition {
     }
 }
 
-impl<C: Copy> AveragePosition<C> {
+impl<C: Copy> Coefficients for AveragePosition<C> {
+    type Coefficient = C;
+    type Of<D: Copy> = AveragePosition<D>;
+
     #[inline(always)]
-    pub(super) fn map<D>(&self, coefficient: impl FnMut(&C) -> D) -> AveragePosition<D> {
+    fn map<D: Copy>(&self, coefficient: impl FnMut(&C) -> D) -> AveragePosition<D> {
         AveragePosition { gains: self.gains.map(coefficient) }
     }
 }

@@ -3,7 +3,7 @@
 //! The dead reckoning of distributed simulation (IEEE 1278.1, first order): x̂ⱼ = xⱼ + min(age, horizon)·vⱼ, and FT = KT·(x − mean x̂ⱼ) + BT·(v − mean vⱼ).
 //! Copies that move alike at one velocity then exert no force on each other, however old the samples are.
 
-use super::{Law, LawForm, LawKind, LawParameter, LawParameters, Observation};
+use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, Observation};
 use crate::tick::coordinate;
 use crate::{Gains, Motion, Number};
 
@@ -29,9 +29,12 @@ impl LawKind for Extrapolated {
     }
 }
 
-impl<C: Copy> Extrapolated<C> {
+impl<C: Copy> Coefficients for Extrapolated<C> {
+    type Coefficient = C;
+    type Of<D: Copy> = Extrapolated<D>;
+
     #[inline(always)]
-    pub(super) fn map<D>(&self, coefficient: impl FnMut(&C) -> D) -> Extrapolated<D> {
+    fn map<D: Copy>(&self, coefficient: impl FnMut(&C) -> D) -> Extrapolated<D> {
         Extrapolated { gains: self.gains.map(coefficient), horizon: self.horizon }
     }
 }

@@ -49,6 +49,27 @@ pub trait Law<N: Number> {
     }
 }
 
+/// The coefficients of a law, in any type: of one peer, of eight lanes, of a linear form.
+pub trait Coefficients {
+    /// The type of a coefficient.
+    type Coefficient;
+    /// The law with coefficients of another type.
+    type Of<D: Copy>;
+
+    /// The law with each coefficient replaced by what `coefficient` makes of it, always in one order.
+    fn map<D: Copy>(&self, coefficient: impl FnMut(&Self::Coefficient) -> D) -> Self::Of<D>;
+}
+
+/// Something that is done with a law, whichever of the registry it is. The compiler makes code for each law, so that a loop within does not choose
+/// between laws at every turn: eight lanes take half the time.
+pub trait LawVisitor<C> {
+    /// What comes out.
+    type Output;
+
+    /// Does it.
+    fn visit<L: Coefficients<Coefficient = C, Of<f64>: Law<f64>>>(self, law: &L) -> Self::Output;
+}
+
 /// What the registry knows of a law.
 pub(super) trait LawKind {
     /// How it pulls towards the others.

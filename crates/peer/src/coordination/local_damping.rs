@@ -4,7 +4,7 @@
 //! whose far end is a sample held for m ticks does at most KT·(m + 1)·Tc times the square of the velocity of the copy as work; a β of that size takes it
 //! away, so the network injects no energy. The price is felt in free motion.
 
-use super::{Law, LawForm, LawKind, LawParameter, LawParameters, LawValue, Observation, UsedGains};
+use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, LawValue, Observation, UsedGains};
 use crate::tick::coordinate;
 use crate::{Gains, Number};
 
@@ -48,9 +48,12 @@ impl LawKind for LocalDamping {
     }
 }
 
-impl<C: Copy> LocalDamping<C> {
+impl<C: Copy> Coefficients for LocalDamping<C> {
+    type Coefficient = C;
+    type Of<D: Copy> = LocalDamping<D>;
+
     #[inline(always)]
-    pub(super) fn map<D>(&self, coefficient: impl FnMut(&C) -> D) -> LocalDamping<D> {
+    fn map<D: Copy>(&self, coefficient: impl FnMut(&C) -> D) -> LocalDamping<D> {
         LocalDamping { gains: self.gains.map(coefficient), damping: self.damping }
     }
 }

@@ -17,7 +17,7 @@ mod strategy;
 pub use average_position::AveragePosition;
 pub use extrapolated::Extrapolated;
 use law::LawKind;
-pub use law::{Law, LawForm, LawParameter, LawParameters, LawValue, LawValues, Observation, Pull, UsedGains};
+pub use law::{Coefficients, Law, LawForm, LawParameter, LawParameters, LawValue, LawValues, LawVisitor, Observation, Pull, UsedGains};
 pub use law_strategy::LawStrategy;
 pub use local_damping::LocalDamping;
 pub use proportional_derivative::ProportionalDerivative;

@@ -2,7 +2,7 @@
 //!
 //! Over an ideal network the difference modes of N copies have the stiffness N·KT (Rakhsha & Constantinescu 2015, equation 3): it grows with N.
 
-use super::{Law, LawKind, LawParameters, Observation, Pull};
+use super::{Coefficients, Law, LawKind, LawParameters, Observation, Pull};
 use crate::{Gains, Number};
 
 /// The conventional law.
@@ -24,9 +24,12 @@ impl LawKind for ProportionalDerivative {
     }
 }
 
-impl<C: Copy> ProportionalDerivative<C> {
+impl<C: Copy> Coefficients for ProportionalDerivative<C> {
+    type Coefficient = C;
+    type Of<D: Copy> = ProportionalDerivative<D>;
+
     #[inline(always)]
-    pub(super) fn map<D>(&self, coefficient: impl FnMut(&C) -> D) -> ProportionalDerivative<D> {
+    fn map<D: Copy>(&self, coefficient: impl FnMut(&C) -> D) -> ProportionalDerivative<D> {
         ProportionalDerivative { summed: self.summed.map(coefficient) }
     }
 }

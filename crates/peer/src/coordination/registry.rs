@@ -4,8 +4,8 @@ use core::time::Duration;
 
 use super::law::LawKind as _;
 use super::{
-    AveragePosition, Extrapolated, Law, LawParameter, LawParameters, LawStrategy, LawValues, LocalDamping, Observation, ProportionalDerivative, Pull,
-    SmoothedAveragePosition, UsedGains,
+    AveragePosition, Coefficients as _, Extrapolated, Law, LawParameter, LawParameters, LawStrategy, LawValues, LawVisitor, LocalDamping,
+    Observation, ProportionalDerivative, Pull, SmoothedAveragePosition, UsedGains,
 };
 use crate::{Gains, Motion, Number};
 
@@ -86,9 +86,17 @@ macro_rules! registry {
             /// The law with each coefficient replaced by what `coefficient` makes of it, always in one order.
             #[must_use]
             #[inline(always)]
-            pub fn map<D>(&self, coefficient: impl FnMut(&C) -> D) -> BuiltIn<D> {
+            pub fn map<D: Copy>(&self, coefficient: impl FnMut(&C) -> D) -> BuiltIn<D> {
                 match self {
                     $(Self::$law(law) => BuiltIn::$law(law.map(coefficient)),)+
+                }
+            }
+
+            /// Does something with the law by its own type.
+            #[inline(always)]
+            pub fn visit<V: LawVisitor<C>>(&self, visitor: V) -> V::Output {
+                match self {
+                    $(Self::$law(law) => visitor.visit(law),)+
                 }
             }
         }

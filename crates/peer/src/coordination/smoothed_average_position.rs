@@ -3,7 +3,7 @@
 //! FT of [`AveragePosition`](super::AveragePosition) through the low-pass filter lag·dFT/dt + FT = F, exact for an F that is held over a tick:
 //! FT(k) = a·FT(k − 1) + (1 − a)·F(k) with a = e^(−Tc/lag).
 
-use super::{Law, LawForm, LawKind, LawParameter, LawParameters, Observation};
+use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, Observation};
 use crate::tick::coordinate;
 use crate::{Gains, Number};
 
@@ -33,9 +33,12 @@ impl LawKind for SmoothedAveragePosition {
     }
 }
 
-impl<C: Copy> SmoothedAveragePosition<C> {
+impl<C: Copy> Coefficients for SmoothedAveragePosition<C> {
+    type Coefficient = C;
+    type Of<D: Copy> = SmoothedAveragePosition<D>;
+
     #[inline(always)]
-    pub(super) fn map<D>(&self, mut coefficient: impl FnMut(&C) -> D) -> SmoothedAveragePosition<D> {
+    fn map<D: Copy>(&self, mut coefficient: impl FnMut(&C) -> D) -> SmoothedAveragePosition<D> {
         SmoothedAveragePosition { gains: self.gains.map(&mut coefficient), kept: coefficient(&self.kept), taken: coefficient(&self.taken) }
     }
 }
