@@ -1,8 +1,8 @@
 //! A spring towards the mean of the others, and a damper that ties each copy to ground.
 //!
-//! Local damping injection in passive set-point control (Lee & Huang 2010, without its set-points): FT = KT·(x − mean xⱼ), and the copy has the damping bO + β. A spring
-//! whose far end is a sample held for m ticks does at most KT·(m + 1)·Tc times the square of the velocity of the copy as work; a β of that size takes it
-//! away, so the network injects no energy. The price is felt in free motion.
+//! Local damping injection as in Lee & Huang (2010), without their set-points: FT = KT·(x − mean xⱼ), and the copy has the damping bO + β. Where no sample
+//! in use is older than m ticks, the springs inject at most the sum of KT·(m + 1)·d² over all ticks, with d the motion of a copy in a tick. A damper takes
+//! at least β·d²/Tc, so with β = KT·(m + 1)·Tc the network injects no energy. The damping is felt in free motion.
 
 use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, LawValue, Observation, UsedGains};
 use crate::tick::coordinate;
