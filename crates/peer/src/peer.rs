@@ -93,6 +93,8 @@ pub struct Forces<const A: usize> {
     pub coupling: [f64; A],
     /// FT, the coordination force, which acts on the copy with the opposite sign \[N\].
     pub coordination: [f64; A],
+    /// The part of FT that is held over a tick \[N\]: all but what [`PeerConfig::own_damping`] adds.
+    pub commanded: [f64; A],
     /// Where the strategy wants the copy to be.
     pub target: State<A>,
 }
@@ -292,7 +294,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         }
         let damped = self.config.own_damping > 0.0;
         let recorded = |axis: usize| if damped { command.force[axis] + self.config.own_damping * own.velocity[axis] } else { command.force[axis] };
-        Forces { coupling, coordination: core::array::from_fn(recorded), target: command.target }
+        Forces { coupling, coordination: core::array::from_fn(recorded), commanded: command.force, target: command.target }
     }
 
     /// Step 4: moves to the next tick, `span` after `now`.
@@ -358,6 +360,18 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     #[must_use]
     pub const fn computed(&self) -> &Acting<A> {
         &self.computed
+    }
+
+    /// The forces that act over the tick that begins now, as of the latest [`Peer::compute`].
+    #[must_use]
+    pub const fn applied(&self) -> &Acting<A> {
+        &self.applied
+    }
+
+    /// Whether forces are applied one tick after they were computed.
+    #[must_use]
+    pub const fn compute_delay(&self) -> bool {
+        self.config.compute_delay
     }
 
     /// Replaces the forces computed at the latest tick.

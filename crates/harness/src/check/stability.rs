@@ -85,7 +85,7 @@ fn follow<const A: usize>(
     scene: &Scene,
     mut keep_going: impl FnMut() -> bool,
 ) -> Stability {
-    let nothing = Watch { ticks: false, packets: false };
+    let nothing = Watch::NOTHING;
     let duration = scene.duration.as_nanos();
     let quarter = |now: Instant| 4 * u128::from(now.as_nanos()) / duration;
     let initial = relative_displacement(&nominal, &disturbed);
