@@ -61,7 +61,7 @@ pub trait Coefficients {
 }
 
 /// Something that is done with a law, whichever of the registry it is. The compiler makes code for each law, so that a loop within does not choose
-/// between laws at every turn: eight lanes take half the time.
+/// between laws at every turn.
 pub trait LawVisitor<C> {
     /// What comes out.
     type Output;
