@@ -194,6 +194,8 @@ impl Draft {
         let name = self.strategy.name();
         let value = |place: usize| match self.settings.of(self.strategy).get(place) {
             LawValue::Automatic => "\"auto\"".to_owned(),
+            LawValue::Word(word) => format!("{:?}", self.strategy.parameters()[place].form.word(word)),
+            LawValue::Place(peer) => format!("{:?}", self.peers[peer].name),
             LawValue::Duration(duration) => format!("\"{}ns\"", duration.as_nanos()),
             LawValue::Number(number) => format!("{number:?}"),
         };
