@@ -23,6 +23,7 @@ mod jumps;
 mod local_damping;
 mod paper;
 mod regions;
+mod send_when;
 mod settling;
 mod stiffness;
 
