@@ -131,7 +131,7 @@ impl<const A: usize> Sample<A> {
     ///
     /// # Errors
     ///
-    /// [`DecodeError`] for anything but a sample of this version with that many axes and finite numbers. Never panics.
+    /// [`DecodeError`] for anything but a sample of this version with this number of axes and finite numbers. Never panics.
     #[inline]
     pub fn decode(datagram: &[u8], axes: usize) -> Result<Self, DecodeError> {
         let Some((header, body)) = datagram.split_first_chunk::<HEADER_LEN>() else {
