@@ -28,13 +28,21 @@ const OTHERS: &str = "## Written by other commands";
 
 /// Pages that need a quiet machine and privileges: what they say, and what writes them.
 const ALONE: [(&str, &str, &str); 3] = [
-    ("measured-relay.md", "how late the relay and how fast", "cargo run --release -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md"),
+    (
+        "measured-relay.md",
+        "how late the relay and how fast",
+        "cargo run --release -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md",
+    ),
     (
         "measured-live.md",
         "how late the ticks of a live session, and what they cost",
         "cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md",
     ),
-    ("measured-soak.md", "an hour of both: memory, drift, lateness", "cargo run --release -p cohaptic-benches-realtime --bin soak -- 1h --out docs/measured-soak.md"),
+    (
+        "measured-soak.md",
+        "an hour of both: memory, drift, lateness",
+        "cargo run --release -p cohaptic-benches-realtime --bin soak -- 1h --out docs/measured-soak.md",
+    ),
 ];
 
 /// The page.

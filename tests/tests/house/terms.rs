@@ -59,7 +59,8 @@ fn first(text: &str, word: &str) -> Option<usize> {
     let is_part = |letter: char| letter.is_alphanumeric() || ['_', '/', '#', '-', '.', '·'].contains(&letter);
     text.match_indices(word).map(|(place, _)| place).find(|&place| {
         let behind = &text[place + word.len()..];
-        let is_alone = !text[..place].ends_with(is_part) && !behind.starts_with(|letter: char| letter.is_alphanumeric() || letter == '_' || letter == '-');
+        let is_alone =
+            !text[..place].ends_with(is_part) && !behind.starts_with(|letter: char| letter.is_alphanumeric() || letter == '_' || letter == '-');
         let in_address = text[..place].rfind(['(', ')']).is_some_and(|bracket| text[..=bracket].ends_with("]("));
         is_alone && !in_address
     })
