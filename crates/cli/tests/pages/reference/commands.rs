@@ -52,7 +52,7 @@ pub(super) fn page() -> String {
     page += &list(&shared);
     for (name, help) in &all {
         let usage: Vec<String> = help.usage.iter().map(|line| format!("`{line}`")).collect();
-        let _ = write!(page, "## {name}\n\n{}: {}.\n\n", help.about, usage.join(", "));
+        let _ = write!(page, "## {name}\n\n{}. {}\n\n", help.about, usage.join(", "));
         let (common, own): (Vec<&Entry>, Vec<&Entry>) = help.entries.iter().partition(|entry| shared.contains(entry));
         page += &list(&own);
         if !common.is_empty() {
