@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use cohaptic_harness::run_side_by_side;
+use cohaptic_harness::measures::{MeasuredValue, Measures};
+use cohaptic_harness::{Model, Summary, run_side_by_side};
 use cohaptic_scene::Scene;
 
 use crate::campaign::Watch;
@@ -94,12 +95,17 @@ impl Work<'_> {
     fn rows(&self, chunk: Chunk, known: &Scenes) -> Result<Vec<Row>, CampaignError> {
         let runs = chunk.start..chunk.end;
         let scenes = runs.clone().map(|run| self.scene(run, known)).collect::<Result<Vec<Scene>, CampaignError>>()?;
-        let summaries = run_side_by_side(&scenes);
-        let rows = runs.zip(scenes.iter().zip(&summaries)).map(|(run, (scene, summary))| {
+        let outcomes: Vec<(Summary, Vec<MeasuredValue>)> = if scenes.iter().all(|scene| scene.measure.is_none()) {
+            run_side_by_side(&scenes).into_iter().map(|summary| (summary, Vec::new())).collect()
+        } else {
+            // Scenes with measures are watched, one run after the other.
+            scenes.iter().map(|scene| Measures::run(scene, Model::Least)).collect()
+        };
+        let rows = runs.zip(scenes.iter().zip(&outcomes)).map(|(run, (scene, (summary, measured)))| {
             let combination = run / self.plan.runs_of_each();
             let place = RunId { run, combination, seed: scene.seed };
             let judgement = usize::try_from(combination).ok().and_then(|place| self.judgements.get(place));
-            row(place, self.plan.values(combination), judgement, summary, self.roster)
+            row(place, self.plan.values(combination), judgement, (summary, measured), self.roster)
         });
         let rows = rows.collect();
         self.watch.ran(chunk.end - chunk.start);

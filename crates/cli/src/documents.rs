@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::{AccessSummary, Ending, LinkSummary, PeerSummary};
 #[cfg(target_os = "linux")]
 use cohaptic_realtime::LatenessSummary;
 use cohaptic_scene::Scene;
 use cohaptic_wan::{DropCause, LinkStats};
 use serde::Serialize;
+use serde_json::{Map, Value};
 
 use crate::document_schema::document;
 
@@ -78,6 +80,12 @@ fn counters(stats: &LinkStats) -> impl Serialize + use<> {
         damaged: stats.damaged(),
         mean_delay_s: stats.mean_delay().map(|delay| delay.as_secs_f64()),
     }
+}
+
+/// The measures of a run by their names; `None` if nothing is measured.
+pub(crate) fn measures_of(scene: &Scene, measured: &[MeasuredValue]) -> Option<impl Serialize + use<>> {
+    let named: Map<String, Value> = measured.iter().map(|measured| (measured.name.text(scene), Value::from(measured.value))).collect();
+    (!named.is_empty()).then(|| document! { measures: named })
 }
 
 /// How late things were, in microseconds.

@@ -31,6 +31,7 @@ mod interrupt;
 mod link;
 #[cfg(target_os = "linux")]
 mod live;
+mod measures;
 mod output;
 mod paper;
 mod progress;

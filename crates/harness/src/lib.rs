@@ -33,6 +33,7 @@ mod datagrams;
 mod disturbance;
 pub mod explain;
 pub mod live;
+pub mod measures;
 mod observer;
 mod plan;
 pub mod record;
@@ -43,7 +44,7 @@ mod world;
 
 pub use arrays::{run_side_by_side, same_shape};
 pub use cohaptic_scene::{FromScene, Strategies};
-pub use observer::{NoObserver, Observer, PacketRow, StateRow, TickRow};
+pub use observer::{HoldRow, InstantRow, NoObserver, Observer, PacketRow, SendRow, StateRow, StepRow, TickRow};
 pub use plan::Model;
 pub use simulation::{MOST_PEERS, Simulation, too_large};
 pub use summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};

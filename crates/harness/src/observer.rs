@@ -1,6 +1,6 @@
 //! The observer of a run.
 
-use cohaptic_units::Instant;
+use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{PacketRecord, Path};
 
 use crate::live::InputRow;
@@ -57,6 +57,26 @@ pub trait Observer {
         false
     }
 
+    /// Whether [`Observer::on_step`] is to be called. Asked once, at the start.
+    fn wants_steps(&self) -> bool {
+        false
+    }
+
+    /// Whether [`Observer::on_instant`] is to be called. Asked once, at the start.
+    fn wants_instants(&self) -> bool {
+        false
+    }
+
+    /// Whether [`Observer::on_send`] is to be called. Asked once, at the start.
+    fn wants_sends(&self) -> bool {
+        false
+    }
+
+    /// Whether [`Observer::on_hold`] is to be called. Asked once, at the start.
+    fn wants_holds(&self) -> bool {
+        false
+    }
+
     /// A peer has computed its forces at a tick.
     ///
     /// # Errors
@@ -72,6 +92,42 @@ pub trait Observer {
     ///
     /// Ends the run.
     fn on_packet(&mut self, _row: &PacketRow) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// A peer has moved from a tick to its next one.
+    ///
+    /// # Errors
+    ///
+    /// Ends the run.
+    fn on_step(&mut self, _row: &StepRow<'_>) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// All peers that tick at an instant have ticked.
+    ///
+    /// # Errors
+    ///
+    /// Ends the run.
+    fn on_instant(&mut self, _row: &InstantRow) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// A peer has sent a sample.
+    ///
+    /// # Errors
+    ///
+    /// Ends the run.
+    fn on_send(&mut self, _row: &SendRow) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// A peer holds a newer sample of another one, from its next tick on, which may be at this instant.
+    ///
+    /// # Errors
+    ///
+    /// Ends the run.
+    fn on_hold(&mut self, _row: &HoldRow) -> Result<(), Self::Error> {
         Ok(())
     }
 
@@ -118,6 +174,60 @@ pub struct TickRow<'a> {
     pub coordination_force: &'a [f64],
 }
 
+/// One peer over one step of its copy, from a tick to the next one of this peer. Slices have as many entries as the scene has axes.
+///
+/// Of a client of a server, which has no copy, it is the step of the device, and F is the coupling force that the server returns or the client computes.
+#[derive(Clone, Copy, Debug)]
+pub struct StepRow<'a> {
+    /// The instant of the tick at which the step begins.
+    pub at: Instant,
+    /// The peer.
+    pub peer: usize,
+    /// Its copy of the object at the beginning of the step.
+    pub before: StateRow<'a>,
+    /// Its copy of the object at the end of the step.
+    pub after: StateRow<'a>,
+    /// The sum of all forces that are held on the copy over the step \[N\]: FC − F and the walls. Damping is no held force.
+    pub held_force: &'a [f64],
+    /// F \[N\], the held part of the coordination force as it is applied, which acts on the copy with the opposite sign: all of FT but the damping of the strategy.
+    pub coordination_force: &'a [f64],
+}
+
+/// An instant at which at least one peer has ticked.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct InstantRow {
+    /// The instant.
+    pub at: Instant,
+    /// The largest distance along an axis between two copies of the object at their latest ticks \[m\].
+    pub discrepancy: f64,
+}
+
+/// One sample that a peer sends.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SendRow {
+    /// The instant.
+    pub at: Instant,
+    /// The sender.
+    pub peer: usize,
+    /// The packets that are offered to the network, each with the sample.
+    pub packets: u64,
+    /// The size of each packet.
+    pub size: Bytes,
+}
+
+/// One sample that a peer holds from now on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct HoldRow {
+    /// The instant at which it was taken in: that of a tick of some peer, at or after the arrival.
+    pub at: Instant,
+    /// The sender.
+    pub from: usize,
+    /// The peer that holds it.
+    pub to: usize,
+    /// The instant at which it was sampled, and sent.
+    pub sampled: Instant,
+}
+
 /// What became of one packet between two peers, whose places are those of the nodes, or of one copy of it.
 pub type PacketRow = PacketRecord<Path>;
 
@@ -129,8 +239,131 @@ impl Observer for NoObserver {
     type Error = std::convert::Infallible;
 }
 
-/// Two observers side by side; the first sees everything first, and either can end the run.
-impl<A: Observer, B: Observer<Error = A::Error>> Observer for (A, B) {
+/// All of an observer but its error, by an observer in a field.
+macro_rules! observe_by_field {
+    ($field:ident) => {
+        fn wants_ticks(&self) -> bool {
+            $crate::Observer::wants_ticks(&self.$field)
+        }
+
+        fn wants_packets(&self) -> bool {
+            $crate::Observer::wants_packets(&self.$field)
+        }
+
+        fn wants_steps(&self) -> bool {
+            $crate::Observer::wants_steps(&self.$field)
+        }
+
+        fn wants_instants(&self) -> bool {
+            $crate::Observer::wants_instants(&self.$field)
+        }
+
+        fn wants_sends(&self) -> bool {
+            $crate::Observer::wants_sends(&self.$field)
+        }
+
+        fn wants_holds(&self) -> bool {
+            $crate::Observer::wants_holds(&self.$field)
+        }
+
+        fn on_tick(&mut self, row: &$crate::TickRow<'_>) -> Result<(), Self::Error> {
+            $crate::Observer::on_tick(&mut self.$field, row)
+        }
+
+        fn on_packet(&mut self, row: &$crate::PacketRow) -> Result<(), Self::Error> {
+            $crate::Observer::on_packet(&mut self.$field, row)
+        }
+
+        fn on_step(&mut self, row: &$crate::StepRow<'_>) -> Result<(), Self::Error> {
+            $crate::Observer::on_step(&mut self.$field, row)
+        }
+
+        fn on_instant(&mut self, row: &$crate::InstantRow) -> Result<(), Self::Error> {
+            $crate::Observer::on_instant(&mut self.$field, row)
+        }
+
+        fn on_send(&mut self, row: &$crate::SendRow) -> Result<(), Self::Error> {
+            $crate::Observer::on_send(&mut self.$field, row)
+        }
+
+        fn on_hold(&mut self, row: &$crate::HoldRow) -> Result<(), Self::Error> {
+            $crate::Observer::on_hold(&mut self.$field, row)
+        }
+
+        fn on_input(&mut self, row: &$crate::live::InputRow<'_>) -> Result<(), Self::Error> {
+            $crate::Observer::on_input(&mut self.$field, row)
+        }
+
+        fn keep_going(&mut self, now: cohaptic_units::Instant) -> bool {
+            $crate::Observer::keep_going(&mut self.$field, now)
+        }
+    };
+}
+pub(crate) use observe_by_field;
+
+/// An observer that may be missing.
+impl<O: Observer> Observer for Option<O> {
+    type Error = O::Error;
+
+    fn wants_ticks(&self) -> bool {
+        self.as_ref().is_some_and(O::wants_ticks)
+    }
+
+    fn wants_packets(&self) -> bool {
+        self.as_ref().is_some_and(O::wants_packets)
+    }
+
+    fn wants_steps(&self) -> bool {
+        self.as_ref().is_some_and(O::wants_steps)
+    }
+
+    fn wants_instants(&self) -> bool {
+        self.as_ref().is_some_and(O::wants_instants)
+    }
+
+    fn wants_sends(&self) -> bool {
+        self.as_ref().is_some_and(O::wants_sends)
+    }
+
+    fn wants_holds(&self) -> bool {
+        self.as_ref().is_some_and(O::wants_holds)
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), O::Error> {
+        self.as_mut().map_or(Ok(()), |observer| observer.on_tick(row))
+    }
+
+    fn on_packet(&mut self, row: &PacketRow) -> Result<(), O::Error> {
+        self.as_mut().map_or(Ok(()), |observer| observer.on_packet(row))
+    }
+
+    fn on_step(&mut self, row: &StepRow<'_>) -> Result<(), O::Error> {
+        self.as_mut().map_or(Ok(()), |observer| observer.on_step(row))
+    }
+
+    fn on_instant(&mut self, row: &InstantRow) -> Result<(), O::Error> {
+        self.as_mut().map_or(Ok(()), |observer| observer.on_instant(row))
+    }
+
+    fn on_send(&mut self, row: &SendRow) -> Result<(), O::Error> {
+        self.as_mut().map_or(Ok(()), |observer| observer.on_send(row))
+    }
+
+    fn on_hold(&mut self, row: &HoldRow) -> Result<(), O::Error> {
+        self.as_mut().map_or(Ok(()), |observer| observer.on_hold(row))
+    }
+
+    fn on_input(&mut self, row: &InputRow<'_>) -> Result<(), O::Error> {
+        self.as_mut().map_or(Ok(()), |observer| observer.on_input(row))
+    }
+
+    fn keep_going(&mut self, now: Instant) -> bool {
+        self.as_mut().is_none_or(|observer| observer.keep_going(now))
+    }
+}
+
+/// Two observers side by side; the first sees everything first, and either can end the run. Errors of the second become those of the first.
+impl<A: Observer<Error: From<B::Error>>, B: Observer> Observer for (A, B) {
     type Error = A::Error;
 
     fn wants_ticks(&self) -> bool {
@@ -141,19 +374,55 @@ impl<A: Observer, B: Observer<Error = A::Error>> Observer for (A, B) {
         self.0.wants_packets() || self.1.wants_packets()
     }
 
+    fn wants_steps(&self) -> bool {
+        self.0.wants_steps() || self.1.wants_steps()
+    }
+
+    fn wants_instants(&self) -> bool {
+        self.0.wants_instants() || self.1.wants_instants()
+    }
+
+    fn wants_sends(&self) -> bool {
+        self.0.wants_sends() || self.1.wants_sends()
+    }
+
+    fn wants_holds(&self) -> bool {
+        self.0.wants_holds() || self.1.wants_holds()
+    }
+
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Self::Error> {
         self.0.on_tick(row)?;
-        self.1.on_tick(row)
+        Ok(self.1.on_tick(row)?)
+    }
+
+    fn on_step(&mut self, row: &StepRow<'_>) -> Result<(), Self::Error> {
+        self.0.on_step(row)?;
+        Ok(self.1.on_step(row)?)
+    }
+
+    fn on_instant(&mut self, row: &InstantRow) -> Result<(), Self::Error> {
+        self.0.on_instant(row)?;
+        Ok(self.1.on_instant(row)?)
+    }
+
+    fn on_send(&mut self, row: &SendRow) -> Result<(), Self::Error> {
+        self.0.on_send(row)?;
+        Ok(self.1.on_send(row)?)
+    }
+
+    fn on_hold(&mut self, row: &HoldRow) -> Result<(), Self::Error> {
+        self.0.on_hold(row)?;
+        Ok(self.1.on_hold(row)?)
     }
 
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), Self::Error> {
         self.0.on_packet(row)?;
-        self.1.on_packet(row)
+        Ok(self.1.on_packet(row)?)
     }
 
     fn on_input(&mut self, row: &InputRow<'_>) -> Result<(), Self::Error> {
         self.0.on_input(row)?;
-        self.1.on_input(row)
+        Ok(self.1.on_input(row)?)
     }
 
     fn keep_going(&mut self, now: Instant) -> bool {

@@ -85,7 +85,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
 
     /// The shape of the scene, if it needs no events and nobody watches.
     fn arrays(&self, plan: &Plan, watch: Watch) -> Option<(Shape, BuiltIn)> {
-        let is_unseen = watch == Watch { ticks: false, packets: false } && self.disturbance.is_none() && self.model == Model::Least;
+        let is_unseen = watch == Watch::NOTHING && self.disturbance.is_none() && self.model == Model::Least;
         if is_unseen { Shape::of(self.scene, plan, &self.strategies) } else { None }
     }
 

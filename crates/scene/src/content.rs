@@ -25,7 +25,7 @@ impl Scene {
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct SceneContent {
     /// Each value as TOML, by its dotted path: `link.delay` is `"24ms"`. Entries of lists are called as in overrides; `peers` and `modulators`, whose order
-    /// counts, have their names besides. Title and expectations, which change nothing that happens, are left out.
+    /// counts, have their names besides. Title, measures and expectations, which change nothing that happens, are left out.
     pub keys: BTreeMap<String, String>,
     /// What each file holds, by its path relative to the folder of the scene.
     pub files: BTreeMap<String, Fingerprint>,
@@ -49,7 +49,8 @@ pub fn scene_content_of_text(text: &str, file: &Path, overrides: &[String]) -> R
     let Parsed { document, files, .. } = parse_scene(Sources { file, text, overrides }, true, &mut |_, _, _| ())?;
     let mut keys = BTreeMap::new();
     collect(&document, "", &mut keys);
-    keys.retain(|key, _| key != "scene.title" && key != "expect" && !key.starts_with("expect."));
+    let is_of = |key: &str, table: &str| key.strip_prefix(table).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+    keys.retain(|key, _| key != "scene.title" && !is_of(key, "expect") && !is_of(key, "measure"));
     let folder = file.parent().unwrap_or_else(|| Path::new(""));
     let name = |path: PathBuf| path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
     Ok(SceneContent { keys, files: files.into_iter().map(|(path, bytes)| (name(path), bytes)).collect() })
@@ -103,7 +104,7 @@ mod tests {
         coordination = { strategy = \"average-position\", stiffness = 1.0, damping = 1.0, update = \"1ms\" }\n\
         peer = { device = { mass = 1.0, damping = 1.0 }, coupling = { stiffness = 1.0, damping = 1.0 } }\n\
         peers = [{ name = \"left\", contact = \"none\", hand = { file = \"hand.csv\" } }, { name = \"right\" }]\nlink = { delay = \"24ms\" }\n\
-        timeline = [{ at = \"0.5s\", link = \"all\", set = { loss = 0.5 } }]\n[expect]\nstable = true\n";
+        timeline = [{ at = \"0.5s\", link = \"all\", set = { loss = 0.5 } }]\n[measure]\nband = 0.002\n[expect]\nstable = true\n";
 
     fn desk() -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();
@@ -123,7 +124,7 @@ mod tests {
         assert_eq!(value("peers.left.contact"), Some("\"none\""));
         assert_eq!(value("peers.right.device.mass"), Some("2"));
         assert_eq!(value("timeline.0.set.loss"), Some("0.5"));
-        assert_eq!((value("scene.title"), value("expect.stable")), (None, None));
+        assert_eq!((value("scene.title"), value("measure.band"), value("expect.stable")), (None, None, None));
         assert_eq!(content.files, BTreeMap::from([("hand.csv".to_owned(), Fingerprint::of("t,fx\n0,1\n"))]));
     }
 

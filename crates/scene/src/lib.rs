@@ -34,6 +34,7 @@ mod assembly;
 mod content;
 mod context;
 mod link_keys;
+mod measures;
 mod model;
 mod oldest_sample;
 mod quantities;
@@ -41,12 +42,14 @@ mod read;
 pub mod schema;
 mod sections;
 mod strategies;
+mod strategy_limits;
 #[cfg(test)]
 mod tests;
 
 pub use cohaptic_linkfile::{Diagnostic, FileError as SceneError, Fingerprint, KeysOfLinks, LinkChange, LinkKeys, LinkSelector, LinkTable};
 pub use content::{SceneContent, scene_content, scene_content_of_text};
 pub use link_keys::{link_key_changes_of_text, link_keys, link_keys_of_text};
+pub use measures::{Measure, MeasureName, Scope};
 pub use model::*;
 pub use read::{at_peer, scene_files};
 pub use strategies::{FromScene, Strategies};

@@ -11,8 +11,10 @@ use cohaptic_wan::{DropCause, LinkModel};
 
 use cohaptic_linkfile::{LinkChange, LinkSelector, LinkTable};
 
+use crate::measures::MeasureName;
+
 /// A scene, ready to be run. Every number in it has been checked; every peer it names exists.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq)]
 pub struct Scene {
     /// The file it was read from, for messages; empty for a text.
     pub file: PathBuf,
@@ -36,8 +38,71 @@ pub struct Scene {
     pub links: LinkTable,
     /// Changes while the scene runs, in order of time; equal instants in the order of the file.
     pub timeline: Vec<Change>,
+    /// What a run is summed up by, if anything is measured.
+    pub measure: Option<MeasureSpec>,
     /// What must come out, if the scene is a test.
     pub expect: Option<Expect>,
+}
+
+impl fmt::Debug for Scene {
+    /// Measures are shown only where there are any: fingerprints of records are made of this text.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, title, duration, seed, axes, object, coordination, integrator, peers, links, timeline, measure, expect } = self;
+        let mut shown = f.debug_struct("Scene");
+        shown.field("file", file).field("title", title).field("duration", duration).field("seed", seed).field("axes", axes);
+        shown.field("object", object).field("coordination", coordination).field("integrator", integrator).field("peers", peers);
+        shown.field("links", links).field("timeline", timeline).field("expect", expect);
+        if let Some(measure) = measure {
+            shown.field("measure", measure);
+        }
+        shown.finish()
+    }
+}
+
+impl Scene {
+    /// The settings of measures: those of `[measure]`, or the usual ones.
+    #[must_use]
+    pub fn measure_settings(&self) -> MeasureSettings {
+        self.measure.as_ref().map(|measure| measure.settings.clone()).unwrap_or_default()
+    }
+}
+
+/// What a run is summed up by.
+#[derive(Clone, PartialEq, Debug)]
+pub struct MeasureSpec {
+    /// The measures, at least one, in their order and each once.
+    pub names: Vec<MeasureName>,
+    /// What they are about.
+    pub settings: MeasureSettings,
+}
+
+/// What measures are about.
+#[derive(Clone, PartialEq, Debug)]
+pub struct MeasureSettings {
+    /// Of [`Measure::Travel`](crate::Measure::Travel).
+    pub travel: MeasureTravel,
+    /// The discrepancy at which [`Measure::Settling`](crate::Measure::Settling) is not settled yet is above this \[m\]; above zero.
+    pub band: f64,
+    /// The peer whose hand meets the impedance, by its place in [`Scene::peers`]: one that pushes with the same sine all the time.
+    pub probe: Option<usize>,
+}
+
+impl Default for MeasureSettings {
+    /// The first peer's copy along x over 20 mm, a band of 1 mm, no probe.
+    fn default() -> Self {
+        Self { travel: MeasureTravel { peer: 0, axis: 0, distance: 0.02 }, band: 0.001, probe: None }
+    }
+}
+
+/// A distance that a copy travels.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct MeasureTravel {
+    /// The peer whose copy is meant, by its place in [`Scene::peers`].
+    pub peer: usize,
+    /// 0 for x, 1 for y, 2 for z.
+    pub axis: usize,
+    /// The distance from where the copy began, either way \[m\]; above zero.
+    pub distance: f64,
 }
 
 /// How many translational axes a scene has.
@@ -273,7 +338,7 @@ pub enum ChangeKind {
 }
 
 /// What must come out of a run for `cohaptic check` to pass. Absent entries are not looked at.
-#[derive(Clone, PartialEq, Debug, Default)]
+#[derive(Clone, PartialEq, Default)]
 pub struct Expect {
     /// Whether a small disturbance of the relative motion dies out (`true`) or grows (`false`).
     pub stable: Option<bool>,
@@ -287,6 +352,22 @@ pub struct Expect {
     pub loss: Vec<ExpectLoss>,
     /// The mean delay of the packets that links delivered.
     pub delay: Vec<ExpectDelay>,
+    /// The values of measures.
+    pub measures: Vec<ExpectMeasure>,
+}
+
+impl fmt::Debug for Expect {
+    /// Measures are shown only where there are any: fingerprints of records are made of this text.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { stable, discrepancy, positions, travel, loss, delay, measures } = self;
+        let mut shown = f.debug_struct("Expect");
+        shown.field("stable", stable).field("discrepancy", discrepancy).field("positions", positions).field("travel", travel);
+        shown.field("loss", loss).field("delay", delay);
+        if !measures.is_empty() {
+            shown.field("measures", measures);
+        }
+        shown.finish()
+    }
 }
 
 /// A closed interval; at least one end is given.
@@ -343,6 +424,15 @@ pub struct ExpectLoss {
     pub min: Option<Probability>,
     /// See `min`.
     pub max: Option<Probability>,
+}
+
+/// An expected value of a measure.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ExpectMeasure {
+    /// The measure.
+    pub name: MeasureName,
+    /// Its value, in its unit. A measure without a value is not within.
+    pub bounds: Bounds,
 }
 
 /// An expected mean delay.

@@ -13,8 +13,8 @@ use cohaptic_units::Instant;
 use crate::context::SceneContext;
 use crate::model::Scene;
 use crate::sections::{
-    Header, PeerSources, check_enough, read_coordination, read_expect, read_header, read_integrator, read_names, read_object, read_peers,
-    read_timeline,
+    Header, Measured, PeerSources, check_enough, read_coordination, read_expect, read_header, read_integrator, read_measure, read_names, read_object,
+    read_peers, read_timeline,
 };
 
 impl Scene {
@@ -92,7 +92,7 @@ pub(crate) fn parse_scene(sources: Sources<'_>, live: bool, on_links: OnLinks<'_
 /// Reads every part, also after one that was refused, so that the first fault in the order of the text is found.
 fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLinks<'_>) -> Option<Scene> {
     let mut root = TableReader::new(document, file, "a table")?;
-    root.know(&["scene", "object", "coordination", "simulation", "peer", "peers", "modulators", "link", "links", "timeline", "expect"]);
+    root.know(&["scene", "object", "coordination", "simulation", "peer", "peers", "modulators", "link", "links", "timeline", "measure", "expect"]);
     let header_node = root.get("scene");
     let header = root.required("scene", "a table [scene] with a duration", read_header).unwrap_or_default();
     let Header { title, duration, seed, axes, count } = header;
@@ -122,8 +122,15 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     let timeline_node = root.get("timeline");
     let gains = coordination.as_ref().map(|coordination| coordination.gains);
     let timeline = read_timeline(timeline_node, duration, links.as_ref(), peers.as_deref(), gains, on_links, context);
+    let of = Measured { peers: peers.as_deref(), timeline: timeline.as_deref() };
+    let measure = match root.get("measure") {
+        Some(node) => read_measure(node, of, context).map(Some),
+        None => Some(None),
+    };
+    // A probe that was refused is a fault already.
+    let has_probe = measure.as_ref().is_none_or(|measure| measure.as_ref().is_some_and(|measure| measure.settings.probe.is_some()));
     let expect = match root.get("expect") {
-        Some(node) => read_expect(node, duration, peers.as_deref(), context).map(Some),
+        Some(node) => read_expect(node, duration, has_probe, peers.as_deref(), context).map(Some),
         None => Some(None),
     };
     root.finish();
@@ -142,9 +149,10 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         peers: peers?,
         links: links.as_ref().and_then(LinkClasses::table)?,
         timeline: timeline?,
+        measure: measure?,
         expect: expect?,
     };
-    if let Some(refused) = scene.refused_automatic() {
+    if let Some(refused) = scene.refused_automatic().map(str::to_owned).or_else(|| scene.refused_strategy()) {
         file.fault_at(coordination_node.unwrap_or(document), refused);
         return None;
     }

@@ -96,7 +96,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "[object]",
             "[objekt]",
-            "3:2: objekt: unknown key: expected one of scene, object, coordination, simulation, peer, peers, modulators, link, links, timeline, expect; did you mean \"object\"?",
+            "3:2: objekt: unknown key: expected one of scene, object, coordination, simulation, peer, peers, modulators, link, links, timeline, measure, expect; did you mean \"object\"?",
         ),
         ("duration = \"7s\"", "duration = \"7s\"\nspeed = 1", "3:1: scene.speed: unknown key: expected one of title, duration, seed, axes, count"),
         ("mass = 0.45", "mass = 0.45\nmas = 1", "5:1: object.mas: unknown key"),
@@ -378,6 +378,62 @@ fn a_change_that_cannot_happen_is_refused() {
     check(&format!("{with_arm}{change}\"none\" }}"), "22:16: timeline.0.set.hand: an arm cannot appear, vanish or change");
     parse(&format!("{with_arm}{change}{} }}", arm.replace("1 } }", "1 }, follows = { position = 0.1 } }")), &[])
         .unwrap_or_else(|error| panic!("{error}"));
+}
+
+#[test]
+fn a_measure_of_what_does_not_exist_is_refused() {
+    check_added(&[
+        ("[measure]\nnames = [\"energy\"]", "19:10: measure.names.0: unknown measure \"energy\": expected one of discrepancy_rms_m, "),
+        ("[measure]\nnames = \"most\"", "19:9: measure.names: found \"most\": expected \"all\" or a list of names"),
+        ("[measure]\nnames = []", "19:9: measure.names: no name is given: expected \"all\" or a list of names"),
+        ("[measure]\nnames = [1]", "19:10: measure.names.0: found the number 1: expected the name of a measure"),
+        ("[measure]\nnames = [\"peers.nobody.energy_j\"]", "19:10: measure.names.0: there is no peer \"nobody\": expected one of left, right"),
+        ("[measure]\nnames = [\"peers.left.travel_s\"]", "19:10: measure.names.0: unknown measure \"peers.left.travel_s\": expected one of"),
+        (
+            "[measure]\nnames = [\"viscosity_n_s_m\"]",
+            "19:10: measure.names.0: viscosity_n_s_m is that of a probe, and there is none: expected measure.probe = { peer",
+        ),
+        ("[measure]\ntravel = { peer = \"nobody\" }", "19:19: measure.travel.peer: there is no peer \"nobody\": expected one of left, right"),
+        ("[measure]\ntravel = { axis = \"y\" }", "19:19: measure.travel.axis: the text \"y\" is beyond the axes of this scene: expected x"),
+        ("[measure]\ntravel = { distance = 0 }", "19:23: measure.travel.distance: 0 is out of range: expected a number above 0"),
+        ("[measure]\nband = 0", "19:8: measure.band: 0 is out of range: expected a number above 0"),
+        (
+            "[measure]\nprobe = { peer = \"left\" }",
+            "19:18: measure.probe.peer: the hand of peer \"left\" is not a sine: expected a peer with hand = { sine",
+        ),
+        ("[expect]\nmeasures = [{ name = \"energy\", max = 1 }]", "19:22: expect.measures.0.name: unknown measure \"energy\": expected one of"),
+        ("[expect]\nmeasures = [{ name = \"energy_j\" }]", "19:13: expect.measures.0: neither min nor max is given"),
+        (
+            "[expect]\nmeasures = [{ name = \"effective_mass_kg\", max = 1 }]",
+            "19:22: expect.measures.0.name: effective_mass_kg is that of a probe, and there is none",
+        ),
+    ]);
+}
+
+#[test]
+fn a_probe_pushes_with_one_sine_all_the_time() {
+    let scene = |frequency: &str, more: &str| {
+        let hand = format!("name = \"left\"\nhand = {{ sine = {{ amplitude = 1, frequency = {frequency} }} }}");
+        format!("{}[measure]\nprobe = {{ peer = \"left\" }}\n{more}", SCENE.replacen("name = \"left\"", &hand, 1))
+    };
+    let measured = parse(&scene("2", ""), &[]).unwrap().measure.unwrap();
+    assert_eq!((measured.settings.probe, measured.names.len()), (Some(0), crate::MeasureName::all(2).len()));
+    check(&scene("0", ""), "20:18: measure.probe.peer: the hand of peer \"left\" is a sine that does not sway");
+    let change = "[[timeline]]\nat = \"1s\"\npeer = \"left\"\nset = { hand = \"none\" }\n";
+    check(&scene("2", change), "20:18: measure.probe.peer: the hand of peer \"left\" changes in the timeline");
+    let live = Scene::parse_live(
+        &scene("2", "").replacen("amplitude = 1, frequency = 2 } }", "amplitude = 1, frequency = 2 } }\nkind = \"falcon\"", 1),
+        Path::new("x.toml"),
+        &[],
+    );
+    assert!(live.unwrap_err().to_string().contains("peer \"left\" is of kind falcon, whose hand is not simulated in a session"));
+}
+
+#[test]
+fn what_is_measured_has_no_part_in_the_fingerprint_of_a_scene_without_it() {
+    let text = format!("{:?}", parse(SCENE, &[]).unwrap());
+    assert!(!text.contains("measure"), "{text}");
+    assert!(text.starts_with("Scene { file: \"x.toml\", title: ") && text.ends_with(", timeline: [], expect: None }"), "{text}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Measure, Scene, Scope};
 use cohaptic_wan::DropCause;
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +41,7 @@ pub(crate) fn columns(variations: &[Variation], verdicts: bool, roster: &Roster)
     if roster.access_lines {
         counters("access", &mut columns);
     }
+    columns.extend(roster.measures().map(|(_, _, name)| column(name, Kind::Number, true)));
     columns
 }
 
@@ -67,6 +68,9 @@ pub(crate) struct Roster {
     pub(crate) fewest_axes: usize,
     /// Whether any run has a line that a peer sends or receives through.
     pub(crate) access_lines: bool,
+    /// The names of all measures of any run.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub(crate) measures: BTreeSet<String>,
 }
 
 impl Roster {
@@ -74,7 +78,20 @@ impl Roster {
         let peers: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
         let axes = scene.axes.count();
         let access_lines = scene.peers.iter().any(|peer| peer.uplink.is_some() || peer.downlink.is_some());
-        Self { always: peers.len(), peers, axes, fewest_axes: axes, access_lines }
+        let measures = scene.measure.iter().flat_map(|measure| &measure.names).map(|name| name.text(scene)).collect();
+        Self { always: peers.len(), peers, axes, fewest_axes: axes, access_lines, measures }
+    }
+
+    /// The measures in the order of their columns: which one, the place of its peer in the roster, and its name.
+    pub(crate) fn measures(&self) -> impl Iterator<Item = (Measure, Option<usize>, String)> {
+        let of = |measure: Measure| -> Vec<(Option<usize>, String)> {
+            match measure.scope() {
+                Scope::Run => vec![(None, measure.name().to_owned())],
+                Scope::Peer => self.peers.iter().enumerate().map(|(place, peer)| (Some(place), measure.of_peer(peer))).collect(),
+            }
+        };
+        let all = Measure::ALL.iter().flat_map(move |measure| of(*measure).into_iter().map(|(peer, name)| (*measure, peer, name)));
+        all.filter(|(_, _, name)| self.measures.contains(name))
     }
 
     /// Takes in what another run has.
@@ -89,6 +106,7 @@ impl Roster {
         self.axes = self.axes.max(other.axes);
         self.fewest_axes = self.fewest_axes.min(other.fewest_axes);
         self.access_lines |= other.access_lines;
+        self.measures.extend(other.measures.iter().cloned());
     }
 }
 
@@ -98,7 +116,7 @@ mod tests {
 
     fn roster(peers: &[&str], axes: usize) -> Roster {
         let peers: Vec<String> = peers.iter().map(|name| (*name).to_owned()).collect();
-        Roster { always: peers.len(), peers, axes, fewest_axes: axes, access_lines: false }
+        Roster { always: peers.len(), peers, axes, fewest_axes: axes, access_lines: false, measures: BTreeSet::new() }
     }
 
     #[test]

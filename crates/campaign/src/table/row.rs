@@ -1,8 +1,11 @@
 //! What a run comes to, as a row.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use cohaptic_harness::{Ending, PeerSummary, Summary};
+use cohaptic_harness::measures::MeasuredValue;
+use cohaptic_harness::{Ending, Summary};
+use cohaptic_scene::MeasureName;
 use cohaptic_units::Instant;
 use cohaptic_wan::{DropCause, LinkStats};
 
@@ -23,7 +26,7 @@ pub(crate) fn row<'a>(
     place: RunId,
     varied: impl Iterator<Item = &'a Varied>,
     judgement: Option<&Judgement>,
-    summary: &Summary,
+    (summary, measured): (&Summary, &[MeasuredValue]),
     roster: &Roster,
 ) -> Row {
     let mut row = vec![integer(place.run), integer(place.combination), integer(place.seed)];
@@ -44,7 +47,7 @@ pub(crate) fn row<'a>(
     row.push(integer(summary.ticks));
     row.push(Value::Number(summary.max_discrepancy));
     for (place, name) in roster.peers.iter().enumerate() {
-        let peer = peer(summary, place, name);
+        let peer = place_of(summary, place, name).map(|place| &summary.peers[place]);
         for quantity in [peer.map(|peer| &peer.position), peer.map(|peer| &peer.velocity)] {
             let component = |axis| quantity.and_then(|components| components.get(axis)).map_or(Value::Absent, |value| Value::Number(*value));
             row.extend((0..roster.axes).map(component));
@@ -56,13 +59,23 @@ pub(crate) fn row<'a>(
     if roster.access_lines {
         counters(&mut row, summary.access_lines.iter().map(|line| &line.stats));
     }
+    let measured: BTreeMap<MeasureName, Option<f64>> = measured.iter().map(|measured| (measured.name, measured.value)).collect();
+    row.extend(roster.measures().map(|(measure, peer, _)| {
+        let peer = peer.map(|place| place_of(summary, place, &roster.peers[place]));
+        let value = match peer {
+            // A peer that this run does not have.
+            Some(None) => None,
+            peer => measured.get(&MeasureName { measure, peer: peer.flatten() }).copied().flatten(),
+        };
+        value.map_or(Value::Absent, Value::Number)
+    }));
     row
 }
 
-/// The peer of that name: nearly always the one in its place.
-fn peer<'a>(summary: &'a Summary, place: usize, name: &str) -> Option<&'a PeerSummary> {
-    let here = summary.peers.get(place).filter(|peer| peer.name == name);
-    here.or_else(|| summary.peers.iter().find(|peer| peer.name == name))
+/// The place of the peer of that name: nearly always that one.
+fn place_of(summary: &Summary, place: usize, name: &str) -> Option<usize> {
+    let here = summary.peers.get(place).is_some_and(|peer| peer.name == name);
+    if here { Some(place) } else { summary.peers.iter().position(|peer| peer.name == name) }
 }
 
 fn counters<'a>(row: &mut Row, stats: impl Iterator<Item = &'a LinkStats> + Clone) {

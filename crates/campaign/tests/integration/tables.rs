@@ -4,6 +4,7 @@ use std::fs::File;
 use std::path::Path;
 
 use cohaptic_campaign::Format;
+use cohaptic_harness::measures::Measures;
 use cohaptic_harness::{Ending, Model, NoObserver, Simulation};
 use cohaptic_scene::Scene;
 use cohaptic_wan::DropCause;
@@ -64,6 +65,9 @@ fn alone(cells: &[(String, String)], set: &[String], text: &str) {
     for cause in DropCause::ALL {
         expected.push((format!("links.dropped_{}", cause.name().replace('-', "_")), sum(&|stats| stats.dropped(cause))));
     }
+    for measured in Measures::run(&scene, Model::Least).1 {
+        expected.push((measured.name.text(&scene), measured.value.map_or_else(String::new, |value| format!("{value:?}"))));
+    }
     for (name, value) in expected {
         assert_eq!(cell(&name), value, "{name} of {overrides:?}");
     }
@@ -77,7 +81,7 @@ fn named(header: &[String], row: &[String]) -> Vec<(String, String)> {
 fn every_run_is_the_run_alone_to_the_last_bit() {
     let mut bench = Bench::new(&VARY, 5);
     bench.format = Format::Csv;
-    bench.set = vec!["link.duplicate=10%".to_owned()];
+    bench.set = vec!["link.duplicate=10%".to_owned(), "measure.names=[\"age_p99_s\", \"peers.right.energy_j\"]".to_owned()];
     let report = bench.finish("out", 2);
     assert_eq!((report.runs, report.computed, report.combinations.len()), (20, 20, 4));
     let (header, rows) = comma_separated(&bench.path("out/runs.csv"));
@@ -88,9 +92,11 @@ fn every_run_is_the_run_alone_to_the_last_bit() {
         let (stiffness, loss) = (["500.0", "1500.0"][combination / 2], ["0.0", "40.0"][combination % 2]);
         let expected = [number.to_string(), combination.to_string(), seed.to_string(), stiffness.to_owned(), loss.to_owned()];
         assert_eq!(row[..5], expected, "the last key varies fastest, and seeds count up in each combination");
-        let set = [bench.set[0].clone(), format!("coordination.stiffness={stiffness}"), format!("link.loss={loss}%")];
+        let mut set = bench.set.clone();
+        set.extend([format!("coordination.stiffness={stiffness}"), format!("link.loss={loss}%")]);
         alone(&named(&header, row), &set, SCENE);
     }
+    assert_eq!(header[header.len() - 2..], ["peers.right.energy_j", "age_p99_s"], "measures come last, in their order");
     let lost = |row: &Vec<String>| row[header.iter().position(|name| name == "links.dropped_loss").unwrap()].parse::<u64>().unwrap();
     assert!(rows.iter().any(|row| lost(row) > 0), "the network does something");
     // The report is the table summed up.
@@ -113,8 +119,14 @@ fn both_formats_hold_the_same_also_of_what_diverges_and_of_who_is_missing() {
         ["scene.count=2,4,3", "scene.axes=2", "coordination.strategy=average-position,proportional-derivative", "coordination.stiffness=100,1e12"];
     let mut bench = Bench::new(&vary, 2);
     bench.text = text.clone();
-    bench.set =
-        ["scene.duration=2s", "peers.peer2.uplink={ delay = \"1ms\" }", "peers.peer1.hand={ force = [1.0, 0.5] }"].map(str::to_owned).to_vec();
+    bench.set = [
+        "scene.duration=2s",
+        "peers.peer2.uplink={ delay = \"1ms\" }",
+        "peers.peer1.hand={ sine = { amplitude = [1.0, 0.5], frequency = 2.0 } }",
+        "measure={ names = \"all\", probe = { peer = \"peer1\" } }",
+    ]
+    .map(str::to_owned)
+    .to_vec();
     bench.part = Some(5);
     let report = bench.finish("parquet", 2);
     let (header, rows) = parquet(&bench.path("parquet/runs.parquet"));
@@ -128,6 +140,9 @@ fn both_formats_hold_the_same_also_of_what_diverges_and_of_who_is_missing() {
         let count: usize = cell(row, "scene.count").parse().unwrap();
         for peer in 1..=4 {
             assert_eq!(cell(row, &format!("peers.peer{peer}.position_y_m")).is_empty(), peer > count);
+            let is_measured = cell(row, "ending") == "complete" && peer <= count;
+            assert!(!is_measured || !cell(row, &format!("peers.peer{peer}.energy_j")).is_empty());
+            assert!(peer <= count || cell(row, &format!("peers.peer{peer}.energy_j")).is_empty());
         }
         assert!(cell(row, "access.offered").parse::<u64>().unwrap() > 0);
         let stiffness = cell(row, "coordination.stiffness");

@@ -21,6 +21,8 @@ pub(crate) struct RunArguments {
     /// --against coordination.strategy=proportional-derivative
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) against: Vec<String>,
+    #[command(flatten)]
+    pub(crate) measure: MeasureArguments,
     /// Write trajectory.csv, packets.csv, links.csv, plots (SVG) and run.html, a page of it all, into this folder; the second run goes into its folder against
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -81,6 +83,8 @@ pub(crate) struct CampaignArguments {
     /// How many runs there are of each combination: with the seed of the scene, with the next one, and so on
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 1)]
     pub(crate) runs: u64,
+    #[command(flatten)]
+    pub(crate) measure: MeasureArguments,
     /// The folder of the campaign: the table, and until that is there the parts. The same command goes on from there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
@@ -101,6 +105,28 @@ pub(crate) struct CampaignArguments {
     pub(crate) no_plot: bool,
     #[command(flatten)]
     pub(crate) pictures: PictureArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MeasureArguments {
+    /// Measure all, or the measures with these names: --measure energy_j,travel_s. In place of the key measure.names; docs/scenes.md lists them
+    #[arg(long, value_name = "all|NAMES")]
+    measure: Option<String>,
+}
+
+impl MeasureArguments {
+    /// As it was given.
+    pub(crate) fn word(&self) -> Option<&str> {
+        self.measure.as_deref()
+    }
+
+    /// As an override of the scene.
+    pub(crate) fn override_text(&self) -> Option<String> {
+        let names = self.measure.as_deref()?.trim();
+        let name = |name: &str| serde_json::Value::from(name.trim()).to_string();
+        let value = if names == "all" { name(names) } else { format!("[{}]", names.split(',').map(name).collect::<Vec<_>>().join(", ")) };
+        Some(format!("measure.names={value}"))
+    }
 }
 
 /// As what a table is written.

@@ -69,15 +69,16 @@ fn plan(arguments: &CampaignArguments) -> Result<CampaignPlan, Failure> {
     let refused = |error: CampaignError| failure(error, arguments);
     let variations =
         arguments.vary.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<Variation>, _>>().map_err(|error| refused(error.into()))?;
-    let (file, set) = (&arguments.scene.scene, &arguments.scene.overrides.set);
+    let set: Vec<String> = arguments.scene.overrides.set.iter().cloned().chain(arguments.measure.override_text()).collect();
+    let file = &arguments.scene.scene;
     let (text, file) = (input::text(file)?, input::named(file));
     let format = match arguments.format {
         TableFormat::Parquet => Format::Parquet,
         TableFormat::Csv => Format::Csv,
     };
     let part = arguments.part.map(NonZeroU64::get);
-    let plan =
-        CampaignPlan::new(PlanSpec { text: &text, file, set, variations, runs: arguments.runs, format, part, program: PROGRAM }).map_err(refused)?;
+    let plan = CampaignPlan::new(PlanSpec { text: &text, file, set: &set, variations, runs: arguments.runs, format, part, program: PROGRAM })
+        .map_err(refused)?;
     Ok(if arguments.verdicts { plan.with_verdicts() } else { plan })
 }
 

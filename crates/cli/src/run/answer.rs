@@ -9,7 +9,8 @@ use serde::Serialize;
 
 use super::Run;
 use crate::document_schema::document;
-use crate::documents::{access_line, ending_name, peer, peer_link};
+use crate::documents::{access_line, ending_name, measures_of, peer, peer_link};
+use crate::measures::measured_lines;
 use crate::{output, terminal_plot};
 
 /// The answer of `cohaptic run --json`. `otherwise`: the differences of the scene from that of the session that is replayed. `against`: the document of the
@@ -28,6 +29,8 @@ pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option
         links: summary.links.iter().map(|link| peer_link(scene, link)).collect::<Vec<_>>(),
         access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
         max_discrepancy_m: summary.max_discrepancy,
+        #[serde(flatten)]
+        measures: measures_of(scene, &run.measured),
         files: run.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
         #[serde(flatten)]
         otherwise: (!otherwise.is_empty()).then(|| document! { replayed_otherwise: otherwise }),
@@ -63,6 +66,7 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
         line(format!("  ... and {}", Counted(summary.peers.len() - MOST_PEERS, "more peer")));
     }
     line(format!("  {}", packets(summary)));
+    measured_lines(scene, &run.measured).into_iter().for_each(|measured| line(format!("  {measured}")));
     text
 }
 

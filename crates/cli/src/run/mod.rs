@@ -11,6 +11,7 @@ use std::time::Instant as Clock;
 
 use cohaptic_harness::check::ExpectationWatch;
 use cohaptic_harness::live::{Inputs, replay};
+use cohaptic_harness::measures::{MeasuredValue, Measures};
 use cohaptic_harness::record::{Bands, RecordError, Recorder};
 use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow};
 use cohaptic_scene::Scene;
@@ -74,15 +75,17 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     Ok(if interrupt::requested() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-/// The overrides of the scene: all `--set`, and then the seed.
+/// The overrides of the scene: all `--set`, then the seed and the measures.
 fn overrides(arguments: &RunArguments) -> Vec<String> {
     let seed = arguments.seed.map(|seed| format!("scene.seed={seed}"));
-    arguments.scene.overrides.set.iter().cloned().chain(seed).collect()
+    arguments.scene.overrides.set.iter().cloned().chain(seed).chain(arguments.measure.override_text()).collect()
 }
 
 /// A run and what it left behind.
 struct Run {
     summary: Summary,
+    /// Empty if nothing is measured.
+    measured: Vec<MeasuredValue>,
     wall_s: f64,
     positions: Option<Bands>,
     files: Vec<PathBuf>,
@@ -102,28 +105,38 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
     let mut watch = Watch {
         progress: Progress::through_scene(&scene.title, scene.duration),
         positions: shown.then(|| Bands::new(scene.duration, PLOT_SPANS, scene.peers.len())),
-        expectations: paged.then(|| ExpectationWatch::new(scene)),
     };
     let start = Clock::now();
-    let (summary, files) = match out.as_deref() {
-        None => (execute(arguments, scene, what, &mut &mut watch)?, Vec::new()),
-        Some(folder) => {
-            let mut observer = (Recorder::create(folder, scene)?.sized(arguments.pictures.size()), &mut watch);
+    let measures = Measures::of(scene);
+    let values = |measures: Option<Measures>, summary: &Summary| measures.map(|measures| measures.values(summary.duration)).unwrap_or_default();
+    let (summary, measured, files) = match out.as_deref() {
+        None => {
+            let mut observer = (&mut watch, measures);
             let summary = execute(arguments, scene, what, &mut observer)?;
-            let (mut files, pictures) = observer.0.finish_with_pictures(&summary)?;
-            if let Some(expectations) = &watch.expectations {
+            let measured = values(observer.1, &summary);
+            (summary, measured, Vec::new())
+        }
+        Some(folder) => {
+            let recorder = Recorder::create(folder, scene)?.sized(arguments.pictures.size());
+            let expectations = paged.then(|| ExpectationWatch::new(scene));
+            let mut observer = ((recorder, &mut watch), (measures, expectations));
+            let summary = execute(arguments, scene, what, &mut observer)?;
+            let ((recorder, _), (measures, expectations)) = observer;
+            let measured = values(measures, &summary);
+            let (mut files, pictures) = recorder.finish_with_pictures(&summary)?;
+            if let Some(expectations) = expectations {
                 let outcomes = expectations.outcomes(&summary);
-                let page = page::html(arguments, scene, overrides, &summary, &outcomes, &pictures)?;
+                let page = page::html(arguments, scene, overrides, (&summary, &measured), &outcomes, &pictures)?;
                 let file = folder.join("run.html");
                 write_file(&file, page)?;
                 files.push(file);
             }
-            (summary, files)
+            (summary, measured, files)
         }
     };
     let wall_s = start.elapsed().as_secs_f64();
     watch.progress.clear();
-    Ok(Run { summary, wall_s, positions: watch.positions, files })
+    Ok(Run { summary, measured, wall_s, positions: watch.positions, files })
 }
 
 fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>, observer: &mut O) -> Result<Summary, O::Error> {
@@ -137,26 +150,21 @@ fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>,
 const PLOT_SPANS: usize = 144;
 
 /// Shows progress, collects what the terminal shows, and ends the run when the user asks for it.
-struct Watch<'a> {
+struct Watch {
     progress: Progress,
     positions: Option<Bands>,
-    /// For the page.
-    expectations: Option<ExpectationWatch<'a>>,
 }
 
-impl Observer for &mut Watch<'_> {
+impl Observer for &mut Watch {
     type Error = RecordError;
 
     fn wants_ticks(&self) -> bool {
-        self.positions.is_some() || self.expectations.as_ref().is_some_and(ExpectationWatch::wants_ticks)
+        self.positions.is_some()
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
         if let Some(positions) = &mut self.positions {
             positions.add(row.peer, row.at, row.object.position[0]);
-        }
-        if let Some(expectations) = &mut self.expectations {
-            expectations.on_tick(row);
         }
         Ok(())
     }
@@ -177,6 +185,7 @@ fn command_line(arguments: &RunArguments) -> String {
     words.extend(arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key))));
     words.extend(arguments.seed.map(|seed| format!("--seed {seed}")));
     words.extend(arguments.against.iter().map(|key| format!("--against {}", quoted(key))));
+    words.extend(arguments.measure.word().map(|names| format!("--measure {}", quoted(names))));
     words.extend(arguments.inputs.as_deref().map(|file| format!("--inputs {}", path(file))));
     words.extend(arguments.force.then(|| "--force".to_owned()));
     words.extend(arguments.general.then(|| "--general".to_owned()));

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use cohaptic_harness::check::Outcome;
+use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::record::SANE_POSITION;
 use cohaptic_harness::{Ending, Summary};
 use cohaptic_picture::page::{Html, Page, Table};
 use cohaptic_scene::{Scene, scene_content_of_text};
-use cohaptic_units::print::{Counted, Span};
+use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::{DropCause, LinkName, LinkStats};
 
 use super::answer::{length, packets};
@@ -15,6 +16,7 @@ use super::command_line;
 use crate::arguments::RunArguments;
 use crate::expectations::{BARS, OutcomeDocument, columns};
 use crate::failure::Failure;
+use crate::output::six_digits;
 use crate::{input, output};
 
 /// More rows of a table stand in a file of the folder only.
@@ -25,7 +27,7 @@ pub(super) fn html(
     arguments: &RunArguments,
     scene: &Scene,
     overrides: &[String],
-    summary: &Summary,
+    (summary, measured): (&Summary, &[MeasuredValue]),
     outcomes: &[Outcome],
     pictures: &[(&'static str, String)],
 ) -> Result<String, Failure> {
@@ -34,7 +36,7 @@ pub(super) fn html(
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
     let mut page = Page::new(scene.title.as_str()).with(ending(scene, summary)).with(Html::facts(facts(arguments, scene, overrides, summary)));
     page = page.with(Html::heading(2, "Made by")).with(Html::preformatted(&command_line(arguments)));
-    page = page.with(expectations(scene, outcomes)).with(Html::heading(2, "Pictures"));
+    page = page.with(expectations(scene, outcomes)).with(measures(scene, measured)).with(Html::heading(2, "Pictures"));
     for (file, svg) in pictures {
         page = page.with(Html::figure(file, Html::picture(svg)));
     }
@@ -88,6 +90,18 @@ fn expectations(scene: &Scene, outcomes: &[Outcome]) -> Html {
         ));
     }
     content
+}
+
+fn measures(scene: &Scene, measured: &[MeasuredValue]) -> Html {
+    if measured.is_empty() {
+        return Html::default();
+    }
+    let head = Table::new().column("measure").number("value").column("unit").column("meaning");
+    let table = measured.iter().take(MOST_ROWS).fold(head, |table, MeasuredValue { name, value }| {
+        let value = value.map_or_else(|| "–".to_owned(), |value| Number(six_digits(value)).to_string());
+        table.row([Html::code(&name.text(scene)), value.into(), name.measure.unit().into(), name.measure.about().into()])
+    });
+    Html::heading(2, "Measures").and(Html::table(&table))
 }
 
 fn peers(scene: &Scene, summary: &Summary) -> Html {

@@ -26,6 +26,31 @@ fn number(text: &str, key: &str) -> f64 {
     rest.split([',', '\n']).next().unwrap().parse().unwrap()
 }
 
+/// The columns of measures are the keys of `measures` in the document of the run alone, with the same digits.
+#[test]
+fn measures_of_a_campaign_are_those_of_the_runs_alone() {
+    let desk = desk();
+    desk.json(&format!("{SIX} --measure all --set measure.probe.peer=left --format csv --out out --json"));
+    let (header, rows) = table(&desk, "out/runs.csv");
+    for row in &rows {
+        let cell = |name: &str| row[header.iter().position(|found| found == name).unwrap_or_else(|| panic!("no {name}"))].clone();
+        let set = format!("--set coordination.stiffness={} --seed {}", cell("coordination.stiffness"), cell("seed"));
+        let alone = desk.text(&format!("run random.toml --json --measure all --set measure.probe.peer=left {set}"));
+        let measures = crate::desk::parse(&alone)["measures"].as_object().unwrap().clone();
+        assert_eq!(measures.len(), 23, "twenty of the run and one of each peer");
+        for (name, value) in &measures {
+            let column = cell(name);
+            match value.is_null() {
+                true => assert_eq!(column, "", "{name}"),
+                false => assert_eq!(column.parse::<f64>().unwrap(), number(&alone, name), "{name} of {set}"),
+            }
+        }
+        assert!(measures["viscosity_n_s_m"].is_f64() && measures["peers.third.energy_j"].is_f64());
+    }
+    desk.cohaptic(&format!("{SIX} --measure energy --format csv --out other")).assert_refused(2, &["unknown measure \"energy\""]);
+    assert!(!desk.json("run random.toml --json").as_object().unwrap().contains_key("measures"), "nothing is measured that is not asked for");
+}
+
 #[test]
 fn a_run_of_a_campaign_is_the_run_that_a_user_would_do_alone() {
     let desk = desk();

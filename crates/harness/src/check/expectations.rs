@@ -1,18 +1,27 @@
 //! Expectations that a single run can answer.
 
+use std::convert::Infallible;
 use std::time::Duration;
 
-use cohaptic_scene::{Bounds, Expect, ExpectDelay, ExpectLoss, LinkSelector, Scene};
+use cohaptic_scene::{Bounds, Expect, ExpectDelay, ExpectLoss, LinkSelector, MeasureName, Scene};
 use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 use cohaptic_wan::{DropCause, LinkName, LinkStats};
 
 use super::Outcome;
-use crate::{Summary, TickRow};
+use crate::measures::Measures;
+use crate::observer::observe_by_field;
+use crate::{Observer, Summary, TickRow};
+
+/// What was seen of what expectations are about.
+#[derive(Debug)]
+pub(crate) struct Watched {
+    seen: (Positions, Option<Measures>),
+}
 
 /// What was seen of the positions that expectations are about.
 #[derive(Debug)]
-pub(crate) struct Watched {
+struct Positions {
     positions: Vec<WatchedPosition>,
     travels: Vec<WatchedTravel>,
 }
@@ -34,8 +43,14 @@ struct WatchedTravel {
     reached: Option<Instant>,
 }
 
-impl Watched {
-    pub(crate) fn new(scene: &Scene, expect: &Expect) -> Self {
+impl Observer for Watched {
+    type Error = Infallible;
+
+    observe_by_field! { seen }
+}
+
+impl Positions {
+    fn new(scene: &Scene, expect: &Expect) -> Self {
         let position =
             |expected: &cohaptic_scene::ExpectPosition| WatchedPosition { peer: expected.peer, axis: expected.axis, at: expected.at, seen: None };
         let travel = |expected: &cohaptic_scene::ExpectTravel| WatchedTravel {
@@ -47,12 +62,16 @@ impl Watched {
         };
         Self { positions: expect.positions.iter().map(position).collect(), travels: expect.travel.iter().map(travel).collect() }
     }
+}
 
-    pub(crate) fn wants_ticks(&self) -> bool {
+impl Observer for Positions {
+    type Error = Infallible;
+
+    fn wants_ticks(&self) -> bool {
         !self.positions.is_empty() || !self.travels.is_empty()
     }
 
-    pub(crate) fn on_tick(&mut self, row: &TickRow<'_>) {
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
         for watched in self.positions.iter_mut().filter(|watched| watched.peer == row.peer && row.at <= watched.at) {
             watched.seen = Some(row.object.position[watched.axis]);
         }
@@ -61,16 +80,26 @@ impl Watched {
                 watched.reached = Some(row.at);
             }
         }
+        Ok(())
+    }
+}
+
+impl Watched {
+    pub(crate) fn new(scene: &Scene, expect: &Expect) -> Self {
+        let names: Vec<MeasureName> = expect.measures.iter().map(|expected| expected.name).collect();
+        let measures = (!names.is_empty()).then(|| Measures::new(scene, &names, &scene.measure_settings()));
+        Self { seen: (Positions::new(scene, expect), measures) }
     }
 
     /// What came out of each expectation, in the order of the file's sections.
     pub(crate) fn outcomes(&self, scene: &Scene, expect: &Expect, summary: &Summary) -> Vec<Outcome> {
         let name = |peer: usize| &scene.peers[peer].name;
+        let (watched, measures) = &self.seen;
         let mut outcomes = Vec::new();
         if let Some(bounds) = &expect.discrepancy {
             outcomes.push(Outcome::number("discrepancy", "largest discrepancy between copies".to_owned(), "m", bounds, summary.max_discrepancy));
         }
-        for (expected, watched) in expect.positions.iter().zip(&self.positions) {
+        for (expected, watched) in expect.positions.iter().zip(&watched.positions) {
             let what = format!("position of {}'s copy along {} at {}", name(expected.peer), AXES[expected.axis], expected.at);
             let at_the_end = expected.at >= Instant::ZERO.saturating_add(scene.duration);
             let seen = if at_the_end { Some(summary.peers[expected.peer].position[expected.axis]) } else { watched.seen };
@@ -79,7 +108,7 @@ impl Watched {
                 Some(seen) => Outcome::number("position", what, "m", &expected.bounds, seen),
             });
         }
-        for (expected, watched) in expect.travel.iter().zip(&self.travels) {
+        for (expected, watched) in expect.travel.iter().zip(&watched.travels) {
             let what = format!("time in which {}'s copy travels {} m along {}", name(expected.peer), expected.distance, AXES[expected.axis]);
             outcomes.push(match watched.reached {
                 None => Outcome::nothing("travel", what, "s", &expected.bounds, "not reached"),
@@ -88,6 +117,14 @@ impl Watched {
         }
         outcomes.extend(expect.loss.iter().map(|expected| loss(scene, expected, summary)));
         outcomes.extend(expect.delay.iter().map(|expected| delay(scene, expected, summary)));
+        let values = measures.as_ref().map(|measures| measures.values(summary.duration)).unwrap_or_default();
+        outcomes.extend(expect.measures.iter().zip(values).map(|(expected, measured)| {
+            let (what, unit) = (expected.name.text(scene), expected.name.measure.unit());
+            match measured.value {
+                None => Outcome::nothing("measures", what, unit, &expected.bounds, "no value"),
+                Some(value) => Outcome::number("measures", what, unit, &expected.bounds, value),
+            }
+        }));
         outcomes
     }
 }

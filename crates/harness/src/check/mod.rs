@@ -12,7 +12,8 @@ use std::convert::Infallible;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use crate::{Ending, Model, Observer, Simulation, Summary, TickRow};
+use crate::observer::observe_by_field;
+use crate::{Ending, Model, Observer, Simulation, Summary};
 use expectations::Watched;
 
 /// Runs a scene and gives one line for each expectation that does not hold, in the order of the file's sections; empty if all hold.
@@ -62,9 +63,9 @@ pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) 
     if let Some(reason) = crate::too_large(scene) {
         return unchecked(reason);
     }
-    let mut observer = Watching { watched: Watched::new(scene, expect), keep_going: &mut keep_going };
+    let mut observer = (Watched::new(scene, expect), Asking(&mut keep_going));
     let Ok(summary) = Simulation::new(scene, model).run(&mut observer);
-    let watched = observer.watched;
+    let (watched, _) = observer;
     if let Ending::Interrupted(at) = summary.ending {
         return unchecked(format!("interrupted at {at}"));
     }
@@ -94,19 +95,6 @@ impl<'a> ExpectationWatch<'a> {
         Self { scene, watched: scene.expect.as_ref().map(|expect| Watched::new(scene, expect)) }
     }
 
-    /// Whether the run must be watched tick by tick.
-    #[must_use]
-    pub fn wants_ticks(&self) -> bool {
-        self.watched.as_ref().is_some_and(Watched::wants_ticks)
-    }
-
-    /// What the observer of the run is shown.
-    pub fn on_tick(&mut self, row: &TickRow<'_>) {
-        if let Some(watched) = &mut self.watched {
-            watched.on_tick(row);
-        }
-    }
-
     /// What came out; nothing of a run that was interrupted.
     #[must_use]
     pub fn outcomes(&self, summary: &Summary) -> Vec<Outcome> {
@@ -117,25 +105,19 @@ impl<'a> ExpectationWatch<'a> {
     }
 }
 
-/// Watches what expectations are about.
-struct Watching<'a, F> {
-    watched: Watched,
-    keep_going: &'a mut F,
-}
-
-impl<F: FnMut() -> bool> Observer for Watching<'_, F> {
+impl Observer for ExpectationWatch<'_> {
     type Error = Infallible;
 
-    fn wants_ticks(&self) -> bool {
-        self.watched.wants_ticks()
-    }
+    observe_by_field! { watched }
+}
 
-    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
-        self.watched.on_tick(row);
-        Ok(())
-    }
+/// Asks whether to go on.
+struct Asking<'a, F>(&'a mut F);
+
+impl<F: FnMut() -> bool> Observer for Asking<'_, F> {
+    type Error = Infallible;
 
     fn keep_going(&mut self, _now: Instant) -> bool {
-        (self.keep_going)()
+        (self.0)()
     }
 }

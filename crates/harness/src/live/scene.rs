@@ -4,16 +4,16 @@ use std::fmt;
 use std::time::Duration;
 
 use cohaptic_peer::State;
-use cohaptic_peer::coordination::LawStrategy;
+use cohaptic_peer::coordination::BuiltInStrategy;
 use cohaptic_scene::{Axes, LinkKeys, Scene};
-use cohaptic_units::Instant;
+use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, LinkStats};
 
 use super::device::LiveDevice;
 use super::inputs::{Input, InputRow};
 use super::presence::{RemotePeers, Transmit};
 use super::seat::{Presence, SampleError, SeatStats};
-use crate::observer::Observer;
+use crate::observer::{Observer, SendRow};
 use crate::plan::{Model, Plan};
 use crate::simulation::{Simulation, too_large};
 use crate::summary::{Ending, Summary};
@@ -34,15 +34,17 @@ const NANOSECOND: Duration = Duration::from_nanos(1);
 pub struct LiveScene {
     world: AnyWorld,
     session: u64,
+    /// The receivers of a sample.
+    others: u64,
     open: Instant,
     ended: Option<Ending>,
 }
 
 /// A world with as many axes as the scene has.
 enum AnyWorld {
-    One(Box<World<1, LawStrategy<1>, RemotePeers<1>>>),
-    Two(Box<World<2, LawStrategy<2>, RemotePeers<2>>>),
-    Three(Box<World<3, LawStrategy<3>, RemotePeers<3>>>),
+    One(Box<World<1, BuiltInStrategy<1>, RemotePeers<1>>>),
+    Two(Box<World<2, BuiltInStrategy<2>, RemotePeers<2>>>),
+    Three(Box<World<3, BuiltInStrategy<3>, RemotePeers<3>>>),
 }
 
 macro_rules! each {
@@ -86,7 +88,7 @@ impl LiveScene {
             Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
         };
         // The session that peers of the scene have: see `Scene::peer_config`.
-        Self { world, session: scene.seed, open: Instant::ZERO, ended: None }
+        Self { world, session: scene.seed, others: scene.peers.len() as u64 - 1, open: Instant::ZERO, ended: None }
     }
 
     /// Takes a sample of a peer of kind `udp`, which came at `at`, and sends it on over the links of that peer. Gives the instant at which it counts: `at`, or
@@ -114,6 +116,10 @@ impl LiveScene {
         // What comes at the very instant that was just handled is not late, but it counts behind it.
         if late > NANOSECOND {
             each!(&mut self.world, world => world.note_late(peer, late));
+        }
+        if observer.wants_sends() {
+            let size = Bytes::new(datagram.len() as u64);
+            observer.on_send(&SendRow { at: counts, peer, packets: self.others, size })?;
         }
         observer.on_input(&InputRow { at: counts, what: Input::Sample { peer, datagram } })?;
         Ok(Ok(counts))

@@ -16,6 +16,13 @@ pub struct RecordError {
     pub source: io::Error,
 }
 
+/// Beside an observer that never fails.
+impl From<std::convert::Infallible> for RecordError {
+    fn from(never: std::convert::Infallible) -> Self {
+        match never {}
+    }
+}
+
 /// A record on its way: a [`WholeFile`] whose errors are those of a record. If it cannot be written to its end, its beginning stays under the name `….partial`.
 #[derive(Debug)]
 pub struct RecordFile(WholeFile);

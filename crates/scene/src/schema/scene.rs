@@ -1,7 +1,7 @@
 //! The keys of a scene.
 
 use cohaptic_peer::Coordination;
-use cohaptic_peer::coordination::{LawForm, LawValues};
+use cohaptic_peer::coordination::{LawForm, LawParameter, LawValues};
 use cohaptic_wan::DropCause;
 use cohaptic_wan::parameters::Quantity;
 
@@ -11,8 +11,10 @@ use cohaptic_linkfile::schema::{
     number, optional, required, somewhere, usual, vector,
 };
 
+use crate::measures::{Measure, Scope};
 use crate::quantities::{
-    ADDED_MASS, ANGLE, DAMPING, DISTANCE, FORCE, FREQUENCY, MASS, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS, VELOCITY, WALL_STIFFNESS,
+    ADDED_MASS, ANGLE, DAMPING, DISTANCE, ENERGY, FORCE, FREQUENCY, IMPEDANCE, MASS, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS, VELOCITY,
+    WALL_STIFFNESS,
 };
 
 const MOST: u64 = i64::MAX.unsigned_abs();
@@ -29,6 +31,7 @@ pub(super) static ROOT: Table = Table::of(&[&[
     optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
     optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction of one pair each: its own keys are laid over those of [link]"),
     optional("timeline", Form::List(&Form::Table(&TIMELINE)), "What changes while the scene runs"),
+    optional("measure", Form::Table(&MEASURE), "What a run is summed up by: numbers that are computed while it runs"),
     optional("expect", Form::Table(&EXPECT), "What must come out: makes the scene a test for cohaptic check"),
 ]]);
 
@@ -84,6 +87,11 @@ const fn form_of(form: LawForm) -> Form {
         LawForm::Duration => Form::Duration,
         LawForm::AutomaticDuration => Form::AnyOf(const { &[Form::Words(&AUTOMATIC), Form::Duration] }),
         LawForm::AutomaticDamping => Form::AnyOf(const { &[Form::Words(&AUTOMATIC), number(DAMPING)] }),
+        LawForm::Damping => number(DAMPING),
+        LawForm::Impedance => number(IMPEDANCE),
+        LawForm::Energy => number(ENERGY),
+        LawForm::Words(words) => Form::Words(words),
+        LawForm::Peer => Form::Text,
     }
 }
 const AUTOMATIC: [(&str, &str); 1] = [("auto", "as the links of the scene ask for")];
@@ -96,7 +104,8 @@ static LAW_KEYS: [[Key; LawValues::MOST]; Coordination::ALL.len()] = {
         let parameters = Coordination::ALL[law].parameters();
         let mut place = 0;
         while place < parameters.len() {
-            keys[law][place] = usual(parameters[place].key, form_of(parameters[place].form), parameters[place].default, parameters[place].about);
+            let LawParameter { key, form, default, about } = parameters[place];
+            keys[law][place] = if default.is_empty() { optional(key, form_of(form), about) } else { usual(key, form_of(form), default, about) };
             place += 1;
         }
         law += 1;
@@ -248,6 +257,44 @@ static GAINS: Table = Table::of(&[&[
     optional("damping", number(DAMPING), "Gain on the difference of velocities; without it as it was"),
 ]]);
 
+static MEASURE: Table = Table::of(&[&[
+    usual("names", Form::AnyOf(const { &[Form::Words(&[("all", "every measure")]), Form::List(&MEASURE_NAME)] }), "\"all\"", "Which measures"),
+    optional("travel", Form::Table(&MEASURE_TRAVEL), "What travel_s is about"),
+    usual("band", number(DISTANCE), "0.001", "Above this discrepancy the copies are not settled, for settling_s"),
+    optional("probe", Form::Table(&PROBE), "Whose hand meets the impedance of viscosity_n_s_m and effective_mass_kg, which have no value without it"),
+]]);
+/// Words for the measures of a run, and an example for those of a peer.
+const MEASURE_NAME_FORM: Form = Form::AnyOf(&[Form::Words(&MEASURES), Form::Like(&["peers.left.energy_j"])]);
+static MEASURE_NAME: Form = MEASURE_NAME_FORM;
+const MEASURES_OF_RUN: usize = {
+    let (mut place, mut count) = (0, 0);
+    while place < Measure::ALL.len() {
+        if matches!(Measure::ALL[place].scope(), Scope::Run) {
+            count += 1;
+        }
+        place += 1;
+    }
+    count
+};
+const MEASURES: [(&str, &str); MEASURES_OF_RUN] = {
+    let mut words = [("", ""); MEASURES_OF_RUN];
+    let (mut place, mut count) = (0, 0);
+    while place < Measure::ALL.len() {
+        if matches!(Measure::ALL[place].scope(), Scope::Run) {
+            words[count] = (Measure::ALL[place].name(), Measure::ALL[place].about());
+            count += 1;
+        }
+        place += 1;
+    }
+    words
+};
+static MEASURE_TRAVEL: Table = Table::of(&[&[
+    optional("peer", Form::Text, "The name of the peer whose copy is meant; without it the first"),
+    usual("distance", number(DISTANCE), "0.02", "How far from where it began"),
+    usual("axis", Form::Words(&AXES), "\"x\"", "Along which axis"),
+]]);
+static PROBE: Table = Table::of(&[&[required("peer", Form::Text, "The name of a peer whose hand is a sine from the beginning to the end")]]);
+
 static EXPECT: Table = Table::of(&[&[
     optional("stable", Form::Boolean, "Whether a small disturbance dies out"),
     optional("discrepancy", Form::Table(&METRES), "The largest distance along an axis between two copies"),
@@ -255,6 +302,7 @@ static EXPECT: Table = Table::of(&[&[
     optional("travel", Form::List(&Form::Table(&EXPECT_TRAVEL)), "When copies have first moved so far"),
     optional("loss", Form::List(&Form::Table(&EXPECT_LOSS)), "Which fraction of what was offered was dropped"),
     optional("delay", Form::List(&Form::Table(&EXPECT_DELAY)), "The mean delay of what was delivered"),
+    optional("measures", Form::List(&Form::Table(&EXPECT_MEASURE)), "The values of measures"),
 ]]);
 static METRES: Table = Table::of(&[&METRE_BOUNDS]);
 const METRE_BOUNDS: [Key; 2] = [optional("min", number(POSITION), "At least"), optional("max", number(POSITION), "At most")];
@@ -279,6 +327,11 @@ static SELECTOR: Table = Table::of(&[&[
 static EXPECT_LOSS: Table =
     Table::of(&[&LINK_OR_LINE, &[optional("cause", Form::Words(&CAUSES), "Dropped for this cause; without it for any")], &FRACTION_BOUNDS]);
 static EXPECT_DELAY: Table = Table::of(&[&LINK_OR_LINE, &TIME_BOUNDS]);
+static EXPECT_MEASURE: Table = Table::of(&[&[
+    required("name", MEASURE_NAME_FORM, "The name of the measure, which ends in its unit"),
+    optional("min", Form::Number(Quantity::any("")), "At least"),
+    optional("max", Form::Number(Quantity::any("")), "At most"),
+]]);
 const CAUSES: [(&str, &str); DropCause::ALL.len()] = {
     let mut causes = [("", "dropped for this cause"); DropCause::ALL.len()];
     let mut place = 0;

@@ -11,11 +11,18 @@ use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::DropCause;
 
 use crate::context::{SceneContext, read_axis};
-use crate::model::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectPosition, ExpectTravel, PeerSpec};
+use crate::model::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectMeasure, ExpectPosition, ExpectTravel, PeerSpec};
 use crate::quantities::{DISTANCE, POSITION};
+use crate::sections::read_measure_name;
 
-/// Reads the expectations. `duration` and `peers` are `None` where they were refused.
-pub(crate) fn read_expect(node: &Node, duration: Option<Duration>, peers: Option<&[PeerSpec]>, context: SceneContext<'_>) -> Option<Expect> {
+/// Reads the expectations. `duration` and `peers` are `None` where they were refused; `has_probe` says whether the impedance of a hand is measured.
+pub(crate) fn read_expect(
+    node: &Node,
+    duration: Option<Duration>,
+    has_probe: bool,
+    peers: Option<&[PeerSpec]>,
+    context: SceneContext<'_>,
+) -> Option<Expect> {
     let mut table = TableReader::new(node, *context, "a table such as [expect]")?;
     let stable = table.maybe("stable", values::boolean);
     let discrepancy = table.maybe("discrepancy", read_discrepancy);
@@ -23,8 +30,17 @@ pub(crate) fn read_expect(node: &Node, duration: Option<Duration>, peers: Option
     let travel = table.optional("travel", Vec::new(), |node, file| each(node, file, |entry| read_travel(entry, context)));
     let loss = table.optional("loss", Vec::new(), |node, context| each(node, context, |entry| read_loss(entry, peers, context)));
     let delay = table.optional("delay", Vec::new(), |node, context| each(node, context, |entry| read_delay(entry, peers, context)));
+    let measures = table.optional("measures", Vec::new(), |node, file| each(node, file, |entry| read_measure(entry, has_probe, file)));
     table.finish();
-    Some(Expect { stable: stable?, discrepancy: discrepancy?, positions: positions?, travel: travel?, loss: loss?, delay: delay? })
+    Some(Expect {
+        stable: stable?,
+        discrepancy: discrepancy?,
+        positions: positions?,
+        travel: travel?,
+        loss: loss?,
+        delay: delay?,
+        measures: measures?,
+    })
 }
 
 /// Reads every table of a list, also after one that was refused.
@@ -88,6 +104,15 @@ fn read_delay(node: &Node, peers: Option<&[PeerSpec]>, context: Context<'_>) -> 
     table.finish();
     let (min, max) = ends?;
     Some(ExpectDelay { link: link?, min, max })
+}
+
+fn read_measure(node: &Node, has_probe: bool, context: Context<'_>) -> Option<ExpectMeasure> {
+    let mut table = TableReader::new(node, context, "a table such as { name = \"energy_j\", max = 0.01 }")?;
+    let name = table.required("name", "the name of a measure such as \"energy_j\"", |node, context| read_measure_name(node, has_probe, context));
+    let unit = name.map_or("", |name| name.measure.unit());
+    let bounds = read_bounds(&mut table, node, context, Quantity::any(unit));
+    table.finish();
+    Some(ExpectMeasure { name: name?, bounds: bounds? })
 }
 
 /// A link or an access line that the scene has: nothing can be expected of a line that is not there.

@@ -4,6 +4,7 @@ mod expect;
 mod hand;
 mod header;
 mod kind;
+mod measure;
 mod motion_file;
 mod object;
 mod peer;
@@ -12,6 +13,7 @@ mod timeline;
 
 pub(crate) use expect::read_expect;
 pub(crate) use header::{Header, read_coordination, read_header, read_integrator};
+pub(crate) use measure::{Measured, read_measure, read_measure_name};
 pub(crate) use object::read_object;
 pub(crate) use peers::{PeerSources, check_enough, read_names, read_peers};
 pub(crate) use timeline::read_timeline;

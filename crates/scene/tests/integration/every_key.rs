@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::path::{Path, PathBuf};
 
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains, Hand, Integrator, Signal};
-use cohaptic_scene::{Axes, Bounds, ChangeKind, LinkSelector, Scaling, Scene};
+use cohaptic_scene::{Axes, Bounds, ChangeKind, LinkSelector, Measure, MeasureName, MeasureSpec, MeasureTravel, Scaling, Scene};
 use cohaptic_units::{Bytes, Hertz, Instant, Probability, Rate};
 use cohaptic_wan::{
     Bottleneck, Delay, Distribution, DropCause, Framing, GilbertElliott, Jitter, LinkConfig, LinkModel, Loss, Order, Outage, QueueLimit,
@@ -146,6 +146,19 @@ fn every_expectation_is_read() {
     assert_eq!((expect.loss[1].link, expect.loss[1].cause, expect.loss[1].min), (LinkSelector::Uplink(0), None, None));
     assert_eq!((expect.delay[0].link, expect.delay[0].min), (LinkSelector::Between { from: 0, to: 1 }, Some(23 * MILLISECOND)));
     assert_eq!(expect.delay[1].link, LinkSelector::Downlink(0));
+    let named = |measure: Measure, peer: Option<usize>| MeasureName { measure, peer };
+    let expected: Vec<(MeasureName, Bounds)> = expect.measures.iter().map(|expected| (expected.name, expected.bounds)).collect();
+    let energy = (named(Measure::PeerEnergy, Some(0)), Bounds { min: Some(-1.0), max: Some(1.0) });
+    assert_eq!(expected, [energy, (named(Measure::AgeP99, None), Bounds { min: None, max: Some(0.1) })]);
+}
+
+#[test]
+fn every_measure_that_is_asked_for_is_read() {
+    let MeasureSpec { names, settings } = scene().measure.unwrap();
+    let named = |measure: Measure, peer: Option<usize>| MeasureName { measure, peer };
+    assert_eq!(names, [named(Measure::Energy, None), named(Measure::PeerEnergy, Some(2)), named(Measure::AgeP99, None)]);
+    assert_eq!(settings.travel, MeasureTravel { peer: 1, axis: 1, distance: 0.05 });
+    assert_eq!((settings.band, settings.probe), (0.002, None));
 }
 
 #[test]

@@ -31,7 +31,13 @@ pub(super) const SCENES: [&str; 3] = [
         { at = "2s", peer = "a", set = { contact = "grasp" } },
         { at = "3s", coordination = { stiffness = 2 } },
     ]
+    [measure]
+    names = ["energy_j", "peers.a.energy_j", "viscosity_n_s_m"]
+    travel = { peer = "b", distance = 0.1, axis = "x" }
+    band = 0.002
+    probe = { peer = "a" }
     [expect]
+    measures = [{ name = "energy_j", min = 0, max = 1 }]
     discrepancy = { max = 1 }
     position = [{ peer = "a", at = "1s", min = 0 }]
     travel = [{ peer = "a", distance = 0.1, max = "1s" }]
@@ -71,6 +77,7 @@ pub(super) const SCENES: [&str; 3] = [
     link = { delay = "20ms", jitter = { sd = "2ms", distribution = { table = "data/two-sided.dist" } } }
     links = [{ from = "peer1", to = "peer2", trace = { file = "data/path.csv" } }, { from = "peer2", to = "peer1", trace = { file = "data/line.trace" } }]
     simulation = {}
+    measure = { names = "all", travel = {} }
     "#,
 ];
 

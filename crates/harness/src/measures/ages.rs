@@ -1,0 +1,88 @@
+//! How old the samples are that peers hold: at each tick of a peer, for each other peer of which anything has arrived, tick less sampling. Both are instants of the
+//! scene, so clocks that drift do not count.
+
+use std::time::Duration;
+
+use cohaptic_scene::Measure;
+use cohaptic_units::Instant;
+
+use super::quantiles::QuantileSketch;
+use super::{Accumulator, Asked, Rows, ratio};
+use crate::{HoldRow, TickRow};
+
+/// Ages so far.
+#[derive(Clone, Debug)]
+pub(super) struct Ages {
+    receivers: Vec<Receiver>,
+    /// Σ of all ages \[ns\], which is exact.
+    nanos: u128,
+    count: u64,
+    /// `None` if no quantile is asked for.
+    sketch: Option<QuantileSketch>,
+}
+
+/// The samples that a peer holds.
+#[derive(Clone, Debug)]
+struct Receiver {
+    /// When each was sampled, in the order of the first arrivals from their senders.
+    sampled: Vec<Instant>,
+    /// The place in that list of each sender, by its place in the scene.
+    places: Vec<Option<usize>>,
+    /// Σ of these instants \[ns\].
+    nanos: u128,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Figure {
+    Mean,
+    P99,
+}
+
+impl Accumulator for Ages {
+    type Figure = Figure;
+
+    const GIVES: &'static [(Measure, Figure)] = &[(Measure::AgeMean, Figure::Mean), (Measure::AgeP99, Figure::P99)];
+    const ROWS: Rows = Rows { ticks: true, holds: true, ..Rows::NONE };
+
+    fn new(asked: &Asked<'_>) -> Self {
+        let peers = asked.scene.peers.len();
+        let receiver = Receiver { sampled: Vec::new(), places: vec![None; peers], nanos: 0 };
+        Self { receivers: vec![receiver; peers], nanos: 0, count: 0, sketch: asked.has(Measure::AgeP99).then(QuantileSketch::default) }
+    }
+
+    fn on_hold(&mut self, row: &HoldRow) {
+        let Receiver { sampled, places, nanos } = &mut self.receivers[row.to];
+        let place = *places[row.from].get_or_insert_with(|| {
+            sampled.push(Instant::ZERO);
+            sampled.len() - 1
+        });
+        *nanos = *nanos + u128::from(row.sampled.as_nanos()) - u128::from(sampled[place].as_nanos());
+        sampled[place] = row.sampled;
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) {
+        let Receiver { sampled, nanos, .. } = &self.receivers[row.peer];
+        let held = sampled.len() as u64;
+        self.nanos += u128::from(held) * u128::from(row.at.as_nanos()) - nanos;
+        self.count += held;
+        if let Some(sketch) = &mut self.sketch {
+            for sampled in sampled {
+                sketch.insert(seconds(row.at.as_nanos() - sampled.as_nanos()));
+            }
+        }
+    }
+
+    fn value(&self, figure: Figure, _peer: Option<usize>, _elapsed: Duration) -> Option<f64> {
+        match figure {
+            Figure::P99 => self.sketch.as_ref()?.quantile(99),
+            Figure::Mean => ratio(self.nanos, self.count).map(|nanos| 1e-9 * nanos),
+        }
+    }
+}
+
+/// A division would take longer than all the rest of a held sample.
+#[inline]
+#[expect(clippy::cast_precision_loss, reason = "an age above 104 days is rounded to its nearest double")]
+fn seconds(nanos: u64) -> f64 {
+    nanos as f64 * 1e-9
+}

@@ -1,0 +1,96 @@
+//! The energy that the coordination injects into the copies.
+//!
+//! Over a step a copy moves by d under forces that are held, so their work is exact: −F·d is what the held part F of the coordination force does. A law that damps the
+//! copy by β takes energy between ticks too. All damping, bO + β, takes f·d − ½·m·(v₁² − v₀²) in a step, with f the sum of the held forces, and β takes its
+//! share β/(bO + β) of it:
+//!
+//! ```text
+//! W = Σᵢ Σₖ (−F·d − β/(bO + β)·(f·d − ½·m·Δv²))
+//! ```
+
+use std::time::Duration;
+
+use cohaptic_scene::{Measure, Scene};
+
+use super::{Accumulator, Asked, Rows};
+use crate::{InstantRow, StepRow};
+
+/// W so far.
+#[derive(Clone, Debug)]
+pub(super) struct Energy {
+    peers: Vec<PeerEnergy>,
+    /// Σ over peers, in the order of steps.
+    injected: f64,
+    peak: f64,
+}
+
+/// W of one copy.
+#[derive(Clone, Debug)]
+struct PeerEnergy {
+    mass: f64,
+    /// β/(bO + β).
+    share: f64,
+    /// `None` before its first step: a peer in another process never makes one.
+    injected: Option<f64>,
+}
+
+impl PeerEnergy {
+    fn new(scene: &Scene, place: usize) -> Self {
+        let (copy, own) = (scene.copy_config(place), scene.peer_config(place).own_damping);
+        Self { mass: copy.mass, share: if own > 0.0 { own / copy.damping } else { 0.0 }, injected: None }
+    }
+
+    /// What the coordination injects into the copy in a step \[J\].
+    #[inline]
+    fn of_step(&self, row: &StepRow<'_>) -> f64 {
+        let mut energy = 0.0;
+        for axis in 0..row.held_force.len() {
+            let moved = row.after.position[axis] - row.before.position[axis];
+            energy -= row.coordination_force[axis] * moved;
+            if self.share > 0.0 {
+                let (before, after) = (row.before.velocity[axis], row.after.velocity[axis]);
+                energy -= self.share * (row.held_force[axis] * moved - 0.5 * self.mass * (after * after - before * before));
+            }
+        }
+        energy
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Figure {
+    AtEnd,
+    Peak,
+}
+
+impl Accumulator for Energy {
+    type Figure = Figure;
+
+    const GIVES: &'static [(Measure, Figure)] =
+        &[(Measure::Energy, Figure::AtEnd), (Measure::EnergyPeak, Figure::Peak), (Measure::PeerEnergy, Figure::AtEnd)];
+    const ROWS: Rows = Rows { steps: true, instants: true, ..Rows::NONE };
+
+    fn new(asked: &Asked<'_>) -> Self {
+        let peers = (0..asked.scene.peers.len()).map(|place| PeerEnergy::new(asked.scene, place)).collect();
+        Self { peers, injected: 0.0, peak: 0.0 }
+    }
+
+    fn on_step(&mut self, row: &StepRow<'_>) {
+        let peer = &mut self.peers[row.peer];
+        let energy = peer.of_step(row);
+        *peer.injected.get_or_insert(0.0) += energy;
+        self.injected += energy;
+    }
+
+    /// Steps of one instant are simultaneous: W between two of them is nothing that ever was.
+    fn on_instant(&mut self, _row: &InstantRow) {
+        self.peak = self.peak.max(self.injected);
+    }
+
+    fn value(&self, figure: Figure, peer: Option<usize>, _elapsed: Duration) -> Option<f64> {
+        match (figure, peer) {
+            (Figure::Peak, _) => Some(self.peak),
+            (Figure::AtEnd, Some(peer)) => self.peers.get(peer)?.injected,
+            (Figure::AtEnd, None) => Some(self.injected),
+        }
+    }
+}

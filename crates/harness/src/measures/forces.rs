@@ -1,0 +1,105 @@
+//! How large the forces of coordination and coupling are, and how rough. Each component along an axis counts by itself.
+
+use std::time::Duration;
+
+use cohaptic_scene::Measure;
+
+use super::{Accumulator, Asked, Rows, mean_square_root};
+use crate::TickRow;
+
+/// F_T on the copies.
+#[derive(Clone, Debug)]
+pub(super) struct CoordinationForce(Force);
+
+/// F_C, which hands feel.
+#[derive(Clone, Debug)]
+pub(super) struct FeltForce(Force);
+
+/// One force of every peer, over all ticks.
+#[derive(Clone, Debug)]
+struct Force {
+    peak: f64,
+    squares: f64,
+    count: u64,
+    jump: f64,
+    /// At the latest tick of each peer; `None` before its first.
+    latest: Vec<Option<[f64; 3]>>,
+}
+
+impl Force {
+    fn new(asked: &Asked<'_>) -> Self {
+        Self { peak: 0.0, squares: 0.0, count: 0, jump: 0.0, latest: vec![None; asked.scene.peers.len()] }
+    }
+
+    #[inline]
+    fn add(&mut self, peer: usize, force: &[f64]) {
+        let latest = &mut self.latest[peer];
+        // The first tick of a peer is no jump.
+        let known = latest.is_some();
+        let latest = latest.get_or_insert_default();
+        for (component, latest) in force.iter().zip(latest) {
+            self.peak = self.peak.max(component.abs());
+            self.squares += component * component;
+            self.count += 1;
+            if known {
+                self.jump = self.jump.max((component - *latest).abs());
+            }
+            *latest = *component;
+        }
+    }
+
+    fn value(&self, of: Figure) -> Option<f64> {
+        match of {
+            Figure::Peak => (self.count > 0).then_some(self.peak),
+            Figure::Rms => mean_square_root(self.squares, self.count),
+            Figure::Jump => (self.count > 0).then_some(self.jump),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Figure {
+    Peak,
+    Rms,
+    Jump,
+}
+
+impl Accumulator for CoordinationForce {
+    type Figure = Figure;
+
+    const GIVES: &'static [(Measure, Figure)] =
+        &[(Measure::ForcePeak, Figure::Peak), (Measure::ForceRms, Figure::Rms), (Measure::ForceJump, Figure::Jump)];
+    const ROWS: Rows = Rows { ticks: true, ..Rows::NONE };
+
+    fn new(asked: &Asked<'_>) -> Self {
+        Self(Force::new(asked))
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) {
+        self.0.add(row.peer, row.coordination_force);
+    }
+
+    fn value(&self, figure: Figure, _peer: Option<usize>, _elapsed: Duration) -> Option<f64> {
+        self.0.value(figure)
+    }
+}
+
+impl Accumulator for FeltForce {
+    type Figure = Figure;
+
+    const GIVES: &'static [(Measure, Figure)] =
+        &[(Measure::FeltPeak, Figure::Peak), (Measure::FeltRms, Figure::Rms), (Measure::FeltJump, Figure::Jump)];
+    const ROWS: Rows = Rows { ticks: true, ..Rows::NONE };
+
+    fn new(asked: &Asked<'_>) -> Self {
+        Self(Force::new(asked))
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) {
+        self.0.add(row.peer, row.coupling_force);
+    }
+
+    fn value(&self, figure: Figure, _peer: Option<usize>, _elapsed: Duration) -> Option<f64> {
+        self.0.value(figure)
+    }
+}

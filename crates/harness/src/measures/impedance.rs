@@ -1,0 +1,159 @@
+//! What the hand of a probe meets: the impedance at the frequency with which it pushes.
+//!
+//! Force and velocity of the device, both at its ticks in the second half of the scene, are fitted by c₀ + c·cos ωt + s·sin ωt with the least sum of squares. Their
+//! phasors c − j·s give Z = F/v, with the viscosity Re Z and the effective mass Im Z/ω.
+
+use std::time::Duration;
+
+use cohaptic_peer::{Hand, Signal};
+use cohaptic_scene::Measure;
+use cohaptic_units::{Instant, RadPerSec};
+
+use super::{Accumulator, Asked, Rows};
+use crate::TickRow;
+
+/// Sums of the normal equations; empty without a probe.
+#[derive(Clone, Debug)]
+pub(super) struct Impedance(Option<Probe>);
+
+#[derive(Clone, Debug)]
+struct Probe {
+    peer: usize,
+    /// The second half begins here.
+    from: Instant,
+    omega: f64,
+    phase: f64,
+    /// The amplitude over its square, component by component: the velocity along the force, for a force of 1.
+    direction: [f64; 3],
+    fit: Fit,
+}
+
+impl Probe {
+    fn new(asked: &Asked<'_>) -> Option<Self> {
+        let peer = asked.settings.probe?;
+        let Some(Hand::Force(Signal::Sine { amplitude, frequency, phase })) = &asked.scene.peers[peer].hand else { return None };
+        let square: f64 = amplitude.iter().map(|amplitude| amplitude * amplitude).sum();
+        let direction = amplitude.map(|amplitude| amplitude / square);
+        let from = Instant::ZERO.saturating_add(asked.scene.duration / 2);
+        Some(Self { peer, from, omega: RadPerSec::from(*frequency).0, phase: *phase, direction, fit: Fit::default() })
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Figure {
+    Viscosity,
+    Mass,
+}
+
+impl Accumulator for Impedance {
+    type Figure = Figure;
+
+    const GIVES: &'static [(Measure, Figure)] = &[(Measure::Viscosity, Figure::Viscosity), (Measure::EffectiveMass, Figure::Mass)];
+    const ROWS: Rows = Rows { ticks: true, ..Rows::NONE };
+
+    fn new(asked: &Asked<'_>) -> Self {
+        Self(Probe::new(asked))
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) {
+        let Some(probe) = self.0.as_mut().filter(|probe| probe.peer == row.peer && probe.from <= row.at) else { return };
+        let angle = probe.omega * row.at.as_secs_f64();
+        let velocity = row.device.velocity.iter().zip(probe.direction).map(|(velocity, direction)| velocity * direction).sum();
+        probe.fit.add([1.0, libm::cos(angle), libm::sin(angle)], [libm::sin(angle + probe.phase), velocity]);
+    }
+
+    fn value(&self, figure: Figure, _peer: Option<usize>, _elapsed: Duration) -> Option<f64> {
+        let probe = self.0.as_ref()?;
+        let [[_, fc, fs], [_, vc, vs]] = probe.fit.solve()?;
+        // (fc − j·fs)/(vc − j·vs)
+        let square = vc * vc + vs * vs;
+        Some(match figure {
+            Figure::Viscosity => (fc * vc + fs * vs) / square,
+            Figure::Mass => (fc * vs - fs * vc) / square / probe.omega,
+        })
+    }
+}
+
+/// Least squares of two signals on three regressors.
+#[derive(Clone, Default, Debug)]
+struct Fit {
+    normal: [[f64; 3]; 3],
+    right: [[f64; 3]; 2],
+}
+
+/// Regressors are dependent where a pivot is this much smaller than the sum of squares of its column: a half of the scene that is a small part of a period, or
+/// ticks at multiples of half a period.
+const DEPENDENT: f64 = 1e-9;
+
+impl Fit {
+    #[inline]
+    fn add(&mut self, regressors: [f64; 3], signals: [f64; 2]) {
+        for (row, one) in self.normal.iter_mut().zip(regressors) {
+            for (sum, other) in row.iter_mut().zip(regressors) {
+                *sum += one * other;
+            }
+        }
+        for (sums, signal) in self.right.iter_mut().zip(signals) {
+            for (sum, regressor) in sums.iter_mut().zip(regressors) {
+                *sum += regressor * signal;
+            }
+        }
+    }
+
+    /// The coefficients of both signals, by Gauss's elimination; `None` where they are not determined.
+    fn solve(&self) -> Option<[[f64; 3]; 2]> {
+        let (mut matrix, mut right) = (self.normal, self.right);
+        for pivot in 0..3 {
+            let row = matrix[pivot];
+            // Not above: no tick at all gives zero for both.
+            if !(row[pivot] > DEPENDENT * self.normal[pivot][pivot]) {
+                return None;
+            }
+            for below in pivot + 1..3 {
+                let factor = matrix[below][pivot] / row[pivot];
+                for (entry, above) in matrix[below].iter_mut().zip(row) {
+                    *entry -= factor * above;
+                }
+                for side in &mut right {
+                    side[below] -= factor * side[pivot];
+                }
+            }
+        }
+        Some(right.map(|side| {
+            let last = side[2] / matrix[2][2];
+            let middle = (side[1] - matrix[1][2] * last) / matrix[1][1];
+            [(side[0] - matrix[0][1] * middle - matrix[0][2] * last) / matrix[0][0], middle, last]
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Signals that are combinations of the regressors are found again, over half a period as well as over many.
+    #[test]
+    fn a_combination_of_the_regressors_is_found_again() {
+        for (omega, ticks) in [(3.0, 1000_u32), (7.0, 500), (40.0, 3000)] {
+            let mut fit = Fit::default();
+            for tick in 0..ticks {
+                let angle = omega * 1e-3 * f64::from(tick);
+                let (c, s) = (libm::cos(angle), libm::sin(angle));
+                fit.add([1.0, c, s], [2.0 - 3.0 * c + 0.5 * s, 1e-3 * c]);
+            }
+            let found = fit.solve().unwrap();
+            for (found, expected) in found.iter().flatten().zip([2.0, -3.0, 0.5, 0.0, 1e-3, 0.0]) {
+                assert!((found - expected).abs() < 1e-11, "{found} for {expected} at {omega} rad/s");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_determined_has_no_value() {
+        assert!(Fit::default().solve().is_none());
+        // All samples at multiples of half a period: the sine is not seen.
+        let mut fit = Fit::default();
+        (0..100).for_each(|tick| fit.add([1.0, if tick % 2 == 0 { 1.0 } else { -1.0 }, 1e-13], [1.0, 1.0]));
+        assert!(fit.solve().is_none());
+    }
+}

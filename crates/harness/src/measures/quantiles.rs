@@ -1,0 +1,146 @@
+//! Quantiles of any number of values in constant memory.
+//!
+//! Values are counted in bins, 128 in each octave from 2⁻⁴⁰ to 2²⁴. The bin of a value is its exponent with the first seven bits of its mantissa: no
+//! logarithm, so the same bin on every machine. The middle of a bin is at most 2⁻⁸ of a value in it away from that value. Two sketches
+//! [add up](QuantileSketch::merge), and the sum is that of one sketch of all values.
+
+/// Values below this count as zero.
+const LEAST: f64 = f64::from_bits((1023 - 40) << 52);
+/// Bits of a double behind those that name its bin: all of its mantissa but seven.
+const BEHIND: u32 = 52 - 7;
+/// What those bits leave of the first bin.
+const FIRST: u64 = LEAST.to_bits() >> BEHIND;
+const BINS: usize = 64 << 7;
+
+/// The counts of all values so far.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct QuantileSketch {
+    /// 64 kB.
+    bins: Box<[u64]>,
+    /// Values below the first bin.
+    below: u64,
+    count: u64,
+}
+
+impl Default for QuantileSketch {
+    fn default() -> Self {
+        Self { bins: vec![0; BINS].into(), below: 0, count: 0 }
+    }
+}
+
+impl QuantileSketch {
+    /// Counts a value. One below 2⁻⁴⁰, or below zero, counts as zero; one of 2²⁴ or more, and a NaN, as infinite.
+    #[inline]
+    pub fn insert(&mut self, value: f64) {
+        self.count += 1;
+        if value < LEAST {
+            self.below += 1;
+            return;
+        }
+        let bin = usize::try_from((value.to_bits() >> BEHIND).wrapping_sub(FIRST)).unwrap_or(usize::MAX);
+        if let Some(bin) = self.bins.get_mut(bin) {
+            *bin += 1;
+        }
+    }
+
+    /// Adds the values of another sketch.
+    pub fn merge(&mut self, other: &Self) {
+        for (bin, more) in self.bins.iter_mut().zip(&other.bins) {
+            *bin += more;
+        }
+        self.below += other.below;
+        self.count += other.count;
+    }
+
+    /// How many values there are.
+    #[must_use]
+    pub const fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The quantile of a number p of per cent: the ⌈p·n/100⌉-th smallest of n values, counted from 1, off by at most 2⁻⁸ of itself. `None` of no value.
+    #[must_use]
+    pub fn quantile(&self, percent: u64) -> Option<f64> {
+        if self.count == 0 {
+            return None;
+        }
+        let rank = (u128::from(percent) * u128::from(self.count)).div_ceil(100).max(1);
+        let mut below = u128::from(self.below);
+        if below >= rank {
+            return Some(0.0);
+        }
+        for (bin, count) in (FIRST..).zip(&self.bins) {
+            below += u128::from(*count);
+            if below >= rank {
+                return Some(f64::from_bits(bin << BEHIND | 1 << (BEHIND - 1)));
+            }
+        }
+        Some(f64::INFINITY)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const END: f64 = 16_777_216.0;
+
+    fn sketch(values: &[f64]) -> QuantileSketch {
+        let mut sketch = QuantileSketch::default();
+        values.iter().for_each(|value| sketch.insert(*value));
+        sketch
+    }
+
+    /// Values over all octaves and beyond both ends, many of them equal.
+    fn values() -> impl Strategy<Value = Vec<f64>> {
+        let value = prop_oneof![
+            8 => (-45.0..26.0_f64).prop_map(libm::exp2),
+            2 => (-45..26_i32).prop_map(|exponent| libm::ldexp(1.0, exponent)),
+            1 => Just(0.0),
+            1 => (0..20_u32).prop_map(f64::from),
+        ];
+        proptest::collection::vec(value, 1..300)
+    }
+
+    proptest! {
+        #[test]
+        fn a_quantile_is_the_value_of_its_rank_within_a_256th(mut values in values(), percent in 0..=100_u64) {
+            let found = sketch(&values).quantile(percent).unwrap();
+            values.sort_by(f64::total_cmp);
+            let rank = (percent * values.len() as u64).div_ceil(100).max(1);
+            let exact = values[usize::try_from(rank - 1).unwrap()];
+            if exact < LEAST {
+                prop_assert_eq!(found, 0.0);
+            } else if exact >= END {
+                prop_assert_eq!(found, f64::INFINITY);
+            } else {
+                prop_assert!((found - exact).abs() <= exact / 256.0, "{} for {}", found, exact);
+            }
+        }
+
+        #[test]
+        fn the_order_of_values_and_the_way_they_are_split_change_nothing(values in values(), at in any::<prop::sample::Index>()) {
+            let (one, other) = values.split_at(at.index(values.len()));
+            let mut merged = sketch(other);
+            merged.merge(&sketch(one));
+            prop_assert_eq!(merged.count(), values.len() as u64);
+            prop_assert_eq!(merged, sketch(&values));
+        }
+    }
+
+    #[test]
+    fn the_ends_of_the_range_are_where_they_are_said_to_be() {
+        assert_eq!(QuantileSketch::default().quantile(50), None);
+        let of = |value: f64| sketch(&[value]).quantile(50).unwrap();
+        assert_eq!((of(LEAST.next_down()), of(-1.0), of(-0.0)), (0.0, 0.0, 0.0));
+        assert_eq!(of(LEAST), LEAST * (1.0 + 1.0 / 256.0));
+        assert_eq!(of(END.next_down()), END * (1.0 - 1.0 / 512.0));
+        assert_eq!((of(END), of(f64::INFINITY), of(f64::NAN)), (f64::INFINITY, f64::INFINITY, f64::INFINITY));
+        // A bin is a 128th of its octave wide, and its lower end is in it.
+        assert_eq!(of(1.0), 1.0 + 1.0 / 256.0);
+        assert_eq!(of(1.0 + 1.0 / 128.0), 1.0 + 3.0 / 256.0);
+        assert_eq!(of((1.0_f64 + 1.0 / 128.0).next_down()), 1.0 + 1.0 / 256.0);
+    }
+}

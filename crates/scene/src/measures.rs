@@ -1,0 +1,166 @@
+//! The measures of a run: their names, units and words. `[measure]`, `[expect]`, the catalogue of keys, columns and documents follow from this list.
+
+use crate::Scene;
+
+macro_rules! registry {
+    ($($measure:ident: $scope:ident, $name:literal, $unit:literal, $about:literal;)+) => {
+        /// A measure: one number that sums a run up.
+        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+        pub enum Measure {
+            $(#[doc = concat!($about, ".")] $measure,)+
+        }
+
+        impl Measure {
+            /// Every measure, in the order in which they are shown.
+            pub const ALL: &'static [Self] = &[$(Self::$measure,)+];
+
+            /// The name, which ends in the unit. A measure of each peer stands behind the name of the peer: see [`MeasureName::text`].
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$measure => $name,)+
+                }
+            }
+
+            /// The name as a list of names shows it: with `peers.NAME.` in front where each peer has one.
+            #[must_use]
+            pub const fn pattern(self) -> &'static str {
+                match self {
+                    $(Self::$measure => pattern!($scope, $name),)+
+                }
+            }
+
+            /// The unit.
+            #[must_use]
+            pub const fn unit(self) -> &'static str {
+                match self {
+                    $(Self::$measure => $unit,)+
+                }
+            }
+
+            /// Its meaning, without the last full stop.
+            #[must_use]
+            pub const fn about(self) -> &'static str {
+                match self {
+                    $(Self::$measure => $about,)+
+                }
+            }
+
+            /// Whether each peer has one, or the run as a whole.
+            #[must_use]
+            pub const fn scope(self) -> Scope {
+                match self {
+                    $(Self::$measure => Scope::$scope,)+
+                }
+            }
+        }
+    };
+}
+
+macro_rules! pattern {
+    (Run, $name:literal) => {
+        $name
+    };
+    (Peer, $name:literal) => {
+        concat!("peers.NAME.", $name)
+    };
+}
+
+/// What a measure is about.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Scope {
+    /// The run as a whole.
+    Run,
+    /// One peer.
+    Peer,
+}
+
+registry! {
+    DiscrepancyRms: Run, "discrepancy_rms_m", "m", "Root mean square over instants of the discrepancy, the largest distance along an axis between two copies";
+    DiscrepancyP50: Run, "discrepancy_p50_m", "m", "Median over instants of the discrepancy";
+    DiscrepancyP95: Run, "discrepancy_p95_m", "m", "Quantile of 95 % over instants of the discrepancy";
+    DiscrepancyP99: Run, "discrepancy_p99_m", "m", "Quantile of 99 % over instants of the discrepancy";
+    Travel: Run, "travel_s", "s", "First tick at which a copy is measure.travel.distance away from its beginning; no value if it never is";
+    Settling: Run, "settling_s", "s", "Instant after the last one with a discrepancy above measure.band, 0 if there is none; no value if it is above at the end";
+    ForcePeak: Run, "force_peak_n", "N", "Largest component of the coordination force F_T, over peers and ticks";
+    ForceRms: Run, "force_rms_n", "N", "Root mean square of the components of F_T, over peers and ticks";
+    ForceJump: Run, "force_jump_n", "N", "Largest change of a component of F_T from a tick to the next one of the same peer";
+    FeltPeak: Run, "felt_peak_n", "N", "Largest component of the coupling force F_C, over peers and ticks";
+    FeltRms: Run, "felt_rms_n", "N", "Root mean square of the components of F_C, over peers and ticks";
+    FeltJump: Run, "felt_jump_n", "N", "Largest change of a component of F_C from a tick to the next one of the same peer";
+    Energy: Run, "energy_j", "J", "Energy that the coordination has injected into all copies by the end: the work of its held forces less the loss in its damping";
+    EnergyPeak: Run, "energy_peak_j", "J", "Largest value of that energy after any instant, at least 0";
+    PeerEnergy: Peer, "energy_j", "J", "Part of that energy which was injected into the copy of this peer";
+    Viscosity: Run, "viscosity_n_s_m", "N·s/m", "Real part of the impedance that the hand of the probe meets at its frequency, over the second half of the scene";
+    EffectiveMass: Run, "effective_mass_kg", "kg", "Imaginary part of that impedance by the angular frequency";
+    PacketRate: Run, "packets_per_s", "1/s", "Packets that all peers offer to the network a second";
+    BitRate: Run, "sent_bits_per_s", "bit/s", "Bits of the datagrams in these packets a second";
+    AgeMean: Run, "age_mean_s", "s", "Mean age of held samples, tick less sampling, over ticks and pairs of peers from the first arrival on";
+    AgeP99: Run, "age_p99_s", "s", "Quantile of 99 % of that age";
+}
+
+/// A measure of a scene: of the run, or of one of its peers.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub struct MeasureName {
+    /// The measure.
+    pub measure: Measure,
+    /// The peer, by its place in [`Scene::peers`]; `None` for a measure of the run.
+    pub peer: Option<usize>,
+}
+
+impl MeasureName {
+    /// Every measure of a scene with this number of peers, in order.
+    #[must_use]
+    pub fn all(peers: usize) -> Vec<Self> {
+        let mut names = Vec::new();
+        for &measure in Measure::ALL {
+            match measure.scope() {
+                Scope::Run => names.push(Self { measure, peer: None }),
+                Scope::Peer => names.extend((0..peers).map(|peer| Self { measure, peer: Some(peer) })),
+            }
+        }
+        names
+    }
+
+    /// As documents and columns have it: `energy_j`, `peers.left.energy_j`.
+    ///
+    /// # Panics
+    ///
+    /// If the scene has no such peer.
+    #[must_use]
+    pub fn text(self, scene: &Scene) -> String {
+        match self.peer {
+            None => self.measure.name().to_owned(),
+            Some(peer) => self.measure.of_peer(&scene.peers[peer].name),
+        }
+    }
+}
+
+impl Measure {
+    /// The name of a measure of that peer.
+    #[must_use]
+    pub fn of_peer(self, peer: &str) -> String {
+        format!("peers.{peer}.{}", self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn patterns_are_unique_and_names_end_in_the_unit() {
+        let patterns: BTreeSet<&str> = Measure::ALL.iter().map(|measure| measure.pattern()).collect();
+        assert_eq!(patterns.len(), Measure::ALL.len());
+        for measure in Measure::ALL {
+            let unit = match measure.unit() {
+                "1/s" => "_per_s".to_owned(),
+                "bit/s" => "_bits_per_s".to_owned(),
+                unit => format!("_{}", unit.replace(['·', '/'], "_").to_lowercase()),
+            };
+            assert!(measure.name().ends_with(&unit), "{} in {}", measure.name(), measure.unit());
+        }
+    }
+}
