@@ -78,7 +78,7 @@ fn with_what_its_strategy_can_have(mut draft: Draft) -> Draft {
     draft
 }
 
-/// [`anything`] with that many peers.
+/// [`anything`] with this number of peers.
 pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Value = Draft> {
     (peers, 1..=3_usize).prop_flat_map(|(count, axes)| {
         let header = (30..200_u64, any::<u32>(), 0.05..2.0, 0.0..2.0, any::<bool>(), option::weighted(0.3, walls()));
@@ -133,7 +133,7 @@ pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Valu
     })
 }
 
-/// Scenes of one shape that need no events, if nobody watches: that many of them, with equal peers, ticks and durations. Everything else may differ, in half of
+/// Scenes of one shape that need no events, if nobody watches: this number of them, with equal peers, ticks and durations. Everything else may differ, in half of
 /// the cases even the links.
 pub fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<Draft>> {
     let counts = prop_oneof![3 => 2..=5_usize, 1 => 6..=11_usize];

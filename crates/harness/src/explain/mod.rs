@@ -47,7 +47,7 @@ pub struct Dimensions {
     pub in_flight: u64,
 }
 
-/// The estimated cost of a run, from the speeds in `docs/speed.md`.
+/// The estimated cost of a run, from the speeds in `docs/measured-speed.md`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Cost {
     /// Control ticks of all peers in a simulated second.
@@ -62,7 +62,7 @@ pub struct Cost {
 }
 
 /// Nanoseconds for a control tick of one peer with one axis, for a packet over a link of constant delay, and for one over a link with more
-/// impairments: see `docs/speed.md`.
+/// impairments: see `docs/measured-speed.md`.
 struct Nanos {
     a_tick: f64,
     a_packet: f64,

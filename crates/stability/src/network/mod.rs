@@ -35,7 +35,7 @@ pub(crate) struct NominalNetwork {
     /// The different timings, each used.
     timings: Vec<LinkTiming>,
     places: Places,
-    /// What is nominal, in words.
+    /// The nominal parts, in words.
     pub(crate) notes: Vec<String>,
 }
 
