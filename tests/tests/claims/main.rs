@@ -26,6 +26,7 @@ mod local_damping;
 mod paper;
 mod passivity_control;
 mod regions;
+mod send_when;
 mod set_position;
 mod settling;
 mod stiffness;

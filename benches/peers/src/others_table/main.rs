@@ -1,4 +1,4 @@
-//! Writes the last part of `docs/peers-speed.md`: what others wrote in other languages, where it is installed. See `others/run`.
+//! Writes the last part of `docs/measured-peers.md`: what others wrote in other languages, where it is installed. See `others/run`.
 
 mod foreign;
 mod map;

@@ -22,7 +22,7 @@ const FIRST_LOOK: u64 = 256;
 const PENDING: u64 = u64::MAX;
 const LOST: u64 = u64::MAX - 1;
 
-/// A network and those who send through it.
+/// A network and its senders.
 pub(crate) struct Probe {
     network: Network<()>,
     nodes: usize,
