@@ -45,7 +45,6 @@ const ALONE: [(&str, &str, &str); 3] = [
     ),
 ];
 
-/// The page.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Page(BTreeMap<Step, String>);
 

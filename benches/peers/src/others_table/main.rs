@@ -27,7 +27,6 @@ fn main() {
     std::fs::remove_dir_all(&folder).expect("it is ours");
 }
 
-/// Where the scripts are.
 fn scripts() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("others")
 }

@@ -34,7 +34,6 @@ pub(crate) struct Probe {
     taken: Vec<Vec<u64>>,
 }
 
-/// A line with a rate.
 #[derive(Clone, Debug)]
 pub(crate) struct RatedLine {
     pub(crate) name: String,
