@@ -4,7 +4,7 @@
 //! f·d − ½·m·Δv² with f the sum of the held forces, β takes β/(bO + β).
 
 use cohaptic_scene::Scene;
-use cohaptic_tests::{Log, Tick};
+use cohaptic_tests::{Draft, Log, Tick};
 use proptest::prelude::*;
 
 /// The energy that the network has injected \[J\], and how far it may be from exact numbers.
@@ -66,4 +66,9 @@ pub(crate) fn stored_at_first(scene: &Scene) -> f64 {
     let pair = scene.coordination.gains.stiffness / (scene.peers.len() - 1) as f64;
     let squares = |one: &f64| scene.peers.iter().map(|other| (one - other.position[0]).powi(2)).sum::<f64>();
     scene.peers.iter().map(|one| 0.25 * pair * squares(&one.position[0])).sum()
+}
+
+/// Whether a link takes longer for a larger packet: extra numbers make samples larger.
+pub(crate) fn has_rates(draft: &Draft) -> bool {
+    draft.link.contains("rate") || draft.links.iter().any(|link| link.keys.contains("rate"))
 }
