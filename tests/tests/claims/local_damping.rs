@@ -10,10 +10,11 @@
 //! with F the spring's force held over a tick, and d what a copy moves in it. Of what all damping takes in a tick, f·d − ½·m·Δv² with f the sum of the held forces, β takes β/(bO + β).
 
 use cohaptic_harness::Model;
+use cohaptic_harness::measures::Measures;
 use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::{Law, LawValue};
-use cohaptic_scene::Scene;
-use cohaptic_tests::{Draft, Log, Tick, run};
+use cohaptic_scene::{Measure, MeasureName, MeasureSettings, MeasureSpec, Scene};
+use cohaptic_tests::{Body, Draft, Log, Tick, run};
 use proptest::prelude::*;
 
 use crate::energy::{heavy, springs};
@@ -36,10 +37,12 @@ impl Injected {
         let stored = |one: &Tick| first.iter().map(|other| 0.25 * pair * (one.object.position[0] - other.object.position[0]).powi(2)).sum::<f64>();
         let most = first.iter().map(stored).sum();
         let (mut injected, mut exchanged, mut energy) = (0.0, most, Vec::new());
-        for pair in ticks.windows(2) {
-            for (place, (now, next)) in pair[0].iter().zip(pair[1]).enumerate() {
+        for (k, row) in ticks.iter().enumerate() {
+            for (place, now) in row.iter().enumerate() {
                 let own = Law::<f64>::damping(&scene.law(place));
-                let (before, after) = (now.object, next.object);
+                let end = &log.summary.peers[place];
+                let at_end = || Body { position: [end.position[0], 0.0, 0.0], velocity: [end.velocity[0], 0.0, 0.0] };
+                let (before, after) = (now.object, ticks.get(k + 1).map_or_else(at_end, |next| next[place].object));
                 let moved = after.position[0] - before.position[0];
                 let spring = now.coordination_force[0] - own * before.velocity[0];
                 let held = now.coupling_force[0] - spring;
@@ -59,6 +62,14 @@ impl Injected {
     fn excess(&self) -> f64 {
         self.energy.iter().copied().fold(f64::MIN, f64::max) - self.most - self.rounding
     }
+}
+
+/// `energy_j` and `energy_peak_j` of the scene.
+fn measured(mut scene: Scene) -> (f64, f64) {
+    let names = [Measure::Energy, Measure::EnergyPeak].map(|measure| MeasureName { measure, peer: None }).to_vec();
+    scene.measure = Some(MeasureSpec { names, settings: MeasureSettings::default() });
+    let values = Measures::run(&scene, Model::Least).1;
+    (values[0].value.unwrap(), values[1].value.unwrap())
 }
 
 fn with_damping(draft: &mut Draft, damping: f64) {
@@ -84,6 +95,10 @@ proptest! {
         let log = run(&draft.scene(), Model::Least);
         let injected = Injected::of(&draft.scene(), &log);
         prop_assert!(injected.excess() <= 0.0, "{:e} J more than {:e} J", injected.excess(), injected.most);
+        let (energy, peak) = measured(draft.scene());
+        let largest = injected.energy.iter().copied().fold(0.0, f64::max);
+        prop_assert!((energy - injected.energy.last().unwrap()).abs() <= injected.rounding && (peak - largest).abs() <= injected.rounding);
+        prop_assert!(peak <= injected.most + injected.rounding, "the measure says what the claim does: {peak} J of {} J", injected.most);
         // The tolerance decides nothing: it is far below what moves.
         prop_assert!(injected.rounding <= 1e-6 * injected.energy.iter().copied().fold(injected.most, |most, energy| most.max(energy.abs())));
     }

@@ -74,7 +74,7 @@ fn force(scene: &Scene, log: &Log, of: impl Fn(&Tick) -> Place) -> (Vec<f64>, Ve
     (all, changes)
 }
 
-/// The energy that the coordination injects, and how far it may be from what is measured.
+/// The energy that the coordination injects, and how far it may be from the measure.
 struct Energy {
     /// After each instant \[J\].
     injected: Vec<f64>,
@@ -110,19 +110,20 @@ fn energy(scene: &Scene, log: &Log) -> Energy {
             let computed = Held { coordination: spring, all: std::array::from_fn(|axis| tick.coupling_force[axis] - spring[axis] + walls[axis]) };
             let applied = if scene.peers[peer].compute_delay { std::mem::replace(&mut late[peer], computed) } else { computed };
             let copy = scene.copy_config(peer);
+            let mut work = 0.0;
             for axis in 0..axes {
                 let moved = after.position[axis] - before.position[axis];
                 let kinetic = 0.5 * copy.mass * (after.velocity[axis].powi(2) - before.velocity[axis].powi(2));
                 let damped = if own > 0.0 { own / copy.damping * (applied.all[axis] * moved - kinetic) } else { 0.0 };
-                let work = -applied.coordination[axis] * moved - damped;
-                sum += work;
-                energy.peers[peer] += work;
+                work -= applied.coordination[axis] * moved + damped;
                 let squares = copy.mass * (after.velocity[axis].powi(2) + before.velocity[axis].powi(2));
                 let forces =
                     applied.coordination[axis].abs() + applied.all[axis].abs() + tick.coupling_force[axis].abs() + own * before.velocity[axis].abs();
                 // A sum of so many terms, each of some roundings.
                 energy.rounding += 1e-13 * (forces * moved.abs() + squares);
             }
+            sum += work;
+            energy.peers[peer] += work;
         }
         energy.injected.push(sum);
     }
@@ -154,8 +155,8 @@ fn sent(scene: &Scene, log: &Log) -> (u64, u64) {
         ticks.saturating_sub(u128::from(scene.peers[peer].phase)).div_ceil(every)
     };
     let packets = (0..scene.peers.len()).map(|peer| u64::try_from(sends(peer)).unwrap() * others).sum();
-    // docs/wire-format.md: 32 bytes and 16 for each axis.
-    (packets, packets * (32 + 16 * scene.axes.count() as u64))
+    // docs/wire-format.md: 48 bytes and 16 for each axis.
+    (packets, packets * (48 + 16 * scene.axes.count() as u64))
 }
 
 /// Equal, or off by at most `error`; a value that is no number is no value.
