@@ -52,7 +52,7 @@ pub(crate) struct RadiusScratch {
 struct Bodies {
     object: Plant,
     device: Plant,
-    law: BuiltIn,
+    law: Option<BuiltIn>,
     /// Of a device that touches nothing.
     loose: Option<Radius>,
 }

@@ -3,8 +3,8 @@
 #[cfg(test)]
 mod links;
 
-use cohaptic_peer::coordination::{Law, LawForm, LawValue, Pull, UsedGains};
-use cohaptic_peer::{Contact, Hand, Integrator, wire};
+use cohaptic_peer::coordination::{LawValue, Pull, UsedGains};
+use cohaptic_peer::{Contact, Hand, Integrator};
 use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
@@ -181,19 +181,22 @@ impl Rows {
             match (spec.settings.of(spec.strategy).get(place), parameter.form) {
                 (LawValue::Automatic, _) => model.push_str("auto"),
                 (LawValue::Duration(span), _) => model.push_str(&Span(span).to_string()),
-                (LawValue::Number(number), LawForm::AutomaticDamping) => model.push_str(&format!("{} N·s/m", Number(number))),
-                (LawValue::Number(number), LawForm::Duration | LawForm::AutomaticDuration) => model.push_str(&Number(number).to_string()),
+                (LawValue::Number(number), form) => model.push_str(&format!("{} {}", Number(number), form.unit())),
+                (LawValue::Word(word), form) => model.push_str(form.word(word)),
+                (LawValue::Place(peer), _) => model.push_str(&scene.peers[peer].name),
             }
         }
-        let damping = Law::<f64>::damping(&scene.law(0));
+        let damping = scene.own_damping(0);
         if damping > 0.0 {
             model.push_str(&format!("; each copy is damped by another {} N·s/m", Number(damping)));
         }
-        if spec.strategy.gains() == UsedGains::Stiffness && gains.damping > 0.0 {
-            model.push_str("; BT is not used");
+        match spec.strategy.gains() {
+            UsedGains::Stiffness if gains.damping > 0.0 => model.push_str("; BT is not used"),
+            UsedGains::Neither => model.push_str("; KT and BT are not used"),
+            UsedGains::Stiffness | UsedGains::Both => {}
         }
         self.model("coordination", model, format!("gains {scaling}{pull}; the mean of the samples held is kept until one changes"));
-        let len = wire::datagram_len(scene.axes.count());
+        let len = scene.sample_kind().datagram_len(scene.axes.count());
         self.model(
             "samples",
             format!("{len} bytes to each other peer every {}", Span(spec.update)),

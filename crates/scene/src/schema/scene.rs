@@ -1,7 +1,7 @@
 //! The keys of a scene.
 
 use cohaptic_peer::Coordination;
-use cohaptic_peer::coordination::{LawForm, LawValues};
+use cohaptic_peer::coordination::{LawForm, LawParameter, LawValues};
 use cohaptic_wan::DropCause;
 use cohaptic_wan::parameters::Quantity;
 
@@ -13,7 +13,8 @@ use cohaptic_linkfile::schema::{
 
 use crate::measures::{Measure, Scope};
 use crate::quantities::{
-    ADDED_MASS, ANGLE, DAMPING, DISTANCE, FORCE, FREQUENCY, MASS, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS, VELOCITY, WALL_STIFFNESS,
+    ADDED_MASS, ANGLE, DAMPING, DISTANCE, ENERGY, FORCE, FREQUENCY, IMPEDANCE, MASS, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS, VELOCITY,
+    WALL_STIFFNESS,
 };
 
 const MOST: u64 = i64::MAX.unsigned_abs();
@@ -86,6 +87,11 @@ const fn form_of(form: LawForm) -> Form {
         LawForm::Duration => Form::Duration,
         LawForm::AutomaticDuration => Form::AnyOf(const { &[Form::Words(&AUTOMATIC), Form::Duration] }),
         LawForm::AutomaticDamping => Form::AnyOf(const { &[Form::Words(&AUTOMATIC), number(DAMPING)] }),
+        LawForm::Damping => number(DAMPING),
+        LawForm::Impedance => number(IMPEDANCE),
+        LawForm::Energy => number(ENERGY),
+        LawForm::Words(words) => Form::Words(words),
+        LawForm::Peer => Form::Text,
     }
 }
 const AUTOMATIC: [(&str, &str); 1] = [("auto", "as the links of the scene ask for")];
@@ -98,7 +104,8 @@ static LAW_KEYS: [[Key; LawValues::MOST]; Coordination::ALL.len()] = {
         let parameters = Coordination::ALL[law].parameters();
         let mut place = 0;
         while place < parameters.len() {
-            keys[law][place] = usual(parameters[place].key, form_of(parameters[place].form), parameters[place].default, parameters[place].about);
+            let LawParameter { key, form, default, about } = parameters[place];
+            keys[law][place] = if default.is_empty() { optional(key, form_of(form), about) } else { usual(key, form_of(form), default, about) };
             place += 1;
         }
         law += 1;

@@ -3,13 +3,14 @@
 use core::time::Duration;
 
 use cohaptic_linkfile::document::{Node, quote};
+use cohaptic_linkfile::mesh::read_peer_name;
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue, LawValues, Pull};
 use cohaptic_peer::{Coordination, Gains, Integrator};
 
 use crate::model::{Axes, CoordinationSpec, Scaling};
-use crate::quantities::{DAMPING, STIFFNESS};
+use crate::quantities::{DAMPING, ENERGY, IMPEDANCE, STIFFNESS};
 
 /// The most peers that `count` makes: a slip of the finger must not take all memory. Each takes about two kilobytes.
 const MOST_PEERS: u64 = 1_000_000;
@@ -110,6 +111,14 @@ fn read_value(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawVal
             }
             None => DAMPING.read(node, context).map(LawValue::Number),
         },
+        LawForm::Damping => DAMPING.read(node, context).map(LawValue::Number),
+        LawForm::Impedance => IMPEDANCE.read(node, context).map(LawValue::Number),
+        LawForm::Energy => ENERGY.read(node, context).map(LawValue::Number),
+        LawForm::Words(words) => {
+            let choices: Vec<_> = words.iter().enumerate().map(|(place, (word, _))| (*word, place)).collect();
+            values::choice(node, context, &choices).map(LawValue::Word)
+        }
+        LawForm::Peer => read_peer_name(node, context).map(LawValue::Place),
     }
 }
 
