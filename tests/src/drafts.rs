@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue};
+use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
 use proptest::collection::vec;
 use proptest::option;
@@ -26,13 +27,16 @@ pub fn anything_of_the_paper() -> impl Strategy<Value = Draft> {
 
 /// A law with values for the parameters that it has of its own, up to 40 ms or 40 N·s/m.
 fn law() -> impl Strategy<Value = (Coordination, LawSettings)> {
-    (select(Coordination::ALL), 0..40_000_u32).prop_map(|(law, micros)| {
+    let laws: Vec<Coordination> = Coordination::ALL.iter().copied().filter(|strategy| strategy.kind() == SampleKind::State).collect();
+    (select(laws), 0..40_000_u32).prop_map(|(law, micros)| {
         let mut settings = LawSettings::default();
         for (place, parameter) in law.parameters().iter().enumerate() {
             let value = match parameter.form {
                 LawForm::Duration | LawForm::AutomaticDuration => LawValue::Duration(Duration::from_micros(micros.into())),
-                // Up to 40 N·s/m.
-                LawForm::AutomaticDamping => LawValue::Number(1e-3 * f64::from(micros)),
+                // Up to 40 N·s/m, and up to 40 J.
+                LawForm::AutomaticDamping | LawForm::Damping | LawForm::Impedance | LawForm::Energy => LawValue::Number(1e-3 * f64::from(micros)),
+                LawForm::Words(_) => LawValue::Word(0),
+                LawForm::Peer => LawValue::Place(0),
             };
             settings.of_mut(law).set(place, value);
         }

@@ -12,7 +12,7 @@
 use cohaptic_harness::Model;
 use cohaptic_harness::measures::Measures;
 use cohaptic_peer::Coordination;
-use cohaptic_peer::coordination::{Law, LawValue};
+use cohaptic_peer::coordination::LawValue;
 use cohaptic_scene::{Measure, MeasureName, MeasureSettings, MeasureSpec, Scene};
 use cohaptic_tests::{Body, Draft, Log, Tick, run};
 use proptest::prelude::*;
@@ -39,7 +39,7 @@ impl Injected {
         let (mut injected, mut exchanged, mut energy) = (0.0, most, Vec::new());
         for (k, row) in ticks.iter().enumerate() {
             for (place, now) in row.iter().enumerate() {
-                let own = Law::<f64>::damping(&scene.law(place));
+                let own = scene.own_damping(place);
                 let end = &log.summary.peers[place];
                 let at_end = || Body { position: [end.position[0], 0.0, 0.0], velocity: [end.velocity[0], 0.0, 0.0] };
                 let (before, after) = (now.object, ticks.get(k + 1).map_or_else(at_end, |next| next[place].object));
@@ -117,7 +117,7 @@ proptest! {
         let scene = draft.scene();
         let log = run(&scene, Model::Least);
         let bound = scene.coordination.gains.stiffness * (ages::oldest(&log, scene.peers.len()) + TICK);
-        let damping = Law::<f64>::damping(&scene.law(0));
+        let damping = scene.own_damping(0);
         prop_assert!(damping >= bound * (1.0 - 1e-12), "{damping} is below {bound}");
         prop_assert!(Injected::of(&scene, &log).excess() <= 0.0);
     }
@@ -133,7 +133,7 @@ fn one_percent_below_the_bound_the_network_injects_energy() {
         settings.set(0, damping);
         settings.set(1, LawValue::Automatic);
         let scene = draft.scene();
-        (Law::<f64>::damping(&scene.law(0)), Injected::of(&scene, &run(&scene, Model::Least)).excess())
+        (scene.own_damping(0), Injected::of(&scene, &run(&scene, Model::Least)).excess())
     };
     let (bound, at_bound) = excess(LawValue::Automatic);
     assert!((bound - 2.1).abs() < 1e-12, "{bound}");

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use cohaptic_harness::measures::Measures;
 use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_peer::State;
-use cohaptic_peer::coordination::Law;
 use cohaptic_scene::{Measure, MeasureName, MeasureSettings, MeasureSpec, MeasureTravel, Scene};
 use cohaptic_tests::{Body, Log, Place, Tick, cases, drafts, run};
 use cohaptic_units::Instant;
@@ -103,7 +102,7 @@ fn energy(scene: &Scene, log: &Log) -> Energy {
     for ticks in instants(log) {
         for tick in ticks {
             let (peer, before, after) = (tick.peer, tick.object, rows.next().unwrap());
-            let own = Law::<f64>::damping(&scene.law(peer));
+            let own = scene.own_damping(peer);
             let state = State { position: before.position, velocity: before.velocity };
             let walls = scene.object.enclosure.map_or([0.0; 3], |enclosure| enclosure.force(&state));
             let spring: Place = std::array::from_fn(|axis| tick.coordination_force[axis] - own * before.velocity[axis]);
@@ -240,7 +239,7 @@ proptest! {
         let log = run(&scene, Model::Least);
         let found = values(&measuring(scene.clone(), MeasureSettings::default()), Model::Least);
         let Energy { injected, peers, rounding } = energy(&scene, &log);
-        let own = (0..peers.len()).any(|peer| Law::<f64>::damping(&scene.law(peer)) > 0.0);
+        let own = (0..peers.len()).any(|peer| scene.own_damping(peer) > 0.0);
         let error = if own { rounding } else { 0.0 };
         let at_end = injected.last().copied().unwrap_or(0.0);
         let energy = found[&MeasureName { measure: Measure::Energy, peer: None }];

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use cohaptic_peer::coordination::{LawSettings, LawValue};
+use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue};
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
 use cohaptic_scene::{Scene, SceneError};
 
@@ -196,6 +196,11 @@ impl Draft {
             LawValue::Automatic => "\"auto\"".to_owned(),
             LawValue::Duration(duration) => format!("\"{}ns\"", duration.as_nanos()),
             LawValue::Number(number) => format!("{number:?}"),
+            LawValue::Word(word) => match self.strategy.parameters()[place].form {
+                LawForm::Words(words) => format!("\"{}\"", words[word].0),
+                form => unreachable!("a word is no value of {form:?}"),
+            },
+            LawValue::Place(peer) => format!("\"{}\"", self.peers[peer].name),
         };
         let own: Vec<String> =
             self.strategy.parameters().iter().enumerate().map(|(place, parameter)| format!("{} = {}", parameter.key, value(place))).collect();
