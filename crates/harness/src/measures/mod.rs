@@ -70,7 +70,7 @@ trait Accumulator: Sized {
     fn value(&self, figure: Self::Figure, peer: Option<usize>, elapsed: Duration) -> Option<f64>;
 }
 
-/// The measures that are asked for, and of which scene.
+/// The measures of a scene that are asked for.
 #[derive(Clone, Copy, Debug)]
 struct Asked<'a> {
     scene: &'a Scene,
