@@ -39,6 +39,7 @@ shipped![
     "coordination/extrapolated",
     "coordination/local-damping-throw",
     "coordination/local-damping",
+    "coordination/measures",
     "coordination/momentum",
     "coordination/n2-pd",
     "coordination/n2",

@@ -80,13 +80,17 @@ const BYTES_A_PACKET: f64 = 40.0;
 /// Says what the scene makes the program model.
 #[must_use]
 pub fn explain(scene: &Scene) -> Explanation {
-    let plan = Plan::new(scene, Model::Least, false);
+    let plan = Plan::new(scene, Model::Least, scene.measure.is_some());
     let mut rows = Rows::default();
     rows.clock_and_motion(scene, &plan);
     rows.peers(scene, &plan);
     rows.coordination(scene);
     rows.network(scene);
-    let in_arrays = Shape::of(scene, &plan, &FromScene).is_some();
+    if let Some(measure) = &scene.measure {
+        let count = Counted(measure.names.len(), "number");
+        rows.model("measures", format!("{count}, computed tick by tick"), "[measure]: the run is watched, so it has events whatever else it needs");
+    }
+    let in_arrays = scene.measure.is_none() && Shape::of(scene, &plan, &FromScene).is_some();
     if in_arrays {
         rows.model(
             "runs that nobody watches",
