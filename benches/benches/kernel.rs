@@ -58,6 +58,7 @@ fn kernels(criterion: &mut Criterion) {
         oldest: None,
         own: LawValues::default(),
     });
+    let registered = registered.expect("average-position is a law");
     group(
         criterion,
         "one peer",
