@@ -10,8 +10,10 @@ use cohaptic_benches::machine::{medians_in_turn, peak_memory, time};
 use cohaptic_benches::watched::{Onlooker, with_all_measures};
 use cohaptic_benches::{Mesh, bare};
 use cohaptic_harness::measures::Measures;
-use cohaptic_harness::{Model, Simulation, run_side_by_side};
-use cohaptic_scene::Scene;
+use cohaptic_harness::{Model, NoObserver, Simulation, run_side_by_side};
+use cohaptic_peer::Coordination;
+use cohaptic_peer::coordination::BuiltInStrategy;
+use cohaptic_scene::{FromScene, Scene, Strategies};
 
 /// What the project asks of itself in each cell of [`Mesh::ALL`]: times real time, and the largest ratio of the bare loop's speed to the program's.
 const ASKED: [(f64, f64); 6] = [(12_000.0, 2.5), (8_000.0, 2.5), (5_000.0, 1.25), (2_500.0, 1.25), (120.0, 2.5), (50.0, 2.5)];
@@ -59,6 +61,7 @@ fn main() -> Result<(), String> {
     one_run(work);
     many_runs(work);
     measured_runs(work);
+    strategies(work);
     print_memory(&memory);
     Ok(())
 }
@@ -159,6 +162,53 @@ fn measured_runs(work: Work) {
         println!("| {} | {} | {watched:.0}× | {measured:.0}× | {:.2} | {ASKED_OF_MEASURES} |", mesh.peers, mesh.links(), watched / measured);
     }
     println!();
+}
+
+/// How many times as long a tick of a strategy may take as one of average-position.
+const ASKED_OF_STRATEGIES: f64 = 1.5;
+
+/// Every strategy of the registry over events, beside average-position.
+fn strategies(work: Work) {
+    println!("## Strategies\n");
+    println!(
+        "The mesh above over constant delays, with events and nothing recorded but counters: the [strategies](model.md#strategies) with their usual parameters,"
+    );
+    println!(
+        "as multiples of the time that average-position takes; {ASKED_OF_STRATEGIES} are asked for. The median of {} rounds in which all of them alternate.\n",
+        work.rounds
+    );
+    println!("| peers | {} |", Coordination::ALL.iter().map(|strategy| strategy.name()).collect::<Vec<_>>().join(" | "));
+    println!("| ---: |{}", " ---: |".repeat(Coordination::ALL.len()));
+    for mesh in Mesh::ALL.into_iter().filter(|mesh| !mesh.impaired) {
+        let seconds = (work.seconds(mesh) / 8).max(1);
+        let scene = mesh.scene(seconds * 1000, 1);
+        let scenes: Vec<Scene> = Coordination::ALL.iter().map(|strategy| with_strategy(&scene, *strategy)).collect();
+        let run = |scene| drop(black_box(Simulation::with_strategies(scene, Model::Least, OverEvents).run(&mut NoObserver)));
+        let works: Vec<Box<dyn Fn() + '_>> = scenes.iter().map(|scene| Box::new(move || run(scene)) as Box<dyn Fn()>).collect();
+        let times = medians_in_turn(&works, work.rounds);
+        let ratios: Vec<String> = times.iter().map(|time| format!("{:.2}", time.as_secs_f64() / times[0].as_secs_f64())).collect();
+        println!("| {} | {} |", mesh.peers, ratios.join(" | "));
+    }
+    println!();
+}
+
+/// The scene with another strategy.
+fn with_strategy(scene: &Scene, strategy: Coordination) -> Scene {
+    let mut scene = scene.clone();
+    scene.coordination.strategy = strategy;
+    scene
+}
+
+/// The strategies of the registry, as if they were somebody's own: never run in arrays.
+#[derive(Clone, Copy, Debug)]
+struct OverEvents;
+
+impl Strategies for OverEvents {
+    type Strategy<const A: usize> = BuiltInStrategy<A>;
+
+    fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> BuiltInStrategy<A> {
+        FromScene.strategy(scene, peer)
+    }
 }
 
 /// Name, processor time, and the most memory so far.
