@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use cohaptic_scene::Measure;
 use serde_json::Value;
 
-use super::{WRITTEN, entry, prose, table};
+use super::{WRITTEN, entry, prose};
 use crate::folder::Folder;
 
 const INTRODUCTION: &str = "\
