@@ -21,6 +21,7 @@ mod healing;
 mod joining;
 mod jumps;
 mod local_damping;
+mod local_lag;
 mod paper;
 mod regions;
 mod settling;

@@ -47,7 +47,7 @@ pub(super) const SCENES: [&str; 3] = [
     r#"
     scene = { duration = "4s", count = 8 }
     object = { mass = 1 }
-    coordination = { strategy = "average-position", stiffness = 1, update = "8ms", pull = "sum", smoothed-average-position = {}, extrapolated = {}, local-damping = { age = "1ms" } }
+    coordination = { strategy = "average-position", stiffness = 1, update = "8ms", pull = "sum", smoothed-average-position = {}, extrapolated = {}, local-damping = { age = "1ms" }, local-lag = { lag = "auto" } }
     peer = { device = { mass = 1 }, contact = "none" }
     link = { rate = "1Mbit", queue = { limit = "64kB", discipline = { codel = {} } }, cells = { payload = "48B" } }
     links = [
