@@ -59,6 +59,7 @@ fn kernels(criterion: &mut Criterion) {
         middle: None,
         own: LawValues::default(),
     });
+    let registered = registered.expect("average-position is a law");
     group(
         criterion,
         "one peer",

@@ -1,4 +1,4 @@
-//! Writes `docs/speed.md`: `cargo run --release -p cohaptic-benches --bin speed-table > docs/speed.md`. Takes some minutes; `--quick` less.
+//! Writes `docs/measured-speed.md`: `cargo run --release -p cohaptic-benches --bin speed-table > docs/measured-speed.md`. Takes some minutes; `--quick` less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "seconds and rounds are small")]
 
@@ -7,8 +7,10 @@ use std::time::Duration;
 
 use cohaptic_benches::effort::Effort;
 use cohaptic_benches::machine::{medians_in_turn, peak_memory, time};
+use cohaptic_benches::watched::{Onlooker, with_all_measures};
 use cohaptic_benches::{Mesh, bare};
-use cohaptic_harness::run_side_by_side;
+use cohaptic_harness::measures::Measures;
+use cohaptic_harness::{Model, Simulation, run_side_by_side};
 use cohaptic_scene::Scene;
 
 /// What the project asks of itself in each cell of [`Mesh::ALL`]: times real time, and the largest ratio of the bare loop's speed to the program's.
@@ -51,11 +53,12 @@ fn main() -> Result<(), String> {
     let effort = Effort::parse(std::env::args().skip(1))?;
     let work = Work::of(effort);
     let what = "Simulated seconds per second of processor time, on one core.";
-    println!("{}", effort.head("Speed", what, "speed-table", "docs/speed.md"));
+    println!("{}", effort.head("Speed", what, "speed-table", "docs/measured-speed.md"));
     // The most memory is that of all before.
     let memory = memory(work);
     one_run(work);
     many_runs(work);
+    measured_runs(work);
     print_memory(&memory);
     Ok(())
 }
@@ -91,7 +94,7 @@ fn one_run(work: Work) {
     println!(
         "for all peers that get it, and does for several peers at once what the loop does one by one. A leaner loop, without counters, and other simulators on"
     );
-    println!("these scenes, all in one run: [peers-speed.md](peers-speed.md).");
+    println!("these scenes, all in one run: [measured-peers.md](measured-peers.md).");
     println!("The same cells as criterion benches: `cargo bench -p cohaptic-benches --bench mesh`.\n");
 }
 
@@ -126,6 +129,34 @@ fn many_runs(work: Work) {
         let speed = |time: Duration| (repetitions(mesh) * SIDE_BY_SIDE) as f64 / time.as_secs_f64();
         let (alone, together) = (speed(times[0]), speed(times[1]));
         println!("| {} | {} | {alone:.1} | {together:.1} | {:.2}× |", mesh.peers, mesh.links(), together / alone);
+    }
+    println!();
+}
+
+/// How many times as long a run may take with all measures as one that is watched.
+const ASKED_OF_MEASURES: f64 = 2.0;
+
+/// Runs with all measures beside runs that are watched.
+fn measured_runs(work: Work) {
+    println!("## Measures\n");
+    println!(
+        "The mesh above, watched by an observer that takes every tick and keeps nothing, and with all [measures](scenes.md#measure), which take more rows than"
+    );
+    println!("ticks: steps, samples held, samples sent. The median of {} rounds in which all of them alternate.\n", work.rounds);
+    println!("| peers | links | watched | all measures | ratio | asked for |");
+    println!("| ---: | --- | ---: | ---: | ---: | ---: |");
+    let seconds = |mesh: Mesh| (work.seconds(mesh) / 8).max(1);
+    let scenes = Mesh::ALL.map(|mesh| with_all_measures(mesh.scene(seconds(mesh) * 1000, 1)));
+    let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
+    for scene in &scenes {
+        works.push(Box::new(|| drop(black_box(Simulation::new(scene, Model::Least).run(&mut Onlooker)))));
+        works.push(Box::new(|| drop(black_box(Measures::run(scene, Model::Least)))));
+    }
+    let times = medians_in_turn(&works, work.rounds);
+    for (mesh, times) in Mesh::ALL.into_iter().zip(times.chunks(2)) {
+        let speed = |time: Duration| seconds(mesh) as f64 / time.as_secs_f64();
+        let (watched, measured) = (speed(times[0]), speed(times[1]));
+        println!("| {} | {} | {watched:.0}× | {measured:.0}× | {:.2} | {ASKED_OF_MEASURES} |", mesh.peers, mesh.links(), watched / measured);
     }
     println!();
 }

@@ -212,7 +212,7 @@ impl<const A: usize> Sample<A> {
     ///
     /// # Errors
     ///
-    /// [`DecodeError`] for anything but a sample of version 1 with that many axes and finite numbers. Never panics.
+    /// [`DecodeError`] for anything but a sample of version 1 with this number of axes and finite numbers. Never panics.
     #[inline]
     pub fn decode(datagram: &[u8], axes: usize) -> Result<Self, DecodeError> {
         Self::decode_as(datagram, SampleKind::State, axes).map(|(sample, _)| sample)
@@ -222,7 +222,7 @@ impl<const A: usize> Sample<A> {
     ///
     /// # Errors
     ///
-    /// [`DecodeError`] for anything but a sample of this kind with that many axes and finite numbers. Never panics.
+    /// [`DecodeError`] for anything but a sample of this kind with this number of axes and finite numbers. Never panics.
     #[inline]
     pub fn decode_as(datagram: &[u8], kind: SampleKind, axes: usize) -> Result<(Self, Extra<A>), DecodeError> {
         let Some((header, body)) = datagram.split_first_chunk::<HEADER_LEN>() else {

@@ -91,7 +91,7 @@ impl Scene {
 }
 
 impl Scaling {
-    /// What the coordination gains are multiplied by among that many peers: 4(N−1)/N² for [`Scaling::InverseN`].
+    /// What the coordination gains are multiplied by among this number of peers: 4(N−1)/N² for [`Scaling::InverseN`].
     ///
     /// Over an ideal network the difference modes of average-position coordination with split mass have the squared frequency (N/mO)·KT·N/(N−1)
     /// (Rakhsha & Constantinescu 2015, equation 6); scaled, it is 4·KT/mO for every N.
@@ -104,7 +104,7 @@ impl Scaling {
         }
     }
 
-    /// What the coupling gains are multiplied by among that many peers: 2/N for [`Scaling::InverseN`].
+    /// What the coupling gains are multiplied by among this number of peers: 2/N for [`Scaling::InverseN`].
     #[must_use]
     pub fn coupling_factor(self, peers: usize) -> f64 {
         match self {

@@ -16,7 +16,7 @@ impl Scene {
     /// ticks from sample to sample.
     ///
     /// `None` where the links bound no such age or do not keep it: anything but constant delays and patterns of lost packets, changes of links in the
-    /// timeline, peers whose clocks differ.
+    /// timeline, peers whose clocks differ, dead bands.
     #[must_use]
     pub fn oldest_sample(&self) -> Option<u64> {
         let clock = self.lasting_clock()?;
@@ -40,8 +40,8 @@ impl Scene {
     /// How many ticks old a sample is in the middle of its use: ⌈delay/Tc⌉ + ⌊(M − 1)/2⌋, with M ticks from sample to sample. Of ticks in which an older
     /// sample is in use there are then as many as of those in which a younger one is, or one more.
     ///
-    /// `None` where that is not the same for all samples: links that do anything but delay, all alike, lines of peers, changes of links in the timeline,
-    /// peers whose clocks differ.
+    /// `None` where that is not the same for all samples: links that do anything but delay, all alike, lines of peers, samples that are not sent, changes of links in the
+    /// timeline, peers whose clocks differ.
     #[must_use]
     pub fn middle_age(&self) -> Option<u64> {
         let clock = self.lasting_clock()?;
@@ -57,12 +57,14 @@ impl Scene {
         ticks.checked_add(update.saturating_sub(1) / 2)
     }
 
-    /// The clock of all peers, if they have one and the timeline does not change links.
+    /// The clock of all peers, if they have one, send every sample, and the timeline does not change links.
     fn lasting_clock(&self) -> Option<Clock> {
         let clock = self.peers[0].clock;
         let is_link_change = |what: &ChangeKind| matches!(what, ChangeKind::Link(_) | ChangeKind::AllLinks(_));
+        // A sample that is not sent leaves the one before it in use.
+        let thinned = self.coordination.send_when.is_some();
         let differs = self.peers.iter().any(|peer| peer.clock != clock);
-        (!differs && !self.timeline.iter().any(|change| is_link_change(&change.what))).then_some(clock)
+        (!thinned && !differs && !self.timeline.iter().any(|change| is_link_change(&change.what))).then_some(clock)
     }
 
     /// After how many ticks a sample is in use that is on its way for `delay`, and how many ticks there are from sample to sample.

@@ -11,6 +11,9 @@ impl Scene {
         let (predicts, exchanges_waves, modulates) =
             (strategy == Coordination::PassivityControl, strategy == Coordination::Wave, strategy == Coordination::SetPosition);
         let refuse = |why: &str| Some(format!("the strategy {} {why}", strategy.name()));
+        if self.coordination.send_when.is_some() && (exchanges_waves || strategy == Coordination::ClientServer) {
+            return refuse("needs every sample: expected no send-when");
+        }
         if (predicts || exchanges_waves || modulates) && self.peers.iter().any(|peer| peer.compute_delay) {
             return refuse("counts the energy of forces that act at once: expected no peer with a compute-delay of 1");
         }

@@ -48,6 +48,11 @@ pub enum AnalysisError {
         /// Its name.
         strategy: &'static str,
     },
+    /// Not all samples are sent.
+    #[error(
+        "with coordination.send-when a sample depends on how far things have moved, which is not linear: simulations tell whether the scene is stable"
+    )]
+    DeadBands,
     /// Ages of samples between clocks that differ.
     #[error(
         "{strategy} coordination uses the ages of samples, which do not repeat where clocks differ: expected one tick, offset and drift for all peers"

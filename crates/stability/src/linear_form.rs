@@ -227,7 +227,7 @@ mod tests {
     #[test]
     fn the_gains_of_both_laws_come_out_to_the_bit() {
         let gains = Gains { stiffness: 1234.567, damping: 0.1 };
-        let pull = |coordination: Coordination| LinearLaw::of(&coordination.law(&parameters(gains))).unwrap().pull();
+        let pull = |coordination: Coordination| LinearLaw::of(&coordination.law(&parameters(gains)).unwrap()).unwrap().pull();
         assert_eq!(pull(Coordination::AveragePosition), Some(gains));
         assert_eq!(pull(Coordination::ProportionalDerivative), Some(Gains { stiffness: 2.0 * 1234.567, damping: 0.2 }));
     }
@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn gains_beyond_all_numbers_are_still_a_pull() {
         let gains = Gains { stiffness: f64::MAX, damping: 0.0 };
-        let law = Coordination::ProportionalDerivative.law(&parameters(gains));
+        let law = Coordination::ProportionalDerivative.law(&parameters(gains)).unwrap();
         assert_eq!(LinearLaw::of(&law).unwrap().pull(), Some(Gains { stiffness: f64::INFINITY, damping: 0.0 }));
     }
 

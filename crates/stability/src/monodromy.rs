@@ -56,10 +56,7 @@ pub enum StateKind {
     /// The force on the copy that acts next, if forces are applied a tick late.
     PendingForce { axis: usize },
     /// A number that the strategy remembers.
-    Memory {
-        /// Which.
-        number: usize,
-    },
+    Memory { number: usize },
     /// Where the copy was at an earlier sampling.
     SamplePosition {
         axis: usize,
@@ -71,6 +68,14 @@ pub enum StateKind {
         axis: usize,
         /// See above.
         age: usize,
+    },
+    /// The force that a server computed for a client at an earlier sampling.
+    SampleForce {
+        axis: usize,
+        /// See above.
+        age: usize,
+        /// The place of the client.
+        receiver: usize,
     },
 }
 
@@ -87,6 +92,7 @@ impl fmt::Display for StateKind {
             Self::Memory { number } => write!(f, "memory {number} of the strategy"),
             Self::SamplePosition { axis: a, age } => write!(f, "position {} sampled {age} before", axis(a)),
             Self::SampleVelocity { axis: a, age } => write!(f, "velocity {} sampled {age} before", axis(a)),
+            Self::SampleForce { axis: a, age, receiver } => write!(f, "force {} for peer {receiver} sampled {age} before", axis(a)),
         }
     }
 }

@@ -103,6 +103,7 @@ fn description(setup: &Setup) -> Description {
         links: setup.pairs.iter().copied().map(link).collect(),
         peers: Vec::new(),
         clocks: vec!["release".to_owned()],
+        measures: Vec::new(),
     }
 }
 
@@ -124,6 +125,7 @@ fn snapshot(view: &View<'_>, pairs: &[(NodeId, NodeId)], tolerance: Tolerance) -
         links: links.iter().zip(pairs).map(|(report, (from, to))| link(report, view.recent_delays(*from, *to))).collect(),
         peers: Vec::new(),
         refused: refused(view, &links),
+        measures: Vec::new(),
     }
 }
 
@@ -132,16 +134,9 @@ fn link(report: &LinkReport, recent: &[Duration]) -> LinkCounters {
 }
 
 fn refused(view: &View<'_>, links: &[LinkReport]) -> Vec<(&'static str, u64)> {
-    let intake = view.intake();
     let undeliverable = links.iter().map(|link| link.counts.undeliverable).sum();
-    let all = [
-        ("stranger", intake.strangers),
-        ("to-itself", intake.to_itself),
-        ("no-room", intake.no_room),
-        ("overload", intake.overload),
-        ("undeliverable", undeliverable),
-    ];
-    all.into_iter().filter(|(_, count)| *count > 0).collect()
+    let all = answer::refused(view.intake()).into_iter().chain([("undeliverable", undeliverable)]);
+    all.filter(|(_, count)| *count > 0).collect()
 }
 
 #[cfg(test)]

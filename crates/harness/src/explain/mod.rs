@@ -4,7 +4,7 @@
 mod links;
 
 use cohaptic_peer::coordination::{Law, LawValue, Pull, UsedGains};
-use cohaptic_peer::{Contact, Hand, Integrator};
+use cohaptic_peer::{Contact, Hand, Integrator, SendWhen};
 use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
@@ -47,7 +47,7 @@ pub struct Dimensions {
     pub in_flight: u64,
 }
 
-/// The estimated cost of a run, from the speeds in `docs/speed.md`.
+/// The estimated cost of a run, from the speeds in `docs/measured-speed.md`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Cost {
     /// Control ticks of all peers in a simulated second.
@@ -62,7 +62,7 @@ pub struct Cost {
 }
 
 /// Nanoseconds for a control tick of one peer with one axis, for a packet over a link of constant delay, and for one over a link with more
-/// impairments: see `docs/speed.md`.
+/// impairments: see `docs/measured-speed.md`.
 struct Nanos {
     a_tick: f64,
     a_packet: f64,
@@ -80,13 +80,17 @@ const BYTES_A_PACKET: f64 = 40.0;
 /// Says what the scene makes the program model.
 #[must_use]
 pub fn explain(scene: &Scene) -> Explanation {
-    let plan = Plan::new(scene, Model::Least, false);
+    let plan = Plan::new(scene, Model::Least, scene.measure.is_some());
     let mut rows = Rows::default();
     rows.clock_and_motion(scene, &plan);
     rows.peers(scene, &plan);
     rows.coordination(scene);
     rows.network(scene);
-    let in_arrays = Shape::of(scene, &plan, &FromScene).is_some();
+    if let Some(measure) = &scene.measure {
+        let count = Counted(measure.names.len(), "number");
+        rows.model("measures", format!("{count}, computed tick by tick"), "[measure]: the run is watched, so it has events whatever else it needs");
+    }
+    let in_arrays = scene.measure.is_none() && Shape::of(scene, &plan, &FromScene).is_some();
     if in_arrays {
         rows.model(
             "runs that nobody watches",
@@ -201,7 +205,7 @@ impl Rows {
         let len = scene.sample_kind().datagram_len(scene.axes.count());
         self.model(
             "samples",
-            format!("{len} bytes to each other peer every {}", Span(spec.update)),
+            format!("{len} bytes to each other peer every {}{}", Span(spec.update), dead_bands(spec.send_when.as_ref())),
             "encoded, sent and decoded as they would be live",
         );
     }
@@ -315,4 +319,15 @@ fn cost(scene: &Scene, nanos: &Nanos) -> Cost {
 #[expect(clippy::cast_precision_loss, reason = "counts of links and axes are far below 2^53")]
 fn count_f64(count: u64) -> f64 {
     count as f64
+}
+
+/// When samples are sent, if not always, in words that go on.
+fn dead_bands(when: Option<&SendWhen>) -> String {
+    let Some(SendWhen { velocity, position, heartbeat }) = when else { return String::new() };
+    let conditions = [
+        velocity.map(|part| format!("the velocity has changed by {} %", Number(part * 100.0))),
+        position.map(|distance| format!("the copy is {} m from where receivers hold it", Number(distance))),
+        heartbeat.map(|span| format!("{} have passed", Span(span))),
+    ];
+    format!(", if {}", conditions.into_iter().flatten().collect::<Vec<_>>().join(" or "))
 }

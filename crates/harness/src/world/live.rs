@@ -243,7 +243,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
     }
 }
 
-/// The sample of the peer in that place of so many.
+/// The sample of the peer in that place among all peers.
 fn read_sample<const A: usize>(
     datagram: &[u8],
     kind: SampleKind,

@@ -5,9 +5,9 @@ mod remote;
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::Role;
+use cohaptic_peer::coordination::{Law, Role};
 use cohaptic_peer::wire::{Extra, SampleKind};
-use cohaptic_peer::{Clock, Contact, Device, Held, ObjectCopy, Peer, Reception, RestingDevice, SimulatedDevice, State, Strategy};
+use cohaptic_peer::{Clock, Contact, Device, Held, LastSent, ObjectCopy, Peer, Reception, RestingDevice, SendWhen, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Change, ChangeKind, Scene};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
@@ -31,6 +31,8 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     datagrams: Datagrams<A>,
     /// What samples carry beyond the state.
     kind: SampleKind,
+    /// Which samples are sent, if not all, and up to which age receivers extrapolate them.
+    send_when: Option<(SendWhen, Option<f64>)>,
     /// The extra numbers of the sample that is sent.
     numbers: Vec<[f64; A]>,
     schedule: Schedule,
@@ -58,6 +60,8 @@ struct Member<const A: usize, S, D> {
     /// The tick at which it sends next, and how many ticks later again.
     next_send: u64,
     send_every: u64,
+    /// With dead bands alone.
+    last_sent: Option<LastSent<A>>,
     stale_samples: u64,
     refused_samples: u64,
     /// The held part of the coordination force that was computed at the latest tick, if steps are watched.
@@ -116,6 +120,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             names: scene.peers.iter().map(|peer| peer.name.clone()).collect(),
             latest: members.iter().map(|member| member.peer.object().state().position).collect(),
             kind: members[0].peer.kind(),
+            send_when: scene.coordination.send_when.map(|when| (when, scene.law(0).and_then(|law| Law::<f64>::horizon(&law)))),
             members,
             network: network(scene, plan),
             datagrams: Datagrams::default(),
@@ -251,6 +256,13 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             }
             member.next_send += member.send_every;
             let local_time = member.clock.local_time(member.tick);
+            if let Some((when, horizon)) = &self.send_when {
+                let own = member.peer.object().state();
+                if !when.is_due(member.last_sent.as_ref(), local_time, own, *horizon) {
+                    continue;
+                }
+                member.last_sent = Some(LastSent { at: local_time, state: *own });
+            }
             if self.kind != SampleKind::State {
                 let sent = self.send_extended(now, from, local_time);
                 if let Some((packets, size)) = sent.filter(|_| watch.sends) {
@@ -318,12 +330,10 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 };
                 let sample = Arriving { sample: self.datagrams.sample(event.payload), kind: self.kind, extra, axes: self.axes };
                 match self.remote.receive(now, &event, &sample, &mut receiver.peer) {
-                    None => {}
-                    Some(Ok(Reception::Newest)) => {
-                        if watch.holds {
-                            observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
-                        }
+                    Some(Ok(Reception::Newest)) if watch.holds => {
+                        observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
                     }
+                    None | Some(Ok(Reception::Newest)) => {}
                     Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
                     Some(Err(_)) if event.damage.is_some() => receiver.refused_samples += 1,
                     Some(Err(error)) => unreachable!("peers of one scene understand each other: {error}"),
@@ -532,6 +542,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
             tick: 0,
             next_send: spec.phase,
             send_every: u64::try_from(send_every).unwrap_or(u64::MAX),
+            last_sent: None,
             stale_samples: 0,
             refused_samples: 0,
             commanded: [0.0; A],

@@ -52,7 +52,7 @@ pub(super) trait ControllerKind<const A: usize> {
 /// Adds what an energy that only grows has grown by since it was heard last. One that has fallen begins a new life of its sender, from 0.
 pub(super) fn hear_energy<const A: usize>(sum: &mut [f64; A], newest: &mut [f64; A], heard: &[f64; A]) {
     for axis in 0..A {
-        // What is below zero was damaged on the way.
+        // An energy below zero was damaged on the way.
         let heard = heard[axis].max(0.0);
         sum[axis] += if heard >= newest[axis] { heard - newest[axis] } else { heard };
         newest[axis] = heard;

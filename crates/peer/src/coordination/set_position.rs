@@ -2,7 +2,7 @@
 //!
 //! Lee & Huang (2010), with a switch at each tick. Each axis is by itself. The copy has the damping bO + β, of whose work an energy tank E gets what the
 //! held force does not lose by being held, (β/h − KT/2)·d² a tick with d the motion of the copy in it. At a tick the spring KT to the set-position y
-//! becomes one to the mean of the others as far as S = E + KT/2·(x − y)² allows: y is the mean within r = √(2·S/KT) of x, and E is what is left. Above
+//! becomes one to the mean of the others as far as S = E + KT/2·(x − y)² allows: y is the mean within r = √(2·S/KT) of x, and E is the rest. Above
 //! its ceiling the tank flows over into an energy e that samples carry, and that each of the others gets a share of.
 
 use alloc::vec;

@@ -63,14 +63,20 @@ static ENCLOSURE: Table = Table::of(&[&[
 ]]);
 
 static COORDINATION: Table = Table::of(&[&GAINS_OF_ALL, LAWS.split_at(LAWS_WITH_KEYS).0]);
-const GAINS_OF_ALL: [Key; 6] = [
+const GAINS_OF_ALL: [Key; 7] = [
     required("strategy", Form::Words(&STRATEGIES), "Where each copy is drawn to"),
     required("stiffness", number(STIFFNESS), "Gain on the difference of positions, K_T"),
     usual("damping", number(DAMPING), "0", "Gain on the difference of velocities, B_T"),
     required("update", Form::Duration, "How often each peer sends a sample; a whole multiple of every peer's tick"),
+    optional("send-when", Form::Table(&SEND_WHEN), "Which of these samples are sent; without it all"),
     usual("scaling", Form::Words(&SCALINGS), "\"none\"", "How both gains follow the number of peers"),
     usual("pull", Form::Words(&PULLS), "\"mean\"", "Whether both gains count once, or once for each other peer"),
 ];
+static SEND_WHEN: Table = Table::of(&[&[
+    optional("velocity", Form::Probability, "The velocity differs from the one sent last by this part of its size, below 100%"),
+    optional("position", number(DISTANCE), "The copy is that far from where receivers hold it"),
+    optional("heartbeat", Form::Duration, "That much time has passed since the last sample"),
+]]);
 const PULLS: [(&str, &str); 2] = [("mean", "once"), ("sum", "times N-1 among N peers; average-position is proportional-derivative then")];
 const STRATEGIES: [(&str, &str); Coordination::ALL.len()] = {
     let mut words = [("", ""); Coordination::ALL.len()];

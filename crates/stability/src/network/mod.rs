@@ -35,7 +35,7 @@ pub(crate) struct NominalNetwork {
     /// The different timings, each used.
     timings: Vec<LinkTiming>,
     places: Places,
-    /// What is nominal, in words.
+    /// The nominal parts, in words.
     pub(crate) notes: Vec<String>,
 }
 
@@ -63,6 +63,9 @@ impl NominalNetwork {
     ///
     /// [`AnalysisError`] if what becomes of samples never repeats: a queue that is offered more than it carries, periods that do not meet.
     pub(crate) fn of(scene: &Scene) -> Result<Self, AnalysisError> {
+        if scene.coordination.send_when.is_some() {
+            return Err(AnalysisError::DeadBands);
+        }
         let size = Bytes::new(scene.sample_kind().datagram_len(scene.axes.count()) as u64);
         let access = |model: Option<&cohaptic_wan::LinkModel>| model.map(|model| Nominal::of(model, size));
         let lines = Lines {

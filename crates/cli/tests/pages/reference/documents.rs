@@ -2,14 +2,19 @@
 
 use std::collections::BTreeSet;
 
+use cohaptic_scene::Measure;
 use serde_json::Value;
 
-use super::{WRITTEN, table};
+use super::{WRITTEN, entry, prose};
 use crate::folder::Folder;
 
 const INTRODUCTION: &str = "\
-The documents of `--json`, command by command. Every document begins with `schema`, its kind, and `version` ([commands.md](commands.md#json)); the tables leave these two out. Keys end in their
-unit. A number that is not finite is `null`. Brackets, `links[]`, mark a list; `NAME` stands for any name. A row with a link has all keys of another table.
+The documents of `--json`, command by command. Every document begins with `schema`, its kind, and `version` ([commands.md](commands.md#json)); they are left out here. Keys end in their
+unit. A number that is not finite is `null`. Brackets, `links[]`, mark a list; `NAME` stands for any name. An entry with a link has all keys of another part.
+";
+
+const MEASURES: &str = "\
+The names under `measures`, of columns of a campaign, and of `[measure]` and `[expect]` in a scene. Definitions are in [model.md](model.md#measures).
 ";
 
 /// A table of keys: each row has keys that are explained together, separated by commas, and what they are.
@@ -66,7 +71,7 @@ const PARTS: [Part; 7] = [
             ("verdict, spectral_radius, error_bound", "of the linear scene that is analysed"),
             ("warning", "what the numbers must not be taken for where a verdict is not `stable`, else `null`"),
             ("object_mass_kg", "mass of the whole object"),
-            ("notes", "what is left out or taken as closed"),
+            ("notes", "parts that are left out or taken as closed"),
         ],
     },
     Part {
@@ -97,7 +102,7 @@ const DOCUMENTS: [Document; 20] = [
     Document {
         command: "run",
         lines: &[
-            "cohaptic run scenarios/network/shared-access-line.toml --against scene.seed=2 --json --out out",
+            "cohaptic run scenarios/network/shared-access-line.toml --against scene.seed=2 --measure all --json --out out",
             "cohaptic live scenarios/live/two-and-a-program.toml --for 50ms --listen 127.0.0.1:0 --no-priority --out session > said && \
              cohaptic run scenarios/live/two-and-a-program.toml --inputs session/inputs.csv --force --json",
         ],
@@ -115,6 +120,7 @@ const DOCUMENTS: [Document; 20] = [
             ("links[].from, links[].to, links[].@Counters", "by sender, then receiver"),
             ("access_lines[].peer, access_lines[].line, access_lines[].@Counters", "`line` is `uplink` or `downlink`"),
             ("max_discrepancy_m", "[discrepancy](model.md#discrepancy)"),
+            ("measures.NAME", "each [measure](#measures) that is asked for; `null` where it has no value"),
             ("files", "paths written by `--out`"),
             ("replayed_otherwise", "with `--inputs --force`: what differs from the scene of the session"),
             ("against", "the document of the second run; absent without `--against`"),
@@ -127,13 +133,13 @@ const DOCUMENTS: [Document; 20] = [
             ("scenes[].file, scenes[].passed, scenes[].failures", "in the order of the files; `failures` is a list of texts"),
             ("scenes[].expects", "whether the scene has an `[expect]`"),
             ("scenes[].notes", "what was judged in another way than with more time"),
-            ("scenes[].expectations[].expectation", "`stable`, `discrepancy`, `position`, `travel`, `loss` or `delay`"),
+            ("scenes[].expectations[].expectation", "`stable`, `discrepancy`, `position`, `travel`, `loss`, `delay` or `measures`"),
             (
                 "scenes[].expectations[].name, scenes[].expectations[].expected, scenes[].expectations[].found",
-                "what is compared, what was expected and what came out, in words",
+                "the quantity, the expected value and the outcome, in words",
             ),
             ("scenes[].expectations[].passed", "whether that is as expected"),
-            ("scenes[].expectations[].unit", "of the next three: `m`, `s` or empty"),
+            ("scenes[].expectations[].unit", "of the next three; empty for ratios"),
             (
                 "scenes[].expectations[].low, scenes[].expectations[].high",
                 "the limits or `null`. A stable scene has a radius of at most 1, an unstable one of at least 1",
@@ -146,7 +152,7 @@ const DOCUMENTS: [Document; 20] = [
         lines: &["cohaptic explain scenarios/network/ideal.toml --json"],
         rows: &[
             ("title", "of the scene"),
-            ("models[].part, models[].model, models[].reason", "what is modelled, as what, and why"),
+            ("models[].part, models[].model, models[].reason", "a part of the scene, its model, and the reason"),
             ("left_out", "list of texts"),
             ("dimensions.plant", "positions and velocities of devices and copies"),
             ("dimensions.held", "numbers in the samples held"),
@@ -174,7 +180,7 @@ const DOCUMENTS: [Document; 20] = [
                 "combinations[].verdict, combinations[].judged, combinations[].radius, combinations[].error_bound, combinations[].reason",
                 "with `--verdicts`: [verdicts](campaign.md#verdicts)",
             ),
-            ("notes", "what verdicts leave out, and what is not drawn"),
+            ("notes", "parts that verdicts leave out, and pictures that are not drawn"),
         ],
     },
     Document {
@@ -218,7 +224,7 @@ const DOCUMENTS: [Document; 20] = [
             "cohaptic stability map scenarios/network/loss-independent.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --grid 2x2 --curve object.mass=1 --out lossy --json",
         ],
         rows: &[
-            ("title, files, notes", "of the scene; what was written; what is left out"),
+            ("title, files, notes", "of the scene; the files written; the parts left out"),
             ("x_key, x_unit, x, y_key, y_unit, y", "the two keys and their values"),
             ("criterion", "`spectral-radius` or `mean-square`"),
             ("spectral_radius, mean_square_radius", "one of both: a row for each y; `null` where it is not finite"),
@@ -247,7 +253,7 @@ const DOCUMENTS: [Document; 20] = [
             ),
             ("settled", "`false` if it ended after 100000 values"),
             ("nominal", "at how many values chance is left out"),
-            ("notes, files", "what is left out; what was written"),
+            ("notes, files", "the parts left out; the files written"),
         ],
     },
     Document {
@@ -269,8 +275,9 @@ const DOCUMENTS: [Document; 20] = [
     },
     Document {
         command: "live",
-        lines: &["cohaptic live scenarios/live/two-and-a-program.toml --for 50ms --listen 127.0.0.1:0 --no-priority --json"],
+        lines: &["cohaptic live scenarios/live/two-and-a-program.toml --set measure.names=all --for 50ms --listen 127.0.0.1:0 --no-priority --json"],
         rows: &[
+            ("measures.NAME", "each [measure](#measures) of the scene; of energy, only that of copies that the session simulates"),
             ("title, duration_s, ending, ticks, max_discrepancy_m, files", "as [of a run](#run)"),
             ("valid", "whether at most one in a thousand ticks and datagrams was later than the tolerance"),
             ("late_ticks", "ticks later than the tolerance"),
@@ -463,7 +470,7 @@ const DOCUMENTS: [Document; 20] = [
             ("place", "where a text is refused, else `null`"),
             ("place.file, place.argument", "the file (`null` for an option), and the argument, such as `--set link.dlay=8ms` (`null` for a file)"),
             ("place.line, place.column, place.key", "both from 1; the dotted path or `null`"),
-            ("place.fault", "what is wrong and what was expected, in one line"),
+            ("place.fault", "the fault and the expected form, in one line"),
         ],
     },
 ];
@@ -501,7 +508,7 @@ fn shown(keys: &str) -> String {
 }
 
 fn rows(of: &[(&str, &str)]) -> String {
-    table(&["key", "value"], &of.iter().map(|(keys, about)| vec![shown(keys), (*about).to_owned()]).collect::<Vec<_>>())
+    of.iter().map(|(keys, about)| entry(&shown(keys), &[], about)).collect::<String>() + "\n"
 }
 
 /// The whole page.
@@ -514,6 +521,8 @@ pub(super) fn page() -> String {
     for part in &PARTS {
         page += &format!("### {}\n\n{}", part.name, rows(part.rows));
     }
+    page += &format!("## Measures\n\n{MEASURES}\n");
+    page.extend(Measure::ALL.iter().map(|measure| entry(&format!("`{}`", measure.pattern()), &[measure.unit()], &prose(measure.about()))));
     page.trim_end().to_owned() + "\n"
 }
 
