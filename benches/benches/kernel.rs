@@ -56,6 +56,7 @@ fn kernels(criterion: &mut Criterion) {
         peers: 3,
         tick: Duration::from_millis(1),
         oldest: None,
+        middle: None,
         own: LawValues::default(),
     });
     let registered = registered.expect("average-position is a law");

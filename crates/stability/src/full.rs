@@ -157,7 +157,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let tied = silent || (0..peers).any(|place| contacts.touching[place] && scene.device_plant(place).stiffness > 0.0);
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);
         let touching = contacts.touching.iter().copied().enumerate();
-        let time = common_time(scene, timetable.frame, linear_law(scene, 0).map_or(scene.coordination.gains, |law| law.force.own), touching, false);
+        let time = common_time(scene, timetable.frame, linear_law(scene, 0).map_or(scene.coordination.gains, |law| law.held_by()), touching, false);
         let compliance = (0..peers).map(|peer| compliance(scene, peer, time)).collect();
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
         let instants = Instants::of(&timetable, peers);
@@ -181,11 +181,11 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let events = self.timetable.events.len();
         watch.expects(full_operations(size, events, A));
         let rest = self.pushed(&vec![0.0; size], Instant::ZERO);
-        let free: Vec<usize> = (0..A).filter(|axis| self.is_free(*axis, &rest)).collect();
+        let (free, translations): (Vec<usize>, Vec<Vec<f64>>) =
+            (0..A).filter_map(|axis| self.free_translation(axis, &rest).map(|translation| (axis, translation))).unzip();
         // Relative to the first peer's copy, and without what nothing depends on.
         let reference: Vec<usize> = free.iter().map(|axis| self.layout.first[0] + 2 * A + axis).collect();
         let kept: Vec<usize> = (0..size).filter(|state| !reference.contains(state) && !self.layout.loose.contains(state)).collect();
-        let translations: Vec<Vec<f64>> = free.iter().map(|axis| self.translation(*axis)).collect();
         let mut monodromy = Matrix::zeros(kept.len(), kept.len());
         self.growth = 1.0;
         let (mut unit, mut reached) = (vec![0.0; size], vec![0.0; size]);
@@ -252,18 +252,18 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         Ok(())
     }
 
-    /// Whether everything may be moved along an axis without a force; not if an arm, or a strategy of somebody's own, knows where the origin is.
-    fn is_free(&mut self, axis: usize, rest: &[f64]) -> bool {
+    /// Everything moved by 1 m along an axis, if it may be without a force; not if an arm, or a strategy of somebody's own, knows where the origin is.
+    fn free_translation(&mut self, axis: usize, rest: &[f64]) -> Option<Vec<f64>> {
         if self.layout.tied {
-            return false;
+            return None;
         }
         let moved = self.translation(axis);
         let reached = self.pushed(&moved, Instant::ZERO);
-        moved.iter().zip(reached.iter().zip(rest)).all(|(moved, (reached, rest))| (reached - rest - moved).abs() <= 1e-9)
+        moved.iter().zip(reached.iter().zip(rest)).all(|(moved, (reached, rest))| (reached - rest - moved).abs() <= 1e-9).then_some(moved)
     }
 
     /// Everything moved by 1 m along an axis, but for devices that touch nothing.
-    fn translation(&self, axis: usize) -> Vec<f64> {
+    fn translation(&mut self, axis: usize) -> Vec<f64> {
         let mut moved = vec![0.0; self.layout.size];
         for (place, first) in self.layout.first.iter().enumerate() {
             if self.layout.touching[place] {
@@ -274,7 +274,36 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 moved[self.layout.samples[place] + age * self.layout.sample_len::<A>() + axis] = 1.0;
             }
         }
+        // Strategies may remember positions: after a tick for each number of the memory those have moved as well.
+        if self.layout.memory.iter().any(|numbers| *numbers > 0) {
+            let (at_rest, displaced) = (self.remembered(&vec![0.0; moved.len()]), self.remembered(&moved));
+            for place in 0..self.members.len() {
+                for number in self.layout.memory_of::<A>(place) {
+                    moved[number] = displaced[number] - at_rest[number];
+                }
+            }
+        }
         moved
+    }
+
+    /// The state `z` with what strategies remember where nothing has moved for as many ticks as they remember numbers.
+    fn remembered(&mut self, z: &[f64]) -> Vec<f64> {
+        self.restore(z, EARLIER);
+        // A frame may begin with nothing held that is used in it; here a sample from every peer is in use.
+        let copies: Vec<State<A>> = self.layout.first.iter().map(|first| state(&z[first + 2 * A..], self.time)).collect();
+        for (place, member) in self.members.iter_mut().enumerate() {
+            let others = copies.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
+            others.enumerate().for_each(|(other, state)| member.hold(other, EARLIER, state));
+        }
+        let mut z = z.to_vec();
+        for (place, member) in self.members.iter_mut().enumerate() {
+            let numbers = self.layout.memory_of::<A>(place);
+            for _ in numbers.clone() {
+                member.compute(Instant::ZERO);
+            }
+            z[numbers].copy_from_slice(member.strategy().memory());
+        }
+        z
     }
 
     /// Where one frame from the state `z` leads, beginning at `begin`.
@@ -434,6 +463,12 @@ impl Layout {
             layout.size += depth * layout.sample_len::<A>();
         }
         layout
+    }
+
+    /// Where the numbers stand that the strategy of a peer remembers.
+    fn memory_of<const A: usize>(&self, place: usize) -> std::ops::Range<usize> {
+        let first = self.first[place] + 4 * A + if self.pending[place] { 2 * A } else { 0 };
+        first..first + self.memory[place]
     }
 
     /// How many numbers a sample has.

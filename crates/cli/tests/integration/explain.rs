@@ -67,6 +67,16 @@ fn what_the_scene_has_is_not_left_out() {
     assert!(model(&document, "peer left").contains("grasps the object"));
 }
 
+/// 24 ms of delay, and half of the 8 ms to the next sample.
+#[test]
+fn the_age_of_own_states_is_said_in_ticks() {
+    let lagging = TWO.replace("average-position", "local-lag");
+    let coordination = |scene: &str| model(&Desk::with("two.toml", scene).json("explain two.toml --json"), "coordination").to_owned();
+    assert!(coordination(&lagging).contains("lag = auto; own states are taken 27 ticks old"), "{}", coordination(&lagging));
+    let plain = coordination(&format!("{lagging}\n[coordination.local-lag]\nlag = \"0s\"\n"));
+    assert!(plain.ends_with("lag = 0s"), "{plain}");
+}
+
 #[test]
 fn a_timeline_that_loses_packets_draws_random_numbers() {
     let timeline = "[[timeline]]\nat = \"100ms\"\nlink = \"all\"\nset = { loss = \"10%\" }\n";
