@@ -12,6 +12,7 @@ fn help_names_the_commands() {
             "check",
             "explain",
             "campaign",
+            "compare",
             "stability",
             "admittance",
             "relay",
@@ -53,6 +54,10 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
                 "--threads <N>",
                 "--part <N>",
             ],
+        ),
+        (
+            "compare",
+            &["<SCENE>", "--strategies <A,B{KEY=VALUE},...>", "--vary <KEY=VALUES>", "--preset <NAME>", "--runs <N>", "--out <DIR>", "--format <FORMAT>", "--json"],
         ),
         ("stability point", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--method <METHOD>"]),
         (
