@@ -1,4 +1,4 @@
-//! Nanoseconds a draw: tables, exact inverses and the program's own draws. `docs/samplers.md` sets them beside their errors.
+//! Nanoseconds a draw: tables, exact inverses and the program's own draws. `docs/measured-samplers.md` sets them beside their errors.
 #![allow(missing_docs, reason = "criterion's macros make public functions")]
 
 use std::time::Duration;

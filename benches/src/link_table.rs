@@ -1,4 +1,4 @@
-//! Writes `docs/link-speed.md`: `cargo run --release -p cohaptic-benches --bin link-table > docs/link-speed.md`. Takes about a minute; `--quick` less.
+//! Writes `docs/measured-link.md`: `cargo run --release -p cohaptic-benches --bin link-table > docs/measured-link.md`. Takes about a minute; `--quick` less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of packets")]
 
@@ -23,7 +23,7 @@ fn main() -> Result<(), String> {
     let work = Work { rounds: effort.of(9, 3, 1), packets: effort.of(1_000_000, 1_000_000, 20_000) };
     let Work { rounds, packets } = work;
     let what = "Packets per second of processor time through one link, on one core.";
-    println!("{}", effort.head("One link: speed", what, "link-table", "docs/link-speed.md"));
+    println!("{}", effort.head("One link: speed", what, "link-table", "docs/measured-link.md"));
     println!(
         "A steady stream of 64-byte packets 1 µs apart over 10 ms, so that 10⁴ are in flight; each is offered, and polled when it comes out. The median of"
     );

@@ -42,11 +42,11 @@ fn commit() -> Option<String> {
     Some(if changes.is_empty() { commit } else { format!("{commit} and changes") })
 }
 
-/// The day on which a page in `docs/` was last changed; `None` outside of the repository.
+/// The day on which a page in `docs/` was last written, a new name not counted; `None` outside of the repository.
 #[must_use]
 pub fn last_change(page: &str) -> Option<String> {
     let docs = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs");
-    said("git", &["-C", docs, "log", "-1", "--format=%cs", "--", page]).filter(|date| !date.is_empty())
+    said("git", &["-C", docs, "log", "-1", "--follow", "--diff-filter=AM", "--format=%cs", "--", page]).filter(|date| !date.is_empty())
 }
 
 /// What a program says that succeeds.

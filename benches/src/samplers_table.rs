@@ -1,4 +1,4 @@
-//! Writes `docs/samplers.md`: `cargo run --release -p cohaptic-benches --bin samplers-table > docs/samplers.md`. Takes about a minute; `--quick`
+//! Writes `docs/measured-samplers.md`: `cargo run --release -p cohaptic-benches --bin samplers-table > docs/measured-samplers.md`. Takes about a minute; `--quick`
 //! less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 
@@ -23,7 +23,7 @@ fn main() -> Result<(), String> {
     let Work { rounds, draws } = work;
     let look = effort.of(Look::CLOSE, Look::CLOSE, Look { places_a_cell: 1, places_a_side: 400, ..Look::CLOSE });
     let what = "What a random delay costs, and how far from its law it is.";
-    println!("{}", effort.head("Samplers", what, "samplers-table", "docs/samplers.md"));
+    println!("{}", effort.head("Samplers", what, "samplers-table", "docs/measured-samplers.md"));
     println!(
         "All laws have mean 24 and standard deviation 2; gamma and lognormal begin at 20. A draw includes its uniform word (SplitMix64); times are medians"
     );

@@ -1,4 +1,4 @@
-//! Writes `docs/speed.md`: `cargo run --release -p cohaptic-benches --bin speed-table > docs/speed.md`. Takes some minutes; `--quick` less.
+//! Writes `docs/measured-speed.md`: `cargo run --release -p cohaptic-benches --bin speed-table > docs/measured-speed.md`. Takes some minutes; `--quick` less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "seconds and rounds are small")]
 
@@ -51,7 +51,7 @@ fn main() -> Result<(), String> {
     let effort = Effort::parse(std::env::args().skip(1))?;
     let work = Work::of(effort);
     let what = "Simulated seconds per second of processor time, on one core.";
-    println!("{}", effort.head("Speed", what, "speed-table", "docs/speed.md"));
+    println!("{}", effort.head("Speed", what, "speed-table", "docs/measured-speed.md"));
     // The most memory is that of all before.
     let memory = memory(work);
     one_run(work);
@@ -91,7 +91,7 @@ fn one_run(work: Work) {
     println!(
         "for all peers that get it, and does for several peers at once what the loop does one by one. A leaner loop, without counters, and other simulators on"
     );
-    println!("these scenes, all in one run: [peers-speed.md](peers-speed.md).");
+    println!("these scenes, all in one run: [measured-peers.md](measured-peers.md).");
     println!("The same cells as criterion benches: `cargo bench -p cohaptic-benches --bench mesh`.\n");
 }
 

@@ -1,4 +1,4 @@
-//! Writes `docs/stability-speed.md`: `cargo run --release -p cohaptic-benches --bin stability-table > docs/stability-speed.md`. Takes some minutes;
+//! Writes `docs/measured-stability.md`: `cargo run --release -p cohaptic-benches --bin stability-table > docs/measured-stability.md`. Takes some minutes;
 //! `--quick` less.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of verdicts")]
@@ -81,7 +81,7 @@ fn main() -> Result<(), String> {
     let effort = Effort::parse(std::env::args().skip(1))?;
     let work = Work::of(effort);
     let what = "Processor time of verdicts on one core, but for the maps.";
-    println!("{}", effort.head("Stability: speed and error", what, "stability-table", "docs/stability-speed.md"));
+    println!("{}", effort.head("Stability: speed and error", what, "stability-table", "docs/measured-stability.md"));
     println!("Each figure is the median of {} rounds in which all rows or columns of a table alternate.\n", work.rounds);
     equal_peers(work);
     figure(work);

@@ -1,7 +1,7 @@
 // A peer of a live session, complete and small: copy it and put your device into it.
 //
 // It joins a scene that runs under `cohaptic live`, simulates a haptic device, its own copy of the shared object and average-position coordination at
-// 1 kHz, and exchanges samples with the other peers through the door of the session. C++17 and POSIX sockets, nothing else. The protocol is in
+// 1 kHz, and exchanges samples with the other peers through the session. C++17 and POSIX sockets, nothing else. The protocol is in
 // docs/live-protocol.md, the equations are in docs/model.md.
 //
 //     c++ -std=c++17 -O2 -Wall -Wextra -o udp_peer udp_peer.cpp

@@ -2,7 +2,7 @@
 """A peer of a live session, complete and small: copy it and put your device into it.
 
 It joins a scene that runs under `cohaptic live`, simulates a haptic device, its own copy of the shared object and average-position coordination at
-1 kHz, and exchanges samples with the other peers through the door of the session. Python 3.8 or newer, standard library only. The protocol is in
+1 kHz, and exchanges samples with the other peers through the session. Python 3.8 or newer, standard library only. The protocol is in
 docs/live-protocol.md, the equations are in docs/model.md.
 
     python3 udp_peer.py 127.0.0.1:7000 --session 42 --place 1 --peers 3 --force 0.5 --duration 5

@@ -27,7 +27,7 @@ fn distance(actual: f64, expected: Quad) -> f64 {
     (Quad::from(actual) - expected).0.abs()
 }
 
-/// Two peers for that many ticks of so many µs, with a sample every 1000 of them.
+/// Two peers for a number of ticks, each of a number of µs, with a sample every 1000 of them.
 fn alone(tick: u64, ticks: u64) -> Draft {
     let mut draft = Draft { duration: tick * ticks / 1000, update: 1000 * tick, ..Draft::calm(2) };
     for peer in &mut draft.peers {

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue};
-use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
+use cohaptic_peer::wire::SampleKind;
+use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains, SendWhen};
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
@@ -21,18 +22,23 @@ pub fn anything() -> impl Strategy<Value = Draft> {
 
 /// [`anything`] with a law of the paper.
 pub fn anything_of_the_paper() -> impl Strategy<Value = Draft> {
-    (anything(), select(PAPER)).prop_map(|(draft, strategy)| Draft { strategy, ..draft })
+    (anything(), select(PAPER)).prop_map(|(draft, strategy)| Draft { strategy, send_when: None, ..draft })
 }
 
-/// A law with values for the parameters that it has of its own, up to 40 ms or 40 N·s/m.
-fn law() -> impl Strategy<Value = (Coordination, LawSettings)> {
+/// A strategy with values for the parameters that it has of its own, up to 40 ms, 40 N·s/m or 40 mJ.
+fn strategy() -> impl Strategy<Value = (Coordination, LawSettings)> {
     (select(Coordination::ALL), 0..40_000_u32).prop_map(|(law, micros)| {
         let mut settings = LawSettings::default();
         for (place, parameter) in law.parameters().iter().enumerate() {
             let value = match parameter.form {
                 LawForm::Duration | LawForm::AutomaticDuration => LawValue::Duration(Duration::from_micros(micros.into())),
                 // Up to 40 N·s/m.
-                LawForm::AutomaticDamping => LawValue::Number(1e-3 * f64::from(micros)),
+                LawForm::AutomaticDamping | LawForm::Damping => LawValue::Number(1e-3 * f64::from(micros)),
+                LawForm::Impedance => LawValue::Number(1e-3 * f64::from(micros + 100)),
+                // Up to 40 mJ.
+                LawForm::Energy => LawValue::Number(1e-6 * f64::from(micros)),
+                LawForm::Words(words) => LawValue::Word(micros as usize % words.len()),
+                LawForm::Peer => LawValue::Place(micros as usize % 2),
             };
             settings.of_mut(law).set(place, value);
         }
@@ -40,17 +46,50 @@ fn law() -> impl Strategy<Value = (Coordination, LawSettings)> {
     })
 }
 
-/// [`anything`] with that many peers.
+/// Dead bands.
+fn send_when() -> impl Strategy<Value = SendWhen> {
+    let heartbeat = option::of((1..100_u64).prop_map(Duration::from_millis));
+    (0.0..0.99, option::of(1e-6..1e-2), heartbeat).prop_map(|(velocity, position, heartbeat)| SendWhen {
+        velocity: Some(velocity),
+        position,
+        heartbeat,
+    })
+}
+
+/// Without what readers refuse for its strategy.
+fn with_what_its_strategy_can_have(mut draft: Draft) -> Draft {
+    let counts_energy = matches!(draft.strategy, Coordination::PassivityControl | Coordination::SetPosition | Coordination::Wave);
+    if counts_energy {
+        draft.peers.iter_mut().for_each(|peer| peer.compute_delay = false);
+    }
+    if matches!(draft.strategy, Coordination::SetPosition | Coordination::Wave) {
+        draft.integrator = None;
+    }
+    if draft.strategy == Coordination::SetPosition {
+        draft.timeline.retain(|entry| !entry.contains("coordination ="));
+        draft.gains.stiffness = draft.gains.stiffness.max(1.0);
+    }
+    if draft.strategy == Coordination::Wave {
+        draft.peers.iter_mut().for_each(|peer| peer.drift = 0);
+    }
+    if matches!(draft.strategy, Coordination::Wave | Coordination::ClientServer) {
+        draft.send_when = None;
+    }
+    draft
+}
+
+/// [`anything`] with this number of peers.
 pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Value = Draft> {
     (peers, 1..=3_usize).prop_flat_map(|(count, axes)| {
         let header = (30..200_u64, any::<u32>(), 0.05..2.0, 0.0..2.0, any::<bool>(), option::weighted(0.3, walls()));
-        let bodies = (place(0.02), place(0.2), law(), gains(2000.0, 20.0), prop_oneof![Just(2000_u64), Just(8000)]);
+        let bodies =
+            (place(0.02), place(0.2), (strategy(), option::weighted(0.2, send_when())), gains(2000.0, 20.0), prop_oneof![Just(2000_u64), Just(8000)]);
         let peers = (vec(any_peer(axes), count), any_clocks(count));
         let network = (link(), vec((0..count, 1..count, link()), 0..3), vec(option::weighted(0.2, link()), 2 * count));
         let rest = (integrator(), vec((1..30_u64, change(count, axes)), 0..4));
         (header, bodies, peers, network, rest).prop_map(move |(header, bodies, (mut peers, clocks), network, (integrator, changes))| {
             let (duration, seed, mass, damping, split_mass, enclosure) = header;
-            let (position, velocity, (strategy, settings), gains, update) = bodies;
+            let (position, velocity, ((strategy, settings), send_when), gains, update) = bodies;
             let (link, links, mut lines) = network;
             for (number, (peer, clock)) in peers.iter_mut().zip(clocks).enumerate() {
                 peer.name = format!("p{number}");
@@ -68,7 +107,7 @@ pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Valu
                 .filter(|(_, change)| !matches!(change, Change::Hand(peer, _) if matches!(peers[*peer].hand, DraftHand::Arm { .. })))
                 .map(|(at, change)| format!("at = \"{at}ms\"\n{}", change.to_toml(axes)))
                 .collect();
-            Draft {
+            let draft = Draft {
                 duration,
                 seed,
                 axes,
@@ -81,18 +120,20 @@ pub fn anything_among(peers: impl Strategy<Value = usize>) -> impl Strategy<Valu
                 strategy,
                 gains,
                 settings,
+                send_when,
                 update,
                 integrator,
                 peers,
                 link,
                 links,
                 timeline,
-            }
+            };
+            with_what_its_strategy_can_have(draft)
         })
     })
 }
 
-/// Scenes of one shape that need no events, if nobody watches: that many of them, with equal peers, ticks and durations. Everything else may differ, in half of
+/// Scenes of one shape that need no events, if nobody watches: this number of them, with equal peers, ticks and durations. Everything else may differ, in half of
 /// the cases even the links.
 pub fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<Draft>> {
     let counts = prop_oneof![3 => 2..=5_usize, 1 => 6..=11_usize];
@@ -101,6 +142,10 @@ pub fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<
         (drafts, any::<bool>(), 0.9..2.0).prop_map(|(mut drafts, same_links, stiffer)| {
             for (draft, link, links) in &mut drafts {
                 draft.timeline.clear();
+                draft.send_when = None;
+                if draft.strategy.kind() != SampleKind::State {
+                    draft.strategy = Coordination::AveragePosition;
+                }
                 draft.link.clone_from(link);
                 let names: Vec<String> = draft.peers.iter().map(|peer| peer.name.clone()).collect();
                 draft.links.clear();

@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
 
-/// A property test of that many cases that leaves no files behind.
+/// A property test of this number of cases that leaves no files behind.
 #[must_use]
 pub fn cases(count: u32) -> ProptestConfig {
     ProptestConfig { cases: count, failure_persistence: None, max_shrink_iters: 400, ..ProptestConfig::default() }

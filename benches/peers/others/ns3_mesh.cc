@@ -243,7 +243,7 @@ int main(int argc, char** argv) {
     for (size_t place = 0; place < mesh.peers.size(); ++place) std::printf("%s%.17g", place ? ", " : "", mesh.peers[place].xo);
     std::printf("], \"lacks\": \"%s\"}\n",
                 sockets ? "jitter on a link and the draws of loss (written here, at the sender); devices, coordination, stability"
-                        : "links: no delay, loss, jitter, rate, queue or counter but what is written here (draws are read from a file)");
+                        : "links: no delay, loss, jitter, rate, queue or counter but those written here (draws are read from a file)");
     ns3::Simulator::Destroy();
     return 0;
 }

@@ -103,7 +103,7 @@ def main():
         seconds=seconds,
         delivered=sum(peer.delivered for peer in peers),
         positions=[peer.xo for peer in peers],
-        lacks="links: no delay, loss, jitter, rate, queue or counter but what is written here (draws are read from a file); bytes",
+        lacks="links: no delay, loss, jitter, rate, queue or counter but those written here (draws are read from a file); bytes",
     )
 
 

@@ -27,7 +27,7 @@ jitter = "2ms"
 loss = "1%"
 "#;
 
-/// A scene of that many peers, the last of them in another program, for a session that may last so long.
+/// A scene of this number of peers, the last of them in another program, for a session that may last that time.
 ///
 /// # Errors
 ///

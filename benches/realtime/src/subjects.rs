@@ -75,7 +75,6 @@ fn measure(
     Ok(Outcome { sent, received, error, at_socket, overload, at_sink, clamped, processor, memory: (memory, after), refused })
 }
 
-/// The relay.
 pub(crate) fn relay(pacing: Pacing, rate: u64, span: Duration) -> Done {
     let (source, sink) = (wide("127.0.0.1:0")?, Sink::start()?);
     let free = "127.0.0.1:0".parse()?;

@@ -15,7 +15,6 @@ use cohaptic_benches_realtime::machine;
 /// The size of a datagram.
 pub(crate) const SIZE: usize = 64;
 
-/// What was sent.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sent {
     pub(crate) count: u64,
@@ -23,7 +22,6 @@ pub(crate) struct Sent {
     pub(crate) processor: Duration,
 }
 
-/// What was received.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Received {
     pub(crate) count: u64,

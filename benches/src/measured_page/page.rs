@@ -28,16 +28,23 @@ const OTHERS: &str = "## Written by other commands";
 
 /// Pages that need a quiet machine and privileges: what they say, and what writes them.
 const ALONE: [(&str, &str, &str); 3] = [
-    ("relay-speed.md", "how late the relay and how fast", "cargo run --release -p cohaptic-benches-realtime --bin relay-table > docs/relay-speed.md"),
     (
-        "live-speed.md",
-        "how late the ticks of a live session, and what they cost",
-        "cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/live-speed.md",
+        "measured-relay.md",
+        "how late the relay and how fast",
+        "cargo run --release -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md",
     ),
-    ("soak.md", "an hour of both: memory, drift, lateness", "cargo run --release -p cohaptic-benches-realtime --bin soak -- 1h --out docs/soak.md"),
+    (
+        "measured-live.md",
+        "how late the ticks of a live session, and what they cost",
+        "cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md",
+    ),
+    (
+        "measured-soak.md",
+        "an hour of both: memory, drift, lateness",
+        "cargo run --release -p cohaptic-benches-realtime --bin soak -- 1h --out docs/measured-soak.md",
+    ),
 ];
 
-/// The page.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Page(BTreeMap<Step, String>);
 
@@ -90,6 +97,7 @@ impl Page {
             let date = machine::last_change(page).map_or_else(String::new, |date| format!(", last written {date}"));
             let _ = writeln!(text, "\n[{page}]({page}): {says}{date}.\n\n    {command}");
         }
+        text += "\n[measured-router.md](measured-router.md): how late the router and how fast. It needs root, and names its command.\n";
         text
     }
 }

@@ -10,21 +10,21 @@ use crate::{accuracy, campaign};
 /// A section, in the order of the page.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, ValueEnum)]
 pub(crate) enum Step {
-    /// One run, many side by side, memory: also writes speed.md
+    /// One run, many side by side, memory: also writes measured-speed.md
     Speed,
     /// Whole campaigns on one thread and on all
     Campaign,
     /// `cohaptic accuracy`: speed against error, tables and plots
     Accuracy,
-    /// Also writes link-speed.md
+    /// Also writes measured-link.md
     Link,
-    /// Also writes samplers.md
+    /// Also writes measured-samplers.md
     Samplers,
-    /// Also writes stability-speed.md
+    /// Also writes measured-stability.md
     Stability,
-    /// Also writes testkit-speed.md; needs the crates of others
+    /// Also writes measured-testkit.md; needs the crates of others
     Testkit,
-    /// Also writes peers-speed.md; needs the crates of others, and measures ns-3, SimPy and numpy where they are installed
+    /// Also writes measured-peers.md; needs the crates of others, and measures ns-3, SimPy and numpy where they are installed
     Peers,
 }
 
@@ -105,7 +105,7 @@ impl Step {
             Self::Speed => {
                 "How fast is one run, how far from the limit of the machine, what do many runs side by side gain, and does memory grow with time? Simulated seconds per
 second of processor time on one core, of N peers at 1 kHz who all hold the object; the *bare loop* does the same arithmetic by hand and nothing else. The
-tables are described in [speed.md](speed.md)."
+tables are described in [measured-speed.md](measured-speed.md)."
             }
             Self::Campaign => {
                 "How many runs a second does [a campaign](campaign.md) make, from the scene to the table on the disk? Wall time, all of it: reading and checking the scene,
@@ -116,22 +116,22 @@ write are compared, and are the same to the byte."
                 "What does each method cost, and how wrong is it? Costs are measured, errors computed unless a note says otherwise; each method of a table has done the same work.
 The methods that are compared, against which reference, and how to read it: [accuracy.md](accuracy.md). In the plots, further left is cheaper, further down more exact."
             }
-            Self::Link => "What does a packet through one emulated link cost? What each stage adds: [link-speed.md](link-speed.md).",
+            Self::Link => "What does a packet through one emulated link cost? What each stage adds: [measured-link.md](measured-link.md).",
             Self::Samplers => {
                 "What does a random delay cost, and how far is it from its law? Of each law, netem's table and the program's own draw; the ways between and what the columns
-are: [samplers.md](samplers.md)."
+are: [measured-samplers.md](measured-samplers.md)."
             }
             Self::Stability => {
                 "How many verdicts on stability a second? Equal peers along a map of two gains; maps, long delays and speed against error of each method:
-[stability-speed.md](stability-speed.md)."
+[measured-stability.md](measured-stability.md)."
             }
             Self::Testkit => {
                 "How fast and how exact is [the test kit](testing.md) compared with turmoil, on the same programs? Of three hosts that send a datagram every 8 ms; the others:
-[testkit-speed.md](testkit-speed.md)."
+[measured-testkit.md](measured-testkit.md)."
             }
             Self::Peers => {
                 "How fast is the same scene on what others wrote? Of ten peers; every program ends in the same state, to the bit unless the table says how far. 3 and 50 peers,
-one link alone, a stability map, and what each of the others does not model: [peers-speed.md](peers-speed.md)."
+one link alone, a stability map, and what each of the others does not model: [measured-peers.md](measured-peers.md)."
             }
         }
     }
@@ -141,18 +141,18 @@ one link alone, a stability map, and what each of the others does not model: [pe
         match self {
             Self::Speed => {
                 let tables = &[("## A full mesh", ALL_ROWS), ("## Many runs of one scene", ALL_ROWS), ("## Memory", ALL_ROWS)];
-                source("speed.md", How::Program("speed-table"), tables)
+                source("measured-speed.md", How::Program("speed-table"), tables)
             }
-            Self::Link => source("link-speed.md", How::Program("link-table"), &[("# One link: speed", ALL_ROWS)]),
-            Self::Samplers => source("samplers.md", How::Program("samplers-table"), &[("# Samplers", ENDS)]),
-            Self::Stability => source("stability-speed.md", How::Program("stability-table"), &[("## Equal peers, Td = Tn", ALL_ROWS)]),
+            Self::Link => source("measured-link.md", How::Program("link-table"), &[("# One link: speed", ALL_ROWS)]),
+            Self::Samplers => source("measured-samplers.md", How::Program("samplers-table"), &[("# Samplers", ENDS)]),
+            Self::Stability => source("measured-stability.md", How::Program("stability-table"), &[("## Equal peers, Td = Tn", ALL_ROWS)]),
             Self::Testkit => {
                 let how = How::Shell("cd benches/peers && cargo run --release", "../../docs/");
-                source("testkit-speed.md", how, &[("## Datagrams all the time", THREE_HOSTS)])
+                source("measured-testkit.md", how, &[("## Datagrams all the time", THREE_HOSTS)])
             }
             Self::Peers => {
                 let line = "cd benches/peers && (cargo run --release --bin mesh-table && others/run)";
-                source("peers-speed.md", How::Shell(line, "../../docs/"), &[("## A full mesh", TEN_PEERS), ("## In other languages", TEN_PEERS)])
+                source("measured-peers.md", How::Shell(line, "../../docs/"), &[("## A full mesh", TEN_PEERS), ("## In other languages", TEN_PEERS)])
             }
             Self::Campaign | Self::Accuracy => None,
         }
@@ -238,7 +238,7 @@ mod tests {
             tables,
             "### A full mesh\n\n| peers |\n| --- |\n| 10 | b |\n\n### In other languages\n\n| peers |\n| --- |\n| 10 | c |\n\nns-3: skipped. There is no compiler\n"
         );
-        assert!(source.tables("## A full mesh\n\nNothing.\n").is_err_and(|why| why.contains("peers-speed.md")));
+        assert!(source.tables("## A full mesh\n\nNothing.\n").is_err_and(|why| why.contains("measured-peers.md")));
     }
 
     /// The pages as they lie in `docs/`: were a heading or the first column of a table changed, a step would find out only after hours.

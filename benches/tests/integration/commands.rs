@@ -53,7 +53,7 @@ fn kind(command: &str) -> Option<Kind> {
         "cohaptic-benches-realtime" => {
             let program = match rest {
                 // The arguments are those that benches/realtime/tests run it with: a span and a page.
-                "soak -- 1h --out docs/soak.md" => "soak",
+                "soak -- 1h --out docs/measured-soak.md" => "soak",
                 _ => rest.split_once(" > docs/").filter(|(_, page)| !page.contains(' '))?.0,
             };
             Some(Kind::Elsewhere("benches/realtime", vec![program.to_owned()]))
@@ -143,11 +143,11 @@ fn every_program_that_writes_a_page_has_its_command_on_one() {
 #[test]
 fn what_is_not_a_command_of_ours_is_not_known() {
     for command in [
-        "cargo run --release -p cohaptic-benches --bin speed-table -- --fast > docs/speed.md",
+        "cargo run --release -p cohaptic-benches --bin speed-table -- --fast > docs/measured-speed.md",
         "cargo run --release -p cohaptic-benches --bin speed-table",
         "cargo run --release -p cohaptic-wan --bin x > docs/x.md",
         "cd benches/peers && cargo test > ../../docs/x.md",
-        "cargo run --release -p cohaptic-benches-realtime --bin soak -- 2h --out docs/soak.md",
+        "cargo run --release -p cohaptic-benches-realtime --bin soak -- 2h --out docs/measured-soak.md",
         "rm -r docs",
     ] {
         assert_eq!(kind(command), None, "{command}");

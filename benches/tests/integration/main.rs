@@ -16,15 +16,15 @@ fn root() -> PathBuf {
 /// The pages whose every command is looked at.
 const PAGES: [&str; 10] = [
     "measured.md",
-    "speed.md",
-    "link-speed.md",
-    "samplers.md",
-    "stability-speed.md",
-    "testkit-speed.md",
-    "peers-speed.md",
-    "relay-speed.md",
-    "live-speed.md",
-    "soak.md",
+    "measured-speed.md",
+    "measured-link.md",
+    "measured-samplers.md",
+    "measured-stability.md",
+    "measured-testkit.md",
+    "measured-peers.md",
+    "measured-relay.md",
+    "measured-live.md",
+    "measured-soak.md",
 ];
 
 /// Name and text of each.

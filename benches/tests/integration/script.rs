@@ -47,7 +47,7 @@ fn a_step_writes_its_section_and_its_page_and_leaves_the_others_as_they_are() {
         }
     }
     assert_eq!(page.matches("\n## ").count(), shipped.matches("\n## ").count());
-    for name in ["link-speed.md", "samplers.md"] {
+    for name in ["measured-link.md", "measured-samplers.md"] {
         assert!(fs::read_to_string(folder.path().join(name)).unwrap().starts_with("# "));
     }
     // Nothing else, and nothing half-written.

@@ -1,6 +1,6 @@
 //! One method at one setting.
 
-use crate::Subject;
+use crate::{AccuracyError, Subject, Watch};
 
 /// What one method cost at one setting, and how wrong it was.
 #[derive(Clone, PartialEq, Debug)]
@@ -32,5 +32,24 @@ impl Row {
     pub(crate) fn of(subject: Subject, case: &str, method: &str, setting: String, (cost, cost_unit): (f64, &'static str)) -> Self {
         let (case, method) = (case.to_owned(), method.to_owned());
         Self { subject, case, method, setting, cost: Some(cost), cost_unit, error: None, error_unit: "", reference: "", note: String::new() }
+    }
+}
+
+/// The rows so far, and the watcher.
+pub(crate) struct RowSink<'a> {
+    pub(crate) rows: Vec<Row>,
+    pub(crate) watch: &'a dyn Watch,
+}
+
+impl RowSink<'_> {
+    /// A row is done.
+    pub(crate) fn push(&mut self, row: Row) -> Result<(), AccuracyError> {
+        self.watch.row(&row);
+        self.rows.push(row);
+        self.check()
+    }
+
+    pub(crate) fn check(&self) -> Result<(), AccuracyError> {
+        if self.watch.stops() { Err(AccuracyError::Stopped) } else { Ok(()) }
     }
 }

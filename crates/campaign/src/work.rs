@@ -99,7 +99,7 @@ impl Work<'_> {
         let outcomes: Vec<(Summary, Vec<MeasuredValue>)> = if scenes.iter().all(|scene| scene.measure.is_none()) {
             run_side_by_side(&scenes).into_iter().map(|summary| (summary, Vec::new())).collect()
         } else {
-            // What is measured is watched, one run after the other.
+            // Scenes with measures are watched, one run after the other.
             scenes.iter().map(|scene| Measures::run(scene, Model::Least)).collect()
         };
         let rows = runs.zip(scenes.iter().zip(&outcomes)).map(|(run, (scene, (summary, measured)))| {

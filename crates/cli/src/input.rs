@@ -26,19 +26,11 @@ pub(crate) fn named(path: &Path) -> &Path {
 }
 
 /// The text of a file and what it is called, read by `read`.
-///
-/// # Errors
-///
-/// [`SceneError`] if the file cannot be read or is no text, and those of `read`.
 pub(crate) fn with<T>(path: &Path, read: impl FnOnce(&str, &Path) -> Result<T, SceneError>) -> Result<T, SceneError> {
     read(&text(path)?, named(path))
 }
 
 /// The text of a file.
-///
-/// # Errors
-///
-/// [`SceneError`] if the file cannot be read or is no text.
 pub(crate) fn text(path: &Path) -> Result<String, SceneError> {
     if !is_standard_input(path) {
         return file_text(path);

@@ -1,17 +1,11 @@
 //! Properties of a device that are known only roughly, as numbers that a laboratory may replace.
 
-use core::ops::RangeInclusive;
-
 use thiserror::Error;
 
 use crate::kinematics::Triple;
 
 /// The largest count that a motor is ever told, either way. Novint's own library stops there: a captured packet for 100 N holds 4095.
 pub const MOTOR_LIMIT: i16 = 4095;
-
-/// What Novint's own library seems to use \[counts per N·m\], fitted to four of its packets of unknown pose. The default is that of libnifalcon, 2 to 4
-/// times as much: so a device may push up to 4.5 times as hard as it is asked to, if Novint's newtons are the true ones.
-pub const NOVINT_COUNTS_PER_NEWTON_METRE: RangeInclusive<f64> = 2200.0..=5400.0;
 
 /// How torques become motor counts, and where positions are counted from.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -22,6 +16,9 @@ pub struct Calibration {
 
 impl Calibration {
     /// The default: 10,000 counts per N·m of an arm, and the origin 125 mm in front of the base.
+    ///
+    /// The counts are those of libnifalcon. Novint's own library seems to use 2200 to 5400, fitted to four of its packets of unknown pose: so a device may
+    /// push up to 4.5 times as hard as it is asked to, if Novint's newtons are the true ones.
     ///
     /// There the usable radius is 80 mm and the device is 45 mm from its inner end and 50 mm from its outer one, so a ball of 40 mm around it lies within
     /// the workspace. VRPN uses the same origin; libnifalcon and HAPI use 150 mm, where 61 mm are left sideways and 30 mm outwards.
@@ -52,12 +49,6 @@ impl Calibration {
     #[must_use]
     pub const fn origin(&self) -> Triple {
         self.origin
-    }
-}
-
-impl Default for Calibration {
-    fn default() -> Self {
-        Self::DEFAULT
     }
 }
 

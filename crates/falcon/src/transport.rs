@@ -36,84 +36,65 @@ pub trait Transport {
     fn read(&mut self, into: &mut [u8], patience: Duration) -> Result<usize, TransportError>;
 }
 
-/// Requests of the chip that are used here.
+/// Requests of the chip that are used here, by their numbers on the wire.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Request {
     /// Purges a buffer: see [`PURGE_RX`](crate::ftdi::PURGE_RX) and [`PURGE_TX`](crate::ftdi::PURGE_TX).
-    Reset,
+    Reset = 0,
     /// Sets the lines RTS and DTR.
-    ModemControl,
+    ModemControl = 1,
     /// Sets the flow control.
-    FlowControl,
+    FlowControl = 2,
     /// Sets the speed, as a divisor.
-    BaudRate,
+    BaudRate = 3,
     /// Sets bits, parity and stop bits.
-    DataFormat,
+    DataFormat = 4,
     /// Sets after how many milliseconds the chip sends what it has.
-    LatencyTimer,
+    LatencyTimer = 9,
 }
 
 impl Request {
     /// Its number on the wire.
     #[must_use]
     pub const fn number(self) -> u8 {
-        match self {
-            Self::Reset => 0,
-            Self::ModemControl => 1,
-            Self::FlowControl => 2,
-            Self::BaudRate => 3,
-            Self::DataFormat => 4,
-            Self::LatencyTimer => 9,
-        }
+        self as u8
     }
 }
 
 /// The transfer that failed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum Operation {
-    /// A control transfer.
     #[error("setting up the serial chip")]
     Control,
-    /// A bulk transfer out.
     #[error("writing to the device")]
     Write,
-    /// A bulk transfer in.
     #[error("reading from the device")]
     Read,
 }
 
 /// What a transfer failed of.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum Fault {
-    /// The deadline passed.
     #[error("it took too long")]
     TimedOut,
-    /// The endpoint stalled.
     #[error("the endpoint stalled")]
     Stalled,
-    /// A fault of the wire or of the protocol.
     #[error("a fault of the wire or of the protocol")]
     Wire,
-    /// The operating system refused the request.
     #[error("the operating system refused it")]
     Refused,
-    /// Another error, with the operating system's number.
     #[error("error {0} of the operating system")]
     Other(u32),
 }
 
 /// A transfer that failed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum TransportError {
-    /// The device is gone, and will not come back on this transport.
     #[error("the device was unplugged; plug it in again and start anew")]
     Unplugged,
-    /// It is still there, but a transfer failed.
     #[error("{during} failed: {fault}")]
-    Io {
-        /// What was being done.
-        during: Operation,
-        /// What went wrong.
-        fault: Fault,
-    },
+    Io { during: Operation, fault: Fault },
 }

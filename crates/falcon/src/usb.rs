@@ -204,29 +204,16 @@ fn transport_error(during: Operation, error: TransferError) -> TransportError {
 
 /// No device could be opened.
 #[derive(Clone, Debug, Error)]
+#[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum UsbError {
-    /// None is plugged in.
     #[error("no Novint Falcon (USB 0403:cb48) is plugged in: check the cable and the power supply")]
     NoDevice,
-    /// There are Falcons, but not that one.
     #[error("no Falcon has the serial number {serial:?}; there are: {}", names(others))]
-    NoSuchSerial {
-        /// What was asked for.
-        serial: String,
-        /// Those that are plugged in.
-        others: Vec<Listed>,
-    },
-    /// More than one, and none was named.
+    NoSuchSerial { serial: String, others: Vec<Listed> },
     #[error("several Falcons are plugged in: name one by its serial number. There are: {}", names(.0))]
     Several(Vec<Listed>),
-    /// The system refused.
     #[error("{doing} failed: {error}{}", advice(error.kind()))]
-    System {
-        /// What was being done.
-        doing: &'static str,
-        /// What the system said.
-        error: nusb::Error,
-    },
+    System { doing: &'static str, error: nusb::Error },
 }
 
 impl UsbError {

@@ -1,8 +1,8 @@
-//! The datagrams on their way: each is stored once, however many receivers it has.
+//! The datagrams on their way: what all receivers get is stored once, however many there are.
 
 use std::num::NonZeroU32;
 
-use cohaptic_peer::wire::{DecodeError, MAX_LEN, Sample};
+use cohaptic_peer::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
 
 /// A datagram in the store.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -15,6 +15,9 @@ pub(crate) struct Handle(NonZeroU32);
 pub(crate) struct Datagrams<const A: usize> {
     slots: Vec<Slot<A>>,
     free: Vec<Handle>,
+    /// For each slot the extra numbers of its sample, by the place of the receiver; a single entry where they are the same for all. Empty where samples have
+    /// none.
+    extras: Vec<Vec<[f64; A]>>,
 }
 
 #[derive(Clone, Debug)]
@@ -49,6 +52,52 @@ impl<const A: usize> Datagrams<A> {
             None => self.grow(slot),
         };
         Ok((handle, len))
+    }
+
+    /// Stores a sample of that kind as [`Datagrams::store`] does: `numbers` has the extra numbers by the place of the receiver, or one entry for all.
+    ///
+    /// # Errors
+    ///
+    /// [`DecodeError`] if nobody can read it.
+    pub(crate) fn store_extended(
+        &mut self,
+        copies: usize,
+        axes: usize,
+        kind: SampleKind,
+        sample: &Sample<A>,
+        numbers: &[[f64; A]],
+    ) -> Result<(Handle, usize), DecodeError> {
+        let (handle, _) = self.store(copies, axes, |datagram| sample.encode(axes, datagram))?;
+        let slot = handle.0.get() as usize - 1;
+        if self.extras.len() <= slot {
+            self.extras.resize(slot + 1, Vec::new());
+        }
+        let mut bytes = [0; MAX_LEN];
+        let read = |(receiver, numbers): (u32, &[f64; A])| {
+            let len = sample.encode_as(kind, &Extra { receiver: if kind.is_personal() { receiver } else { 0 }, numbers: *numbers }, axes, &mut bytes);
+            Sample::<A>::decode_as(&bytes[..len], kind, axes).map(|(_, extra)| extra.numbers)
+        };
+        let stored = &mut self.extras[slot];
+        stored.clear();
+        let read: Result<(), DecodeError> = (0..).zip(numbers).map(read).try_for_each(|numbers| {
+            stored.push(numbers?);
+            Ok(())
+        });
+        if let Err(error) = read {
+            self.slot_mut(handle).copies = 1;
+            self.release(handle);
+            return Err(error);
+        }
+        Ok((handle, kind.datagram_len(axes)))
+    }
+
+    /// The extra numbers of a datagram for a receiver; zeros if it has none.
+    pub(crate) fn extra(&self, handle: Handle, receiver: usize) -> [f64; A] {
+        match self.extras.get(handle.0.get() as usize - 1).map(Vec::as_slice) {
+            Some([one]) => *one,
+            Some(each) => each.get(receiver).copied().unwrap_or([0.0; A]),
+            None => [0.0; A],
+        }
     }
 
     /// What a datagram says.

@@ -175,6 +175,8 @@ pub struct TickRow<'a> {
 }
 
 /// One peer over one step of its copy, from a tick to the next one of this peer. Slices have as many entries as the scene has axes.
+///
+/// Of a client of a server, which has no copy, it is the step of the device, and F is the coupling force that the server returns or the client computes.
 #[derive(Clone, Copy, Debug)]
 pub struct StepRow<'a> {
     /// The instant of the tick at which the step begins.

@@ -128,7 +128,6 @@ pub(crate) fn nonce_of(secret: &[u8; 32], parts: &[&[u8]]) -> Nonce {
     cut(&mac(secret, parts))
 }
 
-/// The key of one way.
 fn way_secret(label: &[u8], key: &SessionKey, session: u64, place: Place, client_nonce: &Nonce, server_nonce: &Nonce) -> Zeroizing<[u8; 32]> {
     mac(key.as_bytes(), &[label, &session.to_le_bytes(), &place.0.to_le_bytes(), client_nonce, server_nonce])
 }

@@ -31,7 +31,6 @@ const STUDENT_975: f64 = 2.045_229_642_132_703;
 /// Batches whose means are nearly independent.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Batches {
-    /// How many.
     pub(crate) count: usize,
     /// What the variance of their means is to be multiplied by for what correlation is left.
     pub(crate) correction: f64,

@@ -125,7 +125,6 @@ impl Case {
         text
     }
 
-    /// The scene.
     pub(crate) fn scene(&self) -> Result<Scene, PaperError> {
         Ok(Scene::parse(&self.text(), Path::new("paper.toml"), &[])?)
     }

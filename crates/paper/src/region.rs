@@ -26,7 +26,6 @@ pub(crate) struct Setting {
     pub(crate) delay_us: u32,
 }
 
-/// One region.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Region {
     pub(crate) setting: Setting,

@@ -93,7 +93,21 @@ impl<const A: usize> Ages<A> {
     ///
     /// Those of [`Peer::handle_sample`]; nothing changed.
     pub fn handle_sample<D: Device<A>, S: Strategy<A>>(&mut self, peer: &mut Peer<A, D, S>, sample: &Sample<A>) -> Result<Reception, ReceiveError> {
-        let received = peer.handle_sample(sample)?;
+        self.handle_extended(peer, sample, &[0.0; A])
+    }
+
+    /// [`Ages::handle_sample`] with the extra numbers of a sample for this peer.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Peer::handle_sample`]; nothing changed.
+    pub fn handle_extended<D: Device<A>, S: Strategy<A>>(
+        &mut self,
+        peer: &mut Peer<A, D, S>,
+        sample: &Sample<A>,
+        extra: &[f64; A],
+    ) -> Result<Reception, ReceiveError> {
+        let received = peer.handle_extended(sample, extra)?;
         let place = peer.place_of(sample.sender).filter(|_| received == Reception::Newest);
         if let Some(aged) = self.aged.iter_mut().find(|aged| Some(aged.place) == place) {
             aged.arrived(sample.sequence, sample.state);

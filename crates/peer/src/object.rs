@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 
+use crate::coordination::Prediction;
 use crate::stepper::Stepper;
 use crate::{Clock, CopyConfig, Integrator, Plant, State};
 
@@ -37,6 +38,13 @@ impl<const A: usize> ObjectCopy<A> {
     /// Puts it into that state.
     pub const fn set_state(&mut self, state: State<A>) {
         self.state = state;
+    }
+
+    /// How a force F that is subtracted from `force` moves it over `span`.
+    pub(crate) fn ahead(&self, span: Duration, force: [f64; A]) -> Prediction<A> {
+        let ([[_, by_velocity], _], [compliance, _]) = self.stepper.map(span).coefficients();
+        let free = core::array::from_fn(|axis| by_velocity * self.state.velocity[axis] + compliance * force[axis]);
+        Prediction { free, compliance }
     }
 
     /// Moves it over `span` under a held force.

@@ -4,8 +4,9 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
+use crate::coordination::{Prediction, Role};
 use crate::tick::on_object;
-use crate::wire::{DecodeError, MAX_LEN, Sample};
+use crate::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
 use crate::{Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
 
 /// What a peer is, apart from its device, its copy of the object and its strategy.
@@ -47,6 +48,8 @@ pub struct Peer<const A: usize, D, S> {
     device: D,
     object: ObjectCopy<A>,
     strategy: S,
+    /// What the strategy asks for beyond what every strategy has.
+    asked: Asked,
     held: Held<A>,
     /// Whether a sample has changed since the mean was computed.
     stale_mean: bool,
@@ -55,6 +58,23 @@ pub struct Peer<const A: usize, D, S> {
     local_time: Instant,
     computed: Acting<A>,
     applied: Acting<A>,
+}
+
+/// What a strategy asks for beyond what every strategy has.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Asked {
+    kind: SampleKind,
+    role: Role,
+    prediction: bool,
+    /// Whether it asks for any of these.
+    any: bool,
+}
+
+impl Asked {
+    fn by<const A: usize>(strategy: &impl Strategy<A>) -> Self {
+        let (kind, role, prediction) = (strategy.kind(), strategy.role(), strategy.needs_prediction());
+        Self { kind, role, prediction, any: kind != SampleKind::State || role != Role::Copy || prediction }
+    }
 }
 
 /// The forces that act over a tick: on the device, and in all on the copy.
@@ -100,6 +120,12 @@ pub enum ReceiveError {
         /// The session it belongs to.
         found: u64,
     },
+    /// It is for another peer.
+    #[error("a sample for peer {receiver}")]
+    Receiver {
+        /// The receiver that it names.
+        receiver: u32,
+    },
     /// It is from nobody else in this session.
     #[error("a sample from peer {sender}, which is not another peer of this session")]
     Sender {
@@ -116,17 +142,78 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         if strategy.needs_ages() {
             held.keep_ages();
         }
-        let local_time = Instant::ZERO;
-        Self { config, device, object, strategy, held, stale_mean: false, next_sequence: 0, local_time, computed: none, applied: none }
+        let (asked, local_time) = (Asked::by(&strategy), Instant::ZERO);
+        Self { config, device, object, strategy, asked, held, stale_mean: false, next_sequence: 0, local_time, computed: none, applied: none }
     }
 
     /// Step 1: writes the sample that this peer sends now into `datagram` and gives its length. `local_time` is what the peer's own clock shows.
+    ///
+    /// For a strategy whose samples are personal, see [`Peer::personal_samples`].
     #[inline]
     pub fn sample(&mut self, local_time: Instant, datagram: &mut [u8; MAX_LEN]) -> usize {
+        let sample = self.next_sample(local_time);
+        let (kind, axes) = (self.asked.kind, self.config.axes);
+        if kind == SampleKind::State {
+            return sample.encode(axes, datagram);
+        }
+        let numbers = self.extra(0);
+        self.all_sent();
+        sample.encode_as(kind, &Extra { receiver: 0, numbers }, axes, datagram)
+    }
+
+    /// Step 1 for a strategy whose samples are personal: hands `send` the place of each receiver in the session and the datagram for it, each with a sequence
+    /// number of its own.
+    pub fn personal_samples(&mut self, local_time: Instant, mut send: impl FnMut(u32, &[u8])) {
+        let Self { config: PeerConfig { place, axes, .. }, asked: Asked { kind, role, .. }, .. } = *self;
+        let mut datagram = [0; MAX_LEN];
+        for (other, receiver) in (0..).filter(|receiver| *receiver != place).take(self.held.len()).enumerate() {
+            if matches!(role, Role::Client { server } if server != other) {
+                continue;
+            }
+            let numbers = self.extra(other);
+            let sample = self.next_sample(local_time);
+            let len = sample.encode_as(kind, &Extra { receiver, numbers }, axes, &mut datagram);
+            send(receiver, &datagram[..len]);
+        }
+        self.all_sent();
+    }
+
+    /// The sample that this peer sends now, without the extra numbers of its strategy.
+    ///
+    /// A driver that has no use for datagrams calls this, [`Peer::extra`] for each receiver if the strategy has a [kind](Peer::kind), and then
+    /// [`Peer::all_sent`].
+    #[inline]
+    pub fn next_sample(&mut self, local_time: Instant) -> Sample<A> {
         let sequence = self.next_sequence;
         self.next_sequence = sequence.wrapping_add(1);
-        let Self { config, object, .. } = self;
-        Sample { session: config.session, sender: config.place, sequence, sent: local_time, state: *object.state() }.encode(config.axes, datagram)
+        let state = match self.asked.role {
+            Role::Copy => *self.object.state(),
+            Role::Client { .. } => self.device.state(),
+        };
+        Sample { session: self.config.session, sender: self.config.place, sequence, sent: local_time, state }
+    }
+
+    /// The extra numbers of the sample that is sent now to another peer, which counts in order with this peer left out; `receiver` is 0 where they are the
+    /// same for all.
+    pub fn extra(&mut self, receiver: usize) -> [f64; A] {
+        self.strategy.extra(receiver, self.object.state(), &self.held)
+    }
+
+    /// The samples of this tick have been made for all receivers.
+    pub fn all_sent(&mut self) {
+        self.strategy.sent(self.object.state());
+    }
+
+    /// What samples carry beyond the state.
+    #[must_use]
+    pub const fn kind(&self) -> SampleKind {
+        self.asked.kind
+    }
+
+    /// Which part of the object the peer has.
+    #[must_use]
+    pub const fn role(&self) -> Role {
+        self.asked.role
     }
 
     /// Step 2: takes in a datagram from another peer.
@@ -136,7 +223,11 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
     #[inline]
     pub fn handle_datagram(&mut self, datagram: &[u8]) -> Result<Reception, ReceiveError> {
-        self.handle_sample(&Sample::decode(datagram, self.config.axes)?)
+        let (sample, extra) = Sample::decode_as(datagram, self.asked.kind, self.config.axes)?;
+        if self.asked.kind.is_personal() && extra.receiver != self.config.place {
+            return Err(ReceiveError::Receiver { receiver: extra.receiver });
+        }
+        self.handle_extended(&sample, &extra.numbers)
     }
 
     /// Step 2 with a datagram that was decoded already: many peers may receive the same one.
@@ -146,28 +237,48 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
     #[inline]
     pub fn handle_sample(&mut self, sample: &Sample<A>) -> Result<Reception, ReceiveError> {
+        self.handle_extended(sample, &[0.0; A])
+    }
+
+    /// [`Peer::handle_sample`] with the extra numbers of a sample for this peer.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
+    #[inline]
+    pub fn handle_extended(&mut self, sample: &Sample<A>, extra: &[f64; A]) -> Result<Reception, ReceiveError> {
         if sample.session != self.config.session {
             return Err(ReceiveError::Session { found: sample.session });
         }
         let Some(place) = self.place_of(sample.sender) else { return Err(ReceiveError::Sender { sender: sample.sender }) };
         if self.held.accept(place, sample.sequence, sample.sent, sample.state) {
             self.stale_mean = true;
+            if self.asked.kind != SampleKind::State {
+                self.strategy.accept(place, extra);
+            }
             Ok(Reception::Newest)
         } else {
             Ok(Reception::Stale)
         }
     }
 
-    /// Step 3: computes the forces of this tick.
+    /// Step 3: computes the forces of this tick, where the next one follows after the period of the tick.
     #[inline(always)]
     pub fn compute(&mut self, now: Instant) -> Forces<A> {
+        self.compute_over(now, self.config.tick)
+    }
+
+    /// Step 3: computes the forces of this tick, where the next one follows after `span`.
+    #[inline(always)]
+    pub fn compute_over(&mut self, now: Instant, span: Duration) -> Forces<A> {
         if self.stale_mean {
             self.held.refresh();
             self.stale_mean = false;
         }
+        let (heard, ahead) = if self.asked.any { self.exchanged(span) } else { (None, Prediction::REST) };
         let own = self.object.state();
-        let coupling = self.coupling_force(own);
-        let command = self.strategy.command(&Context { now, local_time: self.local_time, own, held: &self.held });
+        let coupling = heard.unwrap_or_else(|| self.coupling_force(own));
+        let command = self.strategy.command(&Context { now, local_time: self.local_time, own, held: &self.held, ahead });
         let mut on_object: [f64; A] = core::array::from_fn(|axis| on_object(coupling[axis], command.force[axis]));
         if let Some(enclosure) = &self.config.enclosure {
             let walls = enclosure.force(own);
@@ -190,7 +301,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     #[inline(always)]
     pub fn advance(&mut self, now: Instant, span: Duration) {
         self.device.advance(now, span, self.applied.coupling);
-        self.object.advance(span, self.applied.on_object);
+        if self.asked.role == Role::Copy {
+            self.object.advance(span, self.applied.on_object);
+        }
         self.local_time = self.local_time.saturating_add(self.config.tick);
     }
 
@@ -299,6 +412,23 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// What [`crate::Ages`] change: the peer's own state, what it holds, and whether a sample has changed since the mean was computed.
     pub(crate) const fn aged_parts(&mut self) -> (&State<A>, &mut Held<A>, &mut bool) {
         (self.object.state(), &mut self.held, &mut self.stale_mean)
+    }
+
+    /// What strategies ask for that most do not: the coupling force that was heard of, and how the coordination force moves the copy.
+    #[cold]
+    fn exchanged(&mut self, span: Duration) -> (Option<[f64; A]>, Prediction<A>) {
+        if let Role::Client { server } = self.asked.role {
+            self.object.set_state(*self.held.state(server).expect("the server is another peer"));
+        }
+        let heard = self.strategy.heard_coupling();
+        if !self.asked.prediction {
+            return (heard, Prediction::REST);
+        }
+        let own = self.object.state();
+        let coupling = heard.unwrap_or_else(|| self.coupling_force(own));
+        let walls = self.config.enclosure.as_ref().map_or([0.0; A], |enclosure| enclosure.force(own));
+        let force = core::array::from_fn(|axis| coupling[axis] + walls[axis]);
+        (heard, self.object.ahead(span, force))
     }
 
     #[inline]

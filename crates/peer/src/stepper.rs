@@ -22,6 +22,19 @@ impl Stepper {
         Self { plant, integrator, short, long, free: short.1.is_free() && long.1.is_free() }
     }
 
+    /// The map of a step of that length.
+    #[inline(always)]
+    pub(crate) fn map(&self, span: Duration) -> StepMap {
+        if span == self.short.0 {
+            self.short.1
+        } else if span == self.long.0 {
+            self.long.1
+        } else {
+            // Not a span of this clock: a driver that paces by another one pays for its own map.
+            self.plant.step(span, self.integrator)
+        }
+    }
+
     /// Moves the body over `span` under the held force.
     #[inline(always)]
     pub(crate) fn advance<const A: usize>(&self, state: &mut State<A>, span: Duration, force: [f64; A]) {

@@ -1,24 +1,24 @@
-//! The wire format of a sample: one datagram, little-endian, 48 bytes and 16 for each axis.
+//! The wire format of a sample: one datagram, little-endian. Version 1 has 48 bytes and 16 for each axis, version 2 has 48 and 24.
 //!
 //! ```text
 //! offset  size  field
 //!      0     4  "CHPT"
-//!      4     2  version, 1
+//!      4     2  version, 1 or 2
 //!      6     1  axes, 1 to 3
-//!      7     1  zero
+//!      7     1  version 1: zero; version 2: the kind of the extra number, 1 energy, 2 wave, 3 force
 //!      8     8  session: only peers of one session understand each other
 //!     16     4  sender: the place of the peer in the session
-//!     20     4  zero
+//!     20     4  kinds 2 and 3: receiver, the place of the only peer that it is for; otherwise zero
 //!     24     8  sequence number of the sample, from 0
 //!     32     8  send time \[ns\] on the sender's clock
 //!     40     8  zero
-//!     48    16  position \[m\] and velocity [m/s] on the first axis, then on the others
+//!     48 16/24  position \[m\], velocity [m/s] and, in version 2, the extra number on the first axis, then on the others
 //! ```
 //!
 //! Which sample is the newest follows from the sequence number alone. The send time is for laws that need the age of a sample, and for those who record or measure.
+//! Which version and kind a session speaks follows from its coordination strategy; samples of any other are refused.
 //!
-//! A datagram is taken only if every byte of it has a meaning: whatever decodes encodes to the same bytes again. The zeros are room for what a
-//! later version may send (the energy of a passivity controller, for instance).
+//! A datagram is taken only if every byte of it has a meaning: whatever decodes encodes to the same bytes again.
 
 use cohaptic_units::Instant;
 
@@ -26,18 +26,74 @@ use crate::State;
 
 /// The first four bytes.
 pub const MAGIC: [u8; 4] = *b"CHPT";
-/// The version that this module reads and writes.
-pub const VERSION: u16 = 1;
-/// The length of the largest datagram, with three axes \[byte\].
-pub const MAX_LEN: usize = datagram_len(3);
+/// The length of the largest datagram, with three axes and an extra number on each \[byte\].
+pub const MAX_LEN: usize = SampleKind::Force.datagram_len(3);
 
 const HEADER_LEN: usize = 48;
-const AXIS_LEN: usize = 16;
 
-/// The length of a datagram \[byte\].
-#[must_use]
-pub const fn datagram_len(axes: usize) -> usize {
-    HEADER_LEN + AXIS_LEN * axes
+/// What a sample carries on each axis beyond position and velocity.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum SampleKind {
+    /// Nothing: version 1.
+    #[default]
+    State,
+    /// An energy \[J\] that only grows, the same for all receivers. One that has fallen begins a new life of the sender.
+    Energy,
+    /// A wave [√W] for one receiver.
+    Wave,
+    /// A force \[N\] for one receiver.
+    Force,
+}
+
+impl SampleKind {
+    /// The version of the wire format that has samples of this kind.
+    #[must_use]
+    pub const fn version(self) -> u16 {
+        match self {
+            Self::State => 1,
+            Self::Energy | Self::Wave | Self::Force => 2,
+        }
+    }
+
+    /// Whether each receiver has a sample of its own.
+    #[must_use]
+    pub const fn is_personal(self) -> bool {
+        matches!(self, Self::Wave | Self::Force)
+    }
+
+    /// The length of a datagram \[byte\].
+    #[must_use]
+    pub const fn datagram_len(self, axes: usize) -> usize {
+        HEADER_LEN + self.axis_len() * axes
+    }
+
+    const fn axis_len(self) -> usize {
+        if self.version() == 1 { 16 } else { 24 }
+    }
+
+    /// Byte 7.
+    const fn code(self) -> u8 {
+        match self {
+            Self::State => 0,
+            Self::Energy => 1,
+            Self::Wave => 2,
+            Self::Force => 3,
+        }
+    }
+}
+
+/// What a sample of version 2 says beyond that of version 1.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Extra<const A: usize> {
+    /// The place of the only peer that a sample of a personal kind is for; 0 for the other kinds.
+    pub receiver: u32,
+    /// The extra number on each axis; zeros for [`SampleKind::State`].
+    pub numbers: [f64; A],
+}
+
+impl<const A: usize> Extra<A> {
+    /// Of a sample of version 1.
+    pub const NONE: Self = Self { receiver: 0, numbers: [0.0; A] };
 }
 
 /// What a peer tells the others about its copy of the object.
@@ -68,10 +124,20 @@ pub enum DecodeError {
     #[error("not a sample")]
     Magic,
     /// It is a sample of another version.
-    #[error("version {found} of the wire format; expected {VERSION}")]
+    #[error("version {found} of the wire format; expected {expected}")]
     Version {
         /// The version it has.
         found: u16,
+        /// The version of this session.
+        expected: u16,
+    },
+    /// Its extra numbers are of another kind.
+    #[error("extra numbers of kind {found}; expected {expected}")]
+    Kind {
+        /// The kind it has.
+        found: u8,
+        /// The kind of this session.
+        expected: u8,
     },
     /// It has another number of axes.
     #[error("a sample with {found} axes; expected {expected}")]
@@ -92,91 +158,119 @@ pub enum DecodeError {
     /// A byte that must be zero is not.
     #[error("a reserved byte is not zero")]
     Reserved,
-    /// A position or a velocity is infinite or not a number.
+    /// A position, a velocity or an extra number is infinite or not a number.
     #[error("the {quantity} on axis {axis} is not finite")]
     NotFinite {
         /// Which axis, from 0.
         axis: usize,
-        /// Position or velocity.
+        /// Position, velocity or extra number.
         quantity: &'static str,
     },
 }
 
 impl<const A: usize> Sample<A> {
-    /// Writes the first `axes` axes and gives the length. A peer that simulates more axes than its scene has leaves out those that are always zero.
+    /// [`Sample::encode_as`] of version 1.
     ///
     /// # Panics
     ///
     /// If `axes` is more than A or than 3.
     #[inline]
     pub fn encode(&self, axes: usize, datagram: &mut [u8; MAX_LEN]) -> usize {
+        self.encode_as(SampleKind::State, &Extra::NONE, axes, datagram)
+    }
+
+    /// Writes the first `axes` axes and gives the length. A peer that simulates more axes than its scene has leaves out those that are always zero.
+    ///
+    /// # Panics
+    ///
+    /// If `axes` is more than A or than 3.
+    #[inline]
+    pub fn encode_as(&self, kind: SampleKind, extra: &Extra<A>, axes: usize, datagram: &mut [u8; MAX_LEN]) -> usize {
         let mut header = [0; HEADER_LEN];
         header[0..4].copy_from_slice(&MAGIC);
-        header[4..6].copy_from_slice(&VERSION.to_le_bytes());
+        header[4..6].copy_from_slice(&kind.version().to_le_bytes());
         header[6] = u8::try_from(axes).expect("there are at most three axes");
+        header[7] = kind.code();
         header[8..16].copy_from_slice(&self.session.to_le_bytes());
         header[16..20].copy_from_slice(&self.sender.to_le_bytes());
+        header[20..24].copy_from_slice(&extra.receiver.to_le_bytes());
         header[24..32].copy_from_slice(&self.sequence.to_le_bytes());
         header[32..40].copy_from_slice(&self.sent.as_nanos().to_le_bytes());
         datagram[..HEADER_LEN].copy_from_slice(&header);
+        let (state, axis_len) = (&self.state, kind.axis_len());
         for axis in 0..axes {
-            let start = HEADER_LEN + AXIS_LEN * axis;
-            datagram[start..start + 8].copy_from_slice(&self.state.position[axis].to_le_bytes());
-            datagram[start + 8..start + 16].copy_from_slice(&self.state.velocity[axis].to_le_bytes());
+            let numbers = [state.position[axis], state.velocity[axis], extra.numbers[axis]];
+            let start = HEADER_LEN + axis_len * axis;
+            for (bytes, number) in datagram[start..start + axis_len].chunks_exact_mut(8).zip(numbers) {
+                bytes.copy_from_slice(&number.to_le_bytes());
+            }
         }
-        datagram_len(axes)
+        kind.datagram_len(axes)
     }
 
-    /// Reads a sample of `axes` axes, at most A; the other axes are zero.
+    /// [`Sample::decode_as`] of version 1.
     ///
     /// # Errors
     ///
-    /// [`DecodeError`] for anything but a sample of this version with that many axes and finite numbers. Never panics.
+    /// [`DecodeError`] for anything but a sample of version 1 with this number of axes and finite numbers. Never panics.
     #[inline]
     pub fn decode(datagram: &[u8], axes: usize) -> Result<Self, DecodeError> {
+        Self::decode_as(datagram, SampleKind::State, axes).map(|(sample, _)| sample)
+    }
+
+    /// Reads a sample of that kind and of `axes` axes, at most A; the other axes are zero.
+    ///
+    /// # Errors
+    ///
+    /// [`DecodeError`] for anything but a sample of this kind with this number of axes and finite numbers. Never panics.
+    #[inline]
+    pub fn decode_as(datagram: &[u8], kind: SampleKind, axes: usize) -> Result<(Self, Extra<A>), DecodeError> {
         let Some((header, body)) = datagram.split_first_chunk::<HEADER_LEN>() else {
             return Err(DecodeError::TooShort { len: datagram.len() });
         };
-        check_header(header, datagram.len(), axes)?;
-        let mut state = State::REST;
-        for (axis, numbers) in body.chunks_exact(AXIS_LEN).enumerate().take(A) {
-            let position = f64::from_bits(word(numbers, 0));
-            let velocity = f64::from_bits(word(numbers, 8));
-            if !position.is_finite() {
-                return Err(DecodeError::NotFinite { axis, quantity: "position" });
+        check_header(header, datagram.len(), kind, axes)?;
+        let (mut state, mut extra) = (State::REST, [0.0; A]);
+        let finite = |numbers: &[u8], start: usize, axis: usize, quantity: &'static str| {
+            let number = f64::from_bits(word(numbers, start));
+            if number.is_finite() { Ok(number) } else { Err(DecodeError::NotFinite { axis, quantity }) }
+        };
+        for (axis, numbers) in body.chunks_exact(kind.axis_len()).enumerate().take(A) {
+            state.position[axis] = finite(numbers, 0, axis, "position")?;
+            state.velocity[axis] = finite(numbers, 8, axis, "velocity")?;
+            if kind != SampleKind::State {
+                extra[axis] = finite(numbers, 16, axis, "extra number")?;
             }
-            if !velocity.is_finite() {
-                return Err(DecodeError::NotFinite { axis, quantity: "velocity" });
-            }
-            state.position[axis] = position;
-            state.velocity[axis] = velocity;
         }
-        Ok(Self {
+        let sample = Self {
             session: word(header, 8),
-            sender: u32::from_le_bytes([header[16], header[17], header[18], header[19]]),
+            sender: half_word(header, 16),
             sequence: word(header, 24),
             sent: Instant::from_nanos(word(header, 32)),
             state,
-        })
+        };
+        Ok((sample, Extra { receiver: half_word(header, 20), numbers: extra }))
     }
 }
 
 #[inline]
-fn check_header(header: &[u8; HEADER_LEN], len: usize, axes: usize) -> Result<(), DecodeError> {
+fn check_header(header: &[u8; HEADER_LEN], len: usize, kind: SampleKind, axes: usize) -> Result<(), DecodeError> {
     if header[0..4] != MAGIC {
         return Err(DecodeError::Magic);
     }
     let version = u16::from_le_bytes([header[4], header[5]]);
-    if version != VERSION {
-        return Err(DecodeError::Version { found: version });
+    if version != kind.version() {
+        return Err(DecodeError::Version { found: version, expected: kind.version() });
     }
     if usize::from(header[6]) != axes {
         return Err(DecodeError::Axes { found: header[6], expected: axes });
     }
-    if len != datagram_len(axes) {
-        return Err(DecodeError::Length { found: len, expected: datagram_len(axes) });
+    if kind != SampleKind::State && header[7] != kind.code() {
+        return Err(DecodeError::Kind { found: header[7], expected: kind.code() });
     }
-    if header[7] != 0 || header[20..24] != [0; 4] || word(header, 40) != 0 {
+    if len != kind.datagram_len(axes) {
+        return Err(DecodeError::Length { found: len, expected: kind.datagram_len(axes) });
+    }
+    if header[7] != kind.code() || (!kind.is_personal() && header[20..24] != [0; 4]) || word(header, 40) != 0 {
         return Err(DecodeError::Reserved);
     }
     Ok(())
@@ -187,6 +281,13 @@ fn word(bytes: &[u8], start: usize) -> u64 {
     let mut word = [0; 8];
     word.copy_from_slice(&bytes[start..start + 8]);
     u64::from_le_bytes(word)
+}
+
+#[inline]
+fn half_word(bytes: &[u8], start: usize) -> u32 {
+    let mut word = [0; 4];
+    word.copy_from_slice(&bytes[start..start + 4]);
+    u32::from_le_bytes(word)
 }
 
 #[cfg(test)]
@@ -206,7 +307,7 @@ mod tests {
 
     #[test]
     fn a_sample_of_one_axis_is_64_bytes_and_reads_back() {
-        assert_eq!(datagram_len(1), 64);
+        assert_eq!(SampleKind::State.datagram_len(1), 64);
         assert_eq!(Sample::decode(&datagram()[..64], 1), Ok(sample()));
     }
 
@@ -230,7 +331,7 @@ mod tests {
         assert_eq!(decode(&|_| (), 63), DecodeError::Length { found: 63, expected: 64 });
         assert_eq!(decode(&|_| (), 65), DecodeError::Length { found: 65, expected: 64 });
         assert_eq!(decode(&|b| b[0] = b'X', 64), DecodeError::Magic);
-        assert_eq!(decode(&|b| b[4] = 2, 64), DecodeError::Version { found: 2 });
+        assert_eq!(decode(&|b| b[4] = 2, 64), DecodeError::Version { found: 2, expected: 1 });
         assert_eq!(decode(&|b| b[6] = 3, 64), DecodeError::Axes { found: 3, expected: 1 });
         assert_eq!(decode(&|b| b[45] = 1, 64), DecodeError::Reserved);
         let put = |at: usize, value: f64| move |b: &mut [u8; MAX_LEN]| b[at..at + 8].copy_from_slice(&value.to_le_bytes());
@@ -248,5 +349,23 @@ mod tests {
         assert_eq!(wide.encode(1, &mut bytes), 64);
         assert_eq!(bytes, datagram());
         assert_eq!(Sample::<3>::decode(&bytes[..64], 1), Ok(wide));
+    }
+
+    #[test]
+    fn version_2_has_an_extra_number_on_each_axis_and_a_receiver() {
+        let extra = Extra { receiver: 3, numbers: [0.125] };
+        let mut bytes = [0; MAX_LEN];
+        assert_eq!(sample().encode_as(SampleKind::Wave, &extra, 1, &mut bytes), 72);
+        assert_eq!(bytes[..8], *b"CHPT\x02\x00\x01\x02");
+        assert_eq!((bytes[20], &bytes[64..72]), (3, &0.125_f64.to_le_bytes()[..]));
+        let decode = |kind, bytes: &[u8]| Sample::<1>::decode_as(bytes, kind, 1);
+        assert_eq!(decode(SampleKind::Wave, &bytes[..72]), Ok((sample(), extra)));
+        assert_eq!(decode(SampleKind::Force, &bytes[..72]), Err(DecodeError::Kind { found: 2, expected: 3 }));
+        assert_eq!(decode(SampleKind::State, &bytes[..72]), Err(DecodeError::Version { found: 2, expected: 1 }));
+        assert_eq!(decode(SampleKind::Energy, &datagram()[..64]), Err(DecodeError::Version { found: 1, expected: 2 }));
+        sample().encode_as(SampleKind::Energy, &Extra { receiver: 1, ..extra }, 1, &mut bytes);
+        assert_eq!(decode(SampleKind::Energy, &bytes[..72]), Err(DecodeError::Reserved), "an energy is for all");
+        sample().encode_as(SampleKind::Force, &Extra { receiver: 1, numbers: [f64::NAN] }, 1, &mut bytes);
+        assert_eq!(decode(SampleKind::Force, &bytes[..72]), Err(DecodeError::NotFinite { axis: 0, quantity: "extra number" }));
     }
 }

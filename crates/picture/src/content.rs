@@ -295,6 +295,15 @@ impl Content {
     }
 }
 
+/// What two contents reach over together.
+pub(crate) fn together((one_x, one_y): Reach, (other_x, other_y): Reach) -> Reach {
+    let join = |one: Option<(f64, f64)>, other: Option<(f64, f64)>| match (one, other) {
+        (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
+        (one, other) => one.or(other),
+    };
+    (join(one_x, other_x), join(one_y, other_y))
+}
+
 fn span(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values.fold(None, |found, value| Some(found.map_or((value, value), |(low, high): (f64, f64)| (low.min(value), high.max(value)))))
 }

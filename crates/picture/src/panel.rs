@@ -1,7 +1,7 @@
 //! A panel: two axes and what lies between them.
 
 use crate::axis::Axis;
-use crate::content::{Content, Reach};
+use crate::content::{Content, Reach, together};
 use crate::extent::Extent;
 use crate::text::Text;
 
@@ -58,14 +58,7 @@ impl Panel {
 
     /// What both axes reach over: of this panel alone.
     pub(crate) fn content_extents(&self) -> Reach {
-        let join = |one: Option<(f64, f64)>, other: Option<(f64, f64)>| match (one, other) {
-            (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
-            (one, other) => one.or(other),
-        };
-        self.contents
-            .iter()
-            .map(|content| content.extents(self.x.scale, self.y.scale))
-            .fold((None, None), |(x, y), (other_x, other_y)| (join(x, other_x), join(y, other_y)))
+        self.contents.iter().map(|content| content.extents(self.x.scale, self.y.scale)).fold((None, None), together)
     }
 }
 

@@ -1,6 +1,6 @@
 //! A whole picture: title, panels in a grid, legend.
 
-use crate::content::Reach;
+use crate::content::{Reach, together};
 use crate::extent::{Scale, whole};
 use crate::legend::LegendPlace;
 use crate::panel::{Extents, Panel};
@@ -123,12 +123,8 @@ impl Picture {
 
     /// The axes of each panel as shown.
     pub(crate) fn extents(&self) -> Vec<Extents> {
-        let join = |one: Option<(f64, f64)>, other: Option<(f64, f64)>| match (one, other) {
-            (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
-            (one, other) => one.or(other),
-        };
         let own: Vec<_> = self.panels.iter().map(Panel::content_extents).collect();
-        let all = own.iter().fold((None, None), |(x, y), (other_x, other_y)| (join(x, *other_x), join(y, *other_y)));
+        let all = own.iter().copied().fold((None, None), together);
         let first = self.panels.first();
         let of = |(panel, (x, y)): (&Panel, &Reach)| Extents {
             x: if self.shared_x { first.unwrap_or(panel).x.shown(all.0) } else { panel.x.shown(*x) },

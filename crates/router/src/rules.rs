@@ -50,11 +50,11 @@ impl Rules {
 }
 
 fn applies(rule: &RuleSpec, from: Side, headers: &Headers) -> bool {
-    let port = |wanted: Option<Ports>, place: usize| wanted.is_none_or(|wanted| headers.ports().is_some_and(|ports| wanted.contain(ports[place])));
+    let port = |wanted: Option<Ports>, place: usize| wanted.is_none_or(|wanted| headers.ports.is_some_and(|ports| wanted.contain(ports[place])));
     rule.from.is_none_or(|side| side == from)
-        && rule.protocol.is_none_or(|protocol| protocol == headers.protocol())
-        && rule.source.is_none_or(|network| network.contains(headers.source()))
-        && rule.destination.is_none_or(|network| network.contains(headers.destination()))
+        && rule.protocol.is_none_or(|protocol| protocol == headers.protocol)
+        && rule.source.is_none_or(|network| network.contains(headers.source))
+        && rule.destination.is_none_or(|network| network.contains(headers.destination))
         && port(rule.source_port, 0)
         && port(rule.destination_port, 1)
         && (port(rule.port, 0) || port(rule.port, 1))

@@ -1,6 +1,6 @@
 //! What the parts of a peer are made from, with every scaling applied: how masses and gains depend on the number of peers.
 
-use cohaptic_peer::coordination::{Law, Pull};
+use cohaptic_peer::coordination::Pull;
 use cohaptic_peer::{CopyConfig, Gains, PeerConfig, Plant, State};
 
 use crate::{Scaling, Scene};
@@ -22,7 +22,7 @@ impl Scene {
             coupling: self.coupling(place),
             tick: spec.clock.tick,
             compute_delay: spec.compute_delay,
-            own_damping: Law::<f64>::damping(&self.law(place)),
+            own_damping: self.own_damping(place),
             enclosure: self.object.enclosure,
         }
     }
@@ -74,7 +74,7 @@ impl Scene {
     /// If there is no such peer.
     #[must_use]
     pub fn copy_config(&self, place: usize) -> CopyConfig {
-        CopyConfig { mass: self.copy_mass(), damping: self.object.damping + Law::<f64>::damping(&self.law(place)) }
+        CopyConfig { mass: self.copy_mass(), damping: self.object.damping + self.own_damping(place) }
     }
 
     /// Where the copy and the device of that peer begin.
@@ -91,7 +91,7 @@ impl Scene {
 }
 
 impl Scaling {
-    /// What the coordination gains are multiplied by among that many peers: 4(N−1)/N² for [`Scaling::InverseN`].
+    /// What the coordination gains are multiplied by among this number of peers: 4(N−1)/N² for [`Scaling::InverseN`].
     ///
     /// Over an ideal network the difference modes of average-position coordination with split mass have the squared frequency (N/mO)·KT·N/(N−1)
     /// (Rakhsha & Constantinescu 2015, equation 6); scaled, it is 4·KT/mO for every N.
@@ -104,7 +104,7 @@ impl Scaling {
         }
     }
 
-    /// What the coupling gains are multiplied by among that many peers: 2/N for [`Scaling::InverseN`].
+    /// What the coupling gains are multiplied by among this number of peers: 2/N for [`Scaling::InverseN`].
     #[must_use]
     pub fn coupling_factor(self, peers: usize) -> f64 {
         match self {
@@ -115,10 +115,10 @@ impl Scaling {
 }
 
 impl Scene {
-    /// The mass of each copy of the object \[kg\].
+    /// The mass of each copy of the object \[kg\]; the whole mass where one peer alone has the object.
     #[must_use]
     pub fn copy_mass(&self) -> f64 {
-        if self.object.split_mass { self.object.mass / count(self.peers.len()) } else { self.object.mass }
+        if self.object.split_mass && self.server().is_none() { self.object.mass / count(self.peers.len()) } else { self.object.mass }
     }
 }
 

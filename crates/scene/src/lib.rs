@@ -42,6 +42,7 @@ mod read;
 pub mod schema;
 mod sections;
 mod strategies;
+mod strategy_limits;
 #[cfg(test)]
 mod tests;
 

@@ -109,7 +109,7 @@ pub struct MeasureName {
 }
 
 impl MeasureName {
-    /// Every measure of a scene with that many peers, in order.
+    /// Every measure of a scene with this number of peers, in order.
     #[must_use]
     pub fn all(peers: usize) -> Vec<Self> {
         let mut names = Vec::new();

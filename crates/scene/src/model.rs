@@ -5,7 +5,7 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use cohaptic_peer::coordination::{LawSettings, Pull};
-use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator};
+use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator, SendWhen};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::{DropCause, LinkModel};
 
@@ -171,12 +171,14 @@ pub struct CoordinationSpec {
     pub settings: LawSettings,
     /// The period of sending, Tn; a whole multiple of every peer's tick, on its own clock.
     pub update: Duration,
+    /// Which of these samples are sent; `None`: all.
+    pub send_when: Option<SendWhen>,
 }
 
 impl fmt::Debug for CoordinationSpec {
-    /// The pull and parameters of strategies are shown only where they are not at their defaults: fingerprints of records are made of this text.
+    /// The pull, parameters of strategies and the dead bands are shown only where they are not at their defaults: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { strategy, scaling, pull, gains, settings, update } = self;
+        let Self { strategy, scaling, pull, gains, settings, update, send_when } = self;
         let mut shown = f.debug_struct("CoordinationSpec");
         shown.field("strategy", strategy).field("scaling", scaling).field("gains", gains).field("update", update);
         if *pull != Pull::Mean {
@@ -184,6 +186,9 @@ impl fmt::Debug for CoordinationSpec {
         }
         if *settings != LawSettings::default() {
             shown.field("settings", settings);
+        }
+        if let Some(send_when) = send_when {
+            shown.field("send_when", send_when);
         }
         shown.finish()
     }

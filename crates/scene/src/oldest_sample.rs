@@ -12,12 +12,14 @@ impl Scene {
     /// ticks from sample to sample.
     ///
     /// `None` where the links bound no such age or do not keep it: anything but constant delays and patterns of lost packets, changes of links in the
-    /// timeline, peers whose clocks differ.
+    /// timeline, peers whose clocks differ, dead bands.
     #[must_use]
     pub fn oldest_sample(&self) -> Option<u64> {
         let clock = self.peers[0].clock;
         let is_link_change = |what: &ChangeKind| matches!(what, ChangeKind::Link(_) | ChangeKind::AllLinks(_));
-        if self.peers.iter().any(|peer| peer.clock != clock) || self.timeline.iter().any(|change| is_link_change(&change.what)) {
+        // A sample that is not sent leaves the one before it in use.
+        let thinned = self.coordination.send_when.is_some();
+        if thinned || self.peers.iter().any(|peer| peer.clock != clock) || self.timeline.iter().any(|change| is_link_change(&change.what)) {
             return None;
         }
         let line = |model: Option<&LinkModel>| {

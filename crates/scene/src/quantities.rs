@@ -13,6 +13,10 @@ pub(crate) const MASS: Quantity = Quantity::positive("kg");
 pub(crate) const ADDED_MASS: Quantity = Quantity::not_negative("kg");
 /// At least zero [N·s/m].
 pub(crate) const DAMPING: Quantity = Quantity::not_negative("N·s/m");
+/// Above zero [N·s/m].
+pub(crate) const IMPEDANCE: Quantity = Quantity::positive("N·s/m");
+/// At least zero \[J\].
+pub(crate) const ENERGY: Quantity = Quantity::not_negative("J");
 /// At least zero [N/m].
 pub(crate) const STIFFNESS: Quantity = Quantity::not_negative("N/m");
 /// Above zero [N/m].

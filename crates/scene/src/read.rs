@@ -152,7 +152,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         measure: measure?,
         expect: expect?,
     };
-    if let Some(refused) = scene.refused_automatic() {
+    if let Some(refused) = scene.refused_automatic().map(str::to_owned).or_else(|| scene.refused_strategy()) {
         file.fault_at(coordination_node.unwrap_or(document), refused);
         return None;
     }

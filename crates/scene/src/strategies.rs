@@ -1,7 +1,8 @@
 //! Which strategy each peer runs: the scene's, or one of the caller's own.
 
-use cohaptic_peer::Strategy;
-use cohaptic_peer::coordination::{BuiltIn, LawParameters, LawStrategy};
+use cohaptic_peer::coordination::{BuiltIn, BuiltInStrategy, LawParameters, SessionParameters};
+use cohaptic_peer::wire::SampleKind;
+use cohaptic_peer::{Coordination, Strategy};
 
 use crate::{CoordinationSpec, Scene};
 
@@ -27,26 +28,59 @@ pub trait Strategies {
 pub struct FromScene;
 
 impl Strategies for FromScene {
-    type Strategy<const A: usize> = LawStrategy<A>;
+    type Strategy<const A: usize> = BuiltInStrategy<A>;
 
-    fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> LawStrategy<A> {
-        LawStrategy::new(scene.coordination.strategy, scene.law_parameters(peer))
+    fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> BuiltInStrategy<A> {
+        scene.coordination.strategy.in_session(&scene.session_parameters(peer))
     }
 
     fn law(&self, scene: &Scene, peer: usize) -> Option<BuiltIn> {
-        Some(scene.law(peer))
+        scene.law(peer)
     }
 }
 
 impl Scene {
-    /// The coordination law of a peer.
+    /// The coordination law of a peer; `None` if the strategy of the scene is not a law.
     ///
     /// # Panics
     ///
     /// If there is no such peer.
     #[must_use]
-    pub fn law(&self, peer: usize) -> BuiltIn {
+    pub fn law(&self, peer: usize) -> Option<BuiltIn> {
         self.coordination.strategy.law(&self.law_parameters(peer))
+    }
+
+    /// β [N·s/m]: by how much the strategy damps the copy of a peer.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn own_damping(&self, peer: usize) -> f64 {
+        self.coordination.strategy.damping(&self.law_parameters(peer))
+    }
+
+    /// The peer that alone has the object; `None` if every peer has a copy.
+    #[must_use]
+    pub fn server(&self) -> Option<usize> {
+        let CoordinationSpec { strategy, settings, .. } = &self.coordination;
+        (*strategy == Coordination::ClientServer).then(|| settings.of(*strategy).place(0))
+    }
+
+    /// What samples carry beyond the state.
+    #[must_use]
+    pub const fn sample_kind(&self) -> SampleKind {
+        self.coordination.strategy.kind()
+    }
+
+    /// How many of its ticks are between two samples of a peer.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn samples_every(&self, peer: usize) -> u64 {
+        u64::try_from(self.coordination.update.as_nanos() / self.peers[peer].clock.tick.as_nanos()).unwrap_or(u64::MAX)
     }
 
     /// What the law of a peer is made from: the gains scaled by the number of peers, its tick, and the parameters of the law itself.
@@ -60,6 +94,18 @@ impl Scene {
             tick: self.peers[peer].clock.tick,
             oldest: if own.any_automatic() { self.oldest_sample() } else { None },
             own: *own,
+        }
+    }
+
+    /// What the strategy of a peer is made from.
+    fn session_parameters<const A: usize>(&self, peer: usize) -> SessionParameters<A> {
+        let places = 0..self.peers.len();
+        SessionParameters {
+            law: self.law_parameters(peer),
+            place: peer,
+            samples_every: self.samples_every(peer),
+            initial: places.clone().map(|place| self.initial_state(place)).collect(),
+            couplings: places.map(|place| (self.peers[place].contact, self.coupling(place))).collect(),
         }
     }
 }

@@ -103,7 +103,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "update =",
             "updat =",
-            "8:1: coordination.updat: unknown key: expected one of strategy, scaling, pull, stiffness, damping, update, smoothed-average-position, extrapolated, local-damping; did you mean \"update\"?",
+            "8:1: coordination.updat: unknown key: expected one of strategy, scaling, pull, stiffness, damping, update, send-when, smoothed-average-position, extrapolated, local-damping, passivity-control, set-position, wave, client-server; did you mean \"update\"?",
         ),
         ("damping = 5.0 }\ncoupling", "dampening = 5.0 }\ncoupling", "10:24: peer.device.dampening: unknown key: expected one of mass, damping"),
         (
@@ -177,7 +177,7 @@ fn a_wrong_unit_or_type_is_refused() {
         (
             "average-position",
             "average-positoin",
-            "6:12: coordination.strategy: unknown name \"average-positoin\": expected one of average-position, proportional-derivative, smoothed-average-position, extrapolated, local-damping; did you mean \"average-position\"?",
+            "6:12: coordination.strategy: unknown name \"average-positoin\": expected one of average-position, proportional-derivative, smoothed-average-position, extrapolated, local-damping, passivity-control, set-position, wave, client-server; did you mean \"average-position\"?",
         ),
         ("[peer]", "[peer]\nhand = \"soft\"", "10:8: peer.hand: unknown hand \"soft\": expected \"none\""),
         ("[peer]", "[peer]\ncontact = { pull = 1 }", "10:13: peer.contact.pull: unknown key: expected push"),
@@ -289,6 +289,49 @@ fn what_does_not_fit_together_is_refused() {
         &two_axes.replace("[peer]", "[peer]\nhand = { force = 1.5 }"),
         "11:18: peer.hand.force: 1.5 has one component: expected a list of 2 numbers [N]",
     );
+}
+
+#[test]
+fn a_strategy_that_cannot_work_in_a_scene_is_refused() {
+    let of = |strategy: &str| SCENE.replace("average-position", strategy);
+    let refused = |strategy: &str, changes: &[&str], why: &str| {
+        let changes: Vec<String> = changes.iter().copied().map(str::to_owned).collect();
+        let error = Scene::parse(&of(strategy), Path::new("scene.toml"), &changes).unwrap_err().to_string();
+        assert!(error.contains(&format!("the strategy {strategy} {why}")), "{error}");
+    };
+    for strategy in ["passivity-control", "set-position", "wave", "client-server"] {
+        parse(&of(strategy), &[]).unwrap();
+    }
+    for strategy in ["passivity-control", "set-position", "wave"] {
+        refused(strategy, &["peer.compute-delay=1"], "counts the energy of forces that act at once");
+    }
+    for strategy in ["set-position", "wave"] {
+        refused(strategy, &["simulation.integrator=\"rk4\""], "damps each copy by just as much");
+    }
+    refused("wave", &["peer.clock.drift=\"5ppm\""], "sends waves for as long as it takes");
+    refused("set-position", &["coordination.stiffness=0"], "has no set-position without a spring");
+    refused("set-position", &["timeline=[{at=\"1ms\",coordination={stiffness=5}}]"], "keeps energy in its springs");
+    for strategy in ["wave", "client-server"] {
+        refused(strategy, &["coordination.send-when.velocity=\"10%\""], "needs every sample");
+    }
+}
+
+#[test]
+fn parameters_that_a_strategy_cannot_have_are_refused_at_their_place() {
+    for (key, value, message) in [
+        ("wave.impedance", "0", "coordination.wave.impedance: "),
+        ("wave.on-loss", "\"keep\"", "coordination.wave.on-loss: unknown name \"keep\": expected one of zero, hold"),
+        ("passivity-control.reserve", "-1", "coordination.passivity-control.reserve: "),
+        ("set-position.ceiling", "\"much\"", "coordination.set-position.ceiling: "),
+        ("client-server.server", "\"nobody\"", "coordination.client-server.server: there is no peer \"nobody\""),
+        ("client-server.returns", "\"nothing\"", "coordination.client-server.returns: unknown name \"nothing\""),
+        ("send-when.velocity", "1.0", "coordination.send-when.velocity: with a dead band of 100%"),
+        ("send-when.heartbeat", "\"1s\"", "coordination.send-when: nothing says when a sample is worth sending"),
+        ("send-when.position", "0", "coordination.send-when.position: "),
+    ] {
+        let error = Scene::parse(SCENE, Path::new("scene.toml"), &[format!("coordination.{key}={value}")]).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
 }
 
 #[test]

@@ -42,6 +42,17 @@ pub enum AnalysisError {
         /// Its name.
         strategy: &'static str,
     },
+    /// The strategy exchanges more than states, or is not linear.
+    #[error("{strategy} coordination has no analysis: simulations tell whether it is stable, as in `cohaptic check` and `cohaptic run`")]
+    NoAnalysis {
+        /// Its name.
+        strategy: &'static str,
+    },
+    /// Not all samples are sent.
+    #[error(
+        "with coordination.send-when a sample depends on how far things have moved, which is not linear: simulations tell whether the scene is stable"
+    )]
+    DeadBands,
     /// Ages of samples between clocks that differ.
     #[error(
         "{strategy} coordination uses the ages of samples, which do not repeat where clocks differ: expected one tick, offset and drift for all peers"

@@ -5,6 +5,7 @@
 
 use std::time::Duration;
 
+use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Acting, Contact, Device as _, Gains, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State, Strategy};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
@@ -140,6 +141,9 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             Peer::new(config, device, object, strategy(place), Held::new((1..peers).map(|_| State::REST)))
         };
         let members: Vec<Member<A, S>> = (0..peers).map(member).collect();
+        if members.iter().any(|member| member.kind() != SampleKind::State) {
+            return Err(AnalysisError::NoAnalysis { strategy: scene.coordination.strategy.name() });
+        }
         if members.iter().any(|member| member.strategy().needs_ages()) && !has_equal_clocks(scene) {
             return Err(AnalysisError::AgesByClocks { strategy: scene.coordination.strategy.name() });
         }

@@ -73,20 +73,12 @@ impl Matrix {
     }
 
     /// A row and the one after it, to be changed together.
-    ///
-    /// # Panics
-    ///
-    /// If there are no such rows.
     #[inline]
     pub(crate) fn two_rows_mut(&mut self, row: usize) -> (&mut [f64], &mut [f64]) {
         self.entries[row * self.columns..(row + 2) * self.columns].split_at_mut(self.columns)
     }
 
     /// A row and the two after it, to be changed together.
-    ///
-    /// # Panics
-    ///
-    /// If there are no such rows.
     #[inline]
     pub(crate) fn three_rows_mut(&mut self, row: usize) -> (&mut [f64], &mut [f64], &mut [f64]) {
         let (first, others) = self.entries[row * self.columns..(row + 3) * self.columns].split_at_mut(self.columns);

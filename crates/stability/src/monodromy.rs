@@ -56,10 +56,7 @@ pub enum StateKind {
     /// The force on the copy that acts next, if forces are applied a tick late.
     PendingForce { axis: usize },
     /// A number that the strategy remembers.
-    Memory {
-        /// Which.
-        number: usize,
-    },
+    Memory { number: usize },
     /// Where the copy was at an earlier sampling.
     SamplePosition {
         axis: usize,

@@ -101,7 +101,7 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method:
 }
 
 /// From how many rows on a matrix is replaced by the determinant, whose cost grows with the number of signals and little with their delay: between
-/// 300 and 1000, by docs/stability-speed.md.
+/// 300 and 1000, by docs/measured-stability.md.
 const LARGE: usize = 500;
 /// Up to how many signals the determinant is small.
 const FEW: usize = 32;

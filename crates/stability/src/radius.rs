@@ -61,7 +61,7 @@ impl Radius {
         if (factor * high).is_finite() { Self { value: factor * self.value, error: factor * self.error } } else { Self::at_least(factor * low) }
     }
 
-    /// The radius over that many frames: the power, with the error that follows.
+    /// The radius over this number of frames: the power, with the error that follows.
     #[must_use]
     pub fn over(self, frames: u32) -> Self {
         if frames == 1 {

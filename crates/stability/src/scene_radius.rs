@@ -52,7 +52,7 @@ pub(crate) struct RadiusScratch {
 struct Bodies {
     object: Plant,
     device: Plant,
-    law: BuiltIn,
+    law: Option<BuiltIn>,
     /// Of a device that touches nothing.
     loose: Option<Radius>,
 }
@@ -189,7 +189,8 @@ impl SceneRadius {
     }
 }
 
-fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
+/// The larger of two radii, or what both may be.
+pub(crate) fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
     if BOUND {
         one.or(other)
     } else if other.value > one.value || other.value.is_nan() {

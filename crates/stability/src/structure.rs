@@ -165,7 +165,7 @@ impl Structure {
 
 /// The linear form of the law of a peer; `None` if it has none.
 pub(crate) fn linear_law(scene: &Scene, peer: usize) -> Option<LinearLaw> {
-    LinearLaw::of(&scene.law(peer))
+    LinearLaw::of(&scene.law(peer)?)
 }
 
 /// Whether all peers have the same tick, offset and drift.

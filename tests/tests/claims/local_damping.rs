@@ -11,55 +11,13 @@
 
 use cohaptic_harness::Model;
 use cohaptic_peer::Coordination;
-use cohaptic_peer::coordination::{Law, LawValue};
-use cohaptic_scene::Scene;
-use cohaptic_tests::{Draft, Log, Tick, run};
+use cohaptic_peer::coordination::LawValue;
+use cohaptic_tests::{Draft, run};
 use proptest::prelude::*;
 
 use crate::energy::{heavy, springs};
+use crate::injected::{Injected, stored_at_first};
 use crate::{TICK, ages, cases};
-
-/// The energy that the network has injected by each tick \[J\], what it may be at most, and how far all this may be from exact numbers.
-struct Injected {
-    energy: Vec<f64>,
-    most: f64,
-    rounding: f64,
-}
-
-impl Injected {
-    fn of(scene: &Scene, log: &Log) -> Self {
-        let peers = scene.peers.len();
-        let (stiffness, mass) = (scene.coordination.gains.stiffness, scene.copy_mass());
-        let ticks: Vec<&[Tick]> = log.ticks.chunks_exact(peers).collect();
-        let pair = stiffness / (peers - 1) as f64;
-        let first = ticks[0];
-        let stored = |one: &Tick| first.iter().map(|other| 0.25 * pair * (one.object.position[0] - other.object.position[0]).powi(2)).sum::<f64>();
-        let most = first.iter().map(stored).sum();
-        let (mut injected, mut exchanged, mut energy) = (0.0, most, Vec::new());
-        for pair in ticks.windows(2) {
-            for (place, (now, next)) in pair[0].iter().zip(pair[1]).enumerate() {
-                let own = Law::<f64>::damping(&scene.law(place));
-                let (before, after) = (now.object, next.object);
-                let moved = after.position[0] - before.position[0];
-                let spring = now.coordination_force[0] - own * before.velocity[0];
-                let held = now.coupling_force[0] - spring;
-                let damped = held * moved - 0.5 * mass * (after.velocity[0].powi(2) - before.velocity[0].powi(2));
-                injected -= spring * moved + damped * own / (own + scene.object.damping);
-                exchanged += (spring.abs() + held.abs()) * (moved.abs() + before.position[0].abs() * 1e-4)
-                    + mass * (after.velocity[0].powi(2) + before.velocity[0].powi(2))
-                    + own * before.velocity[0].abs() * moved.abs();
-            }
-            energy.push(injected);
-        }
-        // Step maps are exact to 1e-11 of what they exchange (crates/peer/src/plant.rs), positions to 2^-53 < 1e-4·1e-11 of themselves.
-        Self { energy, most, rounding: 1e-11 * exchanged }
-    }
-
-    /// How much more than it may \[J\]; above zero, by more than rounding, where the claim fails.
-    fn excess(&self) -> f64 {
-        self.energy.iter().copied().fold(f64::MIN, f64::max) - self.most - self.rounding
-    }
-}
 
 fn with_damping(draft: &mut Draft, damping: f64) {
     draft.strategy = Coordination::LocalDamping;
@@ -82,10 +40,8 @@ proptest! {
         let stiffness = draft.gains.stiffness;
         with_damping(&mut draft, (1.0 + more) * stiffness * (age + TICK));
         let log = run(&draft.scene(), Model::Least);
-        let injected = Injected::of(&draft.scene(), &log);
-        prop_assert!(injected.excess() <= 0.0, "{:e} J more than {:e} J", injected.excess(), injected.most);
-        // The tolerance decides nothing: it is far below what moves.
-        prop_assert!(injected.rounding <= 1e-6 * injected.energy.iter().copied().fold(injected.most, |most, energy| most.max(energy.abs())));
+        let most = stored_at_first(&draft.scene());
+        Injected::of(&draft.scene(), &log).is_at_most(most)?;
     }
 
     /// A damping of `auto` is the bound for what the links do at most.
@@ -102,9 +58,9 @@ proptest! {
         let scene = draft.scene();
         let log = run(&scene, Model::Least);
         let bound = scene.coordination.gains.stiffness * (ages::oldest(&log, scene.peers.len()) + TICK);
-        let damping = Law::<f64>::damping(&scene.law(0));
+        let damping = scene.own_damping(0);
         prop_assert!(damping >= bound * (1.0 - 1e-12), "{damping} is below {bound}");
-        prop_assert!(Injected::of(&scene, &log).excess() <= 0.0);
+        Injected::of(&scene, &log).is_at_most(stored_at_first(&scene))?;
     }
 }
 
@@ -118,7 +74,7 @@ fn one_percent_below_the_bound_the_network_injects_energy() {
         settings.set(0, damping);
         settings.set(1, LawValue::Automatic);
         let scene = draft.scene();
-        (Law::<f64>::damping(&scene.law(0)), Injected::of(&scene, &run(&scene, Model::Least)).excess())
+        (scene.own_damping(0), Injected::of(&scene, &run(&scene, Model::Least)).excess(stored_at_first(&scene)))
     };
     let (bound, at_bound) = excess(LawValue::Automatic);
     assert!((bound - 2.1).abs() < 1e-12, "{bound}");

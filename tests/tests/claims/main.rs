@@ -13,18 +13,24 @@
 )]
 
 mod ages;
+mod client_server;
 mod counterexamples;
 mod energy;
 mod experiments;
 mod felt;
 mod healing;
+mod injected;
 mod joining;
 mod jumps;
 mod local_damping;
 mod paper;
+mod passivity_control;
 mod regions;
+mod send_when;
+mod set_position;
 mod settling;
 mod stiffness;
+mod wave;
 
 use cohaptic_tests::same_cases;
 use proptest::prelude::ProptestConfig;

@@ -1,4 +1,4 @@
-//! Writes the first part of `docs/peers-speed.md`: see its first lines, or `others-table`, which writes the rest. Takes about three minutes.
+//! Writes the first part of `docs/measured-peers.md`: see its first lines, or `others-table`, which writes the rest. Takes about three minutes.
 //!
 //! `mesh-table mesh` and `mesh-table link` write one table each.
 
@@ -34,7 +34,7 @@ fn main() {
 fn head() {
     println!("# Compared with others: speed\n");
     println!("The same scenes on this project and on what others wrote, in one run. This page is written by\n");
-    println!("    cd benches/peers && (cargo run --release --bin mesh-table && others/run) > ../../docs/peers-speed.md\n");
+    println!("    cd benches/peers && (cargo run --release --bin mesh-table && others/run) > ../../docs/measured-peers.md\n");
     println!("and measured on: {}. Processor time on one core, the median of {ROUNDS} rounds in which", machine());
     println!("all alternate. What the columns leave out stands in [what the others do not model](#what-the-others-do-not-model).\n");
 }
@@ -45,7 +45,7 @@ fn mesh() {
         "N peers at 1 kHz, each grasping the object through a device, one of them pushed by a constant hand, 125 samples a second to each other peer:"
     );
     println!(
-        "the scene of [speed.md](speed.md). All but cohaptic have the same arithmetic (`benches/peers/src/mesh/body.rs`) and differ in the part that keeps the time and"
+        "the scene of [measured-speed.md](measured-speed.md). All but cohaptic have the same arithmetic (`benches/peers/src/mesh/body.rs`) and differ in the part that keeps the time and"
     );
     println!(
         "brings the samples; each is written as its own documentation would have it, and for speed. All draw loss and jitter from the same addresses, so that"
@@ -59,7 +59,7 @@ fn mesh() {
         "Nothing in this scene happens between ticks but packets on their way. cohaptic sees that, and runs it in arrays, tick by tick, as long as nobody watches"
     );
     println!(
-        "([architecture.md](architecture.md#compiled-to-the-least)); if all links have one constant delay, a sample on its way is one for all its receivers, so that its time"
+        "([architecture.md](architecture.md#compiled-to-the-least)). If all links have one constant delay, a sample on its way is one for all its receivers, so that its time"
     );
     println!(
         "a packet is less than any program can move one in. Its second row is the same scene with an observer that is shown every packet: event by event, as any scene"
@@ -77,7 +77,7 @@ fn mesh() {
         "\n*Cohaptic is* says how many times as fast. The bare loops are what its speed is set against, with nothing but this scene: they have no room for another one."
     );
     println!(
-        "That of [speed.md](speed.md) keeps the counters of each link and the largest discrepancy, as cohaptic does; these keep nothing but what moves. bach's queues"
+        "That of [measured-speed.md](measured-speed.md) keeps the counters of each link and the largest discrepancy, as cohaptic does; these keep nothing but what moves. bach's queues"
     );
     println!("have a packet at its instant; its peers, like those of the loop over ticks, look at each tick.\n");
     println!("### What the others do not model\n");
@@ -147,7 +147,7 @@ fn links() {
     println!(
         "what came out by the last packet sent, of a run with the same packets: how many, and mean and deviation of their delays. What each stage of a link costs:"
     );
-    println!("[link-speed.md](link-speed.md).\n");
+    println!("[measured-link.md](measured-link.md).\n");
     println!("| link | program | ns a packet | million packets/s | seen: out | delay \\[ms\\] |");
     println!("| --- | --- | ---: | ---: | ---: | ---: |");
     let mut times = vec![Vec::new(); link::ROWS.len()];

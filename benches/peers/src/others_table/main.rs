@@ -1,4 +1,4 @@
-//! Writes the last part of `docs/peers-speed.md`: what others wrote in other languages, where it is installed. See `others/run`.
+//! Writes the last part of `docs/measured-peers.md`: what others wrote in other languages, where it is installed. See `others/run`.
 
 mod foreign;
 mod map;
@@ -27,7 +27,6 @@ fn main() {
     std::fs::remove_dir_all(&folder).expect("it is ours");
 }
 
-/// Where the scripts are.
 fn scripts() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("others")
 }

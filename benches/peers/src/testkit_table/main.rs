@@ -1,4 +1,4 @@
-//! Writes `docs/testkit-speed.md`: `cargo run --release > ../../docs/testkit-speed.md` in `benches/peers`. Takes about a minute.
+//! Writes `docs/measured-testkit.md`: `cargo run --release > ../../docs/measured-testkit.md` in `benches/peers`. Takes about a minute.
 
 mod on_testkit;
 mod on_turmoil;
@@ -69,7 +69,7 @@ impl Subject {
 fn main() {
     println!("# The test kit: how fast and how exact\n");
     println!("Compared with [turmoil](https://docs.rs/turmoil) 0.7.2 (MIT), on the same programs, in one run. This page is written by\n");
-    println!("    cd benches/peers && cargo run --release > ../../docs/testkit-speed.md\n");
+    println!("    cd benches/peers && cargo run --release > ../../docs/measured-testkit.md\n");
     println!("and measured on: {}. Each figure is the median of {ROUNDS} rounds in which all alternate, in seconds of processor time.", machine());
     println!("How a program is tested with it: [testing.md](testing.md).\n");
     steady();

@@ -13,7 +13,7 @@ use super::growth::growth_over;
 use super::references::on_the_edge;
 use super::{Effort, row};
 use crate::cost::processor_time;
-use crate::row_sink::RowSink;
+use crate::row::RowSink;
 use crate::{AccuracyError, Row};
 
 const CASE: &str = "boundary of KT, three peers at 24 ms";

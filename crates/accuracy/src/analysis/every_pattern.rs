@@ -50,7 +50,6 @@ pub(super) struct Exact {
     pub(super) probability: f64,
     /// The probability of all patterns together: 1, but for rounding.
     pub(super) all: f64,
-    /// How many patterns there are.
     pub(super) patterns: u32,
 }
 

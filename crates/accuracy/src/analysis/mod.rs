@@ -9,7 +9,7 @@ mod monte_carlo;
 mod radius;
 pub mod references;
 
-use crate::row_sink::RowSink;
+use crate::row::RowSink;
 use crate::{AccuracyError, Row, Subject, Watch};
 
 /// How much work there is in the rows.

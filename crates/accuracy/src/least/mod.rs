@@ -17,9 +17,8 @@ use cohaptic_scene::Scene;
 
 use self::csv::CsvSink;
 use self::scenes::{Recorded, Variant};
-use crate::cost::nanos;
-use crate::rounds::{Rounds, Work};
-use crate::row_sink::RowSink;
+use crate::cost::{Rounds, Work, nanos};
+use crate::row::RowSink;
 use crate::{AccuracyError, Row, Subject, Watch};
 
 /// How much work there is in the rows.

@@ -103,7 +103,6 @@ const BASE: &str = r#"
     hand = { sine = { amplitude = AMPLITUDE, frequency = 1.3, phase = 0.2 } }
 "#;
 
-/// The base.
 pub(super) fn base(millis: u64) -> Result<Scene, AccuracyError> {
     with(&scene("nothing else", &[]), millis)
 }

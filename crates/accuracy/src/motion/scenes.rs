@@ -132,5 +132,4 @@ pub(crate) const PUSH: MotionScene = MotionScene {
     boundary: None,
 };
 
-/// All of them.
 pub(crate) const SCENES: [MotionScene; 4] = [FREE, COUPLED, STIFF, PUSH];

@@ -35,9 +35,6 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
     Ok(())
 }
 
-/// # Panics
-///
-/// If a constant were refused, which a test would show.
 fn ours(distribution: Distribution) -> LinkModel {
     let jitter = Jitter { correlation: Correlation::PerPacket(ASKED), ..Jitter::new(SD, distribution) };
     let delay = Delay::with_jitter(MEAN, jitter).expect("a law with this correlation");

@@ -11,8 +11,7 @@ use super::errors::{Look, probability};
 use super::other_ways::{KernelTable, samplers};
 use super::ways::{Fine, MEAN, Netem, SD, draw, further_laws, laws, next_word};
 use super::{Effort, RowSink, real, row};
-use crate::cost::nanos;
-use crate::rounds::Work;
+use crate::cost::{Work, nanos};
 use crate::{AccuracyError, Row};
 
 const DISTANCE: &str = "Kolmogorov distance [1]";

@@ -36,7 +36,7 @@ pub struct Look {
 }
 
 impl Look {
-    /// As `docs/samplers.md` has it.
+    /// As `docs/measured-samplers.md` has it.
     pub const CLOSE: Self = Self { quantile: 0.9999, places_a_cell: 16, places_a_side: 40_000 };
 
     fn tail_error(self, law: &Law, found: f64) -> f64 {

@@ -21,9 +21,6 @@ struct Case {
     chain: LossChain,
 }
 
-/// # Panics
-///
-/// If a constant were refused, which a test would show.
 fn cases() -> [Case; 4] {
     let p = |value| Probability::new(value).expect("a probability");
     let of_chance = |chance: Chance| {
@@ -77,9 +74,6 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
     Ok(())
 }
 
-/// # Panics
-///
-/// If words that are constants were refused, which a test would show.
 pub(super) fn kernel(words: &str) -> LinkModel {
     let netem = Netem::parse(words).expect("words of tc");
     KernelNetem::new(netem, Vec::new()).expect("a netem that Linux takes").into()

@@ -16,9 +16,9 @@ pub mod ways;
 
 use std::time::Duration;
 
+use crate::cost::Rounds;
 use crate::network::errors::Look;
-use crate::rounds::Rounds;
-use crate::row_sink::RowSink;
+use crate::row::RowSink;
 use crate::{AccuracyError, Row, Subject, Watch};
 
 /// How much work there is in the rows.

@@ -41,9 +41,6 @@ fn normal(words: Words) -> Sampler {
     sampler(rand_distr::Normal::new(MEAN, SD), words, |x: f64| x)
 }
 
-/// # Panics
-///
-/// If the law's parameters were refused, which a test would show.
 fn sampler<D: rand_distr::Distribution<f64> + 'static, E: std::fmt::Debug>(law: Result<D, E>, mut words: Words, delay: fn(f64) -> f64) -> Sampler {
     let law = law.expect("the parameters are constants that the law takes");
     Box::new(move || delay(law.sample(&mut words)))

@@ -8,7 +8,7 @@ mod release;
 use std::time::Duration;
 
 use self::release::{Releases, Way};
-use crate::row_sink::RowSink;
+use crate::row::RowSink;
 use crate::{AccuracyError, Row, Subject, Watch};
 
 /// How much work there is in the rows.

@@ -148,9 +148,6 @@ fn sleep_until(clock: &MonotonicClock, at: Instant) -> io::Result<()> {
     Ok(())
 }
 
-/// # Panics
-///
-/// If the constants were no law, which a test would show.
 fn link(seed: u64) -> Link<u32> {
     // From 7 to 41 ms, so that packets spread over time whatever they began with.
     let jitter = Jitter::new(Duration::from_millis(10), Distribution::Uniform);
@@ -158,9 +155,6 @@ fn link(seed: u64) -> Link<u32> {
     Link::new(seed, &LinkName::between("left", "right"), LinkConfig { delay, ..LinkConfig::default() })
 }
 
-/// # Panics
-///
-/// Never: packets are offered in the order of time.
 fn offer(link: &mut Link<u32>, at: Instant, packet: u32) {
     link.handle_packet(at, Bytes::new(64), packet).expect("time goes on");
 }

@@ -16,7 +16,7 @@ use std::time::Duration;
 use cohaptic_stability::Method;
 
 use crate::cost::median_time;
-use crate::row_sink::RowSink;
+use crate::row::RowSink;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
 use steps::Rounding;
 use traffic::{Errors, Traffic};
@@ -38,7 +38,6 @@ pub(crate) struct Clocks {
     offset: Duration,
 }
 
-/// All of them.
 pub(crate) const CLOCKS: [Clocks; 3] = [
     Clocks { name: "1 ms ticks in lockstep", tick: Duration::from_millis(1), offset: Duration::ZERO },
     Clocks { name: "1 ms ticks, clocks 0.37 ms apart", tick: Duration::from_millis(1), offset: Duration::from_micros(370) },

@@ -28,7 +28,6 @@ impl Rounding {
         u64::try_from(steps).unwrap_or(u64::MAX)
     }
 
-    /// The span as the steps have it.
     pub(crate) fn span(self, span: Duration, step: Duration) -> Duration {
         Duration::from_nanos(self.steps(span, step).saturating_mul(u64::try_from(step.as_nanos()).unwrap_or(u64::MAX)))
     }

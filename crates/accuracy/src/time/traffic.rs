@@ -52,7 +52,6 @@ impl Traffic {
         (0..self.rounds).flat_map(move |number| (0..NODES).map(move |node| (self.instant(node, number), node)))
     }
 
-    /// How many packets there are.
     pub(crate) fn packets(&self) -> f64 {
         #[expect(clippy::cast_precision_loss, reason = "four nodes")]
         let pairs = (NODES * (NODES - 1)) as f64;

@@ -33,7 +33,7 @@ pub(crate) use stability::{
 
 /// Several people feel and move one virtual object together, over a bad network.
 ///
-/// A scene is one TOML file: the object, the peers, the links between them, and what is expected. docs/reference-keys.md lists every key.
+/// A scene is one TOML file: the object, the peers, the links between them, and the expected result. docs/reference-keys.md lists every key.
 #[derive(Debug, Parser)]
 #[command(name = "cohaptic", version, after_help = examples::of_program())]
 pub(crate) struct Arguments {
@@ -65,7 +65,7 @@ pub(crate) enum Command {
     Router(RouterArguments),
     /// Looks at a Novint Falcon, homes it, watches and pushes it, or simulates one
     Falcon(FalconArguments),
-    /// Sends a steady stream over one link and sets what it achieved beside what it was asked for
+    /// Sends a steady stream over one link and compares the result with the configuration
     Link(LinkArguments),
     /// Estimates the link that made a file of measurements, captures or fates
     Fit(FitArguments),

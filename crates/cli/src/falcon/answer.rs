@@ -133,7 +133,6 @@ pub(super) fn light(phase: Phase) -> &'static str {
     }
 }
 
-/// The buttons that are pressed.
 pub(super) fn buttons(pressed: Buttons) -> Vec<&'static str> {
     let names = [(Buttons::PLUS, "plus"), (Buttons::FORWARD, "forward"), (Buttons::CENTRE, "centre"), (Buttons::MINUS, "minus")];
     names.into_iter().filter(|(button, _)| pressed.contains(*button)).map(|(_, name)| name).collect()
@@ -202,7 +201,6 @@ pub(super) fn block(title: &str, lines: &[String]) -> String {
     text
 }
 
-/// The length of a vector.
 pub(super) fn length(vector: Triple) -> f64 {
     let [x, y, z] = vector;
     x.hypot(y).hypot(z)

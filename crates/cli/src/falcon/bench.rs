@@ -25,7 +25,6 @@ pub(super) trait Task {
     fn look(&mut self, at: Duration, status: &Status) -> Result<Go, Failure>;
 }
 
-/// Whether to go on.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Go {
     On,

@@ -76,7 +76,6 @@ fn refuse_to_overwrite(file: &Path, force: bool) -> Result<(), Failure> {
     }
 }
 
-/// How many peers a scene has.
 fn peer_count(scene: &Table) -> usize {
     let by_number = scene.get("scene").and_then(|header| header.get("count")).and_then(Value::as_integer);
     by_number.and_then(|count| usize::try_from(count).ok()).unwrap_or_else(|| entries(scene, "peers").len())

@@ -18,7 +18,6 @@ use crate::{file, output};
 
 /// A link, and what it is asked for.
 pub(super) struct Spec {
-    /// As it was said.
     pub(super) said: String,
     pub(super) model: LinkModel,
     pub(super) asked: Asked,

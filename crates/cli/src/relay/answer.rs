@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use cohaptic_realtime::Wish;
-use cohaptic_relay::{Form, LinkReport, PortReport, Report};
+use cohaptic_relay::{Form, IntakeCounts, LinkReport, PortReport, Report};
 use cohaptic_units::print::Counted;
 use serde::Serialize;
 
@@ -31,7 +31,7 @@ pub(super) fn document(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]
         clamped_us: lateness(&report.clamped.summary()),
         links: report.links.iter().zip(asked).map(|(link, asked)| link_document(link, asked)).collect::<Vec<_>>(),
         ports: report.ports.iter().map(port_document).collect::<Vec<_>>(),
-        refused: refused(report).into_iter().collect::<BTreeMap<_, _>>(),
+        refused: refused(&report.intake).into_iter().collect::<BTreeMap<_, _>>(),
         in_flight: document! { packets: report.held.0, bytes: report.held.1.get() },
         unsent: totals.unsent,
         clients_without_socket: report.without_socket,
@@ -67,8 +67,7 @@ fn port_document(port: &PortReport) -> impl Serialize + use<> {
 }
 
 /// Datagrams that were refused on arrival, by cause.
-pub(super) fn refused(report: &Report) -> [(&'static str, u64); 4] {
-    let intake = &report.intake;
+pub(super) fn refused(intake: &IntakeCounts) -> [(&'static str, u64); 4] {
     [("stranger", intake.strangers), ("to-itself", intake.to_itself), ("no-room", intake.no_room), ("overload", intake.overload)]
 }
 
@@ -128,7 +127,7 @@ pub(super) fn describe(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]
         line(format!("{} of them were offered to their link late: {}", report.clamped.count(), late(&report.clamped.summary())));
     }
     links(&report.links, asked, &mut line);
-    if let Some(refused) = counts(&refused(report)) {
+    if let Some(refused) = counts(&refused(&report.intake)) {
         line(format!("dropped on arrival: {refused}"));
     }
     if report.without_socket > 0 {

@@ -132,16 +132,9 @@ fn link(report: &LinkReport, recent: &[Duration]) -> LinkCounters {
 }
 
 fn refused(view: &View<'_>, links: &[LinkReport]) -> Vec<(&'static str, u64)> {
-    let intake = view.intake();
     let undeliverable = links.iter().map(|link| link.counts.undeliverable).sum();
-    let all = [
-        ("stranger", intake.strangers),
-        ("to-itself", intake.to_itself),
-        ("no-room", intake.no_room),
-        ("overload", intake.overload),
-        ("undeliverable", undeliverable),
-    ];
-    all.into_iter().filter(|(_, count)| *count > 0).collect()
+    let all = answer::refused(view.intake()).into_iter().chain([("undeliverable", undeliverable)]);
+    all.filter(|(_, count)| *count > 0).collect()
 }
 
 #[cfg(test)]

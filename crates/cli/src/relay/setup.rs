@@ -27,7 +27,6 @@ pub(super) struct Setup {
     pub(super) nodes: Vec<String>,
     /// The links by sender and receiver, as reports have them.
     pub(super) pairs: Vec<(NodeId, NodeId)>,
-    /// The keys of each.
     pub(super) keys: Vec<LinkKeys>,
     /// Where files that keys name are looked for.
     pub(super) folder: PathBuf,
@@ -110,7 +109,6 @@ impl Setup {
         ports.enumerate().map(line).collect()
     }
 
-    /// The name of a node.
     pub(super) fn name(&self, node: NodeId) -> &str {
         self.nodes.get(node.index()).map_or("", String::as_str)
     }

@@ -15,7 +15,6 @@ use crate::output;
 pub(crate) struct RowsFile {
     path: PathBuf,
     file: File,
-    /// Whether the folder was made for it.
     made_folder: bool,
 }
 

@@ -88,6 +88,7 @@ pages! {
     hard_cases: "docs/hard-cases.md",
     live: "docs/live.md",
     live_control: "docs/live-control.md",
+    measured_router: "docs/measured-router.md",
     model: "docs/model.md",
     netem: "docs/netem.md",
     reference_commands: "docs/reference-commands.md",

@@ -59,7 +59,6 @@ impl Exposition {
         self.number_of("_sum", labels, sum);
     }
 
-    /// All of it.
     pub(super) fn finish(self) -> String {
         self.text
     }

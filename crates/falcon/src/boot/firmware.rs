@@ -52,16 +52,10 @@ impl Firmware {
 
 /// A file that is no firmware.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum FirmwareError {
-    /// It could not be read.
     #[error("the firmware {} cannot be read: {error}", path.display())]
-    Read {
-        /// Its path.
-        path: PathBuf,
-        /// What the system said.
-        error: io::Error,
-    },
-    /// Too short or too long.
+    Read { path: PathBuf, error: io::Error },
     #[error("a firmware has 1024 to 65536 bytes, and this has {least}{}", if *least > Firmware::LONGEST { " or more" } else { "" })]
     Length {
         /// How many bytes it has, or at least has.

@@ -36,12 +36,6 @@ impl BootOptions {
         Self { attempts: 3, greetings: 100, patience: Duration::from_millis(100), probes: 20, probe_patience: Duration::from_millis(10) };
 }
 
-impl Default for BootOptions {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
 /// How far loading has come.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Progress {
@@ -64,41 +58,22 @@ pub enum Progress {
 
 /// Why the firmware did not get into the device.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
+#[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum BootError {
     /// The transport failed.
     #[error(transparent)]
     Transport(#[from] TransportError),
-    /// The boot loader never answered.
     #[error("the boot loader did not answer {greetings} greetings: is the power supply plugged in? Switch the device off and on again")]
-    NoBootLoader {
-        /// How often it was greeted.
-        greetings: u32,
-    },
-    /// It answered the greeting, and not the request after it.
+    NoBootLoader { greetings: u32 },
     #[error("the boot loader did not get ready for the firmware: {}", match found { Some(byte) => format!("it answered {byte:#04x}, not 0x41"), None => "no answer".to_owned() })]
     NotReady {
         /// What came instead; `None` is nothing.
         found: Option<u8>,
     },
-    /// A byte of the firmware came back wrong.
     #[error("byte {at} of the firmware is {sent:#04x} and came back as {found:#04x}: try again, with another cable or port if it stays so")]
-    Echo {
-        /// Its place, from 0.
-        at: usize,
-        /// What it is.
-        sent: u8,
-        /// What came back.
-        found: u8,
-    },
-    /// The echo stopped.
+    Echo { at: usize, sent: u8, found: u8 },
     #[error("the boot loader sent back {back} of the {of} bytes of the firmware, and no more")]
-    EchoStopped {
-        /// How many bytes came back.
-        back: usize,
-        /// How many the firmware has.
-        of: usize,
-    },
-    /// All went over, and it does not run.
+    EchoStopped { back: usize, of: usize },
     #[error("the firmware is over, and the device does not answer: is the file a firmware for the Novint Falcon?")]
     NotRunning,
 }

@@ -19,11 +19,7 @@ impl Axis {
     /// Its place in a triple.
     #[must_use]
     pub const fn index(self) -> usize {
-        match self {
-            Self::X => 0,
-            Self::Y => 1,
-            Self::Z => 2,
-        }
+        self as usize
     }
 }
 

@@ -5,13 +5,11 @@
 
 mod axes;
 mod mailbox;
-mod snapshot;
 mod stepped;
 mod threaded;
 mod turn;
 
 pub use axes::{Axes, AxesError, Axis};
-pub use snapshot::{LoopStatistics, Snapshot};
 pub use stepped::SteppedFalcon;
 pub use threaded::{Ended, FalconDevice, StartError, Stopper};
-pub use turn::{DeviceConfig, DeviceConfigError, Hold};
+pub use turn::{DeviceConfig, DeviceConfigError, Hold, LoopStatistics, Snapshot};

@@ -12,19 +12,19 @@ use cohaptic_units::Instant;
 use thiserror::Error;
 
 use super::mailbox::Mailbox;
-use super::snapshot::WORDS;
 use super::turn::{Turns, state};
 use super::{DeviceConfig, DeviceConfigError, Snapshot};
 use crate::driver::DriverError;
+use crate::kinematics::Triple;
 use crate::transport::Transport;
 
 /// What peer and thread share.
 #[derive(Debug)]
 struct Shared {
-    /// From the peer: three parts of a force.
-    wanted: Mailbox<3>,
+    /// From the peer: the force on the grip \[N\].
+    wanted: Mailbox<Triple>,
     /// From the thread.
-    snapshot: Mailbox<WORDS>,
+    snapshot: Mailbox<Snapshot>,
     stop: AtomicBool,
     ended: OnceLock<Ended>,
 }
@@ -92,7 +92,7 @@ impl<const A: usize> FalconDevice<A> {
     /// The device after its last exchange; `None` before the first.
     #[must_use]
     pub fn snapshot(&self) -> Option<Snapshot> {
-        self.shared.snapshot.read_newer(0).map(|(words, _)| Snapshot::from_words(&words))
+        self.shared.snapshot.read_newer(0).map(|(snapshot, _)| snapshot)
     }
 
     /// How the thread ended; `None` while it runs.
@@ -136,8 +136,7 @@ impl<const A: usize> Device<A> for FalconDevice<A> {
     }
 
     fn advance(&mut self, _now: Instant, _span: Duration, coupling_force: [f64; A]) {
-        let wanted = self.config.axes.to_device(coupling_force.map(|part| -part));
-        self.shared.wanted.write(&wanted.map(f64::to_bits));
+        self.shared.wanted.write(self.config.axes.to_device(coupling_force.map(|part| -part)));
         self.latched.set(None);
     }
 }
@@ -160,19 +159,19 @@ fn run<T: Transport, const A: usize>(mut turns: Turns<T, A>, shared: &Shared) ->
             turns.driver.stop();
             break Ended::Stopped;
         }
-        if let Some((words, number)) = shared.wanted.read_newer(seen) {
+        if let Some((wanted, number)) = shared.wanted.read_newer(seen) {
             seen = number;
-            turns.want(words.map(f64::from_bits));
+            turns.want(wanted);
         }
         if let Err(error) = turns.exchange() {
             // Zero force to whatever still listens.
             turns.driver.stop();
             break Ended::Failed(error);
         }
-        shared.snapshot.write(&turns.snapshot().to_words());
+        shared.snapshot.write(turns.snapshot());
         turns.pace();
     };
-    shared.snapshot.write(&turns.snapshot().to_words());
+    shared.snapshot.write(turns.snapshot());
     ended
 }
 

@@ -6,9 +6,10 @@ use cohaptic_peer::State;
 use cohaptic_units::Instant;
 use thiserror::Error;
 
-use super::{Axes, LoopStatistics, Snapshot};
-use crate::driver::{Driver, DriverConfig, DriverError, Setpoint};
+use super::Axes;
+use crate::driver::{Driver, DriverConfig, DriverError, Phase, Reading, Setpoint, Statistics, Status};
 use crate::kinematics::Triple;
+use crate::protocol::Buttons;
 use crate::transport::Transport;
 
 /// What keeps the grip in the middle along the axes that the peer does not use.
@@ -104,7 +105,6 @@ impl<T: Transport, const A: usize> Turns<T, A> {
         self.wanted = Some(Setpoint { force, at: self.driver.now() });
     }
 
-    /// An exchange.
     pub(super) fn exchange(&mut self) -> Result<(), DriverError> {
         let setpoint = self.wanted.map(|wanted| Setpoint { force: self.held(wanted.force), ..wanted });
         self.driver.exchange(setpoint).map(|_| ())
@@ -138,7 +138,53 @@ impl<T: Transport, const A: usize> Turns<T, A> {
     }
 
     pub(super) fn snapshot(&self) -> Snapshot {
-        Snapshot::new(self.driver.now(), self.driver.status(), self.driver.statistics(), self.timing)
+        let Status { phase, armed, homed, encoders, buttons, reading, force, motors: _, verdict: _ } = *self.driver.status();
+        let (at, statistics, timing) = (self.driver.now(), *self.driver.statistics(), self.timing);
+        Snapshot { at, phase, armed, homed, encoders, buttons, reading, force, statistics, timing }
+    }
+}
+
+/// How well the loop keeps its time.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct LoopStatistics {
+    /// Turns so far.
+    pub turns: u64,
+    /// Turns that ended after the next should have begun.
+    pub late: u64,
+    /// The longest that one was late.
+    pub worst: Duration,
+}
+
+/// The device after its last exchange.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Snapshot {
+    /// When that was, on the transport's clock.
+    pub at: Instant,
+    /// Where the device stands.
+    pub phase: Phase,
+    /// Whether the device is homed and the user has switched forces on since.
+    pub armed: bool,
+    /// Which encoders are homed.
+    pub homed: [bool; 3],
+    /// The counts of the encoders.
+    pub encoders: [i16; 3],
+    /// Which buttons are pressed.
+    pub buttons: Buttons,
+    /// Where the grip is, if that is known.
+    pub reading: Option<Reading>,
+    /// The force that went out \[N\].
+    pub force: Triple,
+    /// What happened so far.
+    pub statistics: Statistics,
+    /// How well the loop keeps its time.
+    pub timing: LoopStatistics,
+}
+
+impl Snapshot {
+    /// Whether a peer may begin: it is known where the grip is, and forces that are asked for go out.
+    #[must_use]
+    pub const fn is_ready(&self) -> bool {
+        self.armed && self.reading.is_some()
     }
 }
 

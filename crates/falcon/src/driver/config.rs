@@ -69,35 +69,19 @@ impl DriverConfig {
     }
 }
 
-impl Default for DriverConfig {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
 /// A configuration that makes no sense.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
+#[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum DriverConfigError {
     /// A limit of force.
     #[error(transparent)]
     Limits(#[from] LimitsError),
-    /// A time.
     #[error("the {name} is {span:?}, not within 0 to {most:?}")]
-    Span {
-        /// Which.
-        name: &'static str,
-        /// What was given.
-        span: Duration,
-        /// The allowed range.
-        most: Duration,
-    },
-    /// The bandwidth of the velocity.
+    Span { name: &'static str, span: Duration, most: Duration },
     #[error("the bandwidth of the velocity is {0} Hz, not within 0 to 500: half the rate of the loop is the most it can have")]
     Bandwidth(f64),
-    /// A count that must not be zero.
     #[error("homing confirmations and the fastest encoder must not be zero")]
     Zero,
-    /// A place that the grip cannot reach.
     #[error("forces are to be on beyond {0} m from the base, not within 0.08 to 0.18: the grip cannot be pulled there")]
     Arming(f64),
 }

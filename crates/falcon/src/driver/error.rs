@@ -9,6 +9,7 @@ use crate::transport::TransportError;
 
 /// The driver cannot go on.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
+#[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum DriverError {
     /// A number of the configuration makes no sense.
     #[error(transparent)]
@@ -16,10 +17,6 @@ pub enum DriverError {
     /// The transport failed.
     #[error(transparent)]
     Transport(#[from] TransportError),
-    /// The device does not answer.
     #[error("the device has not answered for {silence:?}: is its firmware loaded, and its power supply plugged in?")]
-    Silent {
-        /// For how long.
-        silence: Duration,
-    },
+    Silent { silence: Duration },
 }

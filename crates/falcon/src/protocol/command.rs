@@ -2,8 +2,7 @@
 
 use thiserror::Error;
 
-use super::nibbles::{self, BASE};
-use super::{END, PACKET, START};
+use super::{PACKET, nibbles};
 use crate::safety::MotorCounts;
 
 /// The lights of the logo, in the order of the control bits as existing drivers send them (0x2 green, 0x4 blue, 0x8 red). The order of the colours is
@@ -71,12 +70,7 @@ pub struct CommandParts {
 
 impl CommandParts {
     pub(crate) fn encode(&self) -> [u8; PACKET] {
-        let mut packet = [BASE; PACKET];
-        packet[0] = START;
-        nibbles::put(&mut packet, self.motors);
-        packet[13] = BASE + (self.leds.bits() | if self.homing { HOMING } else { 0 });
-        packet[15] = END;
-        packet
+        nibbles::packet(self.motors, self.leds.bits() | if self.homing { HOMING } else { 0 })
     }
 
     /// Reads a packet. The byte before the last carries nothing and is not looked at.
@@ -86,17 +80,7 @@ impl CommandParts {
     /// [`DecodeCommandError`] at the first byte that cannot be there.
     pub fn decode(packet: &[u8; PACKET]) -> Result<Self, DecodeCommandError> {
         let wrong = |at: usize| DecodeCommandError { at, found: packet[at] };
-        if packet[0] != START {
-            return Err(wrong(0));
-        }
-        let motors = nibbles::take(packet).map_err(wrong)?;
-        if !nibbles::is_letter(packet[13]) {
-            return Err(wrong(13));
-        }
-        let control = packet[13] - BASE;
-        if packet[15] != END {
-            return Err(wrong(15));
-        }
+        let (motors, control) = nibbles::contents(packet, nibbles::is_letter).map_err(wrong)?;
         Ok(Self { motors, leds: Leds::from_bits(control), homing: control & HOMING != 0 })
     }
 }
@@ -113,6 +97,7 @@ pub struct DecodeCommandError {
 
 #[cfg(test)]
 mod tests {
+    use super::nibbles::BASE;
     use super::*;
 
     /// Captured from Novint's own library, as listed in libnifalcon's util/translate_packet.py.

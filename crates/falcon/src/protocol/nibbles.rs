@@ -1,5 +1,7 @@
 //! Sixteen-bit numbers as four letters.
 
+use super::{END, PACKET, START};
+
 /// The offset of a nibble: 0 travels as `A`, 15 as `P`.
 pub const BASE: u8 = b'A';
 
@@ -26,23 +28,36 @@ pub const fn is_letter(byte: u8) -> bool {
     byte >= BASE && byte <= BASE + 0xF
 }
 
-/// Three numbers as twelve letters, into the places 1 to 12 of a packet.
-pub(super) fn put(packet: &mut [u8; super::PACKET], values: [i16; 3]) {
+/// A packet: three numbers at the places 1 to 12, and what is added to the base at place 13.
+pub(super) fn packet(values: [i16; 3], thirteenth: u8) -> [u8; PACKET] {
+    let mut packet = [BASE; PACKET];
+    packet[0] = START;
     for (place, value) in packet[1..13].chunks_exact_mut(4).zip(values) {
         place.copy_from_slice(&encode(value));
     }
+    packet[13] = BASE + thirteenth;
+    packet[15] = END;
+    packet
 }
 
-/// The three numbers at the places 1 to 12 of a packet, or the place of the first byte that is no letter.
-pub(super) fn take(packet: &[u8; super::PACKET]) -> Result<[i16; 3], usize> {
+/// The numbers of a packet and what is added to the base at place 13, or the place of the first byte that cannot be there. The byte before the last is not
+/// looked at.
+pub(super) fn contents(packet: &[u8; PACKET], is_thirteenth: impl Fn(u8) -> bool) -> Result<([i16; 3], u8), usize> {
+    let is_wrong = |at: usize| match at {
+        0 => packet[at] != START,
+        13 => !is_thirteenth(packet[at]),
+        14 => false,
+        15 => packet[at] != END,
+        _ => !is_letter(packet[at]),
+    };
+    if let Some(wrong) = (0..PACKET).find(|at| is_wrong(*at)) {
+        return Err(wrong);
+    }
     let mut values = [0; 3];
     for (place, value) in packet[1..13].chunks_exact(4).zip(&mut values) {
-        match decode([place[0], place[1], place[2], place[3]]) {
-            Some(number) => *value = number,
-            None => return Err((1..13).find(|at| !is_letter(packet[*at])).unwrap_or(1)),
-        }
+        *value = decode([place[0], place[1], place[2], place[3]]).unwrap_or_default();
     }
-    Ok(values)
+    Ok((values, packet[13] - BASE))
 }
 
 #[cfg(test)]

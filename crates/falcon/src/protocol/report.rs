@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
+use super::PACKET;
 use super::nibbles::{self, BASE};
-use super::{END, PACKET, START};
 
 /// The buttons of the standard grip, seen from the front.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -67,16 +67,8 @@ impl Report {
     /// Its 16 bytes, as the device would send them. The byte of which nobody knows the meaning is that of zero.
     #[must_use]
     pub fn encode(&self) -> [u8; PACKET] {
-        let mut packet = [BASE; PACKET];
-        packet[0] = START;
-        nibbles::put(&mut packet, self.encoders);
-        let mut status = self.buttons.bits();
-        for (place, homed) in self.homed.iter().enumerate() {
-            status |= u8::from(*homed) << (4 + place);
-        }
-        packet[13] = BASE + status;
-        packet[15] = END;
-        packet
+        let homed = self.homed.iter().rev().fold(0, |bits, homed| bits << 1 | u8::from(*homed));
+        nibbles::packet(self.encoders, self.buttons.bits() | homed << 4)
     }
 
     /// Reads a packet. The byte before the last is not looked at: its meaning is unknown.
@@ -86,17 +78,7 @@ impl Report {
     /// [`DecodeReportError`] at the first byte that cannot be there.
     pub fn decode(packet: &[u8; PACKET]) -> Result<Self, DecodeReportError> {
         let wrong = |at: usize| DecodeReportError { at, found: packet[at] };
-        if packet[0] != START {
-            return Err(wrong(0));
-        }
-        let encoders = nibbles::take(packet).map_err(wrong)?;
-        if !is_status(packet[13]) {
-            return Err(wrong(13));
-        }
-        if packet[15] != END {
-            return Err(wrong(15));
-        }
-        let status = packet[13] - BASE;
+        let (encoders, status) = nibbles::contents(packet, is_status).map_err(wrong)?;
         Ok(Self { encoders, homed: [status & 0x10 != 0, status & 0x20 != 0, status & 0x40 != 0], buttons: Buttons::from_bits(status) })
     }
 }

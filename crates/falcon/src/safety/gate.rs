@@ -52,16 +52,7 @@ impl ZeroCause {
     /// Its place among [`ZeroCause::ALL`].
     #[must_use]
     pub const fn index(self) -> usize {
-        match self {
-            Self::Stopped => 0,
-            Self::NotHomed => 1,
-            Self::NotArmed => 2,
-            Self::StaleReading => 3,
-            Self::StaleSetpoint => 4,
-            Self::LoopLate => 5,
-            Self::NotFinite => 6,
-            Self::NoTorques => 7,
-        }
+        self as usize
     }
 
     /// In a few words.

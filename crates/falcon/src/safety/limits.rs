@@ -51,27 +51,14 @@ impl Limits {
     }
 }
 
-impl Default for Limits {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
 /// A limit that makes no sense.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
+#[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum LimitsError {
-    /// Beyond any Falcon.
     #[error("the limit of force is {0} N, not within 0 to 20: the device is said to give 8")]
     Force(f64),
-    /// No speed of change.
     #[error("the limit of slew is {0} N/s, not within 0 to 1000000: 1000 is the default")]
     Slew(f64),
-    /// Never, or so long that it protects nobody.
     #[error("the limit of the {name} is {span:?}, not within 0 to 1 s")]
-    Span {
-        /// Which.
-        name: &'static str,
-        /// What was given.
-        span: Duration,
-    },
+    Span { name: &'static str, span: Duration },
 }

@@ -70,9 +70,3 @@ impl MechanicsConfig {
     /// 0.1 kg and 5 N·s/m, which Rakhsha and Constantinescu (2015) chose for the device, and 0.2 N of dry friction, which is a guess.
     pub const DEFAULT: Self = Self { mass: 0.1, damping: 5.0, coulomb: 0.2, stop_stiffness: 40.0, stop_damping: 0.2 };
 }
-
-impl Default for MechanicsConfig {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}

@@ -5,7 +5,7 @@
 
 use std::mem::discriminant;
 
-use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor, Observation};
+use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, Observation};
 use cohaptic_peer::tick::{forces, grasp, on_device, on_object};
 use cohaptic_peer::{Contact, Enclosure, Gains, HandForce, Motion, Plant, State, StepMap};
 use cohaptic_scene::Scene;
@@ -19,7 +19,11 @@ use super::place::{Places, Spot};
 pub(super) struct Blocks<const A: usize> {
     places: Places,
     blocks: Vec<Block>,
-    common: Common,
+    /// By how much the samples held have moved on since they were sent, a block after another; empty for a law that does not ask.
+    leads: Vec<Lanes>,
+    /// What the law remembers: the numbers of one lane after those of another, a block after another.
+    memory: Vec<f64>,
+    object_map: StepMap<Lanes>,
     /// The forces computed at the latest tick, where anybody applies them a tick late.
     late: Option<Vec<Late>>,
     /// The walls of each run, where any has some.
@@ -40,10 +44,6 @@ struct Block {
     object: Motions,
     /// The mean of the samples held.
     mean: Motions,
-    /// By how much those have moved on since they were sent.
-    lead: Lanes,
-    /// What the law remembers: the numbers of one lane after those of another.
-    memory: Vec<f64>,
     hand: Lanes,
     /// KC and BC.
     coupling: Gains<Lanes>,
@@ -56,63 +56,22 @@ struct Block {
     is_tied: bool,
 }
 
-/// What all peers of a run have in common.
-#[derive(Clone, Debug)]
-struct Common {
-    law: BuiltIn<Lanes>,
-    object_map: StepMap<Lanes>,
-}
-
 /// A law of eight lanes, by its own type.
-trait LawOfLanes: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>> {}
-
-impl<L: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>> LawOfLanes for L {}
-
-/// A tick of all blocks.
-struct Step<'a, const A: usize, const L: usize> {
-    per_axis: usize,
-    blocks: &'a mut [Block],
-    object_map: &'a StepMap<Lanes>,
-    late: Option<&'a mut [Late]>,
-    walls: Option<&'a [Option<Enclosure>]>,
-}
-
-impl<const A: usize, const L: usize> LawVisitor<Lanes> for Step<'_, A, L> {
-    /// The largest distance between two copies of each run before they moved \[m\], and the sum of the sizes of everything that moved.
-    type Output = ([f64; L], Lanes);
-
+pub(super) trait LawOfLanes: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>> {
+    /// The law of one lane.
     #[inline(always)]
-    fn visit<W: LawOfLanes>(self, law: &W) -> ([f64; L], Lanes) {
-        let Self { per_axis, blocks, object_map, mut late, walls } = self;
-        let (mut discrepancy, mut size) = ([0.0; L], Lanes::ZERO);
-        for axis in 0..A {
-            let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
-            for place in axis * per_axis..(axis + 1) * per_axis {
-                let block = &mut blocks[place];
-                low = block.object.position.smaller(low);
-                high = block.object.position.larger(high);
-                if walls.is_none() && late.is_none() && block.contacts.is_none() {
-                    block.tick(law, object_map);
-                } else {
-                    let mut forces = block.forces(law);
-                    if let Some(walls) = walls {
-                        block.add_walls(walls, &mut forces.on_object);
-                    }
-                    if let Some(late) = &mut late {
-                        forces = late[place].exchange(forces);
-                    }
-                    block.advance(object_map, &forces);
-                }
-                size = size + block.size();
-            }
-            let distances = distances::<L>(low, high);
-            for run in 0..L {
-                discrepancy[run] = if distances[run] > discrepancy[run] { distances[run] } else { discrepancy[run] };
-            }
-        }
-        (discrepancy, size)
+    fn of_lane(&self, lane: usize) -> Self::Of<f64> {
+        self.map(|coefficient| coefficient.0[lane])
+    }
+
+    /// How many numbers it remembers along each axis: for most laws a constant that the compiler knows, so that they pay nothing for those that remember.
+    #[inline(always)]
+    fn remembered(&self) -> usize {
+        self.of_lane(0).memory()
     }
 }
+
+impl<L: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>> LawOfLanes for L {}
 
 /// The forces of a tick on eight peers.
 #[derive(Clone, Copy, Debug)]
@@ -157,7 +116,7 @@ fn set_map(maps: &mut StepMap<Lanes>, lane: usize, map: &StepMap) {
 }
 
 /// The laws of runs that are made of one law, as one of eight lanes; lane l is of run l modulo their number.
-fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Lanes> {
+pub(super) fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Lanes> {
     let coefficients = |law: &BuiltIn| {
         let mut all = Vec::new();
         let _ = law.map(|coefficient| all.push(*coefficient));
@@ -185,13 +144,13 @@ fn set_lane(motions: &mut Motions, lane: usize, motion: Motion) {
 }
 
 impl<const A: usize> Blocks<A> {
-    /// The bodies of runs of these scenes, with the law of each.
-    pub(super) fn new(places: Places, scenes: &[&Scene], laws: &[BuiltIn]) -> Self {
+    /// The bodies of runs of these scenes, all of which have that law, with numbers of their own.
+    pub(super) fn new(places: Places, scenes: &[&Scene], law: &BuiltIn) -> Self {
         let tick = scenes[0].peers[0].clock.tick;
-        let mut common = Common { law: law_of_lanes(laws), object_map: ZERO_MAP };
+        let mut object_map = ZERO_MAP;
         for lane in 0..WIDTH {
             let run = lane % places.runs;
-            set_map(&mut common.object_map, lane, &scenes[run].copy_config(0).plant().step(tick, scenes[run].integrator));
+            set_map(&mut object_map, lane, &scenes[run].copy_config(0).plant().step(tick, scenes[run].integrator));
         }
         let step = |plant: Plant, run: usize| plant.step(tick, scenes[run].integrator);
         let hands: Vec<(usize, usize, HandForce<A>)> = (0..places.peers)
@@ -201,7 +160,7 @@ impl<const A: usize> Blocks<A> {
         let mut blocks = Vec::with_capacity(A * places.blocks());
         let mut late = Vec::with_capacity(A * places.blocks());
         for axis in 0..A {
-            blocks.extend((0..places.blocks()).map(|_| Block::empty(axis, Law::<f64>::memory(&laws[0]))));
+            blocks.extend((0..places.blocks()).map(|_| Block::empty(axis)));
             late.extend((0..places.blocks()).map(|_| Late { computed: Forces::NONE, is_late: Mask::NONE }));
             for (spot, peer, run) in places.all(axis) {
                 let (spec, config) = (&scenes[run].peers[peer], scenes[run].peer_config(peer));
@@ -230,9 +189,11 @@ impl<const A: usize> Blocks<A> {
         let touches = |peer: usize, run: usize| scenes[run].peers[peer].contact != Contact::None;
         let varies = |(peer, run, hand): &(usize, usize, HandForce<A>)| hand.constant().is_none() && touches(*peer, *run);
         Self {
+            leads: if Law::<f64>::horizon(law).is_some() { vec![Lanes::ZERO; blocks.len()] } else { Vec::new() },
+            memory: vec![0.0; blocks.len() * WIDTH * Law::<f64>::memory(law)],
             places,
             blocks,
-            common,
+            object_map,
             late: any_late.then_some(late),
             walls: walls.iter().any(Option::is_some).then_some(walls),
             hands: hands.into_iter().filter(varies).collect(),
@@ -267,9 +228,9 @@ impl<const A: usize> Blocks<A> {
     pub(super) fn set_lead<const L: usize>(&mut self, axis: usize, peer: usize, lead: [f64; L]) {
         for (run, lead) in lead.into_iter().enumerate() {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
-            self.blocks[block].lead.0[lane] = lead;
+            self.leads[block].0[lane] = lead;
             if peer + 1 == self.places.peers && run + 1 == L {
-                self.blocks[block].lead.0[lane..].fill(lead);
+                self.leads[block].0[lane..].fill(lead);
             }
         }
     }
@@ -296,13 +257,40 @@ impl<const A: usize> Blocks<A> {
         }
     }
 
-    /// Everybody computes forces and moves to the next tick.
+    /// Everybody computes forces by the law and moves to the next tick.
     #[inline(always)]
-    pub(super) fn advance<const L: usize>(&mut self) -> Moved<L> {
-        let Self { places, blocks, common, late, walls, .. } = self;
-        let step =
-            Step::<A, L> { per_axis: places.blocks(), blocks, object_map: &common.object_map, late: late.as_deref_mut(), walls: walls.as_deref() };
-        let (discrepancy, size) = common.law.visit(step);
+    pub(super) fn advance<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L> {
+        let (mut discrepancy, mut size) = ([0.0; L], Lanes::ZERO);
+        let per_axis = self.places.blocks();
+        let remembered = law.remembered() * WIDTH;
+        for axis in 0..A {
+            let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
+            for place in axis * per_axis..(axis + 1) * per_axis {
+                let block = &mut self.blocks[place];
+                // Most laws ask for neither, and the compiler then leaves them out.
+                let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
+                let memory = if remembered > 0 { &mut self.memory[place * remembered..(place + 1) * remembered] } else { &mut [] };
+                low = block.object.position.smaller(low);
+                high = block.object.position.larger(high);
+                if self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
+                    block.tick(law, lead, memory, &self.object_map);
+                } else {
+                    let mut forces = block.forces(law, lead, memory);
+                    if let Some(walls) = &self.walls {
+                        block.add_walls(walls, &mut forces.on_object);
+                    }
+                    if let Some(late) = &mut self.late {
+                        forces = late[place].exchange(forces);
+                    }
+                    block.advance(&self.object_map, &forces);
+                }
+                size = size + block.size();
+            }
+            let distances = distances::<L>(low, high);
+            for run in 0..L {
+                discrepancy[run] = if distances[run] > discrepancy[run] { distances[run] } else { discrepancy[run] };
+            }
+        }
         Moved { discrepancy, finite: self.finite(size) }
     }
 
@@ -344,7 +332,7 @@ fn distances<const L: usize>(mut low: Lanes, mut high: Lanes) -> [f64; L] {
 /// [`Block::tick`]. By references of their own the compiler knows that nothing that is written is read in another lane.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "each by a reference of its own")]
-fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool, L: LawOfLanes>(
+fn tick_of_lanes<const TIED: bool, L: LawOfLanes>(
     devices: &mut Motions,
     objects: &mut Motions,
     (means, leads): (&Motions, &Lanes),
@@ -354,15 +342,14 @@ fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool, L: LawOfLanes>(
     device_map: &StepMap<Lanes>,
     (law, object_map): (&L, &StepMap<Lanes>),
 ) {
-    let remembered = memory.len() / WIDTH;
+    let remembered = law.remembered();
     for lane in 0..WIDTH {
         let (mut device, mut object) = (lane_of(devices, lane), lane_of(objects, lane));
         let gains = coupling.map(|gain| gain.0[lane]);
         let touch = |apart| grasps.keep(lane, grasp(&gains, apart));
         let seen = Observation { own: object, mean: lane_of(means, lane), lead: leads.0[lane] };
-        let memory = if REMEMBERS { &mut memory[lane * remembered..(lane + 1) * remembered] } else { &mut [] };
-        let law = law.map(|coefficient| coefficient.0[lane]);
-        let (coupling, on_object) = forces(device, touch, &seen, &law, memory);
+        let memory = memory_of_lane(memory, remembered, lane);
+        let (coupling, on_object) = forces(device, touch, &seen, &law.of_lane(lane), memory);
         let map = device_map.map(|coefficient| coefficient.0[lane]);
         if TIED {
             map.advance(&mut device, on_device(hands.0[lane], coupling));
@@ -375,16 +362,20 @@ fn tick_of_lanes<const TIED: bool, const REMEMBERS: bool, L: LawOfLanes>(
     }
 }
 
+/// What a law remembers of one lane.
+#[inline(always)]
+fn memory_of_lane(memory: &mut [f64], remembered: usize, lane: usize) -> &mut [f64] {
+    if remembered > 0 { &mut memory[lane * remembered..(lane + 1) * remembered] } else { &mut [] }
+}
+
 impl Block {
-    fn empty(axis: usize, memory: usize) -> Self {
+    fn empty(axis: usize) -> Self {
         let zero = Lanes::ZERO;
         let rest = Motion { position: zero, velocity: zero };
         Self {
             device: rest,
             object: rest,
             mean: rest,
-            lead: zero,
-            memory: vec![0.0; memory * WIDTH],
             hand: zero,
             coupling: Gains { stiffness: zero, damping: zero },
             grasps: Mask::NONE,
@@ -413,21 +404,20 @@ impl Block {
 
     /// Forces and motion of a tick in one pass, where nothing but grasps and the law acts.
     #[inline(always)]
-    fn tick<L: LawOfLanes>(&mut self, law: &L, object_map: &StepMap<Lanes>) {
+    fn tick<L: LawOfLanes>(&mut self, law: &L, lead: &Lanes, memory: &mut [f64], object_map: &StepMap<Lanes>) {
         let common = (law, object_map);
-        let Self { device, object, mean, lead, memory, hand, coupling, grasps, device_map, .. } = self;
-        let (seen, touch) = ((&*mean, &*lead), (&*coupling, &*grasps));
-        match (self.is_tied, memory.is_empty()) {
-            (true, true) => tick_of_lanes::<true, false, L>(device, object, seen, memory, hand, touch, device_map, common),
-            (false, true) => tick_of_lanes::<false, false, L>(device, object, seen, memory, hand, touch, device_map, common),
-            (true, false) => tick_of_lanes::<true, true, L>(device, object, seen, memory, hand, touch, device_map, common),
-            (false, false) => tick_of_lanes::<false, true, L>(device, object, seen, memory, hand, touch, device_map, common),
+        let Self { device, object, mean, hand, coupling, grasps, device_map, .. } = self;
+        let (seen, touch) = ((&*mean, lead), (&*coupling, &*grasps));
+        if self.is_tied {
+            tick_of_lanes::<true, L>(device, object, seen, memory, hand, touch, device_map, common);
+        } else {
+            tick_of_lanes::<false, L>(device, object, seen, memory, hand, touch, device_map, common);
         }
     }
 
     /// The forces of a tick without walls.
     #[inline(always)]
-    fn forces<L: LawOfLanes>(&mut self, law: &L) -> Forces {
+    fn forces<L: LawOfLanes>(&self, law: &L, lead: &Lanes, memory: &mut [f64]) -> Forces {
         let mut coupling = Lanes::ZERO;
         for lane in 0..WIDTH {
             coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), self.apart(lane));
@@ -440,11 +430,10 @@ impl Block {
             }
         }
         let mut on_copy = Lanes::ZERO;
-        let remembered = self.memory.len() / WIDTH;
+        let remembered = law.remembered();
         for lane in 0..WIDTH {
-            let seen = Observation { own: lane_of(&self.object, lane), mean: lane_of(&self.mean, lane), lead: self.lead.0[lane] };
-            let memory = &mut self.memory[lane * remembered..(lane + 1) * remembered];
-            let coordination = law.map(|coefficient| coefficient.0[lane]).force(&seen, memory);
+            let seen = Observation { own: lane_of(&self.object, lane), mean: lane_of(&self.mean, lane), lead: lead.0[lane] };
+            let coordination = law.of_lane(lane).force(&seen, memory_of_lane(memory, remembered, lane));
             on_copy.0[lane] = on_object(coupling.0[lane], coordination);
         }
         Forces { coupling, on_object: on_copy }

@@ -15,7 +15,7 @@ mod samples;
 mod shape;
 mod side_by_side;
 
-use cohaptic_peer::coordination::{BuiltIn, Law};
+use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkStats;
@@ -23,7 +23,8 @@ use pulp::NullaryFnOnce;
 
 use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
 use crate::summary::{Ending, LinkSummary, PeerSummary, Summary};
-use blocks::{Blocks, Moved};
+use blocks::{Blocks, LawOfLanes, Moved, law_of_lanes};
+use lanes::Lanes;
 use place::Places;
 use samples::{Broadcast, PerPacket};
 pub(crate) use shape::Shape;
@@ -34,6 +35,7 @@ pub use side_by_side::{run_side_by_side, same_shape};
 pub(crate) struct Arrays<'a, const A: usize, const L: usize> {
     scenes: [&'a Scene; L],
     shape: Shape,
+    law: BuiltIn<Lanes>,
     blocks: Blocks<A>,
     samples: Samples<A, L>,
     /// Up to which age samples are extrapolated in each run \[s\], if the law does that.
@@ -64,7 +66,8 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             None => Samples::PerPacket(PerPacket::new(&scenes, shape.end, tick_nanos)),
         };
         Self {
-            blocks: Blocks::new(places, &scenes, &laws),
+            law: law_of_lanes(&laws),
+            blocks: Blocks::new(places, &scenes, &laws[0]),
             horizons: Law::<f64>::horizon(&laws[0]).is_some().then(|| laws.map(|law| Law::<f64>::horizon(&law).unwrap_or(0.0))),
             scenes,
             samples,
@@ -79,7 +82,13 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     }
 
     /// Runs all of them to their end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
-    pub(crate) fn run(mut self, mut keep_going: impl FnMut(Instant) -> bool) -> [Summary; L] {
+    pub(crate) fn run(self, mut keep_going: impl FnMut(Instant) -> bool) -> [Summary; L] {
+        // A copy, so that the law is a constant of the loop and nothing that is written can change it.
+        let law = self.law;
+        law.visit(ToEnd { arrays: self, keep_going: &mut keep_going })
+    }
+
+    fn run_by(mut self, law: &impl LawOfLanes, keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {
         let tick_nanos = nanos(self.shape.tick);
         let mut tick = 0;
         loop {
@@ -102,7 +111,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             if self.finite.contains(&false) && self.end_diverged(tick, now) {
                 break;
             }
-            self.step(tick, now);
+            self.step(law, tick, now);
             tick += 1;
         }
         self.summaries.map(|summary| summary.expect("every run has ended"))
@@ -110,7 +119,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
 
     /// Everything that happens at a tick.
     #[inline(always)]
-    fn step(&mut self, tick: u64, now: Instant) {
+    fn step(&mut self, law: &impl LawOfLanes, tick: u64, now: Instant) {
         if tick == self.earliest_send {
             self.send(tick, now);
         }
@@ -122,7 +131,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         if let Some(horizons) = &self.horizons {
             self.extrapolate(now, *horizons);
         }
-        let Moved { discrepancy, finite } = self.motion();
+        let Moved { discrepancy, finite } = self.motion(law);
         for (largest, discrepancy) in self.max_discrepancy.iter_mut().zip(discrepancy) {
             *largest = largest.max(discrepancy);
         }
@@ -131,8 +140,8 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
 
     /// Means and motion of a tick.
     #[inline(always)]
-    fn motion(&mut self) -> Moved<L> {
-        let motion = Motion { samples: &mut self.samples, blocks: &mut self.blocks };
+    fn motion(&mut self, law: &impl LawOfLanes) -> Moved<L> {
+        let motion = Motion { law, samples: &mut self.samples, blocks: &mut self.blocks };
         // With wide registers a run of three or ten peers over constant delays takes six tenths of the time.
         self.processor.dispatch(motion)
     }
@@ -243,13 +252,30 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     }
 }
 
+/// A run to its end. The loop is compiled for each law: where it chooses between laws at every tick, a run of three peers over constant delays takes a sixth
+/// longer.
+struct ToEnd<'a, 'k, const A: usize, const L: usize> {
+    arrays: Arrays<'a, A, L>,
+    keep_going: &'k mut dyn FnMut(Instant) -> bool,
+}
+
+impl<const A: usize, const L: usize> LawVisitor<Lanes> for ToEnd<'_, '_, A, L> {
+    type Output = [Summary; L];
+
+    #[inline(never)]
+    fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> [Summary; L] {
+        self.arrays.run_by(law, self.keep_going)
+    }
+}
+
 /// Means and motion of a tick, compiled once for any processor and once for one that has AVX2: with wider registers, and not one rounding less.
-struct Motion<'a, const A: usize, const L: usize> {
+struct Motion<'a, W, const A: usize, const L: usize> {
+    law: &'a W,
     samples: &'a mut Samples<A, L>,
     blocks: &'a mut Blocks<A>,
 }
 
-impl<const A: usize, const L: usize> NullaryFnOnce for Motion<'_, A, L> {
+impl<W: LawOfLanes, const A: usize, const L: usize> NullaryFnOnce for Motion<'_, W, A, L> {
     type Output = Moved<L>;
 
     #[inline(always)]
@@ -258,7 +284,7 @@ impl<const A: usize, const L: usize> NullaryFnOnce for Motion<'_, A, L> {
             Samples::Broadcast(samples) => samples.refresh(self.blocks),
             Samples::PerPacket(samples) => samples.refresh(self.blocks),
         }
-        self.blocks.advance::<L>()
+        self.blocks.advance::<L>(self.law)
     }
 }
 

@@ -41,6 +41,7 @@ impl Shape {
         let fits = plan.ticking == Ticking::Lockstep
             && !plan.general_links
             && scene.timeline.is_empty()
+            && scene.coordination.send_when.is_none()
             && scene.duration <= LONGEST
             && clock.tick <= LONGEST
             && scene.peers.len() <= usize::from(u16::MAX)

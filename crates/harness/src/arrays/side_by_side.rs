@@ -57,7 +57,7 @@ fn shape(scene: &Scene) -> Option<Shape> {
 /// Runs up to eight scenes of one shape; the last one fills the lanes that are left.
 fn run_lanes(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
     let lanes: [&Scene; WIDTH] = std::array::from_fn(|lane| &scenes[lane.min(scenes.len() - 1)]);
-    let laws = lanes.map(|scene| scene.law(0));
+    let laws = lanes.map(|scene| scene.law(0).expect("scenes of a shape have a law"));
     let summaries = match lanes[0].axes {
         Axes::One => Arrays::<1, WIDTH>::new(lanes, shape, laws).run(|_| true),
         Axes::Two => Arrays::<2, WIDTH>::new(lanes, shape, laws).run(|_| true),

@@ -9,7 +9,7 @@
 //! is only as exact as positions are: with copies that travel beyond 10⁶ m, rounding (10⁻¹⁰ m there) comes near what counts as died out.
 
 use cohaptic_peer::Contact;
-use cohaptic_peer::coordination::LawStrategy;
+use cohaptic_peer::coordination::BuiltInStrategy;
 use cohaptic_scene::{Axes, Scene};
 use cohaptic_units::Instant;
 
@@ -74,14 +74,14 @@ pub fn stability(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) 
     }
 }
 
-fn pair<const A: usize>(scene: &Scene, model: Model, plan: &Plan) -> (World<A, LawStrategy<A>>, World<A, LawStrategy<A>>) {
+fn pair<const A: usize>(scene: &Scene, model: Model, plan: &Plan) -> (World<A, BuiltInStrategy<A>>, World<A, BuiltInStrategy<A>>) {
     let disturbed = Simulation::disturbed(scene, model, Disturbance { size: SIZE });
     (Simulation::new(scene, model).world(plan, NoRemote), disturbed.world(plan, NoRemote))
 }
 
 /// Runs the two side by side.
 fn follow<const A: usize>(
-    (mut nominal, mut disturbed): (World<A, LawStrategy<A>>, World<A, LawStrategy<A>>),
+    (mut nominal, mut disturbed): (World<A, BuiltInStrategy<A>>, World<A, BuiltInStrategy<A>>),
     scene: &Scene,
     mut keep_going: impl FnMut() -> bool,
 ) -> Stability {
@@ -127,7 +127,7 @@ fn verdict(initial: f64, early: f64, late: f64) -> Stability {
 }
 
 /// The largest difference between the two runs in a relative position along an axis \[m\].
-fn relative_displacement<const A: usize>(nominal: &World<A, LawStrategy<A>>, disturbed: &World<A, LawStrategy<A>>) -> f64 {
+fn relative_displacement<const A: usize>(nominal: &World<A, BuiltInStrategy<A>>, disturbed: &World<A, BuiltInStrategy<A>>) -> f64 {
     let (mut low, mut high, mut stretch) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A], 0.0_f64);
     for (one, other) in nominal.bodies().zip(disturbed.bodies()) {
         for axis in 0..A {

@@ -3,8 +3,8 @@
 #[cfg(test)]
 mod links;
 
-use cohaptic_peer::coordination::{Law, LawForm, LawValue, Pull, UsedGains};
-use cohaptic_peer::{Contact, Hand, Integrator, wire};
+use cohaptic_peer::coordination::{LawValue, Pull, UsedGains};
+use cohaptic_peer::{Contact, Hand, Integrator, SendWhen};
 use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
@@ -47,7 +47,7 @@ pub struct Dimensions {
     pub in_flight: u64,
 }
 
-/// The estimated cost of a run, from the speeds in `docs/speed.md`.
+/// The estimated cost of a run, from the speeds in `docs/measured-speed.md`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Cost {
     /// Control ticks of all peers in a simulated second.
@@ -62,7 +62,7 @@ pub struct Cost {
 }
 
 /// Nanoseconds for a control tick of one peer with one axis, for a packet over a link of constant delay, and for one over a link with more
-/// impairments: see `docs/speed.md`.
+/// impairments: see `docs/measured-speed.md`.
 struct Nanos {
     a_tick: f64,
     a_packet: f64,
@@ -177,22 +177,25 @@ impl Rows {
             match (spec.settings.of(spec.strategy).get(place), parameter.form) {
                 (LawValue::Automatic, _) => model.push_str("auto"),
                 (LawValue::Duration(span), _) => model.push_str(&Span(span).to_string()),
-                (LawValue::Number(number), LawForm::AutomaticDamping) => model.push_str(&format!("{} N·s/m", Number(number))),
-                (LawValue::Number(number), LawForm::Duration | LawForm::AutomaticDuration) => model.push_str(&Number(number).to_string()),
+                (LawValue::Number(number), form) => model.push_str(&format!("{} {}", Number(number), form.unit())),
+                (LawValue::Word(word), form) => model.push_str(form.word(word)),
+                (LawValue::Place(peer), _) => model.push_str(&scene.peers[peer].name),
             }
         }
-        let damping = Law::<f64>::damping(&scene.law(0));
+        let damping = scene.own_damping(0);
         if damping > 0.0 {
             model.push_str(&format!("; each copy is damped by another {} N·s/m", Number(damping)));
         }
-        if spec.strategy.gains() == UsedGains::Stiffness && gains.damping > 0.0 {
-            model.push_str("; BT is not used");
+        match spec.strategy.gains() {
+            UsedGains::Stiffness if gains.damping > 0.0 => model.push_str("; BT is not used"),
+            UsedGains::Neither => model.push_str("; KT and BT are not used"),
+            UsedGains::Stiffness | UsedGains::Both => {}
         }
         self.model("coordination", model, format!("gains {scaling}{pull}; the mean of the samples held is kept until one changes"));
-        let len = wire::datagram_len(scene.axes.count());
+        let len = scene.sample_kind().datagram_len(scene.axes.count());
         self.model(
             "samples",
-            format!("{len} bytes to each other peer every {}", Span(spec.update)),
+            format!("{len} bytes to each other peer every {}{}", Span(spec.update), dead_bands(spec.send_when.as_ref())),
             "encoded, sent and decoded as they would be live",
         );
     }
@@ -306,4 +309,15 @@ fn cost(scene: &Scene, nanos: &Nanos) -> Cost {
 #[expect(clippy::cast_precision_loss, reason = "counts of links and axes are far below 2^53")]
 fn count_f64(count: u64) -> f64 {
     count as f64
+}
+
+/// When samples are sent, if not always, in words that go on.
+fn dead_bands(when: Option<&SendWhen>) -> String {
+    let Some(SendWhen { velocity, position, heartbeat }) = when else { return String::new() };
+    let conditions = [
+        velocity.map(|part| format!("the velocity has changed by {} %", Number(part * 100.0))),
+        position.map(|distance| format!("the copy is {} m from where receivers hold it", Number(distance))),
+        heartbeat.map(|span| format!("{} have passed", Span(span))),
+    ];
+    format!(", if {}", conditions.into_iter().flatten().collect::<Vec<_>>().join(" or "))
 }

@@ -4,7 +4,7 @@
 //! the network has delivered. It reads no clock and touches no socket: driven by the clock of the wall it is a live session, driven by the recorded
 //! [`Inputs`] of one, with [`replay`], it is the same session in virtual time, with the same fates and the same motion.
 //!
-//! What a peer's silence does to the others is written in `docs/model.md`.
+//! What a peer's silence does to the others is written in `docs/live.md`.
 
 mod device;
 mod fade;

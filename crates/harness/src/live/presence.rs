@@ -111,10 +111,11 @@ impl<const A: usize> RemotePeers<A> {
         now: Instant,
         ends: (usize, usize),
         sample: &Sample<A>,
+        extra: &[f64; A],
         peer: &mut Peer<A, D, S>,
     ) -> Result<Reception, ReceiveError> {
         let (from, to) = ends;
-        let received = self.ages[to].handle_sample(peer, sample)?;
+        let received = self.ages[to].handle_extended(peer, sample, extra)?;
         if received == Reception::Newest {
             self.arrived(now, from, to);
         }

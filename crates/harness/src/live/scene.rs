@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use cohaptic_peer::State;
-use cohaptic_peer::coordination::LawStrategy;
+use cohaptic_peer::coordination::BuiltInStrategy;
 use cohaptic_scene::{Axes, LinkKeys, Scene};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, LinkStats};
@@ -42,9 +42,9 @@ pub struct LiveScene {
 
 /// A world with as many axes as the scene has.
 enum AnyWorld {
-    One(Box<World<1, LawStrategy<1>, RemotePeers<1>>>),
-    Two(Box<World<2, LawStrategy<2>, RemotePeers<2>>>),
-    Three(Box<World<3, LawStrategy<3>, RemotePeers<3>>>),
+    One(Box<World<1, BuiltInStrategy<1>, RemotePeers<1>>>),
+    Two(Box<World<2, BuiltInStrategy<2>, RemotePeers<2>>>),
+    Three(Box<World<3, BuiltInStrategy<3>, RemotePeers<3>>>),
 }
 
 macro_rules! each {

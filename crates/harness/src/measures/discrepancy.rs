@@ -20,7 +20,7 @@ pub(super) struct Discrepancy {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Figure {
     Rms,
-    /// Of that many per cent.
+    /// Of a number of per cent.
     Quantile(u64),
 }
 

@@ -70,7 +70,7 @@ trait Accumulator: Sized {
     fn value(&self, figure: Self::Figure, peer: Option<usize>, elapsed: Duration) -> Option<f64>;
 }
 
-/// What is asked for.
+/// The measures of a scene that are asked for.
 #[derive(Clone, Copy, Debug)]
 struct Asked<'a> {
     scene: &'a Scene,

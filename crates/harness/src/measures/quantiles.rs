@@ -58,7 +58,7 @@ impl QuantileSketch {
         self.count
     }
 
-    /// The quantile of that many per cent: the ⌈p·n/100⌉-th smallest of n values, counted from 1, off by at most 2⁻⁸ of itself. `None` of no value.
+    /// The quantile of a number p of per cent: the ⌈p·n/100⌉-th smallest of n values, counted from 1, off by at most 2⁻⁸ of itself. `None` of no value.
     #[must_use]
     pub fn quantile(&self, percent: u64) -> Option<f64> {
         if self.count == 0 {

@@ -1,13 +1,12 @@
 //! A running scene some of whose peers are remote.
 
-use cohaptic_peer::wire::{MAX_LEN, Sample};
+use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, State, Strategy};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, LinkStats, NodeId, PacketEvent, PacketInfo, Path};
 
-use super::remote::{Remote, datagram};
-use super::{DeviceModel, Step, Watch, World, row};
+use super::{Arriving, DeviceModel, Remote, Step, Watch, World, row};
 use crate::datagrams::Handle;
 use crate::live::{Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, RemotePeers, SampleError, SeatStats, Transmit, UnsimulatedDevice};
 use crate::observer::Observer;
@@ -72,8 +71,9 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         let Some(seat) = self.remote.seat_mut(place).filter(|seat| seat.is_process) else {
             return Err(SampleError::NoSeat { peer: place });
         };
-        let read = read_sample::<A>(datagram, self.axes, session, place).inspect_err(|_| seat.stats.refused += 1);
-        let mut sample = read?;
+        let peers = self.members.len();
+        let read = read_sample::<A>(datagram, self.kind, self.axes, session, (place, peers)).inspect_err(|_| seat.stats.refused += 1);
+        let (mut sample, extra) = read?;
         seat.admit(sample.sequence)?;
         let joins = seat.hear(at);
         // A peer that comes back counts from 0 again; for the others its numbers go on.
@@ -89,11 +89,20 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         self.latest[place] = sample.state.position;
         self.members[place].peer.object_mut().set_state(sample.state);
         self.change(at);
-        let copies = self.members.len() - 1;
-        let stored = self.datagrams.store(copies, self.axes, |bytes| sample.encode(self.axes, bytes));
+        let copies = if self.kind.is_personal() { 1 } else { peers - 1 };
+        let stored = if self.kind == SampleKind::State {
+            self.datagrams.store(copies, self.axes, |bytes| sample.encode(self.axes, bytes))
+        } else {
+            self.datagrams.store_extended(copies, self.axes, self.kind, &sample, &[extra.numbers])
+        };
         let (handle, len) = stored.expect("what was decoded can be decoded again");
-        let info = PacketInfo { size: Bytes::new(len as u64), ecn_capable: true };
-        self.network.handle_broadcast(at, NodeId::new(place), info, handle).expect("instants come in order");
+        let (info, from) = (PacketInfo { size: Bytes::new(len as u64), ecn_capable: true }, NodeId::new(place));
+        let sent = if self.kind.is_personal() {
+            self.network.handle_packet(at, from, NodeId::new(extra.receiver as usize), info, handle)
+        } else {
+            self.network.handle_broadcast(at, from, info, handle)
+        };
+        sent.expect("instants come in order");
         self.remote.undrained = Some(at);
         Ok(())
     }
@@ -183,21 +192,23 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
         &mut self,
         now: Instant,
         event: &PacketEvent<Handle, Path>,
-        sample: &Sample<A>,
-        axes: usize,
+        sample: &Arriving<'_, A>,
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>> {
         let ends = (event.path.from.index(), event.path.to.index());
         let mut buffer = [0; MAX_LEN];
         if self.is_process(ends.1) {
-            let len = datagram(sample, axes, event.damage.as_ref(), &mut buffer).len();
+            let len = sample.datagram(event.damage.as_ref(), &mut buffer).len();
             self.send_out(ends.1, event.at, Datagram::new(buffer, len));
             return None;
         }
         Some(match &event.damage {
-            None => self.take_in(now, ends, sample, receiver),
-            Some(damage) => match Sample::decode(datagram(sample, axes, Some(damage), &mut buffer), axes) {
-                Ok(damaged) => self.take_in(now, ends, &damaged, receiver),
+            None => self.take_in(now, ends, sample.sample, &sample.extra.numbers, receiver),
+            Some(damage) => match Sample::decode_as(sample.datagram(Some(damage), &mut buffer), sample.kind, sample.axes) {
+                Ok((_, extra)) if sample.kind.is_personal() && extra.receiver as usize != ends.1 => {
+                    Err(ReceiveError::Receiver { receiver: extra.receiver })
+                }
+                Ok((damaged, extra)) => self.take_in(now, ends, &damaged, &extra.numbers, receiver),
                 Err(error) => Err(error.into()),
             },
         })
@@ -232,13 +243,24 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
     }
 }
 
-fn read_sample<const A: usize>(datagram: &[u8], axes: usize, session: u64, place: usize) -> Result<Sample<A>, SampleError> {
-    let sample = Sample::decode(datagram, axes)?;
+/// The sample of the peer in that place among all peers.
+fn read_sample<const A: usize>(
+    datagram: &[u8],
+    kind: SampleKind,
+    axes: usize,
+    session: u64,
+    (place, peers): (usize, usize),
+) -> Result<(Sample<A>, Extra<A>), SampleError> {
+    let (sample, extra) = Sample::decode_as(datagram, kind, axes)?;
     if sample.session != session {
         return Err(ReceiveError::Session { found: sample.session }.into());
     }
     if sample.sender as usize != place {
         return Err(ReceiveError::Sender { sender: sample.sender }.into());
     }
-    Ok(sample)
+    let receiver = extra.receiver as usize;
+    if kind.is_personal() && (receiver == place || receiver >= peers) {
+        return Err(ReceiveError::Receiver { receiver: extra.receiver }.into());
+    }
+    Ok((sample, extra))
 }

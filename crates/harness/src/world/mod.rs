@@ -5,7 +5,9 @@ mod remote;
 
 use std::time::Duration;
 
-use cohaptic_peer::{Clock, Contact, Device, Held, ObjectCopy, Peer, Reception, RestingDevice, SimulatedDevice, State, Strategy};
+use cohaptic_peer::coordination::{Law, Role};
+use cohaptic_peer::wire::{Extra, SampleKind};
+use cohaptic_peer::{Clock, Contact, Device, Held, LastSent, ObjectCopy, Peer, Reception, RestingDevice, SendWhen, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Change, ChangeKind, Scene};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo};
@@ -17,7 +19,7 @@ use crate::plan::{DeviceChoice, Plan};
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
 
-pub(crate) use remote::{NoRemote, Remote};
+pub(crate) use remote::{Arriving, NoRemote, Remote};
 
 /// A scene in the middle of a run; E holds its remote peers.
 pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
@@ -27,6 +29,12 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     members: Vec<Member<A, S, E::Device>>,
     network: Network<Handle>,
     datagrams: Datagrams<A>,
+    /// What samples carry beyond the state.
+    kind: SampleKind,
+    /// Which samples are sent, if not all, and up to which age receivers extrapolate them.
+    send_when: Option<(SendWhen, Option<f64>)>,
+    /// The extra numbers of the sample that is sent.
+    numbers: Vec<[f64; A]>,
     schedule: Schedule,
     /// The changes to come, the next one last.
     changes: Vec<Change>,
@@ -52,6 +60,8 @@ struct Member<const A: usize, S, D> {
     /// The tick at which it sends next, and how many ticks later again.
     next_send: u64,
     send_every: u64,
+    /// With dead bands alone.
+    last_sent: Option<LastSent<A>>,
     stale_samples: u64,
     refused_samples: u64,
     /// The held part of the coordination force that was computed at the latest tick, if steps are watched.
@@ -109,9 +119,12 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             axes: scene.axes.count(),
             names: scene.peers.iter().map(|peer| peer.name.clone()).collect(),
             latest: members.iter().map(|member| member.peer.object().state().position).collect(),
+            kind: members[0].peer.kind(),
+            send_when: scene.coordination.send_when.map(|when| (when, scene.law(0).and_then(|law| Law::<f64>::horizon(&law)))),
             members,
             network: network(scene, plan),
             datagrams: Datagrams::default(),
+            numbers: Vec::new(),
             schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock).enumerate()),
             changes: scene.timeline.iter().rev().cloned().collect(),
             coordination_factor: scene.coordination_factor(),
@@ -206,7 +219,12 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                         self.set_link(change.at, from, to, links.between(from, to));
                     }
                 }
-                ChangeKind::Contact { peer, contact } => self.members[peer].peer.set_contact(contact),
+                ChangeKind::Contact { peer, contact } => {
+                    self.members[peer].peer.set_contact(contact);
+                    for (place, member) in self.members.iter_mut().enumerate().filter(|(place, _)| *place != peer) {
+                        member.peer.strategy_mut().set_contact(if peer < place { peer } else { peer - 1 }, contact);
+                    }
+                }
                 ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
                     DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
                     DeviceModel::Unsimulated(_) => {}
@@ -230,13 +248,28 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             return Ok(());
         }
         let others = self.members.len() - 1;
-        for &from in &self.ticking {
+        for index in 0..self.ticking.len() {
+            let from = self.ticking[index];
             let member = &mut self.members[from];
             if member.tick != member.next_send {
                 continue;
             }
             member.next_send += member.send_every;
             let local_time = member.clock.local_time(member.tick);
+            if let Some((when, horizon)) = &self.send_when {
+                let own = member.peer.object().state();
+                if !when.is_due(member.last_sent.as_ref(), local_time, own, *horizon) {
+                    continue;
+                }
+                member.last_sent = Some(LastSent { at: local_time, state: *own });
+            }
+            if self.kind != SampleKind::State {
+                let sent = self.send_extended(now, from, local_time);
+                if let Some((packets, size)) = sent.filter(|_| watch.sends) {
+                    observer.on_send(&SendRow { at: now, peer: from, packets, size })?;
+                }
+                continue;
+            }
             let stored = self.datagrams.store(others, self.axes, |datagram| member.peer.sample(local_time, datagram));
             let (handle, len) = stored.expect("a run ends before a state that is not finite is sent");
             // Capable of ECN, so that a queue that marks has something to mark: nobody sends less for it, but a marked packet arrives.
@@ -250,19 +283,57 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         Ok(())
     }
 
+    /// A peer sends a sample with extra numbers: to this number of others, in packets of that size.
+    fn send_extended(&mut self, now: Instant, from: usize, local_time: Instant) -> Option<(u64, Bytes)> {
+        let peer = &mut self.members[from].peer;
+        let others = self.names.len() - 1;
+        let sample = peer.next_sample(local_time);
+        self.numbers.clear();
+        if self.kind.is_personal() {
+            self.numbers.extend((0..others).map(|other| peer.extra(other)));
+            self.numbers.insert(from, [0.0; A]);
+        } else {
+            self.numbers.push(peer.extra(0));
+        }
+        peer.all_sent();
+        let role = peer.role();
+        let copies = if role == Role::Copy { others } else { 1 };
+        let Ok((handle, len)) = self.datagrams.store_extended(copies, self.axes, self.kind, &sample, &self.numbers) else {
+            // The states are finite, or the run had ended, but a number made of them is not.
+            self.finite = false;
+            return None;
+        };
+        let (info, from) = (PacketInfo { size: Bytes::new(len as u64), ecn_capable: true }, NodeId::new(from));
+        let sent = match role {
+            Role::Copy => self.network.handle_broadcast(now, from, info, handle),
+            Role::Client { server } => {
+                let server = if server < from.index() { server } else { server + 1 };
+                self.network.handle_packet(now, from, NodeId::new(server), info, handle)
+            }
+        };
+        sent.expect("instants come in order");
+        Some((copies as u64, info.size))
+    }
+
     /// Step 2: whatever has arrived is handed to its receiver.
     fn deliver<O: Observer>(&mut self, now: Instant, observer: &mut O, watch: Watch) -> Result<(), O::Error> {
         self.network.handle_timeout(now).expect("instants come in order");
         while let Some(event) = self.network.poll_event() {
             if let Fate::Delivered(_) = event.fate {
-                let receiver = &mut self.members[event.path.to.index()];
-                let sample = self.datagrams.sample(event.payload);
-                match self.remote.receive(now, &event, sample, self.axes, &mut receiver.peer) {
+                let to = event.path.to.index();
+                let receiver = &mut self.members[to];
+                let extra = if self.kind == SampleKind::State {
+                    Extra::NONE
+                } else {
+                    let place = if self.kind.is_personal() { u32::try_from(to).unwrap_or(u32::MAX) } else { 0 };
+                    Extra { receiver: place, numbers: self.datagrams.extra(event.payload, to) }
+                };
+                let sample = Arriving { sample: self.datagrams.sample(event.payload), kind: self.kind, extra, axes: self.axes };
+                match self.remote.receive(now, &event, &sample, &mut receiver.peer) {
                     None => {}
                     Some(Ok(Reception::Newest)) => {
                         if watch.holds {
-                            let (from, to) = (event.path.from.index(), event.path.to.index());
-                            observer.on_hold(&HoldRow { at: now, from, to, sampled: event.offered })?;
+                            observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
                         }
                     }
                     Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
@@ -299,7 +370,12 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         for &place in &self.ticking {
             let member = &mut self.members[place];
             self.remote.attend(now, place, &mut member.peer, self.axes, observer)?;
-            let forces = member.peer.compute(now);
+            let span = lockstep.unwrap_or_else(|| {
+                let next = member.clock.instant(member.tick + 1);
+                self.schedule.tick_again(place, next);
+                next.unwrap_or(Instant::MAX) - now
+            });
+            let forces = member.peer.compute_over(now, span);
             let object = member.peer.object().state();
             self.latest[place] = object.position;
             if watch.ticks {
@@ -316,11 +392,6 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 })?;
             }
             member.tick += 1;
-            let span = lockstep.unwrap_or_else(|| {
-                let next = member.clock.instant(member.tick);
-                self.schedule.tick_again(place, next);
-                next.unwrap_or(Instant::MAX) - now
-            });
             if watch.steps {
                 member.advance_watched(now, span, forces.commanded, (place, self.axes), observer)?;
             } else {
@@ -336,7 +407,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     fn move_together(&mut self, now: Instant, span: Duration) {
         let mut finite = true;
         for (member, latest) in self.members.iter_mut().zip(&mut self.latest) {
-            member.peer.compute(now);
+            member.peer.compute_over(now, span);
             *latest = member.peer.object().state().position;
             member.tick += 1;
             member.peer.advance(now, span);
@@ -431,17 +502,24 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
     ) -> Result<(), O::Error> {
         let late = std::mem::replace(&mut self.commanded, commanded);
         let coordination = if self.peer.compute_delay() { late } else { commanded };
-        let before = *self.peer.object().state();
-        let held = self.peer.applied().on_object;
+        let before = self.moved_by_coordination();
+        let acting = *self.peer.applied();
         self.peer.advance(now, span);
+        let after = self.moved_by_coordination();
+        let coordination = if self.peer.role() == Role::Copy { coordination } else { acting.coupling };
         observer.on_step(&StepRow {
             at: now,
             peer: place,
             before: row(&before, axes),
-            after: row(self.peer.object().state(), axes),
-            held_force: &held[..axes],
+            after: row(&after, axes),
+            held_force: &acting.on_object[..axes],
             coordination_force: &coordination[..axes],
         })
+    }
+
+    /// The body on which the others act: the copy, or the device of a client.
+    fn moved_by_coordination(&self) -> State<A> {
+        if self.peer.role() == Role::Copy { *self.peer.object().state() } else { self.peer.device().state() }
     }
 }
 
@@ -466,6 +544,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
             tick: 0,
             next_send: spec.phase,
             send_every: u64::try_from(send_every).unwrap_or(u64::MAX),
+            last_sent: None,
             stale_samples: 0,
             refused_samples: 0,
             commanded: [0.0; A],

@@ -1,6 +1,6 @@
 //! The questions of a running scene about its remote peers.
 
-use cohaptic_peer::wire::{MAX_LEN, Sample};
+use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{Device, Peer, ReceiveError, Reception, RestingDevice, Strategy};
 use cohaptic_units::Instant;
 use cohaptic_wan::{Damage, PacketEvent, Path};
@@ -31,8 +31,7 @@ pub(crate) trait Remote<const A: usize> {
         &mut self,
         now: Instant,
         event: &PacketEvent<Handle, Path>,
-        sample: &Sample<A>,
-        axes: usize,
+        sample: &Arriving<'_, A>,
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>>;
 
@@ -71,13 +70,12 @@ impl<const A: usize> Remote<A> for NoRemote {
         &mut self,
         _now: Instant,
         event: &PacketEvent<Handle, Path>,
-        sample: &Sample<A>,
-        axes: usize,
+        sample: &Arriving<'_, A>,
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>> {
         Some(match &event.damage {
-            None => receiver.handle_sample(sample),
-            Some(damage) => receiver.handle_datagram(datagram(sample, axes, Some(damage), &mut [0; MAX_LEN])),
+            None => receiver.handle_extended(sample.sample, &sample.extra.numbers),
+            Some(damage) => receiver.handle_datagram(sample.datagram(Some(damage), &mut [0; MAX_LEN])),
         })
     }
 
@@ -94,11 +92,23 @@ impl<const A: usize> Remote<A> for NoRemote {
     }
 }
 
-/// The bytes of a sample as they arrive.
-pub(super) fn datagram<'a, const A: usize>(sample: &Sample<A>, axes: usize, damage: Option<&Damage>, buffer: &'a mut [u8; MAX_LEN]) -> &'a [u8] {
-    let len = sample.encode(axes, buffer);
-    if let Some(damage) = damage {
-        damage.apply(&mut buffer[..len]);
+/// A sample that arrives.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arriving<'a, const A: usize> {
+    pub(crate) sample: &'a Sample<A>,
+    pub(crate) kind: SampleKind,
+    pub(crate) extra: Extra<A>,
+    /// How many axes the scene has.
+    pub(crate) axes: usize,
+}
+
+impl<const A: usize> Arriving<'_, A> {
+    /// Its bytes.
+    pub(super) fn datagram<'b>(&self, damage: Option<&Damage>, buffer: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        let len = self.sample.encode_as(self.kind, &self.extra, self.axes, buffer);
+        if let Some(damage) = damage {
+            damage.apply(&mut buffer[..len]);
+        }
+        &buffer[..len]
     }
-    &buffer[..len]
 }

@@ -13,7 +13,7 @@ mod virtual_time;
 
 use proptest::prelude::ProptestConfig;
 
-/// A property test of that many cases that leaves no files behind.
+/// A property test of this number of cases that leaves no files behind.
 fn cases(count: u32) -> ProptestConfig {
     ProptestConfig { cases: count, failure_persistence: None, max_shrink_iters: 200, ..ProptestConfig::default() }
 }

@@ -23,7 +23,7 @@ pub struct LinkTable {
 }
 
 impl LinkTable {
-    /// The links between that many peers: `usual`, but for the pairs (sender, receiver) in `exceptions`. Pairs of a peer with itself or beyond the last
+    /// The links between this number of peers: `usual`, but for the pairs (sender, receiver) in `exceptions`. Pairs of a peer with itself or beyond the last
     /// peer are no links and are left out.
     ///
     /// # Panics
@@ -144,7 +144,7 @@ pub struct LinkChange {
     pub config: Arc<LinkModel>,
 }
 
-/// The number of directed links between that many peers.
+/// The number of directed links between this number of peers.
 pub(super) const fn link_count(peers: usize) -> u64 {
     (peers as u64) * (peers as u64).saturating_sub(1)
 }

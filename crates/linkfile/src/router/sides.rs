@@ -4,7 +4,6 @@ use super::{Attachment, InterfaceSpec, Network, TunSpec};
 use crate::document::{Node, quote};
 use crate::reading::{Context, TableReader, values};
 
-/// One side.
 pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment> {
     let mut table = TableReader::new(node, context, "a table with a tun or an interface")?;
     let interface = table.get("interface");

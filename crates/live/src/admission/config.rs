@@ -3,6 +3,7 @@
 use core::fmt;
 use core::time::Duration;
 
+use cohaptic_peer::wire::SampleKind;
 use cohaptic_units::print::Counted;
 
 use crate::{EntropyError, SessionKey};
@@ -44,6 +45,8 @@ pub struct AdmissionConfig {
     pub session: u64,
     /// How many axes the scene has, 1 to 3.
     pub axes: usize,
+    /// What samples carry beyond the state.
+    pub kind: SampleKind,
     /// How many peers the scene has, simulated ones among them.
     pub peers: u32,
     /// Tn, which a welcome tells.
@@ -59,10 +62,10 @@ pub struct AdmissionConfig {
 }
 
 impl AdmissionConfig {
-    /// Without a key and limits, and with a second until a silent peer counts as gone.
+    /// With samples of states, without a key and limits, and with a second until a silent peer counts as gone.
     #[must_use]
     pub const fn new(session: u64, axes: usize, peers: u32, update: Duration, seats: Vec<Seat>) -> Self {
-        Self { session, axes, peers, update, seats, key: None, stale_after: Duration::from_secs(1), limits: None }
+        Self { session, axes, kind: SampleKind::State, peers, update, seats, key: None, stale_after: Duration::from_secs(1), limits: None }
     }
 
     /// With that key, or none.

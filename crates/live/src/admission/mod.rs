@@ -26,7 +26,7 @@ mod seats;
 use core::time::Duration;
 use std::net::SocketAddr;
 
-use cohaptic_peer::wire::{self, Sample};
+use cohaptic_peer::wire::{self, Sample, SampleKind};
 use cohaptic_units::Instant;
 use zeroize::Zeroizing;
 
@@ -98,6 +98,7 @@ impl Admitted {
 pub struct AdmissionControl {
     session: u64,
     axes: usize,
+    kind: SampleKind,
     peers: u32,
     update: Duration,
     key: Option<SessionKey>,
@@ -137,11 +138,11 @@ impl AdmissionControl {
         config.check()?;
         let mut secret = Zeroizing::new([0; 32]);
         entropy.fill(&mut secret[..])?;
-        let AdmissionConfig { session, axes, peers, update, mut seats, key, stale_after, limits } = config;
+        let AdmissionConfig { session, axes, kind, peers, update, mut seats, key, stale_after, limits } = config;
         seats.sort_by_key(|seat| seat.place);
         let seats = seats.into_iter().map(SeatState::free).collect();
         let secret = Secret(secret);
-        Ok(Self { session, axes, peers, update, key, stale_after, limits, secret, seats, stats: AdmissionStats::default() })
+        Ok(Self { session, axes, kind, peers, update, key, stale_after, limits, secret, seats, stats: AdmissionStats::default() })
     }
 
     /// Decides about a datagram that was received from `from`.
@@ -225,11 +226,11 @@ impl AdmissionControl {
     }
 
     fn handle_sample(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) -> Result<Admission, Refusal> {
-        let plain_len = wire::datagram_len(self.axes);
+        let plain_len = self.kind.datagram_len(self.axes);
         // The seal is taken off by length alone; what the bytes are worth is decided below.
         let sealed = (datagram.len() == plain_len + SEAL_LEN).then(|| Sealed::split(datagram)).flatten();
         let plain = sealed.map_or(datagram, |sealed| sealed.sample);
-        let sample = Sample::<3>::decode(plain, self.axes).map_err(Refusal::of_sample)?;
+        let (sample, _) = Sample::<3>::decode_as(plain, self.kind, self.axes).map_err(Refusal::of_sample)?;
         if sample.session != self.session {
             return Err(Refusal::ForeignSession);
         }

@@ -107,7 +107,7 @@ impl Refusal {
         match error {
             DecodeError::TooShort { .. } => Self::TooShort,
             DecodeError::Magic => Self::Magic,
-            DecodeError::Version { .. } => Self::Version,
+            DecodeError::Version { .. } | DecodeError::Kind { .. } => Self::Version,
             DecodeError::Axes { .. } => Self::Axes,
             DecodeError::Length { .. } => Self::Length,
             DecodeError::NotFinite { .. } => Self::NotFinite,

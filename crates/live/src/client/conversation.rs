@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::collections::BTreeMap;
 
-use cohaptic_peer::wire::Sample;
+use cohaptic_peer::wire::{Extra, Sample, SampleKind};
 use cohaptic_units::Instant;
 
 use super::{Joined, Joining};
@@ -75,6 +75,9 @@ pub struct Client {
     place: Place,
     key: Option<SessionKey>,
     info: Option<SessionInfo>,
+    kind: SampleKind,
+    /// The extra numbers of the sample that was heard last.
+    extra: Extra<3>,
     /// The present joining, with a key and after the first welcome.
     joined: Option<Joined>,
     /// The one that is asked for.
@@ -88,7 +91,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// A client that has said nothing yet.
+    /// A client that has said nothing yet, of a session whose samples are states.
     #[must_use]
     pub fn new(config: ClientConfig, now: Instant) -> Self {
         let (session, place, key, info) = match config {
@@ -96,7 +99,32 @@ impl Client {
             ClientConfig::Keyed { session, place, key } => (session, place, Some(key), None),
         };
         let newest = BTreeMap::new();
-        Self { session, place, key, info, joined: None, joining: None, next_hello: now, heard: now, newest, joinings: 0 }
+        Self {
+            session,
+            place,
+            key,
+            info,
+            kind: SampleKind::State,
+            extra: Extra::NONE,
+            joined: None,
+            joining: None,
+            next_hello: now,
+            heard: now,
+            newest,
+            joinings: 0,
+        }
+    }
+
+    /// For a session whose samples are of that kind.
+    #[must_use]
+    pub fn with_kind(self, kind: SampleKind) -> Self {
+        Self { kind, ..self }
+    }
+
+    /// The extra numbers of the sample that [`Client::handle_datagram`] gave last.
+    #[must_use]
+    pub const fn extra(&self) -> &Extra<3> {
+        &self.extra
     }
 
     /// The session's parameters; `None` before the first welcome.
@@ -134,7 +162,7 @@ impl Client {
         }
         let joining = match self.joining.take() {
             Some(joining) => joining,
-            None => Joining::draw(self.session, self.place, key, entropy)?,
+            None => Joining::draw(self.session, self.place, key, entropy)?.with_kind(self.kind),
         };
         self.next_hello = now.saturating_add(HELLO_EVERY);
         Ok(Some(self.joining.insert(joining).hello()))
@@ -160,7 +188,9 @@ impl Client {
             self.begin_anew(now);
             return Heard::Welcome;
         }
-        self.open(datagram).map_or(Heard::Ignored, |sample| self.take(now, sample))
+        let Some((sample, extra)) = self.open(datagram) else { return Heard::Ignored };
+        self.extra = extra;
+        self.take(now, sample)
     }
 
     /// Writes a sample for the session, sealed if there is a key, and gives its length. `None` before the first welcome, where there is a key, and if
@@ -175,15 +205,16 @@ impl Client {
         }
     }
 
-    fn open(&self, datagram: &[u8]) -> Option<Sample<3>> {
+    fn open(&self, datagram: &[u8]) -> Option<(Sample<3>, Extra<3>)> {
         let info = self.info?;
         let plain = match (&self.key, &self.joined) {
             (Some(_), joined) => joined.as_ref()?.open(datagram).ok()?,
             (None, _) => datagram,
         };
-        let sample = Sample::decode(plain, info.axes).ok()?;
+        let (sample, extra) = Sample::decode_as(plain, self.kind, info.axes).ok()?;
         let other = sample.sender < info.peers && sample.sender != self.place.0;
-        (sample.session == self.session && other).then_some(sample)
+        let mine = !self.kind.is_personal() || extra.receiver == self.place.0;
+        (sample.session == self.session && other && mine).then_some((sample, extra))
     }
 
     fn take(&mut self, now: Instant, sample: Sample<3>) -> Heard {

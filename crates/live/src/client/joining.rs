@@ -3,7 +3,7 @@
 //! [`Joining::hello`] → send, again every quarter of a second until → [`Joining::handle_welcome`] → [`Joined::seal`] each sample sent, [`Joined::open`]
 //! each datagram received.
 
-use cohaptic_peer::wire;
+use cohaptic_peer::wire::SampleKind;
 
 use crate::handshake::{HANDSHAKE_LEN, HandshakeError, Hello, Welcome};
 use crate::seal::{JoiningKeys, MAX_DATAGRAM, SEAL_LEN, Sealed};
@@ -14,13 +14,20 @@ use crate::{Entropy, EntropyError, Nonce, Place, SessionKey};
 pub struct Joining {
     hello: Hello,
     key: SessionKey,
+    kind: SampleKind,
 }
 
 impl Joining {
-    /// With a nonce, which must never have been used before.
+    /// For a session whose samples are states. With a nonce, which must never have been used before.
     #[must_use]
     pub fn new(session: u64, place: Place, key: &SessionKey, client_nonce: Nonce) -> Self {
-        Self { hello: Hello { session, place, client_nonce }, key: key.clone() }
+        Self { hello: Hello { session, place, client_nonce }, key: key.clone(), kind: SampleKind::State }
+    }
+
+    /// For a session whose samples are of that kind.
+    #[must_use]
+    pub fn with_kind(self, kind: SampleKind) -> Self {
+        Self { kind, ..self }
     }
 
     /// With a nonce that is drawn now.
@@ -52,7 +59,7 @@ impl Joining {
             return Err(WelcomeError::Other);
         }
         let keys = JoiningKeys::derive(&self.key, session, place, client_nonce, welcome.server_nonce);
-        Ok(Joined { welcome, keys })
+        Ok(Joined { welcome, keys, kind: self.kind })
     }
 }
 
@@ -72,6 +79,7 @@ pub enum WelcomeError {
 pub struct Joined {
     welcome: Welcome,
     keys: JoiningKeys,
+    kind: SampleKind,
 }
 
 impl Joined {
@@ -92,7 +100,7 @@ impl Joined {
     ///
     /// [`OpenError`] if it was not made for this joining. Never panics.
     pub fn open<'a>(&self, datagram: &'a [u8]) -> Result<&'a [u8], OpenError> {
-        let expected = wire::datagram_len(usize::from(self.welcome.axes)) + SEAL_LEN;
+        let expected = self.kind.datagram_len(usize::from(self.welcome.axes)) + SEAL_LEN;
         let sealed = Sealed::split(datagram).filter(|_| datagram.len() == expected).ok_or(OpenError::Length { found: datagram.len(), expected })?;
         if *sealed.client_nonce != self.keys.client_nonce {
             return Err(OpenError::OtherJoining);

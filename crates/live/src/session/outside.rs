@@ -54,6 +54,7 @@ impl Outside {
         let admission = AdmissionConfig {
             stale_after,
             limits: Some(LIMITS),
+            kind: scene.sample_kind(),
             ..AdmissionConfig::new(scene.seed, scene.axes.count(), peers, scene.coordination.update, seats)
         };
         let admission = AdmissionControl::new(admission.with_key(config.key.clone()), &mut SystemEntropy)?;

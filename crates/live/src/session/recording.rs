@@ -49,10 +49,6 @@ pub(crate) struct Stopped;
 
 impl Recording {
     /// Begins to record.
-    ///
-    /// # Errors
-    ///
-    /// [`RecordError`] if the folder or a file in it cannot be made.
     pub(crate) fn create(folder: &Path, scene: &Scene, content: SceneContent) -> Result<Self, RecordError> {
         let recorder = Recorder::create(folder, scene)?;
         let files = Files { recorder, inputs: InputRecorder::create(folder, scene, content)?, releases: Releases::create(folder, scene)? };
@@ -63,10 +59,6 @@ impl Recording {
     }
 
     /// Writes the rest and gives every file its name; gives the files.
-    ///
-    /// # Errors
-    ///
-    /// [`RecordError`] if a file could not be written, now or before.
     pub(crate) fn finish(self, summary: &Summary, ticks: &Lateness, releases: &Lateness) -> Result<Vec<PathBuf>, RecordError> {
         drop(self.rows);
         let files = self.writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;

@@ -48,7 +48,7 @@ impl Mechanics {
         options.into_iter().flat_map(|(name, value)| [name.to_owned(), value]).collect()
     }
 
-    /// Device and copy after that many ticks of 1 ms without a word from the others, by the peer of this project.
+    /// Device and copy after this number of ticks of 1 ms without a word from the others, by the peer of this project.
     fn alone(&self, ticks: u64) -> (State<3>, State<3>) {
         let tick = Duration::from_millis(1);
         let clock = Clock::regular(tick);

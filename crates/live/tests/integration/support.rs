@@ -28,7 +28,7 @@ impl Entropy for Counting {
     }
 }
 
-/// A property test of that many cases that leaves no files behind.
+/// A property test of this number of cases that leaves no files behind.
 pub(crate) fn cases(count: u32) -> ProptestConfig {
     ProptestConfig { cases: count, failure_persistence: None, ..ProptestConfig::default() }
 }

@@ -33,7 +33,6 @@ pub(crate) struct Fit {
     pub(crate) law_with_damping: f64,
 }
 
-/// All of them.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Responses {
     /// [Hz]

@@ -61,7 +61,7 @@ pub trait Coefficients {
 }
 
 /// Something that is done with a law, whichever of the registry it is. The compiler makes code for each law, so that a loop within does not choose
-/// between laws at every turn: eight lanes take half the time.
+/// between laws at every turn.
 pub trait LawVisitor<C> {
     /// What comes out.
     type Output;
@@ -114,6 +114,8 @@ pub enum UsedGains {
     Both,
     /// KT alone.
     Stiffness,
+    /// None of them.
+    Neither,
 }
 
 /// A parameter that one law alone has: a key of the table `[coordination.NAME]`.
@@ -138,6 +140,44 @@ pub enum LawForm {
     AutomaticDuration,
     /// `"auto"`, or a damping of at least zero [N·s/m].
     AutomaticDamping,
+    /// A damping of at least zero [N·s/m].
+    Damping,
+    /// An impedance above zero [N·s/m].
+    Impedance,
+    /// An energy of at least zero \[J\].
+    Energy,
+    /// One of these words, with what they mean.
+    Words(&'static [(&'static str, &'static str)]),
+    /// The name of a peer; the first peer without the key.
+    Peer,
+}
+
+impl LawForm {
+    /// The unit of a number; empty where values are no numbers.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::AutomaticDamping | Self::Damping | Self::Impedance => "N·s/m",
+            Self::Energy => "J",
+            Self::Duration | Self::AutomaticDuration | Self::Words(_) | Self::Peer => "",
+        }
+    }
+
+    /// The word at that place; empty where values are no words.
+    #[must_use]
+    pub const fn word(self, place: usize) -> &'static str {
+        match self {
+            Self::Words(words) if place < words.len() => words[place].0,
+            Self::Words(_)
+            | Self::AutomaticDamping
+            | Self::Damping
+            | Self::Impedance
+            | Self::Energy
+            | Self::Duration
+            | Self::AutomaticDuration
+            | Self::Peer => "",
+        }
+    }
 }
 
 /// The value of a parameter of a law.
@@ -149,6 +189,10 @@ pub enum LawValue {
     Duration(Duration),
     /// A number, in the unit of the [`LawForm`].
     Number(f64),
+    /// The place of a word in its [`LawForm`].
+    Word(usize),
+    /// The place of a peer in the scene.
+    Place(usize),
 }
 
 impl LawValue {
@@ -157,7 +201,7 @@ impl LawValue {
     pub const fn duration(self) -> Option<Duration> {
         match self {
             Self::Duration(duration) => Some(duration),
-            Self::Automatic | Self::Number(_) => None,
+            Self::Automatic | Self::Number(_) | Self::Word(_) | Self::Place(_) => None,
         }
     }
 
@@ -166,7 +210,7 @@ impl LawValue {
     pub const fn number(self) -> Option<f64> {
         match self {
             Self::Number(number) => Some(number),
-            Self::Automatic | Self::Duration(_) => None,
+            Self::Automatic | Self::Duration(_) | Self::Word(_) | Self::Place(_) => None,
         }
     }
 }
@@ -196,12 +240,14 @@ impl LawValues {
         let mut values = Self::default();
         for (value, parameter) in values.0.iter_mut().zip(parameters) {
             let text = parameter.default.trim_matches('"');
-            let duration = || parse::duration(text).map(LawValue::Duration).expect("the default of a law's parameter has its form");
-            *value = match parameter.form {
-                LawForm::AutomaticDuration | LawForm::AutomaticDamping if text == "auto" => LawValue::Automatic,
-                LawForm::Duration | LawForm::AutomaticDuration => duration(),
-                LawForm::AutomaticDamping => LawValue::Number(text.parse().expect("the default of a law's parameter has its form")),
+            let found = match parameter.form {
+                LawForm::AutomaticDuration | LawForm::AutomaticDamping if text == "auto" => Some(LawValue::Automatic),
+                LawForm::Duration | LawForm::AutomaticDuration => parse::duration(text).map(LawValue::Duration).ok(),
+                LawForm::AutomaticDamping | LawForm::Damping | LawForm::Impedance | LawForm::Energy => text.parse().map(LawValue::Number).ok(),
+                LawForm::Words(words) => words.iter().position(|(word, _)| *word == text).map(LawValue::Word),
+                LawForm::Peer => Some(LawValue::Place(0)),
             };
+            *value = found.expect("the default of a law's parameter has its form");
         }
         values
     }
@@ -230,6 +276,26 @@ impl LawValues {
     #[must_use]
     pub fn duration(&self, place: usize) -> Duration {
         self.get(place).duration().unwrap_or(Duration::ZERO)
+    }
+
+    /// The number at that place; zero for any other value.
+    ///
+    /// # Panics
+    ///
+    /// From [`LawValues::MOST`] on.
+    #[must_use]
+    pub fn number(&self, place: usize) -> f64 {
+        self.get(place).number().unwrap_or(0.0)
+    }
+
+    /// The place of a peer at that place; the first peer for any other value.
+    ///
+    /// # Panics
+    ///
+    /// From [`LawValues::MOST`] on.
+    #[must_use]
+    pub const fn place(&self, place: usize) -> usize {
+        if let LawValue::Place(peer) = self.get(place) { peer } else { 0 }
     }
 
     /// Replaces the value of the parameter at that place.

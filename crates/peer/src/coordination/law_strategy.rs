@@ -19,9 +19,13 @@ pub struct LawStrategy<const A: usize> {
 
 impl<const A: usize> LawStrategy<A> {
     /// The strategy of one peer, with nothing remembered.
+    ///
+    /// # Panics
+    ///
+    /// If the strategy of the registry is not a law.
     #[must_use]
     pub fn new(coordination: Coordination, parameters: LawParameters) -> Self {
-        let law = coordination.law(&parameters);
+        let law = coordination.law(&parameters).expect("the strategy is a law");
         let memory = vec![0.0; A * Law::<f64>::memory(&law)];
         Self { coordination, parameters, horizon: Law::<f64>::horizon(&law), law, memory }
     }
@@ -47,7 +51,7 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
 
     fn set_gains(&mut self, gains: Gains) {
         self.parameters.gains = gains;
-        self.law = self.coordination.law(&self.parameters);
+        self.law = self.coordination.law(&self.parameters).expect("it was a law when the strategy was made");
     }
 
     fn memory(&self) -> &[f64] {

@@ -5,22 +5,32 @@
 //! calls; every law is one, and so is a type that is simulated and not a law.
 
 mod average_position;
+mod client_server;
 mod extrapolated;
 mod law;
 mod law_strategy;
 mod local_damping;
+mod passivity_control;
 mod proportional_derivative;
 mod registry;
+mod session;
+mod set_position;
 mod smoothed_average_position;
 mod strategy;
+mod wave;
 
 pub use average_position::AveragePosition;
+pub use client_server::ClientServer;
 pub use extrapolated::Extrapolated;
 use law::LawKind;
 pub use law::{Coefficients, Law, LawForm, LawParameter, LawParameters, LawValue, LawValues, LawVisitor, Observation, Pull, UsedGains};
 pub use law_strategy::LawStrategy;
 pub use local_damping::LocalDamping;
+pub use passivity_control::PassivityControl;
 pub use proportional_derivative::ProportionalDerivative;
-pub use registry::{BuiltIn, Coordination, LawSettings};
+pub use registry::{BuiltIn, BuiltInStrategy, Coordination, LawSettings};
+pub use session::SessionParameters;
+pub use set_position::SetPosition;
 pub use smoothed_average_position::SmoothedAveragePosition;
-pub use strategy::{Command, Context, Strategy};
+pub use strategy::{Command, Context, Prediction, Role, Strategy};
+pub use wave::Wave;

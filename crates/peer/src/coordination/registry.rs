@@ -1,31 +1,40 @@
-//! The laws that a scene can name.
+//! The strategies that a scene can name.
 
+use core::fmt;
 use core::time::Duration;
 
 use super::law::LawKind as _;
+use super::session::ControllerKind as _;
 use super::{
-    AveragePosition, Coefficients as _, Extrapolated, Law, LawParameter, LawParameters, LawStrategy, LawValues, LawVisitor, LocalDamping,
-    Observation, ProportionalDerivative, Pull, SmoothedAveragePosition, UsedGains,
+    AveragePosition, ClientServer, Coefficients as _, Command, Context, Extrapolated, Law, LawParameter, LawParameters, LawStrategy, LawValues,
+    LawVisitor, LocalDamping, Observation, PassivityControl, ProportionalDerivative, Pull, Role, SessionParameters, SetPosition,
+    SmoothedAveragePosition, Strategy, UsedGains, Wave,
 };
-use crate::{Gains, Motion, Number};
+use crate::wire::SampleKind;
+use crate::{Contact, Gains, Held, Motion, Number, State};
 
 macro_rules! registry {
-    ($($law:ident: $name:literal, $about:literal;)+) => {
-        /// The laws that a scene can name: the registry.
+    (
+        laws { $($law:ident: $name:literal, $about:literal;)+ }
+        controllers { $($controller:ident: $controller_name:literal, $controller_about:literal;)+ }
+    ) => {
+        /// The strategies that a scene can name: the registry. The first ones are [laws](Law).
         #[derive(Clone, Copy, PartialEq, Eq, Debug)]
         pub enum Coordination {
             $(#[doc = concat!("Each copy is drawn ", $about, ".")] $law,)+
+            $(#[doc = concat!("Each copy is drawn ", $controller_about, ".")] $controller,)+
         }
 
         impl Coordination {
-            /// Every law.
-            pub const ALL: &'static [Self] = &[$(Self::$law,)+];
+            /// Every strategy.
+            pub const ALL: &'static [Self] = &[$(Self::$law,)+ $(Self::$controller,)+];
 
             /// The name in a scene file.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$law => $name,)+
+                    $(Self::$controller => $controller_name,)+
                 }
             }
 
@@ -34,6 +43,7 @@ macro_rules! registry {
             pub const fn about(self) -> &'static str {
                 match self {
                     $(Self::$law => $about,)+
+                    $(Self::$controller => $controller_about,)+
                 }
             }
 
@@ -42,6 +52,7 @@ macro_rules! registry {
             pub const fn pull(self) -> Pull {
                 match self {
                     $(Self::$law => <$law>::PULL,)+
+                    $(Self::$controller => <$controller<1>>::PULL,)+
                 }
             }
 
@@ -50,6 +61,7 @@ macro_rules! registry {
             pub const fn gains(self) -> UsedGains {
                 match self {
                     $(Self::$law => <$law>::GAINS,)+
+                    $(Self::$controller => <$controller<1>>::GAINS,)+
                 }
             }
 
@@ -58,20 +70,155 @@ macro_rules! registry {
             pub const fn parameters(self) -> &'static [LawParameter] {
                 match self {
                     $(Self::$law => <$law>::PARAMETERS,)+
+                    $(Self::$controller => <$controller<1>>::PARAMETERS,)+
+                }
+            }
+
+            /// What samples carry beyond the state.
+            #[must_use]
+            pub const fn kind(self) -> SampleKind {
+                match self {
+                    $(Self::$law)|+ => SampleKind::State,
+                    $(Self::$controller => <$controller<1>>::KIND,)+
+                }
+            }
+
+            /// The law with these parameters; `None` of a strategy that is not a law.
+            #[must_use]
+            pub fn law(self, parameters: &LawParameters) -> Option<BuiltIn> {
+                match self {
+                    $(Self::$law => Some(BuiltIn::$law(<$law>::new(parameters))),)+
+                    $(Self::$controller => None,)+
+                }
+            }
+
+            /// β [N·s/m]: by how much the strategy damps the peer's own copy, as part of the body.
+            #[must_use]
+            pub fn damping(self, parameters: &LawParameters) -> f64 {
+                match self {
+                    $(Self::$law => Law::<f64>::damping(&<$law>::new(parameters)),)+
+                    $(Self::$controller => <$controller<1>>::damping(parameters),)+
                 }
             }
 
             /// The strategy of one peer out of `peers` whose tick has that period, with the law's own parameters at their defaults.
+            ///
+            /// # Panics
+            ///
+            /// If the strategy is not a law.
             #[must_use]
             pub fn strategy<const A: usize>(self, gains: Gains, peers: usize, tick: Duration) -> LawStrategy<A> {
                 LawStrategy::new(self, LawParameters { gains, peers, tick, oldest: None, own: LawValues::defaults(self.parameters()) })
             }
 
-            /// The law with these parameters.
+            /// The strategy of a peer of a session.
             #[must_use]
-            pub fn law(self, parameters: &LawParameters) -> BuiltIn {
+            pub fn in_session<const A: usize>(self, session: &SessionParameters<A>) -> BuiltInStrategy<A> {
                 match self {
-                    $(Self::$law => BuiltIn::$law(<$law>::new(parameters)),)+
+                    $(Self::$law => BuiltInStrategy::Law(LawStrategy::new(self, session.law)),)+
+                    $(Self::$controller => BuiltInStrategy::$controller(<$controller<A>>::new(session)),)+
+                }
+            }
+        }
+
+        /// A strategy of the registry.
+        #[derive(Clone, Debug)]
+        pub enum BuiltInStrategy<const A: usize> {
+            /// A law.
+            Law(LawStrategy<A>),
+            $(#[doc = concat!("See [`", stringify!($controller), "`].")] $controller($controller<A>),)+
+        }
+
+        impl<const A: usize> Strategy<A> for BuiltInStrategy<A> {
+            #[inline]
+            fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
+                match self {
+                    Self::Law(law) => law.command(context),
+                    $(Self::$controller(controller) => controller.command(context),)+
+                }
+            }
+
+            fn needs_ages(&self) -> bool {
+                match self {
+                    Self::Law(law) => law.needs_ages(),
+                    $(Self::$controller(controller) => controller.needs_ages(),)+
+                }
+            }
+
+            fn needs_prediction(&self) -> bool {
+                match self {
+                    Self::Law(law) => law.needs_prediction(),
+                    $(Self::$controller(controller) => controller.needs_prediction(),)+
+                }
+            }
+
+            fn role(&self) -> Role {
+                match self {
+                    Self::Law(law) => law.role(),
+                    $(Self::$controller(controller) => controller.role(),)+
+                }
+            }
+
+            fn kind(&self) -> SampleKind {
+                match self {
+                    Self::Law(_) => SampleKind::State,
+                    $(Self::$controller(_) => <$controller<A>>::KIND,)+
+                }
+            }
+
+            fn extra(&mut self, receiver: usize, own: &State<A>, held: &Held<A>) -> [f64; A] {
+                match self {
+                    Self::Law(law) => law.extra(receiver, own, held),
+                    $(Self::$controller(controller) => controller.extra(receiver, own, held),)+
+                }
+            }
+
+            fn sent(&mut self, own: &State<A>) {
+                match self {
+                    Self::Law(law) => law.sent(own),
+                    $(Self::$controller(controller) => controller.sent(own),)+
+                }
+            }
+
+            fn accept(&mut self, other: usize, numbers: &[f64; A]) {
+                match self {
+                    Self::Law(law) => law.accept(other, numbers),
+                    $(Self::$controller(controller) => controller.accept(other, numbers),)+
+                }
+            }
+
+            fn heard_coupling(&self) -> Option<[f64; A]> {
+                match self {
+                    Self::Law(law) => law.heard_coupling(),
+                    $(Self::$controller(controller) => controller.heard_coupling(),)+
+                }
+            }
+
+            fn set_contact(&mut self, other: usize, contact: Contact) {
+                match self {
+                    Self::Law(law) => law.set_contact(other, contact),
+                    $(Self::$controller(controller) => controller.set_contact(other, contact),)+
+                }
+            }
+
+            fn set_gains(&mut self, gains: Gains) {
+                match self {
+                    Self::Law(law) => law.set_gains(gains),
+                    $(Self::$controller(controller) => controller.set_gains(gains),)+
+                }
+            }
+
+            fn memory(&self) -> &[f64] {
+                match self {
+                    Self::Law(law) => law.memory(),
+                    $(Self::$controller(controller) => controller.memory(),)+
+                }
+            }
+
+            fn set_memory(&mut self, memory: &[f64]) {
+                match self {
+                    Self::Law(law) => law.set_memory(memory),
+                    $(Self::$controller(controller) => controller.set_memory(memory),)+
                 }
             }
         }
@@ -138,15 +285,23 @@ macro_rules! registry {
 }
 
 registry! {
-    AveragePosition: "average-position", "to the mean of the others";
-    ProportionalDerivative: "proportional-derivative", "to each of the others";
-    SmoothedAveragePosition: "smoothed-average-position", "to the mean of the others, by a force that follows with a lag";
-    Extrapolated: "extrapolated", "to the mean of where the others are by now, by their velocities";
-    LocalDamping: "local-damping", "to the mean of the others without damping between them, while ground damps it";
+    laws {
+        AveragePosition: "average-position", "to the mean of the others";
+        ProportionalDerivative: "proportional-derivative", "to each of the others";
+        SmoothedAveragePosition: "smoothed-average-position", "to the mean of the others, by a force that follows with a lag";
+        Extrapolated: "extrapolated", "to the mean of where the others are by now, by their velocities";
+        LocalDamping: "local-damping", "to the mean of the others without damping between them, while ground damps it";
+    }
+    controllers {
+        PassivityControl: "passivity-control", "to the mean of the others, with no more energy than they have taken";
+        SetPosition: "set-position", "to the mean of the others, as far as there is energy for the way";
+        Wave: "wave", "by waves that it exchanges with each of the others";
+        ClientServer: "client-server", "to the object of a server, which alone has one";
+    }
 }
 
-/// The parameters that laws alone have, of every law: a scene has them whatever its strategy is.
-#[derive(Clone, Copy, PartialEq, Debug)]
+/// The parameters that strategies alone have, of every strategy: a scene has them whatever its strategy is.
+#[derive(Clone, Copy, PartialEq)]
 pub struct LawSettings([LawValues; Coordination::ALL.len()]);
 
 impl Default for LawSettings {
@@ -166,5 +321,14 @@ impl LawSettings {
     /// Those of a law, to be changed.
     pub const fn of_mut(&mut self, law: Coordination) -> &mut LawValues {
         &mut self.0[law as usize]
+    }
+}
+
+impl fmt::Debug for LawSettings {
+    /// Strategies whose parameters are all at their defaults are not shown, so that the text of a scene stays when the registry grows.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let usual = Self::default();
+        let changed = Coordination::ALL.iter().filter(|law| self.of(**law) != usual.of(**law));
+        f.debug_map().entries(changed.map(|law| (law.name(), self.of(*law)))).finish()
     }
 }

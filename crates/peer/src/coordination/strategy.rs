@@ -4,7 +4,8 @@ use alloc::boxed::Box;
 
 use cohaptic_units::Instant;
 
-use crate::{Gains, Held, State};
+use crate::wire::SampleKind;
+use crate::{Contact, Gains, Held, State};
 
 /// What a strategy sees at a tick.
 #[derive(Debug)]
@@ -17,6 +18,35 @@ pub struct Context<'a, const A: usize> {
     pub own: &'a State<A>,
     /// The newest samples from the others.
     pub held: &'a Held<A>,
+    /// How the coordination force moves the copy over this tick; at rest for a strategy that does not [ask](Strategy::needs_prediction).
+    pub ahead: Prediction<A>,
+}
+
+/// The motion of a copy over a tick as a function of the coordination force F: d = free − compliance·F.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Prediction<const A: usize> {
+    /// The motion without a coordination force, walls and coupling included \[m\].
+    pub free: [f64; A],
+    /// By how much a newton that acts over the tick moves the copy [m/N]; above zero.
+    pub compliance: f64,
+}
+
+impl<const A: usize> Prediction<A> {
+    /// Nothing moves.
+    pub const REST: Self = Self { free: [0.0; A], compliance: 0.0 };
+}
+
+/// Which part of the shared object a peer has.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Role {
+    /// A copy of its own.
+    #[default]
+    Copy,
+    /// None: it sends the state of its device, and its copy is the newest state heard from a server.
+    Client {
+        /// The place of the server among the others, in order with this peer left out.
+        server: usize,
+    },
 }
 
 /// What a strategy answers.
@@ -102,6 +132,42 @@ pub trait Strategy<const A: usize> {
         false
     }
 
+    /// Whether the strategy asks for [`Context::ahead`]; asked once, when the peer is made.
+    fn needs_prediction(&self) -> bool {
+        false
+    }
+
+    /// Which part of the object the peer has; asked once, when the peer is made.
+    fn role(&self) -> Role {
+        Role::Copy
+    }
+
+    /// What samples carry beyond the state; asked once, when the peer is made. With [`SampleKind::State`], [`Strategy::extra`], [`Strategy::sent`] and
+    /// [`Strategy::accept`] are not called.
+    fn kind(&self) -> SampleKind {
+        SampleKind::State
+    }
+
+    /// The extra numbers of the sample that is sent now, before the command of the tick, to another peer; of a kind that is not personal, to all of them,
+    /// and `receiver` is 0. The others count in order, with this peer left out.
+    fn extra(&mut self, _receiver: usize, _own: &State<A>, _held: &Held<A>) -> [f64; A] {
+        [0.0; A]
+    }
+
+    /// The samples of this tick have been made for all receivers.
+    fn sent(&mut self, _own: &State<A>) {}
+
+    /// The extra numbers of a sample that is newer than all before it from another peer.
+    fn accept(&mut self, _other: usize, _numbers: &[f64; A]) {}
+
+    /// The coupling force FC that was heard of \[N\], for a peer that does not compute it.
+    fn heard_coupling(&self) -> Option<[f64; A]> {
+        None
+    }
+
+    /// How the device of another peer touches the object from the next tick on; for a strategy that computes the coupling of others.
+    fn set_contact(&mut self, _other: usize, _contact: Contact) {}
+
     /// New gains, from the next tick on. A strategy without gains ignores them.
     fn set_gains(&mut self, gains: Gains);
 
@@ -123,6 +189,38 @@ impl<const A: usize, S: Strategy<A> + ?Sized> Strategy<A> for Box<S> {
 
     fn needs_ages(&self) -> bool {
         (**self).needs_ages()
+    }
+
+    fn needs_prediction(&self) -> bool {
+        (**self).needs_prediction()
+    }
+
+    fn role(&self) -> Role {
+        (**self).role()
+    }
+
+    fn kind(&self) -> SampleKind {
+        (**self).kind()
+    }
+
+    fn extra(&mut self, receiver: usize, own: &State<A>, held: &Held<A>) -> [f64; A] {
+        (**self).extra(receiver, own, held)
+    }
+
+    fn sent(&mut self, own: &State<A>) {
+        (**self).sent(own);
+    }
+
+    fn accept(&mut self, other: usize, numbers: &[f64; A]) {
+        (**self).accept(other, numbers);
+    }
+
+    fn heard_coupling(&self) -> Option<[f64; A]> {
+        (**self).heard_coupling()
+    }
+
+    fn set_contact(&mut self, other: usize, contact: Contact) {
+        (**self).set_contact(other, contact);
     }
 
     fn set_gains(&mut self, gains: Gains) {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::{LawParameters, LawStrategy, LawValue, LawValues};
+use cohaptic_peer::coordination::{LawParameters, LawStrategy, LawValue, LawValues, Prediction};
 use cohaptic_peer::{Context, Coordination, Gains, Held, State, Strategy as _};
 use cohaptic_units::Instant;
 use proptest::collection::vec;
@@ -31,7 +31,9 @@ fn force(gains: Gains, horizon: Duration, own: Body, others: &[(Body, u64)]) -> 
     }
     held.refresh();
     let own = state(own);
-    strategy.command(&Context { now: Instant::ZERO, local_time: Instant::from_nanos(1_000_000_000), own: &own, held: &held }).force[0]
+    strategy
+        .command(&Context { now: Instant::ZERO, local_time: Instant::from_nanos(1_000_000_000), own: &own, held: &held, ahead: Prediction::REST })
+        .force[0]
 }
 
 proptest! {
@@ -71,7 +73,7 @@ proptest! {
     fn without_a_horizon_it_is_the_average_position_law(gains in gains(), own in body(), others in vec((body(), 0..300_u64), 1..12)) {
         let state = |(x, v): Body| State { position: [x], velocity: [v] };
         let (copy, held) = (state(own), Held::new(others.iter().map(|(body, _)| state(*body))));
-        let context = Context { now: Instant::ZERO, local_time: Instant::ZERO, own: &copy, held: &held };
+        let context = Context { now: Instant::ZERO, local_time: Instant::ZERO, own: &copy, held: &held, ahead: Prediction::REST };
         let average = Coordination::AveragePosition.strategy::<1>(gains, 2, TICK).command(&context).force[0];
         prop_assert_eq!(force(gains, Duration::ZERO, own, &others), average);
     }

@@ -14,7 +14,7 @@ mod wire;
 
 use proptest::prelude::ProptestConfig;
 
-/// A property test of that many cases that leaves no files behind.
+/// A property test of this number of cases that leaves no files behind.
 fn cases(count: u32) -> ProptestConfig {
     ProptestConfig { cases: count, failure_persistence: None, ..ProptestConfig::default() }
 }

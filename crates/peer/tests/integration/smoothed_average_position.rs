@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::{LawParameters, LawStrategy, LawValue, LawValues};
+use cohaptic_peer::coordination::{LawParameters, LawStrategy, LawValue, LawValues, Prediction};
 use cohaptic_peer::{Context, Coordination, Gains, Held, State, Strategy as _};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
@@ -19,7 +19,7 @@ fn strategy(gains: Gains, lag: Duration) -> LawStrategy<1> {
 fn forces(strategy: &mut LawStrategy<1>, own: Body, other: Body, ticks: usize) -> Vec<f64> {
     let state = |(x, v): Body| State { position: [x], velocity: [v] };
     let (own, held) = (state(own), Held::new([state(other)]));
-    let context = Context { now: Instant::ZERO, local_time: Instant::ZERO, own: &own, held: &held };
+    let context = Context { now: Instant::ZERO, local_time: Instant::ZERO, own: &own, held: &held, ahead: Prediction::REST };
     (0..ticks).map(|_| strategy.command(&context).force[0]).collect()
 }
 

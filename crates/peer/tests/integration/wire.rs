@@ -1,7 +1,7 @@
 //! The wire format against random bytes, random edits, and a second reading of the table in its module doc.
 
 use cohaptic_peer::State;
-use cohaptic_peer::wire::{DecodeError, MAX_LEN, Sample, datagram_len};
+use cohaptic_peer::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_units::Instant;
 use proptest::collection::vec;
 use proptest::num::f64::{INFINITE, NEGATIVE, NORMAL, POSITIVE, QUIET_NAN, SUBNORMAL, ZERO};
@@ -12,23 +12,29 @@ proptest! {
     #![proptest_config(crate::cases(4000))]
 
     #[test]
-    fn whatever_decodes_encodes_to_the_same_bytes_again(bytes in datagram_like(), axes in 1..=3_usize) {
-        judge(&bytes, axes)?;
+    fn whatever_decodes_encodes_to_the_same_bytes_again(bytes in datagram_like(), kind in kind(), axes in 1..=3_usize) {
+        judge(&bytes, kind, axes)?;
     }
 
     #[test]
-    fn random_bytes_are_never_a_panic(bytes in vec(any::<u8>(), 0..200), axes in 1..=3_usize) {
-        judge(&bytes, axes)?;
+    fn random_bytes_are_never_a_panic(bytes in vec(any::<u8>(), 0..200), kind in kind(), axes in 1..=3_usize) {
+        judge(&bytes, kind, axes)?;
     }
 
     /// Denormals and −0 included.
     #[test]
-    fn every_finite_sample_reads_back_to_the_bit(sample in sample(), axes in 1..=3_usize) {
+    fn every_finite_sample_reads_back_to_the_bit(sample in sample(), kind in kind(), extra in extra(), axes in 1..=3_usize) {
         let mut bytes = [0xAA; MAX_LEN];
-        let len = sample.encode(axes, &mut bytes);
-        prop_assert_eq!(len, 48 + 16 * axes);
+        let written = of_kind(kind, extra);
+        let len = sample.encode_as(kind, &written, axes, &mut bytes);
+        prop_assert_eq!(len, 48 + if kind == SampleKind::State { 16 } else { 24 } * axes);
         prop_assert!(bytes[len..].iter().all(|byte| *byte == 0xAA), "encode writes no further than it says");
-        let read = Sample::<3>::decode(&bytes[..len], axes).unwrap();
+        let (read, found) = Sample::<3>::decode_as(&bytes[..len], kind, axes).unwrap();
+        prop_assert_eq!(found.receiver, written.receiver);
+        for axis in 0..3 {
+            let expected = if axis < axes { written.numbers[axis] } else { 0.0 };
+            prop_assert_eq!(found.numbers[axis].to_bits(), expected.to_bits());
+        }
         let header = |sample: &Sample<3>| (sample.session, sample.sender, sample.sequence, sample.sent);
         prop_assert_eq!(header(&read), header(&sample));
         for axis in 0..3 {
@@ -40,22 +46,36 @@ proptest! {
 }
 
 /// Decodes and compares with what the table says of these bytes.
-fn judge(bytes: &[u8], axes: usize) -> Result<(), TestCaseError> {
-    let decoded = Sample::<3>::decode(bytes, axes);
-    match expected_error(bytes, axes) {
+fn judge(bytes: &[u8], kind: SampleKind, axes: usize) -> Result<(), TestCaseError> {
+    let decoded = Sample::<3>::decode_as(bytes, kind, axes);
+    match expected_error(bytes, kind, axes) {
         Some(error) => prop_assert_eq!(decoded, Err(error)),
         None => {
             let mut again = [0; MAX_LEN];
-            let len = decoded.expect("the table allows it").encode(axes, &mut again);
+            let (sample, extra) = decoded.expect("the table allows it");
+            let len = sample.encode_as(kind, &extra, axes, &mut again);
             prop_assert_eq!(&again[..len], bytes);
         }
     }
     Ok(())
 }
 
-/// The first fault, in the order in which a reader can know of it: too short to say, not ours, of another version, of other axes, of another length,
-/// with a byte that has no meaning, with a number that is none.
-fn expected_error(bytes: &[u8], axes: usize) -> Option<DecodeError> {
+/// The version, byte 7 and the numbers on an axis of a kind, by the table.
+const fn row_of(kind: SampleKind) -> (u16, u8, &'static [&'static str]) {
+    const EXTENDED: &[&str] = &["position", "velocity", "extra number"];
+    match kind {
+        SampleKind::State => (1, 0, &["position", "velocity"]),
+        SampleKind::Energy => (2, 1, EXTENDED),
+        SampleKind::Wave => (2, 2, EXTENDED),
+        SampleKind::Force => (2, 3, EXTENDED),
+    }
+}
+
+/// The first fault, in the order in which a reader can know of it: too short to say, not ours, of another version, of other axes, of another kind, of another
+/// length, with a byte that has no meaning, with a number that is none.
+fn expected_error(bytes: &[u8], kind: SampleKind, axes: usize) -> Option<DecodeError> {
+    let (expected_version, code, quantities) = row_of(kind);
+    let expected_len = 48 + 8 * quantities.len() * axes;
     let number = |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
     if bytes.len() < 48 {
         return Some(DecodeError::TooShort { len: bytes.len() });
@@ -63,17 +83,20 @@ fn expected_error(bytes: &[u8], axes: usize) -> Option<DecodeError> {
     let version = u16::from_le_bytes([bytes[4], bytes[5]]);
     if !bytes.starts_with(b"CHPT") {
         Some(DecodeError::Magic)
-    } else if version != 1 {
-        Some(DecodeError::Version { found: version })
+    } else if version != expected_version {
+        Some(DecodeError::Version { found: version, expected: expected_version })
     } else if usize::from(bytes[6]) != axes {
         Some(DecodeError::Axes { found: bytes[6], expected: axes })
-    } else if bytes.len() != datagram_len(axes) {
-        Some(DecodeError::Length { found: bytes.len(), expected: datagram_len(axes) })
-    } else if [7, 20, 21, 22, 23].into_iter().chain(40..48).any(|at| bytes[at] != 0) {
+    } else if expected_version == 2 && bytes[7] != code {
+        Some(DecodeError::Kind { found: bytes[7], expected: code })
+    } else if bytes.len() != expected_len {
+        Some(DecodeError::Length { found: bytes.len(), expected: expected_len })
+    } else if bytes[7] != code || (40..48).chain(20..if code >= 2 { 20 } else { 24 }).any(|at| bytes[at] != 0) {
         Some(DecodeError::Reserved)
     } else {
-        let numbers = (0..axes).flat_map(|axis| [(axis, "position", 48 + 16 * axis), (axis, "velocity", 56 + 16 * axis)]);
-        numbers.into_iter().find(|(_, _, at)| !number(*at).is_finite()).map(|(axis, quantity, _)| DecodeError::NotFinite { axis, quantity })
+        let on_axis =
+            |axis: usize| quantities.iter().enumerate().map(move |(place, quantity)| (axis, *quantity, 48 + 8 * (quantities.len() * axis + place)));
+        (0..axes).flat_map(on_axis).find(|(_, _, at)| !number(*at).is_finite()).map(|(axis, quantity, _)| DecodeError::NotFinite { axis, quantity })
     }
 }
 
@@ -93,9 +116,9 @@ fn datagram_like() -> impl Strategy<Value = Vec<u8>> {
         (1..60_usize).prop_map(Edit::Shorten),
         any::<u8>().prop_map(Edit::Append),
     ];
-    (sample(), 1..=3_usize, vec(edit, 0..=3)).prop_map(|(sample, axes, edits)| {
+    (sample(), kind(), extra(), 1..=3_usize, vec(edit, 0..=3)).prop_map(|(sample, kind, extra, axes, edits)| {
         let mut buffer = [0; MAX_LEN];
-        let len = sample.encode(axes, &mut buffer);
+        let len = sample.encode_as(kind, &of_kind(kind, extra), axes, &mut buffer);
         let mut bytes = buffer[..len].to_vec();
         for edit in edits {
             match edit {
@@ -111,6 +134,20 @@ fn datagram_like() -> impl Strategy<Value = Vec<u8>> {
         }
         bytes
     })
+}
+
+fn kind() -> impl Strategy<Value = SampleKind> {
+    select(&[SampleKind::State, SampleKind::Energy, SampleKind::Wave, SampleKind::Force][..])
+}
+
+fn extra() -> impl Strategy<Value = Extra<3>> {
+    let finite = || POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO;
+    (any::<u32>(), [finite(), finite(), finite()]).prop_map(|(receiver, numbers)| Extra { receiver, numbers })
+}
+
+/// Without what samples of a kind do not have.
+fn of_kind(kind: SampleKind, extra: Extra<3>) -> Extra<3> {
+    Extra { receiver: if kind.is_personal() { extra.receiver } else { 0 }, numbers: if kind == SampleKind::State { [0.0; 3] } else { extra.numbers } }
 }
 
 fn sample() -> impl Strategy<Value = Sample<3>> {

@@ -74,10 +74,6 @@ impl SendFailures {
 }
 
 /// How many datagrams the kernel has dropped at this socket before anybody could read them, because its buffer was full, from `/proc/net/udp` or `udp6`; `None` if the system does not tell.
-///
-/// # Errors
-///
-/// What the system says.
 pub(super) fn kernel_drops(socket: impl AsFd, is_ipv6: bool) -> io::Result<Option<u64>> {
     let inode = rustix::fs::fstat(socket)?.st_ino;
     let table = std::fs::read_to_string(if is_ipv6 { "/proc/thread-self/net/udp6" } else { "/proc/thread-self/net/udp" })?;

@@ -102,7 +102,6 @@ impl Clients {
         self.closed.pop()
     }
 
-    /// How many there are.
     pub(super) fn count(&self) -> usize {
         self.places.len()
     }

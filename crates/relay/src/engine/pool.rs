@@ -24,7 +24,7 @@ pub(super) struct Pool {
     idle: Vec<Arc<Packet>>,
     /// The bytes that idle ones keep.
     kept: usize,
-    /// They keep no more than this, such that many long ones do not leave their length to many short ones.
+    /// The most that idle ones keep together: a burst of long datagrams does not stay in memory.
     most_kept: usize,
 }
 

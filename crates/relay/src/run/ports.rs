@@ -283,7 +283,6 @@ impl fmt::Debug for Ports {
     }
 }
 
-/// What was heard.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Heard {
     /// A number of datagrams.

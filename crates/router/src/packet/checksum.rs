@@ -29,10 +29,10 @@ pub(super) fn change(bytes: &mut [u8], at: usize, old: u16, new: u16) {
 
 /// Where the checksum of the transport protocol stands, counted from the begin of the packet; `None` if it has none that is known, or if it is not here.
 pub(super) fn transport_field(packet: &[u8], headers: &Headers) -> Option<usize> {
-    let at = headers.transport()? + offset(headers.protocol())?;
-    let field: &[u8; 2] = packet.get(at..headers.length())?.first_chunk()?;
+    let at = headers.transport? + offset(headers.protocol)?;
+    let field: &[u8; 2] = packet.get(at..headers.length)?.first_chunk()?;
     // UDP without a checksum (RFC 768).
-    (headers.protocol() != Protocol::UDP || *field != [0, 0]).then_some(at)
+    (headers.protocol != Protocol::UDP || *field != [0, 0]).then_some(at)
 }
 
 fn offset(protocol: Protocol) -> Option<usize> {
@@ -49,18 +49,18 @@ fn offset(protocol: Protocol) -> Option<usize> {
 /// Linux then leaves the sum of the pseudo-header in the field. A packet whose right checksum happens to be that sum is given it again, so nothing needs
 /// to tell the two apart.
 pub(super) fn complete(packet: &mut [u8], headers: &Headers) {
-    if !headers.is_whole() || !headers.protocol().has_ports() {
+    if !headers.is_whole || !headers.protocol.has_ports() {
         return;
     }
-    let (Some(begin), Some(field)) = (headers.transport(), transport_field(packet, headers)) else { return };
+    let (Some(begin), Some(field)) = (headers.transport, transport_field(packet, headers)) else { return };
     let pseudo = pseudo_header(headers, begin);
     if u16::from_be_bytes([packet[field], packet[field + 1]]) != pseudo {
         return;
     }
     // The field holds the sum of the pseudo-header: with it, the sum of the segment is that of both.
-    let checksum = match !sum(&packet[begin..headers.length()]) {
+    let checksum = match !sum(&packet[begin..headers.length]) {
         // Zero would say that there is none.
-        0 if headers.protocol() == Protocol::UDP => 0xffff,
+        0 if headers.protocol == Protocol::UDP => 0xffff,
         checksum => checksum,
     };
     packet[field..field + 2].copy_from_slice(&checksum.to_be_bytes());
@@ -72,6 +72,6 @@ fn pseudo_header(headers: &Headers, begin: usize) -> u16 {
         IpAddr::V4(address) => sum(&address.octets()),
         IpAddr::V6(address) => sum(&address.octets()),
     };
-    let length = (headers.length() - begin) as u64;
-    fold(u64::from(address(headers.source())) + u64::from(address(headers.destination())) + u64::from(headers.protocol().0) + length)
+    let length = (headers.length - begin) as u64;
+    fold(u64::from(address(headers.source)) + u64::from(address(headers.destination)) + u64::from(headers.protocol.0) + length)
 }

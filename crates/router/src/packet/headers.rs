@@ -9,17 +9,25 @@ use super::checksum;
 /// What the headers of a packet say.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Headers {
-    source: IpAddr,
-    destination: IpAddr,
-    protocol: Protocol,
-    /// Source and destination.
-    ports: Option<[u16; 2]>,
-    ecn: Ecn,
+    /// Where the packet comes from.
+    pub source: IpAddr,
+    /// Where it goes to.
+    pub destination: IpAddr,
+    /// What it carries, behind all extension headers.
+    pub protocol: Protocol,
+    /// The ports of source and destination, if it is TCP or UDP and they are in this packet: of a packet that was cut into fragments they are in the
+    /// first alone.
+    pub ports: Option<[u16; 2]>,
+    /// What it says of congestion.
+    pub ecn: Ecn,
     /// The bytes of the fixed header and, with IPv4, its options: what its checksum covers.
-    header: usize,
-    transport: Option<usize>,
-    whole: bool,
-    length: usize,
+    pub(super) covered: usize,
+    /// Where the header of the transport protocol begins; `None` if it is not in this packet.
+    pub(super) transport: Option<usize>,
+    /// Whether it is no fragment.
+    pub(super) is_whole: bool,
+    /// The bytes of the packet, at most as many as were read.
+    pub length: usize,
 }
 
 /// Why the bytes are no packet.
@@ -71,58 +79,6 @@ impl Headers {
         }
     }
 
-    /// Where the packet comes from.
-    #[must_use]
-    pub const fn source(&self) -> IpAddr {
-        self.source
-    }
-
-    /// Where it goes to.
-    #[must_use]
-    pub const fn destination(&self) -> IpAddr {
-        self.destination
-    }
-
-    /// What it carries, behind all extension headers.
-    #[must_use]
-    pub const fn protocol(&self) -> Protocol {
-        self.protocol
-    }
-
-    /// The ports of source and destination, if it is TCP or UDP and they are in this packet: of a packet that was cut into fragments they are in the
-    /// first alone.
-    #[must_use]
-    pub const fn ports(&self) -> Option<[u16; 2]> {
-        self.ports
-    }
-
-    /// What it says of congestion.
-    #[must_use]
-    pub const fn ecn(&self) -> Ecn {
-        self.ecn
-    }
-
-    /// The bytes of the packet, at most as many as were read.
-    #[must_use]
-    pub const fn length(&self) -> usize {
-        self.length
-    }
-
-    /// Where the header of the transport protocol begins; `None` if it is not in this packet.
-    pub(super) const fn transport(&self) -> Option<usize> {
-        self.transport
-    }
-
-    /// The bytes that the checksum of an IPv4 header covers.
-    pub(super) const fn covered(&self) -> usize {
-        self.header
-    }
-
-    /// Whether it is no fragment.
-    pub(super) const fn is_whole(&self) -> bool {
-        self.whole
-    }
-
     /// Sets both bits in the bytes that were read.
     pub(super) fn mark_congestion(&mut self, bytes: &mut [u8]) {
         match self.source {
@@ -162,9 +118,9 @@ fn read_v4(bytes: &[u8]) -> Result<Headers, Malformed> {
         protocol,
         ports: transport.and_then(|at| ports(&bytes[..length], protocol, at)),
         ecn: Ecn(fixed[1] & 0b11),
-        header,
+        covered: header,
         transport,
-        whole: offset == 0 && !more,
+        is_whole: offset == 0 && !more,
         length,
     })
 }
@@ -184,9 +140,9 @@ fn read_v6(bytes: &[u8]) -> Result<Headers, Malformed> {
         protocol: found.protocol,
         ports: found.at.and_then(|at| ports(&bytes[..length], found.protocol, at)),
         ecn: Ecn(fixed[1] >> 4 & 0b11),
-        header: FIXED,
+        covered: FIXED,
         transport: found.at,
-        whole: found.whole,
+        is_whole: found.whole,
         length,
     })
 }

@@ -86,7 +86,7 @@ impl Packet {
     #[must_use]
     pub fn info(&self) -> PacketInfo {
         match &self.content {
-            Content::Ip { headers, .. } => PacketInfo { size: Bytes::new(headers.length() as u64), ecn_capable: headers.ecn().is_capable() },
+            Content::Ip { headers, .. } => PacketInfo { size: Bytes::new(headers.length as u64), ecn_capable: headers.ecn.is_capable() },
             Content::NotIp | Content::Malformed(_) => Bytes::new(self.bytes.len() as u64).into(),
         }
     }
@@ -102,7 +102,7 @@ impl Packet {
     /// [`cohaptic_wan::Checksum::Passes`]. Bits beyond the end of the packet are left out.
     pub fn damage(&mut self, damage: &Damage) {
         if let Content::Ip { at, headers } = &self.content {
-            let end = at + headers.length();
+            let end = at + headers.length;
             apply(&mut self.bytes[*at..end], headers, damage);
         }
     }
@@ -141,10 +141,10 @@ fn network_layer(frame: &[u8]) -> Option<usize> {
 /// Of a header the checksum is set right and nothing else: a packet whose addresses were hit goes where they say now. A fragment that is not the first
 /// has no checksum that could be set right.
 fn apply(packet: &mut [u8], headers: &Headers, damage: &Damage) {
-    let covered = headers.covered();
-    let is_v4 = headers.source().is_ipv4();
+    let covered = headers.covered;
+    let is_v4 = headers.source.is_ipv4();
     let field = transport_field(packet, headers);
-    let begin = headers.transport().unwrap_or(packet.len());
+    let begin = headers.transport.unwrap_or(packet.len());
     // The addresses are part of the pseudo-header.
     let addresses = if is_v4 { 12..20 } else { 8..40 };
     let of_transport = |packet: &[u8]| [sum(&packet[addresses.clone()]), sum(&packet[begin..])];
@@ -156,12 +156,12 @@ fn apply(packet: &mut [u8], headers: &Headers, damage: &Damage) {
     }
     if let Some(field) = field {
         let now = of_transport(packet);
-        if headers.protocol() != Protocol::ICMP {
+        if headers.protocol != Protocol::ICMP {
             change(packet, field, before.1[0], now[0]);
         }
         change(packet, field, before.1[1], now[1]);
         // Zero would say that there is no checksum; both are zero in ones' complement.
-        if headers.protocol() == Protocol::UDP && packet[field..field + 2] == [0, 0] {
+        if headers.protocol == Protocol::UDP && packet[field..field + 2] == [0, 0] {
             packet[field..field + 2].fill(0xff);
         }
     }

@@ -17,16 +17,16 @@ fn read(bytes: &[u8]) -> Headers {
 #[test]
 fn ports_and_addresses_of_both_families_are_found() {
     let headers = read(&udp_bytes([5000, 53], b"question"));
-    assert_eq!((headers.source(), headers.destination()), (IpAddr::from([10, 1, 0, 1]), IpAddr::from([10, 2, 0, 1])));
-    assert_eq!((headers.protocol(), headers.ports(), headers.length()), (Protocol::UDP, Some([5000, 53]), 36));
+    assert_eq!((headers.source, headers.destination), (IpAddr::from([10, 1, 0, 1]), IpAddr::from([10, 2, 0, 1])));
+    assert_eq!((headers.protocol, headers.ports, headers.length), (Protocol::UDP, Some([5000, 53]), 36));
     let mut bytes = Vec::new();
     PacketBuilder::ipv6([1; 16], [2; 16], 64).tcp(80, 4711, 1, 1000).write(&mut bytes, b"data").unwrap();
     let headers = read(&bytes);
-    assert_eq!((headers.source(), headers.destination()), (IpAddr::from([1; 16]), IpAddr::from([2; 16])));
-    assert_eq!((headers.protocol(), headers.ports()), (Protocol::TCP, Some([80, 4711])));
+    assert_eq!((headers.source, headers.destination), (IpAddr::from([1; 16]), IpAddr::from([2; 16])));
+    assert_eq!((headers.protocol, headers.ports), (Protocol::TCP, Some([80, 4711])));
     let mut bytes = Vec::new();
     PacketBuilder::ipv4([10, 0, 0, 1], [10, 0, 0, 2], 64).icmpv4_echo_request(1, 2).write(&mut bytes, b"ping").unwrap();
-    assert_eq!((read(&bytes).protocol(), read(&bytes).ports()), (Protocol::ICMP, None));
+    assert_eq!((read(&bytes).protocol, read(&bytes).ports), (Protocol::ICMP, None));
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn options_lie_between_the_header_and_the_ports() {
     let mut header = Ipv4Header::new(16, 64, IpNumber::UDP, [10, 0, 0, 1], [10, 0, 0, 2]).unwrap();
     header.options = [1; 8].into();
     let bytes = [header.to_bytes().as_slice(), &[0, 7, 0, 8, 0, 8, 0, 0]].concat();
-    assert_eq!(read(&bytes).ports(), Some([7, 8]));
+    assert_eq!(read(&bytes).ports, Some([7, 8]));
 }
 
 /// Hop-by-hop, destination options, routing and authentication before UDP: the lengths are counted in three different units.
@@ -56,12 +56,12 @@ fn extension_headers_are_walked() {
     bytes.extend(&extensions);
     bytes.extend(udp);
     let headers = read(&bytes);
-    assert_eq!((headers.protocol(), headers.ports()), (Protocol::UDP, Some([7, 8])));
+    assert_eq!((headers.protocol, headers.ports), (Protocol::UDP, Some([7, 8])));
     // Cut off in the middle of the chain: what is known is the header that is not whole.
     bytes.truncate(40 + 8 + 16 + 4);
     let length = u16::try_from(bytes.len() - 40).unwrap().to_be_bytes();
     bytes[4..6].copy_from_slice(&length);
-    assert_eq!((read(&bytes).protocol(), read(&bytes).ports()), (Protocol(43), None));
+    assert_eq!((read(&bytes).protocol, read(&bytes).ports), (Protocol(43), None));
 }
 
 #[test]
@@ -71,13 +71,13 @@ fn only_the_first_fragment_has_ports() {
         header.fragment_offset = IpFragOffset::try_new(offset).unwrap();
         header.more_fragments = more;
         let bytes = [header.to_bytes().as_slice(), &[0, 5, 0, 6, 0, 8, 0, 0]].concat();
-        assert_eq!((read(&bytes).protocol(), read(&bytes).ports()), (Protocol::UDP, expected));
+        assert_eq!((read(&bytes).protocol, read(&bytes).ports), (Protocol::UDP, expected));
         let fragment = Ipv6FragmentHeader::new(IpNumber::UDP, IpFragOffset::try_new(offset).unwrap(), more, 99);
         let mut bytes = vec![0x60, 0, 0, 0, 0, 16, 44, 64];
         bytes.extend([3; 32]);
         bytes.extend(fragment.to_bytes());
         bytes.extend([0, 5, 0, 6, 0, 8, 0, 0]);
-        assert_eq!((read(&bytes).protocol(), read(&bytes).ports()), (Protocol::UDP, expected));
+        assert_eq!((read(&bytes).protocol, read(&bytes).ports), (Protocol::UDP, expected));
     }
 }
 
@@ -185,16 +185,16 @@ proptest! {
     #[test]
     fn headers_say_what_they_were_built_from((bytes, protocol, ports) in built()) {
         let headers = read(&bytes);
-        prop_assert_eq!((headers.protocol(), headers.ports(), headers.length()), (protocol, ports, bytes.len()));
+        prop_assert_eq!((headers.protocol, headers.ports, headers.length), (protocol, ports, bytes.len()));
         let sliced = SlicedPacket::from_ip(&bytes).unwrap();
         let (source, destination) = match sliced.net.unwrap() {
             NetSlice::Ipv4(slice) => (IpAddr::from(slice.header().source_addr()), IpAddr::from(slice.header().destination_addr())),
             NetSlice::Ipv6(slice) => (IpAddr::from(slice.header().source_addr()), IpAddr::from(slice.header().destination_addr())),
             NetSlice::Arp(_) => unreachable!(),
         };
-        prop_assert_eq!((headers.source(), headers.destination()), (source, destination));
+        prop_assert_eq!((headers.source, headers.destination), (source, destination));
         if let Some(TransportSlice::Udp(udp)) = sliced.transport {
-            prop_assert_eq!(headers.ports(), Some([udp.source_port(), udp.destination_port()]));
+            prop_assert_eq!(headers.ports, Some([udp.source_port(), udp.destination_port()]));
         }
     }
 

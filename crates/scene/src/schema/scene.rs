@@ -1,7 +1,7 @@
 //! The keys of a scene.
 
 use cohaptic_peer::Coordination;
-use cohaptic_peer::coordination::{LawForm, LawValues};
+use cohaptic_peer::coordination::{LawForm, LawParameter, LawValues};
 use cohaptic_wan::DropCause;
 use cohaptic_wan::parameters::Quantity;
 
@@ -13,7 +13,8 @@ use cohaptic_linkfile::schema::{
 
 use crate::measures::{Measure, Scope};
 use crate::quantities::{
-    ADDED_MASS, ANGLE, DAMPING, DISTANCE, FORCE, FREQUENCY, MASS, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS, VELOCITY, WALL_STIFFNESS,
+    ADDED_MASS, ANGLE, DAMPING, DISTANCE, ENERGY, FORCE, FREQUENCY, IMPEDANCE, MASS, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS, VELOCITY,
+    WALL_STIFFNESS,
 };
 
 const MOST: u64 = i64::MAX.unsigned_abs();
@@ -62,14 +63,20 @@ static ENCLOSURE: Table = Table::of(&[&[
 ]]);
 
 static COORDINATION: Table = Table::of(&[&GAINS_OF_ALL, LAWS.split_at(LAWS_WITH_KEYS).0]);
-const GAINS_OF_ALL: [Key; 6] = [
+const GAINS_OF_ALL: [Key; 7] = [
     required("strategy", Form::Words(&STRATEGIES), "Where each copy is drawn to"),
     required("stiffness", number(STIFFNESS), "Gain on the difference of positions, K_T"),
     usual("damping", number(DAMPING), "0", "Gain on the difference of velocities, B_T"),
     required("update", Form::Duration, "How often each peer sends a sample; a whole multiple of every peer's tick"),
+    optional("send-when", Form::Table(&SEND_WHEN), "Which of these samples are sent; without it all"),
     usual("scaling", Form::Words(&SCALINGS), "\"none\"", "How both gains follow the number of peers"),
     usual("pull", Form::Words(&PULLS), "\"mean\"", "Whether both gains count once, or once for each other peer"),
 ];
+static SEND_WHEN: Table = Table::of(&[&[
+    optional("velocity", Form::Probability, "The velocity differs from the one sent last by this part of its size, below 100%"),
+    optional("position", number(DISTANCE), "The copy is that far from where receivers hold it"),
+    optional("heartbeat", Form::Duration, "That much time has passed since the last sample"),
+]]);
 const PULLS: [(&str, &str); 2] = [("mean", "once"), ("sum", "times N-1 among N peers; average-position is proportional-derivative then")];
 const STRATEGIES: [(&str, &str); Coordination::ALL.len()] = {
     let mut words = [("", ""); Coordination::ALL.len()];
@@ -86,6 +93,11 @@ const fn form_of(form: LawForm) -> Form {
         LawForm::Duration => Form::Duration,
         LawForm::AutomaticDuration => Form::AnyOf(const { &[Form::Words(&AUTOMATIC), Form::Duration] }),
         LawForm::AutomaticDamping => Form::AnyOf(const { &[Form::Words(&AUTOMATIC), number(DAMPING)] }),
+        LawForm::Damping => number(DAMPING),
+        LawForm::Impedance => number(IMPEDANCE),
+        LawForm::Energy => number(ENERGY),
+        LawForm::Words(words) => Form::Words(words),
+        LawForm::Peer => Form::Text,
     }
 }
 const AUTOMATIC: [(&str, &str); 1] = [("auto", "as the links of the scene ask for")];
@@ -98,7 +110,8 @@ static LAW_KEYS: [[Key; LawValues::MOST]; Coordination::ALL.len()] = {
         let parameters = Coordination::ALL[law].parameters();
         let mut place = 0;
         while place < parameters.len() {
-            keys[law][place] = usual(parameters[place].key, form_of(parameters[place].form), parameters[place].default, parameters[place].about);
+            let LawParameter { key, form, default, about } = parameters[place];
+            keys[law][place] = if default.is_empty() { optional(key, form_of(form), about) } else { usual(key, form_of(form), default, about) };
             place += 1;
         }
         law += 1;

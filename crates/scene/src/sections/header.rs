@@ -3,13 +3,14 @@
 use core::time::Duration;
 
 use cohaptic_linkfile::document::{Node, quote};
+use cohaptic_linkfile::mesh::read_peer_name;
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue, LawValues, Pull};
-use cohaptic_peer::{Coordination, Gains, Integrator};
+use cohaptic_peer::{Coordination, Gains, Integrator, SendWhen};
 
 use crate::model::{Axes, CoordinationSpec, Scaling};
-use crate::quantities::{DAMPING, STIFFNESS};
+use crate::quantities::{DAMPING, DISTANCE, ENERGY, IMPEDANCE, STIFFNESS};
 
 /// The most peers that `count` makes: a slip of the finger must not take all memory. Each takes about two kilobytes.
 const MOST_PEERS: u64 = 1_000_000;
@@ -60,6 +61,7 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<Coo
     let stiffness = table.required("stiffness", &STIFFNESS.expected(), |node, context| STIFFNESS.read(node, context));
     let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
     let update = table.required("update", "a duration above zero such as \"8ms\"", values::positive_duration);
+    let send_when = table.maybe("send-when", read_send_when);
     let settings = read_settings(&mut table);
     table.finish();
     Some(CoordinationSpec {
@@ -69,7 +71,31 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<Coo
         gains: Gains { stiffness: stiffness?, damping: damping? },
         settings: settings?,
         update: update?,
+        send_when: send_when?,
     })
+}
+
+/// `send-when`.
+fn read_send_when(node: &Node, context: Context<'_>) -> Option<SendWhen> {
+    const EXPECTED: &str = "a table such as { velocity = \"10%\", position = 0.0005, heartbeat = \"1s\" }";
+    let mut table = TableReader::new(node, context, EXPECTED)?;
+    let velocity = table.maybe("velocity", |node, context| {
+        let part = values::probability(node, context)?;
+        if part.value() >= 1.0 {
+            context.fault_at(node, "with a dead band of 100% a peer that stops is not heard of: expected less than 100%");
+            return None;
+        }
+        Some(part.value())
+    });
+    let position = table.maybe("position", |node, context| DISTANCE.read(node, context));
+    let heartbeat = table.maybe("heartbeat", values::positive_duration);
+    let is_empty = table.get("velocity").is_none() && table.get("position").is_none();
+    table.finish();
+    if is_empty {
+        context.fault_at(node, format!("nothing says when a sample is worth sending: expected velocity or position, in {EXPECTED}"));
+        return None;
+    }
+    Some(SendWhen { velocity: velocity?, position: position?, heartbeat: heartbeat? })
 }
 
 /// The tables `[coordination.NAME]`, each with the parameters that a strategy has of its own. They may stand there whatever the strategy of the scene is.
@@ -110,6 +136,14 @@ fn read_value(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawVal
             }
             None => DAMPING.read(node, context).map(LawValue::Number),
         },
+        LawForm::Damping => DAMPING.read(node, context).map(LawValue::Number),
+        LawForm::Impedance => IMPEDANCE.read(node, context).map(LawValue::Number),
+        LawForm::Energy => ENERGY.read(node, context).map(LawValue::Number),
+        LawForm::Words(words) => {
+            let choices: Vec<_> = words.iter().enumerate().map(|(place, (word, _))| (*word, place)).collect();
+            values::choice(node, context, &choices).map(LawValue::Word)
+        }
+        LawForm::Peer => read_peer_name(node, context).map(LawValue::Place),
     }
 }
 

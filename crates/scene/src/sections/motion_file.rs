@@ -100,7 +100,7 @@ fn line_at(text: &str, at: usize) -> Range<usize> {
     start..end
 }
 
-/// The field after that many commas of a line, without the space around it.
+/// The field after this number of commas of a line, without the space around it.
 fn field_at(text: &str, line: &Range<usize>, column: usize) -> Range<usize> {
     let mut start = line.start;
     let Some(content) = text.get(line.clone()) else { return line.clone() };

@@ -123,7 +123,7 @@ impl Harmonic {
         }
     }
 
-    /// Σ e^{−jωiT} over i below that many frames, in a closed form that loses no digits where the turns are small or whole.
+    /// Σ e^{−jωiT} over i below this number of frames, in a closed form that loses no digits where the turns are small or whole.
     fn sum_of_turns(&self, frames: usize) -> Complex64 {
         let angle = TAU * (self.periods - self.periods.round());
         let half = 0.5 * angle;

@@ -5,7 +5,6 @@
 //! without simulating (Rakhsha & Constantinescu 2015, Section 4, plot it for their controllers): in steady state one frame multiplies everything by
 //! e^{jωT}, which is one system of linear equations.
 
-mod error;
 mod harmonic;
 mod low_frequency;
 mod response;
@@ -23,7 +22,6 @@ use crate::structure::{Contacts, Structure, count};
 use crate::timetable::{Event, NodeClock, Timetable};
 use crate::{AnalysisError, Matrix, Method, Radius, Unwatched, Verdict, Watch};
 
-pub use error::AdmittanceError;
 pub use low_frequency::{Estimate, LowFrequencyFit};
 pub use response::{AdmittancePoint, FrequencyResponse, ideal};
 
@@ -242,6 +240,19 @@ fn closed_contacts(scene: &Scene, peer: usize) -> (Contacts, Vec<String>) {
         notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
     }
     (Contacts { touching, at_wall: false }, notes)
+}
+
+/// Why there is no admittance.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages describe the variants")]
+pub enum AdmittanceError {
+    #[error("no peer in place {peer}: expected one of the {peers} peers of the scene, counted from 0")]
+    NoSuchPeer { peer: usize, peers: usize },
+    #[error("{hz} Hz: expected a frequency above 0 and at most {highest} Hz, half the rate of the peer's ticks")]
+    Frequency { hz: f64, highest: f64 },
+    /// The scene cannot be analysed.
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
 }
 
 #[cfg(test)]

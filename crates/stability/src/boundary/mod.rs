@@ -27,7 +27,7 @@ pub struct BoundaryOptions {
     pub samples: usize,
     /// How closely each crossing is found, in the unit of the key; above zero.
     pub tolerance: f64,
-    /// The search ends when it has looked at so many values; see [`Boundary::is_settled`]. Default: 100,000.
+    /// The search ends when it has looked at this number of values; see [`Boundary::is_settled`]. Default: 100,000.
     pub most: usize,
 }
 
@@ -228,7 +228,7 @@ impl Boundary {
         let gaps = || known.windows(2).map(|pair| pair[1].0 - pair[0].0);
         let mut marginal: Vec<Stretch> = Vec::new();
         let mut crossings: Vec<Crossing> = Vec::new();
-        // The verdict on this side of the line, and where it was seen last; what is marginal waits until it is known how wide it is.
+        // The verdict on this side of the line, and where it was seen last; a marginal span waits until its width is known.
         let first = known.first().map_or(Verdict::Marginal, |(_, cell)| cell.radius.verdict());
         let mut place = 0;
         let mut before: Option<(f64, Verdict)> = None;

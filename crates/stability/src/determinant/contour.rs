@@ -13,7 +13,7 @@ use super::DelayedLoop;
 use super::point::Point;
 use crate::Watch;
 
-/// The most points that one count may cost, and that many more for each step of delay. A root that asks for more counts as too near.
+/// The most points that one count may cost, and as many more for each step of delay. A root that asks for more counts as too near.
 const POINTS: u64 = 10_000;
 const POINTS_PER_STEP: u64 = 60;
 

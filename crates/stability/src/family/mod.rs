@@ -27,7 +27,7 @@ use crate::{Radius, Unwatched, Watch, has_chance};
 use leaves::Probe;
 use prepared::Prepared;
 
-/// At most so many peers are kept in scenes that have been read for values of a key that is not learned.
+/// The most peers kept in scenes that have been read for values of a key that is not learned.
 const MOST_KEPT: usize = 50_000;
 
 /// A scene with one or two keys left open.

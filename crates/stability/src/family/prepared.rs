@@ -5,7 +5,7 @@ use cohaptic_scene::Scene;
 use super::criterion::Cell;
 use super::leaves::{Leaf, Probe, learn};
 use crate::mean_square::Followed;
-use crate::scene_radius::{RadiusScratch, SceneRadius, scene_radii};
+use crate::scene_radius::{RadiusScratch, SceneRadius, scene_radii, worse};
 use crate::{AnalysisError, Limits, Radius, Watch, has_chance, mean_square_watched};
 
 /// A scene with learned keys.
@@ -92,16 +92,7 @@ impl Prepared {
     /// The largest radius of all combinations of contacts.
     pub(super) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut [RadiusScratch]) -> Radius {
         let radii = self.radii.iter().zip(scratch).map(|(radius, scratch)| radius.radius::<BOUND>(scene, scratch));
-        let worst = |one: Radius, other: Radius| {
-            if BOUND {
-                one.or(other)
-            } else if other.value > one.value || other.value.is_nan() {
-                other
-            } else {
-                one
-            }
-        };
-        radii.reduce(worst).unwrap_or(Radius { value: 0.0, error: 0.0 })
+        radii.reduce(worse::<BOUND>).unwrap_or(Radius { value: 0.0, error: 0.0 })
     }
 }
 

@@ -57,7 +57,7 @@ pub enum MapError {
 }
 
 impl Grid {
-    /// That many nodes along the first key, and along the second.
+    /// A grid with these numbers of nodes along the first key, and along the second.
     ///
     /// # Errors
     ///
@@ -109,7 +109,7 @@ impl Map {
     /// how many there are.
     ///
     /// `done` is called after each row, in no particular order, with its number; `stop` is asked before each row and within long ones: if it answers
-    /// `true`, what is left is not computed and the rows that are not finished stay empty.
+    /// `true`, the rest is not computed and the rows that are not finished stay empty.
     ///
     /// # Errors
     ///
@@ -197,8 +197,8 @@ impl Map {
         contour::contour(self, false)
     }
 
-    /// The stable region: closed polylines along its edge and the edge of the map, anticlockwise around what is stable and clockwise around what is
-    /// not, to be filled by either rule.
+    /// The stable region: closed polylines along its edge and the edge of the map, anticlockwise around stable cells and clockwise around the
+    /// others, to be filled by either rule.
     #[must_use]
     pub fn regions(&self) -> Vec<Polyline> {
         contour::contour(self, true)

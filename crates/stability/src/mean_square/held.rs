@@ -9,7 +9,7 @@
 use super::arrivals::Outcome;
 use crate::{Matrix, Radius, spectrum};
 
-/// The probability, per frame in the long run, that nothing arrives on a link whose chain has that many states, given what may happen in a frame.
+/// The probability, per frame in the long run, that nothing arrives on a link whose chain has this number of states, given what may happen in a frame.
 pub(crate) fn staying(states: usize, frame: &[Vec<Outcome>]) -> Radius {
     let mut stay = Matrix::identity(states);
     let mut roundings = 0;

@@ -79,7 +79,7 @@ impl MeanSquareMethod {
     }
 }
 
-/// What is known about the second moment of a scene.
+/// The result of the analysis of the second moment of a scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MeanSquare {
     /// By what a frame multiplies the second moment of the relative motion, in the long run: below 1 the scene is stable in the mean square.
@@ -119,7 +119,7 @@ pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
     mean_square_within(scene, MOST_UNKNOWNS)
 }
 
-/// [`mean_square`], refused if it takes more than that many unknowns; of many joint states, 2^17 unknowns take seconds and 2^20 minutes.
+/// [`mean_square`], refused if it takes more than this number of unknowns; of many joint states, 2^17 unknowns take seconds and 2^20 minutes.
 ///
 /// # Errors
 ///
@@ -277,7 +277,7 @@ fn hazards(
     Ok(Some((hazards, law)))
 }
 
-/// What was found of what acts, and of what is held without acting.
+/// The radii of the moments that act, and of those that are held without acting.
 #[derive(Clone, Copy, Debug)]
 struct Found {
     radius: Radius,
@@ -302,7 +302,7 @@ impl Found {
     }
 }
 
-/// A link on which nothing ever arrives: what is held stays for certain.
+/// A link on which nothing ever arrives: a held sample stays for certain.
 const SILENT: Radius = Radius { value: 1.0, error: 0.0 };
 
 /// When the samples of equal peers over equal links are sent and may arrive.

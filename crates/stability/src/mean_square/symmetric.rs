@@ -71,7 +71,7 @@ struct Moment {
 }
 
 impl Symmetric {
-    /// The frame of that many peers like the only node of `lifted`, whose timetable has no deliveries: those are in `hazards`.
+    /// The frame of this number of peers like the only node of `lifted`, whose timetable has no deliveries: those are in `hazards`.
     pub(crate) fn new(peers: usize, lifted: &Lifted<'_>, hazards: &Hazards) -> Self {
         let node = &lifted.nodes[0];
         let scale = Scale { time: lifted.time, compliance: node.compliance(lifted.time) };

@@ -15,7 +15,6 @@ mod timing;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use cohaptic_peer::wire::datagram_len;
 use cohaptic_scene::Scene;
 use cohaptic_units::Bytes;
 use cohaptic_wan::{AccessLine, LinkConfig, Network, NetworkConfig, NodeId, PacketInfo};
@@ -36,7 +35,7 @@ pub(crate) struct NominalNetwork {
     /// The different timings, each used.
     timings: Vec<LinkTiming>,
     places: Places,
-    /// What is nominal, in words.
+    /// The nominal parts, in words.
     pub(crate) notes: Vec<String>,
 }
 
@@ -64,7 +63,10 @@ impl NominalNetwork {
     ///
     /// [`AnalysisError`] if what becomes of samples never repeats: a queue that is offered more than it carries, periods that do not meet.
     pub(crate) fn of(scene: &Scene) -> Result<Self, AnalysisError> {
-        let size = Bytes::new(datagram_len(scene.axes.count()) as u64);
+        if scene.coordination.send_when.is_some() {
+            return Err(AnalysisError::DeadBands);
+        }
+        let size = Bytes::new(scene.sample_kind().datagram_len(scene.axes.count()) as u64);
         let access = |model: Option<&cohaptic_wan::LinkModel>| model.map(|model| Nominal::of(model, size));
         let lines = Lines {
             size,

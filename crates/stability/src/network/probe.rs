@@ -22,7 +22,7 @@ const FIRST_LOOK: u64 = 256;
 const PENDING: u64 = u64::MAX;
 const LOST: u64 = u64::MAX - 1;
 
-/// A network and those who send through it.
+/// A network and its senders.
 pub(crate) struct Probe {
     network: Network<()>,
     nodes: usize,
@@ -34,7 +34,6 @@ pub(crate) struct Probe {
     taken: Vec<Vec<u64>>,
 }
 
-/// A line with a rate.
 #[derive(Clone, Debug)]
 pub(crate) struct RatedLine {
     pub(crate) name: String,

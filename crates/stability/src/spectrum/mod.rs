@@ -28,7 +28,7 @@ use triangle::{Triangle, precise};
 const OWN: usize = 64;
 
 /// The backward error of reduction and iteration as a multiple of n·ε·|A|, |A| Frobenius'. The proven constants are larger (Higham 2002, Section 19.3,
-/// gives a multiple of n² for n reflections of length n, all errors pointing the same way); what is seen is below 1.
+/// gives a multiple of n² for n reflections of length n, all errors pointing the same way); errors that were seen are below 1.
 const BACKWARD_ERROR: f64 = 4.0;
 
 /// Runs an expression with the matrix copied to an array of its size, if it is small; `None` if it is not.
@@ -52,7 +52,7 @@ macro_rules! on_the_stack {
 
 /// Room for the computations, to be used again: radii of small matrices never allocate, those of larger ones only when the size changes.
 ///
-/// What is computed does not depend on what was computed before.
+/// A result does not depend on earlier ones.
 #[derive(Debug, Default)]
 pub struct Workspace {
     eigenvalues: Vec<Complex64>,
@@ -271,7 +271,7 @@ impl Workspace {
         }
         let mut large = self.large.take().filter(|large| large.size() == size).unwrap_or_else(|| Large::new(size));
         if !large.eigenvalues(matrix, |value| list.push(value)) {
-            // Neither iteration has converged, which was never seen. What is not known is not a number.
+            // Neither iteration has converged, which was never seen. An unknown value is not a number.
             list.clear();
             list.resize(size, Complex64::new(f64::NAN, f64::NAN));
         }

@@ -28,7 +28,6 @@ pub(super) fn cholesky(symmetric: &Matrix) -> Option<Matrix> {
     Some(factor)
 }
 
-/// The inverse of an upper triangle.
 pub(super) fn triangle_inverse(upper: &Matrix) -> Matrix {
     let size = upper.rows();
     let mut inverse = Matrix::zeros(size, size);

@@ -1,4 +1,4 @@
-//! A quadratic certificate, and the check that trusts nobody who found it.
+//! A quadratic certificate, and a check that does not depend on how it was found.
 //!
 //! Shapes P_v > 0, one per node, with AₑᵀP_to Aₑ <= ρ²·P_from for every edge that lies on a cycle, make V(x) = xᵀP_v x shrink by ρ² or more in every
 //! step: no allowed product grows faster than ρ (Philippe, Essick, Dullerud & Jungers 2016).

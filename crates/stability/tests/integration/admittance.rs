@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::anchors::scene;
 
-/// The paper's scene of that many peers of whom one touches.
+/// The paper's scene of this number of peers of whom one touches.
 fn one_touches(count: usize, strategy: &str) -> Scene {
     one_touches_with(count, strategy, &[])
 }

@@ -50,7 +50,7 @@ pub(super) fn round_between(low: u64, high: u64, digits: u32, step: u64) -> Vec<
     std::iter::successors(next_above(low, digits, step), |value| next_above(*value, digits, step)).take_while(|value| *value < high).collect()
 }
 
-/// Whether the number has at most that many significant digits, counted in steps.
+/// Whether the number has at most this number of significant digits, counted in steps.
 pub(super) fn is_round(value: u64, digits: u32, step: u64) -> bool {
     let count = value / step;
     value.is_multiple_of(step) && count.is_multiple_of(unit(count, digits))

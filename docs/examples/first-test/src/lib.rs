@@ -1,6 +1,6 @@
-use cohaptic_testkit::proptest::prelude::*;
-use cohaptic_testkit::strategies::any_network;
-use cohaptic_testkit::{Testbed, UdpSocket, time};
+#[cfg(test)]
+use cohaptic_testkit::{Testbed, strategies::any_network};
+use cohaptic_testkit::{UdpSocket, proptest::proptest, time};
 
 pub async fn ask(socket: &UdpSocket, question: u8) -> u8 {
     let mut answer = [0];

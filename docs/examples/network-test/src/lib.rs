@@ -1,8 +1,6 @@
 use std::time::Duration;
 
-use cohaptic_testkit::proptest::prelude::*;
-use cohaptic_testkit::strategies::{ImpairedNetwork, any_network};
-use cohaptic_testkit::{Bed, Testbed, UdpSocket, time};
+use cohaptic_testkit::{UdpSocket, time};
 
 /// An answer is two bytes: the question that it belongs to, and the answer itself.
 pub async fn ask(socket: &UdpSocket, question: u8) -> u8 {
@@ -18,33 +16,42 @@ pub async fn ask(socket: &UdpSocket, question: u8) -> u8 {
     }
 }
 
-pub async fn ten_questions(bed: Bed) {
-    let server = bed.host("server").bind("0.0.0.0:7").unwrap();
-    bed.host("server").spawn(async move {
-        let mut question = [0];
-        while let Ok((_, from)) = server.recv_from(&mut question).await {
-            server.send_to(&[question[0], question[0] + 100], from).await.unwrap();
-        }
-    });
-    let client = bed.host("client").bind("0.0.0.0:0").unwrap();
-    client.connect("server:7").await.unwrap();
-    for question in 0..10 {
-        assert_eq!(ask(&client, question).await, question + 100);
-    }
-}
+#[cfg(test)]
+mod tests {
+    use cohaptic_testkit::proptest::prelude::*;
+    use cohaptic_testkit::strategies::{ImpairedNetwork, any_network};
+    use cohaptic_testkit::{Bed, Testbed};
 
-proptest! {
+    use super::ask;
+
+    async fn ten_questions(bed: Bed) {
+        let server = bed.host("server").bind("0.0.0.0:7").unwrap();
+        bed.host("server").spawn(async move {
+            let mut question = [0];
+            while let Ok((_, from)) = server.recv_from(&mut question).await {
+                server.send_to(&[question[0], question[0] + 100], from).await.unwrap();
+            }
+        });
+        let client = bed.host("client").bind("0.0.0.0:0").unwrap();
+        client.connect("server:7").await.unwrap();
+        for question in 0..10 {
+            assert_eq!(ask(&client, question).await, question + 100);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn each_question_has_its_own_answer(network in any_network(2)) {
+            Testbed::new(["client", "server"]).network(&network).run(ten_questions);
+        }
+    }
+
     #[test]
-    fn each_question_has_its_own_answer(network in any_network(2)) {
+    fn late_questions() {
+        let network = ImpairedNetwork::words(
+            "2 hosts
+             a -> b: delay 210ms",
+        );
         Testbed::new(["client", "server"]).network(&network).run(ten_questions);
     }
-}
-
-#[test]
-fn late_answers() {
-    let network = ImpairedNetwork::words(
-        "2 hosts
-         b -> a: delay 210ms",
-    );
-    Testbed::new(["client", "server"]).network(&network).run(ten_questions);
 }

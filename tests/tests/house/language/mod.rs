@@ -2,25 +2,21 @@
 //!
 //! A finding names file, line, the words and the reason. The rules are in `rules`; where a phrase is right all the same, `RIGHT` there lists it.
 
-mod markdown;
+pub(crate) mod markdown;
 mod rules;
 mod source;
 
+use std::collections::BTreeMap;
 use std::fs;
 
 use crate::{files, name, root};
 use markdown::{Block, Kind, blocks};
 use rules::{Finding, of_phrases, of_sentences};
 
-/// Pages that programs write.
-fn is_written_by_a_program(page: &str) -> bool {
-    page.ends_with("-speed.md") || page.starts_with("docs/reference-") || ["docs/measured.md", "docs/soak.md"].contains(&page)
-}
-
-/// Pages of the project, apart from those that programs write and the list of changes.
+/// Pages of the project, also those that programs write, but for the list of changes.
 fn pages() -> Vec<(String, String)> {
     let all = files(&root(), "md").into_iter().map(|path| (name(&path), fs::read_to_string(path).unwrap()));
-    all.filter(|(page, _)| !is_written_by_a_program(page) && page != "CHANGELOG.md").collect()
+    all.filter(|(page, _)| page != "CHANGELOG.md").collect()
 }
 
 fn report(mut findings: Vec<Finding>) {
@@ -53,16 +49,35 @@ fn sentences_of_a_page_have_25_words_on_average() {
     assert!(long.is_empty(), "the sentences of these pages have more than {} words on average:\n{}", rules::MEAN_WORDS, long.join("\n"));
 }
 
+/// The texts of all sources but tests, each with the name of its file.
+fn sources() -> Vec<(String, source::Parts)> {
+    let all = ["crates", "benches"].into_iter().flat_map(|folder| files(&root().join(folder), "rs")).map(|path| (name(&path), path));
+    let is_shown = |file: &str| file.contains("/src/") && !file.contains("/tests/") && !file.ends_with("/tests.rs");
+    let shown: Vec<_> = all.filter(|(file, _)| is_shown(file)).collect();
+    assert!(shown.len() > 500, "{}", shown.len());
+    shown.into_iter().map(|(file, path)| (file, source::parts(&fs::read_to_string(path).unwrap()))).collect()
+}
+
+#[test]
+fn sentences_of_the_comments_of_a_package_have_25_words_on_average() {
+    let mut all: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (file, parts) in sources() {
+        let package = file.split("/src/").next().unwrap().to_owned();
+        let prose = parts.comments.iter().flatten().filter(|block| block.kind == Kind::Prose);
+        all.entry(package).or_default().extend(prose.flat_map(rules::sentence_lengths));
+    }
+    let long = |(package, lengths): (String, Vec<usize>)| {
+        let words: usize = lengths.iter().sum();
+        (words > rules::MEAN_WORDS * lengths.len()).then(|| format!("{package}: {words} words in {} sentences", lengths.len()))
+    };
+    let long: Vec<String> = all.into_iter().filter_map(long).collect();
+    assert!(long.is_empty(), "the sentences of these comments have more than {} words on average:\n{}", rules::MEAN_WORDS, long.join("\n"));
+}
+
 #[test]
 fn comments_and_messages_keep_to_the_language() {
     let mut findings = Vec::new();
-    let sources: Vec<_> =
-        ["crates", "benches"].into_iter().flat_map(|folder| files(&root().join(folder), "rs")).map(|path| (name(&path), path)).collect();
-    let is_shown = |file: &str| file.contains("/src/") && !file.contains("/tests/") && !file.ends_with("/tests.rs");
-    let shown: Vec<_> = sources.into_iter().filter(|(file, _)| is_shown(file)).collect();
-    assert!(shown.len() > 500, "{}", shown.len());
-    for (file, path) in shown {
-        let parts = source::parts(&fs::read_to_string(path).unwrap());
+    for (file, parts) in sources() {
         for comment in parts.comments {
             findings.extend(in_blocks(&file, &comment));
         }

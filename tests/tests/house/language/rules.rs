@@ -14,6 +14,7 @@ const COMPARE: &str = "two figures are compared \"with\" each other";
 /// Words that are not used, in any text.
 const PHRASES: &[(&[&str], &str)] = &[
     (&["so", "many"], "say which number: \"this number of\", \"at most\""),
+    (&["that", "many"], "say which number: \"this number of\""),
     (&["so", "much"], "say which quantity"),
     (&["all", "that", "there", "is"], "name it, or say \"everything\""),
     (&["set", "beside"], COMPARE),
@@ -232,6 +233,7 @@ mod tests {
         let broken = [
             ("A run keeps\nwhat is held.", "2: run keeps what is held."),
             ("It takes so\nmany packets.", "1: it takes so many packets."),
+            ("A run of that many ticks.", "1: run of that many ticks."),
             ("the same, with a tail", "1: the same, with a tail"),
             ("Who sends, waits.", "1: Who sends, waits."),
             ("It goes to whoever calls.", "1: goes to whoever calls."),

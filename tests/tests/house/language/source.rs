@@ -10,10 +10,12 @@ pub(crate) struct Parts {
     pub(crate) messages: Vec<Block>,
 }
 
-/// Reads a source file up to its tests.
+/// Reads a source file up to its tests. A line `mod tests;` is no test: those stand in another file.
 pub(crate) fn parts(text: &str) -> Parts {
-    let text = text.split("#[cfg(test)]\nmod ").next().unwrap();
-    Parts { comments: comments(text), messages: messages(text) }
+    const TESTS: &str = "#[cfg(test)]\nmod ";
+    let is_inline = |place: &usize| text[place + TESTS.len()..].lines().next().is_some_and(|line| line.ends_with('{'));
+    let end = text.match_indices(TESTS).map(|(place, _)| place).find(is_inline).unwrap_or(text.len());
+    Parts { comments: comments(&text[..end]), messages: messages(&text[..end]) }
 }
 
 /// The text of a comment that has its line alone, and which kind of comment it is.
@@ -107,10 +109,10 @@ fn message(line: usize, text: &str) -> Option<Block> {
 
 #[test]
 fn comments_and_messages_are_found_with_their_lines() {
-    let source = "//! One\n//! two.\n\nfn f<'a>(x: &'a str) { // aside\n    let quote = ['\"', '\\'', 'r'];\n    /// Three\n    say(\"a b \\\"c\\\" d\",\n r#\"e f\n g\"#, \"x y\");\n}\n#[cfg(test)]\nmod tests {\n    // not read\n}\n";
+    let source = "//! One\n//! two.\n#[cfg(test)]\nmod others;\nfn f<'a>(x: &'a str) { // aside\n    let quote = ['\"', '\\'', 'r'];\n    /// Three\n    say(\"a b \\\"c\\\" d\",\n r#\"e f\n g\"#, \"x y\");\n}\n#[cfg(test)]\nmod tests {\n    // not read\n}\n";
     let found = parts(source);
     let comments: Vec<(usize, String)> = found.comments.iter().flatten().map(|block| (block.lines[0].0, block.text())).collect();
-    assert_eq!(comments, [(1, "One two.".to_owned()), (6, "Three".to_owned())]);
+    assert_eq!(comments, [(1, "One two.".to_owned()), (7, "Three".to_owned())]);
     let messages: Vec<(usize, String)> = found.messages.iter().map(|block| (block.lines[0].0, block.text())).collect();
-    assert_eq!(messages, [(7, "a b 'c' d".to_owned()), (8, "e f g".to_owned())]);
+    assert_eq!(messages, [(8, "a b 'c' d".to_owned()), (9, "e f g".to_owned())]);
 }

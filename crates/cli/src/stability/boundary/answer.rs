@@ -68,7 +68,6 @@ pub(super) fn describe(order: &Order, found: &Boundary) -> String {
     text
 }
 
-/// One crossing.
 pub(super) fn crossing_in_words(range: &KeyRange, crossing: &Crossing) -> String {
     format!("{} from {} (before: {})", crossing.to.word(), range.text(crossing.value), crossing.from.word())
 }

@@ -30,7 +30,6 @@ struct Order {
     families: Vec<Family>,
 }
 
-/// A map of one variant.
 struct VariantMap {
     name: String,
     overrides: Vec<String>,

@@ -60,15 +60,8 @@ fn on_graph(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failur
     let watch = AnalysisWatch::new();
     let found = analyse_on_watched(scene, &graph, &watch);
     watch.clear();
-    let mut analysis = found.map_err(|error| match error {
-        GraphError::Analysis(AnalysisError::Stopped) => ended(),
-        error @ (GraphError::Analysis(_)
-        | GraphError::Unequal { .. }
-        | GraphError::Weight { .. }
-        | GraphError::Alone { .. }
-        | GraphError::Irregular
-        | GraphError::NotLinear) => refused(error.to_string()),
-    })?;
+    let is_stopped = |error: &GraphError| matches!(error, GraphError::Analysis(AnalysisError::Stopped));
+    let mut analysis = found.map_err(|error| if is_stopped(&error) { ended() } else { refused(error.to_string()) })?;
     if has_chance(scene) {
         analysis.notes.push(NOMINAL.to_owned());
     }

@@ -10,7 +10,7 @@ use super::ended;
 use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::{LinksName, PointArguments};
 use crate::document_schema::document;
-use crate::failure::Failure;
+use crate::failure::{Failure, not_analysed};
 
 /// The worst case, if it is asked for.
 pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<SceneWorstCase>, Failure> {
@@ -29,17 +29,9 @@ pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Resu
     let watch = AnalysisWatch::new();
     let found = worst_case_watched(scene, &patterns, &effort, &watch);
     watch.clear();
-    found.map(Some).map_err(|error| match error {
-        SceneWorstCaseError::Analysis(AnalysisError::Stopped) => ended(),
-        error @ (SceneWorstCaseError::Analysis(_)
-        | SceneWorstCaseError::Ages { .. }
-        | SceneWorstCaseError::Automaton(_)
-        | SceneWorstCaseError::Delays { .. }
-        | SceneWorstCaseError::Overtaking { .. }
-        | SceneWorstCaseError::Frame { .. }
-        | SceneWorstCaseError::Pattern { .. }
-        | SceneWorstCaseError::TooMany { .. }
-        | SceneWorstCaseError::TooLarge { .. }) => Failure::Input(format!("{}: {error}", crate::input::named(path).display())),
+    found.map(Some).map_err(|error| {
+        let is_stopped = matches!(error, SceneWorstCaseError::Analysis(AnalysisError::Stopped));
+        if is_stopped { ended() } else { not_analysed(path, &error) }
     })
 }
 

@@ -1,4 +1,4 @@
-//! The bound on what silence, coming back and coming back elsewhere do to a force: `docs/model.md`.
+//! The bound on what silence, coming back and coming back elsewhere do to a force: `docs/live.md`.
 
 use std::collections::BTreeMap;
 

@@ -3,13 +3,13 @@
 use std::fmt::Write as _;
 
 use super::help::{Entry, Help};
-use super::{WRITTEN, prose, table};
+use super::{WRITTEN, entry, prose};
 
 /// What as many commands take with one meaning is explained once.
 const SHARED: usize = 2;
 
 const INTRODUCTION: &str = "\
-Every command with its arguments, options and examples, as `--help` prints them. [commands.md](commands.md) says which command answers which question.
+Every command with its arguments and options, as `--help` prints them, which also has examples. [commands.md](commands.md) says which command answers which question.
 
 Every command has `-h, --help`, and the program has `--version`. An option without a default is off, or is not applied, unless it is given.
 ";
@@ -23,9 +23,14 @@ fn all(command: &[String]) -> Vec<(String, Help)> {
     help.parts.iter().flat_map(|part| all(&[command, std::slice::from_ref(part)].concat())).collect()
 }
 
-fn row(entry: &Entry) -> Vec<String> {
-    let default = if entry.default.is_empty() { String::new() } else { prose(&entry.default) };
-    vec![format!("`{}`", entry.name.replace('|', "\\|")), default, prose(&entry.about)]
+fn row(of: &Entry) -> String {
+    let default = if of.default.is_empty() { String::new() } else { format!("default {}", prose(&of.default)) };
+    entry(&format!("`{}`", of.name), &[&default], &prose(&of.about))
+}
+
+/// Entries with an empty line behind them; nothing where there are none.
+fn list(of: &[&Entry]) -> String {
+    if of.is_empty() { String::new() } else { of.iter().map(|entry| row(entry)).collect::<String>() + "\n" }
 }
 
 /// The name of an option without its value.
@@ -44,26 +49,16 @@ pub(super) fn page() -> String {
         }
     }
     let mut page = format!("# Reference: commands\n\n{WRITTEN}\n\n{INTRODUCTION}\n## In several commands\n\n");
-    let rows: Vec<Vec<String>> = shared.iter().map(|entry| row(entry)).collect();
-    page += &table(&["argument or option", "default", "meaning"], &rows);
+    page += &list(&shared);
     for (name, help) in &all {
-        let _ = write!(page, "## {name}\n\n{}.\n\n```text\n", help.about);
-        for line in &help.usage {
-            let _ = writeln!(page, "{line}");
-        }
-        page += "```\n\n";
+        let usage: Vec<String> = help.usage.iter().map(|line| format!("`{line}`")).collect();
+        let _ = write!(page, "## {name}\n\n{}. {}\n\n", help.about, usage.join(", "));
         let (common, own): (Vec<&Entry>, Vec<&Entry>) = help.entries.iter().partition(|entry| shared.contains(entry));
-        let rows: Vec<Vec<String>> = own.into_iter().map(row).collect();
-        page += &table(&["argument or option", "default", "meaning"], &rows);
+        page += &list(&own);
         if !common.is_empty() {
             let names: Vec<String> = common.into_iter().map(option).collect();
             let _ = write!(page, "[Also](#in-several-commands): {}.\n\n", names.join(", "));
         }
-        page += "```text\n";
-        for line in &help.examples {
-            let _ = writeln!(page, "{line}");
-        }
-        page += "```\n\n";
     }
     page.trim_end().to_owned() + "\n"
 }

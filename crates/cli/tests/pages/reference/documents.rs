@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::{WRITTEN, table};
+use super::{WRITTEN, entry};
 use crate::folder::Folder;
 
 const INTRODUCTION: &str = "\
-The documents of `--json`, command by command. Every document begins with `schema`, its kind, and `version` ([commands.md](commands.md#json)); the tables leave these two out. Keys end in their
-unit. A number that is not finite is `null`. Brackets, `links[]`, mark a list; `NAME` stands for any name. A row with a link has all keys of another table.
+The documents of `--json`, command by command. Every document begins with `schema`, its kind, and `version` ([commands.md](commands.md#json)); they are left out here. Keys end in their
+unit. A number that is not finite is `null`. Brackets, `links[]`, mark a list; `NAME` stands for any name. An entry with a link has all keys of another part.
 ";
 
 /// A table of keys: each row has keys that are explained together, separated by commas, and what they are.
@@ -66,7 +66,7 @@ const PARTS: [Part; 7] = [
             ("verdict, spectral_radius, error_bound", "of the linear scene that is analysed"),
             ("warning", "what the numbers must not be taken for where a verdict is not `stable`, else `null`"),
             ("object_mass_kg", "mass of the whole object"),
-            ("notes", "what is left out or taken as closed"),
+            ("notes", "parts that are left out or taken as closed"),
         ],
     },
     Part {
@@ -130,7 +130,7 @@ const DOCUMENTS: [Document; 21] = [
             ("scenes[].expectations[].expectation", "`stable`, `discrepancy`, `position`, `travel`, `loss` or `delay`"),
             (
                 "scenes[].expectations[].name, scenes[].expectations[].expected, scenes[].expectations[].found",
-                "what is compared, what was expected and what came out, in words",
+                "the quantity, the expected value and the outcome, in words",
             ),
             ("scenes[].expectations[].passed", "whether that is as expected"),
             ("scenes[].expectations[].unit", "of the next three: `m`, `s` or empty"),
@@ -146,7 +146,7 @@ const DOCUMENTS: [Document; 21] = [
         lines: &["cohaptic explain scenarios/network/ideal.toml --json"],
         rows: &[
             ("title", "of the scene"),
-            ("models[].part, models[].model, models[].reason", "what is modelled, as what, and why"),
+            ("models[].part, models[].model, models[].reason", "a part of the scene, its model, and the reason"),
             ("left_out", "list of texts"),
             ("dimensions.plant", "positions and velocities of devices and copies"),
             ("dimensions.held", "numbers in the samples held"),
@@ -174,7 +174,7 @@ const DOCUMENTS: [Document; 21] = [
                 "combinations[].verdict, combinations[].judged, combinations[].radius, combinations[].error_bound, combinations[].reason",
                 "with `--verdicts`: [verdicts](campaign.md#verdicts)",
             ),
-            ("notes", "what verdicts leave out, and what is not drawn"),
+            ("notes", "parts that verdicts leave out, and pictures that are not drawn"),
         ],
     },
     Document {
@@ -254,7 +254,7 @@ const DOCUMENTS: [Document; 21] = [
             "cohaptic stability map scenarios/network/loss-independent.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --grid 2x2 --curve object.mass=1 --out lossy --json",
         ],
         rows: &[
-            ("title, files, notes", "of the scene; what was written; what is left out"),
+            ("title, files, notes", "of the scene; the files written; the parts left out"),
             ("x_key, x_unit, x, y_key, y_unit, y", "the two keys and their values"),
             ("criterion", "`spectral-radius` or `mean-square`"),
             ("spectral_radius, mean_square_radius", "one of both: a row for each y; `null` where it is not finite"),
@@ -283,7 +283,7 @@ const DOCUMENTS: [Document; 21] = [
             ),
             ("settled", "`false` if it ended after 100000 values"),
             ("nominal", "at how many values chance is left out"),
-            ("notes, files", "what is left out; what was written"),
+            ("notes, files", "the parts left out; the files written"),
         ],
     },
     Document {
@@ -499,7 +499,7 @@ const DOCUMENTS: [Document; 21] = [
             ("place", "where a text is refused, else `null`"),
             ("place.file, place.argument", "the file (`null` for an option), and the argument, such as `--set link.dlay=8ms` (`null` for a file)"),
             ("place.line, place.column, place.key", "both from 1; the dotted path or `null`"),
-            ("place.fault", "what is wrong and what was expected, in one line"),
+            ("place.fault", "the fault and the expected form, in one line"),
         ],
     },
 ];
@@ -537,7 +537,7 @@ fn shown(keys: &str) -> String {
 }
 
 fn rows(of: &[(&str, &str)]) -> String {
-    table(&["key", "value"], &of.iter().map(|(keys, about)| vec![shown(keys), (*about).to_owned()]).collect::<Vec<_>>())
+    of.iter().map(|(keys, about)| entry(&shown(keys), &[], about)).collect::<String>() + "\n"
 }
 
 /// The whole page.

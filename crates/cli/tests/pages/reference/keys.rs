@@ -4,7 +4,7 @@ use cohaptic_linkfile::schema::link::{LINK_TABLE, MODULATOR};
 use cohaptic_linkfile::schema::{Form, Key, Need, Table, Words};
 use cohaptic_scene::schema::FileSchema;
 
-use super::{WRITTEN, prose, table};
+use super::{WRITTEN, entry, prose};
 
 /// Tables with fewer keys are written out wherever they stand.
 const SHORT: usize = 3;
@@ -13,7 +13,7 @@ const OF_FILES: &str = "\
 Every key of [scenes](scenes.md), [relay files](relay.md) and [router files](router.md). Links have a [page of their own](reference-link-keys.md). Values with units are explained in
 [scenes.md](scenes.md#how-values-are-written).
 
-A key with points, `device.mass`, stands in a table: `device = { mass = 0.1 }`. Brackets, `position[]`, mark a list. A *required* key must be given. One that is *required for all* must be
+Behind a key stand its form, and its default or whether it must be given. A key with points, `device.mass`, stands in a table: `device = { mass = 0.1 }`. Brackets, `position[]`, mark a list. A *required* key must be given. One that is *required for all* must be
 given there or in the table that holds for all, such as `[peer]`. Any other key without a default may be left out.
 ";
 const OF_LINKS: &str = "\
@@ -25,7 +25,13 @@ A link is often laid over another one: `[[links]]` over `[link]`, a change over 
 away, as `\"0s\"` does for `jitter`; `queue` and `overhead` go with `rate`.
 ";
 
-const HEADS: [&str; 4] = ["key", "form", "default", "meaning"];
+/// A key: how it is written, its form, whether it is needed, and its meaning.
+type Row = [String; 4];
+
+/// A list of keys with an empty line behind it.
+fn list(rows: &[Row]) -> String {
+    rows.iter().map(|[key, form, need, meaning]| entry(key, &[form, need], meaning)).collect::<String>() + "\n"
+}
 
 /// A key as far as two tables can share it.
 type Shape = (&'static str, &'static str, &'static str);
@@ -126,7 +132,7 @@ impl Reference {
         self.anchor = anchor(heading);
         let mut rows = Vec::new();
         self.table("", heading, table_of, &mut rows);
-        let mut text = format!("{marks} {heading}\n\n{}", table(&HEADS, &rows));
+        let mut text = format!("{marks} {heading}\n\n{}", list(&rows));
         let later = std::mem::take(&mut self.later);
         let puts_off = std::mem::replace(&mut self.puts_off, false);
         for group in later.chunk_by(|one, other| one.0 == other.0) {
@@ -136,7 +142,7 @@ impl Reference {
             for (_, list, inner) in group {
                 self.table(if list.is_empty() { "" } else { "[]." }, &format!("`{name}`"), inner, &mut rows);
             }
-            text += &format!("{marks}# `{name}`\n\n{}", table(&HEADS, &rows));
+            text += &format!("{marks}# `{name}`\n\n{}", list(&rows));
         }
         self.puts_off = puts_off;
         text
@@ -149,12 +155,12 @@ impl Reference {
         self.table("", heading, table_of, &mut rows);
         match &rows[..] {
             [only] if only[1].is_empty() => format!(" {}.\n\n", only[3]),
-            _ => format!("\n\n{}", table(&HEADS, &rows)),
+            _ => format!("\n\n{}", list(&rows)),
         }
     }
 
     /// The rows of a table, or one that names another table with the same keys.
-    fn table(&mut self, prefix: &str, name: &str, table: &'static Table, rows: &mut Vec<Vec<String>>) {
+    fn table(&mut self, prefix: &str, name: &str, table: &'static Table, rows: &mut Vec<Row>) {
         let keys = shape(table);
         let mut own: Vec<&'static Key> = table.keys().collect();
         let within = |one: &[Shape], other: &[Shape]| one.iter().all(|key| other.contains(key));
@@ -167,7 +173,7 @@ impl Reference {
             let page = if known.page == self.page { "" } else { known.page };
             let place = if prefix.is_empty() { "…".to_owned() } else { format!("`{prefix}…`") };
             own.retain(|key| !known.keys.contains(&(key.name, key.about, key.form.unit())));
-            rows.push(vec![place, String::new(), String::new(), format!("All of [{}]({page}#{}){but}", known.name.replace('`', ""), known.anchor)]);
+            rows.push([place, String::new(), String::new(), format!("All of [{}]({page}#{}){but}", known.name.replace('`', ""), known.anchor)]);
         } else if keys.len() >= SHORT || prefix.is_empty() {
             self.explained.push(Explained { keys, name: name.to_owned(), page: self.page, anchor: self.anchor.clone() });
         }
@@ -182,7 +188,7 @@ impl Reference {
         }
     }
 
-    fn key(&mut self, prefix: &str, key: &'static Key, rows: &mut Vec<Vec<String>>) {
+    fn key(&mut self, prefix: &str, key: &'static Key, rows: &mut Vec<Row>) {
         let path = format!("{prefix}{}", key.name);
         let mut words = Vec::new();
         let form = form(&key.form, &mut words);
@@ -190,7 +196,7 @@ impl Reference {
         let inner = tables(&key.form);
         let is_put_off = self.puts_off && prefix.is_empty() && !inner.is_empty();
         let written = if is_put_off { form.replace("table", &format!("[table](#{})", anchor(key.name))) } else { form };
-        rows.push(vec![format!("`{path}`"), written, need(key), prose(&format!("{}{meanings}", key.about))]);
+        rows.push([format!("`{path}`"), written, need(key), prose(&format!("{}{meanings}", key.about))]);
         for (list, inner) in inner {
             if is_put_off {
                 self.later.push((key.name.to_owned(), list, inner));
@@ -205,7 +211,7 @@ fn need(key: &Key) -> String {
     match key.need {
         Need::Required => "*required*".to_owned(),
         Need::RequiredSomewhere => "*required for all*".to_owned(),
-        Need::Default(default) => format!("`{default}`"),
+        Need::Default(default) => format!("default `{default}`"),
         Need::Optional => String::new(),
     }
 }
@@ -262,8 +268,8 @@ fn meanings(words: Words) -> Vec<String> {
 fn a_table_with_the_keys_of_another_one_names_it() {
     let pages = pages();
     let [files, links] = pages.each_ref().map(|(_, text)| text.as_str());
-    assert!(files.contains("\n### Scene `[[peers]]`\n\nOne peer each") && files.contains("| All of [Scene [peer]](#scene-peer) |"), "{files}");
+    assert!(files.contains("\n### Scene `[[peers]]`\n\nOne peer each") && files.contains("- …: All of [Scene [peer]](#scene-peer)\n"), "{files}");
     assert!(files.contains("All of [Keys of a link](reference-link-keys.md#keys-of-a-link)"), "{files}");
-    assert!(files.contains("| `stiffness` | number ≥ 0 [N/m] | *required* | Gain on the difference of positions, K_T |"), "{files}");
+    assert!(files.contains("- `stiffness` (number ≥ 0 [N/m]; *required*): Gain on the difference of positions, K_T\n"), "{files}");
     assert!(links.contains("\n### `jitter`\n") && links.contains("[table](#jitter)"), "{links}");
 }

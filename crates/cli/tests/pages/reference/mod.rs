@@ -34,30 +34,20 @@ fn assert_page(name: &str, text: &str) {
     );
 }
 
-/// A table of Markdown; nothing where there are no rows. Columns in which nothing stands are left out.
-fn table(heads: &[&str], rows: &[Vec<String>]) -> String {
-    let used: Vec<usize> = (0..heads.len()).filter(|&column| rows.iter().any(|row| !row[column].is_empty())).collect();
-    if rows.is_empty() {
-        return String::new();
-    }
-    let line = |cells: &mut dyn Iterator<Item = &str>| {
-        cells.fold("|".to_owned(), |line, cell| line + " " + cell + if cell.is_empty() { "|" } else { " |" }) + "\n"
-    };
-    let mut text = line(&mut used.iter().map(|&column| heads[column]));
-    text += &line(&mut used.iter().map(|_| "---"));
-    for row in rows {
-        text += &line(&mut used.iter().map(|&column| row[column].as_str()));
-    }
-    text + "\n"
+/// An entry of a list: a name, notes in brackets unless they are empty, and a meaning.
+fn entry(name: &str, notes: &[&str], meaning: &str) -> String {
+    let said: Vec<&str> = notes.iter().copied().filter(|note| !note.is_empty()).collect();
+    let brackets = if said.is_empty() { String::new() } else { format!(" ({})", said.join("; ")) };
+    format!("- {name}{brackets}: {meaning}\n")
 }
 
-/// Text of the program within a table: options as code, and nothing that Markdown takes for itself.
+/// Text of the program within a list: options as code, and nothing that Markdown takes for itself.
 fn prose(text: &str) -> String {
     let word = |word: &str| {
         let end = word.find(|letter: char| letter != '-' && !letter.is_ascii_alphanumeric()).unwrap_or(word.len());
         if word.starts_with("--") && end > 2 { format!("`{}`{}", &word[..end], &word[end..]) } else { word.to_owned() }
     };
-    text.split(' ').map(word).collect::<Vec<_>>().join(" ").replace('|', "\\|").replace('<', "&lt;").replace('*', "\\*")
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ").replace('<', "&lt;").replace('*', "\\*")
 }
 
 #[test]
@@ -78,8 +68,7 @@ fn the_pages_of_keys_are_the_catalogue() {
 }
 
 #[test]
-fn a_table_has_the_columns_that_say_something() {
-    let rows = [vec!["`a`".to_owned(), String::new(), prose("see --b, or a|b")], vec![String::new(), String::new(), "*".to_owned()]];
-    assert_eq!(table(&["key", "default", "meaning"], &rows), "| key | meaning |\n| --- | --- |\n| `a` | see `--b`, or a\\|b |\n| | * |\n\n");
-    assert_eq!(table(&["key"], &[]), "");
+fn an_entry_has_the_notes_that_say_something() {
+    assert_eq!(entry("`a`", &["", "default 1"], &prose("see --b, or a*b <c>")), "- `a` (default 1): see `--b`, or a\\*b &lt;c>\n");
+    assert_eq!(entry("`a`", &["", ""], "b"), "- `a`: b\n");
 }

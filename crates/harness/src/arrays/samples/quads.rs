@@ -35,7 +35,7 @@ pub(super) fn swap<const L: usize>(quads: &mut [Quad<L>], one: usize, other: &mu
     std::mem::swap(&mut quad[one % 4 + 4], &mut other.1);
 }
 
-/// The mean position and velocity of each run, of that many samples.
+/// The mean position and velocity of each run, of this number of samples.
 #[inline(always)]
 pub(super) fn mean<const L: usize>(quads: &[Quad<L>], count: f64) -> ([f64; L], [f64; L]) {
     let mut sums: Quad<L> = [[0.0; L]; 8];

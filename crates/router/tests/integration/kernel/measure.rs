@@ -1,4 +1,4 @@
-//! The figures of `docs/router-speed.md`: `cargo test --release -p cohaptic-router -- --ignored --nocapture --test-threads=1 measure`. They depend on the machine, so nothing is
+//! The figures of `docs/measured-router.md`: `cargo test --release -p cohaptic-router -- --ignored --nocapture --test-threads=1 measure`. They depend on the machine, so nothing is
 //! asked of them here.
 
 use std::net::SocketAddr;

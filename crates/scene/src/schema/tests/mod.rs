@@ -263,14 +263,14 @@ fn every_property_is_described() {
 fn the_reference_has_the_keys_of_the_catalogue() {
     let page = |name: &str| std::fs::read_to_string(root().join("docs").join(name)).unwrap();
     let links = page("reference-link-keys.md");
-    let of_links = links.split("\n## Keys of a link\n\n| key").nth(1).unwrap();
-    let rows: Vec<&str> = of_links.lines().skip(2).take_while(|line| line.starts_with('|')).filter_map(|line| line.split('`').nth(1)).collect();
-    assert_eq!(rows, cohaptic_linkfile::link::LINK_KEYS, "the table of the keys of a link");
+    let of_links = links.split("\n## Keys of a link\n\n").nth(1).unwrap();
+    let rows: Vec<&str> = of_links.lines().take_while(|line| line.starts_with("- `")).filter_map(|line| line.split('`').nth(1)).collect();
+    assert_eq!(rows, cohaptic_linkfile::link::LINK_KEYS, "the list of the keys of a link");
 
     let listed: BTreeSet<&str> = tables().values().flat_map(|(_, table)| table.keys().map(|key| key.name)).collect();
     let pages = links + &page("reference-keys.md");
     let mut named = BTreeSet::new();
-    for row in pages.lines().filter(|line| line.starts_with("| `")) {
+    for row in pages.lines().filter(|line| line.starts_with("- `")) {
         let path = row.split('`').nth(1).unwrap();
         for name in path.split('.').map(|name| name.trim_end_matches("[]")).filter(|name| !["", "…", "NAME"].contains(name)) {
             named.insert(name);

@@ -66,7 +66,7 @@ use crate::{AnalysisError, Part, PartKind, Unwatched, Watch};
 /// What the network may do.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Patterns {
-    /// At most so many samples in a row are lost on a link.
+    /// The most samples in a row that are lost on a link.
     pub losses_in_a_row: u32,
     /// Every sample takes any time between these two, which differ by less than the period of sending, whatever the scene's links do. `None`: the delays
     /// of the scene's links.
@@ -78,7 +78,7 @@ pub struct Patterns {
 /// Which links share their fate.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Links {
-    /// In every frame all links lose what is due, or none does, and all delay it alike: an outage of something that they share.
+    /// In every frame all links lose the samples that are due, or none does, and all delay it alike: an outage of something that they share.
     Together,
     /// Each link in each direction on its own. For up to three peers.
     Each,
@@ -135,7 +135,7 @@ pub struct SceneWorstCase {
     pub parts: Vec<WorstPart>,
     /// Which of them has the largest lower bound.
     pub part: usize,
-    /// What is left out, in words.
+    /// The parts that are left out, in words.
     pub notes: Vec<String>,
 }
 

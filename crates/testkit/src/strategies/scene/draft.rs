@@ -3,7 +3,7 @@
 use core::fmt;
 
 use cohaptic_peer::coordination::{LawSettings, LawValue};
-use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
+use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains, SendWhen};
 use cohaptic_scene::{Scene, SceneError};
 
 /// A component for each of up to three axes; those beyond the scene's are not written.
@@ -36,6 +36,8 @@ pub struct Draft {
     pub gains: Gains,
     /// The parameters that strategies have of their own.
     pub settings: LawSettings,
+    /// Which samples are sent; `None`: all.
+    pub send_when: Option<SendWhen>,
     /// The period of sending \[µs\].
     pub update: u64,
     /// Which integrator with how many steps; `None` is the exact one.
@@ -142,6 +144,7 @@ impl Draft {
             strategy: Coordination::AveragePosition,
             gains: Gains { stiffness: 1000.0, damping: 5.0 },
             settings: LawSettings::default(),
+            send_when: None,
             update: 1000,
             integrator: None,
             peers: (1..=peers).map(|number| DraftPeer::calm(&format!("peer{number}"))).collect(),
@@ -194,13 +197,21 @@ impl Draft {
         let name = self.strategy.name();
         let value = |place: usize| match self.settings.of(self.strategy).get(place) {
             LawValue::Automatic => "\"auto\"".to_owned(),
+            LawValue::Word(word) => format!("{:?}", self.strategy.parameters()[place].form.word(word)),
+            LawValue::Place(peer) => format!("{:?}", self.peers[peer].name),
             LawValue::Duration(duration) => format!("\"{}ns\"", duration.as_nanos()),
             LawValue::Number(number) => format!("{number:?}"),
         };
         let own: Vec<String> =
             self.strategy.parameters().iter().enumerate().map(|(place, parameter)| format!("{} = {}", parameter.key, value(place))).collect();
         let own = if own.is_empty() { String::new() } else { format!(", {name} = {{ {} }}", own.join(", ")) };
-        line(format!("coordination = {{ strategy = \"{name}\", stiffness = {k:?}, damping = {b:?}, update = \"{update}us\"{own} }}"));
+        let sends = self.send_when.as_ref().map_or_else(String::new, |when| {
+            let velocity = when.velocity.map(|part| format!("velocity = {part:?}"));
+            let position = when.position.map(|distance| format!("position = {distance:?}"));
+            let heartbeat = when.heartbeat.map(|span| format!("heartbeat = \"{}ns\"", span.as_nanos()));
+            format!(", send-when = {{ {} }}", [velocity, position, heartbeat].into_iter().flatten().collect::<Vec<_>>().join(", "))
+        });
+        line(format!("coordination = {{ strategy = \"{name}\", stiffness = {k:?}, damping = {b:?}, update = \"{update}us\"{own}{sends} }}"));
         if let Some((integrator, substeps)) = self.integrator {
             line(format!("simulation = {{ integrator = \"{integrator}\", substeps = {substeps} }}"));
         }

@@ -50,7 +50,7 @@ enum Event {
     Arrival(u64),
     /// The receiver has waited long enough for a second packet.
     DelayedAck(u64),
-    /// The sender hears of that many arrivals.
+    /// The sender hears of this number of arrivals.
     Ack(usize),
     /// The sender looks after losses and probes, if the timer was not set anew since.
     Timer(u64),

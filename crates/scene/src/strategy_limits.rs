@@ -1,0 +1,34 @@
+//! What strategies cannot have, and why.
+
+use cohaptic_peer::{Coordination, Drift, Integrator};
+
+use crate::{ChangeKind, Scene};
+
+impl Scene {
+    /// Why the strategy cannot work in this scene; `None` if it can.
+    pub(crate) fn refused_strategy(&self) -> Option<String> {
+        let strategy = self.coordination.strategy;
+        let (predicts, exchanges_waves, modulates) =
+            (strategy == Coordination::PassivityControl, strategy == Coordination::Wave, strategy == Coordination::SetPosition);
+        let refuse = |why: &str| Some(format!("the strategy {} {why}", strategy.name()));
+        if self.coordination.send_when.is_some() && (exchanges_waves || strategy == Coordination::ClientServer) {
+            return refuse("needs every sample: expected no send-when");
+        }
+        if (predicts || exchanges_waves || modulates) && self.peers.iter().any(|peer| peer.compute_delay) {
+            return refuse("counts the energy of forces that act at once: expected no peer with a compute-delay of 1");
+        }
+        if (exchanges_waves || modulates) && self.integrator != Integrator::Exact {
+            return refuse("damps each copy by just as much as it counts on: expected the integrator \"exact\"");
+        }
+        if exchanges_waves && self.peers.iter().any(|peer| peer.clock.drift != Drift::default()) {
+            return refuse("sends waves for as long as it takes to the next sample, on a clock that all have: expected no peer whose clock drifts");
+        }
+        if modulates && self.timeline.iter().any(|change| matches!(change.what, ChangeKind::Coordination(_))) {
+            return refuse("keeps energy in its springs: expected a timeline that does not change the gains");
+        }
+        if modulates && self.coordination.gains.stiffness == 0.0 {
+            return refuse("has no set-position without a spring: expected a stiffness above zero");
+        }
+        None
+    }
+}
