@@ -205,7 +205,15 @@ impl Campaign {
         if !self.is_finished() {
             let missing: Vec<u64> = (0..self.parts.count()).filter(|part| !self.has(*part)).collect();
             let keep = |part: u64, rows: &[Row]| self.keep(part, rows);
-            let work = Work { plan: &self.plan, roster: &self.manifest.roster, judgements: &self.judgements, accepted: &self.accepted, parts: self.parts, watch, keep: &keep };
+            let work = Work {
+                plan: &self.plan,
+                roster: &self.manifest.roster,
+                judgements: &self.judgements,
+                accepted: &self.accepted,
+                parts: self.parts,
+                watch,
+                keep: &keep,
+            };
             computed = work.run(&missing)?;
             let kept = self.kept();
             if kept < self.runs() {
@@ -281,7 +289,16 @@ impl Campaign {
         }
         let (combinations, quantiles) = tally.finish();
         let verdicts = self.plan.has_verdicts().then(|| self.folder.verdicts());
-        Ok(Report { file: path, verdicts, runs, computed, combinations, quantiles, judgements: self.judgements.clone(), refused: self.manifest.refused.clone() })
+        Ok(Report {
+            file: path,
+            verdicts,
+            runs,
+            computed,
+            combinations,
+            quantiles,
+            judgements: self.judgements.clone(),
+            refused: self.manifest.refused.clone(),
+        })
     }
 }
 

@@ -191,7 +191,16 @@ mod tests {
         assert_eq!(*first, expected);
         assert_eq!(*second, CombinationReport { runs: 3, diverged: 3, ..CombinationReport::default() });
         assert_eq!((third.worst_run, third.mean_discrepancy), (Some(6), Some(4.0)));
-        let report = Report { file: PathBuf::new(), verdicts: None, runs: 7, computed: 7, combinations, quantiles, judgements: Arc::from([]), refused: Refused::new() };
+        let report = Report {
+            file: PathBuf::new(),
+            verdicts: None,
+            runs: 7,
+            computed: 7,
+            combinations,
+            quantiles,
+            judgements: Arc::from([]),
+            refused: Refused::new(),
+        };
         assert_eq!((report.diverged(), report.worst().and_then(|worst| worst.worst_run)), (4, Some(2)), "of equal ones the first");
     }
 
@@ -202,12 +211,10 @@ mod tests {
         tally.add(Gist { diverged: false, max_discrepancy: 1.0 });
         tally.add(Gist { diverged: false, max_discrepancy: 3.0 });
         let (combinations, quantiles) = tally.finish();
-        assert_eq!(combinations.iter().map(|combination| (combination.runs, combination.mean_discrepancy)).collect::<Vec<_>>(), [
-            (0, None),
-            (2, Some(2.0)),
-            (0, None),
-            (0, None)
-        ]);
+        assert_eq!(
+            combinations.iter().map(|combination| (combination.runs, combination.mean_discrepancy)).collect::<Vec<_>>(),
+            [(0, None), (2, Some(2.0)), (0, None), (0, None)]
+        );
         assert_eq!(quantiles.iter().map(Option::is_some).collect::<Vec<_>>(), [false, true, false, false]);
     }
 

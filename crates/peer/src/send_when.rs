@@ -40,8 +40,8 @@ impl SendWhen {
         let age = crate::age(now, last.at);
         let lead = horizon.map_or(0.0, |horizon| age.min(horizon));
         let sent = &last.state;
-        let moved = distance(core::array::from_fn(|axis| own.position[axis] - (sent.position[axis] + lead * sent.velocity[axis])));
-        let changed = distance(core::array::from_fn(|axis| own.velocity[axis] - sent.velocity[axis]));
+        let moved = distance::<A>(core::array::from_fn(|axis| own.position[axis] - (sent.position[axis] + lead * sent.velocity[axis])));
+        let changed = distance::<A>(core::array::from_fn(|axis| own.velocity[axis] - sent.velocity[axis]));
         self.velocity.is_some_and(|part| changed >= part * (distance(sent.velocity) + STANDSTILL))
             || self.position.is_some_and(|most| moved >= most)
             || self.heartbeat.is_some_and(|most| now.saturating_duration_since(last.at) >= most)

@@ -3,9 +3,14 @@
 //! A strategy is compared with the baseline, the first one, at equal values of all other keys. Runs of one seed have equal random numbers, so the difference of
 //! two of them is that of the strategies, and its interval is narrower than those of the two means. A pair counts where both runs came to their end and both have
 //! the measure.
+//!
+//! A run counts as diverged, and for no mean, where a number was not finite any more and where two copies were farther apart than people reach: whether an unstable run
+//! leaves the range of numbers before its end is a matter of its duration, and a mean over 10³⁰ m says nothing.
+
+use cohaptic_harness::record::SANE_POSITION;
 
 use super::interval::{Estimate, Share};
-use super::measured::MeasuredColumn;
+use super::measured::{LARGEST, MeasuredColumn};
 use crate::plan::{Accepted, CampaignPlan, Refused};
 use crate::table::RunColumns;
 
@@ -28,7 +33,7 @@ pub struct Comparison {
 pub struct Cell {
     /// Why the strategy refuses the scene with these values; `None` if it runs.
     pub refused: Option<String>,
-    /// Which share of the runs diverged; `None` if there are none.
+    /// Which share of the runs diverged, or had copies farther apart than [`SANE_POSITION`]; `None` if there are none.
     pub diverged: Option<Share>,
     /// The figures of each of [`Comparison::measures`].
     pub figures: Vec<Figures>,
@@ -46,19 +51,22 @@ pub struct Figures {
 impl Comparison {
     /// The comparison of the first key of a plan. `columns` are those of `measures`, by run.
     pub(crate) fn of(plan: &CampaignPlan, accepted: &Accepted, refused: &Refused, measures: Vec<MeasuredColumn>, columns: &RunColumns) -> Self {
+        let apart = measures.iter().zip(&columns.columns).find(|(measure, _)| measure.name == LARGEST).map(|(_, column)| column);
+        let is_whole = |run: usize| columns.complete[run] && apart.is_none_or(|apart| apart[run] <= SANE_POSITION);
         let strategies: Vec<String> = plan.variations().first().map_or_else(Vec::new, |vary| vary.texts().map(str::to_owned).collect());
         let each = usize::try_from(plan.runs_of_each()).unwrap_or(usize::MAX);
         let starts = starts(plan.combinations(), accepted, each);
         let others = starts.len() / strategies.len().max(1);
-        let known: Vec<bool> = columns.columns.iter().map(|column| column.iter().any(|value| value.is_finite())).collect();
+        let has = |column: &Vec<f64>| column.iter().enumerate().any(|(run, value)| value.is_finite() && is_whole(run));
+        let known: Vec<bool> = columns.columns.iter().map(has).collect();
         let cell = |(combination, start): (usize, &Option<usize>)| {
             let baseline = starts[combination % others].filter(|_| combination >= others);
             let figures = columns.columns.iter().zip(&known).filter(|(_, known)| **known).map(|(column, _)| {
-                let values = |start: &usize| (*start..start + each).map(|run| Some(column[run]).filter(|value| columns.complete[run] && value.is_finite()));
+                let values = |start: &usize| (*start..start + each).map(|run| Some(column[run]).filter(|value| is_whole(run) && value.is_finite()));
                 Figures::of(start.iter().flat_map(values), baseline.iter().flat_map(values))
             });
             let diverged = start.and_then(|start| {
-                let diverged = columns.complete[start..start + each].iter().filter(|complete| !**complete).count();
+                let diverged = (start..start + each).filter(|run| !is_whole(*run)).count();
                 Share::of(diverged as u64, each as u64)
             });
             Cell { refused: refused.get(&(combination as u64)).cloned(), diverged, figures: figures.collect() }
@@ -117,7 +125,8 @@ mod tests {
     fn plan(runs: u64) -> CampaignPlan {
         let variations = ["coordination.strategy=average-position,extrapolated,local-damping", "link.loss=0,0.5"];
         let variations = variations.iter().map(|text| Variation::parse(text).unwrap()).collect();
-        CampaignPlan::new(PlanSpec { text: "", file: Path::new(""), set: &[], variations, runs, format: Format::Csv, part: None, program: "" }).unwrap()
+        CampaignPlan::new(PlanSpec { text: "", file: Path::new(""), set: &[], variations, runs, format: Format::Csv, part: None, program: "" })
+            .unwrap()
     }
 
     fn measure(name: &str) -> MeasuredColumn {
@@ -164,13 +173,29 @@ mod tests {
     }
 
     #[test]
+    fn copies_farther_apart_than_people_reach_count_as_diverged() {
+        let (plan, accepted) = (plan(3), Accepted::new(6, 3, std::iter::empty()));
+        let mut apart = vec![0.01; 18];
+        (apart[1], apart[2], apart[8]) = (SANE_POSITION, 1.001, 1e30);
+        let columns = RunColumns { complete: vec![true; 18], columns: vec![apart, (0..18).map(f64::from).collect()] };
+        let comparison = Comparison::of(&plan, &accepted, &Refused::new(), vec![measure(LARGEST), measure("a")], &columns);
+        let count = |strategy| comparison.cell(strategy, 0).diverged.map(|share| share.count);
+        assert_eq!((count(0), count(1), count(2)), (Some(1), Some(1), Some(0)));
+        assert_eq!(comparison.cell(0, 0).figures[1].mean.map(|mean| (mean.count, mean.mean)), Some((2, 0.5)));
+        assert_eq!(comparison.cell(1, 0).figures[1].difference.map(|difference| (difference.count, difference.mean)), Some((2, 6.0)));
+    }
+
+    #[test]
     fn a_measure_that_some_runs_lack_counts_where_it_is_and_one_that_all_lack_is_left_out() {
         let mut some = vec![NONE; 18];
         (some[0], some[1], some[6], some[8]) = (1.0, 2.0, 4.0, 9.0);
         let comparison = compared(&Refused::new(), vec![true; 18], vec![vec![NONE; 18], some]);
         assert_eq!(comparison.measures, [measure("1")]);
         let figures = comparison.cell(1, 0).figures[0];
-        assert_eq!((figures.mean.map(|mean| (mean.count, mean.mean)), figures.difference.map(|difference| (difference.count, difference.mean))), (Some((2, 6.5)), Some((1, 3.0))));
+        assert_eq!(
+            (figures.mean.map(|mean| (mean.count, mean.mean)), figures.difference.map(|difference| (difference.count, difference.mean))),
+            (Some((2, 6.5)), Some((1, 3.0)))
+        );
         assert_eq!(comparison.cell(2, 1).figures[0], Figures::default());
     }
 }

@@ -116,9 +116,15 @@ mod tests {
     fn quantiles_of_student_are_those_of_closed_forms_and_tables() {
         let one = libm::tan(0.475 * core::f64::consts::PI);
         let two = libm::sqrt(2.0 * 0.95 * 0.95 / (1.0 - 0.95 * 0.95));
-        for (freedom, expected, tolerance) in
-            [(1.0, one, 1e-8), (2.0, two, 1e-8), (3.0, 3.182, 5e-4), (7.0, 2.365, 5e-4), (15.0, 2.131, 5e-4), (30.0, 2.042, 5e-4), (100.0, 1.984, 5e-4)]
-        {
+        for (freedom, expected, tolerance) in [
+            (1.0, one, 1e-8),
+            (2.0, two, 1e-8),
+            (3.0, 3.182, 5e-4),
+            (7.0, 2.365, 5e-4),
+            (15.0, 2.131, 5e-4),
+            (30.0, 2.042, 5e-4),
+            (100.0, 1.984, 5e-4),
+        ] {
             assert!((student_975(freedom) - expected).abs() < tolerance * expected, "{freedom}: {} and {expected}", student_975(freedom));
         }
         // The law tends to the normal one: t ≈ z + (z³ + z)/(4ν), Abramowitz & Stegun 26.7.5, with the next term below 3/ν².
@@ -133,10 +139,16 @@ mod tests {
         let first = [0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0];
         let second = [1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4];
         let alone = Estimate::of(&first).unwrap();
-        assert!((alone.mean - 0.75).abs() < 1e-12 && (alone.low() + 0.529_780_4).abs() < 1e-6 && (alone.high() - 2.029_780_4).abs() < 1e-6, "{alone:?}");
+        assert!(
+            (alone.mean - 0.75).abs() < 1e-12 && (alone.low() + 0.529_780_4).abs() < 1e-6 && (alone.high() - 2.029_780_4).abs() < 1e-6,
+            "{alone:?}"
+        );
         let differences: Vec<f64> = second.iter().zip(&first).map(|(second, first)| second - first).collect();
         let paired = Estimate::of(&differences).unwrap();
-        assert!((paired.mean - 1.58).abs() < 1e-12 && (paired.low() - 0.700_114_2).abs() < 1e-6 && (paired.high() - 2.459_885_8).abs() < 1e-6, "{paired:?}");
+        assert!(
+            (paired.mean - 1.58).abs() < 1e-12 && (paired.low() - 0.700_114_2).abs() < 1e-6 && (paired.high() - 2.459_885_8).abs() < 1e-6,
+            "{paired:?}"
+        );
         assert_eq!((alone.side(), paired.side(), paired.count), (Ordering::Equal, Ordering::Greater, 10));
     }
 

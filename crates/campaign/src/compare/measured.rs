@@ -5,7 +5,7 @@ use cohaptic_scene::{Measure, Scope};
 use crate::table::{Column, Kind};
 
 /// The column that every table has.
-const LARGEST: &str = "max_discrepancy_m";
+pub(super) const LARGEST: &str = "max_discrepancy_m";
 
 /// A column with one number for each run that says how good or bad the run was.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -43,7 +43,16 @@ mod tests {
     #[test]
     fn measures_of_the_run_and_of_each_peer_are_compared_and_nothing_else() {
         let column = |name: &str| Column { name: name.to_owned(), kind: Kind::Number, optional: true };
-        let names = ["ended_at_s", LARGEST, "peers.left.position_x_m", "links.mean_delay_s", "travel_s", "peers.a.b.energy_j", "energy_j", "peers.left.travel_s"];
+        let names = [
+            "ended_at_s",
+            LARGEST,
+            "peers.left.position_x_m",
+            "links.mean_delay_s",
+            "travel_s",
+            "peers.a.b.energy_j",
+            "energy_j",
+            "peers.left.travel_s",
+        ];
         let found = measured(&names.map(column));
         assert_eq!(found.iter().map(|measure| measure.name.as_str()).collect::<Vec<&str>>(), [LARGEST, "travel_s", "peers.a.b.energy_j", "energy_j"]);
         assert_eq!(found.iter().map(|measure| measure.unit.as_str()).collect::<Vec<&str>>(), ["m", "s", "J", "J"]);

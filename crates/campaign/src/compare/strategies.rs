@@ -16,7 +16,9 @@ pub struct Strategies {
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum StrategiesError {
     /// There is one alone, or none.
-    #[error("{found} cannot be compared with another: expected at least two strategies with a comma between them, such as average-position,extrapolated")]
+    #[error(
+        "{found} cannot be compared with another: expected at least two strategies with a comma between them, such as average-position,extrapolated"
+    )]
     TooFew {
         /// The text as given.
         found: String,

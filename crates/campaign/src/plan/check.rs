@@ -144,8 +144,11 @@ impl CampaignPlan {
     ///
     /// If one of these scenes is refused: the first.
     pub(crate) fn fingerprint(&self) -> Result<u64, CampaignError> {
-        let numbers: Vec<Result<u64, CampaignError>> =
-            self.looked_at().into_par_iter().map(|combination| self.scene_or_fallback(combination).map(|(scene, _)| scene.fingerprint().get())).collect();
+        let numbers: Vec<Result<u64, CampaignError>> = self
+            .looked_at()
+            .into_par_iter()
+            .map(|combination| self.scene_or_fallback(combination).map(|(scene, _)| scene.fingerprint().get()))
+            .collect();
         Ok(all_of(numbers.into_iter().collect::<Result<Vec<u64>, CampaignError>>()?))
     }
 

@@ -96,7 +96,8 @@ fn commas_within_values_do_not_split() {
 
 #[test]
 fn a_strategy_may_have_settings() {
-    let vary = Variation::parse("coordination.strategy=average-position,local-damping{ damping = 58 },extrapolated{horizon=50ms,object.mass=1}").unwrap();
+    let vary =
+        Variation::parse("coordination.strategy=average-position,local-damping{ damping = 58 },extrapolated{horizon=50ms,object.mass=1}").unwrap();
     assert_eq!(vary.texts().collect::<Vec<&str>>(), ["average-position", "local-damping{damping=58}", "extrapolated{horizon=50ms,object.mass=1}"]);
     assert_eq!(vary.overrides(0), ["coordination.strategy=average-position"]);
     assert_eq!(vary.overrides(1), ["coordination.strategy=local-damping", "coordination.local-damping.damping=58"]);

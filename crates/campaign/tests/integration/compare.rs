@@ -70,7 +70,10 @@ fn what_a_strategy_refuses_is_known_before_anything_runs_and_stops_nothing_else(
     bench.vary = ["coordination.strategy=local-damping,average-position", "link.jitter=1ms"].map(str::to_owned).to_vec();
     finished(outcome(&bench, "other", 1, &NoWatch));
     let (_, other) = comma_separated(&bench.path("other/runs.csv"));
-    assert_eq!(other.iter().map(|row| [&row[0], &row[1], &row[2]].map(String::as_str).join(" ")).collect::<Vec<String>>(), (0..10).map(|run| format!("{} 1 {}", run + 10, run + 7)).collect::<Vec<String>>());
+    assert_eq!(
+        other.iter().map(|row| [&row[0], &row[1], &row[2]].map(String::as_str).join(" ")).collect::<Vec<String>>(),
+        (0..10).map(|run| format!("{} 1 {}", run + 10, run + 7)).collect::<Vec<String>>()
+    );
     let figures = |rows: &[Vec<String>]| rows.iter().map(|row| row[5..].to_vec()).collect::<Vec<Vec<String>>>();
     assert_eq!(figures(&other), figures(&rows[10..20]));
 }
@@ -81,7 +84,7 @@ fn however_it_was_interrupted_the_table_without_the_refused_is_the_same() {
         let mut bench = bench(&REFUSING);
         bench.format = format;
         let whole = compare(&bench, "whole");
-        for (stop, threads) in [(1, 1), (9, 2), (3, 3)] {
+        for (stop, threads) in [(1, 1), (1, 2)] {
             assert!(matches!(outcome(&bench, "parts", threads, &StopAfter::runs(stop)), Outcome::Interrupted { .. }));
         }
         assert_eq!(compare(&bench, "parts"), whole);

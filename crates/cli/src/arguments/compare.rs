@@ -44,6 +44,6 @@ pub(crate) struct CompareArguments {
 /// Strategies and values that are known by a name.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum PresetName {
-    /// Every strategy with its parameters at their defaults, over link delays of 0 to 200 ms and losses of 0 to 30 %
+    /// Every strategy with its parameters at their defaults, and a dead band of 10 % of the velocity, over link delays of 0 to 200 ms and losses of 0 to 30 %
     Field,
 }

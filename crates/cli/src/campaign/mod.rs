@@ -158,9 +158,7 @@ pub(crate) fn failure(error: CampaignError, scene: &Path, strategies: &[String])
             };
             Failure::Combination { error, option, combination: combination(&varied) }
         }
-        CampaignError::NotRun { message, varied } => {
-            Failure::Input(format!("{}: {message}{}", output::path(scene), combination(&varied)))
-        }
+        CampaignError::NotRun { message, varied } => Failure::Input(format!("{}: {message}{}", output::path(scene), combination(&varied))),
         error @ (CampaignError::Vary(_) | CampaignError::SameKey { .. }) => Failure::Input(format!("--vary: {error}")),
         error @ CampaignError::Seeds { .. } => Failure::Input(format!("--runs: {error}")),
         error @ CampaignError::Size(_) => Failure::Input(error.to_string()),

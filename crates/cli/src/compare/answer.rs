@@ -1,9 +1,8 @@
 //! A comparison as a JSON document.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use cohaptic_campaign::{Cell, Estimate, Figures, Judgement};
+use cohaptic_campaign::{Cell, Estimate, Figures, Judgement, MeasuredColumn};
 use serde::Serialize;
 
 use super::Finished;
@@ -57,11 +56,16 @@ fn of_judgement(judgement: &Judgement) -> impl Serialize {
     }
 }
 
-fn measures_of<'a>(finished: &'a Finished, cell: &'a Cell) -> BTreeMap<&'a str, impl Serialize + use<>> {
-    let of = |figures: &Figures| {
-        document! { count: figures.mean.map_or(0, |mean| mean.count), mean: figures.mean.map(mean_and_ends), difference: figures.difference.map(counted) }
+fn measures_of<'a>(finished: &'a Finished, cell: &'a Cell) -> Vec<impl Serialize + use<'a>> {
+    let of = |(measure, figures): (&'a MeasuredColumn, &Figures)| {
+        document! {
+            name: measure.name.as_str(),
+            count: figures.mean.map_or(0, |mean| mean.count),
+            mean: figures.mean.map(mean_and_ends),
+            difference: figures.difference.map(counted),
+        }
     };
-    finished.comparison.measures.iter().zip(&cell.figures).map(|(measure, figures)| (measure.name.as_str(), of(figures))).collect()
+    finished.comparison.measures.iter().zip(&cell.figures).map(of).collect()
 }
 
 /// The ends are `null` without an interval.

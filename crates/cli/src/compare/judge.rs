@@ -1,4 +1,4 @@
-//! Whether a combination is stable: by analysis where that is a matter of a second, else by two runs, of which one begins with a small disturbance.
+//! Whether a combination is stable: by analysis where that takes less than a second, else by two runs, of which one begins with a small disturbance.
 
 use cohaptic_campaign::{Judge, Judgement, Verdict};
 use cohaptic_harness::Model;
@@ -11,7 +11,7 @@ use crate::quick_verdict::{Quick, quick_verdict};
 use crate::stability::source;
 
 /// Two runs judge where the analysis takes longer than this, by its estimate \[s\].
-const QUICK: f64 = 1.0;
+const QUICK: f64 = 0.25;
 
 /// The word for a verdict by two runs.
 pub(super) const TWO_RUNS: &str = "two-runs";

@@ -22,7 +22,8 @@ pub(super) fn text(finished: &Finished) -> String {
             continue;
         }
         let (runs, diverged) = cell.diverged.map_or((0, 0), |share| (share.of, share.count));
-        let (verdict, judged) = finished.judgement(strategy, other).and_then(Judgement::verdict).map_or(("", ""), |known| (&*known.word, &*known.judged));
+        let (verdict, judged) =
+            finished.judgement(strategy, other).and_then(Judgement::verdict).map_or(("", ""), |known| (&*known.word, &*known.judged));
         for (measure, figures) in comparison.measures.iter().zip(&cell.figures) {
             let [mean, difference] = [figures.mean, figures.difference].map(|estimate| estimate_cells(estimate.as_ref()));
             text.push_str(&format!("{head},{runs},{diverged},{verdict},{judged},{},{mean},{difference}\n", csv_field(&measure.name)));

@@ -56,7 +56,10 @@ fn head(finished: &Finished) -> Vec<String> {
     } else {
         format!("  {} run in {wall_s:.3} s", report.computed)
     });
-    lines.push(format!("  ± is 95 % (Student); a difference is that to {}, seed by seed, where both runs came to their end", comparison.strategies[0]));
+    lines.push(format!(
+        "  ± is 95 % (Student); a difference is that to {}, seed by seed, where neither run diverged or came apart",
+        comparison.strategies[0]
+    ));
     lines
 }
 
@@ -67,9 +70,12 @@ fn strategies(finished: &Finished) -> Vec<Vec<String>> {
     for (number, name) in comparison.strategies.iter().enumerate() {
         let sum = Sum::of(finished, number);
         let diverged = cohaptic_campaign::Share::of(sum.diverged, sum.runs).map_or_else(|| NOTHING.to_owned(), |share| figures::share(&share));
-        let stable = match finished.judgement(number, 0) {
-            Some(judgement) if comparison.others() == 1 => verdict(judgement),
-            Some(_) | None => format!("{} of {}", sum.stable, sum.judged),
+        let stable = if sum.judged == 0 {
+            NOTHING.to_owned()
+        } else if comparison.others() == 1 {
+            finished.judgement(number, 0).map_or_else(String::new, verdict)
+        } else {
+            format!("{} of {}", sum.stable, sum.judged)
         };
         let refused = if sum.refused == 0 { NOTHING.to_owned() } else { format!("{} of {}", sum.refused, comparison.others()) };
         rows.push(vec![(number + 1).to_string(), name.clone(), diverged, stable, refused]);
@@ -142,10 +148,13 @@ fn rows(finished: &Finished, measure: usize, shown: &Shown) -> Vec<Vec<String>> 
 /// Mean, difference, and on which side that is.
 pub(super) fn cells(figures: &Figures, shown: &Shown, of_each: u64) -> [String; 3] {
     let text = |estimate: Option<cohaptic_campaign::Estimate>| {
-        estimate.map_or_else(|| NOTHING.to_owned(), |estimate| {
-            let fewer = if estimate.count < of_each { format!(" (n {})", estimate.count) } else { String::new() };
-            shown.estimate(&estimate) + &fewer
-        })
+        estimate.map_or_else(
+            || NOTHING.to_owned(),
+            |estimate| {
+                let fewer = if estimate.count < of_each { format!(" (n {})", estimate.count) } else { String::new() };
+                shown.estimate(&estimate) + &fewer
+            },
+        )
     };
     let difference = if figures.difference.is_some() { text(figures.difference) } else { String::new() };
     [text(figures.mean), difference, side(figures).to_owned()]

@@ -57,7 +57,16 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
         ),
         (
             "compare",
-            &["<SCENE>", "--strategies <A,B{KEY=VALUE},...>", "--vary <KEY=VALUES>", "--preset <NAME>", "--runs <N>", "--out <DIR>", "--format <FORMAT>", "--json"],
+            &[
+                "<SCENE>",
+                "--strategies <A,B{KEY=VALUE},...>",
+                "--vary <KEY=VALUES>",
+                "--preset <NAME>",
+                "--runs <N>",
+                "--out <DIR>",
+                "--format <FORMAT>",
+                "--json",
+            ],
         ),
         ("stability point", &["<SCENE>", "--set <KEY=VALUE>", "--json", "--method <METHOD>"]),
         (

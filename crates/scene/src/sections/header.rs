@@ -81,11 +81,11 @@ fn read_send_when(node: &Node, context: Context<'_>) -> Option<SendWhen> {
     let mut table = TableReader::new(node, context, EXPECTED)?;
     let velocity = table.maybe("velocity", |node, context| {
         let part = values::probability(node, context)?;
-        if part.value() >= 1.0 {
+        if part.get() >= 1.0 {
             context.fault_at(node, "with a dead band of 100% a peer that stops is not heard of: expected less than 100%");
             return None;
         }
-        Some(part.value())
+        Some(part.get())
     });
     let position = table.maybe("position", |node, context| DISTANCE.read(node, context));
     let heartbeat = table.maybe("heartbeat", values::positive_duration);

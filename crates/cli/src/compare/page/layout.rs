@@ -34,8 +34,13 @@ impl Layout {
     /// Why nothing is drawn; `None` if it is.
     pub(super) fn undrawn(&self, keys: &[Variation]) -> Option<String> {
         let names: Vec<&str> = self.facets.iter().map(|(key, _)| keys[*key].key()).collect();
-        (self.panels() > MOST_PANELS)
-            .then(|| format!("No pictures: a panel for each value of {} would be {} panels, and at most {MOST_PANELS} are drawn.", names.join(" and "), self.panels()))
+        (self.panels() > MOST_PANELS).then(|| {
+            format!(
+                "No pictures: a panel for each value of {} would be {} panels, and at most {MOST_PANELS} are drawn.",
+                names.join(" and "),
+                self.panels()
+            )
+        })
     }
 
     /// The values that a panel is of, as `KEY=VALUE`; empty if there is one alone.
@@ -96,7 +101,8 @@ mod tests {
             let keys = keys(texts);
             let layout = Layout::of(&keys);
             let along: Vec<Option<usize>> = layout.x.as_ref().map_or_else(|| vec![None], |x| (0..x.values.len()).map(Some).collect());
-            let mut found: Vec<usize> = (0..layout.panels()).flat_map(|panel| along.iter().map(move |at| (panel, *at))).map(|(panel, at)| layout.other(panel, at)).collect();
+            let mut found: Vec<usize> =
+                (0..layout.panels()).flat_map(|panel| along.iter().map(move |at| (panel, *at))).map(|(panel, at)| layout.other(panel, at)).collect();
             found.sort_unstable();
             assert_eq!(found, (0..keys.iter().map(Variation::count).product()).collect::<Vec<usize>>());
         }

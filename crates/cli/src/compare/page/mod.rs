@@ -5,8 +5,8 @@ mod panels;
 mod scale;
 mod tables;
 
-use cohaptic_picture::page::{Html, Page};
 use cohaptic_picture::Picture;
+use cohaptic_picture::page::{Html, Page};
 use cohaptic_scene::scene_content_of_text;
 use cohaptic_units::print::Counted;
 
@@ -14,8 +14,8 @@ use super::figures::Shown;
 use super::{Finished, words};
 use crate::arguments::{CompareArguments, TableFormat};
 use crate::failure::Failure;
-use crate::shell::{path, quoted};
 use crate::input;
+use crate::shell::{path, quoted};
 use layout::Layout;
 use panels::Sheet;
 use scale::Scale;
@@ -52,19 +52,24 @@ const DIFFERENCES: &str = "At how many combinations of the other keys a measure 
     on that side of zero. Lower is better for discrepancy, force, settling and energy.";
 
 /// What the numbers rest on.
-const NOTES: [&str; 5] = [
-    "A mean is that of the runs that came to their end and have the measure; a strategy that lets its hardest runs diverge is judged by the easier ones, so look at the diverged runs first.",
+const NOTES: [&str; 6] = [
+    "A run counts as diverged where a number is not finite any more, and where two copies are more than 1 m apart at some instant. No mean has it.",
+    "A mean is that of the other runs, if they have the measure: a strategy whose hardest runs diverge is judged by the easier ones, so look at the diverged runs first.",
     "± and bands reach over the interval of 95 % of the mean (Student).",
-    "Every strategy has the same seeds, and so the same hands, losses and delays. A difference is the mean over the seeds of which both runs came to their end, with its own interval of 95 %.",
+    "Every strategy has the same seeds, and so the same hands, losses and delays. A difference is the mean over the seeds of which neither run diverged, with its own interval of 95 %.",
     "An interval is for one comparison. Of twenty intervals around no difference, one lies beside zero.",
-    "A verdict is that of the analysis where it takes a second at most and leaves nothing out (spectral-radius, mean-square), else of two runs, one of them with a small disturbance (two-runs).",
+    "A verdict is that of the analysis where it takes less than a second and leaves nothing out (spectral-radius, mean-square), else of two runs, one of them with a small disturbance (two-runs).",
 ];
 
 /// How many runs there are, in words.
 fn sum(finished: &Finished) -> String {
     let keys: Vec<&str> = finished.keys().iter().map(cohaptic_campaign::Variation::key).collect();
     let (runs, each) = (finished.report.runs, finished.plan.runs_of_each());
-    let over = if keys.is_empty() { String::new() } else { format!(" at {} of {}", Counted(finished.comparison.others(), "combination"), keys.join(" and ")) };
+    let over = if keys.is_empty() {
+        String::new()
+    } else {
+        format!(" at {} of {}", Counted(finished.comparison.others(), "combination"), keys.join(" and "))
+    };
     format!("{}, {each} of each strategy{over}, with the same seeds for all.", Counted(runs, "run"))
 }
 
@@ -76,7 +81,9 @@ fn defaults(arguments: &CompareArguments, finished: &Finished) -> Result<Vec<(&'
         let varied = strategies.variation().overrides(place);
         let overrides: Vec<String> = arguments.scene.overrides.set.iter().chain(&varied).cloned().collect();
         // A scene that is refused has no content, and its overrides say enough.
-        let keys = input::with(&arguments.scene.scene, |text, file| scene_content_of_text(text, file, &overrides)).map(|content| content.keys).unwrap_or_default();
+        let keys = input::with(&arguments.scene.scene, |text, file| scene_content_of_text(text, file, &overrides))
+            .map(|content| content.keys)
+            .unwrap_or_default();
         let given = |(key, default): &(String, &str)| {
             let own = varied.iter().rev().find_map(|text| text.strip_prefix(key.as_str())?.strip_prefix('='));
             let value = own.or_else(|| keys.get(key).map(String::as_str)).unwrap_or(*default);
@@ -114,17 +121,24 @@ fn measures(sheet: &Sheet<'_>) -> Html {
     }
     let each = sheet.layout.panels() > 1;
     if undrawn.is_none() && !each {
+        let pictures = sheet.all(&scales);
         let cut = if scales.iter().any(|scale| scale.is_cut) { CUT } else { "" };
-        content = content.and(figure("measures", &sheet.all(&scales), cut));
+        let last = pictures.len().saturating_sub(1);
+        for (number, picture) in pictures.iter().enumerate() {
+            content = content.and(figure("", picture, if number == last { cut } else { "" }));
+        }
     }
     for (place, measure) in comparison.measures.iter().enumerate() {
         let shown = Shown::of(comparison, place);
-        let mut section = Html::heading(3, shown.title.as_str()).and(Html::paragraph(format!("{}.", measure.about)));
-        if undrawn.is_none() && each {
-            section = section.and(figure("", &sheet.measure(place, &scales[place]), if scales[place].is_cut { CUT } else { "" }));
-        }
-        let head = format!("Table of {}", shown.head());
-        content = content.and(Html::section(&measure.name, section.and(Html::details(&head, tables::measure(sheet.finished, place, &shown)))));
+        let about = Html::paragraph(format!("{}.", measure.about));
+        let table = tables::measure(sheet.finished, place, &shown);
+        let section = if undrawn.is_none() && each {
+            let picture = figure("", &sheet.measure(place, &scales[place]), if scales[place].is_cut { CUT } else { "" });
+            Html::heading(3, shown.title.as_str()).and(about).and(picture).and(Html::details(&format!("Table of {}", shown.head()), table))
+        } else {
+            Html::details(&shown.head(), about.and(table))
+        };
+        content = content.and(Html::section(&measure.name, section));
     }
     content
 }

@@ -14,13 +14,21 @@ const MOST_MARKED: usize = 24;
 /// How far the bar of an interval reaches to both sides of the middle of its row.
 const HALF_BAR: f64 = 0.16;
 
+/// The most panels of a picture of all measures: its legend is not to be far from them.
+const PANELS: usize = 6;
+
+/// The number of panels beside each other.
+const fn columns_of(panels: usize) -> usize {
+    match panels {
+        1 => 1,
+        2 | 4 => 2,
+        _ => 3,
+    }
+}
+
 /// A picture without a title: that stands in the page.
 fn picture(panels: Vec<Panel>) -> Picture {
-    let columns = match panels.len() {
-        1 => 1,
-        2..=4 => 2,
-        _ => 3,
-    };
+    let columns = columns_of(panels.len());
     let aspect = if columns == 1 { 0.45 } else { 0.75 };
     Picture::new("").columns(columns).aspect(aspect).panels(panels)
 }
@@ -36,26 +44,29 @@ impl Sheet<'_> {
         self.finished.comparison.strategies.iter().map(String::as_str).enumerate()
     }
 
-    /// One picture of all measures, a panel each, where no key has panels.
-    pub(super) fn all(&self, scales: &[Scale]) -> Picture {
-        let shares = self.any_diverged().then(|| self.diverged_panel(0).titled(""));
-        let panels: Vec<Panel> = shares.into_iter().chain(scales.iter().enumerate().map(|(measure, scale)| self.measure_panel(measure, scale, 0))).collect();
-        let picture = picture(panels);
-        if self.layout.x.is_some() { picture.shared_x() } else { self.with_rows(picture) }
+    /// Pictures of all measures, a panel each, where no key has panels.
+    pub(super) fn all(&self, scales: &[Scale]) -> Vec<Picture> {
+        let shares = self.any_diverged().then(|| self.diverged_panel(0));
+        let panels: Vec<Panel> =
+            shares.into_iter().chain(scales.iter().enumerate().map(|(measure, scale)| self.measure_panel(measure, scale, 0))).collect();
+        panels.chunks(PANELS).map(|panels| self.arranged(picture(panels.to_vec()), panels.len())).collect()
+    }
+
+    /// With one axis of x, or with rows of strategies.
+    fn arranged(&self, picture: Picture, panels: usize) -> Picture {
+        if self.layout.x.is_some() { picture.shared_x() } else { self.with_rows(picture.shared_y(), panels) }
     }
 
     /// The picture of one measure, a panel for each value of the other keys.
     pub(super) fn measure(&self, measure: usize, scale: &Scale) -> Picture {
         let panels = (0..self.layout.panels()).map(|panel| self.titled(self.measure_panel(measure, scale, panel), panel));
-        let picture = picture(panels.collect()).shared_y();
-        if self.layout.x.is_some() { picture.shared_x() } else { self.with_rows(picture) }
+        self.arranged(picture(panels.collect()).shared_y(), self.layout.panels())
     }
 
     /// Shares of runs that diverged, a panel for each value of the other keys.
     pub(super) fn diverged(&self) -> Picture {
         let panels = (0..self.layout.panels()).map(|panel| self.titled(self.diverged_panel(panel), panel));
-        let picture = picture(panels.collect()).shared_y();
-        if self.layout.x.is_some() { picture.shared_x() } else { self.with_rows(picture) }
+        self.arranged(picture(panels.collect()).shared_y(), self.layout.panels())
     }
 
     /// Whether any run diverged.
@@ -64,9 +75,9 @@ impl Sheet<'_> {
     }
 
     /// Rows need no more height than their names.
-    fn with_rows(&self, picture: Picture) -> Picture {
-        let rows = u32::try_from(self.finished.comparison.strategies.len()).unwrap_or(u32::MAX);
-        picture.shared_y().aspect(0.15 * f64::from(1 + rows))
+    fn with_rows(&self, picture: Picture, panels: usize) -> Picture {
+        let rows = (1 + self.finished.comparison.strategies.len()) * columns_of(panels);
+        picture.aspect(0.05 * from_place(rows))
     }
 
     fn titled(&self, panel: Panel, place: usize) -> Panel {
@@ -149,7 +160,8 @@ impl Sheet<'_> {
             let axes = Panel::new(x.axis(), Axis::new("").categories(names.iter().copied()));
             self.titled(self.areas(axes, (&x.edges(), &rows), at), panel)
         };
-        Some(self.with_rows(picture((0..self.layout.panels()).map(panel).collect())).shared_x())
+        let panels = self.layout.panels();
+        Some(self.with_rows(picture((0..panels).map(panel).collect()).shared_y(), panels).shared_x())
     }
 
     /// The verdicts of cells as areas.

@@ -40,6 +40,8 @@ impl Scale {
             let (least, most) = (least.max(-limit), most.min(limit));
             let room = (most - least).max(0.1 * most.abs().max(least.abs())).max(f64::MIN_POSITIVE);
             let (low, high) = span(ends);
+            // Of a quantity that is never negative an interval may be.
+            let low = if least >= 0.0 { low.max(0.0) } else { low };
             (low.max(least - room), high.min(most + room))
         };
         Self { shown, low, high, is_logarithmic, is_cut }
@@ -71,6 +73,7 @@ impl Scale {
 
 /// The least and the largest; 0 and 1 of none.
 fn span(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let found = values.filter(|value| value.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let found =
+        values.filter(|value| value.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     if found.0 > found.1 { (0.0, 1.0) } else { found }
 }

@@ -3,14 +3,15 @@
 use cohaptic_campaign::{Figures, Share, Variation};
 use cohaptic_picture::page::{Html, Mark, Table};
 
+use crate::compare::Finished;
 use crate::compare::figures::{self, Shown};
 use crate::compare::words::{self, Sum};
-use crate::compare::Finished;
 
 /// The strategies: what each does, its parameters, and what became of all its runs.
 pub(super) fn strategies(finished: &Finished, words: &[(&'static str, String)]) -> Html {
     let comparison = &finished.comparison;
-    let head = Table::new().column("strategy").column("each copy is drawn").column("parameters").number("diverged").number("stable").number("refused");
+    let head =
+        Table::new().column("strategy").column("each copy is drawn").column("parameters").number("diverged").number("stable").number("refused");
     let table = comparison.strategies.iter().zip(words).enumerate().fold(head, |table, (place, (name, (about, parameters)))| {
         let sum = Sum::of(finished, place);
         let baseline = if place == 0 { " (baseline)" } else { "" };
@@ -20,7 +21,7 @@ pub(super) fn strategies(finished: &Finished, words: &[(&'static str, String)]) 
             (*about).into(),
             parameters.as_str().into(),
             diverged.into(),
-            Html::text(&format!("{} of {}", sum.stable, sum.judged)),
+            Html::text(&if sum.judged == 0 { NOTHING.to_owned() } else { format!("{} of {}", sum.stable, sum.judged) }),
             Html::text(&if sum.refused == 0 { NOTHING.to_owned() } else { format!("{} of {}", sum.refused, comparison.others()) }),
         ];
         table.row(cells)
