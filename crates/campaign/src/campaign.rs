@@ -1,24 +1,29 @@
 //! A campaign in its folder, and its watcher.
 
 use std::fs::File;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use cohaptic_files::write_whole;
 
+use crate::compare::{Comparison, MOST_NUMBERS_COMPARED, measured};
 use crate::error::CampaignError;
 use crate::folder::{Folder, Manifest};
-use crate::plan::{CampaignPlan, Parts};
+use crate::plan::{Accepted, CampaignPlan, Parts, Refused};
 use crate::report::{Report, Tally};
 use crate::table::{Column, Head, Row, TableError, columns};
 use crate::verdicts::{Journal, Judge, Judgement, judge, read_whole, write_all};
 use crate::work::Work;
+
+/// What helps where the table is not as it was written.
+const TABLE_WAY_OUT: &str = "remove the folder, or choose another one";
 
 /// A campaign in its folder, which no other process works on as long as this value lives.
 #[derive(Debug)]
 pub struct Campaign {
     plan: CampaignPlan,
     manifest: Manifest,
+    accepted: Accepted,
     parts: Parts,
     columns: Vec<Column>,
     folder: Folder,
@@ -62,15 +67,16 @@ impl Campaign {
             Some(_) | None => Self::same_manifest(&plan, &folder)?,
         };
         folder.sweep()?;
-        let parts = manifest.parts(plan.runs());
+        let accepted = manifest.accepted(&plan);
+        let parts = manifest.parts(accepted.runs());
         let columns = columns(plan.variations(), plan.has_verdicts(), &manifest.roster);
-        Ok(Self { plan, manifest, parts, columns, folder, judgements: Arc::from([]) })
+        Ok(Self { plan, manifest, accepted, parts, columns, folder, judgements: Arc::from([]) })
     }
 
     fn new_manifest(plan: &CampaignPlan, watch: &dyn Watch) -> Result<Manifest, CampaignError> {
         let checked = plan.check(watch)?;
         let parts = Parts::of(plan, &checked, columns(plan.variations(), plan.has_verdicts(), &checked.roster).len())?;
-        Ok(Manifest::new(plan, plan.fingerprint_of(&checked.numbers), checked.roster, parts))
+        Ok(Manifest::new(plan, plan.fingerprint_of(&checked.numbers), checked, parts))
     }
 
     /// The manifest in the folder, which must be that of this plan.
@@ -95,6 +101,18 @@ impl Campaign {
         &self.columns
     }
 
+    /// The combinations that are left out, each with its reason.
+    #[must_use]
+    pub const fn refused(&self) -> &Refused {
+        &self.manifest.refused
+    }
+
+    /// How many runs there are, without those of combinations that are left out.
+    #[must_use]
+    pub const fn runs(&self) -> u64 {
+        self.accepted.runs()
+    }
+
     /// Whether the table is there.
     #[must_use]
     pub fn is_finished(&self) -> bool {
@@ -105,7 +123,7 @@ impl Campaign {
     #[must_use]
     pub fn kept(&self) -> u64 {
         if self.is_finished() {
-            return self.plan.runs();
+            return self.runs();
         }
         (0..self.parts.count()).filter(|part| self.has(*part)).map(|part| self.parts.len(part)).sum()
     }
@@ -120,29 +138,56 @@ impl Campaign {
         if !self.plan.has_verdicts() || !self.judgements.is_empty() {
             return Ok(0);
         }
-        let path = self.folder.verdicts();
-        if let Some(judgements) = read_whole(&path, &self.plan)? {
-            self.folder.remove_journal()?;
-            self.judgements = judgements.into();
-            return Ok(0);
+        match self.judged(&self.folder.verdicts(), by, watch)? {
+            Ok(judgements) => {
+                self.judgements = judgements.into();
+                Ok(0)
+            }
+            Err(missing) => Ok(missing),
+        }
+    }
+
+    /// Judges the combinations as [`Campaign::judge`] does, for a plan without verdicts: the judgements stand in `stability.csv` and not in the table. `Err` with
+    /// the number of combinations that have none if the watch or the judge ended it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Campaign::judge`].
+    pub fn judge_apart(&self, by: &dyn Judge, watch: &dyn Watch) -> Result<Result<Vec<Judgement>, u64>, CampaignError> {
+        self.judged(&self.folder.stability(), by, watch)
+    }
+
+    /// The file of [`Campaign::judge_apart`].
+    #[must_use]
+    pub fn stability_file(&self) -> PathBuf {
+        self.folder.stability()
+    }
+
+    /// The judgements in the table of that name, which is made if it is not there; `Err` with how many are missing.
+    fn judged(&self, path: &Path, by: &dyn Judge, watch: &dyn Watch) -> Result<Result<Vec<Judgement>, u64>, CampaignError> {
+        let journal = Folder::journal(path);
+        if let Some(judgements) = read_whole(path, &self.plan)? {
+            Folder::remove_journal(journal)?;
+            return Ok(Ok(judgements));
         }
         let combinations = self.plan.combinations();
-        let (mut journal, known) = Journal::open(self.folder.journal(), combinations)?;
+        let (mut file, known) = Journal::open(journal.clone(), combinations)?;
         let mut judgements = vec![None; usize::try_from(combinations).unwrap_or_default()];
-        watch.judged(known.len() as u64);
-        for (combination, judgement) in known {
+        let refused = self.refused().iter().map(|(combination, reason)| (*combination, Judgement::Refused(reason.as_str().into())));
+        watch.judged((known.len() + self.refused().len()) as u64);
+        for (combination, judgement) in known.into_iter().chain(refused) {
             judgements[usize::try_from(combination).unwrap_or_default()] = Some(judgement);
         }
-        let judgements = judge(&self.plan, by, watch, &mut journal, judgements)?;
+        let judgements = judge(&self.plan, by, watch, &mut file, judgements)?;
         let missing = judgements.iter().filter(|judgement| judgement.is_none()).count() as u64;
-        if missing == 0 {
-            let judgements: Vec<Judgement> = judgements.into_iter().flatten().collect();
-            write_all(&path, &self.plan, &judgements)?;
-            drop(journal);
-            self.folder.remove_journal()?;
-            self.judgements = judgements.into();
+        if missing > 0 {
+            return Ok(Err(missing));
         }
-        Ok(missing)
+        let judgements: Vec<Judgement> = judgements.into_iter().flatten().collect();
+        write_all(path, &self.plan, &judgements)?;
+        drop(file);
+        Folder::remove_journal(journal)?;
+        Ok(Ok(judgements))
     }
 
     /// Does the runs that are missing, on all threads of the pool that it is called in, and puts the table together. A campaign that is finished is left as
@@ -160,10 +205,18 @@ impl Campaign {
         if !self.is_finished() {
             let missing: Vec<u64> = (0..self.parts.count()).filter(|part| !self.has(*part)).collect();
             let keep = |part: u64, rows: &[Row]| self.keep(part, rows);
-            let work = Work { plan: &self.plan, roster: &self.manifest.roster, judgements: &self.judgements, parts: self.parts, watch, keep: &keep };
+            let work = Work {
+                plan: &self.plan,
+                roster: &self.manifest.roster,
+                judgements: &self.judgements,
+                accepted: &self.accepted,
+                parts: self.parts,
+                watch,
+                keep: &keep,
+            };
             computed = work.run(&missing)?;
             let kept = self.kept();
-            if kept < self.plan.runs() {
+            if kept < self.runs() {
                 return Ok(Outcome::Interrupted { kept });
             }
             self.merge()?;
@@ -171,6 +224,29 @@ impl Campaign {
         let report = self.report(computed)?;
         self.folder.remove_parts(self.parts.count(), self.plan.format())?;
         Ok(Outcome::Finished(report))
+    }
+
+    /// Compares the values of the first key, which are [`Strategies`](crate::Strategies), by the table of a finished campaign.
+    ///
+    /// # Errors
+    ///
+    /// [`CampaignError::File`] if the table cannot be read, [`CampaignError::Damaged`] if it is not as it was written, [`CampaignError::Size`] if it has more than
+    /// [`MOST_NUMBERS_COMPARED`] numbers.
+    pub fn compare(&self) -> Result<Comparison, CampaignError> {
+        let measures = measured(&self.columns);
+        let numbers = self.runs().saturating_mul(measures.len() as u64);
+        if numbers > MOST_NUMBERS_COMPARED {
+            return Err(CampaignError::Size(format!("{numbers} numbers to compare: expected at most {MOST_NUMBERS_COMPARED}, runs times measures")));
+        }
+        let path = self.folder.table(self.plan.format());
+        let file = File::open(&path).map_err(|error| CampaignError::File { verb: "read", path: path.clone(), error })?;
+        let names: Vec<&str> = measures.iter().map(|measure| measure.name.as_str()).collect();
+        let columns = self.plan.format().read_columns(file, &names).map_err(|error| unread(&path, error, TABLE_WAY_OUT))?;
+        let (found, runs) = (columns.complete.len() as u64, self.runs());
+        if found != runs || columns.columns.iter().any(|column| column.len() != columns.complete.len()) {
+            return Err(CampaignError::Damaged { path, message: format!("{found} rows: expected {runs}"), way_out: TABLE_WAY_OUT });
+        }
+        Ok(Comparison::of(&self.plan, &self.accepted, self.refused(), measures, &columns))
     }
 
     fn has(&self, part: u64) -> bool {
@@ -202,19 +278,27 @@ impl Campaign {
 
     /// Sums the table up.
     fn report(&self, computed: u64) -> Result<Report, CampaignError> {
-        const WAY_OUT: &str = "remove the folder, or choose another one";
         let path = self.folder.table(self.plan.format());
         let file = File::open(&path).map_err(|error| CampaignError::File { verb: "read", path: path.clone(), error })?;
-        let mut tally = Tally::new(self.plan.runs_of_each(), self.plan.combinations());
+        let mut tally = Tally::new(self.plan.runs_of_each(), self.plan.combinations(), &self.accepted);
         let read = self.plan.format().read_gists(file, &mut |gist| tally.add(gist));
-        read.map_err(|error| unread(&path, error, WAY_OUT))?;
-        let (found, runs) = (tally.runs(), self.plan.runs());
+        read.map_err(|error| unread(&path, error, TABLE_WAY_OUT))?;
+        let (found, runs) = (tally.runs(), self.runs());
         if found != runs {
-            return Err(CampaignError::Damaged { path, message: format!("{found} rows: expected {runs}"), way_out: WAY_OUT });
+            return Err(CampaignError::Damaged { path, message: format!("{found} rows: expected {runs}"), way_out: TABLE_WAY_OUT });
         }
         let (combinations, quantiles) = tally.finish();
         let verdicts = self.plan.has_verdicts().then(|| self.folder.verdicts());
-        Ok(Report { file: path, verdicts, runs, computed, combinations, quantiles, judgements: self.judgements.clone() })
+        Ok(Report {
+            file: path,
+            verdicts,
+            runs,
+            computed,
+            combinations,
+            quantiles,
+            judgements: self.judgements.clone(),
+            refused: self.manifest.refused.clone(),
+        })
     }
 }
 

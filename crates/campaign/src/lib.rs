@@ -11,6 +11,9 @@
 //!
 //! A plan [with verdicts](CampaignPlan::with_verdicts) has each combination judged once, by a [`Judge`] that its caller brings, before anything runs.
 //!
+//! A campaign over [`Strategies`] is [compared](Campaign::compare): the mean of every measure for each strategy, its difference to the first one seed by seed, and
+//! intervals of both. Combinations that a strategy refuses are [left out](CampaignPlan::leaving_out), and known before anything runs.
+//!
 //! Nothing here is printed and no clock is read.
 //!
 //! ```
@@ -33,6 +36,7 @@
 //! ```
 
 mod campaign;
+mod compare;
 mod error;
 mod folder;
 mod plan;
@@ -43,8 +47,9 @@ mod verdicts;
 mod work;
 
 pub use campaign::{Campaign, NoWatch, Outcome, Watch};
+pub use compare::{Cell, Comparison, Estimate, Figures, MOST_NUMBERS_COMPARED, MeasuredColumn, Share, Strategies, StrategiesError};
 pub use error::CampaignError;
-pub use plan::{CampaignPlan, MOST_COMBINATIONS, MOST_RUNS, PlanSpec};
+pub use plan::{CampaignPlan, MOST_COMBINATIONS, MOST_RUNS, PlanSpec, Refused};
 pub use report::{CombinationReport, MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Quantiles, Report};
 pub use table::{Column, Format, Kind, Value};
 pub use vary::{MOST_VALUES, Variation, VaryError, split_at_commas};

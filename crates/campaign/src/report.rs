@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::plan::{Accepted, Refused};
 use crate::table::Gist;
 use crate::verdicts::Judgement;
 
@@ -17,13 +18,15 @@ pub struct Report {
     pub runs: u64,
     /// How many of them were done this time; the others were there already.
     pub computed: u64,
-    /// The combinations, in order.
+    /// The combinations, in order; those that are left out have no runs.
     pub combinations: Vec<CombinationReport>,
     /// The quantiles of each combination, `None` where all of its runs diverged. Empty if they would take too much memory: beyond
     /// [`MOST_RUNS_OF_QUANTILES`] or [`MOST_COMBINATIONS_OF_QUANTILES`].
     pub quantiles: Vec<Option<Quantiles>>,
     /// The judgement of each combination; empty without verdicts.
     pub judgements: Arc<[Judgement]>,
+    /// The combinations that are left out, each with its reason.
+    pub refused: Refused,
 }
 
 /// What the runs of one combination come to.
@@ -59,8 +62,10 @@ impl Report {
 
 /// Takes the runs one by one, in order.
 #[derive(Debug)]
-pub(crate) struct Tally {
-    of_each: u64,
+pub(crate) struct Tally<'a> {
+    accepted: &'a Accepted,
+    /// How many combinations there are, those that are left out among them.
+    all: u64,
     runs: u64,
     combinations: Vec<CombinationReport>,
     /// Of the runs of the combination at hand that did not diverge; `None` if no quantiles are kept.
@@ -68,18 +73,18 @@ pub(crate) struct Tally {
     quantiles: Vec<Option<Quantiles>>,
 }
 
-impl Tally {
-    pub(crate) fn new(of_each: u64, combinations: u64) -> Self {
+impl<'a> Tally<'a> {
+    pub(crate) fn new(of_each: u64, combinations: u64, accepted: &'a Accepted) -> Self {
         let kept = of_each <= MOST_RUNS_OF_QUANTILES && combinations <= MOST_COMBINATIONS_OF_QUANTILES;
-        Self { of_each, runs: 0, combinations: Vec::new(), discrepancies: kept.then(Vec::new), quantiles: Vec::new() }
+        Self { accepted, all: combinations, runs: 0, combinations: Vec::new(), discrepancies: kept.then(Vec::new), quantiles: Vec::new() }
     }
 
     pub(crate) fn add(&mut self, gist: Gist) {
-        if self.runs.is_multiple_of(self.of_each) {
-            self.end_combination();
-            self.combinations.push(CombinationReport::default());
+        let (combination, of_it) = self.accepted.run(self.runs);
+        if of_it == 0 {
+            self.begin(combination + 1);
         }
-        let run = self.runs;
+        let run = self.accepted.number(self.runs);
         self.runs += 1;
         let Some(combination) = self.combinations.last_mut() else { return };
         combination.runs += 1;
@@ -103,6 +108,14 @@ impl Tally {
         self.runs
     }
 
+    /// Ends combinations until there are that many: those before the last are left out.
+    fn begin(&mut self, count: u64) {
+        while (self.combinations.len() as u64) < count {
+            self.end_combination();
+            self.combinations.push(CombinationReport::default());
+        }
+    }
+
     /// Puts away what the combination that is over has.
     fn end_combination(&mut self) {
         if let Some(discrepancies) = self.discrepancies.as_mut().filter(|_| !self.combinations.is_empty()) {
@@ -113,6 +126,7 @@ impl Tally {
 
     /// What the combinations come to, and their quantiles.
     pub(crate) fn finish(mut self) -> (Vec<CombinationReport>, Vec<Option<Quantiles>>) {
+        self.begin(self.all);
         self.end_combination();
         for combination in &mut self.combinations {
             #[expect(clippy::cast_precision_loss, reason = "fewer runs than 2^52")]
@@ -161,7 +175,8 @@ mod tests {
 
     #[test]
     fn runs_are_summed_up_by_combination_without_those_that_diverged() {
-        let mut tally = Tally::new(3, 3);
+        let accepted = Accepted::new(3, 3, std::iter::empty());
+        let mut tally = Tally::new(3, 3, &accepted);
         for (diverged, max_discrepancy) in
             [(false, 1.0), (true, f64::INFINITY), (false, 4.0), (true, 5.0), (true, 6.0), (true, f64::NAN), (false, 4.0)]
         {
@@ -176,8 +191,31 @@ mod tests {
         assert_eq!(*first, expected);
         assert_eq!(*second, CombinationReport { runs: 3, diverged: 3, ..CombinationReport::default() });
         assert_eq!((third.worst_run, third.mean_discrepancy), (Some(6), Some(4.0)));
-        let report = Report { file: PathBuf::new(), verdicts: None, runs: 7, computed: 7, combinations, quantiles, judgements: Arc::from([]) };
+        let report = Report {
+            file: PathBuf::new(),
+            verdicts: None,
+            runs: 7,
+            computed: 7,
+            combinations,
+            quantiles,
+            judgements: Arc::from([]),
+            refused: Refused::new(),
+        };
         assert_eq!((report.diverged(), report.worst().and_then(|worst| worst.worst_run)), (4, Some(2)), "of equal ones the first");
+    }
+
+    #[test]
+    fn combinations_that_are_left_out_have_no_runs() {
+        let accepted = Accepted::new(4, 2, [0, 2, 3].into_iter());
+        let mut tally = Tally::new(2, 4, &accepted);
+        tally.add(Gist { diverged: false, max_discrepancy: 1.0 });
+        tally.add(Gist { diverged: false, max_discrepancy: 3.0 });
+        let (combinations, quantiles) = tally.finish();
+        assert_eq!(
+            combinations.iter().map(|combination| (combination.runs, combination.mean_discrepancy)).collect::<Vec<_>>(),
+            [(0, None), (2, Some(2.0)), (0, None), (0, None)]
+        );
+        assert_eq!(quantiles.iter().map(Option::is_some).collect::<Vec<_>>(), [false, true, false, false]);
     }
 
     /// The definition itself: the least value that at least p % do not exceed.

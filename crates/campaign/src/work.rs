@@ -13,7 +13,7 @@ use cohaptic_scene::Scene;
 
 use crate::campaign::Watch;
 use crate::error::CampaignError;
-use crate::plan::{CHUNK, CampaignPlan, Parts};
+use crate::plan::{Accepted, CHUNK, CampaignPlan, Parts};
 use crate::table::{Roster, Row, RunId, row};
 use crate::verdicts::Judgement;
 
@@ -26,6 +26,7 @@ pub(crate) struct Work<'a> {
     pub(crate) roster: &'a Roster,
     /// One for each combination; none if none are asked for.
     pub(crate) judgements: &'a [Judgement],
+    pub(crate) accepted: &'a Accepted,
     pub(crate) parts: Parts,
     pub(crate) watch: &'a dyn Watch,
     /// Puts a whole part away.
@@ -102,8 +103,8 @@ impl Work<'_> {
             scenes.iter().map(|scene| Measures::run(scene, Model::Least)).collect()
         };
         let rows = runs.zip(scenes.iter().zip(&outcomes)).map(|(run, (scene, (summary, measured)))| {
-            let combination = run / self.plan.runs_of_each();
-            let place = RunId { run, combination, seed: scene.seed };
+            let (combination, _) = self.accepted.run(run);
+            let place = RunId { run: self.accepted.number(run), combination, seed: scene.seed };
             let judgement = usize::try_from(combination).ok().and_then(|place| self.judgements.get(place));
             row(place, self.plan.values(combination), judgement, (summary, measured), self.roster)
         });
@@ -114,9 +115,9 @@ impl Work<'_> {
 
     /// The scene of a run: that of its combination with a seed of its own.
     fn scene(&self, run: u64, known: &Scenes) -> Result<Scene, CampaignError> {
-        let of_each = self.plan.runs_of_each();
-        let mut scene = Scene::clone(&*known.get(run / of_each, self.plan)?);
-        scene.seed += run % of_each;
+        let (combination, of_it) = self.accepted.run(run);
+        let mut scene = Scene::clone(&*known.get(combination, self.plan)?);
+        scene.seed += of_it;
         Ok(scene)
     }
 

@@ -30,8 +30,8 @@ pub(crate) enum Failure {
     /// The scene is refused with the values of one combination of a campaign.
     Combination {
         error: Box<SceneError>,
-        /// Whether the fault is in one of these values.
-        is_varied: bool,
+        /// The option that gave the value with the fault.
+        option: &'static str,
         /// Which combination it is, as a line of its own.
         combination: String,
     },
@@ -93,9 +93,8 @@ impl Failure {
     pub(crate) const fn option(&self) -> &'static str {
         match self {
             Self::Override { option, .. } => option,
-            Self::Combination { is_varied: true, .. } => "--vary",
-            Self::Combination { .. }
-            | Self::Scene(_)
+            Self::Combination { option, .. } => option,
+            Self::Scene(_)
             | Self::Record(_)
             | Self::LinkKeys(_)
             | Self::Input(_)

@@ -14,6 +14,7 @@ mod analysis_watch;
 mod arguments;
 mod campaign;
 mod check;
+mod compare;
 mod document_schema;
 mod documents;
 #[cfg(not(target_os = "linux"))]
@@ -35,6 +36,7 @@ mod measures;
 mod output;
 mod paper;
 mod progress;
+mod quick_verdict;
 #[cfg(target_os = "linux")]
 mod realtime;
 #[cfg(target_os = "linux")]
@@ -43,6 +45,7 @@ mod report;
 #[cfg(target_os = "linux")]
 mod router;
 mod run;
+mod shell;
 mod stability;
 mod terminal_plot;
 mod texts;
@@ -70,6 +73,7 @@ fn main() -> ExitCode {
         Command::Check(arguments) => check::check(&arguments),
         Command::Explain(arguments) => explain::explain(&arguments),
         Command::Campaign(arguments) => campaign::campaign(&arguments),
+        Command::Compare(arguments) => compare::compare(&arguments),
         Command::Stability(arguments) => stability::stability(&arguments),
         Command::Admittance(arguments) => admittance::admittance(&arguments),
         Command::Live(arguments) => live::live(&arguments),

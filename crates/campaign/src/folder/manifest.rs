@@ -7,7 +7,7 @@ use cohaptic_files::write_whole;
 use serde::{Deserialize, Serialize};
 
 use crate::error::CampaignError;
-use crate::plan::{CampaignPlan, Parts};
+use crate::plan::{Accepted, CampaignPlan, Checked, Parts, Refused};
 use crate::table::Roster;
 
 /// How files of a campaign are laid out. Another layout is another number.
@@ -37,11 +37,14 @@ pub(crate) struct Manifest {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     verdicts: bool,
     pub(crate) roster: Roster,
+    /// The combinations that are left out.
+    #[serde(default, skip_serializing_if = "Refused::is_empty")]
+    pub(crate) refused: Refused,
 }
 
 impl Manifest {
     /// Of a plan that was checked.
-    pub(crate) fn new(plan: &CampaignPlan, fingerprint: u64, roster: Roster, parts: Parts) -> Self {
+    pub(crate) fn new(plan: &CampaignPlan, fingerprint: u64, checked: Checked, parts: Parts) -> Self {
         Self {
             layout: LAYOUT,
             program: plan.program().to_owned(),
@@ -54,7 +57,8 @@ impl Manifest {
             part: plan.part(),
             part_runs: parts.size,
             verdicts: plan.has_verdicts(),
-            roster,
+            roster: checked.roster,
+            refused: checked.refused,
         }
     }
 
@@ -92,6 +96,11 @@ impl Manifest {
         Parts { runs, size: self.part_runs }
     }
 
+    /// The combinations that are run.
+    pub(crate) fn accepted(&self, plan: &CampaignPlan) -> Accepted {
+        Accepted::new(plan.combinations(), plan.runs_of_each(), self.refused.keys().copied())
+    }
+
     /// What this campaign, which is there, has that the plan has not, in words; nothing if it is the same one. Files that scenes name are not compared.
     pub(crate) fn differences(&self, plan: &CampaignPlan) -> Vec<String> {
         let mut differences = Vec::new();
@@ -110,6 +119,9 @@ impl Manifest {
         compare("--part", part(self.part), part(plan.part()));
         let given = |verdicts: bool| if verdicts { "given" } else { "not given" }.to_owned();
         compare("--verdicts", given(self.verdicts), given(plan.has_verdicts()));
+        if !self.refused.is_empty() && !plan.may_leave_out() {
+            differences.push(format!("combinations that are refused, {} of them, are left out there and not here", self.refused.len()));
+        }
         if self.scene != plan.text() {
             differences.push(different_line(&self.scene, plan.text()));
         }

@@ -5,6 +5,8 @@
 //! campaign.json            what the campaign is; the first file with its own name
 //! verdicts.part.csv        judgements, as long as not all are known
 //! verdicts.csv             all judgements
+//! stability.part.csv       judgements of a campaign whose table has none
+//! stability.csv
 //! part-00000.parquet …     whole parts
 //! runs.parquet             the table; the parts go when it is there
 //! ```
@@ -108,9 +110,14 @@ impl Folder {
         self.path.join("verdicts.csv")
     }
 
-    /// Judgements as they are made.
-    pub(crate) fn journal(&self) -> PathBuf {
-        self.path.join("verdicts.part.csv")
+    /// All judgements of a campaign whose table has none.
+    pub(crate) fn stability(&self) -> PathBuf {
+        self.path.join("stability.csv")
+    }
+
+    /// The file of judgements as they are made, before they are all in the table of that name.
+    pub(crate) fn journal(judgements: &Path) -> PathBuf {
+        judgements.with_extension("part.csv")
     }
 
     pub(crate) fn part(&self, part: u64, format: Format) -> PathBuf {
@@ -130,8 +137,8 @@ impl Folder {
     }
 
     /// Removes the judgements as they were made, which are all in their table.
-    pub(crate) fn remove_journal(&self) -> Result<(), CampaignError> {
-        remove(self.journal())
+    pub(crate) fn remove_journal(journal: PathBuf) -> Result<(), CampaignError> {
+        remove(journal)
     }
 
     /// Removes the parts, which are all in the table.
@@ -146,7 +153,7 @@ impl Folder {
 /// Whether a file of a campaign was being written: `campaign.json.partial`, `part-….partial`, `runs.….partial`, `verdicts.csv.partial`.
 fn is_partial(path: &Path) -> bool {
     let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-    name.ends_with(cohaptic_files::PARTIAL) && ["campaign.", "part-", "runs.", "verdicts."].iter().any(|begin| name.starts_with(begin))
+    name.ends_with(cohaptic_files::PARTIAL) && ["campaign.", "part-", "runs.", "verdicts.", "stability."].iter().any(|begin| name.starts_with(begin))
 }
 
 /// Removes a file if it is there.

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use cohaptic_scene::{Fingerprint, Scene};
 use rayon::prelude::*;
 
-use super::CampaignPlan;
+use super::{CampaignPlan, Refused};
 use crate::campaign::Watch;
 use crate::error::CampaignError;
 use crate::table::Roster;
@@ -22,6 +22,17 @@ pub(crate) struct Checked {
     pub(crate) events: u64,
     /// The numbers of those scenes that the fingerprint looks at, by combination: to read them a second time would take as long as the check.
     pub(crate) numbers: BTreeMap<u64, u64>,
+    /// The combinations that are left out.
+    pub(crate) refused: Refused,
+}
+
+/// What a block of combinations comes to.
+#[derive(Default)]
+struct Block {
+    /// Their roster, and the events of the longest run; `None` if all of them are left out.
+    runs: Option<(Roster, u64)>,
+    numbers: BTreeMap<u64, u64>,
+    refused: Refused,
 }
 
 impl CampaignPlan {
@@ -44,40 +55,74 @@ impl CampaignPlan {
             }
             checked
         };
-        let checked: Vec<Result<Checked, CampaignError>> = (0..blocks).into_par_iter().map(check).collect();
-        let mut all: Option<Checked> = None;
+        let checked: Vec<Result<Block, CampaignError>> = (0..blocks).into_par_iter().map(check).collect();
+        let mut all = Block::default();
         for checked in checked {
-            all = Some(join(all, checked?));
+            all.join(checked?);
         }
-        all.ok_or(CampaignError::Stopped)
+        let Block { runs, numbers, refused } = all;
+        match (runs, refused.keys().next()) {
+            (Some((roster, events)), _) => Ok(Checked { roster, events, numbers, refused }),
+            // Nothing is left to be run: the first refusal says why.
+            (None, Some(first)) => Err(self.scene(*first).map_or_else(|error| error, |_| CampaignError::Stopped)),
+            (None, None) => Err(CampaignError::Stopped),
+        }
     }
 
-    fn check_block(&self, block: u64, watch: &dyn Watch) -> Result<Checked, CampaignError> {
+    fn check_block(&self, block: u64, watch: &dyn Watch) -> Result<Block, CampaignError> {
         if !watch.keep_going() {
             return Err(CampaignError::Stopped);
         }
         let combinations = block * BLOCK..((block + 1) * BLOCK).min(self.combinations);
         let count = combinations.end - combinations.start;
-        let mut all: Option<Checked> = None;
+        let mut all = Block::default();
         for combination in combinations {
-            let scene = self.scene(combination)?;
-            let (roster, events) = (Roster::of(&scene), events(&scene));
-            let number = self.is_looked_at(combination).then(|| (combination, scene.fingerprint().get()));
-            all = Some(join(all, Checked { roster, events, numbers: number.into_iter().collect() }));
+            let (scene, reason) = self.scene_or_fallback(combination)?;
+            match reason {
+                Some(reason) => drop(all.refused.insert(combination, reason)),
+                None => all.add(Roster::of(&scene), events(&scene)),
+            }
+            if self.is_looked_at(combination) {
+                all.numbers.insert(combination, scene.fingerprint().get());
+            }
         }
         watch.checked(count);
-        all.ok_or(CampaignError::Stopped)
+        Ok(all)
+    }
+
+    /// The scene of a combination; of one that is left out its scene with the fallback, and why it is left out.
+    fn scene_or_fallback(&self, combination: u64) -> Result<(Scene, Option<String>), CampaignError> {
+        let error = match self.scene(combination) {
+            Ok(scene) => return Ok((scene, None)),
+            Err(error) => error,
+        };
+        let reason = match (&self.fallback, &error) {
+            (Some(fallback), CampaignError::Scene { error: refused, .. }) => {
+                let reason = refused.diagnostic().map_or_else(|| refused.to_string(), |diagnostic| diagnostic.message().to_owned());
+                self.scene_with(combination, fallback).ok().map(|scene| (scene, Some(reason)))
+            }
+            _ => None,
+        };
+        reason.ok_or(error)
     }
 }
 
-fn join(all: Option<Checked>, other: Checked) -> Checked {
-    match all {
-        None => other,
-        Some(mut all) => {
-            all.roster.add(&other.roster);
-            all.events = all.events.max(other.events);
-            all.numbers.extend(other.numbers);
-            all
+impl Block {
+    fn join(&mut self, other: Self) {
+        if let Some((roster, events)) = other.runs {
+            self.add(roster, events);
+        }
+        self.numbers.extend(other.numbers);
+        self.refused.extend(other.refused);
+    }
+
+    fn add(&mut self, roster: Roster, events: u64) {
+        match &mut self.runs {
+            None => self.runs = Some((roster, events)),
+            Some((all, most)) => {
+                all.add(&roster);
+                *most = events.max(*most);
+            }
         }
     }
 }
@@ -93,14 +138,17 @@ fn events(scene: &Scene) -> u64 {
 
 impl CampaignPlan {
     /// A number for all that the scenes say, and the files that they name. Looked at are those scenes in which every value of every key appears once: whatever file a value names is
-    /// among them.
+    /// among them. A combination that is left out is looked at with the fallback.
     ///
     /// # Errors
     ///
     /// If one of these scenes is refused: the first.
     pub(crate) fn fingerprint(&self) -> Result<u64, CampaignError> {
-        let numbers: Vec<Result<u64, CampaignError>> =
-            self.looked_at().into_par_iter().map(|combination| self.scene(combination).map(|scene| scene.fingerprint().get())).collect();
+        let numbers: Vec<Result<u64, CampaignError>> = self
+            .looked_at()
+            .into_par_iter()
+            .map(|combination| self.scene_or_fallback(combination).map(|(scene, _)| scene.fingerprint().get()))
+            .collect();
         Ok(all_of(numbers.into_iter().collect::<Result<Vec<u64>, CampaignError>>()?))
     }
 

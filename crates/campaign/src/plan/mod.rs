@@ -1,5 +1,6 @@
 //! The plan of a campaign: which runs there are, and the scene of each.
 
+mod accepted;
 mod check;
 mod parts;
 #[cfg(test)]
@@ -13,6 +14,9 @@ use crate::error::CampaignError;
 use crate::table::Format;
 use crate::vary::{Variation, Varied, same_key};
 
+pub(crate) use accepted::Accepted;
+pub use accepted::Refused;
+pub(crate) use check::Checked;
 pub(crate) use parts::{CHUNK, Parts};
 
 /// The most combinations of values.
@@ -55,6 +59,8 @@ pub struct CampaignPlan {
     part: Option<u64>,
     program: String,
     verdicts: bool,
+    /// With these overrides on top a combination is accepted that may be left out; `None`: none may.
+    fallback: Option<Vec<String>>,
 }
 
 impl CampaignPlan {
@@ -91,13 +97,20 @@ impl CampaignPlan {
             )));
         }
         let (text, file, set, program) = (text.to_owned(), file.to_path_buf(), set.to_vec(), program.to_owned());
-        Ok(Self { text, file, set, variations, runs, combinations, format, part, program, verdicts: false })
+        Ok(Self { text, file, set, variations, runs, combinations, format, part, program, verdicts: false, fallback: None })
     }
 
     /// The same campaign with a verdict on each combination, which stands in the rows of its runs.
     #[must_use]
     pub fn with_verdicts(self) -> Self {
         Self { verdicts: true, ..self }
+    }
+
+    /// The same campaign, in which a combination is left out whose scene is refused and would not be with these overrides on top: what refuses it is then the
+    /// value that they replace. Any other refusal is an error as ever.
+    #[must_use]
+    pub fn leaving_out(self, fallback: Vec<String>) -> Self {
+        Self { fallback: Some(fallback), ..self }
     }
 
     /// Whether each combination is judged.
@@ -118,7 +131,7 @@ impl CampaignPlan {
         self.runs
     }
 
-    /// How many runs there are in all.
+    /// How many runs there are in all, if no combination is left out.
     #[must_use]
     pub const fn runs(&self) -> u64 {
         self.combinations * self.runs
@@ -133,7 +146,7 @@ impl CampaignPlan {
     /// What a combination puts into the scene, on top of the overrides of all runs: texts `KEY=VALUE`.
     #[must_use]
     pub fn varied(&self, combination: u64) -> Vec<String> {
-        self.places(combination).into_iter().zip(&self.variations).map(|(place, vary)| vary.override_text(place)).collect()
+        self.places(combination).into_iter().zip(&self.variations).flat_map(|(place, vary)| vary.overrides(place)).collect()
     }
 
     /// The values of a combination, for the table.
@@ -172,8 +185,13 @@ impl CampaignPlan {
     ///
     /// [`CampaignError::Scene`] if the scene is refused with these values or too large, [`CampaignError::NotRun`] if its seeds leave their range.
     pub fn scene(&self, combination: u64) -> Result<Scene, CampaignError> {
+        self.scene_with(combination, &[])
+    }
+
+    /// The scene of a combination with more overrides on top.
+    fn scene_with(&self, combination: u64, more: &[String]) -> Result<Scene, CampaignError> {
         let varied = self.varied(combination);
-        let overrides: Vec<String> = self.set.iter().chain(&varied).cloned().collect();
+        let overrides: Vec<String> = self.set.iter().chain(&varied).chain(more).cloned().collect();
         let scene = match Scene::parse(&self.text, &self.file, &overrides) {
             Ok(scene) => scene,
             Err(error) => return Err(CampaignError::Scene { error: Box::new(error), varied }),
@@ -208,6 +226,11 @@ impl CampaignPlan {
 
     pub(crate) fn set(&self) -> &[String] {
         &self.set
+    }
+
+    /// Whether combinations may be left out.
+    pub(crate) const fn may_leave_out(&self) -> bool {
+        self.fallback.is_some()
     }
 
     pub(crate) const fn part(&self) -> Option<u64> {

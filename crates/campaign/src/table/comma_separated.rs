@@ -6,7 +6,7 @@ use std::path::Path;
 
 use cohaptic_files::WholeFile;
 
-use super::format::{GIST, Gist, Gists, TableError, rows_missing};
+use super::format::{COMPLETE, GIST, Gist, Gists, RunColumns, TableError, rows_missing};
 use super::{Column, Row, Value};
 
 pub(super) fn write(file: &mut WholeFile, columns: &[Column], rows: &[Row]) -> io::Result<()> {
@@ -113,4 +113,23 @@ pub(super) fn read_gists(file: File, each: Gists<'_>) -> Result<(), TableError> 
         each(Gist { diverged: record.get(ending) == Some("diverged"), max_discrepancy });
     }
     Ok(())
+}
+
+/// Columns of numbers, and which runs were complete.
+pub(super) fn read_columns(file: File, names: &[&str]) -> Result<RunColumns, TableError> {
+    let mut reader = csv::Reader::from_reader(BufReader::new(file));
+    let header = reader.headers().map_err(unread)?;
+    let place = |name: &str| header.iter().position(|found| found == name).ok_or_else(|| TableError::Content(format!("no column {name}")));
+    let ending = place(GIST[0])?;
+    let places = names.iter().map(|name| place(name)).collect::<Result<Vec<usize>, TableError>>()?;
+    let (mut read, mut record) = (RunColumns::of(names.len()), csv::StringRecord::new());
+    while reader.read_record(&mut record).map_err(unread)? {
+        read.complete.push(record.get(ending) == Some(COMPLETE));
+        for (place, column) in places.iter().zip(&mut read.columns) {
+            let cell = record.get(*place).unwrap_or_default();
+            let number = if cell.is_empty() { Ok(f64::NAN) } else { cell.parse() };
+            column.push(number.map_err(|_| TableError::Content(format!("{cell:?} is no number")))?);
+        }
+    }
+    Ok(read)
 }

@@ -51,6 +51,14 @@ impl Format {
             Self::Csv => comma_separated::read_gists(file, each),
         }
     }
+
+    /// Columns of numbers by their names, and which runs were complete.
+    pub(crate) fn read_columns(self, file: File, names: &[&str]) -> Result<RunColumns, TableError> {
+        match self {
+            Self::Parquet => parquet_file::read_columns(file, names),
+            Self::Csv => comma_separated::read_columns(file, names),
+        }
+    }
 }
 
 /// What goes into every file of a table.
@@ -69,6 +77,25 @@ pub(crate) struct Gist {
     pub(crate) diverged: bool,
     pub(crate) max_discrepancy: f64,
 }
+
+/// Columns of a table, by run.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct RunColumns {
+    /// Whether the run came to its end.
+    pub(crate) complete: Vec<bool>,
+    /// The columns in the order in which they were asked for; no number where a run has none.
+    pub(crate) columns: Vec<Vec<f64>>,
+}
+
+impl RunColumns {
+    /// Empty columns.
+    pub(super) fn of(columns: usize) -> Self {
+        Self { complete: Vec::new(), columns: vec![Vec::new(); columns] }
+    }
+}
+
+/// What the column `ending` says of a run that came to its end.
+pub(super) const COMPLETE: &str = "complete";
 
 /// The names of the columns that a [`Gist`] comes from.
 pub(super) const GIST: [&str; 2] = ["ending", "max_discrepancy_m"];

@@ -18,7 +18,7 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 
-use super::format::{GIST, Gist, Gists, Head, TableError, rows_missing};
+use super::format::{COMPLETE, GIST, Gist, Gists, Head, RunColumns, TableError, rows_missing};
 use super::{Column, Kind, Row, Value};
 
 /// Under which key a file says what it belongs to.
@@ -148,13 +148,68 @@ pub(super) fn read_gists(file: File, each: Gists<'_>) -> Result<(), TableError> 
                 ending.read_records(rows, None, None, &mut endings)?;
                 discrepancy.read_records(rows, None, None, &mut discrepancies)?;
             }
-            _ => return Err(TableError::Content("columns of another kind than was written".to_owned())),
+            _ => return Err(of_another_kind()),
         }
         for (ending, max_discrepancy) in endings.iter().zip(&discrepancies) {
             each(Gist { diverged: ending.data() == b"diverged", max_discrepancy: *max_discrepancy });
         }
     }
     Ok(())
+}
+
+/// Columns of numbers, and which runs were complete.
+pub(super) fn read_columns(file: File, names: &[&str]) -> Result<RunColumns, TableError> {
+    let reader = SerializedFileReader::new(file)?;
+    let described = reader.metadata().file_metadata().schema_descr_ptr();
+    let place = |name: &str| {
+        let found = described.columns().iter().position(|column| column.name() == name);
+        found.ok_or_else(|| TableError::Content(format!("no column {name}")))
+    };
+    let ending = place(GIST[0])?;
+    let places = names.iter().map(|name| place(name)).collect::<Result<Vec<usize>, TableError>>()?;
+    let mut read = RunColumns::of(names.len());
+    for number in 0..reader.num_row_groups() {
+        let group = reader.get_row_group(number)?;
+        let rows = usize::try_from(group.metadata().num_rows()).unwrap_or_default();
+        let mut endings = Vec::new();
+        let ColumnReader::ByteArrayColumnReader(mut ending) = group.get_column_reader(ending)? else { return Err(of_another_kind()) };
+        ending.read_records(rows, None, None, &mut endings)?;
+        read.complete.extend(endings.iter().map(|ending| ending.data() == COMPLETE.as_bytes()));
+        for (place, column) in places.iter().zip(&mut read.columns) {
+            let optional = described.column(*place).max_def_level() > 0;
+            column.extend(numbers(group.get_column_reader(*place)?, rows, optional)?);
+        }
+    }
+    Ok(read)
+}
+
+/// The values of a column in one row group: no number where there is none.
+fn numbers(column: ColumnReader, rows: usize, optional: bool) -> Result<Vec<f64>, TableError> {
+    let (mut integers, mut numbers, mut levels) = (Vec::new(), Vec::new(), Vec::new());
+    let given = optional.then_some(&mut levels);
+    match column {
+        ColumnReader::Int64ColumnReader(mut column) => {
+            column.read_records(rows, given, None, &mut integers)?;
+            #[expect(clippy::cast_precision_loss, reason = "counts far below 2^53")]
+            numbers.extend(integers.into_iter().map(|integer| integer as f64));
+        }
+        ColumnReader::DoubleColumnReader(mut column) => drop(column.read_records(rows, given, None, &mut numbers)?),
+        ColumnReader::BoolColumnReader(_)
+        | ColumnReader::Int32ColumnReader(_)
+        | ColumnReader::Int96ColumnReader(_)
+        | ColumnReader::FloatColumnReader(_)
+        | ColumnReader::ByteArrayColumnReader(_)
+        | ColumnReader::FixedLenByteArrayColumnReader(_) => return Err(of_another_kind()),
+    }
+    if !optional {
+        return Ok(numbers);
+    }
+    let mut known = numbers.into_iter();
+    Ok(levels.into_iter().map(|level| if level > 0 { known.next().unwrap_or(f64::NAN) } else { f64::NAN }).collect())
+}
+
+fn of_another_kind() -> TableError {
+    TableError::Content("columns of another kind than was written".to_owned())
 }
 
 impl From<ParquetError> for TableError {

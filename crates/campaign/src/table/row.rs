@@ -9,6 +9,7 @@ use cohaptic_scene::MeasureName;
 use cohaptic_units::Instant;
 use cohaptic_wan::{DropCause, LinkStats};
 
+use super::format::COMPLETE;
 use super::{Roster, Row, Value};
 use crate::vary::Varied;
 use crate::verdicts::Judgement;
@@ -38,7 +39,7 @@ pub(crate) fn row<'a>(
         None => [const { Value::Absent }; 4],
     }));
     let (ending, ended) = match summary.ending {
-        Ending::Complete => ("complete", summary.duration.as_secs_f64()),
+        Ending::Complete => (COMPLETE, summary.duration.as_secs_f64()),
         Ending::Diverged(at) => ("diverged", seconds(at)),
         Ending::Interrupted(at) => ("interrupted", seconds(at)),
     };

@@ -51,7 +51,7 @@ impl Grid {
     pub(super) fn values(&self) -> Vec<Varied> {
         let value = |place| {
             let value = self.at(place);
-            Varied { text: text_of_quantity(value, &self.unit), value: Value::Number(value + 0.0) }
+            Varied::plain(text_of_quantity(value, &self.unit), Value::Number(value + 0.0))
         };
         (0..self.count).map(value).collect()
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use cohaptic_linkfile::number_and_unit;
 
+use super::group::Group;
 use super::{MOST_VALUES, Varied, VaryError};
 use crate::table::{Kind, Value};
 
@@ -16,14 +17,22 @@ pub(super) struct List {
 }
 
 impl List {
-    pub(super) fn parse(whole: &str, text: &str) -> Result<Self, VaryError> {
+    /// `with_settings`: the key, if its values may have settings.
+    pub(super) fn parse(whole: &str, with_settings: Option<&str>, text: &str) -> Result<Self, VaryError> {
         let whole = || whole.to_owned();
-        let texts = split_at_commas(text);
+        let mut texts = split_at_commas(text);
         if texts.iter().any(String::is_empty) {
             return Err(VaryError::NoValue { text: whole() });
         }
         if texts.len() > MOST_VALUES {
             return Err(VaryError::TooMany { text: whole() });
+        }
+        let mut settings = vec![Vec::new(); texts.len()];
+        for (text, settings) in texts.iter_mut().zip(&mut settings).filter(|_| with_settings.is_some()) {
+            let group = Group::parse(with_settings.unwrap_or_default(), text);
+            if let Some(group) = group.map_err(|()| VaryError::Settings { text: whole(), value: text.clone() })? {
+                (*text, *settings) = (group.text, group.settings);
+            }
         }
         let mut sorted: Vec<&String> = texts.iter().collect();
         sorted.sort_unstable();
@@ -31,7 +40,7 @@ impl List {
             return Err(VaryError::Twice { text: whole(), value });
         }
         let (unit, kind, values) = typed(&texts);
-        let values = texts.into_iter().zip(values).map(|(text, value)| Varied { text, value }).collect();
+        let values = texts.into_iter().zip(values).zip(settings).map(|((text, value), settings)| Varied { text, value, settings }).collect();
         Ok(Self { unit, kind, values })
     }
 }

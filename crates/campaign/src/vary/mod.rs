@@ -1,15 +1,19 @@
 //! A key of a scene and the values that it takes in a campaign, as they are written: `KEY=LOW..HIGH/COUNT`, `KEY=LOW..HIGH/COUNT:log`, `KEY=A,B,C`.
+//! Of `coordination.strategy` a value may have settings, `NAME{KEY=VALUE,…}`, which are put into the scene with it.
 
 mod grid;
+mod group;
 mod list;
 
 use grid::Grid;
 use list::List;
 
-use crate::table::Kind;
-use crate::table::Value;
+use crate::table::{Kind, Value, value_text};
 
 pub use list::split_at_commas;
+
+/// The key whose values may have settings.
+const STRATEGY: &str = "coordination.strategy";
 
 /// The most values that one key takes.
 pub const MOST_VALUES: usize = 1_000_000;
@@ -28,10 +32,19 @@ pub struct Variation {
 /// One value of a key.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Varied {
-    /// As it is put into the scene.
+    /// As it is written: without settings, as it is put into the scene.
     pub(crate) text: String,
     /// As it stands in the table.
     pub(crate) value: Value,
+    /// Overrides that are put into the scene with it, by their dotted paths.
+    pub(crate) settings: Vec<String>,
+}
+
+impl Varied {
+    /// A value without settings.
+    pub(super) const fn plain(text: String, value: Value) -> Self {
+        Self { text, value, settings: Vec::new() }
+    }
 }
 
 /// Why a text does not vary a key.
@@ -109,6 +122,17 @@ pub enum VaryError {
         /// The text as given.
         text: String,
     },
+    /// Braces behind the name of a strategy do not hold settings.
+    #[error(
+        "\"{value}\" in \"{text}\" is no strategy with settings: expected NAME{{KEY=VALUE,...}}, such as local-damping{{damping=58}}, with parameters of that \
+         strategy or other keys of the scene by their dotted paths"
+    )]
+    Settings {
+        /// The text as given.
+        text: String,
+        /// The value.
+        value: String,
+    },
     /// A list has an entry twice.
     #[error("{value} is there twice in \"{text}\": expected different values; for more runs of each, --runs")]
     Twice {
@@ -137,7 +161,7 @@ impl Variation {
         let (unit, kind, logarithmic, values) = match Grid::parse(text, values)? {
             Some(grid) => (grid.unit.clone(), Kind::Number, grid.logarithmic, grid.values()),
             None => {
-                let list = List::parse(text, values)?;
+                let list = List::parse(text, same_key(key, STRATEGY).then_some(key), values)?;
                 (list.unit, list.kind, false, list.values)
             }
         };
@@ -162,14 +186,31 @@ impl Variation {
         self.values.len()
     }
 
-    /// The override that gives the key this value, by its place: `KEY=VALUE`.
+    /// The key with a value as it is written, by its place: `KEY=VALUE`.
     ///
     /// # Panics
     ///
     /// If there are fewer values.
     #[must_use]
-    pub fn override_text(&self, place: usize) -> String {
+    pub fn label(&self, place: usize) -> String {
         format!("{}={}", self.key, self.values[place].text)
+    }
+
+    /// The overrides that a value puts into the scene, by its place: `KEY=VALUE`, and those of its settings.
+    ///
+    /// # Panics
+    ///
+    /// If there are fewer values.
+    #[must_use]
+    pub fn overrides(&self, place: usize) -> Vec<String> {
+        let varied = &self.values[place];
+        let name = if varied.settings.is_empty() { varied.text.as_str() } else { varied.text.split('{').next().unwrap_or_default() };
+        std::iter::once(format!("{}={name}", self.key)).chain(varied.settings.iter().cloned()).collect()
+    }
+
+    /// Its values as they are written, in order.
+    pub fn texts(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.values.iter().map(|varied| varied.text.as_str())
     }
 
     /// The name of its column: the key, and the unit if all values have the same: `link.delay_ms`, `link.loss_percent`.
@@ -211,6 +252,12 @@ impl Variation {
         self.values.get(place).map_or("", |varied| &varied.text)
     }
 
+    /// A value by its place, as it stands in a table of text; empty if there are fewer.
+    #[must_use]
+    pub fn cell(&self, place: usize) -> String {
+        self.values.get(place).map_or_else(String::new, |varied| value_text(&varied.value))
+    }
+
     pub(crate) const fn kind(&self) -> Kind {
         self.kind
     }
@@ -220,7 +267,8 @@ impl Variation {
     }
 
     /// Whether it varies that key, however its parts are quoted.
-    pub(crate) fn is_key(&self, key: &str) -> bool {
+    #[must_use]
+    pub fn is_key(&self, key: &str) -> bool {
         same_key(&self.key, key)
     }
 }

@@ -9,7 +9,7 @@ fn a_range_has_both_ends_and_equal_steps() {
     let vary = Variation::parse(" coordination.stiffness = 0..6000/4 ").unwrap();
     assert_eq!((vary.key(), vary.count(), vary.column().as_str()), ("coordination.stiffness", 4, "coordination.stiffness"));
     assert_eq!(texts("a=0..6000/4"), ["0", "2000", "4000", "6000"]);
-    assert_eq!(vary.override_text(2), "coordination.stiffness=4000");
+    assert_eq!(vary.overrides(2), ["coordination.stiffness=4000"]);
     assert_eq!((vary.kind(), &vary.values()[1].value), (Kind::Number, &Value::Number(2000.0)));
     // Tenths are the tenths that a user would write, and no others one bit away.
     assert_eq!(texts("a=0..1/11"), ["0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "1"]);
@@ -49,7 +49,7 @@ fn a_list_takes_anything_and_its_column_what_all_are() {
     assert_eq!(texts("peer.hand={ force = [1.0, 2.0] },{ force = [0.0, 0.0] }"), ["{ force = [1.0, 2.0] }", "{ force = [0.0, 0.0] }"]);
     let quoted = Variation::parse("scene.title=\"a, b\",'c'").unwrap();
     assert_eq!(quoted.values()[0].value, Value::Text("a, b".into()));
-    assert_eq!(quoted.override_text(0), "scene.title=\"a, b\"");
+    assert_eq!(quoted.overrides(0), ["scene.title=\"a, b\""]);
     assert_eq!(texts("a=5"), ["5"]);
 }
 
@@ -92,6 +92,24 @@ fn commas_within_values_do_not_split() {
     assert_eq!(split_at_commas("peer.hand={ force = [1.0, 2.0], a = 1 },x=1"), ["peer.hand={ force = [1.0, 2.0], a = 1 }", "x=1"]);
     assert_eq!(split_at_commas("scene.title=\"a, b\",x='[,'"), ["scene.title=\"a, b\"", "x='[,'"]);
     assert_eq!(split_at_commas("a=1,"), ["a=1", ""]);
+}
+
+#[test]
+fn a_strategy_may_have_settings() {
+    let vary =
+        Variation::parse("coordination.strategy=average-position,local-damping{ damping = 58 },extrapolated{horizon=50ms,object.mass=1}").unwrap();
+    assert_eq!(vary.texts().collect::<Vec<&str>>(), ["average-position", "local-damping{damping=58}", "extrapolated{horizon=50ms,object.mass=1}"]);
+    assert_eq!(vary.overrides(0), ["coordination.strategy=average-position"]);
+    assert_eq!(vary.overrides(1), ["coordination.strategy=local-damping", "coordination.local-damping.damping=58"]);
+    assert_eq!(vary.overrides(2), ["coordination.strategy=extrapolated", "coordination.extrapolated.horizon=50ms", "object.mass=1"]);
+    assert_eq!(vary.label(1), "coordination.strategy=local-damping{damping=58}");
+    assert_eq!((vary.column(), vary.kind()), ("coordination.strategy".to_owned(), Kind::Text));
+    for (values, part) in [("a{b}", "is no strategy with settings"), ("a{b=1},a{ b=1 }", "is there twice")] {
+        let error = Variation::parse(&format!("coordination.strategy={values}")).unwrap_err().to_string();
+        assert!(error.contains(part) && error.contains("expected"), "{error}");
+    }
+    // Texts of other keys are what they are.
+    assert_eq!(Variation::parse("scene.title=a{b}").unwrap().overrides(0), ["scene.title=a{b}"]);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, reason = "tests: what is written is what was computed, to the bit")]
 
 mod bench;
+mod compare;
 mod folders;
 mod resume;
 mod tables;

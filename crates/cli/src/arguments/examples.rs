@@ -46,6 +46,12 @@ pub(super) const CAMPAIGN: &[&str] = &[
     "cohaptic campaign scene.toml --vary link.loss=0%..30%/7 --verdicts --size one-column --out losses",
 ];
 
+pub(super) const COMPARE: &[&str] = &[
+    "cohaptic compare scene.toml --strategies average-position,extrapolated --vary link.delay=8ms..48ms/6 --out compared",
+    "cohaptic compare scene.toml --strategies 'extrapolated{horizon=50ms},extrapolated{horizon=200ms}' --vary link.loss=0%,10% --runs 20 --out horizons",
+    "cohaptic compare scene.toml --preset field --out field",
+];
+
 pub(super) const STABILITY: &[&str] =
     &["cohaptic stability point scenarios/paper/5-1-ap-2100.toml", "cohaptic stability boundary scene.toml --along coordination.stiffness=100..6000"];
 

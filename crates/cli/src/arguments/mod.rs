@@ -1,5 +1,6 @@
 //! What can be said on the command line.
 
+mod compare;
 mod examples;
 mod falcon;
 mod links;
@@ -17,6 +18,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use cohaptic_picture::{Size, SizeError};
 
+pub(crate) use compare::{CompareArguments, PresetName};
 pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
 };
@@ -24,7 +26,7 @@ pub(crate) use links::{FitArguments, LinkArguments, Profile};
 pub(crate) use pages::{CompletionsArguments, FileKind, InitArguments, ManArguments, SchemaArguments};
 pub(crate) use paper::{AccuracyArguments, PaperArguments};
 pub(crate) use realtime::{LiveArguments, RealTimeArguments, RelayArguments, RouterArguments};
-pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, RunArguments, TableFormat};
+pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, MeasureArguments, RunArguments, TableFormat};
 pub(crate) use stability::{
     AdmittanceArguments, BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, StabilityArguments, StabilityCommand,
 };
@@ -49,6 +51,8 @@ pub(crate) enum Command {
     Explain(ExplainArguments),
     /// Runs a scene many times, over values of its keys and over seeds, into one table: on all cores, and resumable
     Campaign(CampaignArguments),
+    /// Sets strategies side by side, over values of keys and with the same seeds: measures with their intervals, a table and a page
+    Compare(CompareArguments),
     /// Says whether a scene is stable without simulating it, maps where it is, and finds where that changes
     Stability(StabilityArguments),
     /// Says what the hand of one peer feels, frequency by frequency, without simulating it

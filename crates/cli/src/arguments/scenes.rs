@@ -115,6 +115,11 @@ pub(crate) struct MeasureArguments {
 }
 
 impl MeasureArguments {
+    /// All, as by `--measure all`.
+    pub(crate) fn all() -> Self {
+        Self { measure: Some("all".to_owned()) }
+    }
+
     /// As it was given.
     pub(crate) fn word(&self) -> Option<&str> {
         self.measure.as_deref()

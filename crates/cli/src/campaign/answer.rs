@@ -112,8 +112,8 @@ fn table(finished: &Finished) -> Vec<String> {
     let heads = heads.iter().chain(&["diverged", "mean discrepancy", "largest"]).map(|head| (*head).to_owned());
     let mut rows: Vec<Vec<String>> = vec![keys.iter().cloned().chain(heads).collect()];
     for (number, combination) in finished.report.combinations.iter().enumerate().take(MOST_COMBINATIONS) {
-        let varied = finished.plan.varied(number as u64);
-        let values = varied.iter().map(|text| text.split_once('=').map_or_else(String::new, |(_, value)| value.to_owned()));
+        let places = finished.plan.places(number as u64);
+        let values = finished.plan.variations().iter().zip(places).map(|(vary, place)| vary.value_text(place).to_owned());
         let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), length);
         let figures = [combination.diverged.to_string(), metres(combination.mean_discrepancy), metres(combination.largest_discrepancy)];
         rows.push(values.chain(judgements.get(number).into_iter().flat_map(judged)).chain(figures).collect());

@@ -2,10 +2,10 @@
 
 mod answer;
 mod judge;
-mod picture;
+pub(crate) mod picture;
 
 use std::num::NonZeroU64;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
@@ -21,7 +21,7 @@ use judge::ByAnalysis;
 use picture::Drawn;
 
 /// The program, as a campaign remembers it.
-const PROGRAM: &str = concat!("cohaptic ", env!("CARGO_PKG_VERSION"));
+pub(crate) const PROGRAM: &str = concat!("cohaptic ", env!("CARGO_PKG_VERSION"));
 
 /// A campaign that is finished, and what it took.
 struct Finished {
@@ -66,7 +66,7 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
 }
 
 fn plan(arguments: &CampaignArguments) -> Result<CampaignPlan, Failure> {
-    let refused = |error: CampaignError| failure(error, arguments);
+    let refused = |error: CampaignError| failure(error, &arguments.scene.scene, &[]);
     let variations =
         arguments.vary.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<Variation>, _>>().map_err(|error| refused(error.into()))?;
     let set: Vec<String> = arguments.scene.overrides.set.iter().cloned().chain(arguments.measure.override_text()).collect();
@@ -83,49 +83,82 @@ fn plan(arguments: &CampaignArguments) -> Result<CampaignPlan, Failure> {
 }
 
 fn execute(arguments: &CampaignArguments, plan: CampaignPlan) -> Result<Report, Failure> {
-    let refused = |error: CampaignError| failure(error, arguments);
-    let (runs, combinations) = (plan.runs(), plan.combinations());
-    let checking = Shown::checking(combinations);
-    let opened = Campaign::open(plan, &arguments.out, &checking);
-    checking.clear();
-    let mut campaign = opened.map_err(refused)?;
+    let refused = |error: CampaignError| failure(error, &arguments.scene.scene, &[]);
+    let combinations = plan.combinations();
+    let mut campaign = open(plan, &arguments.out).map_err(refused)?;
     let judging = Shown::judging(combinations);
     let missing = campaign.judge(&ByAnalysis, &judging);
     judging.clear();
     let missing = missing.map_err(refused)?;
     if missing > 0 {
-        let out = output::path(&arguments.out);
-        let judged = combinations - missing;
-        return Err(Failure::Interrupted(format!("{judged} of {combinations} verdicts are kept in {out}; the same command goes on from there")));
+        return Err(not_all_judged(combinations - missing, combinations, &arguments.out));
     }
+    run_to_end(&mut campaign, &arguments.out).map_err(|ended| ended.unwrap_or_else(refused))
+}
+
+/// Begins or continues a campaign, and shows how far the check of its combinations is.
+pub(crate) fn open(plan: CampaignPlan, out: &Path) -> Result<Campaign, CampaignError> {
+    let checking = Shown::checking(plan.combinations());
+    let opened = Campaign::open(plan, out, &checking);
+    checking.clear();
+    opened
+}
+
+/// The user ended it before all combinations were judged.
+pub(crate) fn not_all_judged(judged: u64, combinations: u64, out: &Path) -> Failure {
+    Failure::Interrupted(format!("{judged} of {combinations} verdicts are kept in {}; the same command goes on from there", output::path(out)))
+}
+
+/// A command on a campaign that ended before its result: in words already, or with an error of the campaign.
+pub(crate) enum Ended {
+    Said(Failure),
+    Error(CampaignError),
+}
+
+impl Ended {
+    pub(crate) fn unwrap_or_else(self, said: impl FnOnce(CampaignError) -> Failure) -> Failure {
+        match self {
+            Self::Said(failure) => failure,
+            Self::Error(error) => said(error),
+        }
+    }
+}
+
+/// Does the runs that are missing, and shows how far they are.
+pub(crate) fn run_to_end(campaign: &mut Campaign, out: &Path) -> Result<Report, Ended> {
+    let runs = campaign.runs();
     let running = Shown::running(runs, campaign.kept());
     let outcome = campaign.run(&running);
     running.clear();
     match outcome {
         Ok(Outcome::Finished(report)) => Ok(report),
         Ok(Outcome::Interrupted { kept }) => {
-            let out = output::path(&arguments.out);
-            Err(Failure::Interrupted(format!("{kept} of {runs} runs are kept in {out}; the same command goes on from there")))
+            let out = output::path(out);
+            Err(Ended::Said(Failure::Interrupted(format!("{kept} of {runs} runs are kept in {out}; the same command goes on from there"))))
         }
         Err(error @ CampaignError::File { .. }) => {
             let kept = campaign.kept();
-            Err(Failure::System(format!("{error}\n{kept} of {runs} runs are kept: once that can be done, the same command goes on from there")))
+            let going_on = format!("{error}\n{kept} of {runs} runs are kept: once that can be done, the same command goes on from there");
+            Err(Ended::Said(Failure::System(going_on)))
         }
-        Err(error) => Err(refused(error)),
+        Err(error) => Err(Ended::Error(error)),
     }
 }
 
-/// Why there is no campaign, in the words of the user's options.
-fn failure(error: CampaignError, arguments: &CampaignArguments) -> Failure {
+/// Why there is no campaign, in the words of the user's options. `strategies` are overrides that came from `--strategies`.
+pub(crate) fn failure(error: CampaignError, scene: &Path, strategies: &[String]) -> Failure {
     match error {
         CampaignError::Scene { error, varied } => {
-            let culprit = error.diagnostic().and_then(Diagnostic::override_text).map(str::to_owned);
-            let is_varied = culprit.is_some_and(|culprit| varied.contains(&culprit));
-            Failure::Combination { error, is_varied, combination: combination(&varied) }
+            let culprit = error.diagnostic().and_then(Diagnostic::override_text).unwrap_or_default();
+            let among = |texts: &[String]| texts.iter().any(|text| text == culprit);
+            let option = match (among(strategies), among(&varied)) {
+                (true, _) => "--strategies",
+                (false, true) => "--vary",
+                (false, false) => "--set",
+            };
+            Failure::Combination { error, option, combination: combination(&varied) }
         }
-        CampaignError::NotRun { message, varied } => {
-            Failure::Input(format!("{}: {message}{}", output::path(&arguments.scene.scene), combination(&varied)))
-        }
+        CampaignError::NotRun { message, varied } => Failure::Input(format!("{}: {message}{}", output::path(scene), combination(&varied))),
         error @ (CampaignError::Vary(_) | CampaignError::SameKey { .. }) => Failure::Input(format!("--vary: {error}")),
         error @ CampaignError::Seeds { .. } => Failure::Input(format!("--runs: {error}")),
         error @ CampaignError::Size(_) => Failure::Input(error.to_string()),
@@ -143,14 +176,14 @@ fn combination(varied: &[String]) -> String {
 }
 
 /// Shows how far it came on the terminal, and ends it when the user asks for it.
-struct Shown(Progress);
+pub(crate) struct Shown(Progress);
 
 impl Shown {
     fn checking(combinations: u64) -> Self {
         Self(Progress::new(combinations, "checking combinations {bar:30} {pos}/{len}, {eta} left"))
     }
 
-    fn judging(combinations: u64) -> Self {
+    pub(crate) fn judging(combinations: u64) -> Self {
         Self(Progress::new(combinations, "judging combinations {bar:30} {pos}/{len}, {eta} left"))
     }
 
@@ -158,7 +191,7 @@ impl Shown {
         Self(Progress::through_runs(runs, kept))
     }
 
-    fn clear(&self) {
+    pub(crate) fn clear(&self) {
         self.0.clear();
     }
 }

@@ -10,18 +10,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 use cohaptic_harness::check::{Finding, Judged};
 use cohaptic_harness::{Model, check as harness};
 use cohaptic_scene::{Scene, SceneError, scene_files};
-use cohaptic_stability::{AnalysisError, Limits, Method, NOMINAL, QUICK_UNKNOWNS, Verdict, has_chance, judge_watched};
+use cohaptic_stability::Verdict;
 use cohaptic_units::print::Number;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::analysis_watch::{Interruptible, OPERATIONS_A_SECOND};
 use crate::arguments::CheckArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::expectations::OutcomeDocument;
 use crate::failure::{self, EXPECTATION, Failure, INTERRUPTED, scene_status};
 use crate::file::write_file;
 use crate::progress::Progress;
+use crate::quick_verdict::{Quick, quick_verdict};
 use crate::{input, interrupt, output};
 
 #[derive(Clone, Serialize)]
@@ -141,26 +141,16 @@ const QUICK: f64 = 10.0;
 /// Whether a scene is as stable as it is expected to be, by analysis. One that is not linear, that changes on its way, or whose chance has no second
 /// moment that can be followed in seconds, is left to a simulation; of the last it is noted.
 fn judged(scene: &Scene, stable: bool, note: impl FnOnce(String)) -> Judged {
-    if !scene.timeline.is_empty() {
-        return Judged::Unknown;
-    }
-    let limits = Limits { unknowns: QUICK_UNKNOWNS, operations: QUICK * OPERATIONS_A_SECOND, watch: &Interruptible };
-    let judgement = match judge_watched(scene, Method::Reduced, &limits) {
-        Ok(judgement) => judgement,
-        Err(AnalysisError::Stopped) => {
-            return Judged::Found(Finding { passed: false, found: "the analysis was interrupted".to_owned(), radius: None });
+    let judgement = match quick_verdict(scene, QUICK) {
+        Quick::Known(judgement) => judgement,
+        Quick::Stopped => return Judged::Found(Finding { passed: false, found: "the analysis was interrupted".to_owned(), radius: None }),
+        Quick::Simulate(refused) => {
+            if let Some(refused) = refused {
+                note(format!("stable: told by a simulation with the seed of the scene, not in the mean square: {refused}"));
+            }
+            return Judged::Unknown;
         }
-        Err(_) => return Judged::Unknown,
     };
-    let refused = judgement.analysis.notes.iter().find_map(|note| note.strip_prefix(NOMINAL));
-    if let Some(refused) = refused {
-        note(format!("stable: told by a simulation with the seed of the scene, not in the mean square: {refused}"));
-    }
-    // Without a second moment, whatever was replaced by something nominal is better simulated as it is.
-    let nominal = judgement.mean_square.is_none() && (has_chance(scene) || !judgement.analysis.notes.is_empty());
-    if judgement.analysis.modes.len() > 1 || nominal {
-        return Judged::Unknown;
-    }
     let (radius, what) = match &judgement.mean_square {
         Some(mean_square) => (mean_square.radius, "mean-square radius"),
         None => (judgement.analysis.radius, "spectral radius"),

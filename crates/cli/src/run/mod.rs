@@ -5,7 +5,7 @@ mod page;
 mod replayed;
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
@@ -22,6 +22,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::{self, Failure, INTERRUPTED};
 use crate::file::write_file;
 use crate::progress::Progress;
+use crate::shell::{path, quoted};
 use crate::{input, interrupt, output};
 use answer::describe;
 
@@ -195,33 +196,4 @@ fn command_line(arguments: &RunArguments) -> String {
         words.push("< scene.toml".to_owned());
     }
     words.join(" ")
-}
-
-fn path(path: &Path) -> String {
-    quoted(&output::path(path))
-}
-
-/// A word as POSIX shells read it.
-fn quoted(word: &str) -> String {
-    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=:,%+@".contains(letter);
-    if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_are_quoted_where_a_shell_would_read_them_otherwise() {
-        for (word, expected) in [
-            ("link.delay=24ms", "link.delay=24ms"),
-            ("", "''"),
-            ("scene.title=\"a b\"", "'scene.title=\"a b\"'"),
-            ("it's", "'it'\\''s'"),
-            ("$HOME", "'$HOME'"),
-            ("a\nb", "'a\nb'"),
-        ] {
-            assert_eq!(quoted(word), expected);
-        }
-    }
 }

@@ -15,6 +15,7 @@ fn a_document_names_its_schema_and_version_before_all_else() {
         ("check two.toml --json", "cohaptic/check"),
         ("explain two.toml --json", "cohaptic/explain"),
         ("campaign two.toml --out out --json", "cohaptic/campaign"),
+        ("compare two.toml --strategies average-position,extrapolated --runs 2 --out compared --json", "cohaptic/compare"),
         ("stability point two.toml --json", "cohaptic/stability-point"),
         ("stability map two.toml --x coordination.stiffness=1..2 --y coordination.damping=0..1 --grid 2x2 --json", "cohaptic/stability-map"),
         ("stability boundary two.toml --along coordination.stiffness=1..2 --samples 3 --json", "cohaptic/stability-boundary"),

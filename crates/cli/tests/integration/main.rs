@@ -12,6 +12,7 @@ mod campaign_pictures;
 mod campaign_verdicts;
 mod check;
 mod check_page;
+mod compare;
 mod desk;
 mod documents;
 mod errors;

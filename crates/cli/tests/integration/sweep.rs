@@ -13,11 +13,14 @@ const WRONG: [&str; 9] =
 /// Integers besides: too large for every type of integer, and not whole.
 const NO_INTEGERS: [&str; 4] = ["-1", "1.5", "1e3", "99999999999999999999999999999999999999999999999"];
 
-const INTEGERS: [&str; 15] = [
+const INTEGERS: [&str; 18] = [
     "check two.toml --jobs ",
     "campaign two.toml --out c --vary object.mass=1,2 --threads ",
     "campaign two.toml --out c --vary object.mass=1,2 --runs ",
     "campaign two.toml --out c --vary object.mass=1,2 --part ",
+    "compare two.toml --strategies average-position,extrapolated --out c --threads ",
+    "compare two.toml --strategies average-position,extrapolated --out c --runs ",
+    "compare two.toml --strategies average-position,extrapolated --out c --part ",
     "stability map two.toml --x object.mass=1..2 --y coordination.stiffness=1..2 --grid 2x2 --jobs ",
     "stability boundary two.toml --along object.mass=1..2 --samples ",
     "stability point two.toml --losses-in-a-row ",
@@ -31,7 +34,7 @@ const INTEGERS: [&str; 15] = [
     "falcon simulate --seed ",
 ];
 
-const OTHERS: [&str; 24] = [
+const OTHERS: [&str; 26] = [
     "stability point two.toml --accuracy ",
     "stability point two.toml --losses-in-a-row 1 --delay-within ",
     "stability boundary two.toml --along object.mass=1..2 --tolerance ",
@@ -41,6 +44,8 @@ const OTHERS: [&str; 24] = [
     "admittance two.toml --peer left --to ",
     "admittance two.toml --peer left --at ",
     "campaign two.toml --out c --vary object.mass=",
+    "compare two.toml --strategies average-position,extrapolated --out c --vary object.mass=",
+    "compare two.toml --out c --strategies average-position,extrapolated{horizon=7},",
     "link delay 1ms --every ",
     "link delay 1ms --size ",
     "link delay ",

@@ -109,6 +109,12 @@ impl Html {
         Self { text: format!("<code>{}</code>", escape(text)) }
     }
 
+    /// One below the other, in a cell of a table.
+    #[must_use]
+    pub fn lines(lines: impl IntoIterator<Item = Self>) -> Self {
+        Self { text: lines.into_iter().map(|line| format!("<div>{}</div>", line.text)).collect() }
+    }
+
     /// Lines of a file or a command.
     #[must_use]
     pub fn preformatted(text: &str) -> Self {

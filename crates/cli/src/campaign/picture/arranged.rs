@@ -32,13 +32,13 @@ pub(super) enum Keys {
 }
 
 /// A key along an axis.
-pub(super) struct Along {
+pub(crate) struct Along {
     /// Its place among the keys of the plan.
-    pub(super) key: usize,
+    pub(crate) key: usize,
     /// Its values, rising; of names their numbers from below.
-    pub(super) values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// The place of each value among those of the key.
-    places: Vec<usize>,
+    pub(crate) places: Vec<usize>,
     logarithmic: bool,
     /// With the range of names; numbers have none yet.
     axis: Axis,
@@ -81,7 +81,7 @@ impl Arranged {
     /// What a panel shows, in words, behind what all of them show; empty if there is one alone and nothing to be said.
     pub(super) fn title(&self, plan: &CampaignPlan, facet: usize, what: &str) -> String {
         let places = self.places(facet, &[]);
-        let texts: Vec<String> = self.panels.iter().map(|(key, _)| plan.variations()[*key].override_text(places[*key])).collect();
+        let texts: Vec<String> = self.panels.iter().map(|(key, _)| plan.variations()[*key].label(places[*key])).collect();
         match (texts.is_empty(), what.is_empty()) {
             (true, _) => String::new(),
             (false, true) => texts.join(", "),
@@ -120,7 +120,7 @@ impl Keys {
 
 impl Along {
     /// `None` if the values are not all different numbers.
-    fn of_numbers(key: usize, vary: &Variation) -> Option<Self> {
+    pub(crate) fn of_numbers(key: usize, vary: &Variation) -> Option<Self> {
         let numbers: Vec<f64> = (0..vary.count()).map(|place| vary.number(place).filter(|number| number.is_finite())).collect::<Option<_>>()?;
         let mut places: Vec<usize> = (0..numbers.len()).collect();
         places.sort_by(|one, other| numbers[*one].total_cmp(&numbers[*other]));
@@ -151,7 +151,7 @@ impl Along {
     }
 
     /// The axis from the first to the last value, of names with half a step around them.
-    pub(super) fn axis(&self) -> Axis {
+    pub(crate) fn axis(&self) -> Axis {
         match (self.values.first(), self.values.last()) {
             (Some(first), Some(last)) if !self.is_names => self.axis.clone().range(*first, *last),
             _ => self.axis.clone(),
@@ -159,7 +159,7 @@ impl Along {
     }
 
     /// Where the cells around the values begin and end.
-    pub(super) fn edges(&self) -> Vec<f64> {
+    pub(crate) fn edges(&self) -> Vec<f64> {
         cell_edges(&self.values, self.logarithmic)
     }
 }

@@ -13,6 +13,7 @@ use cohaptic_picture::{Panel, Picture, Size};
 use super::Finished;
 use crate::failure::Failure;
 use crate::file::write_file;
+pub(crate) use arranged::Along;
 use arranged::{Arranged, Keys};
 use scale::Scale;
 

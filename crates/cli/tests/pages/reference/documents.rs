@@ -98,7 +98,7 @@ const PARTS: [Part; 7] = [
     },
 ];
 
-const DOCUMENTS: [Document; 20] = [
+const DOCUMENTS: [Document; 21] = [
     Document {
         command: "run",
         lines: &[
@@ -181,6 +181,45 @@ const DOCUMENTS: [Document; 20] = [
                 "with `--verdicts`: [verdicts](campaign.md#verdicts)",
             ),
             ("notes", "parts that verdicts leave out, and pictures that are not drawn"),
+        ],
+    },
+    Document {
+        command: "compare",
+        lines: &[
+            "cohaptic compare scenarios/network/loss-independent.toml --strategies average-position,local-damping,extrapolated --vary link.delay=8ms,24ms --runs 2 \
+             --out compared --json",
+        ],
+        rows: &[
+            ("title", "of the scene of the first combination that runs"),
+            ("runs, runs_computed", "in the table; done this time"),
+            ("wall_s", "of this time"),
+            ("out, files", "the folder; the table of runs, verdicts, the table of figures, the page"),
+            (
+                "strategies[].name, strategies[].set",
+                "as it is written; what it puts into the scene, a list of `KEY=VALUE`. The first is the baseline",
+            ),
+            ("measures[].name, measures[].unit, measures[].about", "the measures that any run has"),
+            ("combinations[].strategy, combinations[].vary", "`vary` is a list of `KEY=VALUE` without the strategy"),
+            ("combinations[].refused", "why the strategy does not run here; `null` where it does"),
+            ("combinations[].runs", "how many runs there are"),
+            (
+                "combinations[].diverged.count, combinations[].diverged.share, combinations[].diverged.low, combinations[].diverged.high",
+                "runs that diverged or had copies more than 1 m apart, with Wilson's interval of 95 %; `diverged` is `null` where nothing runs",
+            ),
+            (
+                "combinations[].verdict, combinations[].judged, combinations[].radius",
+                "`stable`, `unstable`, `marginal`, `overflow` or `undecided`; by `spectral-radius`, `mean-square` or `two-runs`, which have no radius. `null` where nothing runs",
+            ),
+            ("combinations[].measures[].name, combinations[].measures[].count", "a measure; runs that did neither and have it"),
+            (
+                "combinations[].measures[].mean.value, combinations[].measures[].mean.low, combinations[].measures[].mean.high",
+                "their mean with Student's interval of 95 %, whose ends are `null` of one run; `mean` is `null` of none",
+            ),
+            (
+                "combinations[].measures[].difference.count, combinations[].measures[].difference.value, combinations[].measures[].difference.low, \
+                 combinations[].measures[].difference.high",
+                "the difference to the baseline over the seeds of which both runs have the measure; `null` of the baseline and of no seed",
+            ),
         ],
     },
     Document {

@@ -1,0 +1,201 @@
+//! The runs of strategies, paired by their seeds.
+//!
+//! A strategy is compared with the baseline, the first one, at equal values of all other keys. Runs of one seed have equal random numbers, so the difference of
+//! two of them is that of the strategies, and its interval is narrower than those of the two means. A pair counts where both runs came to their end and both have
+//! the measure.
+//!
+//! A run counts as diverged, and for no mean, where a number was not finite any more and where two copies were farther apart than people reach: whether an unstable run
+//! leaves the range of numbers before its end is a matter of its duration, and a mean over 10³⁰ m says nothing.
+
+use cohaptic_harness::record::SANE_POSITION;
+
+use super::interval::{Estimate, Share};
+use super::measured::{LARGEST, MeasuredColumn};
+use crate::plan::{Accepted, CampaignPlan, Refused};
+use crate::table::RunColumns;
+
+/// The most numbers that are compared, runs times measures: 800 MB.
+pub const MOST_NUMBERS_COMPARED: u64 = 100_000_000;
+
+/// Strategies side by side.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Comparison {
+    /// The strategies as they are written; the first is the baseline.
+    pub strategies: Vec<String>,
+    /// The measures that any run has, in the order of the table.
+    pub measures: Vec<MeasuredColumn>,
+    /// A cell for each combination, in order: those of the baseline first.
+    pub cells: Vec<Cell>,
+}
+
+/// What the runs of one combination come to.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Cell {
+    /// Why the strategy refuses the scene with these values; `None` if it runs.
+    pub refused: Option<String>,
+    /// Which share of the runs diverged, or had copies farther apart than [`SANE_POSITION`]; `None` if there are none.
+    pub diverged: Option<Share>,
+    /// The figures of each of [`Comparison::measures`].
+    pub figures: Vec<Figures>,
+}
+
+/// A measure of one combination.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Figures {
+    /// The mean over the runs that came to their end and have the measure; `None` if none has.
+    pub mean: Option<Estimate>,
+    /// The mean difference to the baseline over the seeds of which both runs did; `None` if there are none, and of the baseline itself.
+    pub difference: Option<Estimate>,
+}
+
+impl Comparison {
+    /// The comparison of the first key of a plan. `columns` are those of `measures`, by run.
+    pub(crate) fn of(plan: &CampaignPlan, accepted: &Accepted, refused: &Refused, measures: Vec<MeasuredColumn>, columns: &RunColumns) -> Self {
+        let apart = measures.iter().zip(&columns.columns).find(|(measure, _)| measure.name == LARGEST).map(|(_, column)| column);
+        let is_whole = |run: usize| columns.complete[run] && apart.is_none_or(|apart| apart[run] <= SANE_POSITION);
+        let strategies: Vec<String> = plan.variations().first().map_or_else(Vec::new, |vary| vary.texts().map(str::to_owned).collect());
+        let each = usize::try_from(plan.runs_of_each()).unwrap_or(usize::MAX);
+        let starts = starts(plan.combinations(), accepted, each);
+        let others = starts.len() / strategies.len().max(1);
+        let has = |column: &Vec<f64>| column.iter().enumerate().any(|(run, value)| value.is_finite() && is_whole(run));
+        let known: Vec<bool> = columns.columns.iter().map(has).collect();
+        let cell = |(combination, start): (usize, &Option<usize>)| {
+            let baseline = starts[combination % others].filter(|_| combination >= others);
+            let figures = columns.columns.iter().zip(&known).filter(|(_, known)| **known).map(|(column, _)| {
+                let values = |start: &usize| (*start..start + each).map(|run| Some(column[run]).filter(|value| is_whole(run) && value.is_finite()));
+                Figures::of(start.iter().flat_map(values), baseline.iter().flat_map(values))
+            });
+            let diverged = start.and_then(|start| {
+                let diverged = (start..start + each).filter(|run| !is_whole(*run)).count();
+                Share::of(diverged as u64, each as u64)
+            });
+            Cell { refused: refused.get(&(combination as u64)).cloned(), diverged, figures: figures.collect() }
+        };
+        let cells = starts.iter().enumerate().map(cell).collect();
+        let measures = measures.into_iter().zip(known).filter_map(|(measure, known)| known.then_some(measure)).collect();
+        Self { strategies, measures, cells }
+    }
+
+    /// How many combinations of the other keys there are; 1 if nothing else is varied.
+    #[must_use]
+    pub const fn others(&self) -> usize {
+        self.cells.len() / self.strategies.len()
+    }
+
+    /// The cell of a strategy at a combination of the other keys.
+    ///
+    /// # Panics
+    ///
+    /// If there are fewer.
+    #[must_use]
+    pub fn cell(&self, strategy: usize, other: usize) -> &Cell {
+        &self.cells[strategy * self.others() + other]
+    }
+}
+
+/// In which place of the table the runs of each combination begin; `None` of those that are left out.
+fn starts(combinations: u64, accepted: &Accepted, each: usize) -> Vec<Option<usize>> {
+    let mut starts = vec![None; usize::try_from(combinations).unwrap_or_default()];
+    let runs = usize::try_from(accepted.runs()).unwrap_or_default();
+    for place in (0..runs).step_by(each) {
+        let (combination, _) = accepted.run(place as u64);
+        starts[usize::try_from(combination).unwrap_or_default()] = Some(place);
+    }
+    starts
+}
+
+impl Figures {
+    /// Of the values of each seed, with those of the baseline; none where the baseline is not run, or is meant itself.
+    fn of(values: impl Iterator<Item = Option<f64>> + Clone, baseline: impl Iterator<Item = Option<f64>>) -> Self {
+        let own: Vec<f64> = values.clone().flatten().collect();
+        let differences: Vec<f64> = values.zip(baseline).filter_map(|(value, baseline)| Some(value? - baseline?)).collect();
+        Self { mean: Estimate::of(&own), difference: Estimate::of(&differences) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{Format, PlanSpec, Variation};
+
+    const NONE: f64 = f64::NAN;
+
+    fn plan(runs: u64) -> CampaignPlan {
+        let variations = ["coordination.strategy=average-position,extrapolated,local-damping", "link.loss=0,0.5"];
+        let variations = variations.iter().map(|text| Variation::parse(text).unwrap()).collect();
+        CampaignPlan::new(PlanSpec { text: "", file: Path::new(""), set: &[], variations, runs, format: Format::Csv, part: None, program: "" })
+            .unwrap()
+    }
+
+    fn measure(name: &str) -> MeasuredColumn {
+        MeasuredColumn { name: name.to_owned(), unit: String::new(), about: String::new() }
+    }
+
+    fn compared(refused: &Refused, complete: Vec<bool>, columns: Vec<Vec<f64>>) -> Comparison {
+        let (plan, measures) = (plan(3), (0..columns.len()).map(|place| measure(&place.to_string())).collect());
+        let accepted = Accepted::new(plan.combinations(), plan.runs_of_each(), refused.keys().copied());
+        Comparison::of(&plan, &accepted, refused, measures, &RunColumns { complete, columns })
+    }
+
+    #[test]
+    fn pairs_are_of_one_seed_and_of_equal_values_of_the_other_keys() {
+        // Baseline at both losses, then the two others; one run of three each diverged in places.
+        let values: Vec<f64> = vec![1.0, 2.0, 3.0, 10.0, 20.0, 30.0, 2.0, 9.0, 5.0, 11.0, 20.0, 33.0, 0.0, 0.0, 0.0, 7.0, 7.0, 7.0];
+        let mut complete = vec![true; 18];
+        (complete[0], complete[7]) = (false, false);
+        let comparison = compared(&Refused::new(), complete, vec![values]);
+        assert_eq!((comparison.others(), comparison.strategies.join(" ")), (2, "average-position extrapolated local-damping".to_owned()));
+        let figures = |strategy, other| comparison.cell(strategy, other).figures[0];
+        let mean = |estimate: Option<Estimate>| estimate.map(|estimate| (estimate.count, estimate.mean));
+        assert_eq!((mean(figures(0, 0).mean), figures(0, 0).difference), (Some((2, 2.5)), None));
+        // Without the seed that diverged here, and the one that diverged in the baseline: 5 − 3 is left.
+        assert_eq!((mean(figures(1, 0).mean), mean(figures(1, 0).difference)), (Some((2, 3.5)), Some((1, 2.0))));
+        // 1, 0 and 3, whose deviation is √(7/3): the interval is that of the differences, far narrower than that of the means.
+        let paired = figures(1, 1).difference.unwrap();
+        let half = 4.302_652_729_911_275 * (7.0_f64 / 3.0 / 3.0).sqrt();
+        assert_eq!((paired.count, paired.mean), (3, 4.0 / 3.0));
+        assert!((paired.half_width.unwrap() - half).abs() < 1e-8 && figures(1, 1).mean.unwrap().half_width.unwrap() > 20.0);
+        let share = comparison.cell(1, 0).diverged.unwrap();
+        assert_eq!((share.count, share.of, comparison.cell(2, 1).diverged.unwrap().count), (1, 3, 0));
+    }
+
+    #[test]
+    fn what_is_refused_has_no_figures_and_a_baseline_that_is_refused_no_differences() {
+        let refused: Refused = [(1, "chance".to_owned()), (4, "chance".to_owned())].into();
+        let comparison = compared(&refused, vec![true; 12], vec![(0..12).map(f64::from).collect()]);
+        assert_eq!(comparison.cell(2, 0), &Cell { refused: Some("chance".into()), diverged: None, figures: vec![Figures::default()] });
+        let at = |strategy, other| comparison.cell(strategy, other).figures[0];
+        assert_eq!(at(1, 0).difference.map(|difference| (difference.mean, difference.half_width)), Some((3.0, Some(0.0))));
+        assert_eq!((at(1, 1).mean.map(|mean| mean.mean), at(1, 1).difference), (Some(7.0), None));
+        assert_eq!((at(2, 1).mean.map(|mean| mean.mean), at(2, 1).difference), (Some(10.0), None));
+    }
+
+    #[test]
+    fn copies_farther_apart_than_people_reach_count_as_diverged() {
+        let (plan, accepted) = (plan(3), Accepted::new(6, 3, std::iter::empty()));
+        let mut apart = vec![0.01; 18];
+        (apart[1], apart[2], apart[8]) = (SANE_POSITION, 1.001, 1e30);
+        let columns = RunColumns { complete: vec![true; 18], columns: vec![apart, (0..18).map(f64::from).collect()] };
+        let comparison = Comparison::of(&plan, &accepted, &Refused::new(), vec![measure(LARGEST), measure("a")], &columns);
+        let count = |strategy| comparison.cell(strategy, 0).diverged.map(|share| share.count);
+        assert_eq!((count(0), count(1), count(2)), (Some(1), Some(1), Some(0)));
+        assert_eq!(comparison.cell(0, 0).figures[1].mean.map(|mean| (mean.count, mean.mean)), Some((2, 0.5)));
+        assert_eq!(comparison.cell(1, 0).figures[1].difference.map(|difference| (difference.count, difference.mean)), Some((2, 6.0)));
+    }
+
+    #[test]
+    fn a_measure_that_some_runs_lack_counts_where_it_is_and_one_that_all_lack_is_left_out() {
+        let mut some = vec![NONE; 18];
+        (some[0], some[1], some[6], some[8]) = (1.0, 2.0, 4.0, 9.0);
+        let comparison = compared(&Refused::new(), vec![true; 18], vec![vec![NONE; 18], some]);
+        assert_eq!(comparison.measures, [measure("1")]);
+        let figures = comparison.cell(1, 0).figures[0];
+        assert_eq!(
+            (figures.mean.map(|mean| (mean.count, mean.mean)), figures.difference.map(|difference| (difference.count, difference.mean))),
+            (Some((2, 6.5)), Some((1, 3.0)))
+        );
+        assert_eq!(comparison.cell(2, 1).figures[0], Figures::default());
+    }
+}

@@ -1,0 +1,62 @@
+//! Which columns of a table are measures, with their units and meanings.
+
+use cohaptic_scene::{Measure, Scope};
+
+use crate::table::{Column, Kind};
+
+/// The column that every table has.
+pub(super) const LARGEST: &str = "max_discrepancy_m";
+
+/// A column with one number for each run that says how good or bad the run was.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct MeasuredColumn {
+    /// Its name in the table.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its meaning, without the last full stop.
+    pub about: String,
+}
+
+/// The columns that are measures, in the order of the table.
+pub(crate) fn measured(columns: &[Column]) -> Vec<MeasuredColumn> {
+    columns.iter().filter(|column| column.kind == Kind::Number).filter_map(|column| words(&column.name)).collect()
+}
+
+/// The unit and the meaning of a column; `None` if it is no measure.
+fn words(column: &str) -> Option<MeasuredColumn> {
+    let (unit, about) = if column == LARGEST {
+        ("m", "Largest distance along an axis between two copies, over instants")
+    } else {
+        let name = column.strip_prefix("peers.").and_then(|rest| rest.rsplit_once('.')).map_or(column, |(_, name)| name);
+        let scope = if name == column { Scope::Run } else { Scope::Peer };
+        let measure = Measure::ALL.iter().find(|measure| measure.name() == name && measure.scope() == scope)?;
+        (measure.unit(), measure.about())
+    };
+    Some(MeasuredColumn { name: column.to_owned(), unit: unit.to_owned(), about: about.to_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measures_of_the_run_and_of_each_peer_are_compared_and_nothing_else() {
+        let column = |name: &str| Column { name: name.to_owned(), kind: Kind::Number, optional: true };
+        let names = [
+            "ended_at_s",
+            LARGEST,
+            "peers.left.position_x_m",
+            "links.mean_delay_s",
+            "travel_s",
+            "peers.a.b.energy_j",
+            "energy_j",
+            "peers.left.travel_s",
+        ];
+        let found = measured(&names.map(column));
+        assert_eq!(found.iter().map(|measure| measure.name.as_str()).collect::<Vec<&str>>(), [LARGEST, "travel_s", "peers.a.b.energy_j", "energy_j"]);
+        assert_eq!(found.iter().map(|measure| measure.unit.as_str()).collect::<Vec<&str>>(), ["m", "s", "J", "J"]);
+        assert_ne!(found[2].about, found[3].about);
+        assert!(measured(&Measure::ALL.iter().map(|measure| column(measure.name())).collect::<Vec<Column>>()).len() >= Measure::ALL.len() - 1);
+    }
+}

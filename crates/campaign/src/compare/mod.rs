@@ -1,0 +1,13 @@
+//! Strategies side by side: the runs of a campaign whose first key is the strategy, summed up by strategy and compared seed by seed.
+
+mod comparison;
+mod interval;
+mod measured;
+mod strategies;
+
+pub use comparison::{Cell, Comparison, Figures, MOST_NUMBERS_COMPARED};
+pub use interval::{Estimate, Share};
+pub use measured::MeasuredColumn;
+pub use strategies::{Strategies, StrategiesError};
+
+pub(crate) use measured::measured;

@@ -1,0 +1,79 @@
+//! A comparison as a JSON document.
+
+use std::path::Path;
+
+use cohaptic_campaign::{Cell, Estimate, Figures, Judgement, MeasuredColumn};
+use serde::Serialize;
+
+use super::Finished;
+use crate::document_schema::document;
+use crate::output;
+
+/// The answer of `cohaptic compare --json`.
+pub(super) fn of(finished: &Finished, out: &Path) -> impl Serialize {
+    let Finished { report, comparison, .. } = finished;
+    let strategy = &finished.plan.variations()[0];
+    let strategies = comparison.strategies.iter().enumerate().map(|(place, name)| document! { name: name.clone(), set: strategy.overrides(place) });
+    let measures = comparison.measures.iter().map(|measure| {
+        document! { name: measure.name.as_str(), unit: measure.unit.as_str(), about: measure.about.as_str() }
+    });
+    let cells = comparison.cells.iter().enumerate().map(|(combination, cell)| {
+        let (strategy, other) = (combination / comparison.others(), combination % comparison.others());
+        document! {
+            strategy: comparison.strategies[strategy].as_str(),
+            vary: finished.keys().iter().zip(finished.places(other)).map(|(key, place)| key.label(place)).collect::<Vec<_>>(),
+            // Why the strategy does not run; `null` if it does.
+            refused: cell.refused.as_deref(),
+            runs: cell.diverged.map_or(0, |share| share.of),
+            // `null` where nothing ran.
+            diverged: cell.diverged.map(|share| document! { count: share.count, share: share.value(), low: share.low, high: share.high }),
+            #[serde(flatten)]
+            judgement: finished.judgement(strategy, other).map(of_judgement),
+            measures: measures_of(finished, cell),
+        }
+    });
+    document! {
+        title: finished.title.as_str(),
+        runs: report.runs,
+        runs_computed: report.computed,
+        wall_s: finished.wall_s,
+        out: output::path(out),
+        // The table of runs, verdicts, the table of figures, the page.
+        files: finished.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
+        strategies: strategies.collect::<Vec<_>>(),
+        measures: measures.collect::<Vec<_>>(),
+        combinations: cells.collect::<Vec<_>>(),
+    }
+}
+
+/// Words are `null` where there is no verdict, the radius where it has none.
+fn of_judgement(judgement: &Judgement) -> impl Serialize {
+    let verdict = judgement.verdict();
+    document! {
+        verdict: verdict.map(|verdict| &*verdict.word),
+        judged: verdict.map(|verdict| &*verdict.judged),
+        radius: verdict.map(|verdict| verdict.radius),
+    }
+}
+
+fn measures_of<'a>(finished: &'a Finished, cell: &'a Cell) -> Vec<impl Serialize + use<'a>> {
+    let of = |(measure, figures): (&'a MeasuredColumn, &Figures)| {
+        document! {
+            name: measure.name.as_str(),
+            count: figures.mean.map_or(0, |mean| mean.count),
+            mean: figures.mean.map(mean_and_ends),
+            difference: figures.difference.map(counted),
+        }
+    };
+    finished.comparison.measures.iter().zip(&cell.figures).map(of).collect()
+}
+
+/// The ends are `null` without an interval.
+fn mean_and_ends(estimate: Estimate) -> impl Serialize {
+    let known = estimate.half_width.is_some();
+    document! { value: estimate.mean, low: known.then(|| estimate.low()), high: known.then(|| estimate.high()) }
+}
+
+fn counted(estimate: Estimate) -> impl Serialize {
+    document! { count: estimate.count, #[serde(flatten)] mean: mean_and_ends(estimate) }
+}

@@ -1,0 +1,50 @@
+//! Whether a combination is stable: by analysis where that takes less than a second, else by two runs, of which one begins with a small disturbance.
+
+use cohaptic_campaign::{Judge, Judgement, Verdict};
+use cohaptic_harness::Model;
+use cohaptic_harness::check::{Stability, stability};
+use cohaptic_scene::Scene;
+use cohaptic_stability::Criterion;
+
+use crate::interrupt;
+use crate::quick_verdict::{Quick, quick_verdict};
+use crate::stability::source;
+
+/// Two runs judge where the analysis takes longer than this, by its estimate \[s\].
+const QUICK: f64 = 0.25;
+
+/// The word for a verdict by two runs.
+pub(super) const TWO_RUNS: &str = "two-runs";
+/// The verdict of two runs that leave it open within the duration of the scene.
+pub(super) const UNDECIDED: &str = "undecided";
+
+/// Judges until the user asks for the end.
+pub(super) struct ByAnalysisOrRuns;
+
+impl Judge for ByAnalysisOrRuns {
+    fn judge(&self, scene: &Scene) -> Option<Judgement> {
+        match quick_verdict(scene, QUICK) {
+            Quick::Known(judgement) => {
+                let (criterion, radius) = match &judgement.mean_square {
+                    Some(mean_square) => (Criterion::MeanSquare, mean_square.radius),
+                    None => (Criterion::SpectralRadius, judgement.analysis.radius),
+                };
+                let judged = source::judged(criterion, false).into();
+                Some(Judgement::Known(Verdict { word: judgement.verdict.word().into(), judged, radius: radius.value, error: radius.error }))
+            }
+            Quick::Simulate(_) => by_runs(scene),
+            Quick::Stopped => None,
+        }
+    }
+}
+
+/// The verdict of two runs with the first seed, which have no radius.
+fn by_runs(scene: &Scene) -> Option<Judgement> {
+    let word = match stability(scene, Model::Least, || !interrupt::requested()) {
+        Stability::Stable => cohaptic_stability::Verdict::Stable.word(),
+        Stability::Unstable => cohaptic_stability::Verdict::Unstable.word(),
+        Stability::Undecided { .. } => UNDECIDED,
+        Stability::Interrupted => return None,
+    };
+    Some(Judgement::Known(Verdict { word: word.into(), judged: TWO_RUNS.into(), radius: f64::NAN, error: f64::NAN }))
+}

@@ -1,0 +1,137 @@
+//! `cohaptic compare`.
+
+mod answer;
+mod figures;
+mod judge;
+mod page;
+mod preset;
+mod rows_file;
+mod words;
+
+use std::num::NonZeroU64;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant as Clock;
+
+use cohaptic_campaign::{CampaignError, CampaignPlan, Comparison, Format, Judgement, PlanSpec, Report, Strategies, Variation};
+
+use crate::arguments::{CompareArguments, MeasureArguments, TableFormat};
+use crate::campaign::{self, PROGRAM, Shown};
+use crate::document_schema::DocumentSchema;
+use crate::failure::Failure;
+use crate::file::write_file;
+use crate::{input, output};
+use judge::ByAnalysisOrRuns;
+use preset::Asked;
+
+/// A comparison that is finished, and what it took.
+struct Finished {
+    plan: CampaignPlan,
+    title: String,
+    report: Report,
+    comparison: Comparison,
+    /// One for each combination.
+    stability: Vec<Judgement>,
+    /// Of this time.
+    wall_s: f64,
+    /// All that are there: the table of runs, verdicts, the table of figures, the page.
+    files: Vec<PathBuf>,
+}
+
+/// Does the runs that are missing, and sets the strategies side by side.
+pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure> {
+    let asked = Asked::of(arguments).map_err(|error| Failure::Input(format!("--strategies: {error}")))?;
+    let settings: Vec<String> = overrides(&asked.strategies);
+    let refused = |error: CampaignError| campaign::failure(error, &arguments.scene.scene, &settings);
+    let plan = plan(arguments, &asked).map_err(|error| error.unwrap_or_else(refused))?;
+    let threads = usize::from(arguments.threads.unwrap_or(0));
+    let start = Clock::now();
+    let mut finished = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(|| execute(arguments, plan)).map_err(|error| error.unwrap_or_else(refused))?,
+        Err(error) => return Err(Failure::System(format!("--threads {threads}: {error}"))),
+    };
+    finished.wall_s = start.elapsed().as_secs_f64();
+    for (name, content) in [("compare.csv", rows_file::text(&finished)), ("compare.html", page::html(arguments, &finished)?)] {
+        let path = arguments.out.join(name);
+        write_file(&path, content)?;
+        finished.files.push(path);
+    }
+    let words = || words::describe(&finished);
+    output::answer(arguments.scene.json, DocumentSchema::COMPARE, &answer::of(&finished, &arguments.out), words, &finished.files)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// All that the strategies put into scenes.
+fn overrides(strategies: &Strategies) -> Vec<String> {
+    let variation = strategies.variation();
+    (0..variation.count()).flat_map(|place| variation.overrides(place)).collect()
+}
+
+/// What every run has: the overrides of the user, and all measures.
+fn set(arguments: &CompareArguments) -> Vec<String> {
+    arguments.scene.overrides.set.iter().cloned().chain(MeasureArguments::all().override_text()).collect()
+}
+
+fn plan(arguments: &CompareArguments, asked: &Asked) -> Result<CampaignPlan, campaign::Ended> {
+    let said = campaign::Ended::Said;
+    let mut variations = vec![asked.strategies.variation()];
+    for text in &asked.vary {
+        let variation = Variation::parse(text).map_err(|error| campaign::Ended::Error(error.into()))?;
+        if variation.is_key(Strategies::KEY) {
+            return Err(said(Failure::Input(format!("--vary {text}: the strategies are those of --strategies: expected another key"))));
+        }
+        variations.push(variation);
+    }
+    let (file, set) = (&arguments.scene.scene, set(arguments));
+    let (text, file) = (input::text(file).map_err(|error| said(error.into()))?, input::named(file));
+    let format = match arguments.format {
+        TableFormat::Parquet => Format::Parquet,
+        TableFormat::Csv => Format::Csv,
+    };
+    let part = arguments.part.map(NonZeroU64::get);
+    let plan = CampaignPlan::new(PlanSpec { text: &text, file, set: &set, variations, runs: arguments.runs, format, part, program: PROGRAM });
+    Ok(plan.map_err(campaign::Ended::Error)?.leaving_out(Strategies::fallback()))
+}
+
+fn execute(arguments: &CompareArguments, plan: CampaignPlan) -> Result<Finished, campaign::Ended> {
+    let failed = campaign::Ended::Error;
+    let combinations = plan.combinations();
+    let mut campaign = campaign::open(plan, &arguments.out).map_err(failed)?;
+    let judging = Shown::judging(combinations);
+    let judged = campaign.judge_apart(&ByAnalysisOrRuns, &judging);
+    judging.clear();
+    let stability = match judged.map_err(failed)? {
+        Ok(stability) => stability,
+        Err(missing) => return Err(campaign::Ended::Said(campaign::not_all_judged(combinations - missing, combinations, &arguments.out))),
+    };
+    let report = campaign::run_to_end(&mut campaign, &arguments.out)?;
+    let comparison = campaign.compare().map_err(failed)?;
+    let plan = campaign.plan().clone();
+    let first = (0..combinations).find(|combination| !report.refused.contains_key(combination)).unwrap_or_default();
+    let title = plan.scene(first).map_or_else(|_| output::path(input::named(&arguments.scene.scene)), |scene| scene.title);
+    let files = vec![report.file.clone(), campaign.stability_file()];
+    Ok(Finished { plan, title, report, comparison, stability, wall_s: 0.0, files })
+}
+
+impl Finished {
+    /// The keys that vary beside the strategy.
+    fn keys(&self) -> &[Variation] {
+        &self.plan.variations()[1..]
+    }
+
+    /// Which value of each of [`Finished::keys`] a combination of them has.
+    fn places(&self, other: usize) -> Vec<usize> {
+        // Of the baseline, whose combinations come first.
+        self.plan.places(other as u64).split_off(1)
+    }
+
+    /// The values of a combination of the other keys, as they are written.
+    fn values(&self, other: usize) -> Vec<String> {
+        self.keys().iter().zip(self.places(other)).map(|(key, place)| key.value_text(place).to_owned()).collect()
+    }
+
+    /// The judgement of a strategy at a combination of the other keys.
+    fn judgement(&self, strategy: usize, other: usize) -> Option<&Judgement> {
+        self.stability.get(strategy * self.comparison.others() + other)
+    }
+}

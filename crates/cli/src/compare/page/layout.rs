@@ -1,0 +1,116 @@
+//! Which key lies along the pictures, and which have a panel for each of their values.
+
+use cohaptic_campaign::Variation;
+
+use crate::campaign::picture::Along;
+
+/// The most panels that a key is drawn in.
+const MOST_PANELS: usize = 16;
+
+/// The keys that vary beside the strategy, arranged in pictures.
+pub(super) struct Layout {
+    /// The first key of numbers; `None` if there is none.
+    pub(super) x: Option<Along>,
+    /// The other keys with several values: their places, and how many values each has.
+    facets: Vec<(usize, usize)>,
+    /// How many values each key has.
+    counts: Vec<usize>,
+}
+
+impl Layout {
+    pub(super) fn of(keys: &[Variation]) -> Self {
+        let counts: Vec<usize> = keys.iter().map(Variation::count).collect();
+        let x = keys.iter().enumerate().filter(|(_, key)| key.count() > 1).find_map(|(place, key)| Along::of_numbers(place, key));
+        let along = x.as_ref().map(|along| along.key);
+        let facets = counts.iter().copied().enumerate().filter(|(place, count)| *count > 1 && Some(*place) != along).collect();
+        Self { x, facets, counts }
+    }
+
+    /// How many panels a picture has.
+    pub(super) fn panels(&self) -> usize {
+        self.facets.iter().map(|(_, count)| count).product()
+    }
+
+    /// Why nothing is drawn; `None` if it is.
+    pub(super) fn undrawn(&self, keys: &[Variation]) -> Option<String> {
+        let names: Vec<&str> = self.facets.iter().map(|(key, _)| keys[*key].key()).collect();
+        (self.panels() > MOST_PANELS).then(|| {
+            format!(
+                "No pictures: a panel for each value of {} would be {} panels, and at most {MOST_PANELS} are drawn.",
+                names.join(" and "),
+                self.panels()
+            )
+        })
+    }
+
+    /// The values that a panel is of, as `KEY=VALUE`; empty if there is one alone.
+    pub(super) fn title(&self, keys: &[Variation], panel: usize) -> String {
+        let places = self.places(panel, None);
+        self.facets.iter().map(|(key, _)| keys[*key].label(places[*key])).collect::<Vec<String>>().join(", ")
+    }
+
+    /// The combination of the keys in a panel, at a place along x.
+    pub(super) fn other(&self, panel: usize, at: Option<usize>) -> usize {
+        self.places(panel, at).into_iter().zip(&self.counts).fold(0, |other, (place, count)| other * count + place)
+    }
+
+    /// The key of the panels along the other axis of a map, if there is one such key alone and it is of numbers.
+    pub(super) fn y(&self, keys: &[Variation]) -> Option<Along> {
+        match (&self.x, self.facets.as_slice()) {
+            (Some(_), [(key, _)]) => Along::of_numbers(*key, &keys[*key]),
+            _ => None,
+        }
+    }
+
+    fn places(&self, panel: usize, at: Option<usize>) -> Vec<usize> {
+        let mut places = vec![0; self.counts.len()];
+        let mut left = panel;
+        for (key, count) in self.facets.iter().rev() {
+            places[*key] = left % count;
+            left /= count;
+        }
+        if let (Some(x), Some(at)) = (&self.x, at) {
+            places[x.key] = x.places[at];
+        }
+        places
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keys(texts: &[&str]) -> Vec<Variation> {
+        texts.iter().map(|text| Variation::parse(text).unwrap()).collect()
+    }
+
+    #[test]
+    fn the_first_key_of_numbers_is_along_the_pictures_and_the_others_have_panels() {
+        let keys = keys(&["peer.contact=none,grasp", "link.delay=24ms,8ms,16ms", "link.loss=0,0.5"]);
+        let layout = Layout::of(&keys);
+        assert_eq!((layout.x.as_ref().map(|along| along.key), layout.panels(), layout.undrawn(&keys)), (Some(1), 4, None));
+        assert_eq!(layout.title(&keys, 1), "peer.contact=none, link.loss=0.5");
+        // Along x values rise: 8 ms is second in the command. Of grasp and 0.5: 6 + 2 + 1.
+        assert_eq!(layout.other(3, Some(0)), 9);
+        assert!(layout.y(&keys).is_none());
+    }
+
+    #[test]
+    fn every_combination_has_one_place() {
+        for texts in [&["a=1,2,3", "b=1,2"][..], &["b=x,y", "a=3,1,2"], &["a=x,y"], &[]] {
+            let keys = keys(texts);
+            let layout = Layout::of(&keys);
+            let along: Vec<Option<usize>> = layout.x.as_ref().map_or_else(|| vec![None], |x| (0..x.values.len()).map(Some).collect());
+            let mut found: Vec<usize> =
+                (0..layout.panels()).flat_map(|panel| along.iter().map(move |at| (panel, *at))).map(|(panel, at)| layout.other(panel, at)).collect();
+            found.sort_unstable();
+            assert_eq!(found, (0..keys.iter().map(Variation::count).product()).collect::<Vec<usize>>());
+        }
+    }
+
+    #[test]
+    fn too_many_panels_are_not_drawn() {
+        let keys = keys(&["a=1,2", "b=1..17/17"]);
+        assert!(Layout::of(&keys).undrawn(&keys).is_some_and(|why| why.contains("17 panels")));
+    }
+}

@@ -1,0 +1,176 @@
+//! `compare.html`: strategies side by side on one page.
+
+mod layout;
+mod panels;
+mod scale;
+mod tables;
+
+use cohaptic_picture::Picture;
+use cohaptic_picture::page::{Html, Page};
+use cohaptic_scene::scene_content_of_text;
+use cohaptic_units::print::Counted;
+
+use super::figures::Shown;
+use super::{Finished, words};
+use crate::arguments::{CompareArguments, TableFormat};
+use crate::failure::Failure;
+use crate::input;
+use crate::shell::{path, quoted};
+use layout::Layout;
+use panels::Sheet;
+use scale::Scale;
+
+/// The folder of a command on a page, which does not depend on where it was written.
+const FOLDER: &str = "FOLDER";
+
+/// The page. It depends on the scene, the runs and the strategies alone.
+pub(super) fn html(arguments: &CompareArguments, finished: &Finished) -> Result<String, Failure> {
+    let sheet = Sheet { finished, layout: Layout::of(finished.keys()) };
+    let comparison = &finished.comparison;
+    let strategies = comparison.strategies.len();
+    let mut page = Page::new(format!("{}: {strategies} strategies side by side", finished.title)).with(Html::paragraph(sum(finished)));
+    page = page.with(Html::heading(2, "Strategies")).with(tables::strategies(finished, &defaults(arguments, finished)?));
+    let refusals = words::refusals(finished);
+    if !refusals.is_empty() {
+        let items = refusals.into_iter().map(|(reason, count)| Html::text(&format!("{reason} ({})", Counted(count, "combination"))));
+        page = page.with(Html::paragraph("Refused, so that nothing was run:")).with(Html::list(items));
+    }
+    page = page.with(Html::heading(2, "Differences to the first strategy")).with(Html::paragraph(DIFFERENCES)).with(tables::overview(finished));
+    page = page.with(Html::heading(2, "Stability")).with(stability(&sheet));
+    page = page.with(measures(&sheet));
+    page = page.with(Html::heading(2, "How the numbers are made")).with(Html::list(NOTES.map(Html::text)));
+    page = page.with(Html::heading(2, "Made by")).with(Html::preformatted(&command_line(arguments)));
+    page = page.with(Html::paragraph(Html::text("The table of runs is that of ").and(Html::code(&campaign_line(arguments, finished))).and(".")));
+    let text = input::text(&arguments.scene.scene)?;
+    let said = "The file as it was read; overrides are not in it.";
+    page = page.with(Html::heading(2, "Scene")).with(Html::details("The text of the scene", Html::paragraph(said).and(Html::preformatted(&text))));
+    Ok(page.html())
+}
+
+/// What stands above the table of differences.
+const DIFFERENCES: &str = "At how many combinations of the other keys a measure is lower (▼) and higher (▲) than with the first strategy, where the whole interval of the paired difference is \
+    on that side of zero. Lower is better for discrepancy, force, settling and energy.";
+
+/// What the numbers rest on.
+const NOTES: [&str; 6] = [
+    "A run counts as diverged where a number is not finite any more, and where two copies are more than 1 m apart at some instant. No mean has it.",
+    "A mean is that of the other runs, if they have the measure: a strategy whose hardest runs diverge is judged by the easier ones, so look at the diverged runs first.",
+    "± and bands reach over the interval of 95 % of the mean (Student).",
+    "Every strategy has the same seeds, and so the same hands, losses and delays. A difference is the mean over the seeds of which neither run diverged, with its own interval of 95 %.",
+    "An interval is for one comparison. Of twenty intervals around no difference, one lies beside zero.",
+    "A verdict is that of the analysis where it takes less than a second and leaves nothing out (spectral-radius, mean-square), else of two runs, one of them with a small disturbance (two-runs).",
+];
+
+/// How many runs there are, in words.
+fn sum(finished: &Finished) -> String {
+    let keys: Vec<&str> = finished.keys().iter().map(cohaptic_campaign::Variation::key).collect();
+    let (runs, each) = (finished.report.runs, finished.plan.runs_of_each());
+    let over = if keys.is_empty() {
+        String::new()
+    } else {
+        format!(" at {} of {}", Counted(finished.comparison.others(), "combination"), keys.join(" and "))
+    };
+    format!("{}, {each} of each strategy{over}, with the same seeds for all.", Counted(runs, "run"))
+}
+
+/// The parameters of each strategy with their values in the scene.
+fn defaults(arguments: &CompareArguments, finished: &Finished) -> Result<Vec<(&'static str, String)>, Failure> {
+    let strategies = super::preset::Asked::of(arguments).map_err(|error| Failure::Input(error.to_string()))?.strategies;
+    let all = (0..finished.comparison.strategies.len()).map(|place| {
+        let (about, parameters) = strategies.registered(place);
+        let varied = strategies.variation().overrides(place);
+        let overrides: Vec<String> = arguments.scene.overrides.set.iter().chain(&varied).cloned().collect();
+        // A scene that is refused has no content, and its overrides say enough.
+        let keys = input::with(&arguments.scene.scene, |text, file| scene_content_of_text(text, file, &overrides))
+            .map(|content| content.keys)
+            .unwrap_or_default();
+        let given = |(key, default): &(String, &str)| {
+            let own = varied.iter().rev().find_map(|text| text.strip_prefix(key.as_str())?.strip_prefix('='));
+            let value = own.or_else(|| keys.get(key).map(String::as_str)).unwrap_or(*default);
+            format!("{} {}", key.rsplit('.').next().unwrap_or_default(), value.trim_matches('"'))
+        };
+        let mut words: Vec<String> = parameters.iter().map(given).collect();
+        words.extend(varied.iter().skip(1).filter(|text| parameters.iter().all(|(key, _)| !text.starts_with(&format!("{key}=")))).cloned());
+        (about, words.join(", "))
+    });
+    Ok(all.collect())
+}
+
+/// Verdicts as a picture, and which runs diverged.
+fn stability(sheet: &Sheet<'_>) -> Html {
+    let drawn = sheet.layout.undrawn(sheet.finished.keys()).is_none();
+    let picture = sheet.stability().filter(|_| drawn).map_or_else(Html::default, |picture| figure("stability", &picture, ""));
+    let diverged = if !sheet.any_diverged() {
+        Html::paragraph("No run diverged.")
+    } else if drawn && sheet.layout.panels() > 1 {
+        figure("diverged", &sheet.diverged(), "Share of the runs that diverged, with Wilson's interval of 95 %.")
+    } else {
+        Html::default()
+    };
+    picture.and(Html::details("Verdicts and diverged runs", tables::stability(sheet.finished))).and(diverged)
+}
+
+/// A section for each measure, or one picture of all where one panel each is enough.
+fn measures(sheet: &Sheet<'_>) -> Html {
+    let Finished { comparison, .. } = sheet.finished;
+    let scales: Vec<Scale> = (0..comparison.measures.len()).map(|measure| Scale::of(comparison, measure)).collect();
+    let undrawn = sheet.layout.undrawn(sheet.finished.keys());
+    let mut content = Html::heading(2, "Measures");
+    if let Some(why) = &undrawn {
+        content = content.and(Html::paragraph(why.as_str()));
+    }
+    let each = sheet.layout.panels() > 1;
+    if undrawn.is_none() && !each {
+        let pictures = sheet.all(&scales);
+        let cut = if scales.iter().any(|scale| scale.is_cut) { CUT } else { "" };
+        let last = pictures.len().saturating_sub(1);
+        for (number, picture) in pictures.iter().enumerate() {
+            content = content.and(figure("", picture, if number == last { cut } else { "" }));
+        }
+    }
+    for (place, measure) in comparison.measures.iter().enumerate() {
+        let shown = Shown::of(comparison, place);
+        let about = Html::paragraph(format!("{}.", measure.about));
+        let table = tables::measure(sheet.finished, place, &shown);
+        let section = if undrawn.is_none() && each {
+            let picture = figure("", &sheet.measure(place, &scales[place]), if scales[place].is_cut { CUT } else { "" });
+            Html::heading(3, shown.title.as_str()).and(about).and(picture).and(Html::details(&format!("Table of {}", shown.head()), table))
+        } else {
+            Html::details(&shown.head(), about.and(table))
+        };
+        content = content.and(Html::section(&measure.name, section));
+    }
+    content
+}
+
+/// Below a picture whose axis ends before the largest values.
+const CUT: &str = "What lies far beyond the other means is cut off.";
+
+fn figure(name: &str, picture: &Picture, caption: &str) -> Html {
+    let content = Html::picture(&picture.svg());
+    Html::figure(name, if caption.is_empty() { content } else { content.and(Html::caption(caption)) })
+}
+
+/// The command that makes this page.
+fn command_line(arguments: &CompareArguments) -> String {
+    let scene = &arguments.scene.scene;
+    let mut words = vec!["cohaptic compare".to_owned(), path(scene)];
+    words.extend(arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key))));
+    words.extend(arguments.preset.iter().map(|_| "--preset field".to_owned()));
+    words.extend(arguments.strategies.iter().map(|strategies| format!("--strategies {}", quoted(strategies))));
+    words.extend(arguments.vary.iter().map(|key| format!("--vary {}", quoted(key))));
+    words.push(format!("--runs {} --out {FOLDER}", arguments.runs));
+    words.extend((arguments.format == TableFormat::Csv).then(|| "--format csv".to_owned()));
+    if input::is_standard_input(scene) {
+        words.push("< scene.toml".to_owned());
+    }
+    words.join(" ")
+}
+
+/// The campaign whose table of runs is that of the comparison.
+fn campaign_line(arguments: &CompareArguments, finished: &Finished) -> String {
+    let set = arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key)));
+    let vary = finished.plan.variations().iter().map(|key| format!("--vary {}", quoted(key.text())));
+    let words: Vec<String> = set.chain(vary).collect();
+    format!("cohaptic campaign {} {} --runs {} --measure all --out {FOLDER}", path(&arguments.scene.scene), words.join(" "), arguments.runs)
+}

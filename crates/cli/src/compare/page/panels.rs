@@ -1,0 +1,192 @@
+//! The panels: a line and a band for each strategy, or below each other where no key of numbers varies; shares of runs that diverged; where each strategy is stable.
+
+use cohaptic_campaign::Judgement;
+use cohaptic_picture::{Axis, Band, Fill, Line, Look, Marker, Panel, Picture, Region};
+use cohaptic_stability::Verdict;
+
+use super::layout::Layout;
+use super::scale::Scale;
+use crate::campaign::picture::Along;
+use crate::compare::{Finished, judge};
+
+/// With no more values along x than this, each is marked.
+const MOST_MARKED: usize = 24;
+/// How far the bar of an interval reaches to both sides of the middle of its row.
+const HALF_BAR: f64 = 0.16;
+
+/// The most panels of a picture of all measures: its legend is not to be far from them.
+const PANELS: usize = 6;
+
+/// The number of panels beside each other.
+const fn columns_of(panels: usize) -> usize {
+    match panels {
+        1 => 1,
+        2 | 4 => 2,
+        _ => 3,
+    }
+}
+
+/// A picture without a title: that stands in the page.
+fn picture(panels: Vec<Panel>) -> Picture {
+    let columns = columns_of(panels.len());
+    let aspect = if columns == 1 { 0.45 } else { 0.75 };
+    Picture::new("").columns(columns).aspect(aspect).panels(panels)
+}
+
+/// What all pictures of a page have in common.
+pub(super) struct Sheet<'a> {
+    pub(super) finished: &'a Finished,
+    pub(super) layout: Layout,
+}
+
+impl Sheet<'_> {
+    fn names(&self) -> impl Iterator<Item = (usize, &str)> {
+        self.finished.comparison.strategies.iter().map(String::as_str).enumerate()
+    }
+
+    /// Pictures of all measures, a panel each, where no key has panels.
+    pub(super) fn all(&self, scales: &[Scale]) -> Vec<Picture> {
+        let shares = self.any_diverged().then(|| self.diverged_panel(0));
+        let panels: Vec<Panel> =
+            shares.into_iter().chain(scales.iter().enumerate().map(|(measure, scale)| self.measure_panel(measure, scale, 0))).collect();
+        panels.chunks(PANELS).map(|panels| self.arranged(picture(panels.to_vec()), panels.len())).collect()
+    }
+
+    /// With one axis of x, or with rows of strategies.
+    fn arranged(&self, picture: Picture, panels: usize) -> Picture {
+        if self.layout.x.is_some() { picture.shared_x() } else { self.with_rows(picture.shared_y(), panels) }
+    }
+
+    /// The picture of one measure, a panel for each value of the other keys.
+    pub(super) fn measure(&self, measure: usize, scale: &Scale) -> Picture {
+        let panels = (0..self.layout.panels()).map(|panel| self.titled(self.measure_panel(measure, scale, panel), panel));
+        self.arranged(picture(panels.collect()).shared_y(), self.layout.panels())
+    }
+
+    /// Shares of runs that diverged, a panel for each value of the other keys.
+    pub(super) fn diverged(&self) -> Picture {
+        let panels = (0..self.layout.panels()).map(|panel| self.titled(self.diverged_panel(panel), panel));
+        self.arranged(picture(panels.collect()).shared_y(), self.layout.panels())
+    }
+
+    /// Whether any run diverged.
+    pub(super) fn any_diverged(&self) -> bool {
+        self.finished.comparison.cells.iter().any(|cell| cell.diverged.is_some_and(|share| share.count > 0))
+    }
+
+    /// Rows need no more height than their names.
+    fn with_rows(&self, picture: Picture, panels: usize) -> Picture {
+        let rows = (1 + self.finished.comparison.strategies.len()) * columns_of(panels);
+        picture.aspect(0.05 * from_place(rows))
+    }
+
+    fn titled(&self, panel: Panel, place: usize) -> Panel {
+        panel.titled(self.layout.title(self.finished.keys(), place))
+    }
+
+    fn measure_panel(&self, measure: usize, scale: &Scale, panel: usize) -> Panel {
+        let value = |strategy: usize, at: Option<usize>| {
+            let estimate = self.finished.comparison.cell(strategy, self.layout.other(panel, at)).figures[measure].mean?;
+            let (low, high) = scale.ends(&estimate);
+            Some((scale.mean(&estimate), low, high))
+        };
+        self.panel(scale.axis(), value)
+    }
+
+    fn diverged_panel(&self, panel: usize) -> Panel {
+        let value = |strategy: usize, at: Option<usize>| {
+            let share = self.finished.comparison.cell(strategy, self.layout.other(panel, at)).diverged?;
+            Some((share.value(), share.low, share.high))
+        };
+        self.panel(Axis::new("diverged").range(0.0, 1.0), value)
+    }
+
+    /// Values with their intervals: over x, or in a row for each strategy.
+    fn panel(&self, axis: Axis, value: impl Fn(usize, Option<usize>) -> Option<(f64, f64, f64)>) -> Panel {
+        match &self.layout.x {
+            Some(x) => self.over(x, axis, |strategy, at| value(strategy, Some(at))),
+            None => self.rows(axis, |strategy| value(strategy, None)),
+        }
+    }
+
+    fn over(&self, x: &Along, axis: Axis, value: impl Fn(usize, usize) -> Option<(f64, f64, f64)>) -> Panel {
+        let points = |strategy: usize| x.values.iter().enumerate().map(|(at, x)| (*x, value(strategy, at))).collect::<Vec<_>>();
+        let nothing = (f64::NAN, f64::NAN, f64::NAN);
+        let bands = self.names().map(|(strategy, _)| {
+            let ends = points(strategy).into_iter().map(|(x, value)| (x, value.unwrap_or(nothing)));
+            Band::new(ends.map(|(x, (_, low, high))| (x, low, high)), Fill::Tint(strategy))
+        });
+        let lines = self.names().map(|(strategy, name)| {
+            let means = points(strategy).into_iter().map(|(x, value)| (x, value.unwrap_or(nothing).0));
+            let line = Line::new(means, Look::of(strategy)).named(name);
+            if x.values.len() <= MOST_MARKED { line.marked(Marker::of(strategy)) } else { line }
+        });
+        // The baseline lies over the others: its line is the widest, and theirs have gaps through which it is seen.
+        Panel::new(x.axis(), axis).with_all(bands).with_all(lines)
+    }
+
+    /// The first strategy is the uppermost.
+    fn rows(&self, axis: Axis, value: impl Fn(usize) -> Option<(f64, f64, f64)>) -> Panel {
+        let count = self.finished.comparison.strategies.len();
+        let rows: Vec<(usize, f64)> = (0..count).rev().enumerate().map(|(row, strategy)| (strategy, from_place(row))).collect();
+        let names = rows.iter().map(|(strategy, _)| self.finished.comparison.strategies[*strategy].as_str());
+        let mut panel = Panel::new(axis, Axis::new("").categories(names));
+        for (strategy, y) in rows {
+            let Some((mean, low, high)) = value(strategy) else { continue };
+            if low < high {
+                let bar = vec![(low, y - HALF_BAR), (high, y - HALF_BAR), (high, y + HALF_BAR), (low, y + HALF_BAR)];
+                panel = panel.with(Region::new([bar], Fill::Deep(strategy)));
+            }
+            panel = panel.with(Line::new([(mean, y)], Look::of(strategy)).marks_only(Marker::of(strategy)));
+        }
+        panel
+    }
+
+    /// Where each strategy is stable: over two keys of numbers a panel for each strategy, over one a row. `None` without a key of numbers.
+    pub(super) fn stability(&self) -> Option<Picture> {
+        let x = self.layout.x.as_ref()?;
+        if let Some(y) = self.layout.y(self.finished.keys()) {
+            let panel = |(strategy, name): (usize, &str)| {
+                let at = |column: usize, row: usize| (strategy, self.layout.other(y.places[row], Some(column)));
+                self.areas(Panel::new(x.axis(), y.axis()), (&x.edges(), &y.edges()), at).titled(name)
+            };
+            return Some(picture(self.names().map(panel).collect()).shared_x().shared_y());
+        }
+        let count = self.finished.comparison.strategies.len();
+        let names: Vec<&str> = self.finished.comparison.strategies.iter().rev().map(String::as_str).collect();
+        let rows: Vec<f64> = (0..=count).map(|row| from_place(row) - 0.5).collect();
+        let panel = |panel: usize| {
+            let at = |column: usize, row: usize| (count - 1 - row, self.layout.other(panel, Some(column)));
+            let axes = Panel::new(x.axis(), Axis::new("").categories(names.iter().copied()));
+            self.titled(self.areas(axes, (&x.edges(), &rows), at), panel)
+        };
+        let panels = self.layout.panels();
+        Some(self.with_rows(picture((0..panels).map(panel).collect()).shared_y(), panels).shared_x())
+    }
+
+    /// The verdicts of cells as areas.
+    fn areas(&self, panel: Panel, (columns, rows): (&[f64], &[f64]), at: impl Fn(usize, usize) -> (usize, usize)) -> Panel {
+        let word = |column: usize, row: usize| {
+            let (strategy, other) = at(column, row);
+            self.finished.judgement(strategy, other).and_then(Judgement::verdict).map(|verdict| &*verdict.word)
+        };
+        let (stable, unstable) = (Verdict::Stable.word(), Verdict::Unstable.word());
+        let is = |expected: &'static str| move |found: Option<&str>| found == Some(expected);
+        let open = |found: Option<&str>| found.is_some_and(|word| word != stable && word != unstable);
+        let areas: [(Fill, &str, &dyn Fn(Option<&str>) -> bool); 4] = [
+            (Fill::Tint(0), stable, &is(stable)),
+            (Fill::Tint(1), unstable, &is(unstable)),
+            (Fill::Grey, judge::UNDECIDED, &open),
+            (Fill::BackHatch, "refused", &|found| found.is_none()),
+        ];
+        areas.into_iter().fold(panel, |panel, (fill, name, holds)| {
+            let shown = |column: usize, row: usize| holds(word(column, row));
+            let any = (1..columns.len()).any(|column| (1..rows.len()).any(|row| shown(column - 1, row - 1)));
+            if any { panel.with(Region::between(columns, rows, fill, shown).named(name)) } else { panel }
+        })
+    }
+}
+
+fn from_place(place: usize) -> f64 {
+    f64::from(u32::try_from(place).unwrap_or(u32::MAX))
+}

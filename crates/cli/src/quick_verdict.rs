@@ -1,0 +1,35 @@
+//! Whether a scene is stable, by analysis where that is a matter of seconds and leaves nothing out.
+
+use cohaptic_scene::Scene;
+use cohaptic_stability::{AnalysisError, Judgement, Limits, Method, NOMINAL, QUICK_UNKNOWNS, has_chance, judge_watched};
+
+use crate::analysis_watch::{Interruptible, OPERATIONS_A_SECOND};
+
+/// What the analysis says.
+pub(crate) enum Quick {
+    /// Its judgement, which leaves nothing out.
+    Known(Box<Judgement>),
+    /// None that holds for the scene as it is, which is left to a simulation. With the reason where the chance of the links has a second moment that cannot be
+    /// followed in that time.
+    Simulate(Option<String>),
+    /// The user asked for the end.
+    Stopped,
+}
+
+/// Whether a scene is stable, by analysis, if that takes at most `seconds` by the estimate. One that is not linear, that changes on its way, or whose chance has
+/// no second moment that can be followed in that time, is left to a simulation.
+pub(crate) fn quick_verdict(scene: &Scene, seconds: f64) -> Quick {
+    if !scene.timeline.is_empty() {
+        return Quick::Simulate(None);
+    }
+    let limits = Limits { unknowns: QUICK_UNKNOWNS, operations: seconds * OPERATIONS_A_SECOND, watch: &Interruptible };
+    let judgement = match judge_watched(scene, Method::Reduced, &limits) {
+        Ok(judgement) => judgement,
+        Err(AnalysisError::Stopped) => return Quick::Stopped,
+        Err(_) => return Quick::Simulate(None),
+    };
+    let refused = judgement.analysis.notes.iter().find_map(|note| note.strip_prefix(NOMINAL)).map(str::to_owned);
+    // Without a second moment, whatever was replaced by something nominal is better simulated as it is.
+    let nominal = judgement.mean_square.is_none() && (has_chance(scene) || !judgement.analysis.notes.is_empty());
+    if judgement.analysis.modes.len() > 1 || nominal { Quick::Simulate(refused) } else { Quick::Known(Box::new(judgement)) }
+}
