@@ -73,9 +73,8 @@ impl Strategies {
         if texts.len() < 2 {
             return Err(StrategiesError::TooFew { found: quote(text.trim()) });
         }
-        let variation = Variation::parse(&format!("{}={}", Self::KEY, texts.join(","))).map_err(|error| match error {
-            VaryError::Twice { value, .. } => StrategiesError::Twice { strategy: value },
-            error => StrategiesError::Values(error),
+        let variation = Variation::parse(&format!("{}={}", Self::KEY, texts.join(","))).map_err(|error| {
+            if let VaryError::Twice { value, .. } = error { StrategiesError::Twice { strategy: value } } else { StrategiesError::Values(error) }
         })?;
         let sets: Vec<Vec<String>> = (0..variation.count()).map(|place| sorted(variation.overrides(place))).collect();
         if let Some(place) = (1..sets.len()).find(|place| sets[..*place].contains(&sets[*place])) {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::{Law, LawParameters, LawStrategy, LawValue, LawValues};
+use cohaptic_peer::coordination::{Law, LawParameters, LawStrategy, LawValue, LawValues, Prediction};
 use cohaptic_peer::{Context, Coordination, Gains, Held, State, Strategy as _};
 use cohaptic_units::Instant;
 use proptest::collection::vec;
@@ -24,7 +24,7 @@ fn strategy(gains: Gains, ticks: u32) -> LawStrategy<1> {
 fn force(strategy: &mut LawStrategy<1>, own: Body, others: &[Body]) -> f64 {
     let state = |(x, v): Body| State { position: [x], velocity: [v] };
     let (own, held) = (state(own), Held::new(others.iter().copied().map(state)));
-    strategy.command(&Context { now: Instant::ZERO, local_time: Instant::ZERO, own: &own, held: &held }).force[0]
+    strategy.command(&Context { now: Instant::ZERO, local_time: Instant::ZERO, own: &own, held: &held, ahead: Prediction::REST }).force[0]
 }
 
 proptest! {

@@ -173,7 +173,7 @@ impl Sheet<'_> {
         let (stable, unstable) = (Verdict::Stable.word(), Verdict::Unstable.word());
         let is = |expected: &'static str| move |found: Option<&str>| found == Some(expected);
         let open = |found: Option<&str>| found.is_some_and(|word| word != stable && word != unstable);
-        let areas: [(Fill, &str, &dyn Fn(Option<&str>) -> bool); 4] = [
+        let areas: [(Fill, &str, IsShown<'_>); 4] = [
             (Fill::Tint(0), stable, &is(stable)),
             (Fill::Tint(1), unstable, &is(unstable)),
             (Fill::Grey, judge::UNDECIDED, &open),
@@ -186,6 +186,9 @@ impl Sheet<'_> {
         })
     }
 }
+
+/// Whether a cell with this verdict, or with none, belongs to an area.
+type IsShown<'a> = &'a dyn Fn(Option<&str>) -> bool;
 
 fn from_place(place: usize) -> f64 {
     f64::from(u32::try_from(place).unwrap_or(u32::MAX))
