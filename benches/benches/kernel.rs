@@ -56,8 +56,10 @@ fn kernels(criterion: &mut Criterion) {
         peers: 3,
         tick: Duration::from_millis(1),
         oldest: None,
+        middle: None,
         own: LawValues::default(),
     });
+    let registered = registered.expect("average-position is a law");
     group(
         criterion,
         "one peer",

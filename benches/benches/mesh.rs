@@ -3,7 +3,10 @@
 
 use std::time::Duration;
 
+use cohaptic_benches::watched::{Onlooker, with_all_measures};
 use cohaptic_benches::{Mesh, bare};
+use cohaptic_harness::measures::Measures;
+use cohaptic_harness::{Model, Simulation};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
 fn mesh(criterion: &mut Criterion) {
@@ -16,6 +19,9 @@ fn mesh(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(seconds * 1000));
         let scene = mesh.scene(seconds * 1000, 1);
         group.bench_function(BenchmarkId::new("cohaptic", &size), |bencher| bencher.iter(|| Mesh::run(&scene)));
+        group.bench_function(BenchmarkId::new("watched", &size), |bencher| bencher.iter(|| Simulation::new(&scene, Model::Least).run(&mut Onlooker)));
+        let measured = with_all_measures(scene.clone());
+        group.bench_function(BenchmarkId::new("measures", &size), |bencher| bencher.iter(|| Measures::run(&measured, Model::Least)));
         group.bench_function(BenchmarkId::new("bare-loop", &size), |bencher| bencher.iter(|| bare::run(mesh, seconds * 1000)));
     }
     group.finish();

@@ -11,7 +11,8 @@ use crate::by_hand::{Eight, Numbers, Tick};
 pub fn one(tick: &Tick<f64>, law: &impl Law<f64>, numbers: &mut Numbers<f64>, ticks: u32) {
     let [mut device, mut own, mean] = bodies(|place| numbers[place]);
     for _ in 0..ticks {
-        let (coupling, on_object) = forces(device, |apart| grasp(&tick.coupling, apart), &Observation { own, mean, lead: 0.0 }, law, &mut []);
+        let (coupling, on_object) =
+            forces(device, |apart| grasp(&tick.coupling, apart), &Observation { own, past: own, mean, lead: 0.0 }, law, &mut []);
         tick.device.advance_free(&mut device, on_device(tick.hand, coupling));
         tick.object.advance_free(&mut own, on_object);
     }
@@ -25,7 +26,8 @@ pub fn eight<L: Law<f64>>(tick: &Tick<Eight>, law: impl Fn(usize) -> L, numbers:
         for lane in 0..8 {
             let [mut device, mut own, mean] = bodies(|place| numbers[place].0[lane]);
             let coupling = tick.coupling.map(|gain| gain.0[lane]);
-            let (coupling, on_object) = forces(device, |apart| grasp(&coupling, apart), &Observation { own, mean, lead: 0.0 }, &law(lane), &mut []);
+            let (coupling, on_object) =
+                forces(device, |apart| grasp(&coupling, apart), &Observation { own, past: own, mean, lead: 0.0 }, &law(lane), &mut []);
             let of_lane = |map: &StepMap<Eight>| map.map(|coefficient| coefficient.0[lane]);
             of_lane(&tick.device).advance_free(&mut device, on_device(tick.hand.0[lane], coupling));
             of_lane(&tick.object).advance_free(&mut own, on_object);
@@ -43,7 +45,8 @@ pub fn columns<const C: usize>(tick: &Tick<f64>, law: &impl Law<f64>, numbers: &
     for _ in 0..ticks {
         for column in 0..C {
             let [mut device, mut own, mean] = bodies(|place| numbers[place][column]);
-            let (coupling, on_object) = forces(device, |apart| grasp(&tick.coupling, apart), &Observation { own, mean, lead: 0.0 }, law, &mut []);
+            let (coupling, on_object) =
+                forces(device, |apart| grasp(&tick.coupling, apart), &Observation { own, past: own, mean, lead: 0.0 }, law, &mut []);
             tick.device.advance(&mut device, -coupling);
             tick.object.advance(&mut own, on_object);
             (numbers[0][column], numbers[1][column]) = (device.position, device.velocity);

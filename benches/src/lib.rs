@@ -16,6 +16,7 @@ pub mod machine;
 pub mod one_link;
 pub mod pages;
 pub mod verdicts;
+pub mod watched;
 
 pub use cohaptic_benches_common::mesh::Mesh;
 

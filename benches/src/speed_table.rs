@@ -7,9 +7,13 @@ use std::time::Duration;
 
 use cohaptic_benches::effort::Effort;
 use cohaptic_benches::machine::{medians_in_turn, peak_memory, time};
+use cohaptic_benches::watched::{Onlooker, with_all_measures};
 use cohaptic_benches::{Mesh, bare};
-use cohaptic_harness::run_side_by_side;
-use cohaptic_scene::Scene;
+use cohaptic_harness::measures::Measures;
+use cohaptic_harness::{Model, NoObserver, Simulation, run_side_by_side};
+use cohaptic_peer::Coordination;
+use cohaptic_peer::coordination::BuiltInStrategy;
+use cohaptic_scene::{FromScene, Scene, Strategies};
 
 /// What the project asks of itself in each cell of [`Mesh::ALL`]: times real time, and the largest ratio of the bare loop's speed to the program's.
 const ASKED: [(f64, f64); 6] = [(12_000.0, 2.5), (8_000.0, 2.5), (5_000.0, 1.25), (2_500.0, 1.25), (120.0, 2.5), (50.0, 2.5)];
@@ -56,6 +60,8 @@ fn main() -> Result<(), String> {
     let memory = memory(work);
     one_run(work);
     many_runs(work);
+    measured_runs(work);
+    strategies(work);
     print_memory(&memory);
     Ok(())
 }
@@ -128,6 +134,81 @@ fn many_runs(work: Work) {
         println!("| {} | {} | {alone:.1} | {together:.1} | {:.2}× |", mesh.peers, mesh.links(), together / alone);
     }
     println!();
+}
+
+/// How many times as long a run may take with all measures as one that is watched.
+const ASKED_OF_MEASURES: f64 = 2.0;
+
+/// Runs with all measures beside runs that are watched.
+fn measured_runs(work: Work) {
+    println!("## Measures\n");
+    println!(
+        "The mesh above, watched by an observer that takes every tick and keeps nothing, and with all [measures](scenes.md#measure), which take more rows than"
+    );
+    println!("ticks: steps, samples held, samples sent. The median of {} rounds in which all of them alternate.\n", work.rounds);
+    println!("| peers | links | watched | all measures | ratio | asked for |");
+    println!("| ---: | --- | ---: | ---: | ---: | ---: |");
+    let seconds = |mesh: Mesh| (work.seconds(mesh) / 8).max(1);
+    let scenes = Mesh::ALL.map(|mesh| with_all_measures(mesh.scene(seconds(mesh) * 1000, 1)));
+    let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
+    for scene in &scenes {
+        works.push(Box::new(|| drop(black_box(Simulation::new(scene, Model::Least).run(&mut Onlooker)))));
+        works.push(Box::new(|| drop(black_box(Measures::run(scene, Model::Least)))));
+    }
+    let times = medians_in_turn(&works, work.rounds);
+    for (mesh, times) in Mesh::ALL.into_iter().zip(times.chunks(2)) {
+        let speed = |time: Duration| seconds(mesh) as f64 / time.as_secs_f64();
+        let (watched, measured) = (speed(times[0]), speed(times[1]));
+        println!("| {} | {} | {watched:.0}× | {measured:.0}× | {:.2} | {ASKED_OF_MEASURES} |", mesh.peers, mesh.links(), watched / measured);
+    }
+    println!();
+}
+
+/// How many times as long a tick of a strategy may take as one of average-position.
+const ASKED_OF_STRATEGIES: f64 = 1.5;
+
+/// Every strategy of the registry over events, beside average-position.
+fn strategies(work: Work) {
+    println!("## Strategies\n");
+    println!(
+        "The mesh above over constant delays, with events and nothing recorded but counters: the [strategies](model.md#strategies) with their usual parameters,"
+    );
+    println!(
+        "as multiples of the time that average-position takes; {ASKED_OF_STRATEGIES} are asked for. The median of {} rounds in which all of them alternate.\n",
+        work.rounds
+    );
+    println!("| peers | {} |", Coordination::ALL.iter().map(|strategy| strategy.name()).collect::<Vec<_>>().join(" | "));
+    println!("| ---: |{}", " ---: |".repeat(Coordination::ALL.len()));
+    for mesh in Mesh::ALL.into_iter().filter(|mesh| !mesh.impaired) {
+        let seconds = (work.seconds(mesh) / 8).max(1);
+        let scene = mesh.scene(seconds * 1000, 1);
+        let scenes: Vec<Scene> = Coordination::ALL.iter().map(|strategy| with_strategy(&scene, *strategy)).collect();
+        let run = |scene| drop(black_box(Simulation::with_strategies(scene, Model::Least, OverEvents).run(&mut NoObserver)));
+        let works: Vec<Box<dyn Fn() + '_>> = scenes.iter().map(|scene| Box::new(move || run(scene)) as Box<dyn Fn()>).collect();
+        let times = medians_in_turn(&works, work.rounds);
+        let ratios: Vec<String> = times.iter().map(|time| format!("{:.2}", time.as_secs_f64() / times[0].as_secs_f64())).collect();
+        println!("| {} | {} |", mesh.peers, ratios.join(" | "));
+    }
+    println!();
+}
+
+/// The scene with another strategy.
+fn with_strategy(scene: &Scene, strategy: Coordination) -> Scene {
+    let mut scene = scene.clone();
+    scene.coordination.strategy = strategy;
+    scene
+}
+
+/// The strategies of the registry, as if they were somebody's own: never run in arrays.
+#[derive(Clone, Copy, Debug)]
+struct OverEvents;
+
+impl Strategies for OverEvents {
+    type Strategy<const A: usize> = BuiltInStrategy<A>;
+
+    fn strategy<const A: usize>(&self, scene: &Scene, peer: usize) -> BuiltInStrategy<A> {
+        FromScene.strategy(scene, peer)
+    }
 }
 
 /// Name, processor time, and the most memory so far.

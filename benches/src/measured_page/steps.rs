@@ -103,7 +103,7 @@ impl Step {
     const fn question(self) -> &'static str {
         match self {
             Self::Speed => {
-                "How fast is one run, how far from the limit of the machine, what do many runs side by side gain, and does memory grow with time? Simulated seconds per
+                "How fast is one run, how far from the limit of the machine, what do many runs side by side gain, what do measures cost, and does memory grow with time? Simulated seconds per
 second of processor time on one core, of N peers at 1 kHz who all hold the object; the *bare loop* does the same arithmetic by hand and nothing else. The
 tables are described in [measured-speed.md](measured-speed.md)."
             }
@@ -140,7 +140,8 @@ one link alone, a stability map, and what each of the others does not model: [me
         let source = |name, how, tables| Some(Source { name, how, tables });
         match self {
             Self::Speed => {
-                let tables = &[("## A full mesh", ALL_ROWS), ("## Many runs of one scene", ALL_ROWS), ("## Memory", ALL_ROWS)];
+                let tables =
+                    &[("## A full mesh", ALL_ROWS), ("## Many runs of one scene", ALL_ROWS), ("## Measures", ALL_ROWS), ("## Memory", ALL_ROWS)];
                 source("measured-speed.md", How::Program("speed-table"), tables)
             }
             Self::Link => source("measured-link.md", How::Program("link-table"), &[("# One link: speed", ALL_ROWS)]),

@@ -28,6 +28,25 @@ function showClocks(clocks) {
   });
 }
 
+/** Measures of the run so far; a scene without any has none. */
+function showMeasures(measures) {
+  $('measures-section').hidden = measures.length === 0;
+  const body = $('measures');
+  while (body.rows.length > measures.length) body.deleteRow(-1);
+  measures.forEach(({ name, value, unit, about }, i) => {
+    let tr = body.rows[i];
+    if (!tr) {
+      tr = body.insertRow();
+      const head = make('th', 'name');
+      head.scope = 'row';
+      tr.append(head, make('td', 'n'));
+    }
+    put(tr.cells[0], name);
+    tr.cells[0].title = about;
+    put(tr.cells[1], value === null ? 'no value' : Number(value.toPrecision(4)) + ' ' + unit);
+  });
+}
+
 /** Causes with their counts, each with a bar of its share. */
 function showCauses(list, causes, none) {
   const entries = Object.entries(causes).filter(([, n]) => n > 0).sort((one, other) => other[1] - one[1]);

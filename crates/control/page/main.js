@@ -16,6 +16,7 @@ function take(state) {
   showRows(state.links);
   takePeers(state.peers);
   showClocks(state.clocks);
+  showMeasures(state.measures || []);
   showCauses($('drops'), state.links[chosen] ? state.links[chosen].dropped : {}, 'nothing');
   showCauses($('refused'), state.refused, 'none');
   $('plots').hidden = state.links.length === 0;

@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use serde::Serialize;
 
-/// The numbers of a run at one instant. What belongs to links, peers and clocks stands in the order of the [`Description`](crate::Description).
+/// The numbers of a run at one instant. What belongs to links, peers, clocks and measures stands in the order of the [`Description`](crate::Description).
 ///
 /// A list that is shorter than that of the description is filled up with nothing counted yet, one that is longer is cut.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -21,6 +21,8 @@ pub struct Snapshot {
     pub peers: Vec<PeerView>,
     /// How many datagrams were refused, by cause, since the run began.
     pub refused: Vec<(&'static str, u64)>,
+    /// The value of each measure of the description so far; `None` where it has none.
+    pub measures: Vec<Option<f64>>,
 }
 
 /// A distribution of spans in a few numbers. With a count of 0 the others say nothing.
@@ -129,6 +131,8 @@ pub struct Description {
     pub peers: Vec<PeerName>,
     /// The clocks whose lateness is measured, such as `"tick of left"` or `"release"`.
     pub clocks: Vec<String>,
+    /// The measures that are computed while it runs, or none.
+    pub measures: Vec<MeasureLabel>,
 }
 
 /// The command that runs.
@@ -164,6 +168,17 @@ pub struct LinkName {
     pub from: String,
     /// Where it ends.
     pub to: String,
+}
+
+/// A measure in words.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct MeasureLabel {
+    /// No other measure has it. It ends in the unit.
+    pub name: String,
+    /// The unit.
+    pub unit: &'static str,
+    /// Its meaning, without the last full stop.
+    pub about: &'static str,
 }
 
 /// A participant in names.

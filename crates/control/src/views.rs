@@ -4,12 +4,12 @@ use core::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-use crate::{Description, Latest, LinkCounters, PeerView, Quantiles, Snapshot};
+use crate::{Description, Latest, LinkCounters, MeasureLabel, PeerView, Quantiles, Snapshot};
 
 /// Everything that changes by itself, with the names.
 pub(crate) fn state(description: &Description, latest: &Latest) -> Value {
     let snapshot = &*latest.snapshot;
-    json!({
+    let mut state = json!({
         "kind": description.kind,
         "title": description.title,
         "number": latest.number,
@@ -20,7 +20,11 @@ pub(crate) fn state(description: &Description, latest: &Latest) -> Value {
         "links": (0..description.links.len()).map(|number| link(description, snapshot, number)).collect::<Vec<_>>(),
         "peers": peers(description, snapshot),
         "refused": counted(&snapshot.refused),
-    })
+    });
+    if !description.measures.is_empty() {
+        state["measures"] = measures(description, snapshot).into();
+    }
+    state
 }
 
 /// One link with its counters.
@@ -68,6 +72,15 @@ fn clocks(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
         json!({ "name": name, "lateness": quantiles(&lateness) })
     };
     description.clocks.iter().enumerate().map(clock).collect()
+}
+
+/// Measures without a value are `null`.
+fn measures(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
+    let measure = |(number, label): (usize, &MeasureLabel)| {
+        let value = snapshot.measures.get(number).copied().flatten();
+        json!({ "name": label.name, "value": value, "unit": label.unit, "about": label.about })
+    };
+    description.measures.iter().enumerate().map(measure).collect()
 }
 
 fn peers(description: &Description, snapshot: &Snapshot) -> Vec<Value> {

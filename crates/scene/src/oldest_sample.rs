@@ -1,11 +1,15 @@
-//! How old the samples in use are at most, where the links of a scene bound it.
+//! How old the samples in use are, where the links of a scene determine it.
 
 use core::time::Duration;
 
-use cohaptic_peer::coordination::LawValue;
+use cohaptic_peer::coordination::{Law, LawValue};
+use cohaptic_peer::{Clock, Coordination};
 use cohaptic_wan::{Counts, Layout, LinkConfig, LinkModel, Loss, Order};
 
 use crate::{ChangeKind, Scene};
+
+/// How many ticks a law looks back at most: a slip of the finger must not take all memory.
+const MOST_LAG: usize = 10_000;
 
 impl Scene {
     /// How many ticks old a sample in use is at most: ⌈delay/Tc⌉ + M − 1 + M·(longest run of lost packets), of the slowest link and the worst pattern, with M
@@ -15,13 +19,7 @@ impl Scene {
     /// timeline, peers whose clocks differ, dead bands.
     #[must_use]
     pub fn oldest_sample(&self) -> Option<u64> {
-        let clock = self.peers[0].clock;
-        let is_link_change = |what: &ChangeKind| matches!(what, ChangeKind::Link(_) | ChangeKind::AllLinks(_));
-        // A sample that is not sent leaves the one before it in use.
-        let thinned = self.coordination.send_when.is_some();
-        if thinned || self.peers.iter().any(|peer| peer.clock != clock) || self.timeline.iter().any(|change| is_link_change(&change.what)) {
-            return None;
-        }
+        let clock = self.lasting_clock()?;
         let line = |model: Option<&LinkModel>| {
             model.map_or(Some(Duration::ZERO), |model| bounded(model).filter(|(_, run)| *run == 0).map(|(delay, _)| delay))
         };
@@ -35,10 +33,58 @@ impl Scene {
             let (delay, run) = bounded(model)?;
             (slowest, longest) = (slowest.max(delay), longest.max(run));
         }
-        let delay = slowest.saturating_add(up).saturating_add(down).as_nanos();
-        let ticks = u64::try_from(delay.div_ceil(clock.tick.as_nanos())).ok()?;
-        let update = u64::try_from(self.coordination.update.as_nanos() / clock.tick.as_nanos()).ok()?;
+        let (ticks, update) = self.ticks_of(slowest.saturating_add(up).saturating_add(down), clock)?;
         ticks.checked_add(update.checked_mul(longest.checked_add(1)?)?)?.checked_sub(1)
+    }
+
+    /// How many ticks old a sample is in the middle of its use: ⌈delay/Tc⌉ + ⌊(M − 1)/2⌋, with M ticks from sample to sample. Of ticks in which an older
+    /// sample is in use there are then as many as of those in which a younger one is, or one more.
+    ///
+    /// `None` where that is not the same for all samples: links that do anything but delay, all alike, lines of peers, samples that are not sent, changes of links in the
+    /// timeline, peers whose clocks differ.
+    #[must_use]
+    pub fn middle_age(&self) -> Option<u64> {
+        let clock = self.lasting_clock()?;
+        if self.peers.iter().any(|peer| peer.uplink.is_some() || peer.downlink.is_some()) {
+            return None;
+        }
+        let mut delays = self.links.used().map(|(link, _)| link.is_constant_delay().then(|| link.mean_delay()));
+        let delay = delays.next()??;
+        if delays.any(|other| other != Some(delay)) {
+            return None;
+        }
+        let (ticks, update) = self.ticks_of(delay, clock)?;
+        ticks.checked_add(update.saturating_sub(1) / 2)
+    }
+
+    /// The clock of all peers, if they have one, send every sample, and the timeline does not change links.
+    fn lasting_clock(&self) -> Option<Clock> {
+        let clock = self.peers[0].clock;
+        let is_link_change = |what: &ChangeKind| matches!(what, ChangeKind::Link(_) | ChangeKind::AllLinks(_));
+        // A sample that is not sent leaves the one before it in use.
+        let thinned = self.coordination.send_when.is_some();
+        let differs = self.peers.iter().any(|peer| peer.clock != clock);
+        (!thinned && !differs && !self.timeline.iter().any(|change| is_link_change(&change.what))).then_some(clock)
+    }
+
+    /// After how many ticks a sample is in use that is on its way for `delay`, and how many ticks there are from sample to sample.
+    fn ticks_of(&self, delay: Duration, clock: Clock) -> Option<(u64, u64)> {
+        let tick = clock.tick.as_nanos();
+        let ticks = u64::try_from(delay.as_nanos().div_ceil(tick)).ok()?;
+        Some((ticks, u64::try_from(self.coordination.update.as_nanos() / tick).ok()?))
+    }
+
+    /// Why the coordination law cannot look back as far as its lag says; `None` if it can.
+    pub(crate) fn refused_lag(&self) -> Option<&'static str> {
+        let is_automatic = self.coordination.settings.of(self.coordination.strategy).any_automatic();
+        if self.coordination.strategy == Coordination::LocalLag && is_automatic && self.middle_age().is_none() {
+            return Some(
+                "a lag of \"auto\" needs links that all have one constant delay and do nothing else, and peers whose clocks are alike: expected a lag such as \"16ms\"",
+            );
+        }
+        let (_, place) = self.peers.iter().enumerate().map(|(place, peer)| (peer.clock.tick, place)).min()?;
+        (Law::<f64>::lag(&self.law(place)?) > MOST_LAG)
+            .then_some("the lag is more than 10000 ticks of a peer, which it does not remember: expected at most 10000 ticks")
     }
 
     /// Why a parameter of the coordination law cannot be `"auto"` in this scene; `None` if none is, or all can.

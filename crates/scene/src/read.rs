@@ -105,7 +105,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     // From here on the readers know axes, names and modulators.
     let object = root.required("object", "a table [object] with a mass", |node, _| read_object(node, context));
     let coordination_node = root.get("coordination");
-    let coordination = root.required("coordination", "a table [coordination] with a strategy", read_coordination);
+    let coordination = root.required("coordination", "a table [coordination] with a strategy", |node, _| read_coordination(node, file));
     let integrator = root.optional("simulation", cohaptic_peer::Integrator::default(), read_integrator);
     let defaults = root.get("peer");
     let update = coordination.as_ref().zip(coordination_node).map(|(coordination, node)| {
@@ -152,7 +152,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         measure: measure?,
         expect: expect?,
     };
-    if let Some(refused) = scene.refused_automatic().map(str::to_owned).or_else(|| scene.refused_strategy()) {
+    if let Some(refused) = scene.refused_automatic().or_else(|| scene.refused_lag()).map(str::to_owned).or_else(|| scene.refused_strategy()) {
         file.fault_at(coordination_node.unwrap_or(document), refused);
         return None;
     }

@@ -93,6 +93,7 @@ impl Scene {
             peers,
             tick: self.peers[peer].clock.tick,
             oldest: if own.any_automatic() { self.oldest_sample() } else { None },
+            middle: if own.any_automatic() { self.middle_age() } else { None },
             own: *own,
         }
     }

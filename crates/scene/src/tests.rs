@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use cohaptic_peer::Contact;
+use cohaptic_peer::coordination::Law;
 
 use crate::{Scene, SceneError};
 
@@ -103,7 +104,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "update =",
             "updat =",
-            "8:1: coordination.updat: unknown key: expected one of strategy, scaling, pull, stiffness, damping, update, send-when, smoothed-average-position, extrapolated, local-damping, passivity-control, set-position, wave, client-server; did you mean \"update\"?",
+            "8:1: coordination.updat: unknown key: expected one of strategy, scaling, pull, stiffness, damping, update, send-when, smoothed-average-position, extrapolated, local-damping, local-lag, passivity-control, set-position, wave, client-server; did you mean \"update\"?",
         ),
         ("damping = 5.0 }\ncoupling", "dampening = 5.0 }\ncoupling", "10:24: peer.device.dampening: unknown key: expected one of mass, damping"),
         (
@@ -177,7 +178,7 @@ fn a_wrong_unit_or_type_is_refused() {
         (
             "average-position",
             "average-positoin",
-            "6:12: coordination.strategy: unknown name \"average-positoin\": expected one of average-position, proportional-derivative, smoothed-average-position, extrapolated, local-damping, passivity-control, set-position, wave, client-server; did you mean \"average-position\"?",
+            "6:12: coordination.strategy: unknown name \"average-positoin\": expected one of average-position, proportional-derivative, smoothed-average-position, extrapolated, local-damping, local-lag, passivity-control, set-position, wave, client-server; did you mean \"average-position\"?",
         ),
         ("[peer]", "[peer]\nhand = \"soft\"", "10:8: peer.hand: unknown hand \"soft\": expected \"none\""),
         ("[peer]", "[peer]\ncontact = { pull = 1 }", "10:13: peer.contact.pull: unknown key: expected push"),
@@ -358,6 +359,41 @@ fn a_damping_that_no_link_bounds_is_refused() {
         "update = \"8ms\"",
         "update = \"8ms\"\nlocal-damping = { damping = \"automatic\" }",
         "9:29: coordination.local-damping.damping: unknown name \"automatic\": expected auto, or a number of at least zero [N·s/m]",
+    )]);
+}
+
+#[test]
+fn a_lag_that_no_links_give_is_refused() {
+    let lagging = SCENE.replace("average-position", "local-lag");
+    let ticks = |text: &str, changes: &[&str]| Law::<f64>::lag(&parse(text, changes).unwrap().law(0).unwrap());
+    // ⌈24 ms/1 ms⌉ + ⌊(8 − 1)/2⌋, and a delay that ends between two ticks.
+    assert_eq!([ticks(&lagging, &[]), ticks(&lagging, &["link.delay=\"24.2ms\""]), ticks(&lagging, &["coordination.update=\"1ms\""])], [27, 28, 24]);
+    let refused = "5:1: coordination: a lag of \"auto\" needs links that all have one constant delay and do nothing else, and peers whose clocks are alike: expected a lag such as \"16ms\"";
+    for added in [
+        "loss = { packets = [3], every = 4 }\n",
+        "jitter = \"1ms\"\n",
+        "rate = \"1Mbit\"\n",
+        "[[links]]\nfrom = \"left\"\nto = \"right\"\ndelay = \"1ms\"\n",
+        "[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { delay = \"30ms\" }\n",
+    ] {
+        check(&format!("{lagging}{added}"), refused);
+        assert_eq!(ticks(&format!("{lagging}{added}"), &["coordination.local-lag.lag=\"30.1ms\""]), 31);
+        // Of a strategy that is not in use nothing is asked.
+        parse(&format!("{lagging}{added}"), &["coordination.strategy=\"average-position\""]).unwrap();
+    }
+    check(&lagging.replace("[[peers]]\nname = \"right\"", "[[peers]]\ntick = \"2ms\"\nname = \"right\""), refused);
+    check(&lagging.replace("[[peers]]\nname = \"right\"", "[[peers]]\nuplink = { delay = \"1ms\" }\nname = \"right\""), refused);
+    // New gains do not touch it.
+    parse(&format!("{lagging}[[timeline]]\nat = \"1s\"\ncoordination = {{ stiffness = 100.0 }}\n"), &[]).unwrap();
+    let long = "the lag is more than 10000 ticks of a peer, which it does not remember: expected at most 10000 ticks";
+    for changes in [["coordination.local-lag.lag=\"10001ms\""], ["link.delay=\"1h\""]] {
+        assert!(parse(&lagging, &changes).unwrap_err().to_string().contains(long), "{changes:?}");
+    }
+    assert_eq!(ticks(&lagging, &["coordination.local-lag.lag=\"10s\""]), 10_000);
+    check_replaced(&[(
+        "update = \"8ms\"",
+        "update = \"8ms\"\nlocal-lag = { lag = 3 }",
+        "9:21: coordination.local-lag.lag: found the integer 3: expected",
     )]);
 }
 

@@ -5,6 +5,7 @@
 
 use std::time::Duration;
 
+use cohaptic_peer::coordination::Role;
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Acting, Contact, Device as _, Gains, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State, Strategy};
 use cohaptic_scene::Scene;
@@ -15,7 +16,7 @@ use crate::lifted::majorant::error_of;
 use crate::lifted::{Body, Lifted, Node, closer_of};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::structure::{Contacts, Structure, common_time, count, has_equal_clocks, linear_law};
-use crate::timetable::{Event, Instants, NodeClock, Timetable};
+use crate::timetable::{Event, Instants, NodeClock, Timetable, UseOfHeld};
 use crate::{AnalysisError, Matrix, StateKind, StateName, Watch};
 
 /// What the general path finds: the matrix of one frame in relative coordinates.
@@ -103,6 +104,8 @@ struct Pusher<const A: usize, S> {
     compliance: Vec<f64>,
     /// The samples of each peer: those of earlier frames, oldest first, then those of this one.
     samples: Vec<Vec<State<A>>>,
+    /// The extra numbers of each of them, for each other peer; none where samples are states alone.
+    extras: Vec<Vec<[f64; A]>>,
     /// The largest number seen on the way of the unit vectors, for the bound of errors.
     growth: f64,
 }
@@ -115,6 +118,8 @@ struct Layout {
     pending: Vec<bool>,
     /// Where the samples of earlier frames of each peer begin, the newest first.
     samples: Vec<usize>,
+    /// How many receivers have extra numbers in a sample.
+    receivers: usize,
     size: usize,
     /// States that nothing depends on and that drift with everything else: positions of devices that touch nothing.
     loose: Vec<usize>,
@@ -128,7 +133,8 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let clocks: Vec<NodeClock> = (0..peers).map(|place| NodeClock::of(scene, place)).collect();
         let pairs = (0..peers).flat_map(|to| (0..peers).filter(move |from| *from != to).map(move |from| (from, to)));
         let links: Vec<(usize, usize, LinkTiming)> = pairs.map(|(from, to)| (from, to, network.timing(from, to).clone())).collect();
-        let timetable = Timetable::new(&clocks, &links)?;
+        let uses = if scene.sample_kind() == SampleKind::State { UseOfHeld::Ticks } else { UseOfHeld::SamplesAndTicks };
+        let timetable = Timetable::with_use_of_held(&clocks, &links, uses)?;
         let member = |place: usize| {
             let spec = &scene.peers[place];
             let mut config = scene.peer_config(place);
@@ -141,7 +147,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             Peer::new(config, device, object, strategy(place), Held::new((1..peers).map(|_| State::REST)))
         };
         let members: Vec<Member<A, S>> = (0..peers).map(member).collect();
-        if members.iter().any(|member| member.kind() != SampleKind::State) {
+        if !members.iter().all(|member| matches!(member.kind(), SampleKind::State | SampleKind::Force)) {
             return Err(AnalysisError::NoAnalysis { strategy: scene.coordination.strategy.name() });
         }
         if members.iter().any(|member| member.strategy().needs_ages()) && !has_equal_clocks(scene) {
@@ -151,11 +157,22 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let tied = silent || (0..peers).any(|place| contacts.touching[place] && scene.device_plant(place).stiffness > 0.0);
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);
         let touching = contacts.touching.iter().copied().enumerate();
-        let time = common_time(scene, timetable.frame, linear_law(scene, 0).map_or(scene.coordination.gains, |law| law.force.own), touching, false);
+        let time = common_time(scene, timetable.frame, linear_law(scene, 0).map_or(scene.coordination.gains, |law| law.held_by()), touching, false);
         let compliance = (0..peers).map(|peer| compliance(scene, peer, time)).collect();
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
         let instants = Instants::of(&timetable, peers);
-        Ok(Self { samples: vec![Vec::new(); peers], instants, members, names, timetable, layout, time, compliance, growth: 1.0 })
+        Ok(Self {
+            samples: vec![Vec::new(); peers],
+            extras: vec![Vec::new(); peers],
+            instants,
+            members,
+            names,
+            timetable,
+            layout,
+            time,
+            compliance,
+            growth: 1.0,
+        })
     }
 
     /// The matrix, vector by vector; `None` if the watcher ends it.
@@ -164,11 +181,11 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let events = self.timetable.events.len();
         watch.expects(full_operations(size, events, A));
         let rest = self.pushed(&vec![0.0; size], Instant::ZERO);
-        let free: Vec<usize> = (0..A).filter(|axis| self.is_free(*axis, &rest)).collect();
+        let (free, translations): (Vec<usize>, Vec<Vec<f64>>) =
+            (0..A).filter_map(|axis| self.free_translation(axis, &rest).map(|translation| (axis, translation))).unzip();
         // Relative to the first peer's copy, and without what nothing depends on.
         let reference: Vec<usize> = free.iter().map(|axis| self.layout.first[0] + 2 * A + axis).collect();
         let kept: Vec<usize> = (0..size).filter(|state| !reference.contains(state) && !self.layout.loose.contains(state)).collect();
-        let translations: Vec<Vec<f64>> = free.iter().map(|axis| self.translation(*axis)).collect();
         let mut monodromy = Matrix::zeros(kept.len(), kept.len());
         self.growth = 1.0;
         let (mut unit, mut reached) = (vec![0.0; size], vec![0.0; size]);
@@ -235,18 +252,18 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         Ok(())
     }
 
-    /// Whether everything may be moved along an axis without a force; not if an arm, or a strategy of somebody's own, knows where the origin is.
-    fn is_free(&mut self, axis: usize, rest: &[f64]) -> bool {
+    /// Everything moved by 1 m along an axis, if it may be without a force; not if an arm, or a strategy of somebody's own, knows where the origin is.
+    fn free_translation(&mut self, axis: usize, rest: &[f64]) -> Option<Vec<f64>> {
         if self.layout.tied {
-            return false;
+            return None;
         }
         let moved = self.translation(axis);
         let reached = self.pushed(&moved, Instant::ZERO);
-        moved.iter().zip(reached.iter().zip(rest)).all(|(moved, (reached, rest))| (reached - rest - moved).abs() <= 1e-9)
+        moved.iter().zip(reached.iter().zip(rest)).all(|(moved, (reached, rest))| (reached - rest - moved).abs() <= 1e-9).then_some(moved)
     }
 
     /// Everything moved by 1 m along an axis, but for devices that touch nothing.
-    fn translation(&self, axis: usize) -> Vec<f64> {
+    fn translation(&mut self, axis: usize) -> Vec<f64> {
         let mut moved = vec![0.0; self.layout.size];
         for (place, first) in self.layout.first.iter().enumerate() {
             if self.layout.touching[place] {
@@ -254,10 +271,39 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             }
             moved[first + 2 * A + axis] = 1.0;
             for age in 0..self.timetable.depth[place] {
-                moved[self.layout.samples[place] + age * 2 * A + axis] = 1.0;
+                moved[self.layout.samples[place] + age * self.layout.sample_len::<A>() + axis] = 1.0;
+            }
+        }
+        // Strategies may remember positions: after a tick for each number of the memory those have moved as well.
+        if self.layout.memory.iter().any(|numbers| *numbers > 0) {
+            let (at_rest, displaced) = (self.remembered(&vec![0.0; moved.len()]), self.remembered(&moved));
+            for place in 0..self.members.len() {
+                for number in self.layout.memory_of::<A>(place) {
+                    moved[number] = displaced[number] - at_rest[number];
+                }
             }
         }
         moved
+    }
+
+    /// The state `z` with what strategies remember where nothing has moved for as many ticks as they remember numbers.
+    fn remembered(&mut self, z: &[f64]) -> Vec<f64> {
+        self.restore(z, EARLIER);
+        // A frame may begin with nothing held that is used in it; here a sample from every peer is in use.
+        let copies: Vec<State<A>> = self.layout.first.iter().map(|first| state(&z[first + 2 * A..], self.time)).collect();
+        for (place, member) in self.members.iter_mut().enumerate() {
+            let others = copies.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
+            others.enumerate().for_each(|(other, state)| member.hold(other, EARLIER, state));
+        }
+        let mut z = z.to_vec();
+        for (place, member) in self.members.iter_mut().enumerate() {
+            let numbers = self.layout.memory_of::<A>(place);
+            for _ in numbers.clone() {
+                member.compute(Instant::ZERO);
+            }
+            z[numbers].copy_from_slice(member.strategy().memory());
+        }
+        z
     }
 
     /// Where one frame from the state `z` leads, beginning at `begin`.
@@ -274,7 +320,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let peers = self.members.len();
         for event in 0..self.timetable.events.len() {
             match self.timetable.events[event] {
-                Event::Sample { node } => self.samples[node].push(*self.members[node].object().state()),
+                Event::Sample { node } => self.sample_now(node),
                 Event::Deliver { from, to, sample } => {
                     self.hold(to, from, sample, begin_local);
                 }
@@ -296,18 +342,38 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
     }
 
+    /// A peer samples.
+    fn sample_now(&mut self, node: usize) {
+        let member = &mut self.members[node];
+        let state = match member.role() {
+            Role::Copy => *member.object().state(),
+            Role::Client { .. } => member.device().state(),
+        };
+        self.samples[node].push(state);
+        self.extras[node].extend((0..self.layout.receivers).map(|receiver| member.extra(receiver)));
+    }
+
     /// A peer holds a sample of another.
     fn hold(&mut self, to: usize, from: usize, sample: i64, begin_local: Instant) {
         let state = *self.sample(from, sample);
         let after = self.instants.sent_at(from, sample, self.timetable.frame);
         let sent = Instant::from_nanos(begin_local.as_nanos().saturating_add_signed(after));
-        self.members[to].hold(if from < to { from } else { from - 1 }, sent, state);
+        let among_others = |one: usize, other: usize| if one < other { one } else { one - 1 };
+        self.members[to].hold(among_others(from, to), sent, state);
+        if self.layout.receivers > 0 {
+            let extra = self.extras[from][self.sample_place(from, sample) * self.layout.receivers + among_others(to, from)];
+            self.members[to].strategy_mut().accept(among_others(from, to), &extra);
+        }
     }
 
     /// The sample with that number: from 0 if it is of this frame.
     fn sample(&self, from: usize, number: i64) -> &State<A> {
-        let place = i64::try_from(self.timetable.depth[from]).unwrap_or(0) + number;
-        &self.samples[from][usize::try_from(place).unwrap_or(0)]
+        &self.samples[from][self.sample_place(from, number)]
+    }
+
+    /// Where that sample is kept.
+    fn sample_place(&self, from: usize, number: i64) -> usize {
+        usize::try_from(i64::try_from(self.timetable.depth[from]).unwrap_or(0) + number).unwrap_or(0)
     }
 
     fn restore(&mut self, z: &[f64], begin_local: Instant) {
@@ -327,9 +393,14 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             member.strategy_mut().set_memory(&z[next..next + layout.memory[place]]);
             // Kept with the oldest first, so that a sample's place follows from its number.
             let depth = self.timetable.depth[place];
-            let samples = (0..depth).rev().map(|age| state(&z[layout.samples[place] + age * 2 * A..], self.time));
+            let begin = |age: usize| layout.samples[place] + age * layout.sample_len::<A>();
+            let samples = (0..depth).rev().map(|age| state(&z[begin(age)..], self.time));
             self.samples[place].clear();
             self.samples[place].extend(samples);
+            let force = |first: usize| core::array::from_fn(|axis| z[first + axis] / self.compliance[place]);
+            let extras = (0..depth).rev().flat_map(|age| (0..layout.receivers).map(move |receiver| begin(age) + (2 + receiver) * A));
+            self.extras[place].clear();
+            self.extras[place].extend(extras.map(force));
         }
         for held in 0..self.timetable.held.len() {
             let (to, from, sample) = self.timetable.held[held];
@@ -352,8 +423,14 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             next += 2 * A;
         }
         z[next..next + layout.memory[place]].copy_from_slice(member.strategy().memory());
-        for (age, sample) in self.samples[place].iter().rev().take(self.timetable.depth[place]).enumerate() {
-            write(sample, &mut z[layout.samples[place] + age * 2 * A..], self.time);
+        let receivers = layout.receivers;
+        for (age, (number, sample)) in self.samples[place].iter().enumerate().rev().take(self.timetable.depth[place]).enumerate() {
+            let first = layout.samples[place] + age * layout.sample_len::<A>();
+            write(sample, &mut z[first..], self.time);
+            for (entry, force) in z[first + 2 * A..].iter_mut().zip(self.extras[place][number * receivers..(number + 1) * receivers].iter().flatten())
+            {
+                *entry = force * self.compliance[place];
+            }
         }
     }
 }
@@ -366,6 +443,7 @@ impl Layout {
             memory: Vec::new(),
             pending: Vec::new(),
             samples: Vec::new(),
+            receivers: if members.iter().any(|member| member.kind().is_personal()) { members.len() - 1 } else { 0 },
             size: 0,
             loose: Vec::new(),
             tied,
@@ -382,9 +460,20 @@ impl Layout {
         }
         for depth in &timetable.depth {
             layout.samples.push(layout.size);
-            layout.size += depth * 2 * A;
+            layout.size += depth * layout.sample_len::<A>();
         }
         layout
+    }
+
+    /// Where the numbers stand that the strategy of a peer remembers.
+    fn memory_of<const A: usize>(&self, place: usize) -> std::ops::Range<usize> {
+        let first = self.first[place] + 4 * A + if self.pending[place] { 2 * A } else { 0 };
+        first..first + self.memory[place]
+    }
+
+    /// How many numbers a sample has.
+    const fn sample_len<const A: usize>(&self) -> usize {
+        (2 + self.receivers) * A
     }
 
     /// What every state is, in order.
@@ -407,6 +496,8 @@ impl Layout {
             for age in 1..=*depth {
                 names.extend((0..A).map(|axis| StateName { peer, kind: StateKind::SamplePosition { axis, age } }));
                 names.extend((0..A).map(|axis| StateName { peer, kind: StateKind::SampleVelocity { axis, age } }));
+                let extras = (0..self.receivers).flat_map(|other| (0..A).map(move |axis| (if other < peer { other } else { other + 1 }, axis)));
+                names.extend(extras.map(|(receiver, axis)| StateName { peer, kind: StateKind::SampleForce { axis, age, receiver } }));
             }
         }
         names

@@ -5,8 +5,9 @@ use std::ops::{Add, Mul, Neg, Sub};
 use cohaptic_peer::coordination::{BuiltIn, Law, Observation};
 use cohaptic_peer::{Gains, Motion, Number};
 
-/// Own position and velocity, those of the mean of the samples held, by how much these have moved on, and one number that the law remembers.
-const UNKNOWNS: usize = 6;
+/// Own position and velocity, those of the mean of the samples held, those of the own state of the past, by how much the samples have moved on, and one
+/// number that the law remembers.
+const UNKNOWNS: usize = 8;
 
 /// A constant plus a multiple of each unknown; or the knowledge that it is no such sum.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -91,10 +92,11 @@ impl Mul for Form {
 
 /// What comes out of a law in linear form: FT \[N\], or a number that the law remembers from now on.
 ///
-/// own·(x, v) − heard·(x̄, v̄) − ahead·lead + Σ memory·m, with x̄, v̄ and the lead of an [`Observation`].
+/// own·(x, v) + past·(x, v)(L ticks ago) − heard·(x̄, v̄) − ahead·lead + Σ memory·m, with x̄, v̄ and the lead of an [`Observation`].
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct LawRow {
     pub(crate) own: Gains,
+    pub(crate) past: Gains,
     pub(crate) heard: Gains,
     pub(crate) ahead: f64,
     /// What each number that the law remembered is multiplied by.
@@ -108,17 +110,20 @@ pub(crate) struct LinearLaw {
     pub(crate) memory: Vec<LawRow>,
     /// Up to which age \[s\] samples are extrapolated; `None` if they are taken as they are.
     pub(crate) horizon: Option<f64>,
+    /// L, how many ticks the law looks back. If any, it remembers nothing else.
+    pub(crate) lag: usize,
 }
 
 impl LawRow {
     /// Of the parts of `form` that do not depend on what the law remembers; `None` if it is no such sum, or changes where everything is moved alike.
     #[expect(clippy::float_cmp, reason = "what moves with everything has equal gains for both ends to the bit")]
     fn of(form: &Form) -> Option<Self> {
-        let Form { constant, by: [stiffness, damping, mean_position, mean_velocity, lead, _], is_linear } = *form;
-        let fits = is_linear && constant == 0.0 && mean_position == -stiffness;
+        let Form { constant, by: [stiffness, damping, mean_position, mean_velocity, past_stiffness, past_damping, lead, _], is_linear } = *form;
+        let fits = is_linear && constant == 0.0 && mean_position == -(stiffness + past_stiffness);
         let negative = |value: f64| if value == 0.0 { 0.0 } else { -value };
         fits.then(|| Self {
             own: Gains { stiffness, damping },
+            past: Gains { stiffness: past_stiffness, damping: past_damping },
             heard: Gains { stiffness: negative(mean_position), damping: negative(mean_velocity) },
             ahead: negative(lead),
             memory: Vec::new(),
@@ -127,7 +132,8 @@ impl LawRow {
 
     /// With everything that is seen multiplied by a factor.
     fn scaled(&self, factor: f64) -> Self {
-        Self { own: self.own.scaled(factor), heard: self.heard.scaled(factor), ahead: self.ahead * factor, memory: self.memory.clone() }
+        let Self { own, past, heard, ahead, memory } = self;
+        Self { own: own.scaled(factor), past: past.scaled(factor), heard: heard.scaled(factor), ahead: ahead * factor, memory: memory.clone() }
     }
 }
 
@@ -137,24 +143,29 @@ impl LinearLaw {
     /// The coefficients are those that the law multiplies with, to the bit, where every other factor on the way is 1 or 0.
     pub(crate) fn of(law: &BuiltIn) -> Option<Self> {
         let remembered = Law::<f64>::memory(law);
-        let seen = Observation { own: Form::motion(0), mean: Form::motion(1), lead: Form::unknown(4) };
+        let lag = Law::<f64>::lag(law);
+        if lag > 0 && remembered > 0 {
+            return None;
+        }
+        let past = Form::motion(if lag > 0 { 2 } else { 0 });
+        let seen = Observation { own: Form::motion(0), past, mean: Form::motion(1), lead: Form::unknown(6) };
         let forms = law.map(|number| Form::of(*number));
         // FT and the memory after the tick, with one number of the memory before it as an unknown and the others zero.
         let come_out = |unknown: Option<usize>| {
             let mut memory = vec![Form::of(0.0); remembered];
             if let Some(unknown) = unknown {
-                memory[unknown] = Form::unknown(5);
+                memory[unknown] = Form::unknown(7);
             }
             (forms.force(&seen, &mut memory), memory)
         };
         let (force, memory) = come_out(None);
-        let mut law =
-            Self { force: LawRow::of(&force)?, memory: memory.iter().map(LawRow::of).collect::<Option<_>>()?, horizon: Law::<f64>::horizon(law) };
+        let memory = memory.iter().map(LawRow::of).collect::<Option<_>>()?;
+        let mut law = Self { force: LawRow::of(&force)?, memory, horizon: Law::<f64>::horizon(law), lag };
         for unknown in 0..remembered {
             let (force, memory) = come_out(Some(unknown));
             for (row, form) in law.rows_mut().zip(std::iter::once(&force).chain(&memory)) {
                 LawRow::of(form)?;
-                row.memory.push(form.by[5]);
+                row.memory.push(form.by[7]);
             }
         }
         if law.horizon.is_none() {
@@ -167,7 +178,7 @@ impl LinearLaw {
     /// No force at all.
     pub(crate) const fn none() -> Self {
         let none = Gains { stiffness: 0.0, damping: 0.0 };
-        Self { force: LawRow { own: none, heard: none, ahead: 0.0, memory: Vec::new() }, memory: Vec::new(), horizon: None }
+        Self { force: LawRow { own: none, past: none, heard: none, ahead: 0.0, memory: Vec::new() }, memory: Vec::new(), horizon: None, lag: 0 }
     }
 
     /// FT, and then what the law remembers.
@@ -179,16 +190,23 @@ impl LinearLaw {
         std::iter::once(&mut self.force).chain(&mut self.memory)
     }
 
+    /// How stiffly and with which damping FT holds the own copy, now or later.
+    pub(crate) fn held_by(&self) -> Gains {
+        let LawRow { own, past, .. } = &self.force;
+        Gains { stiffness: own.stiffness + past.stiffness, damping: own.damping + past.damping }
+    }
+
     /// KT and BT of a law that pulls the copy towards the mean of the samples held and remembers nothing: FT = KT·(x − x̄) + BT·(v − v̄). `None` for any
     /// other law.
     pub(crate) fn pull(&self) -> Option<Gains> {
         let LawRow { own, heard, ahead, .. } = &self.force;
-        (self.memory.is_empty() && own == heard && *ahead == 0.0).then_some(*own)
+        (self.memory.is_empty() && self.lag == 0 && own == heard && *ahead == 0.0).then_some(*own)
     }
 
     /// The law with everything that it sees multiplied by a factor.
     pub(crate) fn scaled(&self, factor: f64) -> Self {
-        Self { force: self.force.scaled(factor), memory: self.memory.iter().map(|row| row.scaled(factor)).collect(), horizon: self.horizon }
+        let memory = self.memory.iter().map(|row| row.scaled(factor)).collect();
+        Self { force: self.force.scaled(factor), memory, ..self.clone() }
     }
 }
 
@@ -202,14 +220,14 @@ mod tests {
     use super::*;
 
     fn parameters(gains: Gains) -> LawParameters {
-        LawParameters { gains, peers: 3, tick: Duration::from_millis(1), oldest: None, own: LawValues::default() }
+        LawParameters { gains, peers: 3, tick: Duration::from_millis(1), oldest: None, middle: None, own: LawValues::default() }
     }
 
     /// Equation (10), and equation (2) as the sum of two pulls: KT·(x − x₁) + KT·(x − x₂) with x₁ + x₂ = 2·x̄.
     #[test]
     fn the_gains_of_both_laws_come_out_to_the_bit() {
         let gains = Gains { stiffness: 1234.567, damping: 0.1 };
-        let pull = |coordination: Coordination| LinearLaw::of(&coordination.law(&parameters(gains))).unwrap().pull();
+        let pull = |coordination: Coordination| LinearLaw::of(&coordination.law(&parameters(gains)).unwrap()).unwrap().pull();
         assert_eq!(pull(Coordination::AveragePosition), Some(gains));
         assert_eq!(pull(Coordination::ProportionalDerivative), Some(Gains { stiffness: 2.0 * 1234.567, damping: 0.2 }));
     }
@@ -217,7 +235,7 @@ mod tests {
     #[test]
     fn gains_beyond_all_numbers_are_still_a_pull() {
         let gains = Gains { stiffness: f64::MAX, damping: 0.0 };
-        let law = Coordination::ProportionalDerivative.law(&parameters(gains));
+        let law = Coordination::ProportionalDerivative.law(&parameters(gains)).unwrap();
         assert_eq!(LinearLaw::of(&law).unwrap().pull(), Some(Gains { stiffness: f64::INFINITY, damping: 0.0 }));
     }
 
@@ -228,6 +246,6 @@ mod tests {
         assert!(!(two - x * y).is_linear);
         assert!(!(x * x * Form::of(0.0)).is_linear);
         let form = two * (x - y) * two + -two;
-        assert_eq!(form, Form { constant: -2.0, by: [4.0, -4.0, 0.0, 0.0, 0.0, 0.0], is_linear: true });
+        assert_eq!(form, Form { constant: -2.0, by: [4.0, -4.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], is_linear: true });
     }
 }

@@ -1,6 +1,6 @@
 //! A dense real matrix, row by row.
 
-use std::ops::{Index, IndexMut};
+use std::ops::{Index, IndexMut, Range};
 
 /// A dense real matrix, stored row by row.
 ///
@@ -84,6 +84,15 @@ impl Matrix {
         let (first, others) = self.entries[row * self.columns..(row + 3) * self.columns].split_at_mut(self.columns);
         let (second, third) = others.split_at_mut(self.columns);
         (first, second, third)
+    }
+
+    /// Copies rows to where they begin at `to`, also over themselves.
+    ///
+    /// # Panics
+    ///
+    /// If there are no such rows.
+    pub(crate) fn move_rows(&mut self, rows: Range<usize>, to: usize) {
+        self.entries.copy_within(rows.start * self.columns..rows.end * self.columns, to * self.columns);
     }
 
     /// All entries, row by row.

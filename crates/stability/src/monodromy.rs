@@ -69,6 +69,14 @@ pub enum StateKind {
         /// See above.
         age: usize,
     },
+    /// The force that a server computed for a client at an earlier sampling.
+    SampleForce {
+        axis: usize,
+        /// See above.
+        age: usize,
+        /// The place of the client.
+        receiver: usize,
+    },
 }
 
 impl fmt::Display for StateKind {
@@ -84,6 +92,7 @@ impl fmt::Display for StateKind {
             Self::Memory { number } => write!(f, "memory {number} of the strategy"),
             Self::SamplePosition { axis: a, age } => write!(f, "position {} sampled {age} before", axis(a)),
             Self::SampleVelocity { axis: a, age } => write!(f, "velocity {} sampled {age} before", axis(a)),
+            Self::SampleForce { axis: a, age, receiver } => write!(f, "force {} for peer {receiver} sampled {age} before", axis(a)),
         }
     }
 }

@@ -147,7 +147,7 @@ impl Structure {
     /// The common time of the classes, of which those are the nodes \[s\].
     pub(crate) fn time(&self, scene: &Scene, nodes: &[Node]) -> f64 {
         let peers = self.classes.iter().zip(&self.touching).map(|(class, touching)| (class[0], *touching));
-        common_time(scene, self.timetable.frame, nodes[0].law.force.own, peers, self.at_wall)
+        common_time(scene, self.timetable.frame, nodes[0].law.held_by(), peers, self.at_wall)
     }
 
     /// The system of the classes' averages.

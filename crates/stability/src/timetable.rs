@@ -111,6 +111,15 @@ pub(crate) struct Timetable {
     pub(crate) held: Vec<(usize, usize, i64)>,
 }
 
+/// At which events nodes use the samples that they hold.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum UseOfHeld {
+    /// When they compute forces.
+    Ticks,
+    /// Also when they sample, before the deliveries of the same instant.
+    SamplesAndTicks,
+}
+
 impl Timetable {
     /// No sample that is used in the frame is older \[s\].
     pub(crate) fn oldest(&self) -> f64 {
@@ -120,6 +129,11 @@ impl Timetable {
 
     /// The frame of nodes that send to each other over those links: (from, to, timing).
     pub(crate) fn new(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)]) -> Result<Self, AnalysisError> {
+        Self::with_use_of_held(clocks, links, UseOfHeld::Ticks)
+    }
+
+    /// [`Timetable::new`] for nodes that use what they hold at those events.
+    pub(crate) fn with_use_of_held(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)], uses: UseOfHeld) -> Result<Self, AnalysisError> {
         let frame = frame(clocks, links)?;
         let end = i128::try_from(frame).map_err(|_| AnalysisError::NoFrame)?;
         let mut events: Vec<(i128, u8, usize, usize, i64, Event)> = Vec::new();
@@ -153,8 +167,12 @@ impl Timetable {
             let (from, to) = (*from, *to);
             let arrivals = arrivals(&clocks[from], &clocks[to], timing, first_sample[from], end);
             let mut need = |sample: i64| depth[from] = depth[from].max(usize::try_from(-sample).unwrap_or(0));
-            // The sample held when the frame begins matters if the node ticks before anything arrives.
-            if arrivals.new.first().is_none_or(|(at, _)| *at > first_tick_at[to])
+            // The sample held when the frame begins matters if the node ticks before anything arrives. It samples before that.
+            let is_used_before = |at: i128| match uses {
+                UseOfHeld::Ticks => at > first_tick_at[to],
+                UseOfHeld::SamplesAndTicks => at >= first_tick_at[to],
+            };
+            if arrivals.new.first().is_none_or(|(at, _)| is_used_before(*at))
                 && let Some(sample) = arrivals.before
             {
                 held.push((to, from, sample));

@@ -47,6 +47,18 @@ fn with_three_in_place_of_two_ap_is_unstable() {
 }
 
 #[test]
+fn with_own_states_of_the_past_three_are_unstable_until_the_stiffness_is_a_fifth() {
+    let radius = |changes: &[&str]| analyse(&scene("local-lag-three.toml", changes), Method::Reduced).unwrap().radius.value;
+    // Of a simulation apart from this program.
+    assert!((radius(&[]) - 1.050_557_7).abs() < 6e-8);
+    assert!((radius(&[AP]) - 0.896_488_1).abs() < 6e-8);
+    assert!((radius(&["coordination.stiffness=200"]) - 0.848_044_258).abs() < 6e-10);
+    let case = |changes: &[&str]| is_stable(&scene("local-lag-three.toml", changes));
+    assert!(!case(&[]));
+    assert!(case(&[AP]) && case(&["coordination.stiffness=200"]));
+}
+
+#[test]
 fn ap_is_unstable_where_pd_is_stable_until_the_stiffness_is_halved() {
     let case = |changes: &[&str]| is_stable(&scene("region-contains.toml", changes));
     assert!(!case(&[]));

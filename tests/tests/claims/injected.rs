@@ -3,8 +3,10 @@
 //! W = Σᵢ Σ (−F·d − what β took) with F the force that a strategy holds over a tick, and d what a copy moves in it. Of what all damping takes in a tick,
 //! f·d − ½·m·Δv² with f the sum of the held forces, β takes β/(bO + β).
 
-use cohaptic_scene::Scene;
-use cohaptic_tests::{Log, Tick};
+use cohaptic_harness::Model;
+use cohaptic_harness::measures::Measures;
+use cohaptic_scene::{Measure, MeasureName, MeasureSettings, MeasureSpec, Scene};
+use cohaptic_tests::{Body, Draft, Log, Tick};
 use proptest::prelude::*;
 
 /// The energy that the network has injected \[J\], and how far it may be from exact numbers.
@@ -21,7 +23,13 @@ impl Injected {
         let own: Vec<f64> = (0..scene.peers.len()).map(|place| scene.own_damping(place)).collect();
         let mut before: Vec<Option<Tick>> = vec![None; scene.peers.len()];
         let (mut injected, mut exchanged, mut energy) = (0.0, 0.0, Vec::new());
-        for next in &log.ticks {
+        // Where the last step of each leads to is no tick any more.
+        let end = |last: &Tick| {
+            let end = &log.summary.peers[last.peer];
+            Tick { object: Body { position: [end.position[0], 0.0, 0.0], velocity: [end.velocity[0], 0.0, 0.0] }, ..*last }
+        };
+        let ends: Vec<Tick> = (0..before.len()).filter_map(|peer| log.ticks.iter().rfind(|tick| tick.peer == peer)).map(end).collect();
+        for next in log.ticks.iter().chain(&ends) {
             if let Some(now) = before[next.peer].replace(*next) {
                 let own = own[next.peer];
                 let (before, after) = (now.object, next.object);
@@ -53,6 +61,17 @@ impl Injected {
         self.peak() - most - self.rounding - 1e-11 * most
     }
 
+    /// Fails where the measures of the scene say something else.
+    pub(crate) fn is_measured(&self, scene: &Scene) -> Result<(), TestCaseError> {
+        let names = [Measure::Energy, Measure::EnergyPeak].map(|measure| MeasureName { measure, peer: None }).to_vec();
+        let scene = Scene { measure: Some(MeasureSpec { names, settings: MeasureSettings::default() }), ..scene.clone() };
+        let values = Measures::run(&scene, Model::Least).1;
+        let (energy, peak) = (values[0].value.unwrap(), values[1].value.unwrap());
+        prop_assert!((energy - self.energy.last().unwrap()).abs() <= self.rounding, "{energy} J are measured");
+        prop_assert!(peak >= energy && peak <= self.peak().max(0.0) + self.rounding, "{peak} J are measured of {} J", self.peak());
+        Ok(())
+    }
+
     /// Fails where it is more than `most` \[J\], or where the tolerance decides.
     pub(crate) fn is_at_most(&self, most: f64) -> Result<(), TestCaseError> {
         prop_assert!(self.excess(most) <= 0.0, "{:e} J more than {most:e} J", self.excess(most));
@@ -66,4 +85,9 @@ pub(crate) fn stored_at_first(scene: &Scene) -> f64 {
     let pair = scene.coordination.gains.stiffness / (scene.peers.len() - 1) as f64;
     let squares = |one: &f64| scene.peers.iter().map(|other| (one - other.position[0]).powi(2)).sum::<f64>();
     scene.peers.iter().map(|one| 0.25 * pair * squares(&one.position[0])).sum()
+}
+
+/// Whether a link takes longer for a larger packet: extra numbers make samples larger.
+pub(crate) fn has_rates(draft: &Draft) -> bool {
+    draft.link.contains("rate") || draft.links.iter().any(|link| link.keys.contains("rate"))
 }

@@ -41,7 +41,9 @@ proptest! {
         with_damping(&mut draft, (1.0 + more) * stiffness * (age + TICK));
         let log = run(&draft.scene(), Model::Least);
         let most = stored_at_first(&draft.scene());
-        Injected::of(&draft.scene(), &log).is_at_most(most)?;
+        let injected = Injected::of(&draft.scene(), &log);
+        injected.is_at_most(most)?;
+        injected.is_measured(&draft.scene())?;
     }
 
     /// A damping of `auto` is the bound for what the links do at most.

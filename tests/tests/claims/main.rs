@@ -23,6 +23,7 @@ mod injected;
 mod joining;
 mod jumps;
 mod local_damping;
+mod local_lag;
 mod paper;
 mod passivity_control;
 mod regions;

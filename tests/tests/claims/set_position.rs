@@ -11,7 +11,7 @@ use cohaptic_tests::{Draft, run};
 use proptest::prelude::*;
 
 use crate::energy::springs;
-use crate::injected::Injected;
+use crate::injected::{Injected, has_rates};
 use crate::{TICK, cases};
 
 /// What the springs to the set-positions store at the beginning, and the tanks \[J\].
@@ -53,6 +53,7 @@ proptest! {
     /// With more energy than is ever asked for the spring goes to the mean of the others: `local-damping` with the same β.
     #[test]
     fn with_a_large_tank_it_is_local_damping(mut draft in springs(), damping in 0.5..20.0) {
+        prop_assume!(!has_rates(&draft));
         draft.strategy = Coordination::LocalDamping;
         draft.settings.of_mut(Coordination::LocalDamping).set(0, LawValue::Number(damping));
         let damped = run(&draft.scene(), Model::Least);

@@ -74,7 +74,7 @@ impl Settling {
     /// The age of the oldest sample that is part of the state, in frames.
     pub(crate) fn memory(&self) -> usize {
         let age = |kind: StateKind| match kind {
-            StateKind::SamplePosition { age, .. } | StateKind::SampleVelocity { age, .. } => age,
+            StateKind::SamplePosition { age, .. } | StateKind::SampleVelocity { age, .. } | StateKind::SampleForce { age, .. } => age,
             StateKind::DevicePosition { .. }
             | StateKind::DeviceVelocity { .. }
             | StateKind::ObjectPosition { .. }
@@ -106,8 +106,8 @@ impl Settling {
             StateKind::ObjectVelocity { .. } => motions[peer][start].object.1 * time,
             StateKind::SamplePosition { age, .. } => sample(peer, age).0 - reference,
             StateKind::SampleVelocity { age, .. } => sample(peer, age).1 * time,
-            StateKind::PendingCoupling { .. } | StateKind::PendingForce { .. } | StateKind::Memory { .. } => {
-                unreachable!("no computation delay, nothing remembered")
+            StateKind::PendingCoupling { .. } | StateKind::PendingForce { .. } | StateKind::Memory { .. } | StateKind::SampleForce { .. } => {
+                unreachable!("no computation delay, nothing remembered, no server")
             }
         };
         self.monodromy.states.iter().map(|state| value(state.peer, state.kind).powi(2)).sum::<f64>().sqrt()

@@ -10,6 +10,7 @@ mod held_samples;
 mod ideal_network;
 mod impedance;
 mod local_damping;
+mod local_lag;
 mod measures;
 mod own_strategies;
 mod replay;

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use cohaptic_harness::measures::Measures;
 use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_peer::State;
-use cohaptic_peer::coordination::Law;
 use cohaptic_scene::{Measure, MeasureName, MeasureSettings, MeasureSpec, MeasureTravel, Scene};
 use cohaptic_tests::{Body, Log, Place, Tick, cases, drafts, run};
 use cohaptic_units::Instant;
@@ -74,7 +73,7 @@ fn force(scene: &Scene, log: &Log, of: impl Fn(&Tick) -> Place) -> (Vec<f64>, Ve
     (all, changes)
 }
 
-/// The energy that the coordination injects, and how far it may be from what is measured.
+/// The energy that the coordination injects, and how far it may be from the measure.
 struct Energy {
     /// After each instant \[J\].
     injected: Vec<f64>,
@@ -103,26 +102,27 @@ fn energy(scene: &Scene, log: &Log) -> Energy {
     for ticks in instants(log) {
         for tick in ticks {
             let (peer, before, after) = (tick.peer, tick.object, rows.next().unwrap());
-            let own = Law::<f64>::damping(&scene.law(peer));
+            let own = scene.own_damping(peer);
             let state = State { position: before.position, velocity: before.velocity };
             let walls = scene.object.enclosure.map_or([0.0; 3], |enclosure| enclosure.force(&state));
             let spring: Place = std::array::from_fn(|axis| tick.coordination_force[axis] - own * before.velocity[axis]);
             let computed = Held { coordination: spring, all: std::array::from_fn(|axis| tick.coupling_force[axis] - spring[axis] + walls[axis]) };
             let applied = if scene.peers[peer].compute_delay { std::mem::replace(&mut late[peer], computed) } else { computed };
             let copy = scene.copy_config(peer);
+            let mut work = 0.0;
             for axis in 0..axes {
                 let moved = after.position[axis] - before.position[axis];
                 let kinetic = 0.5 * copy.mass * (after.velocity[axis].powi(2) - before.velocity[axis].powi(2));
                 let damped = if own > 0.0 { own / copy.damping * (applied.all[axis] * moved - kinetic) } else { 0.0 };
-                let work = -applied.coordination[axis] * moved - damped;
-                sum += work;
-                energy.peers[peer] += work;
+                work -= applied.coordination[axis] * moved + damped;
                 let squares = copy.mass * (after.velocity[axis].powi(2) + before.velocity[axis].powi(2));
                 let forces =
                     applied.coordination[axis].abs() + applied.all[axis].abs() + tick.coupling_force[axis].abs() + own * before.velocity[axis].abs();
                 // A sum of so many terms, each of some roundings.
                 energy.rounding += 1e-13 * (forces * moved.abs() + squares);
             }
+            sum += work;
+            energy.peers[peer] += work;
         }
         energy.injected.push(sum);
     }
@@ -154,8 +154,8 @@ fn sent(scene: &Scene, log: &Log) -> (u64, u64) {
         ticks.saturating_sub(u128::from(scene.peers[peer].phase)).div_ceil(every)
     };
     let packets = (0..scene.peers.len()).map(|peer| u64::try_from(sends(peer)).unwrap() * others).sum();
-    // docs/wire-format.md: 32 bytes and 16 for each axis.
-    (packets, packets * (32 + 16 * scene.axes.count() as u64))
+    // docs/wire-format.md: 48 bytes and 16 for each axis.
+    (packets, packets * (48 + 16 * scene.axes.count() as u64))
 }
 
 /// Equal, or off by at most `error`; a value that is no number is no value.
@@ -239,7 +239,7 @@ proptest! {
         let log = run(&scene, Model::Least);
         let found = values(&measuring(scene.clone(), MeasureSettings::default()), Model::Least);
         let Energy { injected, peers, rounding } = energy(&scene, &log);
-        let own = (0..peers.len()).any(|peer| Law::<f64>::damping(&scene.law(peer)) > 0.0);
+        let own = (0..peers.len()).any(|peer| scene.own_damping(peer) > 0.0);
         let error = if own { rounding } else { 0.0 };
         let at_end = injected.last().copied().unwrap_or(0.0);
         let energy = found[&MeasureName { measure: Measure::Energy, peer: None }];

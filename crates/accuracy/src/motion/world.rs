@@ -123,7 +123,7 @@ impl<T: Number> World<T> {
         }
         let law = AveragePosition { gains: gains.coordination };
         for peer in 0..2 {
-            let seen = Observation { own: self.bodies[2 + peer], mean: self.held[peer], lead: T::of(0.0) };
+            let seen = Observation { own: self.bodies[2 + peer], past: self.bodies[2 + peer], mean: self.held[peer], lead: T::of(0.0) };
             let touch = |apart: Motion<T>| coupling_force(gains.touch[peer], &gains.coupling, apart);
             let (coupling, on_object) = forces(self.bodies[peer], touch, &seen, &law, &mut []);
             movers[peer].advance(&mut self.bodies[peer], on_device(hands[peer], coupling));

@@ -12,7 +12,8 @@ use cohaptic_units::print::{Counted, Span};
 use serde::Serialize;
 
 use crate::document_schema::document;
-use crate::documents::{access_line, ending_name, lateness, micros, peer, peer_link};
+use crate::documents::{access_line, ending_name, lateness, measures_of, micros, peer, peer_link};
+use crate::measures::measured_lines;
 use crate::output;
 use crate::realtime::{late, notes};
 use crate::run::answer::{length, packets};
@@ -43,6 +44,8 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
         links: summary.links.iter().map(|link| peer_link(scene, link)).collect::<Vec<_>>(),
         access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
         max_discrepancy_m: summary.max_discrepancy,
+        #[serde(flatten)]
+        measures: measures_of(scene, &report.measures),
         #[serde(flatten)]
         admission: report.admission.as_ref().map(|(stats, socket)| document! { door: of_admission(stats, socket) }),
         granted: report.prepared.granted.iter().copied().map(Wish::name).collect::<Vec<_>>(),
@@ -96,6 +99,7 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
         line(format!("{} ({}) ends at {}{seat}", peer.name, spec.kind.name(), position.join(", ")));
     }
     line(packets(summary));
+    measured_lines(scene, &report.measures).into_iter().for_each(&mut line);
     if let Some((door, socket)) = &report.admission {
         line(format!("session at {}: {} let in, {} sent", socket.address, Counted(door.admitted, "sample"), door.sent));
         let refused: Vec<String> = door.refusals().filter(|(_, count)| *count > 0).map(|(cause, count)| format!("{count} {cause}")).collect();

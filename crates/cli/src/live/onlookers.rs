@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Receiver;
 
-use cohaptic_control::{Description, Kind, LinkCounters, LinkEditor, LinkName, PeerName, PeerView, Presence as Shown, Snapshot};
+use cohaptic_control::{Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Presence as Shown, Snapshot};
 use cohaptic_harness::live::Presence;
 use cohaptic_live::session::{LinkStatus, PeerStatus};
 use cohaptic_live::{Conductor, LinkChange, Refusal, Status};
-use cohaptic_scene::{LinkKeys, Scene};
+use cohaptic_scene::{LinkKeys, MeasureName, Scene};
 use cohaptic_units::Instant;
 
 use crate::documents::micros;
@@ -64,6 +64,7 @@ pub(super) fn pairs(scene: &Scene) -> Vec<(usize, usize)> {
 
 pub(super) fn description(scene: &Scene, pairs: &[(usize, usize)]) -> Description {
     let name = |peer: usize| scene.peers[peer].name.clone();
+    let label = |name: &MeasureName| MeasureLabel { name: name.text(scene), unit: name.measure.unit(), about: name.measure.about() };
     Description {
         kind: Kind::Live,
         title: scene.title.clone(),
@@ -73,6 +74,7 @@ pub(super) fn description(scene: &Scene, pairs: &[(usize, usize)]) -> Descriptio
             .collect(),
         peers: scene.peers.iter().map(|peer| PeerName { name: peer.name.clone(), kind: peer.kind.name().to_owned() }).collect(),
         clocks: vec!["tick".to_owned(), "release".to_owned()],
+        measures: scene.measure.iter().flat_map(|measure| &measure.names).map(label).collect(),
     }
 }
 
@@ -90,6 +92,7 @@ pub(super) fn snapshot(status: &Status, axes: usize) -> Snapshot {
             let refused = door.refusals().filter(|(_, count)| *count > 0);
             refused.map(|(cause, count): (Refusal, u64)| (cause.name(), count)).collect()
         }),
+        measures: status.measures.iter().map(|measured| measured.value).collect(),
     }
 }
 

@@ -103,6 +103,7 @@ fn description(setup: &Setup) -> Description {
         links: setup.pairs.iter().copied().map(link).collect(),
         peers: Vec::new(),
         clocks: vec!["release".to_owned()],
+        measures: Vec::new(),
     }
 }
 
@@ -124,6 +125,7 @@ fn snapshot(view: &View<'_>, pairs: &[(NodeId, NodeId)], tolerance: Tolerance) -
         links: links.iter().zip(pairs).map(|(report, (from, to))| link(report, view.recent_delays(*from, *to))).collect(),
         peers: Vec::new(),
         refused: refused(view, &links),
+        measures: Vec::new(),
     }
 }
 

@@ -154,7 +154,8 @@ fn description(file: &RouterFile) -> Description {
             LinkName { name: format!("{0}.{from}->{0}.{to}", link.name), from: from.to_owned(), to: to.to_owned() }
         })
     });
-    Description { kind: Kind::Router, title: output::path(&file.file), links: lanes.collect(), peers: Vec::new(), clocks: vec!["release".to_owned()] }
+    let clocks = vec!["release".to_owned()];
+    Description { kind: Kind::Router, title: output::path(&file.file), links: lanes.collect(), peers: Vec::new(), clocks, measures: Vec::new() }
 }
 
 fn snapshot(report: &Report, validity: Validity) -> Snapshot {
@@ -165,6 +166,7 @@ fn snapshot(report: &Report, validity: Validity) -> Snapshot {
         links: report.counters.lanes.iter().map(link).collect(),
         peers: Vec::new(),
         refused: refused(report).into_iter().filter(|(_, count)| *count > 0).collect(),
+        measures: Vec::new(),
     }
 }
 

@@ -41,6 +41,19 @@ fn what_the_scene_has_not_is_left_out() {
 }
 
 #[test]
+fn a_scene_with_measures_has_no_run_that_nobody_watches() {
+    let desk = Desk::with("two.toml", TWO);
+    let parts = |set: &str| -> Vec<String> {
+        let document = desk.json(&format!("explain two.toml --json {set}"));
+        document["models"].as_array().unwrap().iter().map(|row| row["part"].as_str().unwrap().to_owned()).collect()
+    };
+    let has = |parts: &[String], part: &str| parts.iter().any(|found| found == part);
+    let (without, with) = (parts(""), parts("--set measure.names=all"));
+    assert!(has(&without, "runs that nobody watches") && !has(&without, "measures"), "{without:?}");
+    assert!(has(&with, "measures") && !has(&with, "runs that nobody watches"), "{with:?}");
+}
+
+#[test]
 fn what_the_scene_has_is_not_left_out() {
     let document = Desk::with("three.toml", RANDOM).json("explain three.toml --json");
     let left_out = left_out(&document).join("\n");
@@ -52,6 +65,16 @@ fn what_the_scene_has_is_not_left_out() {
     }
     assert!(model(&document, "uplink of left").contains("2 packets"));
     assert!(model(&document, "peer left").contains("grasps the object"));
+}
+
+/// 24 ms of delay, and half of the 8 ms to the next sample.
+#[test]
+fn the_age_of_own_states_is_said_in_ticks() {
+    let lagging = TWO.replace("average-position", "local-lag");
+    let coordination = |scene: &str| model(&Desk::with("two.toml", scene).json("explain two.toml --json"), "coordination").to_owned();
+    assert!(coordination(&lagging).contains("lag = auto; own states are taken 27 ticks old"), "{}", coordination(&lagging));
+    let plain = coordination(&format!("{lagging}\n[coordination.local-lag]\nlag = \"0s\"\n"));
+    assert!(plain.ends_with("lag = 0s"), "{plain}");
 }
 
 #[test]

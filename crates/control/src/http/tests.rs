@@ -11,7 +11,7 @@ use tokio::runtime::{Builder, Runtime};
 use tower::ServiceExt as _;
 
 use super::{App, router};
-use crate::{Board, Description, Kind, LinkCounters, LinkEditor, LinkName, Snapshot};
+use crate::{Board, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, Snapshot};
 
 const TOKEN: &str = "a-token-of-more-than-22-characters";
 
@@ -54,10 +54,14 @@ impl Site {
             links: (0..links).map(name).collect(),
             peers: Vec::new(),
             clocks: Vec::new(),
+            measures: vec![
+                MeasureLabel { name: "energy_j".to_owned(), unit: "J", about: "Energy" },
+                MeasureLabel { name: "travel_s".to_owned(), unit: "s", about: "Travel" },
+            ],
         };
         let board = Arc::new(Board::new(description));
         let counters = LinkCounters { offered: 7, dropped: vec![("loss", 2)], ..LinkCounters::default() };
-        board.publish(Arc::new(Snapshot { links: vec![counters], ..Snapshot::default() })).unwrap();
+        board.publish(Arc::new(Snapshot { links: vec![counters], measures: vec![Some(0.25)], ..Snapshot::default() })).unwrap();
         let calls = Calls::default();
         let app = App {
             board,
@@ -102,6 +106,17 @@ fn request(method: &str, path: &str) -> axum::http::request::Builder {
 
 fn pairs(keys: &[(&str, &str)]) -> Vec<(String, String)> {
     keys.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect()
+}
+
+#[test]
+fn the_state_has_measures_where_the_run_has_some() {
+    let site = Site::new(1);
+    let measure = |name: &str, value: Value, unit: &str, about: &str| json!({ "name": name, "value": value, "unit": unit, "about": about });
+    let expected = [measure("energy_j", 0.25.into(), "J", "Energy"), measure("travel_s", Value::Null, "s", "Travel")];
+    assert_eq!(site.ask("GET", "/api/state", "").json()["measures"], json!(expected));
+    let description = Description { kind: Kind::Router, title: String::new(), links: vec![], peers: vec![], clocks: vec![], measures: vec![] };
+    let state = crate::views::state(&description, &Board::new(description.clone()).latest());
+    assert!(!state.as_object().unwrap().contains_key("measures"));
 }
 
 #[test]

@@ -114,6 +114,7 @@ fn example(strange: &str) -> (Description, Latest) {
         ],
         peers: vec![PeerName { name: strange.to_owned(), kind: "simulated".to_owned() }],
         clocks: vec![format!("tick{strange}")],
+        measures: Vec::new(),
     };
     let spans = Quantiles {
         count: 1000,
@@ -144,6 +145,7 @@ fn example(strange: &str) -> (Description, Latest) {
         links: vec![link],
         peers: vec![peer],
         refused: vec![("too-short", 9), ("wrong-magic", 0)],
+        measures: Vec::new(),
     };
     (description, Latest { number: 250, snapshot: Arc::new(snapshot) })
 }

@@ -7,7 +7,8 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use cohaptic_control::{
-    Board, Description, Kind, LinkCounters, LinkEditor, LinkName, PeerName, PeerView, Presence, Quantiles, Server, ServerConfig, Snapshot, serve,
+    Board, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Presence, Quantiles, Server, ServerConfig,
+    Snapshot, serve,
 };
 
 pub(crate) const TOKEN: &str = "a-token-of-more-than-22-characters";
@@ -107,6 +108,11 @@ impl Drop for Run {
     }
 }
 
+fn measure(name: &str) -> MeasureLabel {
+    let unit = if name.ends_with("_j") { "J" } else { "s" };
+    MeasureLabel { name: name.to_owned(), unit, about: "A <measure>" }
+}
+
 fn description(links: usize, peers: usize) -> Description {
     const NAMES: [&str; 4] = ["left", "right", "far", "robot"];
     let name = |number: usize| NAMES.get(number).map_or_else(|| format!("peer {number}"), |name| (*name).to_owned());
@@ -118,6 +124,7 @@ fn description(links: usize, peers: usize) -> Description {
         links: pairs.map(|(from, to)| LinkName { name: format!("{}->{}", name(from), name(to)), from: name(from), to: name(to) }).collect(),
         peers: (0..peers).map(|number| PeerName { name: name(number), kind: "simulated Falcon".to_owned() }).collect(),
         clocks: vec!["tick".to_owned(), "release".to_owned()],
+        measures: ["energy_j", "travel_s"].map(measure).to_vec(),
     }
 }
 
@@ -171,6 +178,7 @@ fn snapshot(elapsed: Duration, links: usize, peers: usize, axes: usize) -> Snaps
         links: (0..links).map(link).collect(),
         peers: (0..peers).map(peer).collect(),
         refused: vec![("wrong-magic", whole(t)), ("too-short", whole(t / 3.0))],
+        measures: vec![Some(0.25), None],
     }
 }
 

@@ -23,6 +23,10 @@ pub(super) struct Blocks<const A: usize> {
     leads: Vec<Lanes>,
     /// What the law remembers: the numbers of one lane after those of another, a block after another.
     memory: Vec<f64>,
+    /// The copies at the latest ticks, as many as the law looks back: the blocks of one tick, then those of the next.
+    past: Vec<Motions>,
+    /// The oldest of those ticks.
+    oldest: usize,
     object_map: StepMap<Lanes>,
     /// The forces computed at the latest tick, where anybody applies them a tick late.
     late: Option<Vec<Late>>,
@@ -68,6 +72,12 @@ pub(super) trait LawOfLanes: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>
     #[inline(always)]
     fn remembered(&self) -> usize {
         self.of_lane(0).memory()
+    }
+
+    /// How many ticks it looks back.
+    #[inline(always)]
+    fn looks_back(&self) -> usize {
+        self.of_lane(0).lag()
     }
 }
 
@@ -191,6 +201,8 @@ impl<const A: usize> Blocks<A> {
         Self {
             leads: if Law::<f64>::horizon(law).is_some() { vec![Lanes::ZERO; blocks.len()] } else { Vec::new() },
             memory: vec![0.0; blocks.len() * WIDTH * Law::<f64>::memory(law)],
+            past: (0..Law::<f64>::lag(law)).flat_map(|_| blocks.iter().map(|block| block.object)).collect(),
+            oldest: 0,
             places,
             blocks,
             object_map,
@@ -262,20 +274,22 @@ impl<const A: usize> Blocks<A> {
     pub(super) fn advance<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L> {
         let (mut discrepancy, mut size) = ([0.0; L], Lanes::ZERO);
         let per_axis = self.places.blocks();
-        let remembered = law.remembered() * WIDTH;
+        let (remembered, lag) = (law.remembered() * WIDTH, law.looks_back());
+        let oldest = self.oldest * A * per_axis;
         for axis in 0..A {
             let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));
             for place in axis * per_axis..(axis + 1) * per_axis {
                 let block = &mut self.blocks[place];
-                // Most laws ask for neither, and the compiler then leaves them out.
+                // Most laws ask for none of these, and the compiler then leaves them out.
+                let past = if lag > 0 { std::mem::replace(&mut self.past[oldest + place], block.object) } else { block.object };
                 let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
                 let memory = if remembered > 0 { &mut self.memory[place * remembered..(place + 1) * remembered] } else { &mut [] };
                 low = block.object.position.smaller(low);
                 high = block.object.position.larger(high);
                 if self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
-                    block.tick(law, lead, memory, &self.object_map);
+                    block.tick(law, &past, lead, memory, &self.object_map);
                 } else {
-                    let mut forces = block.forces(law, lead, memory);
+                    let mut forces = block.forces(law, &past, lead, memory);
                     if let Some(walls) = &self.walls {
                         block.add_walls(walls, &mut forces.on_object);
                     }
@@ -290,6 +304,9 @@ impl<const A: usize> Blocks<A> {
             for run in 0..L {
                 discrepancy[run] = if distances[run] > discrepancy[run] { distances[run] } else { discrepancy[run] };
             }
+        }
+        if lag > 0 {
+            self.oldest = if self.oldest + 1 == lag { 0 } else { self.oldest + 1 };
         }
         Moved { discrepancy, finite: self.finite(size) }
     }
@@ -335,7 +352,7 @@ fn distances<const L: usize>(mut low: Lanes, mut high: Lanes) -> [f64; L] {
 fn tick_of_lanes<const TIED: bool, L: LawOfLanes>(
     devices: &mut Motions,
     objects: &mut Motions,
-    (means, leads): (&Motions, &Lanes),
+    (means, pasts, leads): (&Motions, &Motions, &Lanes),
     memory: &mut [f64],
     hands: &Lanes,
     (coupling, grasps): (&Gains<Lanes>, &Mask),
@@ -347,7 +364,7 @@ fn tick_of_lanes<const TIED: bool, L: LawOfLanes>(
         let (mut device, mut object) = (lane_of(devices, lane), lane_of(objects, lane));
         let gains = coupling.map(|gain| gain.0[lane]);
         let touch = |apart| grasps.keep(lane, grasp(&gains, apart));
-        let seen = Observation { own: object, mean: lane_of(means, lane), lead: leads.0[lane] };
+        let seen = Observation { own: object, past: lane_of(pasts, lane), mean: lane_of(means, lane), lead: leads.0[lane] };
         let memory = memory_of_lane(memory, remembered, lane);
         let (coupling, on_object) = forces(device, touch, &seen, &law.of_lane(lane), memory);
         let map = device_map.map(|coefficient| coefficient.0[lane]);
@@ -404,10 +421,10 @@ impl Block {
 
     /// Forces and motion of a tick in one pass, where nothing but grasps and the law acts.
     #[inline(always)]
-    fn tick<L: LawOfLanes>(&mut self, law: &L, lead: &Lanes, memory: &mut [f64], object_map: &StepMap<Lanes>) {
+    fn tick<L: LawOfLanes>(&mut self, law: &L, past: &Motions, lead: &Lanes, memory: &mut [f64], object_map: &StepMap<Lanes>) {
         let common = (law, object_map);
         let Self { device, object, mean, hand, coupling, grasps, device_map, .. } = self;
-        let (seen, touch) = ((&*mean, lead), (&*coupling, &*grasps));
+        let (seen, touch) = ((&*mean, past, lead), (&*coupling, &*grasps));
         if self.is_tied {
             tick_of_lanes::<true, L>(device, object, seen, memory, hand, touch, device_map, common);
         } else {
@@ -417,7 +434,7 @@ impl Block {
 
     /// The forces of a tick without walls.
     #[inline(always)]
-    fn forces<L: LawOfLanes>(&self, law: &L, lead: &Lanes, memory: &mut [f64]) -> Forces {
+    fn forces<L: LawOfLanes>(&self, law: &L, past: &Motions, lead: &Lanes, memory: &mut [f64]) -> Forces {
         let mut coupling = Lanes::ZERO;
         for lane in 0..WIDTH {
             coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), self.apart(lane));
@@ -432,7 +449,8 @@ impl Block {
         let mut on_copy = Lanes::ZERO;
         let remembered = law.remembered();
         for lane in 0..WIDTH {
-            let seen = Observation { own: lane_of(&self.object, lane), mean: lane_of(&self.mean, lane), lead: lead.0[lane] };
+            let seen =
+                Observation { own: lane_of(&self.object, lane), past: lane_of(past, lane), mean: lane_of(&self.mean, lane), lead: lead.0[lane] };
             let coordination = law.of_lane(lane).force(&seen, memory_of_lane(memory, remembered, lane));
             on_copy.0[lane] = on_object(coupling.0[lane], coordination);
         }

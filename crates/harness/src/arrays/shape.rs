@@ -16,6 +16,8 @@ pub(crate) struct Shape {
     pub(super) law: Coordination,
     /// How many numbers it remembers along each axis.
     pub(super) memory: usize,
+    /// How many ticks it looks back.
+    pub(super) lag: usize,
     pub(super) peers: usize,
     pub(super) axes: usize,
     pub(super) tick: Duration,
@@ -51,6 +53,7 @@ impl Shape {
             let shape = Self {
                 law: scene.coordination.strategy,
                 memory: Law::<f64>::memory(&law),
+                lag: Law::<f64>::lag(&law),
                 peers: scene.peers.len(),
                 axes: plan.axes.count(),
                 tick: clock.tick,

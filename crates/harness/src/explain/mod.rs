@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod links;
 
-use cohaptic_peer::coordination::{LawValue, Pull, UsedGains};
+use cohaptic_peer::coordination::{Law, LawValue, Pull, UsedGains};
 use cohaptic_peer::{Contact, Hand, Integrator, SendWhen};
 use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
 use cohaptic_units::print::{Counted, Number, Span};
@@ -80,13 +80,17 @@ const BYTES_A_PACKET: f64 = 40.0;
 /// Says what the scene makes the program model.
 #[must_use]
 pub fn explain(scene: &Scene) -> Explanation {
-    let plan = Plan::new(scene, Model::Least, false);
+    let plan = Plan::new(scene, Model::Least, scene.measure.is_some());
     let mut rows = Rows::default();
     rows.clock_and_motion(scene, &plan);
     rows.peers(scene, &plan);
     rows.coordination(scene);
     rows.network(scene);
-    let in_arrays = Shape::of(scene, &plan, &FromScene).is_some();
+    if let Some(measure) = &scene.measure {
+        let count = Counted(measure.names.len(), "number");
+        rows.model("measures", format!("{count}, computed tick by tick"), "[measure]: the run is watched, so it has events whatever else it needs");
+    }
+    let in_arrays = scene.measure.is_none() && Shape::of(scene, &plan, &FromScene).is_some();
     if in_arrays {
         rows.model(
             "runs that nobody watches",
@@ -181,6 +185,12 @@ impl Rows {
                 (LawValue::Word(word), form) => model.push_str(form.word(word)),
                 (LawValue::Place(peer), _) => model.push_str(&scene.peers[peer].name),
             }
+        }
+        let lags = (0..scene.peers.len()).map(|peer| scene.law(peer).map_or(0, |law| Law::<f64>::lag(&law)));
+        match (lags.clone().min().unwrap_or(0), lags.max().unwrap_or(0)) {
+            (0, 0) => {}
+            (least, most) if least == most => model.push_str(&format!("; own states are taken {} old", Counted(most, "tick"))),
+            (least, most) => model.push_str(&format!("; own states are taken {least} to {most} ticks old, as the peers' ticks are")),
         }
         let damping = scene.own_damping(0);
         if damping > 0.0 {

@@ -7,6 +7,9 @@
 //! ```text
 //! W = Σᵢ Σₖ (−F·d − β/(bO + β)·(f·d − ½·m·Δv²))
 //! ```
+//!
+//! Where a server alone has the object, F of the server is −Σ FC of its clients, and each client adds −FC·dH, with dH the motion of its device: the rows of its steps
+//! are those of that device.
 
 use std::time::Duration;
 

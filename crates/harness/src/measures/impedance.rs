@@ -3,6 +3,7 @@
 //! Force and velocity of the device, both at its ticks in the second half of the scene, are fitted by c₀ + c·cos ωt + s·sin ωt with the least sum of squares. Their
 //! phasors c − j·s give Z = F/v, with the viscosity Re Z and the effective mass Im Z/ω.
 
+use std::cmp::Ordering;
 use std::time::Duration;
 
 use cohaptic_peer::{Hand, Signal};
@@ -106,7 +107,7 @@ impl Fit {
         for pivot in 0..3 {
             let row = matrix[pivot];
             // Not above: no tick at all gives zero for both.
-            if !(row[pivot] > DEPENDENT * self.normal[pivot][pivot]) {
+            if row[pivot].partial_cmp(&(DEPENDENT * self.normal[pivot][pivot])) != Some(Ordering::Greater) {
                 return None;
             }
             for below in pivot + 1..3 {

@@ -80,6 +80,7 @@ impl QuantileSketch {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that must come out exactly")]
 mod tests {
     use proptest::prelude::*;
 

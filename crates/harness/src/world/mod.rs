@@ -330,12 +330,10 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 };
                 let sample = Arriving { sample: self.datagrams.sample(event.payload), kind: self.kind, extra, axes: self.axes };
                 match self.remote.receive(now, &event, &sample, &mut receiver.peer) {
-                    None => {}
-                    Some(Ok(Reception::Newest)) => {
-                        if watch.holds {
-                            observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
-                        }
+                    Some(Ok(Reception::Newest)) if watch.holds => {
+                        observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
                     }
+                    None | Some(Ok(Reception::Newest)) => {}
                     Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
                     Some(Err(_)) if event.damage.is_some() => receiver.refused_samples += 1,
                     Some(Err(error)) => unreachable!("peers of one scene understand each other: {error}"),

@@ -84,7 +84,7 @@ impl Session {
         let outside = Outside::open(scene, &config)?;
         let recording = config.out.as_deref().map(|folder| Recording::create(folder, scene, config.content.clone())).transpose()?;
         let peers = scene.peers.len();
-        Ok(Self { live: LiveScene::new(scene, devices), outside, watch: Watch::new(peers, recording), config, peers })
+        Ok(Self { live: LiveScene::new(scene, devices), outside, watch: Watch::new(scene, recording), config, peers })
     }
 
     /// Where the session listens; `None` in a scene without peers in other programs.
@@ -121,6 +121,7 @@ impl Session {
             admission: self.outside.as_ref().map(Outside::counts),
             prepared,
             files,
+            measures: self.watch.measured(summary.duration),
             summary,
         })
     }
@@ -215,8 +216,10 @@ impl Session {
             let state = self.live.peer(place)?;
             Some(PeerStatus { state, force: self.watch.forces[place], seat: self.live.seat_stats(place) })
         };
+        let elapsed = self.live.open().saturating_duration_since(Instant::ZERO);
         Status {
-            elapsed: self.live.open().saturating_duration_since(Instant::ZERO),
+            elapsed,
+            measures: self.watch.measured(elapsed),
             ticks: self.watch.ticks.summary(),
             releases: self.watch.releases.summary(),
             validity: self.validity(),

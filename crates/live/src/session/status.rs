@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use cohaptic_harness::Summary;
 use cohaptic_harness::live::{PeerState, SeatStats};
+use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_realtime::udp::EndpointCounts;
 use cohaptic_realtime::{LatenessSummary, Prepared, Validity};
 use cohaptic_wan::LinkStats;
@@ -29,6 +30,8 @@ pub struct Status {
     pub links: Vec<LinkStatus>,
     /// The counts of the admission; `None` in a scene without peers in other programs.
     pub admission: Option<AdmissionStats>,
+    /// The measures of the scene so far; empty if it asks for none.
+    pub measures: Vec<MeasuredValue>,
 }
 
 /// A peer at one moment.
@@ -62,6 +65,8 @@ pub struct LinkStatus {
 pub struct Report {
     /// What the scene came to, in logical time.
     pub summary: Summary,
+    /// The measures of the scene; empty if it asks for none.
+    pub measures: Vec<MeasuredValue>,
     /// How late ticks were.
     pub ticks: LatenessSummary,
     /// How many ticks were later than the tolerance.

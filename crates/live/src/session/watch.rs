@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use cohaptic_harness::live::InputRow;
-use cohaptic_harness::{Observer, PacketRow, TickRow};
+use cohaptic_harness::measures::{MeasuredValue, Measures};
+use cohaptic_harness::{HoldRow, InstantRow, Observer, PacketRow, SendRow, StepRow, TickRow};
 use cohaptic_realtime::Lateness;
+use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use cohaptic_wan::Fate;
 
@@ -24,6 +26,7 @@ pub(super) struct Watch {
     pub(super) links: Vec<Carried>,
     /// The force that each device renders.
     pub(super) forces: Vec<[f64; 3]>,
+    measures: Option<Measures>,
 }
 
 /// What a link has delivered: all bytes, and the delays of the latest packets.
@@ -53,7 +56,8 @@ impl Carried {
 }
 
 impl Watch {
-    pub(super) fn new(peers: usize, recording: Option<Recording>) -> Self {
+    pub(super) fn new(scene: &Scene, recording: Option<Recording>) -> Self {
+        let peers = scene.peers.len();
         let empty = Carried { bytes: 0, recent: [Duration::ZERO; RECENT], next: 0, filled: 0 };
         Self {
             recording,
@@ -64,7 +68,13 @@ impl Watch {
             releases: Lateness::new(),
             links: vec![empty; peers * peers],
             forces: vec![[0.0; 3]; peers],
+            measures: Measures::of(scene),
         }
+    }
+
+    /// The measures after that much of the scene; none if it asks for none.
+    pub(super) fn measured(&self, elapsed: Duration) -> Vec<MeasuredValue> {
+        self.measures.as_ref().map(|measures| measures.values(elapsed)).unwrap_or_default()
     }
 
     pub(super) fn released(&mut self, release: Release) -> Result<(), Stopped> {
@@ -88,6 +98,22 @@ impl Observer for Watch {
         true
     }
 
+    fn wants_steps(&self) -> bool {
+        self.measures.wants_steps()
+    }
+
+    fn wants_instants(&self) -> bool {
+        self.measures.wants_instants()
+    }
+
+    fn wants_sends(&self) -> bool {
+        self.measures.wants_sends()
+    }
+
+    fn wants_holds(&self) -> bool {
+        self.measures.wants_holds()
+    }
+
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Stopped> {
         // Peers that tick at the same instant are one tick of the loop.
         if self.last_tick != Some(row.at) {
@@ -95,7 +121,28 @@ impl Observer for Watch {
             self.ticks.record(self.woken.saturating_duration_since(row.at));
         }
         self.forces[row.peer] = std::array::from_fn(|axis| row.coupling_force.get(axis).copied().unwrap_or(0.0));
+        let Ok(()) = self.measures.on_tick(row);
         self.recording.as_ref().map_or(Ok(()), |recording| recording.tick(row))
+    }
+
+    fn on_step(&mut self, row: &StepRow<'_>) -> Result<(), Stopped> {
+        let Ok(()) = self.measures.on_step(row);
+        Ok(())
+    }
+
+    fn on_instant(&mut self, row: &InstantRow) -> Result<(), Stopped> {
+        let Ok(()) = self.measures.on_instant(row);
+        Ok(())
+    }
+
+    fn on_send(&mut self, row: &SendRow) -> Result<(), Stopped> {
+        let Ok(()) = self.measures.on_send(row);
+        Ok(())
+    }
+
+    fn on_hold(&mut self, row: &HoldRow) -> Result<(), Stopped> {
+        let Ok(()) = self.measures.on_hold(row);
+        Ok(())
     }
 
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), Stopped> {

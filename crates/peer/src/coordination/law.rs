@@ -11,6 +11,8 @@ use crate::{Gains, Motion, Number};
 pub struct Observation<N = f64> {
     /// The peer's own copy of the object.
     pub own: Motion<N>,
+    /// The peer's own copy [`Law::lag`] ticks ago; before the first tick it was as at the first. The same as `own` for a law that does not look back.
+    pub past: Motion<N>,
     /// The mean of the newest samples held from the other peers.
     pub mean: Motion<N>,
     /// By how much those samples have moved on since they were sent, on average: the mean of min(age, [`Law::horizon`])·velocity \[m\]. Zero for a law that
@@ -25,6 +27,12 @@ pub struct Observation<N = f64> {
 pub trait Law<N: Number> {
     /// How many numbers the law remembers from tick to tick, along each axis.
     fn memory(&self) -> usize {
+        0
+    }
+
+    /// L, how many ticks old the own state is that the law takes as [`Observation::past`]; 0 for a law that does not look back. A law that does has no
+    /// [`Law::memory`] beside it.
+    fn lag(&self) -> usize {
         0
     }
 
@@ -94,6 +102,8 @@ pub struct LawParameters {
     pub tick: Duration,
     /// How many ticks old a sample in use is at most, where the links bound it; for parameters that are [`LawValue::Automatic`].
     pub oldest: Option<u64>,
+    /// How many ticks old samples are in the middle of their use, where the links give all one such age; for parameters that are [`LawValue::Automatic`].
+    pub middle: Option<u64>,
     /// The parameters that this law alone has.
     pub own: LawValues,
 }

@@ -3,6 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::past::Past;
 use super::{BuiltIn, Command, Context, Coordination, Law, LawParameters, Observation, Strategy};
 use crate::{Gains, State};
 
@@ -15,6 +16,8 @@ pub struct LawStrategy<const A: usize> {
     horizon: Option<f64>,
     /// What the law remembers along each axis, one axis after another.
     memory: Vec<f64>,
+    /// The own states of the latest ticks, for a law that looks back: then that is all that it remembers.
+    past: Option<Past<A>>,
 }
 
 impl<const A: usize> LawStrategy<A> {
@@ -27,7 +30,10 @@ impl<const A: usize> LawStrategy<A> {
     pub fn new(coordination: Coordination, parameters: LawParameters) -> Self {
         let law = coordination.law(&parameters).expect("the strategy is a law");
         let memory = vec![0.0; A * Law::<f64>::memory(&law)];
-        Self { coordination, parameters, horizon: Law::<f64>::horizon(&law), law, memory }
+        let lag = Law::<f64>::lag(&law);
+        debug_assert!(lag == 0 || memory.is_empty(), "a law that looks back remembers nothing else");
+        let past = (lag > 0).then(|| Past::new(lag));
+        Self { coordination, parameters, horizon: Law::<f64>::horizon(&law), law, memory, past }
     }
 }
 
@@ -37,8 +43,9 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
         let mut command = Command { force: [0.0; A], target: State::REST };
         let remembered = self.memory.len() / A;
         let lead = self.horizon.map_or([0.0; A], |horizon| context.held.lead(context.local_time, horizon));
+        let past = self.past.as_mut().map_or(*context.own, |past| past.exchange(context.own));
         for (axis, lead) in lead.into_iter().enumerate() {
-            let seen = Observation { own: context.own.along(axis), mean: context.held.mean().along(axis), lead };
+            let seen = Observation { own: context.own.along(axis), past: past.along(axis), mean: context.held.mean().along(axis), lead };
             command.force[axis] = self.law.force(&seen, &mut self.memory[axis * remembered..(axis + 1) * remembered]);
             command.target.set_along(axis, self.law.target(&seen));
         }
@@ -55,10 +62,13 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
     }
 
     fn memory(&self) -> &[f64] {
-        &self.memory
+        self.past.as_ref().map_or(&self.memory, Past::numbers)
     }
 
     fn set_memory(&mut self, memory: &[f64]) {
-        self.memory.copy_from_slice(memory);
+        match &mut self.past {
+            Some(past) => past.set_numbers(memory),
+            None => self.memory.copy_from_slice(memory),
+        }
     }
 }

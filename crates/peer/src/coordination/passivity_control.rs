@@ -87,15 +87,15 @@ impl<const A: usize> Strategy<A> for PassivityControl<A> {
     fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
         let (own, mean) = (context.own, context.held.mean());
         self.settle(own);
-        let mut force = [0.0; A];
-        for axis in 0..A {
+        let limited = |axis: usize| {
             let wanted = coordinate(&self.gains, own.along(axis).relative_to(mean.along(axis)));
             let available = self.initial[axis] + self.heard[axis] / self.others - self.given[axis];
             let (free, compliance) = (context.ahead.free[axis], context.ahead.compliance);
             let root = libm::sqrt((free * free + 4.0 * compliance * available).max(0.0));
             let (least, most) = ((free - root) / (2.0 * compliance), (free + root) / (2.0 * compliance));
-            force[axis] = wanted.max(least).min(most);
-        }
+            wanted.max(least).min(most)
+        };
+        let force = core::array::from_fn(limited);
         self.before = Some((own.position, force));
         Command { force, target: *mean }
     }

@@ -7,7 +7,7 @@ use super::law::LawKind as _;
 use super::session::ControllerKind as _;
 use super::{
     AveragePosition, ClientServer, Coefficients as _, Command, Context, Extrapolated, Law, LawParameter, LawParameters, LawStrategy, LawValues,
-    LawVisitor, LocalDamping, Observation, PassivityControl, ProportionalDerivative, Pull, Role, SessionParameters, SetPosition,
+    LawVisitor, LocalDamping, LocalLag, Observation, PassivityControl, ProportionalDerivative, Pull, Role, SessionParameters, SetPosition,
     SmoothedAveragePosition, Strategy, UsedGains, Wave,
 };
 use crate::wire::SampleKind;
@@ -108,7 +108,7 @@ macro_rules! registry {
             /// If the strategy is not a law.
             #[must_use]
             pub fn strategy<const A: usize>(self, gains: Gains, peers: usize, tick: Duration) -> LawStrategy<A> {
-                LawStrategy::new(self, LawParameters { gains, peers, tick, oldest: None, own: LawValues::defaults(self.parameters()) })
+                LawStrategy::new(self, LawParameters { gains, peers, tick, oldest: None, middle: None, own: LawValues::defaults(self.parameters()) })
             }
 
             /// The strategy of a peer of a session.
@@ -255,6 +255,13 @@ macro_rules! registry {
                 }
             }
 
+            #[inline(always)]
+            fn lag(&self) -> usize {
+                match self {
+                    $(Self::$law(law) => law.lag(),)+
+                }
+            }
+
             fn damping(&self) -> f64 {
                 match self {
                     $(Self::$law(law) => law.damping(),)+
@@ -291,6 +298,7 @@ registry! {
         SmoothedAveragePosition: "smoothed-average-position", "to the mean of the others, by a force that follows with a lag";
         Extrapolated: "extrapolated", "to the mean of where the others are by now, by their velocities";
         LocalDamping: "local-damping", "to the mean of the others without damping between them, while ground damps it";
+        LocalLag: "local-lag", "from where it was some ticks ago to the mean of the others";
     }
     controllers {
         PassivityControl: "passivity-control", "to the mean of the others, with no more energy than they have taken";

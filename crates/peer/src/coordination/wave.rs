@@ -150,8 +150,8 @@ impl<const A: usize> Strategy<A> for Wave<A> {
     fn accept(&mut self, other: usize, numbers: &[f64; A]) {
         let line = &mut self.lines[other];
         line.count_to(self.tick);
-        for axis in 0..A {
-            self.sum[axis] += numbers[axis] - line.wave[axis];
+        for ((sum, new), old) in self.sum.iter_mut().zip(numbers).zip(line.wave) {
+            *sum += new - old;
         }
         line.wave = *numbers;
         if !self.holds {

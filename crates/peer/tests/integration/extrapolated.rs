@@ -14,7 +14,7 @@ use crate::laws::{Body, TICK, body, count, gains, pull, rounding};
 fn strategy(gains: Gains, horizon: Duration) -> LawStrategy<1> {
     let mut own = LawValues::default();
     own.set(0, LawValue::Duration(horizon));
-    LawStrategy::new(Coordination::Extrapolated, LawParameters { gains, peers: 2, tick: TICK, oldest: None, own })
+    LawStrategy::new(Coordination::Extrapolated, LawParameters { gains, peers: 2, tick: TICK, oldest: None, middle: None, own })
 }
 
 /// FT at the local time 1 s of samples with those ages \[ms\].

@@ -81,7 +81,7 @@ proptest! {
 }
 
 fn parameters(gains: Gains) -> LawParameters {
-    LawParameters { gains, peers: 2, tick: TICK, oldest: None, own: LawValues::default() }
+    LawParameters { gains, peers: 2, tick: TICK, oldest: None, middle: None, own: LawValues::default() }
 }
 
 /// The strategies of the registry that are laws.

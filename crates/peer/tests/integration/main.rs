@@ -7,6 +7,7 @@ mod ageing;
 mod extrapolated;
 mod late_samples;
 mod laws;
+mod local_lag;
 mod own_parts;
 mod smoothed_average_position;
 mod step_map;

@@ -13,7 +13,7 @@ use crate::laws::{Body, TICK, body, gains, pull};
 fn strategy(gains: Gains, lag: Duration) -> LawStrategy<1> {
     let mut own = LawValues::default();
     own.set(0, LawValue::Duration(lag));
-    LawStrategy::new(Coordination::SmoothedAveragePosition, LawParameters { gains, peers: 2, tick: TICK, oldest: None, own })
+    LawStrategy::new(Coordination::SmoothedAveragePosition, LawParameters { gains, peers: 2, tick: TICK, oldest: None, middle: None, own })
 }
 
 fn forces(strategy: &mut LawStrategy<1>, own: Body, other: Body, ticks: usize) -> Vec<f64> {

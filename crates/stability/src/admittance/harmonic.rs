@@ -103,7 +103,7 @@ impl Harmonic {
         let ahead = self.back.conj();
         for (place, row) in (0..self.map.states.rows()).filter(|row| Some(*row) != reference).enumerate() {
             self.matrix[(place, place)] += ahead;
-            let moved = if self.map.is_position(row) { Complex64::ONE } else { Complex64::ZERO };
+            let moved = Complex64::from(self.map.displacement(row));
             self.subtract(place, Source::State(row), Complex64::ONE);
             self.subtract_reference(place, moved);
         }

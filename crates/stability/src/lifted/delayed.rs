@@ -22,7 +22,7 @@ impl FrameMap {
         let size = states + sent + usize::from(self.reference().is_some());
         let moved = size - 1;
         // One row of the frame for each signal, in units of which `displaced` by the reference's motion is taken off.
-        let mut rows: Vec<(&[f64], f64)> = kept.iter().map(|row| (self.states.row(*row), if self.is_position(*row) { 1.0 } else { 0.0 })).collect();
+        let mut rows: Vec<(&[f64], f64)> = kept.iter().map(|row| (self.states.row(*row), self.displacement(*row))).collect();
         rows.extend((0..sent).map(|row| (self.sent.row(row), self.translation(sent - row))));
         let reference = self.reference().map(|row| self.states.row(row));
         if let Some(reference) = reference {

@@ -51,8 +51,8 @@ impl Instrument for Autonomous {}
 pub(crate) struct FrameMap {
     /// The states at the end, one row each, the reference among them, in positions as they are.
     pub(crate) states: Matrix,
-    /// Which of the rows are positions.
-    positions: Vec<bool>,
+    /// How far a translation by 1 moves each of the rows: 1 for positions.
+    displacements: Vec<f64>,
     /// The row of the position that all others are relative to.
     reference: Option<usize>,
     /// The samples sent in the frame: for each node, its rows in `sent`.
@@ -192,16 +192,14 @@ impl Lifted<'_> {
                 }
             }
         }
-        let mut positions = vec![false; count];
-        for row in &rows {
-            positions[row.object] = true;
-            if let Some(device) = row.device {
-                positions[device] = true;
-            }
+        let mut displacements = Vec::with_capacity(count);
+        for (node, rows) in self.nodes.iter().zip(&rows) {
+            let first = rows.device.unwrap_or(rows.object);
+            displacements.extend((first..first + node.states()).map(|row| node.displacement(*rows, row, self.time)));
         }
         Some(FrameMap {
             states: z,
-            positions,
+            displacements,
             reference,
             sent: tail(&store, used.len()),
             first_sent: first_sent.iter().map(|first| first - used.len()).collect(),
@@ -278,7 +276,7 @@ impl FrameMap {
             }
         };
         for (row, source) in kept.iter().enumerate() {
-            put(row, self.states.row(*source), if self.positions[*source] { 1.0 } else { 0.0 });
+            put(row, self.states.row(*source), self.displacements[*source]);
         }
         let mut shifted = Vec::new();
         for (node, depth) in self.depth.iter().enumerate() {
@@ -326,9 +324,9 @@ impl FrameMap {
         self.reference
     }
 
-    /// Whether a row is a position.
-    pub(crate) fn is_position(&self, row: usize) -> bool {
-        self.positions[row]
+    /// How far a translation by 1 moves a row.
+    pub(crate) fn displacement(&self, row: usize) -> f64 {
+        self.displacements[row]
     }
 
     fn used_place(&self, number: usize, first: &[usize]) -> usize {

@@ -11,6 +11,8 @@
 //! near that of T: with a = KT·h²/(2m) the copy alone goes by about a − 3 a tick, its majorant by a + 4. So e stays about u times the ticks times s,
 //! where the square of the growth ([`Rounding`](super::Rounding)) says nothing any more.
 
+use std::collections::VecDeque;
+
 use super::frame::Lifted;
 use super::node::{Body, Node, Scale};
 use crate::structure::count;
@@ -52,6 +54,8 @@ struct NodeSizes {
     pending: [Size; 2],
     /// What the law remembers, in its own units.
     memory: Vec<Size>,
+    /// What it takes of the own states of the latest ticks, the newest first.
+    past: VecDeque<Size>,
 }
 
 /// A bound of the errors of all rows of a frame as one matrix, in the 2-norm: of the states at the end and of the samples sent, positions and velocities,
@@ -62,7 +66,13 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
     let begin = |node: usize| {
         let force = Size { sum: 1.0 / compliance(node), error: 0.0 };
         let memory = (0..lifted.nodes[node].law.memory.len()).map(|place| Size { sum: 1.0 / unit(node, place), error: 0.0 }).collect();
-        NodeSizes { device: [Size::UNIT; 2], copy: [Size::UNIT; 2], pending: [force; 2], memory }
+        NodeSizes {
+            device: [Size::UNIT; 2],
+            copy: [Size::UNIT; 2],
+            pending: [force; 2],
+            memory,
+            past: vec![Size::UNIT; lifted.nodes[node].looks_back()].into(),
+        }
     };
     let mut sizes: Vec<NodeSizes> = (0..nodes).map(begin).collect();
     let (sampling, time) = (lifted.sampling, lifted.time);
@@ -127,6 +137,8 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
         if lifted.nodes[node].compute_delay {
             size.pending.iter().for_each(|force| add(Size::ZERO.plus(compliance(node), *force).rounded(f64::EPSILON), Size::ZERO));
         }
+        // Each is displaced by the share of the position in it, at most 1.
+        size.past.iter().for_each(|number| add(*number, origin));
         let memory = size.memory.iter().enumerate();
         memory.for_each(|(place, number)| add(Size::ZERO.plus(unit(node, place), *number).rounded(2.0 * f64::EPSILON), Size::ZERO));
     }
@@ -146,6 +158,11 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>,
     let next: Vec<Size> = next.collect();
     let mut on_copy =
         remembered(heard[0], &node.law.force.memory).plus(gains.stiffness + wall.stiffness, x).plus((gains.damping + wall.damping) / time, v);
+    if let Some(oldest) = sizes.past.pop_back() {
+        let (unit, past) = (node.past_unit(time), node.law.force.past);
+        on_copy = on_copy.plus(unit, oldest);
+        sizes.past.push_front(Size::ZERO.plus(past.stiffness / unit, x).plus(past.damping / time / unit, v).rounded(MEAN));
+    }
     let mut on_device = Size::ZERO;
     if node.device.is_some() {
         let [xh, vh] = sizes.device;

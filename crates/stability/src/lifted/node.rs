@@ -63,6 +63,8 @@ pub(crate) struct Rows {
     pub(crate) pending: Option<usize>,
     /// The first of the numbers that the law remembers.
     pub(crate) memory: usize,
+    /// Where the law looks back: what it takes of the own states of the latest ticks, the newest first.
+    pub(crate) past: usize,
 }
 
 /// The units of the states.
@@ -100,14 +102,38 @@ impl Node {
     /// How many rows its states take.
     pub(crate) fn states(&self) -> usize {
         let bodies = if self.device.is_some() { 2 } else { 1 };
-        2 * bodies + if self.compute_delay { bodies } else { 0 } + self.law.memory.len()
+        2 * bodies + if self.compute_delay { bodies } else { 0 } + self.law.memory.len() + self.looks_back()
+    }
+
+    /// How many ticks the law looks back, where it does anything with what it sees there.
+    pub(crate) fn looks_back(&self) -> usize {
+        let Gains { stiffness, damping } = self.law.force.past;
+        if stiffness + damping > 0.0 { self.law.lag } else { 0 }
+    }
+
+    /// What a combination (K·x + B·v)/(K + B/time) of an own state is divided by to be a length, of the gains K and B by which the law takes the past [N/m].
+    pub(crate) fn past_unit(&self, time: f64) -> f64 {
+        let Gains { stiffness, damping } = self.law.force.past;
+        stiffness + damping / time
+    }
+
+    /// How far a translation of everything by 1 moves each of its rows, where it stands at `rows`.
+    pub(crate) fn displacement(&self, rows: Rows, row: usize, time: f64) -> f64 {
+        if row == rows.object || Some(row) == rows.device {
+            1.0
+        } else if row >= rows.past {
+            self.law.force.past.stiffness / self.past_unit(time)
+        } else {
+            0.0
+        }
     }
 
     /// Its rows, from `first` on.
     pub(crate) fn rows(&self, first: usize) -> Rows {
         let device = self.device.map(|_| first);
         let object = first + if self.device.is_some() { 2 } else { 0 };
-        Rows { device, object, pending: self.compute_delay.then_some(object + 2), memory: first + self.states() - self.law.memory.len() }
+        let past = first + self.states() - self.looks_back();
+        Rows { device, object, pending: self.compute_delay.then_some(object + 2), memory: past - self.law.memory.len(), past }
     }
 
     /// The compliance that makes the node's forces lengths: how far a force moves the copy within the common time.
@@ -121,7 +147,7 @@ impl Node {
         let wall = self.wall.map_or(0.0, gain);
         // Samples are used up to the horizon at most; one that is without end counts by the gains alone, as its own row does.
         let oldest = self.law.horizon.filter(|horizon| horizon.is_finite()).unwrap_or(0.0);
-        let seen = |row: &LawRow| gain(row.own) + gain(row.heard) + row.ahead.abs() * oldest / scale.time;
+        let seen = |row: &LawRow| gain(row.own) + gain(row.past) + gain(row.heard) + row.ahead.abs() * oldest / scale.time;
         let remembered = |row: &LawRow| row.memory.iter().enumerate().map(|(place, by)| by.abs() / self.memory_unit(place, scale)).sum::<f64>();
         let coordination = match self.law.pull() {
             Some(gains) => 2.0 * gain(gains),
@@ -181,6 +207,9 @@ impl Node {
                 }
             }
         }
+        if self.looks_back() > 0 {
+            self.look_back(z, rows, scale, on_object);
+        }
         if !self.law.memory.is_empty() {
             self.remember(z, rows, heard, scale, (on_object, memory));
         }
@@ -201,6 +230,19 @@ impl Node {
 }
 
 impl Node {
+    /// The oldest of the own states takes part in the force, and the present one is remembered.
+    fn look_back(&self, z: &mut Matrix, rows: Rows, scale: Scale, on_object: &mut [f64]) {
+        let (count, unit, gains) = (self.looks_back(), self.past_unit(scale.time), scale.gains(self.law.force.past));
+        for (force, oldest) in on_object.iter_mut().zip(z.row(rows.past + count - 1)) {
+            *force -= unit * oldest;
+        }
+        z.move_rows(rows.past..rows.past + count - 1, rows.past + 1);
+        let (stiffness, damping) = (gains.stiffness / unit, gains.damping / unit);
+        for column in 0..z.columns() {
+            z[(rows.past, column)] = stiffness * z[(rows.object, column)] + damping * z[(rows.object + 1, column)];
+        }
+    }
+
     /// The memory of the law takes part in the force and takes its next values.
     fn remember<'a>(
         &self,

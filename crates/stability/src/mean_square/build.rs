@@ -54,7 +54,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
         first.push(count);
         for row in count..count + node.states() {
             made.kept.push((row, row));
-            moved.push(if row == rows.object || Some(row) == rows.device { 1.0 } else { 0.0 });
+            moved.push(node.displacement(rows, row, lifted.time));
         }
         count += node.states();
     }

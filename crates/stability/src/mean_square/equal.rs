@@ -194,15 +194,7 @@ impl Equal {
             }
         }
         // Where nothing ties the scene to ground positions are relative to the copy's; a sample moves with KT only.
-        let moves = |row: usize| {
-            if row >= states {
-                position_share
-            } else if row == own.object || Some(row) == own.device {
-                1.0
-            } else {
-                0.0
-            }
-        };
+        let moves = |row: usize| if row >= states { position_share } else { node.displacement(own, row, lifted.time) };
         let ends: Vec<(usize, f64)> = begins
             .map(|row| (if row >= states && row < mean { row + sent } else { row }, if reference.is_some() { moves(row) } else { 0.0 }))
             .collect();

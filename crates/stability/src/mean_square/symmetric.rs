@@ -117,7 +117,7 @@ impl Symmetric {
         steps.push(flush(&map, &|row| if row < states { row } else { row + sent }, size));
         let translation = (!lifted.tied).then(|| {
             let moved = lifted.sampling.translation(0, lifted.time);
-            let mut states: Vec<f64> = (0..states).map(|row| if row == rows.object || Some(row) == rows.device { 1.0 } else { 0.0 }).collect();
+            let mut states: Vec<f64> = (0..states).map(|row| node.displacement(rows, row, lifted.time)).collect();
             states.resize(size, moved);
             (states, moved)
         });

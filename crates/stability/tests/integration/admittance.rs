@@ -251,6 +251,7 @@ mod simulated {
             one_touches(3, "proportional-derivative"),
             one_touches_with(2, "smoothed-average-position", &["coordination.stiffness=200.0"]),
             one_touches(3, "extrapolated"),
+            one_touches_with(2, "local-lag", &["coordination.stiffness=200.0", "coordination.local-lag.lag=11ms"]),
             // Ages of 8 to 15 ms.
             one_touches_with(2, "extrapolated", &["coordination.extrapolated.horizon=11ms"]),
         ];

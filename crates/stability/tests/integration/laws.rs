@@ -1,9 +1,9 @@
-//! The laws that remember or extrapolate, against values that were computed apart from this program: see `tests/reference/README.md`.
+//! The laws that remember, extrapolate or look back, against values that were computed apart from this program: see `tests/reference/README.md`.
 
 use cohaptic_stability::{Method, analyse};
 use serde_json::Value;
 
-use crate::reference::{Case, cases_of, compare};
+use crate::reference::{Case, cases_of, compare, compare_value};
 use crate::{admittance, mean_square};
 
 fn entries(kind: &str) -> Vec<Value> {
@@ -31,10 +31,16 @@ fn the_general_path_finds_the_same_of_laws() {
     }
 }
 
+/// Own states of the past are signals of the determinant, which bounds loops of many signals loosely: of these only the truth of the bound is asked.
 #[test]
 fn the_determinant_finds_the_same_of_laws() {
     for case in cases() {
-        compare(&case, &analyse(&case.scene, Method::Determinant).unwrap(), 1e-6);
+        let found = analyse(&case.scene, Method::Determinant).unwrap();
+        if case.name.starts_with("local-lag") {
+            compare_value(&case, &found);
+        } else {
+            compare(&case, &found, 1e-6);
+        }
     }
 }
 

@@ -95,6 +95,7 @@ def simulated(scene_, peer, hz, settle, periods):
     # Samples with the tick at which they were sent, and the forces of the tick before.
     held = {pair: (0, np.zeros(2, dtype=complex)) for pair in scene_.links}
     lagging = np.zeros(count, dtype=complex)
+    past = [[np.zeros(2, dtype=complex) for _ in range(scene_.looks_back(i))] for i in range(count)]
     delay = {pair: -(-link.delay // tick) for pair, link in scene_.links.items()}
     flying = {pair: [] for pair in scene_.links}
 
@@ -123,7 +124,9 @@ def simulated(scene_, peer, hz, settle, periods):
             fc = 0.0
             if scene_.peers[i].touches:
                 fc = m.kc * (device[i][0] - copy[i][0]) + m.bc * (device[i][1] - copy[i][1])
-            ft = m.kt * (copy[i][0] - target[0]) + m.bt * (copy[i][1] - target[1])
+            past[i].append(copy[i].copy())
+            own = past[i].pop(0)
+            ft = m.kt * (own[0] - target[0]) + m.bt * (own[1] - target[1])
             if scene_.lag is not None:
                 ft = lagging[i] = m.kept * lagging[i] + (1 - m.kept) * ft
             hand = np.exp(1j * omega * k) if i == peer else 0.0

@@ -1,8 +1,10 @@
-"""The laws that remember or extrapolate, from their equations: radii, mean squares and admittances of laws.json.
+"""The laws that remember, extrapolate or look back, from their equations: radii, mean squares and admittances of laws.json.
 
 smoothed-average-position: FT(k) = a·FT(k − 1) + (1 − a)·[KT·(x − x̄) + BT·(v − v̄)], a = e^(−Tc/lag), at first 0. One more state for each peer.
 
 extrapolated: FT = KT·(x − mean x̂_j) + BT·(v − mean v_j), x̂_j = x_j + min(age, horizon)·v_j, the age counted from when the sample was sent.
+
+local-lag: FT(k) = KT·(x(k − L) − x̄(k)) + BT·(v(k − L) − v̄(k)), L the lag in ticks, rounded up. Two more states for each peer and tick.
 """
 
 import dataclasses
@@ -18,7 +20,7 @@ from cases import EVERY_DIFFERENT, NONE, Case, full_radius
 from monodromy import Frame, relative, rigid_modes
 from plant import Exact, Maps
 from radius import digits, spectral_radius
-from scene import EXTRAPOLATED, SMOOTHED, parse
+from scene import EXTRAPOLATED, LOCAL_LAG, SMOOTHED, parse
 from text import arm, scene
 
 
@@ -28,6 +30,10 @@ def smoothed(n, kt, lag="10ms", **keys):
 
 def extrapolated(n, kt, horizon="100ms", **keys):
     return scene(n, kt, strategy=EXTRAPOLATED, own=f'horizon = "{horizon}"', **keys)
+
+
+def local_lag(n, kt, lag="auto", **keys):
+    return scene(n, kt, strategy=LOCAL_LAG, own=f'lag = "{lag}"', **keys)
 
 
 def radius_by_modes(text):
@@ -119,9 +125,54 @@ def radii_of_extrapolated():
     yield Case(f"{strategy}-n20-cut", extrapolated(20, 50.0, "12ms", bo=0.5, bt=3.0, delay="8ms", contact="none"), "twenty, no device, cut in the frame", "modes")
 
 
+def radii_of_local_lag():
+    strategy = "local-lag"
+    yield Case(f"{strategy}-n3-push", local_lag(3, 200.0, "11ms", delay="8ms"), "the page of the comparators has 0.848044258")
+    yield Case(f"{strategy}-n3-auto", scene(3, 1000.0, strategy=LOCAL_LAG, delay="8ms"), "without a table the lag is 11 ticks; the page has 1.0505577")
+    yield Case(f"{strategy}-n3-lag-0", local_lag(3, 1000.0, "0s", delay="8ms"), "average-position itself: 0.8964881385693")
+    yield Case(f"{strategy}-n3-lag-1ms-0ms", local_lag(3, 500.0, "1ms"), "no delay, one tick")
+    yield Case(f"{strategy}-n2-rounded-up", local_lag(2, 300.0, "10200us", delay="8ms"), "eleven ticks")
+    yield Case(f"{strategy}-n2-within-a-frame", local_lag(2, 300.0, "3ms", delay="11.3ms"), "shorter than a frame")
+    yield Case(f"{strategy}-n2-40ms", local_lag(2, 50.0, delay="40ms"), "43 ticks and five samples in flight a link", "modes")
+    yield Case(f"{strategy}-n3-free", local_lag(3, 100.0, bo=1.0, delay="16ms", contact="none"), "none touches")
+    yield Case(
+        f"{strategy}-n3-free-undamped",
+        local_lag(3, 20.0, delay="3ms", contact="none"),
+        "each sample is in use around its middle age: copies that move on alike exert no force on average",
+    )
+    yield Case(f"{strategy}-n3-update-4ms", local_lag(3, 300.0, update="4ms", delay="9.5ms", split=False), "another frame, whole masses")
+    yield Case(f"{strategy}-compute-delay", local_lag(3, 300.0, kc=1500.0, delay="8ms", compute_delay=1), "forces that are one tick late")
+    yield Case(
+        f"{strategy}-arms",
+        local_lag(2, 300.0, delay="8ms", peers=["hand = " + arm(0.3, 10.0, 100.0), NONE + "; hand = " + arm(0.3, 1.0, 50.0)]),
+        "one is tied to ground by its arm, the device of the other for itself",
+    )
+    yield Case(f"{strategy}-n5-two-touch", local_lag(5, 300.0, "3ms", delay="8ms", peers=["", NONE, "", NONE, NONE]), "classes of two and three, mixed")
+    yield Case(
+        f"{strategy}-everything-different",
+        local_lag(
+            3,
+            200.0,
+            "7ms",
+            delay="12.5ms",
+            bo=0.3,
+            peers=[
+                EVERY_DIFFERENT[0] + '; clock = { offset = "123456ns" }',
+                EVERY_DIFFERENT[1].replace("phase = 5", "phase = 3") + '; tick = "2ms"; compute-delay = 1',
+                EVERY_DIFFERENT[2] + '; clock = { offset = "3ms" }; tick = "500us"',
+            ],
+            links=[(0, 2, 'delay = "31ms"'), (2, 0, 'delay = "1ns"')],
+        ),
+        "14, 7 and 4 ticks of 0.5, 1 and 2 ms",
+    )
+    yield Case(f"{strategy}-n20", local_lag(20, 300.0, delay="11.3ms"), "twenty equal peers: two blocks", "modes")
+    yield Case(f"{strategy}-n20-free", local_lag(20, 50.0, "5ms", bo=0.5, bt=3.0, delay="8ms", contact="none"), "twenty and no device", "modes")
+
+
 def radii():
     yield from radii_of_smoothed()
     yield from radii_of_extrapolated()
+    yield from radii_of_local_lag()
 
 
 def mean_squares():
@@ -154,6 +205,13 @@ def mean_squares():
         extrapolated(3, 400.0, "1s", loss=0.1, links=[(1, 2, "loss = 0.84")]),
         "a held sample moves on, so that none acts on nothing for ever",
     )
+    yield "local-lag-n2-p0.3", local_lag(2, 300.0, "4ms", delay="3ms", loss=0.3), "every link loses each sample with the same probability"
+    yield "local-lag-n2-free", local_lag(2, 100.0, "2ms", bo=1.0, delay="3ms", loss=0.2, contact="none"), "none touches"
+    yield "local-lag-n3-p0.1", local_lag(3, 300.0, "3ms", loss=0.1), "no delay"
+    yield "local-lag-n2-compute-delay", local_lag(2, 200.0, "2ms", loss=0.2, compute_delay=1), "forces one tick late"
+    yield "local-lag-n2-gilbert", local_lag(2, 300.0, "3ms", delay="8ms", loss=chain), "bursts of 2.5 packets"
+    yield "local-lag-n2-jitter", local_lag(2, 300.0, "6ms", delay="2500us", jitter=jitter), "uniform from 0 to 5 ms: 1, 2, 3, 4 or 5 ticks"
+    yield "local-lag-n3-different", local_lag(3, 200.0, "2ms", delay="8ms", loss=0.1, peers=["", "phase = 3", NONE], links=unlike), "no symmetry"
     yield "smoothed-n2-lag-100ms", smoothed(2, 500.0, "100ms", delay="8ms", loss=0.3), "a lag of many frames"
     yield (
         "extrapolated-n2-free-undamped",
@@ -180,19 +238,25 @@ def admittances():
     yield "extrapolated-n3-24ms", extrapolated(3, 300.0, "1s", delay="24ms", bo=2.0), 1, [0.5, 5.0, 62.5], "all touch"
     yield "extrapolated-different", extrapolated(3, 400.0, "14ms", delay="8ms", peers=EVERY_DIFFERENT), 1, [0.2, 4.0, 25.0], "no symmetry, cut on some links"
     yield "extrapolated-compute-delay", extrapolated(2, 500.0, kc=1500.0, delay="8ms", compute_delay=1), 0, [0.3, 6.0], "forces one tick late"
+    yield "local-lag-n2", one_touches(local_lag, 200.0, delay="8ms"), 0, wide, "one touches"
+    yield "local-lag-n3-24ms", local_lag(3, 100.0, delay="24ms", bo=2.0), 1, [0.5, 5.0, 62.5], "all touch"
+    yield "local-lag-different", local_lag(3, 200.0, "9ms", delay="8ms", peers=EVERY_DIFFERENT), 1, [0.2, 4.0, 25.0], "no symmetry"
+    yield "local-lag-compute-delay", local_lag(2, 200.0, kc=1500.0, delay="8ms", compute_delay=1), 0, [0.3, 6.0], "forces one tick late"
 
 
 def check():
     """What must agree before anything is written."""
     near = mpf(10) ** -60
-    for law, bound in ((smoothed, "10ms"), (extrapolated, "10ms"), (extrapolated, "1s")):
+    for law, bound in ((smoothed, "10ms"), (extrapolated, "10ms"), (extrapolated, "1s"), (local_lag, "5ms")):
         for keys in ({"delay": "8ms"}, {"delay": None}, {"delay": "11.3ms", "contact": "none", "bo": 1.0}, {"compute_delay": 1, "update": "4ms"}):
             text = law(5, 300.0, bound, **keys)
             (full, rigid), (blocks, of_blocks) = full_radius(text), radius_by_modes(text)
             assert abs(full - blocks) < near and rigid == of_blocks, "two blocks and the full matrix"
     plain = full_radius(scene(3, 1000.0, delay="8ms"))[0]
-    for law in (smoothed, extrapolated):
+    for law in (smoothed, extrapolated, local_lag):
         assert abs(full_radius(law(3, 1000.0, "0s", delay="8ms"))[0] - plain) < near, "without lag and horizon it is average-position"
+    for kt, anchor in ((200.0, "0.848044258"), (1000.0, "1.0505577")):
+        assert abs(full_radius(local_lag(3, kt, delay="8ms"))[0] - mpf(anchor)) < mpf(6) / 10 ** len(anchor.split(".")[1]) / 10, "of another simulation"
     for keys in ({"peers": EVERY_DIFFERENT}, {"compute_delay": 1}, {"update": "4ms", "links": [(0, 1, 'delay = "19ms"')]}):
         made = parse(extrapolated(3, 400.0, "1s", delay="11.3ms", **keys))
         frame = Frame(made, outcomes={pair: link.delay for pair, link in made.links.items()})
@@ -205,6 +269,7 @@ def check():
             (smoothed(3, 800.0, "3ms", **different), 1, 25.0, 30_000),
             (one_touches(extrapolated, 1000.0, "11ms", delay="8ms"), 0, 62.5, 100_000),
             (extrapolated(3, 400.0, "1s", **different), 1, 25.0, 30_000),
+            (local_lag(3, 200.0, "9ms", **different), 1, 25.0, 30_000),
         )
     )
 

@@ -6,7 +6,7 @@ is assumed about symmetry, delays, phases or clocks: every directed link has its
 
 The state, at the beginning of a frame (an instant that is a multiple of Tn, before anything happens at it):
     for each peer, its device and copy as they will be at its first tick of the frame; with a compute delay also the forces computed at its last tick, and
-    with a lag the coordination force of that tick;
+    with a lag of the force the coordination force of that tick, and with a lag of the own state the copy at the latest ticks, the newest first;
     for each directed link, the sample held and the samples in flight, oldest first.
 
 A law that extrapolates knows the age of what it holds. Without chance that age is known at every tick: samples are held as they were sent. With outcomes
@@ -83,6 +83,8 @@ class Frame:
                 self.states += [("fH", i), ("fO", i)]
             if scene.lag is not None:
                 self.states.append(("fT", i))
+            for age in range(1, scene.looks_back(i) + 1):
+                self.states += [("past x", i, age), ("past v", i, age)]
         for pair in pairs:
             self.states += [("held x", pair), ("held v", pair)]
             for place in range(len(flights[pair])):
@@ -105,6 +107,7 @@ class Frame:
         copy = [[unit("xO", i), unit("vO", i)] for i in peers]
         pending = [[unit("fH", i), unit("fO", i)] if scene.peers[i].compute_delay else None for i in peers]
         lagging = [unit("fT", i) if scene.lag is not None else None for i in peers]
+        past = [[(unit("past x", i, age), unit("past v", i, age)) for age in range(1, scene.looks_back(i) + 1)] for i in peers]
         held = {pair: (unit("held x", pair), unit("held v", pair)) for pair in pairs}
         moving = scene.horizon is not None and outcomes is not None
         ageing = scene.horizon is not None and outcomes is None
@@ -173,7 +176,9 @@ class Frame:
                     fc = m.kc * (device[i][0] - copy[i][0]) + m.bc * (device[i][1] - copy[i][1])
                 else:
                     fc = zero
-                ft = m.kt * (copy[i][0] - mean[0]) + m.bt * (copy[i][1] - mean[1])
+                past[i].insert(0, tuple(copy[i]))
+                own = past[i].pop()
+                ft = m.kt * (own[0] - mean[0]) + m.bt * (own[1] - mean[1])
                 if scene.lag is not None:
                     ft = lagging[i] = m.kept * lagging[i] + (1 - m.kept) * ft
                 applied = [fc, fc - ft]
@@ -195,6 +200,8 @@ class Frame:
                 final.update({("fH", i): pending[i][0], ("fO", i): pending[i][1]})
             if scene.lag is not None:
                 final["fT", i] = lagging[i]
+            for age, (x, v) in enumerate(past[i], start=1):
+                final["past x", i, age], final["past v", i, age] = x, v
         for pair in pairs:
             final["held x", pair], final["held v", pair] = held[pair]
             flying = timing.in_flight(*pair, timing.t1)

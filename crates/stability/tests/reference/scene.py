@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 UNITS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9, "min": 60 * 10**9, "h": 3600 * 10**9}
-SMOOTHED, EXTRAPOLATED = "smoothed-average-position", "extrapolated"
+SMOOTHED, EXTRAPOLATED, LOCAL_LAG = "smoothed-average-position", "extrapolated", "local-lag"
 # The laws that have a parameter of their own: its key and its default.
-LAWS = {SMOOTHED: ("lag", "10ms"), EXTRAPOLATED: ("horizon", "100ms")}
+LAWS = {SMOOTHED: ("lag", "10ms"), EXTRAPOLATED: ("horizon", "100ms"), LOCAL_LAG: ("lag", "auto")}
 
 
 def nanoseconds(text):
@@ -60,6 +60,11 @@ class Scene:
     identical: bool = False  # made by `count`
     lag: int | None = None  # of smoothed-average-position [ns]
     horizon: int | None = None  # of extrapolated [ns]
+    own_age: int | None = None  # the lag of local-lag [ns]
+
+    def looks_back(self, place):
+        """L: how many ticks old the own state is that the law of a peer compares, rounded up."""
+        return 0 if self.own_age is None else -(-self.own_age // self.peers[place].tick)
 
 
 def take(table, *known):
@@ -133,7 +138,7 @@ def parse(text):
     strategy = coordination["strategy"]
     if strategy not in ("average-position", "proportional-derivative", *LAWS):
         raise ValueError(f"a strategy not covered: {strategy}")
-    own_of_laws = {law: nanoseconds(take(coordination.get(law, {}), key).get(key, default)) for law, (key, default) in LAWS.items()}
+    own_of_laws = {law: take(coordination.get(law, {}), key).get(key, default) for law, (key, default) in LAWS.items()}
     common = root.get("peer", {})
     tables = {f"peer{i + 1}": common for i in range(head.get("count", 0))}
     for entry in root.get("peers", []):
@@ -161,6 +166,15 @@ def parse(text):
         peers=peers,
         links=links,
         identical="peers" not in root and "links" not in root,
-        lag=own_of_laws[SMOOTHED] if strategy == SMOOTHED else None,
-        horizon=own_of_laws[EXTRAPOLATED] if strategy == EXTRAPOLATED else None,
+        lag=nanoseconds(own_of_laws[SMOOTHED]) if strategy == SMOOTHED else None,
+        horizon=nanoseconds(own_of_laws[EXTRAPOLATED]) if strategy == EXTRAPOLATED else None,
+        own_age=own_age(own_of_laws[LOCAL_LAG], nanoseconds(coordination["update"]), peers, links) if strategy == LOCAL_LAG else None,
     )
+
+
+def own_age(text, update, peers, links):
+    """The lag of local-lag [ns]; of "auto" the delay in whole ticks, rounded up, and half of the ticks to the next sample, rounded down."""
+    if text != "auto":
+        return nanoseconds(text)
+    (tick,), (delay,) = {p.tick for p in peers}, {link.delay for link in links.values()}
+    return (-(-delay // tick) + (update // tick - 1) // 2) * tick

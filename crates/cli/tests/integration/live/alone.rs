@@ -31,12 +31,12 @@ fn its_records_are_those_of_the_run_and_its_document_says_how_late_it_was() {
     let desk = Desk::with("scene.toml", &eventful());
     let begin = Instant::now();
     // Standard error is a pipe: no progress is drawn on it, and there is nothing else to say.
-    let document = desk.json("live scene.toml --json --out out");
+    let document = desk.json("live scene.toml --json --out out --set measure.names=all");
     assert!(begin.elapsed().as_secs_f64() >= 0.6, "600 ms by the wall clock");
-    let run = desk.json("run scene.toml --json --out run");
+    let run = desk.json("run scene.toml --json --out run --measure all");
     assert_same(&desk, "out", "run");
     assert_eq!(inputs(&desk, "out"), [], "nothing came in");
-    for key in ["duration_s", "ending", "ticks", "links", "access_lines", "max_discrepancy_m", "title"] {
+    for key in ["duration_s", "ending", "ticks", "links", "access_lines", "max_discrepancy_m", "title", "measures"] {
         assert_eq!(document[key], run[key], "{key}");
     }
     for (live, run) in document["peers"].as_array().unwrap().iter().zip(run["peers"].as_array().unwrap()) {

@@ -2,14 +2,19 @@
 
 use std::collections::BTreeSet;
 
+use cohaptic_scene::Measure;
 use serde_json::Value;
 
-use super::{WRITTEN, entry};
+use super::{WRITTEN, entry, prose};
 use crate::folder::Folder;
 
 const INTRODUCTION: &str = "\
 The documents of `--json`, command by command. Every document begins with `schema`, its kind, and `version` ([commands.md](commands.md#json)); they are left out here. Keys end in their
 unit. A number that is not finite is `null`. Brackets, `links[]`, mark a list; `NAME` stands for any name. An entry with a link has all keys of another part.
+";
+
+const MEASURES: &str = "\
+The names under `measures`, of columns of a campaign, and of `[measure]` and `[expect]` in a scene. Definitions are in [model.md](model.md#measures).
 ";
 
 /// A table of keys: each row has keys that are explained together, separated by commas, and what they are.
@@ -97,7 +102,7 @@ const DOCUMENTS: [Document; 21] = [
     Document {
         command: "run",
         lines: &[
-            "cohaptic run scenarios/network/shared-access-line.toml --against scene.seed=2 --json --out out",
+            "cohaptic run scenarios/network/shared-access-line.toml --against scene.seed=2 --measure all --json --out out",
             "cohaptic live scenarios/live/two-and-a-program.toml --for 50ms --listen 127.0.0.1:0 --no-priority --out session > said && \
              cohaptic run scenarios/live/two-and-a-program.toml --inputs session/inputs.csv --force --json",
         ],
@@ -115,6 +120,7 @@ const DOCUMENTS: [Document; 21] = [
             ("links[].from, links[].to, links[].@Counters", "by sender, then receiver"),
             ("access_lines[].peer, access_lines[].line, access_lines[].@Counters", "`line` is `uplink` or `downlink`"),
             ("max_discrepancy_m", "[discrepancy](model.md#discrepancy)"),
+            ("measures.NAME", "each [measure](#measures) that is asked for; `null` where it has no value"),
             ("files", "paths written by `--out`"),
             ("replayed_otherwise", "with `--inputs --force`: what differs from the scene of the session"),
             ("against", "the document of the second run; absent without `--against`"),
@@ -127,13 +133,13 @@ const DOCUMENTS: [Document; 21] = [
             ("scenes[].file, scenes[].passed, scenes[].failures", "in the order of the files; `failures` is a list of texts"),
             ("scenes[].expects", "whether the scene has an `[expect]`"),
             ("scenes[].notes", "what was judged in another way than with more time"),
-            ("scenes[].expectations[].expectation", "`stable`, `discrepancy`, `position`, `travel`, `loss` or `delay`"),
+            ("scenes[].expectations[].expectation", "`stable`, `discrepancy`, `position`, `travel`, `loss`, `delay` or `measures`"),
             (
                 "scenes[].expectations[].name, scenes[].expectations[].expected, scenes[].expectations[].found",
                 "the quantity, the expected value and the outcome, in words",
             ),
             ("scenes[].expectations[].passed", "whether that is as expected"),
-            ("scenes[].expectations[].unit", "of the next three: `m`, `s` or empty"),
+            ("scenes[].expectations[].unit", "of the next three; empty for ratios"),
             (
                 "scenes[].expectations[].low, scenes[].expectations[].high",
                 "the limits or `null`. A stable scene has a radius of at most 1, an unstable one of at least 1",
@@ -308,8 +314,9 @@ const DOCUMENTS: [Document; 21] = [
     },
     Document {
         command: "live",
-        lines: &["cohaptic live scenarios/live/two-and-a-program.toml --for 50ms --listen 127.0.0.1:0 --no-priority --json"],
+        lines: &["cohaptic live scenarios/live/two-and-a-program.toml --set measure.names=all --for 50ms --listen 127.0.0.1:0 --no-priority --json"],
         rows: &[
+            ("measures.NAME", "each [measure](#measures) of the scene; of energy, only that of copies that the session simulates"),
             ("title, duration_s, ending, ticks, max_discrepancy_m, files", "as [of a run](#run)"),
             ("valid", "whether at most one in a thousand ticks and datagrams was later than the tolerance"),
             ("late_ticks", "ticks later than the tolerance"),
@@ -553,6 +560,8 @@ pub(super) fn page() -> String {
     for part in &PARTS {
         page += &format!("### {}\n\n{}", part.name, rows(part.rows));
     }
+    page += &format!("## Measures\n\n{MEASURES}\n");
+    page.extend(Measure::ALL.iter().map(|measure| entry(&format!("`{}`", measure.pattern()), &[measure.unit()], &prose(measure.about()))));
     page.trim_end().to_owned() + "\n"
 }
 

@@ -86,6 +86,7 @@ fn sees_the_run(browser: &mut Browser) {
     browser.wait("document.querySelectorAll('#clocks tr').length === 2");
     browser.wait("document.getElementById('refused').textContent.includes('wrong-magic')");
     browser.wait("document.getElementById('drops').textContent.includes('queue-full')");
+    browser.wait("document.getElementById('measures').textContent === 'energy_j0.25 Jtravel_sno value'");
     for canvas in ["delay-plot", "loss-plot", "rate-plot"] {
         wait_painted(browser, canvas, "--c0");
         wait_painted(browser, canvas, "--c5");

@@ -103,7 +103,7 @@ impl Block<'_> {
         };
         let kept = (0..frame.states.rows()).filter(|row| Some(*row) != frame.reference());
         for (row, source) in kept.enumerate() {
-            put(row, frame.states.row(source), None, if frame.is_position(source) { 1.0 } else { 0.0 });
+            put(row, frame.states.row(source), None, frame.displacement(source));
         }
         for (node, depth) in depth.iter().enumerate() {
             for age in 1..=*depth {

@@ -50,7 +50,7 @@ fn radius_along(prepared: &Prepared, sequence: &[usize]) -> f64 {
     prepared.searches.iter().map(|search| of(&search.automaton)).chain(prepared.devices.iter().map(|device| device.radius.value)).fold(0.0, f64::max)
 }
 
-const VARIANTS: [&[&str]; 9] = [
+const VARIANTS: [&[&str]; 11] = [
     &[],
     &["link.delay=0s"],
     &["link.delay=3ms"],
@@ -60,6 +60,8 @@ const VARIANTS: [&[&str]; 9] = [
     &["peer.compute-delay=1", "link.delay=13ms"],
     &["peers=[{ name = \"peer1\", clock = { offset = \"300us\" } }]", "link.delay=12345us"],
     &["peers=[{ name = \"peer1\", hand = { arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 }, follows = { position = 0.0 } } }]"],
+    &["coordination.strategy=local-lag", "coordination.local-lag.lag=5ms", "coordination.stiffness=300"],
+    &["coordination.strategy=local-lag", "coordination.local-lag.lag=19ms", "coordination.stiffness=100", "peer.contact=none", "scene.count=3"],
 ];
 
 #[test]
