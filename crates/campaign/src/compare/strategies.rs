@@ -73,9 +73,10 @@ impl Strategies {
         if texts.len() < 2 {
             return Err(StrategiesError::TooFew { found: quote(text.trim()) });
         }
-        let variation = Variation::parse(&format!("{}={}", Self::KEY, texts.join(","))).map_err(|error| {
-            if let VaryError::Twice { value, .. } = error { StrategiesError::Twice { strategy: value } } else { StrategiesError::Values(error) }
-        })?;
+        let variation = match Variation::parse(&format!("{}={}", Self::KEY, texts.join(","))) {
+            Err(VaryError::Twice { value, .. }) => return Err(StrategiesError::Twice { strategy: value }),
+            variation => variation?,
+        };
         let sets: Vec<Vec<String>> = (0..variation.count()).map(|place| sorted(variation.overrides(place))).collect();
         if let Some(place) = (1..sets.len()).find(|place| sets[..*place].contains(&sets[*place])) {
             return Err(StrategiesError::Twice { strategy: variation.value_text(place).to_owned() });

@@ -171,24 +171,20 @@ impl Sheet<'_> {
             self.finished.judgement(strategy, other).and_then(Judgement::verdict).map(|verdict| &*verdict.word)
         };
         let (stable, unstable) = (Verdict::Stable.word(), Verdict::Unstable.word());
-        let is = |expected: &'static str| move |found: Option<&str>| found == Some(expected);
-        let open = |found: Option<&str>| found.is_some_and(|word| word != stable && word != unstable);
-        let areas: [(Fill, &str, IsShown<'_>); 4] = [
-            (Fill::Tint(0), stable, &is(stable)),
-            (Fill::Tint(1), unstable, &is(unstable)),
-            (Fill::Grey, judge::UNDECIDED, &open),
-            (Fill::BackHatch, "refused", &|found| found.is_none()),
-        ];
-        areas.into_iter().fold(panel, |panel, (fill, name, holds)| {
-            let shown = |column: usize, row: usize| holds(word(column, row));
+        let areas = [(Fill::Tint(0), stable), (Fill::Tint(1), unstable), (Fill::Grey, judge::UNDECIDED), (Fill::BackHatch, "refused")];
+        let place_of = |word: Option<&str>| match word {
+            Some(word) if word == stable => 0,
+            Some(word) if word == unstable => 1,
+            Some(_) => 2,
+            None => 3,
+        };
+        areas.into_iter().enumerate().fold(panel, |panel, (place, (fill, name))| {
+            let shown = |column: usize, row: usize| place_of(word(column, row)) == place;
             let any = (1..columns.len()).any(|column| (1..rows.len()).any(|row| shown(column - 1, row - 1)));
             if any { panel.with(Region::between(columns, rows, fill, shown).named(name)) } else { panel }
         })
     }
 }
-
-/// Whether a cell with this verdict, or with none, belongs to an area.
-type IsShown<'a> = &'a dyn Fn(Option<&str>) -> bool;
 
 fn from_place(place: usize) -> f64 {
     f64::from(u32::try_from(place).unwrap_or(u32::MAX))
