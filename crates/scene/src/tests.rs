@@ -465,7 +465,7 @@ fn a_measure_of_what_does_not_exist_is_refused() {
         ("[measure]\nnames = [\"energy\"]", "19:10: measure.names.0: unknown measure \"energy\": expected one of discrepancy_rms_m, "),
         ("[measure]\nnames = \"most\"", "19:9: measure.names: found \"most\": expected \"all\" or a list of names"),
         ("[measure]\nnames = []", "19:9: measure.names: no name is given: expected \"all\" or a list of names"),
-        ("[measure]\nnames = [1]", "19:10: measure.names.0: found the number 1: expected the name of a measure"),
+        ("[measure]\nnames = [1]", "19:10: measure.names.0: found the integer 1: expected the name of a measure such as \"energy_j\""),
         ("[measure]\nnames = [\"peers.nobody.energy_j\"]", "19:10: measure.names.0: there is no peer \"nobody\": expected one of left, right"),
         ("[measure]\nnames = [\"peers.left.travel_s\"]", "19:10: measure.names.0: unknown measure \"peers.left.travel_s\": expected one of"),
         (

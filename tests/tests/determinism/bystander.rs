@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 
 use cohaptic_harness::Model;
+use cohaptic_peer::Coordination;
+use cohaptic_peer::coordination::LawValue;
 use cohaptic_tests::{Draft, DraftPeer, cases, drafts, run};
 use cohaptic_units::Instant;
 use cohaptic_wan::Fate;
@@ -35,9 +37,16 @@ proptest! {
         draft.gains.stiffness /= 100.0;
         draft.gains.damping /= 100.0;
         draft.enclosure = None;
+        // With dead bands, motion says what is sent.
+        draft.send_when = None;
         draft.timeline.retain(|entry| entry.contains("link = "));
         let before = fates(&draft);
-        draft.peers.insert(place % (draft.peers.len() + 1), DraftPeer { tick: draft.peers[0].tick, ..DraftPeer::calm("bystander") });
+        let place = place % (draft.peers.len() + 1);
+        draft.peers.insert(place, DraftPeer { tick: draft.peers[0].tick, ..DraftPeer::calm("bystander") });
+        // The server stays the same peer.
+        let settings = draft.settings.of_mut(Coordination::ClientServer);
+        let server = settings.place(0);
+        settings.set(0, LawValue::Place(if place <= server { server + 1 } else { server }));
         let after = fates(&draft);
         for (link, fates) in &before {
             prop_assert_eq!(Some(fates), after.get(link), "{:?}", link);

@@ -47,8 +47,8 @@ pub(super) const CAMPAIGN: &[&str] = &[
 ];
 
 pub(super) const COMPARE: &[&str] = &[
-    "cohaptic compare scene.toml --strategies average-position,extrapolated --vary link.delay=8ms..48ms/6 --out compared",
-    "cohaptic compare scene.toml --strategies 'extrapolated{horizon=50ms},extrapolated{horizon=200ms}' --vary link.loss=0%,10% --runs 20 --out horizons",
+    "cohaptic compare scene.toml --strategies average-position,wave --vary link.delay=8ms,48ms --out a",
+    "cohaptic compare scene.toml --strategies 'wave{impedance=5},wave{impedance=50}' --runs 20 --out b",
     "cohaptic compare scene.toml --preset field --out field",
 ];
 

@@ -82,6 +82,7 @@ pages! {
     commands_analysis: "docs/commands-analysis.md",
     commands_network: "docs/commands-network.md",
     commands_run: "docs/commands-run.md",
+    compare: "docs/compare.md",
     the_book: "docs/README.md",
     extending: "docs/extending.md",
     falcon: "docs/falcon.md",

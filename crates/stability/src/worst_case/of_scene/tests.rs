@@ -61,7 +61,7 @@ const VARIANTS: [&[&str]; 11] = [
     &["peers=[{ name = \"peer1\", clock = { offset = \"300us\" } }]", "link.delay=12345us"],
     &["peers=[{ name = \"peer1\", hand = { arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 }, follows = { position = 0.0 } } }]"],
     &["coordination.strategy=local-lag", "coordination.local-lag.lag=5ms", "coordination.stiffness=300"],
-    &["coordination.strategy=local-lag", "coordination.local-lag.lag=19ms", "coordination.stiffness=100", "peer.contact=none", "scene.count=3"],
+    &["coordination.strategy=local-lag", "coordination.local-lag.lag=19ms", "coordination.stiffness=100", "peer.contact=none"],
 ];
 
 #[test]
