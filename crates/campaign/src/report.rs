@@ -108,7 +108,7 @@ impl<'a> Tally<'a> {
         self.runs
     }
 
-    /// Ends combinations until there are that many: those before the last are left out.
+    /// Ends combinations up to this number of them: those before the last are left out.
     fn begin(&mut self, count: u64) {
         while (self.combinations.len() as u64) < count {
             self.end_combination();

@@ -10,10 +10,14 @@ const PAGE: usize = 3_500;
 /// The most words that all pages have to be read: those of sentences, headings and tables.
 const BOOK: usize = 45_000;
 
-/// Each page of the book with its text, apart from measured figures and the table of contents.
+/// Pages that hold figures which programs have computed: the paper again, and strategies compared.
+const RESULTS: [&str; 2] = ["docs/compare.md", "docs/results.md"];
+
+/// Each page of the book with its text, apart from figures and the table of contents.
 fn pages() -> Vec<(String, String)> {
     let all = files(&root().join("docs"), "md").into_iter().map(|path| (name(&path), fs::read_to_string(path).unwrap()));
-    all.filter(|(page, _)| !page.starts_with("docs/measured") && page != "docs/SUMMARY.md").collect()
+    let is_left_out = |page: &str| page.starts_with("docs/measured") || page == "docs/SUMMARY.md" || RESULTS.contains(&page);
+    all.filter(|(page, _)| !is_left_out(page)).collect()
 }
 
 /// The words outside of blocks of code. Code within a sentence is one word.

@@ -79,7 +79,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// That many of a number; `None` of none.
+    /// A part of a number of runs; `None` of no runs.
     #[must_use]
     pub fn of(happened: u64, of: u64) -> Option<Self> {
         if of == 0 {

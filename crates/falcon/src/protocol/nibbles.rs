@@ -28,7 +28,7 @@ pub const fn is_letter(byte: u8) -> bool {
     byte >= BASE && byte <= BASE + 0xF
 }
 
-/// A packet: three numbers at the places 1 to 12, and what is added to the base at place 13.
+/// A packet: three numbers at the places 1 to 12, and an addend of the base at place 13.
 pub(super) fn packet(values: [i16; 3], thirteenth: u8) -> [u8; PACKET] {
     let mut packet = [BASE; PACKET];
     packet[0] = START;
@@ -40,7 +40,7 @@ pub(super) fn packet(values: [i16; 3], thirteenth: u8) -> [u8; PACKET] {
     packet
 }
 
-/// The numbers of a packet and what is added to the base at place 13, or the place of the first byte that cannot be there. The byte before the last is not
+/// The numbers of a packet and the addend of the base at place 13, or the place of the first byte that cannot be there. The byte before the last is not
 /// looked at.
 pub(super) fn contents(packet: &[u8; PACKET], is_thirteenth: impl Fn(u8) -> bool) -> Result<([i16; 3], u8), usize> {
     let is_wrong = |at: usize| match at {

@@ -2,6 +2,7 @@
 
 use cohaptic_linkfile::schema::link::{LINK_TABLE, MODULATOR};
 use cohaptic_linkfile::schema::{Form, Key, Need, Table, Words};
+use cohaptic_scene::Measure;
 use cohaptic_scene::schema::FileSchema;
 
 use super::{WRITTEN, entry, prose};
@@ -192,7 +193,8 @@ impl Reference {
         let path = format!("{prefix}{}", key.name);
         let mut words = Vec::new();
         let form = form(&key.form, &mut words);
-        let meanings = if words.is_empty() { String::new() } else { format!(". {}", words.join("; ")) };
+        let meanings =
+            if words.is_empty() { String::new() } else { format!(". {}", words.join(if words.len() > MOST_IN_A_SENTENCE { ". " } else { "; " })) };
         let inner = tables(&key.form);
         let is_put_off = self.puts_off && prefix.is_empty() && !inner.is_empty();
         let written = if is_put_off { form.replace("table", &format!("[table](#{})", anchor(key.name))) } else { form };
@@ -255,11 +257,18 @@ fn many(form: &str) -> String {
     if ["table", "duration", "size"].contains(&form) { format!("{form}s") } else { form.to_owned() }
 }
 
-/// Each word with its meaning; words alone where all mean one thing.
+/// More words than these are explained by a sentence each.
+const MOST_IN_A_SENTENCE: usize = 8;
+
+/// Each word with its meaning; words alone where all mean one thing. Measures have a list of their own.
 fn meanings(words: Words) -> Vec<String> {
+    let alone = || words.iter().map(|(word, _)| format!("`\"{word}\"`")).collect::<Vec<_>>().join(", ");
+    if words.first().is_some_and(|(word, _)| *word == Measure::ALL[0].name()) {
+        return vec![format!("{}: see [measures](reference-documents.md#measures)", alone())];
+    }
     let differ = words.iter().any(|(_, meaning)| *meaning != words[0].1);
     if !differ {
-        return vec![words.iter().map(|(word, _)| format!("`\"{word}\"`")).collect::<Vec<_>>().join(", ")];
+        return vec![alone()];
     }
     words.iter().map(|(word, meaning)| format!("`\"{word}\"`: {meaning}")).collect()
 }
