@@ -10,7 +10,7 @@ use cohaptic_benches::machine::{medians_in_turn, peak_memory, time};
 use cohaptic_benches::watched::{Onlooker, with_all_measures};
 use cohaptic_benches::{Mesh, bare};
 use cohaptic_harness::measures::Measures;
-use cohaptic_harness::{Model, NoObserver, Simulation, run_side_by_side};
+use cohaptic_harness::{Ending, Model, NoObserver, Simulation, run_side_by_side};
 use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::BuiltInStrategy;
 use cohaptic_scene::{FromScene, Scene, Strategies};
@@ -174,9 +174,10 @@ fn strategies(work: Work) {
         "The mesh above over constant delays, with events and nothing recorded but counters: the [strategies](model.md#strategies) with their usual parameters,"
     );
     println!(
-        "as multiples of the time that average-position takes; {ASKED_OF_STRATEGIES} are asked for. The median of {} rounds in which all of them alternate.\n",
+        "as multiples of the time that average-position takes; {ASKED_OF_STRATEGIES} are asked for, and a dash is a mesh that diverges. The median of {} rounds in which",
         work.rounds
     );
+    println!("all of them alternate.\n");
     println!("| peers | {} |", Coordination::ALL.iter().map(|strategy| strategy.name()).collect::<Vec<_>>().join(" | "));
     println!("| ---: |{}", " ---: |".repeat(Coordination::ALL.len()));
     for mesh in Mesh::ALL.into_iter().filter(|mesh| !mesh.impaired) {
@@ -186,7 +187,12 @@ fn strategies(work: Work) {
         let run = |scene| drop(black_box(Simulation::with_strategies(scene, Model::Least, OverEvents).run(&mut NoObserver)));
         let works: Vec<Box<dyn Fn() + '_>> = scenes.iter().map(|scene| Box::new(move || run(scene)) as Box<dyn Fn()>).collect();
         let times = medians_in_turn(&works, work.rounds);
-        let ratios: Vec<String> = times.iter().map(|time| format!("{:.2}", time.as_secs_f64() / times[0].as_secs_f64())).collect();
+        let ratio = |(scene, time): (&Scene, &Duration)| {
+            let Ok(summary) = Simulation::new(scene, Model::Least).run(&mut NoObserver);
+            let ratio = time.as_secs_f64() / times[0].as_secs_f64();
+            if summary.ending == Ending::Complete { format!("{ratio:.2}") } else { "–".to_owned() }
+        };
+        let ratios: Vec<String> = scenes.iter().zip(&times).map(ratio).collect();
         println!("| {} | {} |", mesh.peers, ratios.join(" | "));
     }
     println!();

@@ -474,8 +474,8 @@ fn a_measure_of_what_does_not_exist_is_refused() {
         ),
         ("[measure]\ntravel = { peer = \"nobody\" }", "19:19: measure.travel.peer: there is no peer \"nobody\": expected one of left, right"),
         ("[measure]\ntravel = { axis = \"y\" }", "19:19: measure.travel.axis: the text \"y\" is beyond the axes of this scene: expected x"),
-        ("[measure]\ntravel = { distance = 0 }", "19:23: measure.travel.distance: 0 is out of range: expected a number above 0"),
-        ("[measure]\nband = 0", "19:8: measure.band: 0 is out of range: expected a number above 0"),
+        ("[measure]\ntravel = { distance = 0 }", "19:23: measure.travel.distance: 0 is out of range: expected a number above zero [m]"),
+        ("[measure]\nband = 0", "19:8: measure.band: 0 is out of range: expected a number above zero [m]"),
         (
             "[measure]\nprobe = { peer = \"left\" }",
             "19:18: measure.probe.peer: the hand of peer \"left\" is not a sine: expected a peer with hand = { sine",

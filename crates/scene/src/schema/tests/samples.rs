@@ -47,7 +47,7 @@ pub(super) const SCENES: [&str; 3] = [
     r#"
     scene = { duration = "4s", count = 8 }
     object = { mass = 1 }
-    coordination = { strategy = "average-position", stiffness = 1, update = "8ms", pull = "sum", smoothed-average-position = {}, extrapolated = {}, local-damping = { age = "1ms" }, local-lag = {}, passivity-control = { reserve = 0.1 }, set-position = { damping = 1, tank = 0, ceiling = 0 }, wave = { impedance = 1, on-loss = "hold" }, client-server = { server = "peer2", returns = "object" }, send-when = { velocity = "10%", position = 0.001, heartbeat = "1s" } }
+    coordination = { strategy = "average-position", stiffness = 1, update = "8ms", pull = "sum", smoothed-average-position = {}, extrapolated = {}, local-damping = { age = "1ms" }, local-lag = {}, passivity-control = {}, set-position = {}, wave = {}, client-server = {}, send-when = { velocity = "10%", position = 0.001, heartbeat = "1s" } }
     peer = { device = { mass = 1 }, contact = "none" }
     link = { rate = "1Mbit", queue = { limit = "64kB", discipline = { codel = {} } }, cells = { payload = "48B" } }
     links = [
@@ -77,7 +77,7 @@ pub(super) const SCENES: [&str; 3] = [
     link = { delay = "20ms", jitter = { sd = "2ms", distribution = { table = "data/two-sided.dist" } } }
     links = [{ from = "peer1", to = "peer2", trace = { file = "data/path.csv" } }, { from = "peer2", to = "peer1", trace = { file = "data/line.trace" } }]
     simulation = {}
-    measure = { names = "all", travel = {} }
+    measure = { travel = {} }
     "#,
 ];
 
