@@ -18,7 +18,7 @@ fn linear() -> impl Strategy<Value = Draft> {
     let delays = proptest::collection::vec(0..40_000_u64, 7);
     // A run records no memory of a law, and ages repeat only between equal clocks.
     (drafts::anything_among(2..=3_usize), delays, select(drafts::PAPER)).prop_map(|(mut draft, delays, strategy)| {
-        draft.strategy = strategy;
+        (draft.strategy, draft.send_when) = (strategy, None);
         draft.enclosure = None;
         draft.timeline.clear();
         draft.link = format!("delay = \"{}us\"", delays[0]);

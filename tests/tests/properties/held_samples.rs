@@ -22,7 +22,7 @@ proptest! {
     /// Most packets overtake others.
     #[test]
     fn a_late_packet_never_replaces_a_newer_sample(mut draft in drafts::anything_among(Just(2)), sd in 8..20_u32) {
-        draft.strategy = drafts::PAPER[0];
+        (draft.strategy, draft.send_when) = (drafts::PAPER[0], None);
         draft.link = format!("delay = \"20ms\", jitter = \"{sd}ms\", loss = 0.2");
         (draft.links, draft.update, draft.duration) = (Vec::new(), 2000, 200);
         draft.timeline.retain(|entry| !entry.contains("link = "));

@@ -1,6 +1,7 @@
 //! Space has no origin, and peers have no rank.
 
 use cohaptic_harness::Model;
+use cohaptic_peer::wire::SampleKind;
 use cohaptic_tests::{Draft, Log, Tick, cases, drafts, run};
 use proptest::prelude::*;
 
@@ -32,6 +33,10 @@ proptest! {
     /// packet to the first peer goes first.
     #[test]
     fn three_peers_in_another_order_move_as_before(mut draft in drafts::anything_among(Just(3)), order in Just(vec![0, 1, 2]).prop_shuffle()) {
+        // Energies and waves are added in the order in which they arrive, and a server is one of the peers.
+        if draft.strategy.kind() != SampleKind::State {
+            draft.strategy = drafts::PAPER[0];
+        }
         for peer in &mut draft.peers {
             (peer.uplink, peer.downlink) = (None, None);
         }
