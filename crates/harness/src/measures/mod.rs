@@ -1,5 +1,5 @@
 //! Measures: numbers that sum a run up, computed while it runs, in one pass and constant memory. Sums are taken in the order of ticks, so a measure has the same bits
-//! whatever the [`Model`](crate::Model).
+//! whatever the [`Model`].
 //!
 //! [`Measures`] is an [`Observer`]; a scene without measures has none, and its runs are not watched. Names, units and words stand in [`cohaptic_scene::Measure`]. Each file here is one idea that gives some
 //! of them; a new one is such a file, its line in the list below, and its lines in that registry.
