@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use cohaptic_peer::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
+use cohaptic_peer::wire::{DecodeError, MAX_LEN, Sample, SampleKind};
 
 /// A datagram in the store.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -72,22 +72,16 @@ impl<const A: usize> Datagrams<A> {
         if self.extras.len() <= slot {
             self.extras.resize(slot + 1, Vec::new());
         }
-        let mut bytes = [0; MAX_LEN];
-        let read = |(receiver, numbers): (u32, &[f64; A])| {
-            let len = sample.encode_as(kind, &Extra { receiver: if kind.is_personal() { receiver } else { 0 }, numbers: *numbers }, axes, &mut bytes);
-            Sample::<A>::decode_as(&bytes[..len], kind, axes).map(|(_, extra)| extra.numbers)
-        };
-        let stored = &mut self.extras[slot];
-        stored.clear();
-        let read: Result<(), DecodeError> = (0..).zip(numbers).map(read).try_for_each(|numbers| {
-            stored.push(numbers?);
-            Ok(())
-        });
-        if let Err(error) = read {
+        // Encoded and read again, numbers keep their bits: all that can be refused is one that is not finite.
+        let refused = (0..axes).find(|axis| numbers.iter().any(|numbers| !numbers[*axis].is_finite()));
+        if let Some(axis) = refused {
             self.slot_mut(handle).copies = 1;
             self.release(handle);
-            return Err(error);
+            return Err(DecodeError::NotFinite { axis, quantity: "extra number" });
         }
+        let stored = &mut self.extras[slot];
+        stored.clear();
+        stored.extend_from_slice(numbers);
         Ok((handle, kind.datagram_len(axes)))
     }
 

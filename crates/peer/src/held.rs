@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use cohaptic_units::Instant;
 
 use crate::State;
+use crate::lead::{Lead, Moving};
 
 /// What a peer knows of the others: per sender, the sample with the highest sequence number that has arrived.
 ///
@@ -14,7 +15,7 @@ pub struct Held<const A: usize> {
     samples: Vec<HeldSample<A>>,
     mean: State<A>,
     /// How each sample moves on while it is held, if anybody asks for it.
-    motions: Option<Vec<Extrapolation<A>>>,
+    motions: Option<Motions<A>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -24,19 +25,22 @@ struct HeldSample<const A: usize> {
     next: u64,
 }
 
-/// How a sample moves on while it is held.
-#[derive(Clone, Copy, Debug)]
-struct Extrapolation<const A: usize> {
-    /// When it was sampled, on the sender's clock.
-    sent: Instant,
-    velocity: [f64; A],
+/// How the samples move on while they are held.
+#[derive(Clone, Debug)]
+struct Motions<const A: usize> {
+    /// Up to which age \[s\].
+    horizon: f64,
+    samples: Vec<Moving<A>>,
+    lead: Lead<A>,
+    /// The lead as of the last [`Held::move_on`].
+    now: [f64; A],
 }
 
-/// The age of a sample \[s\]: what the receiver's own clock shows less the send time on the sender's clock, and not below zero.
-#[must_use]
-#[inline]
-pub fn age(now: Instant, sent: Instant) -> f64 {
-    now.saturating_duration_since(sent).as_secs_f64()
+impl<const A: usize> Motions<A> {
+    fn set(&mut self, place: usize, moving: Moving<A>) {
+        self.samples[place] = moving;
+        self.lead = Lead::STALE;
+    }
 }
 
 impl<const A: usize> Held<A> {
@@ -49,10 +53,10 @@ impl<const A: usize> Held<A> {
         held
     }
 
-    /// Keeps send times and velocities for [`Held::lead`] from now on: the samples held so far count as sampled at the instant 0 of their senders' clocks.
-    pub fn keep_ages(&mut self) {
-        let motion = |sample: &HeldSample<A>| Extrapolation { sent: Instant::ZERO, velocity: sample.state.velocity };
-        self.motions = Some(self.samples.iter().map(motion).collect());
+    /// Keeps send times and velocities for [`Held::lead`] from now on, for samples that move on up to an age of `horizon` \[s\]: the samples held so far count as sampled at the instant 0 of their senders' clocks.
+    pub fn keep_ages(&mut self, horizon: f64) {
+        let moving = |sample: &HeldSample<A>| Moving { sent: Instant::ZERO, velocity: sample.state.velocity };
+        self.motions = Some(Motions { horizon, samples: self.samples.iter().map(moving).collect(), lead: Lead::STALE, now: [0.0; A] });
     }
 
     /// How many other peers there are.
@@ -79,23 +83,20 @@ impl<const A: usize> Held<A> {
         &self.mean
     }
 
-    /// By how much the samples held have moved on since they were sent, on average \[m\]: the mean of min(age, `horizon`)·velocity, with ages \[s\] at
-    /// `now` on the holder's own clock. Zero unless [`Held::keep_ages`] was called.
-    ///
-    /// Four partial sums, as in [`Held::refresh`].
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-    pub fn lead(&self, now: Instant, horizon: f64) -> [f64; A] {
-        let mut sums = [[0.0; A]; 4];
-        let Some(motions) = self.motions.as_ref().filter(|motions| !motions.is_empty()) else { return [0.0; A] };
-        for (place, motion) in motions.iter().enumerate() {
-            let age = age(now, motion.sent).min(horizon);
-            for (sum, velocity) in sums[place % 4].iter_mut().zip(motion.velocity) {
-                *sum += age * velocity;
-            }
+    /// The holder's own clock shows `now`: samples have moved on since they were sent.
+    pub fn move_on(&mut self, now: Instant) {
+        let Some(motions) = &mut self.motions else { return };
+        if !motions.lead.holds_at(now) {
+            motions.lead = Lead::of(motions.samples.iter().copied(), now, motions.horizon);
         }
-        let [a, b, c, d] = sums;
-        core::array::from_fn(|axis| ((a[axis] + b[axis]) + (c[axis] + d[axis])) / motions.len() as f64)
+        motions.now = motions.lead.at(now);
+    }
+
+    /// By how much the samples held have moved on since they were sent, on average, as of the last [`Held::move_on`] \[m\]: the mean of
+    /// min(age, horizon)·velocity. Zero unless [`Held::keep_ages`] was called.
+    #[must_use]
+    pub fn lead(&self) -> [f64; A] {
+        self.motions.as_ref().map_or([0.0; A], |motions| motions.now)
     }
 
     /// Takes in a sample that was sent at `sent` on its sender's clock if it is newer than the one held, and says whether it was: a late or repeated sample
@@ -114,7 +115,7 @@ impl<const A: usize> Held<A> {
             // A sequence number of 2^64 − 1 is the last there can be: nothing is newer.
             *held = HeldSample { state, next: sequence.saturating_add(1) };
             if let Some(motions) = &mut self.motions {
-                motions[place] = Extrapolation { sent, velocity: state.velocity };
+                motions.set(place, Moving { sent, velocity: state.velocity });
             }
         }
         newer
@@ -128,7 +129,7 @@ impl<const A: usize> Held<A> {
     pub fn hold(&mut self, place: usize, sent: Instant, state: State<A>) {
         self.samples[place] = HeldSample { state, next: 0 };
         if let Some(motions) = &mut self.motions {
-            motions[place] = Extrapolation { sent, velocity: state.velocity };
+            motions.set(place, Moving { sent, velocity: state.velocity });
         }
     }
 
@@ -136,7 +137,7 @@ impl<const A: usize> Held<A> {
     pub(crate) fn replace_state(&mut self, place: usize, state: State<A>, velocity: [f64; A]) {
         self.samples[place].state = state;
         if let Some(motions) = &mut self.motions {
-            motions[place].velocity = velocity;
+            motions.set(place, Moving { velocity, ..motions.samples[place] });
         }
     }
 
@@ -219,22 +220,25 @@ mod tests {
         assert!(held.accept(0, u64::MAX, Instant::ZERO, at(2.0)));
     }
 
-    /// Ages 30 ms and, beyond the horizon, 25 ms: (0.030·(−1) + 0.025·(−2))/2; none below zero.
+    /// Ages 30 ms and, beyond the horizon, 33 ms: (0.030·(−1) + 0.033·(−2))/2; none below zero.
     #[test]
     fn samples_move_on_up_to_the_horizon() {
         let at_ms = |ms: u64| Instant::from_nanos(ms * 1_000_000);
         let mut held = Held::new([at(0.0), at(0.0)]);
-        assert_eq!(held.lead(at_ms(10), 1.0), [0.0]);
-        held.keep_ages();
+        let lead = |held: &mut Held<1>, ms| {
+            held.move_on(at_ms(ms));
+            held.lead()
+        };
+        assert_eq!(lead(&mut held, 10), [0.0]);
+        held.keep_ages(0.033);
         held.accept(0, 0, at_ms(10), at(1.0));
         held.hold(1, at_ms(5), at(2.0));
-        let expected = (-0.030 + 0.033 * -2.0) / 2.0;
-        assert_eq!(held.lead(at_ms(40), 0.033), [expected]);
-        assert_eq!(held.lead(at_ms(1), 0.033), [0.0]);
+        assert_eq!(lead(&mut held, 40), [-0.048]);
+        assert_eq!(lead(&mut held, 1), [0.0]);
         assert!(!held.accept(0, 0, at_ms(39), at(7.0)));
-        assert_eq!(held.lead(at_ms(40), 0.033), [expected]);
+        assert_eq!(lead(&mut held, 40), [-0.048]);
         held.replace_state(1, at(3.0), [0.0]);
-        assert_eq!(held.lead(at_ms(40), 0.033), [-0.015]);
+        assert_eq!(lead(&mut held, 40), [-0.015]);
     }
 
     #[test]

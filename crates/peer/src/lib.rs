@@ -78,6 +78,7 @@ pub mod coordination;
 mod device;
 mod enclosure;
 mod held;
+mod lead;
 mod motion;
 mod number;
 mod object;
@@ -96,7 +97,8 @@ pub use config::{ArmConfig, Contact, CopyConfig, DeviceConfig, Direction, Gains,
 pub use coordination::{Command, Context, Coordination, Strategy};
 pub use device::{Device, HandForce, RestingDevice, SimulatedDevice};
 pub use enclosure::Enclosure;
-pub use held::{Held, age};
+pub use held::Held;
+pub use lead::{Lead, Moving};
 pub use motion::Motion;
 pub use number::Number;
 pub use object::ObjectCopy;

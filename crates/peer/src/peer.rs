@@ -66,14 +66,16 @@ struct Asked {
     kind: SampleKind,
     role: Role,
     prediction: bool,
-    /// Whether it asks for any of these.
+    horizon: bool,
+    /// Whether it asks for [`Peer::heard`].
     any: bool,
 }
 
 impl Asked {
     fn by<const A: usize>(strategy: &impl Strategy<A>) -> Self {
-        let (kind, role, prediction) = (strategy.kind(), strategy.role(), strategy.needs_prediction());
-        Self { kind, role, prediction, any: kind != SampleKind::State || role != Role::Copy || prediction }
+        let (kind, role, horizon) = (strategy.kind(), strategy.role(), strategy.horizon().is_some());
+        let any = kind != SampleKind::State || role != Role::Copy || horizon;
+        Self { kind, role, prediction: strategy.needs_prediction(), horizon, any }
     }
 }
 
@@ -139,8 +141,8 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     #[must_use]
     pub fn new(config: PeerConfig, device: D, object: ObjectCopy<A>, strategy: S, mut held: Held<A>) -> Self {
         let none = Acting { coupling: [0.0; A], on_object: [0.0; A] };
-        if strategy.needs_ages() {
-            held.keep_ages();
+        if let Some(horizon) = strategy.horizon() {
+            held.keep_ages(horizon);
         }
         let (asked, local_time) = (Asked::by(&strategy), Instant::ZERO);
         Self { config, device, object, strategy, asked, held, stale_mean: false, next_sequence: 0, local_time, computed: none, applied: none }
@@ -275,13 +277,19 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             self.held.refresh();
             self.stale_mean = false;
         }
-        let (heard, ahead) = if self.asked.any { self.exchanged(span) } else { (None, Prediction::REST) };
+        let heard = if self.asked.any { self.heard() } else { None };
         let own = self.object.state();
         let coupling = heard.unwrap_or_else(|| self.coupling_force(own));
+        let walls = self.config.enclosure.as_ref().map(|enclosure| enclosure.force(own));
+        let ahead = if self.asked.prediction {
+            let walls = walls.unwrap_or([0.0; A]);
+            self.object.ahead(span, core::array::from_fn(|axis| coupling[axis] + walls[axis]))
+        } else {
+            Prediction::REST
+        };
         let command = self.strategy.command(&Context { now, local_time: self.local_time, own, held: &self.held, ahead });
         let mut on_object: [f64; A] = core::array::from_fn(|axis| on_object(coupling[axis], command.force[axis]));
-        if let Some(enclosure) = &self.config.enclosure {
-            let walls = enclosure.force(own);
+        if let Some(walls) = walls {
             for axis in 0..A {
                 on_object[axis] += walls[axis];
             }
@@ -414,21 +422,15 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         (self.object.state(), &mut self.held, &mut self.stale_mean)
     }
 
-    /// What strategies ask for that most do not: the coupling force that was heard of, and how the coordination force moves the copy.
-    #[cold]
-    fn exchanged(&mut self, span: Duration) -> (Option<[f64; A]>, Prediction<A>) {
+    /// Brings up to date what some strategies ask for and most do not, and gives the coupling force if it was heard of.
+    fn heard(&mut self) -> Option<[f64; A]> {
+        if self.asked.horizon {
+            self.held.move_on(self.local_time);
+        }
         if let Role::Client { server } = self.asked.role {
             self.object.set_state(*self.held.state(server).expect("the server is another peer"));
         }
-        let heard = self.strategy.heard_coupling();
-        if !self.asked.prediction {
-            return (heard, Prediction::REST);
-        }
-        let own = self.object.state();
-        let coupling = heard.unwrap_or_else(|| self.coupling_force(own));
-        let walls = self.config.enclosure.as_ref().map_or([0.0; A], |enclosure| enclosure.force(own));
-        let force = core::array::from_fn(|axis| coupling[axis] + walls[axis]);
-        (heard, self.object.ahead(span, force))
+        self.strategy.heard_coupling()
     }
 
     #[inline]

@@ -37,7 +37,7 @@ impl SendWhen {
     #[must_use]
     pub fn is_due<const A: usize>(&self, last: Option<&LastSent<A>>, now: Instant, own: &State<A>, horizon: Option<f64>) -> bool {
         let Some(last) = last else { return true };
-        let age = crate::age(now, last.at);
+        let age = now.saturating_duration_since(last.at).as_secs_f64();
         let lead = horizon.map_or(0.0, |horizon| age.min(horizon));
         let sent = &last.state;
         let moved = distance::<A>(core::array::from_fn(|axis| own.position[axis] - (sent.position[axis] + lead * sent.velocity[axis])));

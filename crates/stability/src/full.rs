@@ -150,7 +150,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         if !members.iter().all(|member| matches!(member.kind(), SampleKind::State | SampleKind::Force)) {
             return Err(AnalysisError::NoAnalysis { strategy: scene.coordination.strategy.name() });
         }
-        if members.iter().any(|member| member.strategy().needs_ages()) && !has_equal_clocks(scene) {
+        if members.iter().any(|member| member.strategy().horizon().is_some()) && !has_equal_clocks(scene) {
             return Err(AnalysisError::AgesByClocks { strategy: scene.coordination.strategy.name() });
         }
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));

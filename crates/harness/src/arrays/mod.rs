@@ -9,12 +9,12 @@
 
 mod blocks;
 mod lanes;
-mod lead;
 mod place;
 mod samples;
 mod shape;
 mod side_by_side;
 
+use cohaptic_peer::Lead;
 use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
@@ -38,8 +38,8 @@ pub(crate) struct Arrays<'a, const A: usize, const L: usize> {
     law: BuiltIn<Lanes>,
     blocks: Blocks<A>,
     samples: Samples<A, L>,
-    /// Up to which age samples are extrapolated in each run \[s\], if the law does that.
-    horizons: Option<[f64; L]>,
+    /// Up to which age samples are extrapolated in each run \[s\], and how far they have come by peer and run, if the law does that.
+    leads: Option<([f64; L], Vec<[Lead<A>; L]>)>,
     /// The tick at which each peer sends next.
     next_send: Vec<u64>,
     earliest_send: u64,
@@ -68,7 +68,9 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         Self {
             law: law_of_lanes(&laws),
             blocks: Blocks::new(places, &scenes, &laws[0]),
-            horizons: Law::<f64>::horizon(&laws[0]).is_some().then(|| laws.map(|law| Law::<f64>::horizon(&law).unwrap_or(0.0))),
+            leads: Law::<f64>::horizon(&laws[0])
+                .is_some()
+                .then(|| (laws.map(|law| Law::<f64>::horizon(&law).unwrap_or(0.0)), vec![[Lead::STALE; L]; shape.peers])),
             scenes,
             samples,
             earliest_send: shape.phases.iter().copied().min().unwrap_or(u64::MAX),
@@ -128,8 +130,8 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             Samples::PerPacket(samples) => samples.deliver(tick),
         }
         self.blocks.move_hands(now);
-        if let Some(horizons) = &self.horizons {
-            self.extrapolate(now, *horizons);
+        if self.leads.is_some() {
+            self.extrapolate(now);
         }
         let Moved { discrepancy, finite } = self.motion(law);
         for (largest, discrepancy) in self.max_discrepancy.iter_mut().zip(discrepancy) {
@@ -146,18 +148,28 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         self.processor.dispatch(motion)
     }
 
-    /// Leads of a tick.
+    /// Leads of a tick: what [`cohaptic_peer::Held::move_on`] gives, to the bit.
     #[inline(never)]
-    fn extrapolate(&mut self, now: Instant, horizons: [f64; L]) {
+    fn extrapolate(&mut self, now: Instant) {
         let Shape { tick, send_every, phases, .. } = &self.shape;
         let sent = |sender: usize, sequence: u64| Instant::from_nanos((phases[sender] + sequence * send_every) * nanos(*tick));
-        for peer in 0..self.shape.peers {
+        let Some((horizons, leads)) = &mut self.leads else { return };
+        for (peer, leads) in leads.iter_mut().enumerate() {
+            let values: [[f64; A]; L] = std::array::from_fn(|run| {
+                let lead = &mut leads[run];
+                match &self.samples {
+                    Samples::Broadcast(samples) if samples.has_changed(peer) || !lead.holds_at(now) => {
+                        *lead = Lead::of(samples.moving((peer, run), sent), now, horizons[run]);
+                    }
+                    Samples::PerPacket(samples) if samples.has_changed(peer, run) || !lead.holds_at(now) => {
+                        *lead = Lead::of(samples.moving((peer, run), sent), now, horizons[run]);
+                    }
+                    Samples::Broadcast(_) | Samples::PerPacket(_) => {}
+                }
+                lead.at(now)
+            });
             for axis in 0..A {
-                let lead = std::array::from_fn(|run| match &self.samples {
-                    Samples::Broadcast(samples) => samples.lead((axis, peer, run), now, horizons[run], sent),
-                    Samples::PerPacket(samples) => samples.lead((axis, peer, run), now, horizons[run], sent),
-                });
-                self.blocks.set_lead::<L>(axis, peer, lead);
+                self.blocks.set_lead::<L>(axis, peer, values.map(|value| value[axis]));
             }
         }
     }

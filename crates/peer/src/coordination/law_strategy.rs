@@ -13,7 +13,6 @@ pub struct LawStrategy<const A: usize> {
     coordination: Coordination,
     parameters: LawParameters,
     law: BuiltIn,
-    horizon: Option<f64>,
     /// What the law remembers along each axis, one axis after another.
     memory: Vec<f64>,
     /// The own states of the latest ticks, for a law that looks back: then that is all that it remembers.
@@ -33,7 +32,7 @@ impl<const A: usize> LawStrategy<A> {
         let lag = Law::<f64>::lag(&law);
         debug_assert!(lag == 0 || memory.is_empty(), "a law that looks back remembers nothing else");
         let past = (lag > 0).then(|| Past::new(lag));
-        Self { coordination, parameters, horizon: Law::<f64>::horizon(&law), law, memory, past }
+        Self { coordination, parameters, law, memory, past }
     }
 }
 
@@ -42,7 +41,7 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
     fn command(&mut self, context: &Context<'_, A>) -> Command<A> {
         let mut command = Command { force: [0.0; A], target: State::REST };
         let remembered = self.memory.len() / A;
-        let lead = self.horizon.map_or([0.0; A], |horizon| context.held.lead(context.local_time, horizon));
+        let lead = context.held.lead();
         let past = self.past.as_mut().map_or(*context.own, |past| past.exchange(context.own));
         for (axis, lead) in lead.into_iter().enumerate() {
             let seen = Observation { own: context.own.along(axis), past: past.along(axis), mean: context.held.mean().along(axis), lead };
@@ -52,8 +51,8 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
         command
     }
 
-    fn needs_ages(&self) -> bool {
-        self.horizon.is_some()
+    fn horizon(&self) -> Option<f64> {
+        Law::<f64>::horizon(&self.law)
     }
 
     fn set_gains(&mut self, gains: Gains) {

@@ -91,6 +91,10 @@ impl<const A: usize> Strategy<A> for PassivityControl<A> {
             let wanted = coordinate(&self.gains, own.along(axis).relative_to(mean.along(axis)));
             let available = self.initial[axis] + self.heard[axis] / self.others - self.given[axis];
             let (free, compliance) = (context.ahead.free[axis], context.ahead.compliance);
+            // −F·d = (c·F − d0)·F: most forces stay below what may be given, and need no root.
+            if (compliance * wanted - free) * wanted <= available {
+                return wanted;
+            }
             let root = libm::sqrt((free * free + 4.0 * compliance * available).max(0.0));
             let (least, most) = ((free - root) / (2.0 * compliance), (free + root) / (2.0 * compliance));
             wanted.max(least).min(most)

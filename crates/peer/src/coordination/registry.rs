@@ -138,10 +138,10 @@ macro_rules! registry {
                 }
             }
 
-            fn needs_ages(&self) -> bool {
+            fn horizon(&self) -> Option<f64> {
                 match self {
-                    Self::Law(law) => law.needs_ages(),
-                    $(Self::$controller(controller) => controller.needs_ages(),)+
+                    Self::Law(law) => law.horizon(),
+                    $(Self::$controller(controller) => controller.horizon(),)+
                 }
             }
 

@@ -127,9 +127,9 @@ pub trait Strategy<const A: usize> {
     /// The command at a tick. Called exactly once a tick, after the samples that have arrived were taken in.
     fn command(&mut self, context: &Context<'_, A>) -> Command<A>;
 
-    /// Whether the strategy asks for [`Held::lead`]; asked once, when the peer is made.
-    fn needs_ages(&self) -> bool {
-        false
+    /// Up to which age \[s\] samples move on in [`Held::lead`], for a strategy that asks for it; asked once, when the peer is made.
+    fn horizon(&self) -> Option<f64> {
+        None
     }
 
     /// Whether the strategy asks for [`Context::ahead`]; asked once, when the peer is made.
@@ -187,8 +187,8 @@ impl<const A: usize, S: Strategy<A> + ?Sized> Strategy<A> for Box<S> {
         (**self).command(context)
     }
 
-    fn needs_ages(&self) -> bool {
-        (**self).needs_ages()
+    fn horizon(&self) -> Option<f64> {
+        (**self).horizon()
     }
 
     fn needs_prediction(&self) -> bool {

@@ -22,18 +22,17 @@ fn force(gains: Gains, horizon: Duration, own: Body, others: &[(Body, u64)]) -> 
     let state = |(x, v): Body| State { position: [x], velocity: [v] };
     let mut strategy = strategy(gains, horizon);
     let mut held = Held::new(others.iter().map(|_| State::REST));
-    assert_eq!(strategy.needs_ages(), !horizon.is_zero());
-    if strategy.needs_ages() {
-        held.keep_ages();
+    assert_eq!(strategy.horizon(), (!horizon.is_zero()).then_some(horizon.as_secs_f64()));
+    if let Some(horizon) = strategy.horizon() {
+        held.keep_ages(horizon);
     }
     for (place, (body, age)) in others.iter().enumerate() {
         held.accept(place, 0, Instant::from_nanos((1000 - age) * 1_000_000), state(*body));
     }
     held.refresh();
-    let own = state(own);
-    strategy
-        .command(&Context { now: Instant::ZERO, local_time: Instant::from_nanos(1_000_000_000), own: &own, held: &held, ahead: Prediction::REST })
-        .force[0]
+    let (own, local_time) = (state(own), Instant::from_nanos(1_000_000_000));
+    held.move_on(local_time);
+    strategy.command(&Context { now: Instant::ZERO, local_time, own: &own, held: &held, ahead: Prediction::REST }).force[0]
 }
 
 proptest! {

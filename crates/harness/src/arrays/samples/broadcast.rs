@@ -4,14 +4,13 @@
 
 use std::collections::VecDeque;
 
+use cohaptic_peer::Moving;
 use cohaptic_scene::Scene;
-
 use cohaptic_units::Instant;
 
 use super::quads::{self, Quad};
 use super::{Sample, others};
 use crate::arrays::blocks::Blocks;
-use crate::arrays::lead::mean_lead;
 
 /// The samples in flight, and those held from each sender.
 #[derive(Clone, Debug)]
@@ -24,7 +23,16 @@ pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
     first: Sample<A, L>,
     /// How many samples of each sender have arrived.
     arrived: Vec<u64>,
-    changed: bool,
+    changed: Changed,
+}
+
+/// From whom a sample has arrived since the means were computed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Changed {
+    Nothing,
+    From(usize),
+    /// From several, or nothing was computed yet.
+    More,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +54,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
             held: std::array::from_fn(|_| quads::empty(peers - 1)),
             first: Sample::initial(scenes, 0),
             arrived: vec![0; peers],
-            changed: true,
+            changed: Changed::More,
         };
         for sender in 0..peers {
             broadcast.hold(sender, &Sample::initial(scenes, sender));
@@ -67,7 +75,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
             self.on_the_way.pop_front();
             self.hold(sender, &sample);
             self.arrived[sender] += 1;
-            self.changed = true;
+            self.changed = if self.changed == Changed::Nothing { Changed::From(sender) } else { Changed::More };
         }
     }
 
@@ -84,28 +92,30 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         }
     }
 
-    /// By how much what a peer holds has moved on since it was sent: along an axis, at a receiver, in a run. `sent` says when a sample of a sender was sent.
-    pub(in crate::arrays) fn lead(
-        &self,
-        (axis, peer, run): (usize, usize, usize),
-        now: Instant,
-        horizon: f64,
-        sent: impl Fn(usize, u64) -> Instant,
-    ) -> f64 {
-        let moving = |sender: usize| {
-            let velocity = match sender.checked_sub(1) {
+    /// How what a peer holds in a run moves on, in the order in which the peer holds it. `sent` says when a sample of a sender was sent.
+    pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
+        (0..self.peers).filter(move |sender| *sender != peer).map(move |sender| Moving {
+            sent: self.arrived[sender].checked_sub(1).map_or(Instant::ZERO, |newest| sent(sender, newest)),
+            velocity: std::array::from_fn(|axis| match sender.checked_sub(1) {
                 Some(place) => quads::velocity(&self.held[axis], place, run),
                 None => self.first.velocity[axis][run],
-            };
-            (self.arrived[sender].checked_sub(1).map_or(Instant::ZERO, |newest| sent(sender, newest)), velocity)
-        };
-        mean_lead((0..self.peers).filter(|sender| *sender != peer).map(moving), now, horizon, others(self.peers))
+            }),
+        })
+    }
+
+    /// Whether anything that a peer holds has changed since the means were computed.
+    pub(in crate::arrays) fn has_changed(&self, peer: usize) -> bool {
+        match self.changed {
+            Changed::Nothing => false,
+            Changed::From(sender) => sender != peer,
+            Changed::More => true,
+        }
     }
 
     /// The means are those of the samples held.
     #[inline(always)]
     pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks<A>) {
-        if !std::mem::take(&mut self.changed) {
+        if std::mem::replace(&mut self.changed, Changed::Nothing) == Changed::Nothing {
             return;
         }
         let count = others(self.peers);

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use cohaptic_peer::Moving;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkName, LinkStats};
@@ -12,7 +13,6 @@ use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkName, LinkStats};
 use super::quads::{self, Quad};
 use super::{Sample, others};
 use crate::arrays::blocks::Blocks;
-use crate::arrays::lead::mean_lead;
 
 /// Ticks ahead that lie in the wheel; what arrives later than that is kept aside.
 const HORIZON: u64 = 256;
@@ -40,7 +40,8 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     held: [Vec<Quad<L>>; A],
     /// By place, then run: the lowest sequence number that is newer than the sample held.
     next: Vec<u64>,
-    changed: Vec<bool>,
+    /// By receiver: bit r says whether a sample has arrived in run r since the means were computed.
+    changed: Vec<u8>,
     /// By receiver, then run: samples that arrived after a newer one.
     stale: Vec<u64>,
 }
@@ -126,7 +127,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             emptied: Vec::new(),
             held: std::array::from_fn(|_| (0..peers).flat_map(|_| quads::empty(peers - 1)).collect()),
             next: vec![0; peers * row * L],
-            changed: vec![true; peers],
+            changed: vec![u8::MAX; peers],
             stale: vec![0; peers * L],
         };
         for sender in 0..peers {
@@ -182,21 +183,22 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         self.take_in(tick, Instant::MAX);
     }
 
-    /// By how much what a peer holds has moved on since it was sent: along an axis, at a receiver, in a run. `sent` says when a sample of a sender was sent.
-    pub(in crate::arrays) fn lead(
-        &self,
-        (axis, peer, run): (usize, usize, usize),
-        now: Instant,
-        horizon: f64,
-        sent: impl Fn(usize, u64) -> Instant,
-    ) -> f64 {
+    /// How what a peer holds in a run moves on, in the order in which the peer holds it. `sent` says when a sample of a sender was sent.
+    pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
         let first = peer * row_of(self.peers);
-        let moving = |place: usize| {
+        (0..self.peers - 1).map(move |place| {
             let sender = place + usize::from(place >= peer);
             let newest = self.next[(first + place) * L + run].checked_sub(1);
-            (newest.map_or(Instant::ZERO, |newest| sent(sender, newest)), quads::velocity(&self.held[axis], first + place, run))
-        };
-        mean_lead((0..self.peers - 1).map(moving), now, horizon, others(self.peers))
+            Moving {
+                sent: newest.map_or(Instant::ZERO, |newest| sent(sender, newest)),
+                velocity: std::array::from_fn(|axis| quads::velocity(&self.held[axis], first + place, run)),
+            }
+        })
+    }
+
+    /// Whether anything that a peer holds in a run has changed since the means were computed.
+    pub(in crate::arrays) fn has_changed(&self, peer: usize, run: usize) -> bool {
+        self.changed[peer] & (1 << run) != 0
     }
 
     /// The means are those of the samples held.
@@ -204,7 +206,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks<A>) {
         let count = others(self.peers);
         for peer in 0..self.peers {
-            if !std::mem::take(&mut self.changed[peer]) {
+            if std::mem::take(&mut self.changed[peer]) == 0 {
                 continue;
             }
             let quads = row_of(self.peers) / 4;
@@ -264,7 +266,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         for axis in 0..A {
             quads::set(&mut self.held[axis], place, run, packet.position[axis], packet.velocity[axis]);
         }
-        self.changed[usize::from(packet.receiver)] = true;
+        self.changed[usize::from(packet.receiver)] |= 1 << packet.run;
     }
 
     /// A run ends before the end of the scene: samples still in flight in it never arrive.
