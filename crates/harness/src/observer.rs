@@ -191,6 +191,8 @@ pub struct StepRow<'a> {
     pub held_force: &'a [f64],
     /// F \[N\], the held part of the coordination force as it is applied, which acts on the copy with the opposite sign: all of FT but the damping of the strategy.
     pub coordination_force: &'a [f64],
+    /// β, by how much the strategy damps the copy over the step [N·s/m].
+    pub own_damping: f64,
 }
 
 /// An instant at which at least one peer has ticked.

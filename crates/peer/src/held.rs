@@ -59,6 +59,13 @@ impl<const A: usize> Held<A> {
         self.motions = Some(Motions { horizon, samples: self.samples.iter().map(moving).collect(), lead: Lead::STALE, now: [0.0; A] });
     }
 
+    /// Samples move on up to an age of `horizon` \[s\] from now on, if [`Held::keep_ages`] was called.
+    pub(crate) fn set_horizon(&mut self, horizon: f64) {
+        if let Some(motions) = self.motions.as_mut().filter(|motions| motions.horizon.to_bits() != horizon.to_bits()) {
+            (motions.horizon, motions.lead) = (horizon, Lead::STALE);
+        }
+    }
+
     /// How many other peers there are.
     #[must_use]
     pub fn len(&self) -> usize {

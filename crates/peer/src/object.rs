@@ -40,6 +40,11 @@ impl<const A: usize> ObjectCopy<A> {
         self.state = state;
     }
 
+    /// Another damping towards ground [N·s/m], from the next step on.
+    pub(crate) fn set_damping(&mut self, damping: f64) {
+        self.stepper.set_damping(damping);
+    }
+
     /// How a force F that is subtracted from `force` moves it over `span`.
     pub(crate) fn ahead(&self, span: Duration, force: [f64; A]) -> Prediction<A> {
         let ([[_, by_velocity], _], [compliance, _]) = self.stepper.map(span).coefficients();

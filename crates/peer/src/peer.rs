@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
-use crate::coordination::{Prediction, Role};
+use crate::coordination::{LawValues, Prediction, Role};
 use crate::tick::on_object;
 use crate::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
 use crate::{Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
@@ -396,6 +396,25 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// The strategy, to change its gains.
     pub const fn strategy_mut(&mut self) -> &mut S {
         &mut self.strategy
+    }
+
+    /// New values of the parameters that the strategy has of its own, from the next tick on, with β as it is then [N·s/m] and the damping of the copy with β
+    /// in it. Send times of samples are kept for a strategy that had a horizon when the peer was made.
+    pub fn set_parameters(&mut self, own: &LawValues, own_damping: f64, damping: f64) {
+        self.strategy.set_parameters(own);
+        if let Some(horizon) = self.strategy.horizon() {
+            self.held.set_horizon(horizon);
+        }
+        if own_damping.to_bits() != self.config.own_damping.to_bits() {
+            self.config.own_damping = own_damping;
+            self.object.set_damping(damping);
+        }
+    }
+
+    /// β, by how much the strategy damps the copy [N·s/m].
+    #[must_use]
+    pub const fn own_damping(&self) -> f64 {
+        self.config.own_damping
     }
 
     /// How the device touches the copy.

@@ -22,6 +22,15 @@ impl Stepper {
         Self { plant, integrator, short, long, free: short.1.is_free() && long.1.is_free() }
     }
 
+    /// Another damping towards ground [N·s/m], from the next step on.
+    pub(crate) fn set_damping(&mut self, damping: f64) {
+        self.plant.damping = damping;
+        for (span, map) in [&mut self.short, &mut self.long] {
+            *map = self.plant.step(*span, self.integrator);
+        }
+        self.free = self.short.1.is_free() && self.long.1.is_free();
+    }
+
     /// The map of a step of that length.
     #[inline(always)]
     pub(crate) fn map(&self, span: Duration) -> StepMap {

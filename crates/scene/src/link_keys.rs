@@ -146,7 +146,11 @@ mod tests {
                     assert_eq!(links.len(), 1);
                     assert_eq!(links[&(link.from, link.to)].model(Path::new("")).unwrap(), *link.config);
                 }
-                crate::ChangeKind::Contact { .. } | crate::ChangeKind::Hand { .. } | crate::ChangeKind::Coordination(_) => panic!("{change:?}"),
+                crate::ChangeKind::Contact { .. }
+                | crate::ChangeKind::Hand { .. }
+                | crate::ChangeKind::Coordination(_)
+                | crate::ChangeKind::Parameters(_)
+                | crate::ChangeKind::SendWhen(_) => panic!("{change:?}"),
             }
         }
     }

@@ -340,6 +340,10 @@ pub enum ChangeKind {
     },
     /// The coordination gains change, at every peer. As written, before scaling.
     Coordination(Gains),
+    /// Parameters that strategies have of their own change, at every peer: those of all strategies, from now on.
+    Parameters(Box<LawSettings>),
+    /// Which samples are sent changes, at every peer.
+    SendWhen(SendWhen),
 }
 
 /// What must come out of a run for `cohaptic check` to pass. Absent entries are not looked at.

@@ -62,7 +62,7 @@ impl Scene {
         let clock = self.peers[0].clock;
         let is_link_change = |what: &ChangeKind| matches!(what, ChangeKind::Link(_) | ChangeKind::AllLinks(_));
         // A sample that is not sent leaves the one before it in use.
-        let thinned = self.coordination.send_when.is_some();
+        let thinned = self.leaves_out_samples();
         let differs = self.peers.iter().any(|peer| peer.clock != clock);
         (!thinned && !differs && !self.timeline.iter().any(|change| is_link_change(&change.what))).then_some(clock)
     }

@@ -120,8 +120,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         on_links(Instant::ZERO, LinkSelector::All, links);
     }
     let timeline_node = root.get("timeline");
-    let gains = coordination.as_ref().map(|coordination| coordination.gains);
-    let timeline = read_timeline(timeline_node, duration, links.as_ref(), peers.as_deref(), gains, on_links, context);
+    let timeline = read_timeline(timeline_node, duration, links.as_ref(), peers.as_deref(), coordination.as_ref(), on_links, context);
     let of = Measured { peers: peers.as_deref(), timeline: timeline.as_deref() };
     let measure = match root.get("measure") {
         Some(node) => read_measure(node, of, context).map(Some),
@@ -152,8 +151,12 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         measure: measure?,
         expect: expect?,
     };
-    if let Some(refused) = scene.refused_automatic().or_else(|| scene.refused_lag()).map(str::to_owned).or_else(|| scene.refused_strategy()) {
-        file.fault_at(coordination_node.unwrap_or(document), refused);
+    let refused = match scene.refused_coordination() {
+        None => scene.refused_changes().map(|refused| (timeline_node, refused)),
+        Some(refused) => Some((coordination_node, refused)),
+    };
+    if let Some((node, refused)) = refused {
+        file.fault_at(node.unwrap_or(document), refused);
         return None;
     }
     Some(scene)

@@ -1,10 +1,10 @@
 //! Which strategy each peer runs: the scene's, or one of the caller's own.
 
-use cohaptic_peer::coordination::{BuiltIn, BuiltInStrategy, LawParameters, SessionParameters};
+use cohaptic_peer::coordination::{BuiltIn, BuiltInStrategy, LawParameters, LawSettings, SessionParameters};
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Coordination, Strategy};
 
-use crate::{CoordinationSpec, Scene};
+use crate::{ChangeKind, CoordinationSpec, Scene};
 
 /// Makes the coordination strategy of each peer, for as many axes as are simulated.
 ///
@@ -71,6 +71,17 @@ impl Scene {
     #[must_use]
     pub const fn sample_kind(&self) -> SampleKind {
         self.coordination.strategy.kind()
+    }
+
+    /// The scene with these parameters of strategies.
+    #[must_use]
+    pub fn with_parameters(&self, settings: &LawSettings) -> Self {
+        Self { coordination: CoordinationSpec { settings: *settings, ..self.coordination }, ..self.clone() }
+    }
+
+    /// Whether there are dead bands, at the beginning or later.
+    pub(crate) fn leaves_out_samples(&self) -> bool {
+        self.coordination.send_when.is_some() || self.timeline.iter().any(|change| matches!(change.what, ChangeKind::SendWhen(_)))
     }
 
     /// How many of its ticks are between two samples of a peer.

@@ -1,17 +1,47 @@
 //! What strategies cannot have, and why.
 
+use cohaptic_peer::coordination::Law;
 use cohaptic_peer::{Coordination, Drift, Integrator};
 
 use crate::{ChangeKind, Scene};
 
 impl Scene {
+    /// Why the coordination cannot be as it is at the beginning; `None` if it can.
+    pub(crate) fn refused_coordination(&self) -> Option<String> {
+        self.refused_automatic().or_else(|| self.refused_lag()).map(str::to_owned).or_else(|| self.refused_strategy())
+    }
+
+    /// Why the timeline cannot change parameters of the strategy as it does; `None` if it can.
+    pub(crate) fn refused_changes(&self) -> Option<String> {
+        let settings = self.timeline.iter().filter_map(|change| match &change.what {
+            ChangeKind::Parameters(settings) => Some(settings),
+            ChangeKind::Link(_)
+            | ChangeKind::AllLinks(_)
+            | ChangeKind::Contact { .. }
+            | ChangeKind::Hand { .. }
+            | ChangeKind::Coordination(_)
+            | ChangeKind::SendWhen(_) => None,
+        });
+        let keeps_ages = |scene: &Self| scene.law(0).is_some_and(|law| Law::<f64>::horizon(&law).is_some());
+        let refused = |scene: Self| {
+            let begins = keeps_ages(&scene) != keeps_ages(self);
+            scene.refused_coordination().or_else(|| {
+                begins.then(|| {
+                    "send times of samples are kept from the beginning or not at all: expected horizons that are all above zero, or all zero"
+                        .to_owned()
+                })
+            })
+        };
+        settings.map(|settings| self.with_parameters(settings)).find_map(refused)
+    }
+
     /// Why the strategy cannot work in this scene; `None` if it can.
     pub(crate) fn refused_strategy(&self) -> Option<String> {
         let strategy = self.coordination.strategy;
         let (predicts, exchanges_waves, modulates) =
             (strategy == Coordination::PassivityControl, strategy == Coordination::Wave, strategy == Coordination::SetPosition);
         let refuse = |why: &str| Some(format!("the strategy {} {why}", strategy.name()));
-        if self.coordination.send_when.is_some() && (exchanges_waves || strategy == Coordination::ClientServer) {
+        if self.leaves_out_samples() && (exchanges_waves || strategy == Coordination::ClientServer) {
             return refuse("needs every sample: expected no send-when");
         }
         if (predicts || exchanges_waves || modulates) && self.peers.iter().any(|peer| peer.compute_delay) {

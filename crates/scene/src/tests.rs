@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::time::Duration;
 
-use cohaptic_peer::Contact;
 use cohaptic_peer::coordination::Law;
+use cohaptic_peer::{Contact, Coordination};
 
-use crate::{Scene, SceneError};
+use crate::{Change, ChangeKind, Scene, SceneError};
 
 /// A scene to which faults are done. Its lines are numbered so that the tables below can be read.
 const SCENE: &str = r#"[scene]
@@ -312,9 +312,25 @@ fn a_strategy_that_cannot_work_in_a_scene_is_refused() {
     refused("wave", &["peer.clock.drift=\"5ppm\""], "sends waves for as long as it takes");
     refused("set-position", &["coordination.stiffness=0"], "has no set-position without a spring");
     refused("set-position", &["timeline=[{at=\"1ms\",coordination={stiffness=5}}]"], "keeps energy in its springs");
+    refused("wave", &["timeline=[{at=\"1ms\",coordination={send-when={position=1}}}]"], "needs every sample");
     for strategy in ["wave", "client-server"] {
         refused(strategy, &["coordination.send-when.velocity=\"10%\""], "needs every sample");
     }
+}
+
+#[test]
+fn parameters_change_with_the_timeline_as_far_as_the_strategy_can_follow() {
+    let change = |parameters: &str| format!("[[timeline]]\nat = \"1s\"\ncoordination = {{ {parameters} }}\n");
+    let text = |strategy: &str, parameters: &str| format!("{}{}", SCENE.replace("average-position", strategy), change(parameters));
+    let scene = parse(&text("extrapolated", "stiffness = 5, extrapolated = { horizon = \"20ms\" }"), &[]).unwrap();
+    let [Change { what: ChangeKind::Coordination(gains), .. }, Change { what: ChangeKind::Parameters(settings), .. }] = &*scene.timeline else {
+        panic!("{:?}", scene.timeline)
+    };
+    assert_eq!(gains.stiffness, 5.0);
+    assert_eq!(settings.of(Coordination::Extrapolated).duration(0), Duration::from_millis(20));
+    let started = "18:1: timeline: send times of samples are kept from the beginning or not at all";
+    check(&text("extrapolated", "extrapolated = { horizon = \"0s\" }"), started);
+    check(&text("local-lag", "local-lag = { lag = \"11s\" }"), "18:1: timeline: the lag is more than 10000 ticks of a peer");
 }
 
 #[test]
@@ -440,7 +456,19 @@ fn a_change_that_cannot_happen_is_refused() {
             "[[timeline]]\nat = \"8s\"\ncoordination = { stiffness = 1 }",
             "19:6: timeline.0.at: 8s is after the end of the scene: expected at most scene.duration, 7s",
         ),
-        ("[[timeline]]\nat = \"1s\"\ncoordination = {}", "20:16: timeline.0.coordination: nothing changes: expected stiffness, damping or both"),
+        (
+            "[[timeline]]\nat = \"1s\"\ncoordination = {}",
+            "20:16: timeline.0.coordination: nothing changes: expected stiffness, damping, send-when, or a table",
+        ),
+        (
+            "[[timeline]]\nat = \"1s\"\ncoordination = { local-lag = { lag = \"auto\" } }",
+            "20:38: timeline.0.coordination.local-lag.lag: \"auto\" is computed once",
+        ),
+        (
+            "[[timeline]]\nat = \"1s\"\ncoordination = { set-position = { tank = 1 } }",
+            "20:35: timeline.0.coordination.set-position.tank: unknown key: expected one of damping, ceiling",
+        ),
+        ("[[timeline]]\nat = \"1s\"\ncoordination = { wave = { impedance = 1 } }", "20:18: timeline.0.coordination.wave: unknown key"),
         ("[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = {}", "21:7: timeline.0.set: nothing changes"),
         ("[[timeline]]\nat = \"1s\"\nlink = \"some\"\nset = { loss = 0 }", "20:8: timeline.0.link: unknown links \"some\": expected \"all\" or"),
         ("[[timeline]]\nat = \"1s\"\nlink = \"all\"\npeer = \"left\"\nset = { loss = 0 }", "21:1: timeline.0.peer: \"link\" is given already"),

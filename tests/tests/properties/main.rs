@@ -13,6 +13,7 @@ mod local_damping;
 mod local_lag;
 mod measures;
 mod own_strategies;
+mod parameter_changes;
 mod replay;
 mod symmetry;
 

@@ -31,28 +31,28 @@ pub(super) struct Energy {
 #[derive(Clone, Debug)]
 struct PeerEnergy {
     mass: f64,
-    /// β/(bO + β).
-    share: f64,
+    /// bO [N·s/m].
+    damping: f64,
     /// `None` before its first step: a peer in another process never makes one.
     injected: Option<f64>,
 }
 
 impl PeerEnergy {
     fn new(scene: &Scene, place: usize) -> Self {
-        let (copy, own) = (scene.copy_config(place), scene.peer_config(place).own_damping);
-        Self { mass: copy.mass, share: if own > 0.0 { own / copy.damping } else { 0.0 }, injected: None }
+        Self { mass: scene.copy_config(place).mass, damping: scene.object.damping, injected: None }
     }
 
     /// What the coordination injects into the copy in a step \[J\].
     #[inline]
     fn of_step(&self, row: &StepRow<'_>) -> f64 {
         let mut energy = 0.0;
+        let share = if row.own_damping > 0.0 { row.own_damping / (self.damping + row.own_damping) } else { 0.0 };
         for axis in 0..row.held_force.len() {
             let moved = row.after.position[axis] - row.before.position[axis];
             energy -= row.coordination_force[axis] * moved;
-            if self.share > 0.0 {
+            if share > 0.0 {
                 let (before, after) = (row.before.velocity[axis], row.after.velocity[axis]);
-                energy -= self.share * (row.held_force[axis] * moved - 0.5 * self.mass * (after * after - before * before));
+                energy -= share * (row.held_force[axis] * moved - 0.5 * self.mass * (after * after - before * before));
             }
         }
         energy

@@ -5,7 +5,7 @@ mod remote;
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::{Law, Role};
+use cohaptic_peer::coordination::{LawValues, Role};
 use cohaptic_peer::wire::{Extra, SampleKind};
 use cohaptic_peer::{Clock, Contact, Device, Held, LastSent, ObjectCopy, Peer, Reception, RestingDevice, SendWhen, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Change, ChangeKind, Scene};
@@ -31,13 +31,17 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     datagrams: Datagrams<A>,
     /// What samples carry beyond the state.
     kind: SampleKind,
-    /// Which samples are sent, if not all, and up to which age receivers extrapolate them.
-    send_when: Option<(SendWhen, Option<f64>)>,
+    /// Which samples are sent, if not all.
+    send_when: Option<SendWhen>,
+    /// Up to which age receivers extrapolate samples \[s\], if they do.
+    horizon: Option<f64>,
     /// The extra numbers of the sample that is sent.
     numbers: Vec<[f64; A]>,
     schedule: Schedule,
     /// The changes to come, the next one last.
     changes: Vec<Change>,
+    /// What these changes of parameters are, the next one last.
+    parameters: Vec<ParameterChange>,
     coordination_factor: f64,
     end: Instant,
     now: Instant,
@@ -50,6 +54,24 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     /// In lockstep, the next tick at which anybody sends.
     earliest_send: u64,
     remote: E,
+}
+
+/// New values of the parameters that the strategy has of its own.
+struct ParameterChange {
+    own: LawValues,
+    /// For each peer β, and the damping of its copy with it [N·s/m].
+    damping: Vec<(f64, f64)>,
+}
+
+/// The changes of parameters in the timeline, the first one last.
+fn parameter_changes(scene: &Scene) -> Vec<ParameterChange> {
+    let change = |change: &Change| {
+        let ChangeKind::Parameters(settings) = &change.what else { return None };
+        let then = scene.with_parameters(settings);
+        let damping = (0..then.peers.len()).map(|place| (then.own_damping(place), then.copy_config(place).damping)).collect();
+        Some(ParameterChange { own: *settings.of(scene.coordination.strategy), damping })
+    };
+    scene.timeline.iter().rev().filter_map(change).collect()
 }
 
 /// A peer with its clock.
@@ -120,7 +142,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             names: scene.peers.iter().map(|peer| peer.name.clone()).collect(),
             latest: members.iter().map(|member| member.peer.object().state().position).collect(),
             kind: members[0].peer.kind(),
-            send_when: scene.coordination.send_when.map(|when| (when, scene.law(0).and_then(|law| Law::<f64>::horizon(&law)))),
+            send_when: scene.coordination.send_when,
+            horizon: members[0].peer.strategy().horizon(),
+            parameters: parameter_changes(scene),
             members,
             network: network(scene, plan),
             datagrams: Datagrams::default(),
@@ -229,6 +253,14 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
                     DeviceModel::Unsimulated(_) => {}
                 },
+                ChangeKind::SendWhen(when) => self.send_when = Some(when),
+                ChangeKind::Parameters(_) => {
+                    let ParameterChange { own, damping } = self.parameters.pop().expect("there is one for each of these changes");
+                    for (member, (own_damping, damping)) in self.members.iter_mut().zip(damping) {
+                        member.peer.set_parameters(&own, own_damping, damping);
+                    }
+                    self.horizon = self.members[0].peer.strategy().horizon();
+                }
                 ChangeKind::Coordination(gains) => {
                     for member in &mut self.members {
                         member.peer.strategy_mut().set_gains(gains.scaled(self.coordination_factor));
@@ -256,9 +288,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             }
             member.next_send += member.send_every;
             let local_time = member.clock.local_time(member.tick);
-            if let Some((when, horizon)) = &self.send_when {
+            if let Some(when) = &self.send_when {
                 let own = member.peer.object().state();
-                if !when.is_due(member.last_sent.as_ref(), local_time, own, *horizon) {
+                if !when.is_due(member.last_sent.as_ref(), local_time, own, self.horizon) {
                     continue;
                 }
                 member.last_sent = Some(LastSent { at: local_time, state: *own });
@@ -512,6 +544,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
             after: row(&after, axes),
             held_force: &acting.on_object[..axes],
             coordination_force: &coordination[..axes],
+            own_damping: self.peer.own_damping(),
         })
     }
 

@@ -37,8 +37,20 @@ impl<const A: usize> ControllerKind<A> for ClientServer<A> {
     const GAINS: UsedGains = UsedGains::Neither;
     const KIND: SampleKind = SampleKind::Force;
     const PARAMETERS: &[LawParameter] = &[
-        LawParameter { key: "server", form: LawForm::Peer, default: "", about: "The peer that has the object; the first if there is no such key" },
-        LawParameter { key: "returns", form: LawForm::Words(RETURNS), default: "\"force\"", about: "What the server sends to its clients" },
+        LawParameter {
+            key: "server",
+            form: LawForm::Peer,
+            default: "",
+            about: "The peer that has the object; the first if there is no such key",
+            can_change: false,
+        },
+        LawParameter {
+            key: "returns",
+            form: LawForm::Words(RETURNS),
+            default: "\"force\"",
+            about: "What the server sends to its clients",
+            can_change: false,
+        },
     ];
 
     fn new(session: &SessionParameters<A>) -> Self {

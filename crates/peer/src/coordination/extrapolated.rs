@@ -22,6 +22,7 @@ impl LawKind for Extrapolated {
         form: LawForm::Duration,
         default: "\"100ms\"",
         about: "Up to which age samples are extrapolated; 0 for average-position itself",
+        can_change: true,
     }];
 
     fn new(parameters: &LawParameters) -> Self {

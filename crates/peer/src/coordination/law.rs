@@ -139,6 +139,8 @@ pub struct LawParameter {
     pub default: &'static str,
     /// What it means, without the last full stop.
     pub about: &'static str,
+    /// Whether the timeline of a scene may change it; a parameter that only says how a run begins, or what its samples mean, cannot change.
+    pub can_change: bool,
 }
 
 /// What values a parameter of a law has.

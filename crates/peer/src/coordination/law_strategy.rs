@@ -4,7 +4,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::past::Past;
-use super::{BuiltIn, Command, Context, Coordination, Law, LawParameters, Observation, Strategy};
+use super::{BuiltIn, Command, Context, Coordination, Law, LawParameters, LawValues, Observation, Strategy};
 use crate::{Gains, State};
 
 /// A law of the registry with what it remembers.
@@ -58,6 +58,15 @@ impl<const A: usize> Strategy<A> for LawStrategy<A> {
     fn set_gains(&mut self, gains: Gains) {
         self.parameters.gains = gains;
         self.law = self.coordination.law(&self.parameters).expect("it was a law when the strategy was made");
+    }
+
+    fn set_parameters(&mut self, own: &LawValues) {
+        self.parameters.own = *own;
+        self.set_gains(self.parameters.gains);
+        match (&mut self.past, Law::<f64>::lag(&self.law)) {
+            (Some(past), lag @ 1..) => past.set_lag(lag),
+            (past, lag) => *past = (lag > 0).then(|| Past::new(lag)),
+        }
     }
 
     fn memory(&self) -> &[f64] {

@@ -25,12 +25,14 @@ impl LawKind for LocalDamping {
             form: LawForm::AutomaticDamping,
             default: "\"auto\"",
             about: "Damping of each copy towards ground, β; auto for K_T times the age of the oldest sample in use and a tick",
+            can_change: true,
         },
         LawParameter {
             key: "age",
             form: LawForm::AutomaticDuration,
             default: "\"auto\"",
             about: "The age of the oldest sample in use, for a damping of auto; auto where all links have constant delays, with patterns of lost packets or none",
+            can_change: false,
         },
     ];
 

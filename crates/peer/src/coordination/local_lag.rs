@@ -23,6 +23,7 @@ impl LawKind for LocalLag {
         form: LawForm::AutomaticDuration,
         default: "\"auto\"",
         about: "Age of the own state that is compared, in whole ticks, rounded up; auto for the middle age of samples, where all links have one constant delay; 0 for average-position itself",
+        can_change: true,
     }];
 
     fn new(parameters: &LawParameters) -> Self {

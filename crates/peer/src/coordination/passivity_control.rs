@@ -10,7 +10,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::session::{ControllerKind, SessionParameters, hear_energy};
-use super::{Command, Context, LawForm, LawParameter, Strategy};
+use super::{Command, Context, LawForm, LawParameter, LawValues, Strategy};
 use crate::tick::coordinate;
 use crate::wire::SampleKind;
 use crate::{Gains, Held, State};
@@ -22,7 +22,9 @@ pub struct PassivityControl<const A: usize> {
     gains: Gains,
     /// N − 1.
     others: f64,
-    /// E0 \[J\].
+    /// The reserve of each axis \[J\].
+    reserve: f64,
+    /// E0 with the reserve \[J\].
     initial: [f64; A],
     /// Ein \[J\].
     taken: [f64; A],
@@ -43,6 +45,7 @@ impl<const A: usize> ControllerKind<A> for PassivityControl<A> {
         form: LawForm::Energy,
         default: "0",
         about: "Energy that each peer may give on each axis beyond what the springs between the copies hold at the beginning",
+        can_change: true,
     }];
 
     fn new(session: &SessionParameters<A>) -> Self {
@@ -57,6 +60,7 @@ impl<const A: usize> ControllerKind<A> for PassivityControl<A> {
         Self {
             gains,
             others,
+            reserve,
             initial: core::array::from_fn(|axis| springs(axis) + reserve),
             taken: [0.0; A],
             given: [0.0; A],
@@ -124,5 +128,10 @@ impl<const A: usize> Strategy<A> for PassivityControl<A> {
 
     fn set_gains(&mut self, gains: Gains) {
         self.gains = gains;
+    }
+    /// A reserve that has grown can be given from now on; one that has shrunk is missed.
+    fn set_parameters(&mut self, own: &LawValues) {
+        let more = own.number(0) - core::mem::replace(&mut self.reserve, own.number(0));
+        self.initial = self.initial.map(|initial| initial + more);
     }
 }

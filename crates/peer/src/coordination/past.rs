@@ -25,6 +25,20 @@ impl<const A: usize> Past<A> {
         Self { numbers: vec![0.0; 4 * A * lag], lag, oldest: 0, is_known: false }
     }
 
+    /// Room for the states of that number of ticks, at least one, from now on. The latest states stay; where more are asked for than are known, the copy was
+    /// before the oldest as at the oldest.
+    pub(super) fn set_lag(&mut self, lag: usize) {
+        if lag == self.lag {
+            return;
+        }
+        let known = self.is_known.then(|| self.numbers().to_vec());
+        *self = Self::new(lag);
+        let Some(known) = known else { return };
+        let (oldest, count) = (&known[..2 * A], known.len() / (2 * A));
+        let missing = oldest.repeat(lag.saturating_sub(count));
+        self.set_numbers(&[&missing, &known[2 * A * count.saturating_sub(lag)..]].concat());
+    }
+
     /// Gives the oldest state, and remembers the present one. Before the first tick the copy was as at the first.
     pub(super) fn exchange(&mut self, now: &State<A>) -> State<A> {
         if !self.is_known {
@@ -91,6 +105,22 @@ mod tests {
                 assert_eq!(past.numbers(), window);
             }
         }
+    }
+
+    /// A window that was longer or shorter before gives back what one of its length from the beginning does, as far as it has seen.
+    #[test]
+    fn a_lag_that_changes_keeps_the_latest_states() {
+        for (before, after) in [(3_u32, 7_u32), (7, 3), (4, 4), (1, 5), (5, 1)] {
+            let mut past = Past::new(before as usize);
+            (10..30).for_each(|tick| _ = past.exchange(&state(tick)));
+            past.set_lag(after as usize);
+            for tick in 30..50 {
+                assert_eq!(past.exchange(&state(tick)), state((tick - after).max(30 - before)), "{before} to {after} at {tick}");
+            }
+        }
+        let mut unknown = Past::new(2);
+        unknown.set_lag(3);
+        assert_eq!(unknown.exchange(&state(5)), state(5));
     }
 
     #[test]

@@ -208,6 +208,13 @@ macro_rules! registry {
                 }
             }
 
+            fn set_parameters(&mut self, own: &LawValues) {
+                match self {
+                    Self::Law(law) => law.set_parameters(own),
+                    $(Self::$controller(controller) => controller.set_parameters(own),)+
+                }
+            }
+
             fn memory(&self) -> &[f64] {
                 match self {
                     Self::Law(law) => law.memory(),

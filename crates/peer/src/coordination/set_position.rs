@@ -9,7 +9,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::session::{ControllerKind, SessionParameters, hear_energy};
-use super::{Command, Context, LawForm, LawParameter, LawParameters, Strategy, UsedGains};
+use super::{Command, Context, LawForm, LawParameter, LawParameters, LawValues, Strategy, UsedGains};
 use crate::wire::SampleKind;
 use crate::{Gains, Held, State};
 
@@ -18,8 +18,11 @@ use crate::{Gains, Held, State};
 pub struct SetPosition<const A: usize> {
     /// KT.
     stiffness: f64,
-    /// β/h − KT/2 [N/m].
+    /// h \[s\].
+    period: f64,
+    /// β/h − KT/2 [N/m] in the tick just over and in the one that comes.
     gain: f64,
+    next_gain: f64,
     /// N − 1.
     others: f64,
     /// The most that a tank holds \[J\].
@@ -48,13 +51,21 @@ impl<const A: usize> ControllerKind<A> for SetPosition<A> {
             form: LawForm::Damping,
             default: "10",
             about: "Damping of each copy towards ground, beta, which fills the tank",
+            can_change: true,
         },
-        LawParameter { key: "tank", form: LawForm::Energy, default: "0.01", about: "Energy in the tank of each axis at the beginning" },
+        LawParameter {
+            key: "tank",
+            form: LawForm::Energy,
+            default: "0.01",
+            about: "Energy in the tank of each axis at the beginning",
+            can_change: false,
+        },
         LawParameter {
             key: "ceiling",
             form: LawForm::Energy,
             default: "0.01",
             about: "The most energy that a tank holds; the rest goes to the others",
+            can_change: true,
         },
     ];
 
@@ -69,9 +80,13 @@ impl<const A: usize> ControllerKind<A> for SetPosition<A> {
             let rest = session.initial.iter().enumerate().filter(|(place, _)| *place != session.place);
             rest.map(|(_, other)| other.position[axis]).sum::<f64>() / others
         };
+        let period = session.law.tick.as_secs_f64();
+        let gain = gain(Self::damping(&session.law), period, stiffness);
         Self {
             stiffness,
-            gain: Self::damping(&session.law) / session.law.tick.as_secs_f64() - 0.5 * stiffness,
+            period,
+            gain,
+            next_gain: gain,
             others,
             ceiling: energy(2),
             set: core::array::from_fn(mean),
@@ -83,6 +98,11 @@ impl<const A: usize> ControllerKind<A> for SetPosition<A> {
             before: None,
         }
     }
+}
+
+/// β/h − KT/2: what the tank gets for the square of a motion [N/m].
+fn gain(damping: f64, period: f64, stiffness: f64) -> f64 {
+    damping / period - 0.5 * stiffness
 }
 
 impl<const A: usize> Strategy<A> for SetPosition<A> {
@@ -99,8 +119,14 @@ impl<const A: usize> Strategy<A> for SetPosition<A> {
             self.got[axis] = heard;
             let apart = x - self.set[axis];
             let all = stored + half * (apart * apart);
-            let reach = libm::sqrt(2.0 * all.max(0.0) / self.stiffness);
-            let set = mean.position[axis].max(x - reach).min(x + reach);
+            let wanted = x - mean.position[axis];
+            // Most of the time there is energy for the whole way, and no need of a root.
+            let set = if half * (wanted * wanted) <= all {
+                mean.position[axis]
+            } else {
+                let reach = libm::sqrt(2.0 * all.max(0.0) / self.stiffness);
+                mean.position[axis].max(x - reach).min(x + reach)
+            };
             let apart = x - set;
             let left = all - half * (apart * apart);
             let over = (left - self.ceiling).max(0.0);
@@ -111,6 +137,7 @@ impl<const A: usize> Strategy<A> for SetPosition<A> {
             command.target.position[axis] = set;
         }
         self.before = Some(own.position);
+        self.gain = self.next_gain;
         command
     }
 
@@ -128,4 +155,9 @@ impl<const A: usize> Strategy<A> for SetPosition<A> {
 
     /// Scenes in which the timeline changes gains are refused: a jump of the stiffness is a jump of the energy.
     fn set_gains(&mut self, _gains: Gains) {}
+    /// What the tank holds above a ceiling that has fallen goes to the others at the next tick.
+    fn set_parameters(&mut self, own: &LawValues) {
+        self.next_gain = gain(own.number(0), self.period, self.stiffness);
+        self.ceiling = own.number(2);
+    }
 }

@@ -24,6 +24,7 @@ impl LawKind for SmoothedAveragePosition {
         form: LawForm::Duration,
         default: "\"10ms\"",
         about: "Time constant of the force; 0 for average-position itself",
+        can_change: true,
     }];
 
     fn new(parameters: &LawParameters) -> Self {

@@ -4,6 +4,7 @@ use alloc::boxed::Box;
 
 use cohaptic_units::Instant;
 
+use super::LawValues;
 use crate::wire::SampleKind;
 use crate::{Contact, Gains, Held, State};
 
@@ -171,6 +172,10 @@ pub trait Strategy<const A: usize> {
     /// New gains, from the next tick on. A strategy without gains ignores them.
     fn set_gains(&mut self, gains: Gains);
 
+    /// New values of the parameters that the strategy has of its own, from the next tick on: of those that [can change](super::LawParameter::can_change). β is part
+    /// of the body, and the peer changes it.
+    fn set_parameters(&mut self, _own: &LawValues) {}
+
     /// Everything the strategy remembers from tick to tick, as numbers; always as many. Empty for one that remembers nothing.
     ///
     /// The stability analysis puts a strategy into a state and looks where it goes. A strategy that remembers what it does not show here is refused there.
@@ -225,6 +230,10 @@ impl<const A: usize, S: Strategy<A> + ?Sized> Strategy<A> for Box<S> {
 
     fn set_gains(&mut self, gains: Gains) {
         (**self).set_gains(gains);
+    }
+
+    fn set_parameters(&mut self, own: &LawValues) {
+        (**self).set_parameters(own);
     }
 
     fn memory(&self) -> &[f64] {

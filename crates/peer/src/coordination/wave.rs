@@ -67,12 +67,19 @@ impl<const A: usize> ControllerKind<A> for Wave<A> {
     const GAINS: UsedGains = UsedGains::Neither;
     const KIND: SampleKind = SampleKind::Wave;
     const PARAMETERS: &[LawParameter] = &[
-        LawParameter { key: "impedance", form: LawForm::Impedance, default: "20", about: "Wave impedance at each copy, b, shared by its lines" },
+        LawParameter {
+            key: "impedance",
+            form: LawForm::Impedance,
+            default: "20",
+            about: "Wave impedance at each copy, b, shared by its lines",
+            can_change: false,
+        },
         LawParameter {
             key: "on-loss",
             form: LawForm::Words(ON_LOSS),
             default: "\"zero\"",
             about: "What acts when the next wave is due and has not come",
+            can_change: false,
         },
     ];
 

@@ -62,7 +62,7 @@ static ENCLOSURE: Table = Table::of(&[&[
     required("damping", number(DAMPING), "Damping of the walls"),
 ]]);
 
-static COORDINATION: Table = Table::of(&[&GAINS_OF_ALL, LAWS.split_at(LAWS_WITH_KEYS).0]);
+static COORDINATION: Table = Table::of(&[&GAINS_OF_ALL, LAWS.split_at(count_laws(false)).0]);
 const GAINS_OF_ALL: [Key; 7] = [
     required("strategy", Form::Words(&STRATEGIES), "Where each copy is drawn to"),
     required("stiffness", number(STIFFNESS), "Gain on the difference of positions, K_T"),
@@ -102,64 +102,92 @@ const fn form_of(form: LawForm) -> Form {
 }
 const AUTOMATIC: [(&str, &str); 1] = [("auto", "as the links of the scene ask for")];
 
-/// The keys of each law's own parameters, by its place in the registry; the first ones of a row are used.
-static LAW_KEYS: [[Key; LawValues::MOST]; Coordination::ALL.len()] = {
-    let mut keys = [const { [const { optional("", Form::Duration, "") }; LawValues::MOST] }; Coordination::ALL.len()];
-    let mut law = 0;
-    while law < keys.len() {
-        let parameters = Coordination::ALL[law].parameters();
-        let mut place = 0;
-        while place < parameters.len() {
-            let LawParameter { key, form, default, about } = parameters[place];
-            keys[law][place] = if default.is_empty() { optional(key, form_of(form), about) } else { usual(key, form_of(form), default, about) };
-            place += 1;
+/// The parameters that a strategy has of its own, of all or of those that the timeline may change: how many of them each has.
+const fn count_parameters(law: usize, changing: bool) -> usize {
+    let parameters = Coordination::ALL[law].parameters();
+    let (mut place, mut count) = (0, 0);
+    while place < parameters.len() {
+        if !changing || parameters[place].can_change {
+            count += 1;
         }
-        law += 1;
+        place += 1;
     }
-    keys
-};
-static LAW_GROUPS: [[&[Key]; 1]; Coordination::ALL.len()] = {
-    let mut groups: [[&[Key]; 1]; Coordination::ALL.len()] = [[&[]]; Coordination::ALL.len()];
-    let mut law = 0;
-    while law < groups.len() {
-        groups[law] = [LAW_KEYS[law].split_at(Coordination::ALL[law].parameters().len()).0];
-        law += 1;
-    }
-    groups
-};
-static LAW_TABLES: [Table; Coordination::ALL.len()] = {
-    let mut tables = [const { Table::of(&[]) }; Coordination::ALL.len()];
-    let mut law = 0;
-    while law < tables.len() {
-        tables[law] = Table::of(&LAW_GROUPS[law]);
-        law += 1;
-    }
-    tables
-};
-/// How many laws have parameters of their own.
-const LAWS_WITH_KEYS: usize = {
+    count
+}
+
+/// How many strategies have such parameters.
+const fn count_laws(changing: bool) -> usize {
     let (mut law, mut count) = (0, 0);
     while law < Coordination::ALL.len() {
-        if !Coordination::ALL[law].parameters().is_empty() {
+        if count_parameters(law, changing) > 0 {
             count += 1;
         }
         law += 1;
     }
     count
-};
-/// The tables of the laws that have parameters of their own, one after another.
-static LAWS: [Key; Coordination::ALL.len()] = {
-    let mut keys = [const { optional("", Form::Duration, "") }; Coordination::ALL.len()];
-    let (mut law, mut count) = (0, 0);
-    while law < Coordination::ALL.len() {
-        if !Coordination::ALL[law].parameters().is_empty() {
-            keys[count] = optional(Coordination::ALL[law].name(), Form::Table(&LAW_TABLES[law]), "Parameters that this strategy alone has");
-            count += 1;
-        }
-        law += 1;
-    }
-    keys
-};
+}
+
+/// Declares the key of a table for each strategy that has such parameters, one after another: the first ones of `$laws` are used.
+macro_rules! law_tables {
+    ($changing:literal, $about:literal, $keys:ident, $groups:ident, $tables:ident, $laws:ident) => {
+        /// The keys of each strategy, by its place in the registry; the first ones of a row are used.
+        static $keys: [[Key; LawValues::MOST]; Coordination::ALL.len()] = {
+            let mut keys = [const { [const { optional("", Form::Duration, "") }; LawValues::MOST] }; Coordination::ALL.len()];
+            let mut law = 0;
+            while law < keys.len() {
+                let parameters = Coordination::ALL[law].parameters();
+                let (mut place, mut count) = (0, 0);
+                while place < parameters.len() {
+                    let LawParameter { key, form, default, about, can_change } = parameters[place];
+                    if !$changing || can_change {
+                        keys[law][count] = if $changing || default.is_empty() {
+                            optional(key, form_of(form), about)
+                        } else {
+                            usual(key, form_of(form), default, about)
+                        };
+                        count += 1;
+                    }
+                    place += 1;
+                }
+                law += 1;
+            }
+            keys
+        };
+        static $groups: [[&[Key]; 1]; Coordination::ALL.len()] = {
+            let mut groups: [[&[Key]; 1]; Coordination::ALL.len()] = [[&[]]; Coordination::ALL.len()];
+            let mut law = 0;
+            while law < groups.len() {
+                groups[law] = [$keys[law].split_at(count_parameters(law, $changing)).0];
+                law += 1;
+            }
+            groups
+        };
+        static $tables: [Table; Coordination::ALL.len()] = {
+            let mut tables = [const { Table::of(&[]) }; Coordination::ALL.len()];
+            let mut law = 0;
+            while law < tables.len() {
+                tables[law] = Table::of(&$groups[law]);
+                law += 1;
+            }
+            tables
+        };
+        static $laws: [Key; Coordination::ALL.len()] = {
+            let mut keys = [const { optional("", Form::Duration, "") }; Coordination::ALL.len()];
+            let (mut law, mut count) = (0, 0);
+            while law < Coordination::ALL.len() {
+                if count_parameters(law, $changing) > 0 {
+                    keys[count] = optional(Coordination::ALL[law].name(), Form::Table(&$tables[law]), $about);
+                    count += 1;
+                }
+                law += 1;
+            }
+            keys
+        };
+    };
+}
+law_tables!(false, "Parameters that this strategy alone has", LAW_KEYS, LAW_GROUPS, LAW_TABLES, LAWS);
+law_tables!(true, "Of this strategy: what changes", CHANGING_KEYS, CHANGING_GROUPS, CHANGING_TABLES, CHANGING_LAWS);
+
 const SCALINGS: [(&str, &str); 2] = [("none", "as they are written"), ("inverse-n", "times 4(N-1)/N^2 among N peers; of a coupling times 2/N")];
 
 static SIMULATION: Table = Table::of(&[&[
@@ -250,7 +278,7 @@ static TIMELINE: Table = Table::of(&[&[
     optional("link", LINKS_BETWEEN, "Which links change: all, or one by its ends"),
     optional("peer", Form::Text, "The name of the peer that changes"),
     optional("set", Form::Table(&SET), "The keys that change: of the link, or contact and hand of the peer"),
-    optional("coordination", Form::Table(&GAINS), "In place of link or peer, and without set: new gains at every peer"),
+    optional("coordination", Form::Table(&CHANGES), "In place of link or peer, and without set: what changes at every peer"),
 ]]);
 /// The key of a link or of a peer that is set: another key says which of the two.
 static SET: Table = Table::over(&joined::<16>(&[LINK.as_slice(), &[&SET_OF_PEER]]));
@@ -258,10 +286,12 @@ const SET_OF_PEER: [Key; 2] = [
     optional("contact", Form::AnyOf(const { &[Form::Words(&CONTACTS), Form::Table(&PUSH)] }), "Of a peer: how the device touches the object"),
     optional("hand", HAND, "Of a peer: what the user does"),
 ];
-static GAINS: Table = Table::of(&[&[
+static CHANGES: Table = Table::of(&[&CHANGES_OF_ALL, CHANGING_LAWS.split_at(count_laws(true)).0]);
+const CHANGES_OF_ALL: [Key; 3] = [
     optional("stiffness", number(STIFFNESS), "Gain on the difference of positions; without it as it was"),
     optional("damping", number(DAMPING), "Gain on the difference of velocities; without it as it was"),
-]]);
+    optional("send-when", Form::Table(&SEND_WHEN), "Which samples are sent; without it as it was"),
+];
 
 static MEASURE: Table = Table::of(&[&[
     usual("names", Form::AnyOf(const { &[Form::Words(&[("all", "every measure")]), Form::List(&MEASURE_NAME)] }), "\"all\"", "Which measures"),

@@ -3,6 +3,7 @@
 use core::time::Duration;
 
 use cohaptic_linkfile::document::{Node, quote};
+use cohaptic_linkfile::link::is_empty;
 use cohaptic_linkfile::mesh::read_peer_name;
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
@@ -76,7 +77,7 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<Coo
 }
 
 /// `send-when`.
-fn read_send_when(node: &Node, context: Context<'_>) -> Option<SendWhen> {
+pub(super) fn read_send_when(node: &Node, context: Context<'_>) -> Option<SendWhen> {
     const EXPECTED: &str = "a table such as { velocity = \"10%\", position = 0.0005, heartbeat = \"1s\" }";
     let mut table = TableReader::new(node, context, EXPECTED)?;
     let velocity = table.maybe("velocity", |node, context| {
@@ -122,6 +123,44 @@ fn read_values(node: &Node, context: Context<'_>, law: Coordination) -> Option<L
     }
     table.finish();
     is_read.then_some(values)
+}
+
+/// A parameter that changes: of which strategy, its place among those of the strategy, and its value.
+pub(super) type ParameterChange = (Coordination, usize, LawValue);
+
+/// The tables of strategies in an entry of the timeline, each with the parameters that change.
+pub(super) fn read_parameter_changes(coordination: &mut TableReader<'_>) -> Option<Vec<ParameterChange>> {
+    let (mut changes, mut is_read) = (Vec::new(), true);
+    for law in Coordination::ALL.iter().copied().filter(|law| law.parameters().iter().any(|parameter| parameter.can_change)) {
+        is_read &= coordination.maybe(law.name(), |node, context| read_changes(node, law, &mut changes, context)).is_some();
+    }
+    is_read.then_some(changes)
+}
+
+fn read_changes(node: &Node, law: Coordination, changes: &mut Vec<ParameterChange>, context: Context<'_>) -> Option<()> {
+    let mut table = TableReader::new(node, context, &format!("a table of the parameters of {} that change", law.name()))?;
+    let mut is_read = true;
+    for (place, parameter) in law.parameters().iter().enumerate().filter(|(_, parameter)| parameter.can_change) {
+        match table.maybe(parameter.key, |node, context| read_change(parameter.form, node, context)) {
+            Some(value) => changes.extend(value.map(|value| (law, place, value))),
+            None => is_read = false,
+        }
+    }
+    table.finish();
+    if is_empty(node) {
+        context.fault_at(node, format!("nothing changes: expected parameters of {}", law.name()));
+        return None;
+    }
+    is_read.then_some(())
+}
+
+fn read_change(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawValue> {
+    let value = read_value(form, node, context)?;
+    if value == LawValue::Automatic {
+        context.fault_at(node, "\"auto\" is computed once, from the links at the beginning: expected a value");
+        return None;
+    }
+    Some(value)
 }
 
 fn read_value(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawValue> {

@@ -8,13 +8,14 @@ use cohaptic_linkfile::link::is_empty;
 use cohaptic_linkfile::mesh::{LinkClasses, OnLinks, read_key_changes, read_links_between, read_peer_name};
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, only_one, values};
-use cohaptic_peer::{Contact, Gains, Hand};
+use cohaptic_peer::{Contact, Gains, Hand, SendWhen};
 use cohaptic_units::Instant;
 
 use super::hand::read_hand;
+use super::header::{ParameterChange, read_parameter_changes, read_send_when};
 use super::peer::read_contact;
 use crate::context::SceneContext;
-use crate::model::{Change, ChangeKind, PeerSpec};
+use crate::model::{Change, ChangeKind, CoordinationSpec, PeerSpec};
 use crate::quantities::{DAMPING, STIFFNESS};
 
 /// An entry, before it is known what stands before it in time.
@@ -28,7 +29,7 @@ struct Planned<'a> {
 enum PlannedKind<'a> {
     Links { selector: LinkSelector, set: &'a Node },
     Peer { peer: usize, contact: Option<(Contact, &'a Node)>, hand: Option<(Option<Hand>, &'a Node)> },
-    Coordination { stiffness: Option<f64>, damping: Option<f64> },
+    Coordination { stiffness: Option<f64>, damping: Option<f64>, send_when: Option<SendWhen>, parameters: Vec<ParameterChange> },
 }
 
 /// Reads the changes and puts them in order of time. The arguments say how things stand at the beginning; each is `None` if it was refused.
@@ -37,7 +38,7 @@ pub(crate) fn read_timeline(
     duration: Option<Duration>,
     links: Option<&LinkClasses>,
     peers: Option<&[PeerSpec]>,
-    gains: Option<Gains>,
+    coordination: Option<&CoordinationSpec>,
     on_links: OnLinks<'_>,
     context: SceneContext<'_>,
 ) -> Option<Vec<Change>> {
@@ -48,7 +49,7 @@ pub(crate) fn read_timeline(
     // Stable: equal instants stay in the order of the file.
     planned.sort_by_key(|entry| entry.at);
 
-    let (mut links, mut gains) = (links?.clone(), gains?);
+    let (mut links, CoordinationSpec { mut gains, mut settings, .. }) = (links?.clone(), *coordination?);
     let mut changes = Vec::with_capacity(planned.len());
     let mut complete = true;
     for Planned { at, what } in planned {
@@ -69,9 +70,18 @@ pub(crate) fn read_timeline(
                 changes.extend(contact.map(|(contact, _)| Change { at, what: ChangeKind::Contact { peer, contact } }));
                 changes.extend(hand.map(|(hand, _)| Change { at, what: ChangeKind::Hand { peer, hand } }));
             }
-            PlannedKind::Coordination { stiffness, damping } => {
-                gains = Gains { stiffness: stiffness.unwrap_or(gains.stiffness), damping: damping.unwrap_or(gains.damping) };
-                changes.push(Change { at, what: ChangeKind::Coordination(gains) });
+            PlannedKind::Coordination { stiffness, damping, send_when, parameters } => {
+                if stiffness.is_some() || damping.is_some() {
+                    gains = Gains { stiffness: stiffness.unwrap_or(gains.stiffness), damping: damping.unwrap_or(gains.damping) };
+                    changes.push(Change { at, what: ChangeKind::Coordination(gains) });
+                }
+                changes.extend(send_when.map(|send_when| Change { at, what: ChangeKind::SendWhen(send_when) }));
+                if !parameters.is_empty() {
+                    for (strategy, place, value) in parameters {
+                        settings.of_mut(strategy).set(place, value);
+                    }
+                    changes.push(Change { at, what: ChangeKind::Parameters(Box::new(settings)) });
+                }
             }
         }
     }
@@ -102,7 +112,7 @@ fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: SceneCont
             context.fault(set.key, &set.node.path, "coordination holds its own keys: expected no key set beside it");
             return None;
         }
-        let what = read_gains(&target.node, *context);
+        let what = read_coordination_changes(&target.node, *context);
         return Some(Planned { at: at?, what: what? });
     }
     let what = if target.name == "link" {
@@ -118,16 +128,18 @@ fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: SceneCont
     Some(Planned { at: at?, what })
 }
 
-fn read_gains<'a>(node: &'a Node, context: Context<'a>) -> Option<PlannedKind<'a>> {
+fn read_coordination_changes<'a>(node: &'a Node, context: Context<'a>) -> Option<PlannedKind<'a>> {
     let mut table = TableReader::new(node, context, "a table such as { stiffness = 1000.0, damping = 5.0 }")?;
     let stiffness = table.maybe("stiffness", |node, context| STIFFNESS.read(node, context));
     let damping = table.maybe("damping", |node, context| DAMPING.read(node, context));
+    let send_when = table.maybe("send-when", read_send_when);
+    let parameters = read_parameter_changes(&mut table);
     table.finish();
     if is_empty(node) {
-        context.fault_at(node, "nothing changes: expected stiffness, damping or both");
+        context.fault_at(node, "nothing changes: expected stiffness, damping, send-when, or a table of a strategy with parameters that change");
         return None;
     }
-    Some(PlannedKind::Coordination { stiffness: stiffness?, damping: damping? })
+    Some(PlannedKind::Coordination { stiffness: stiffness?, damping: damping?, send_when: send_when?, parameters: parameters? })
 }
 
 #[expect(clippy::type_complexity, reason = "used once, above")]

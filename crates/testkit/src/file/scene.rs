@@ -29,7 +29,11 @@ impl LinkFile {
                     LinkChange { at, from, to, link }
                 })),
                 // They change the ends of the links.
-                ChangeKind::Contact { .. } | ChangeKind::Hand { .. } | ChangeKind::Coordination(_) => {}
+                ChangeKind::Contact { .. }
+                | ChangeKind::Hand { .. }
+                | ChangeKind::Coordination(_)
+                | ChangeKind::Parameters(_)
+                | ChangeKind::SendWhen(_) => {}
             }
         }
         let hosts = scene.peers.into_iter().map(|peer| peer.name).collect();

@@ -29,7 +29,9 @@ pub(super) const SCENES: [&str; 3] = [
     timeline = [
         { at = "1s", link = { from = "a", to = "b" }, set = { delay = "2ms" } },
         { at = "2s", peer = "a", set = { contact = "grasp" } },
-        { at = "3s", coordination = { stiffness = 2 } },
+        { at = "3s", coordination = { stiffness = 2, damping = 1, send-when = { position = 0.001 } } },
+        { at = "3s", coordination = { smoothed-average-position = { lag = "1ms" }, extrapolated = { horizon = "1ms" }, local-damping = { damping = 1 } } },
+        { at = "3s", coordination = { local-lag = { lag = "1ms" }, passivity-control = { reserve = 1 }, set-position = { damping = 1, ceiling = 1 } } },
     ]
     [measure]
     names = ["energy_j", "peers.a.energy_j", "viscosity_n_s_m"]
