@@ -25,7 +25,7 @@ fn value(form: LawForm, second: bool) -> LawValue {
         LawForm::Duration | LawForm::AutomaticDuration => LawValue::Duration(Duration::from_millis(if second { 21 } else { 8 })),
         LawForm::AutomaticDamping | LawForm::Damping | LawForm::Impedance => LawValue::Number(if second { 31.0 } else { 12.0 }),
         LawForm::Energy => LawValue::Number(if second { 0.004 } else { 0.0 }),
-        LawForm::Words(_) | LawForm::Peer => panic!("no word and no peer can change"),
+        LawForm::Words(_) | LawForm::Peer => unreachable!("no word and no peer can change"),
     }
 }
 

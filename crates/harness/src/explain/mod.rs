@@ -203,9 +203,10 @@ impl Rows {
         }
         self.model("coordination", model, format!("gains {scaling}{pull}; the mean of the samples held is kept until one changes"));
         let len = scene.sample_kind().datagram_len(scene.axes.count());
+        let receivers = if scene.server().is_some() { "from each client to the server and back" } else { "to each other peer" };
         self.model(
             "samples",
-            format!("{len} bytes to each other peer every {}{}", Span(spec.update), dead_bands(spec.send_when.as_ref())),
+            format!("{len} bytes {receivers} every {}{}", Span(spec.update), dead_bands(spec.send_when.as_ref())),
             "encoded, sent and decoded as they would be live",
         );
     }
