@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use cohaptic_peer::coordination::Law;
-use cohaptic_peer::{Contact, Coordination};
+use cohaptic_peer::{Contact, Coordination, Gains};
 
 use crate::{Change, ChangeKind, Scene, SceneError};
 
@@ -326,7 +326,7 @@ fn parameters_change_with_the_timeline_as_far_as_the_strategy_can_follow() {
     let [Change { what: ChangeKind::Coordination(gains), .. }, Change { what: ChangeKind::Parameters(settings), .. }] = &*scene.timeline else {
         panic!("{:?}", scene.timeline)
     };
-    assert_eq!(gains.stiffness, 5.0);
+    assert_eq!(*gains, Gains { stiffness: 5.0, damping: 0.0 });
     assert_eq!(settings.of(Coordination::Extrapolated).duration(0), Duration::from_millis(20));
     let started = "18:1: timeline: send times of samples are kept from the beginning or not at all";
     check(&text("extrapolated", "extrapolated = { horizon = \"0s\" }"), started);
