@@ -15,6 +15,7 @@ mod measures;
 mod own_strategies;
 mod replay;
 mod symmetry;
+mod waves;
 
 /// Half the distance from 1 to the next double: the largest relative error of one rounding.
 const ROUNDING: f64 = f64::EPSILON / 2.0;
