@@ -11,6 +11,7 @@ use crate::network::NominalNetwork;
 use crate::parts::{Part, radius_of, reduced};
 use crate::spectrum::bounded_radius;
 use crate::structure::{Contacts, Structure, linear_law};
+use crate::unseen::felt;
 use crate::{AnalysisError, Radius, Unwatched, Verdict, Watch};
 
 /// How a verdict is reached.
@@ -209,15 +210,19 @@ fn push_through(
             2 => full::<2, _>(scene, &network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
             _ => full::<3, _>(scene, &network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
         }?;
-        let radius = bounded_radius(&map.monodromy, map.error);
-        watch.done(eigenvalue_operations(map.monodromy.rows()));
-        let part = Part::whole(radius, map.monodromy.rows());
+        let (matrix, rounded) = match &map.forces {
+            Some(forces) => felt(&map.monodromy, forces, &map.states),
+            None => (map.monodromy, 0.0),
+        };
+        let radius = bounded_radius(&matrix, map.error + rounded);
+        watch.done(eigenvalue_operations(matrix.rows()));
+        let part = Part::whole(radius, matrix.rows());
         Ok(ContactMode {
             contacts: combination.words.clone(),
             radius,
             parts: vec![part],
             rigid_modes: map.rigid_modes,
-            dimension: map.monodromy.rows(),
+            dimension: matrix.rows(),
             frame: map.frame,
         })
     });

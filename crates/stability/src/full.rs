@@ -3,6 +3,8 @@
 //! Real [`Peer`]s with real strategies are put into a state, stepped through one frame of the timetable, and looked at. Whatever strategy they run is
 //! analysed so, as long as it is linear; one that is not, or that depends on more than it shows, is found out and refused.
 
+mod rigid;
+
 use std::time::Duration;
 
 use cohaptic_peer::coordination::Role;
@@ -31,8 +33,10 @@ pub(crate) struct FullMap {
     pub(crate) states: Vec<StateName>,
     /// What velocities are multiplied by \[s\].
     pub(crate) time: f64,
-    /// For each axis, whether positions are relative to the first peer's copy.
-    pub(crate) relative: Vec<bool>,
+    /// For each peer and axis, whose copy positions are relative to.
+    pub(crate) relative: Vec<Vec<Option<usize>>>,
+    /// What the states add to the forces that strategies command in the frame, a row for each of them; `None` where samples carry no waves.
+    pub(crate) forces: Option<Matrix>,
 }
 
 /// The facts about a strategy that are known before anything is pushed.
@@ -54,6 +58,7 @@ pub(crate) fn full<const A: usize, S: Strategy<A>>(
     strategy: impl Fn(usize) -> S,
 ) -> Result<FullMap, AnalysisError> {
     let mut pusher = Pusher::<A, S>::new(scene, network, contacts, strategy)?;
+    pusher.settle();
     if trust == Trust::Nothing {
         pusher.check()?;
     }
@@ -99,13 +104,18 @@ struct Pusher<const A: usize, S> {
     timetable: Timetable,
     instants: Instants,
     layout: Layout,
-    /// What velocities \[s\] and forces [m/N] are multiplied by.
+    /// What velocities \[s\] and forces [m/N] are multiplied by; and the extra numbers of samples, and what strategies remember.
     time: f64,
     compliance: Vec<f64>,
+    extra: Vec<f64>,
+    remembered: f64,
     /// The samples of each peer: those of earlier frames, oldest first, then those of this one.
     samples: Vec<Vec<State<A>>>,
     /// The extra numbers of each of them, for each other peer; none where samples are states alone.
     extras: Vec<Vec<[f64; A]>>,
+    kind: SampleKind,
+    /// The forces that strategies command in the frame, tick by tick, where samples carry waves.
+    commanded: Vec<f64>,
     /// The largest number seen on the way of the unit vectors, for the bound of errors.
     growth: f64,
 }
@@ -118,13 +128,14 @@ struct Layout {
     pending: Vec<bool>,
     /// Where the samples of earlier frames of each peer begin, the newest first.
     samples: Vec<usize>,
-    /// How many receivers have extra numbers in a sample.
+    /// How many receivers have extra numbers in a sample, and whether those are waves.
     receivers: usize,
+    has_waves: bool,
     size: usize,
     /// States that nothing depends on and that drift with everything else: positions of devices that touch nothing.
     loose: Vec<usize>,
-    /// Whether something ties the object to ground.
-    tied: bool,
+    /// For each peer, whether something ties its copy to ground.
+    tied: Vec<bool>,
 }
 
 impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
@@ -147,18 +158,25 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             Peer::new(config, device, object, strategy(place), Held::new((1..peers).map(|_| State::REST)))
         };
         let members: Vec<Member<A, S>> = (0..peers).map(member).collect();
-        if !members.iter().all(|member| matches!(member.kind(), SampleKind::State | SampleKind::Force)) {
+        let kind = members.first().map_or(SampleKind::State, Peer::kind);
+        if kind == SampleKind::Energy {
             return Err(AnalysisError::NoAnalysis { strategy: scene.coordination.strategy.name() });
         }
         if members.iter().any(|member| member.strategy().horizon().is_some()) && !has_equal_clocks(scene) {
             return Err(AnalysisError::AgesByClocks { strategy: scene.coordination.strategy.name() });
         }
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
-        let tied = silent || (0..peers).any(|place| contacts.touching[place] && scene.device_plant(place).stiffness > 0.0);
+        let arm = |place: usize| contacts.touching[place] && scene.device_plant(place).stiffness > 0.0;
+        // Waves carry no position: each copy may be anywhere, but for what holds its own device.
+        let tied = |place: usize| if kind == SampleKind::Wave { arm(place) } else { silent || (0..peers).any(arm) };
+        let tied = (0..peers).map(tied).collect();
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);
         let touching = contacts.touching.iter().copied().enumerate();
         let time = common_time(scene, timetable.frame, linear_law(scene, 0).map_or(scene.coordination.gains, |law| law.held_by()), touching, false);
-        let compliance = (0..peers).map(|peer| compliance(scene, peer, time)).collect();
+        let compliance: Vec<f64> = (0..peers).map(|peer| compliance(scene, peer, time)).collect();
+        // A wave of 1 √W against a line of 1 N·s/m gives √2 N: what that moves a copy by from one sample to the next, at a velocity of a wave.
+        let wave = scene.coordination.update.as_secs_f64() * (time / scene.copy_mass()).sqrt();
+        let (extra, remembered) = if kind == SampleKind::Wave { (vec![wave; peers], wave) } else { (compliance.clone(), 1.0) };
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
         let instants = Instants::of(&timetable, peers);
         Ok(Self {
@@ -171,6 +189,10 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             layout,
             time,
             compliance,
+            extra,
+            remembered,
+            kind,
+            commanded: Vec::new(),
             growth: 1.0,
         })
     }
@@ -181,13 +203,13 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let events = self.timetable.events.len();
         watch.expects(full_operations(size, events, A));
         let rest = self.pushed(&vec![0.0; size], Instant::ZERO);
-        let (free, translations): (Vec<usize>, Vec<Vec<f64>>) =
-            (0..A).filter_map(|axis| self.free_translation(axis, &rest).map(|translation| (axis, translation))).unzip();
-        // Relative to the first peer's copy, and without what nothing depends on.
-        let reference: Vec<usize> = free.iter().map(|axis| self.layout.first[0] + 2 * A + axis).collect();
-        let kept: Vec<usize> = (0..size).filter(|state| !reference.contains(state) && !self.layout.loose.contains(state)).collect();
+        let free = self.free_translations(&rest);
+        // Relative to the copies of reference, and without what nothing depends on.
+        let kept: Vec<usize> =
+            (0..size).filter(|state| free.iter().all(|free| free.reference != *state) && !self.layout.loose.contains(state)).collect();
         let mut monodromy = Matrix::zeros(kept.len(), kept.len());
         self.growth = 1.0;
+        let mut commanded = Vec::new();
         let (mut unit, mut reached) = (vec![0.0; size], vec![0.0; size]);
         for (column, state) in kept.iter().enumerate() {
             if watch.stops() {
@@ -200,9 +222,10 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 *entry -= rest;
             }
             for (row, target) in kept.iter().enumerate() {
-                let moved: f64 = reference.iter().zip(&translations).map(|(reference, translation)| reached[*reference] * translation[*target]).sum();
+                let moved: f64 = free.iter().map(|free| reached[free.reference] * free.moved[*target]).sum();
                 monodromy[(row, column)] = reached[*target] - moved;
             }
+            commanded.push(self.commanded.clone());
             watch.done(pushed_operations(events, A));
         }
         let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
@@ -216,8 +239,18 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             frame: self.timetable.frame,
             states: kept.iter().map(|state| names[*state]).collect(),
             time: self.time,
-            relative: (0..A).map(|axis| free.contains(&axis)).collect(),
+            relative: self.relative_to(&free),
+            forces: self.layout.has_waves.then(|| forces_of(&commanded, &self.order_of_forces())),
         })
+    }
+
+    /// The places of the commanded forces, in the order of peers, axes and ticks.
+    fn order_of_forces(&self) -> Vec<usize> {
+        let ticks = self.timetable.events.iter().filter_map(|event| if let Event::Tick { node, .. } = event { Some(*node) } else { None });
+        let mut order: Vec<(usize, usize, usize)> =
+            ticks.flat_map(|node| (0..A).map(move |axis| (node, axis))).enumerate().map(|(place, (node, axis))| (node, axis, place)).collect();
+        order.sort_unstable();
+        order.into_iter().map(|(.., place)| place).collect()
     }
 
     /// Refuses a strategy that is not linear, or that depends on more than the state it shows.
@@ -252,60 +285,6 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         Ok(())
     }
 
-    /// Everything moved by 1 m along an axis, if it may be without a force; not if an arm, or a strategy of somebody's own, knows where the origin is.
-    fn free_translation(&mut self, axis: usize, rest: &[f64]) -> Option<Vec<f64>> {
-        if self.layout.tied {
-            return None;
-        }
-        let moved = self.translation(axis);
-        let reached = self.pushed(&moved, Instant::ZERO);
-        moved.iter().zip(reached.iter().zip(rest)).all(|(moved, (reached, rest))| (reached - rest - moved).abs() <= 1e-9).then_some(moved)
-    }
-
-    /// Everything moved by 1 m along an axis, but for devices that touch nothing.
-    fn translation(&mut self, axis: usize) -> Vec<f64> {
-        let mut moved = vec![0.0; self.layout.size];
-        for (place, first) in self.layout.first.iter().enumerate() {
-            if self.layout.touching[place] {
-                moved[first + axis] = 1.0;
-            }
-            moved[first + 2 * A + axis] = 1.0;
-            for age in 0..self.timetable.depth[place] {
-                moved[self.layout.samples[place] + age * self.layout.sample_len::<A>() + axis] = 1.0;
-            }
-        }
-        // Strategies may remember positions: after a tick for each number of the memory those have moved as well.
-        if self.layout.memory.iter().any(|numbers| *numbers > 0) {
-            let (at_rest, displaced) = (self.remembered(&vec![0.0; moved.len()]), self.remembered(&moved));
-            for place in 0..self.members.len() {
-                for number in self.layout.memory_of::<A>(place) {
-                    moved[number] = displaced[number] - at_rest[number];
-                }
-            }
-        }
-        moved
-    }
-
-    /// The state `z` with what strategies remember where nothing has moved for as many ticks as they remember numbers.
-    fn remembered(&mut self, z: &[f64]) -> Vec<f64> {
-        self.restore(z, EARLIER);
-        // A frame may begin with nothing held that is used in it; here a sample from every peer is in use.
-        let copies: Vec<State<A>> = self.layout.first.iter().map(|first| state(&z[first + 2 * A..], self.time)).collect();
-        for (place, member) in self.members.iter_mut().enumerate() {
-            let others = copies.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
-            others.enumerate().for_each(|(other, state)| member.hold(other, EARLIER, state));
-        }
-        let mut z = z.to_vec();
-        for (place, member) in self.members.iter_mut().enumerate() {
-            let numbers = self.layout.memory_of::<A>(place);
-            for _ in numbers.clone() {
-                member.compute(Instant::ZERO);
-            }
-            z[numbers].copy_from_slice(member.strategy().memory());
-        }
-        z
-    }
-
     /// Where one frame from the state `z` leads, beginning at `begin`.
     fn pushed(&mut self, z: &[f64], begin: Instant) -> Vec<f64> {
         let mut reached = vec![0.0; z.len()];
@@ -317,18 +296,22 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
     fn push(&mut self, z: &[f64], begin: Instant, reached: &mut [f64]) {
         let begin_local = EARLIER.saturating_add(begin - Instant::ZERO);
         self.restore(z, begin_local);
+        self.commanded.clear();
         let peers = self.members.len();
         for event in 0..self.timetable.events.len() {
             match self.timetable.events[event] {
                 Event::Sample { node } => self.sample_now(node),
                 Event::Deliver { from, to, sample } => {
-                    self.hold(to, from, sample, begin_local);
+                    self.hold((to, from, sample), begin_local, true);
                 }
                 Event::Tick { node, at, span } => {
                     let now = begin.saturating_add_nanos(at);
                     let member = &mut self.members[node];
-                    member.compute(now);
+                    let forces = member.compute(now);
                     member.advance(now, span);
+                    if self.layout.has_waves {
+                        self.commanded.extend(forces.commanded);
+                    }
                     let (device, object) = (member.device().state(), member.object().state());
                     for axis in 0..A {
                         let largest = object.position[axis].abs().max(device.position[axis].abs());
@@ -350,17 +333,20 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             Role::Client { .. } => member.device().state(),
         };
         self.samples[node].push(state);
-        self.extras[node].extend((0..self.layout.receivers).map(|receiver| member.extra(receiver)));
+        if self.kind != SampleKind::State {
+            self.extras[node].extend((0..self.layout.receivers).map(|receiver| member.extra(receiver)));
+            member.all_sent();
+        }
     }
 
-    /// A peer holds a sample of another.
-    fn hold(&mut self, to: usize, from: usize, sample: i64, begin_local: Instant) {
+    /// A peer holds a sample of another; whether its strategy is handed what the sample carries beyond the state.
+    fn hold(&mut self, (to, from, sample): (usize, usize, i64), begin_local: Instant, accepts: bool) {
         let state = *self.sample(from, sample);
         let after = self.instants.sent_at(from, sample, self.timetable.frame);
         let sent = Instant::from_nanos(begin_local.as_nanos().saturating_add_signed(after));
         let among_others = |one: usize, other: usize| if one < other { one } else { one - 1 };
         self.members[to].hold(among_others(from, to), sent, state);
-        if self.layout.receivers > 0 {
+        if self.layout.receivers > 0 && accepts {
             let extra = self.extras[from][self.sample_place(from, sample) * self.layout.receivers + among_others(to, from)];
             self.members[to].strategy_mut().accept(among_others(from, to), &extra);
         }
@@ -390,21 +376,23 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 member.set_computed(Acting { coupling: force(next), on_object: force(next + A) });
                 next += 2 * A;
             }
-            member.strategy_mut().set_memory(&z[next..next + layout.memory[place]]);
+            let memory: Vec<f64> = z[next..next + layout.memory[place]].iter().map(|number| number / self.remembered).collect();
+            member.strategy_mut().set_memory(&memory);
             // Kept with the oldest first, so that a sample's place follows from its number.
             let depth = self.timetable.depth[place];
             let begin = |age: usize| layout.samples[place] + age * layout.sample_len::<A>();
             let samples = (0..depth).rev().map(|age| state(&z[begin(age)..], self.time));
             self.samples[place].clear();
             self.samples[place].extend(samples);
-            let force = |first: usize| core::array::from_fn(|axis| z[first + axis] / self.compliance[place]);
+            let extra = |first: usize| core::array::from_fn(|axis| z[first + axis] / self.extra[place]);
             let extras = (0..depth).rev().flat_map(|age| (0..layout.receivers).map(move |receiver| begin(age) + (2 + receiver) * A));
             self.extras[place].clear();
-            self.extras[place].extend(extras.map(force));
+            self.extras[place].extend(extras.map(extra));
         }
         for held in 0..self.timetable.held.len() {
             let (to, from, sample) = self.timetable.held[held];
-            self.hold(to, from, sample, begin_local);
+            // A strategy that shows what it remembers has it back already.
+            self.hold((to, from, sample), begin_local, self.layout.memory[to] == 0);
         }
     }
 
@@ -422,21 +410,29 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             }
             next += 2 * A;
         }
-        z[next..next + layout.memory[place]].copy_from_slice(member.strategy().memory());
+        for (entry, number) in z[next..next + layout.memory[place]].iter_mut().zip(member.strategy().memory()) {
+            *entry = number * self.remembered;
+        }
         let receivers = layout.receivers;
         for (age, (number, sample)) in self.samples[place].iter().enumerate().rev().take(self.timetable.depth[place]).enumerate() {
             let first = layout.samples[place] + age * layout.sample_len::<A>();
             write(sample, &mut z[first..], self.time);
-            for (entry, force) in z[first + 2 * A..].iter_mut().zip(self.extras[place][number * receivers..(number + 1) * receivers].iter().flatten())
+            for (entry, extra) in z[first + 2 * A..].iter_mut().zip(self.extras[place][number * receivers..(number + 1) * receivers].iter().flatten())
             {
-                *entry = force * self.compliance[place];
+                *entry = extra * self.extra[place];
             }
         }
     }
 }
 
 impl Layout {
-    fn new<const A: usize, S: Strategy<A>>(scene: &Scene, contacts: &Contacts, members: &[Member<A, S>], timetable: &Timetable, tied: bool) -> Self {
+    fn new<const A: usize, S: Strategy<A>>(
+        scene: &Scene,
+        contacts: &Contacts,
+        members: &[Member<A, S>],
+        timetable: &Timetable,
+        tied: Vec<bool>,
+    ) -> Self {
         let mut layout = Self {
             first: Vec::new(),
             touching: contacts.touching.clone(),
@@ -444,6 +440,7 @@ impl Layout {
             pending: Vec::new(),
             samples: Vec::new(),
             receivers: if members.iter().any(|member| member.kind().is_personal()) { members.len() - 1 } else { 0 },
+            has_waves: members.iter().any(|member| member.kind() == SampleKind::Wave),
             size: 0,
             loose: Vec::new(),
             tied,
@@ -497,7 +494,10 @@ impl Layout {
                 names.extend((0..A).map(|axis| StateName { peer, kind: StateKind::SamplePosition { axis, age } }));
                 names.extend((0..A).map(|axis| StateName { peer, kind: StateKind::SampleVelocity { axis, age } }));
                 let extras = (0..self.receivers).flat_map(|other| (0..A).map(move |axis| (if other < peer { other } else { other + 1 }, axis)));
-                names.extend(extras.map(|(receiver, axis)| StateName { peer, kind: StateKind::SampleForce { axis, age, receiver } }));
+                let kind = |axis, receiver| {
+                    if self.has_waves { StateKind::SampleWave { axis, age, receiver } } else { StateKind::SampleForce { axis, age, receiver } }
+                };
+                names.extend(extras.map(|(receiver, axis)| StateName { peer, kind: kind(axis, receiver) }));
             }
         }
         names
@@ -508,6 +508,13 @@ impl Layout {
         let firsts = if self.samples.first().is_some_and(|first| place >= *first) { &self.samples } else { &self.first };
         firsts.partition_point(|first| *first <= place).saturating_sub(1)
     }
+}
+
+/// A row for each of the forces, in that order, with a column for each state; of equal ones in a row the first.
+fn forces_of(commanded: &[Vec<f64>], order: &[usize]) -> Matrix {
+    let mut rows: Vec<Vec<f64>> = order.iter().map(|place| commanded.iter().map(|forces| forces[*place]).collect()).collect();
+    rows.dedup();
+    Matrix::from_fn(rows.len(), commanded.len(), |row, column| rows[row][column])
 }
 
 fn state<const A: usize>(z: &[f64], time: f64) -> State<A> {

@@ -49,6 +49,7 @@ mod spectrum;
 mod stack_frame;
 mod structure;
 mod timetable;
+mod unseen;
 mod watch;
 mod worst_case;
 

@@ -25,12 +25,13 @@ pub struct Monodromy {
     pub rigid_modes: usize,
     /// A bound of the errors of the entries, as the largest sum over a row.
     pub error: f64,
-    /// For each axis, whether positions are relative to the first peer's copy.
-    pub relative: Vec<bool>,
+    /// For each peer and axis, whose copy positions are relative to: the first peer's, or with waves, which carry no position, its own. `None` where the origin
+    /// is known.
+    pub relative: Vec<Vec<Option<usize>>>,
 }
 
-/// A state of a scene. Positions are in metres, relative to the first peer's copy along the axes that nothing ties to ground; velocities are multiplied by
-/// a common time, forces by a compliance.
+/// A state of a scene. Positions are in metres, relative to a copy ([`Monodromy::relative`]) where nothing ties them to ground; velocities are multiplied by
+/// a common time, forces and waves by a compliance.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StateName {
     /// Whose it is, by its place in [`Scene::peers`].
@@ -77,6 +78,14 @@ pub enum StateKind {
         /// The place of the client.
         receiver: usize,
     },
+    /// The wave that was sent to a peer at an earlier sampling.
+    SampleWave {
+        axis: usize,
+        /// See above.
+        age: usize,
+        /// The place of that peer.
+        receiver: usize,
+    },
 }
 
 impl fmt::Display for StateKind {
@@ -93,6 +102,7 @@ impl fmt::Display for StateKind {
             Self::SamplePosition { axis: a, age } => write!(f, "position {} sampled {age} before", axis(a)),
             Self::SampleVelocity { axis: a, age } => write!(f, "velocity {} sampled {age} before", axis(a)),
             Self::SampleForce { axis: a, age, receiver } => write!(f, "force {} for peer {receiver} sampled {age} before", axis(a)),
+            Self::SampleWave { axis: a, age, receiver } => write!(f, "wave {} for peer {receiver} sampled {age} before", axis(a)),
         }
     }
 }
@@ -123,7 +133,7 @@ fn pushed(scene: &Scene, trust: Trust, strategies: &impl Strategies) -> Result<M
         return Err(AnalysisError::SeveralModes);
     };
     let contacts = &combination.contacts;
-    let FullMap { monodromy, error, rigid_modes, frame, states, time, relative } = match combination.axes {
+    let FullMap { monodromy, error, rigid_modes, frame, states, time, relative, forces: _ } = match combination.axes {
         1 => full::<1, _>(scene, &network, contacts, trust, &Unwatched, |peer| strategies.strategy(scene, peer)),
         2 => full::<2, _>(scene, &network, contacts, trust, &Unwatched, |peer| strategies.strategy(scene, peer)),
         _ => full::<3, _>(scene, &network, contacts, trust, &Unwatched, |peer| strategies.strategy(scene, peer)),

@@ -74,7 +74,8 @@ impl Settling {
     /// The age of the oldest sample that is part of the state, in frames.
     pub(crate) fn memory(&self) -> usize {
         let age = |kind: StateKind| match kind {
-            StateKind::SamplePosition { age, .. } | StateKind::SampleVelocity { age, .. } | StateKind::SampleForce { age, .. } => age,
+            StateKind::SamplePosition { age, .. } | StateKind::SampleVelocity { age, .. } => age,
+            StateKind::SampleForce { age, .. } | StateKind::SampleWave { age, .. } => age,
             StateKind::DevicePosition { .. }
             | StateKind::DeviceVelocity { .. }
             | StateKind::ObjectPosition { .. }
@@ -106,7 +107,11 @@ impl Settling {
             StateKind::ObjectVelocity { .. } => motions[peer][start].object.1 * time,
             StateKind::SamplePosition { age, .. } => sample(peer, age).0 - reference,
             StateKind::SampleVelocity { age, .. } => sample(peer, age).1 * time,
-            StateKind::PendingCoupling { .. } | StateKind::PendingForce { .. } | StateKind::Memory { .. } | StateKind::SampleForce { .. } => {
+            StateKind::PendingCoupling { .. }
+            | StateKind::PendingForce { .. }
+            | StateKind::Memory { .. }
+            | StateKind::SampleForce { .. }
+            | StateKind::SampleWave { .. } => {
                 unreachable!("no computation delay, nothing remembered, no server")
             }
         };

@@ -138,7 +138,7 @@ fn state(monodromy: &Monodromy, draft: &Draft, log: &Log, frame: usize) -> Vec<f
         let mass = if draft.split_mass { draft.mass / crate::count(draft.peers.len()) } else { draft.mass };
         monodromy.time * (draft.peers[peer].tick as f64 * 1e-6) / mass
     };
-    let relative = |position: f64, axis: usize| if monodromy.relative[axis] { position - reference[axis] } else { position };
+    let relative = |position: f64, axis: usize| if monodromy.relative[0][axis].is_some() { position - reference[axis] } else { position };
     let value = |peer: usize, kind: StateKind| match kind {
         // A device that touches nothing is relative to nothing.
         StateKind::DevicePosition { axis } if draft.peers[peer].contact == Contact::None => first(peer).device.position[axis],

@@ -16,6 +16,7 @@ mod own_strategies;
 mod parameter_changes;
 mod replay;
 mod symmetry;
+mod waves;
 
 /// Half the distance from 1 to the next double: the largest relative error of one rounding.
 const ROUNDING: f64 = f64::EPSILON / 2.0;

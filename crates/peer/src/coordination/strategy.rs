@@ -178,7 +178,9 @@ pub trait Strategy<const A: usize> {
 
     /// Everything the strategy remembers from tick to tick, as numbers; always as many. Empty for one that remembers nothing.
     ///
-    /// The stability analysis puts a strategy into a state and looks where it goes. A strategy that remembers what it does not show here is refused there.
+    /// The stability analysis puts a strategy into a state and looks where it goes. A strategy that remembers what it does not show here is refused there,
+    /// but for two things. Counts of ticks need not be shown: the state is put back where they stand as at the beginning of any frame. A strategy of a
+    /// [kind](Strategy::kind) that shows nothing is handed again what it accepted last.
     fn memory(&self) -> &[f64] {
         &[]
     }

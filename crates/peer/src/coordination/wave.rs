@@ -29,38 +29,35 @@ pub struct Wave<const A: usize> {
     period: f64,
     /// Whether a wave goes on when its ticks are over.
     holds: bool,
-    lines: Vec<Line<A>>,
+    lines: Vec<Line>,
+    /// Where the copy was at the last sample.
+    sampled: [f64; A],
+    /// All of them waves: ρ/(M·h)·`sampled`; then for each line sⱼ, and the sum of sⱼ over the ticks from the last sample to [`Line::since`].
+    numbers: Vec<[f64; A]>,
     /// Σ sⱼ.
     sum: [f64; A],
     /// The waves that end, with the tick of their end, in order.
     ends: VecDeque<(u64, usize)>,
     /// The tick whose command comes next.
     tick: u64,
-    /// Where the copy was at the last sample.
-    sampled: [f64; A],
 }
 
-/// A line as seen from one of its ends.
-#[derive(Clone, Debug)]
-struct Line<const A: usize> {
-    /// sⱼ.
-    wave: [f64; A],
-    /// The sum of sⱼ over the ticks from the last sample to `since`.
-    received: [f64; A],
+/// The ticks of a line, as seen from one of its ends.
+#[derive(Clone, Copy, Debug)]
+struct Line {
     since: u64,
     /// The tick at which sⱼ ends.
     end: u64,
 }
 
-impl<const A: usize> Line<A> {
-    #[expect(clippy::cast_precision_loss, reason = "ticks are counted, far below 2^53")]
-    fn count_to(&mut self, tick: u64) {
-        let ticks = (tick - self.since) as f64;
-        for axis in 0..A {
-            self.received[axis] += ticks * self.wave[axis];
-        }
-        self.since = tick;
-    }
+/// Where sⱼ stands among the numbers.
+const fn wave_of(other: usize) -> usize {
+    1 + 2 * other
+}
+
+/// Where the sum of sⱼ stands among the numbers.
+const fn received_of(other: usize) -> usize {
+    2 + 2 * other
 }
 
 impl<const A: usize> ControllerKind<A> for Wave<A> {
@@ -89,18 +86,21 @@ impl<const A: usize> ControllerKind<A> for Wave<A> {
 
     #[expect(clippy::cast_precision_loss, reason = "ticks are counted, far below 2^53")]
     fn new(session: &SessionParameters<A>) -> Self {
-        let line = Line { wave: [0.0; A], received: [0.0; A], since: 0, end: 0 };
-        Self {
+        let others = session.initial.len() - 1;
+        let mut wave = Self {
             root: libm::sqrt(2.0 * Self::damping(&session.law) / session.others()),
             every: session.samples_every,
             period: session.samples_every as f64 * session.law.tick.as_secs_f64(),
             holds: session.law.own.get(1) == LawValue::Word(HOLD),
-            lines: alloc::vec![line; session.initial.len() - 1],
+            lines: alloc::vec![Line { since: 0, end: 0 }; others],
+            sampled: [0.0; A],
+            numbers: alloc::vec![[0.0; A]; 1 + 2 * others],
             sum: [0.0; A],
             ends: VecDeque::new(),
             tick: 0,
-            sampled: session.initial[session.place].position,
-        }
+        };
+        wave.sample(&session.initial[session.place].position);
+        wave
     }
 }
 
@@ -109,13 +109,36 @@ impl<const A: usize> Wave<A> {
     fn end_waves(&mut self) {
         while let Some(&(end, other)) = self.ends.front().filter(|(end, _)| *end <= self.tick) {
             self.ends.pop_front();
-            let line = &mut self.lines[other];
-            if line.end == end {
-                line.count_to(end);
-                for axis in 0..A {
-                    self.sum[axis] -= line.wave[axis];
-                    line.wave[axis] = 0.0;
+            if self.lines[other].end == end {
+                self.count_to(other, end);
+                let wave = &mut self.numbers[wave_of(other)];
+                for (sum, wave) in self.sum.iter_mut().zip(wave) {
+                    *sum -= *wave;
+                    *wave = 0.0;
                 }
+            }
+        }
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "ticks are counted, far below 2^53")]
+    fn count_to(&mut self, other: usize, tick: u64) {
+        let ticks = (tick - core::mem::replace(&mut self.lines[other].since, tick)) as f64;
+        for axis in 0..A {
+            self.numbers[received_of(other)][axis] += ticks * self.numbers[wave_of(other)][axis];
+        }
+    }
+
+    fn sample(&mut self, position: &[f64; A]) {
+        self.sampled = *position;
+        self.numbers[0] = position.map(|position| self.root * position / self.period);
+    }
+
+    /// Adds the waves up anew.
+    fn add_up(&mut self) {
+        self.sum = [0.0; A];
+        for other in 0..self.lines.len() {
+            for (sum, wave) in self.sum.iter_mut().zip(self.numbers[wave_of(other)]) {
+                *sum += wave;
             }
         }
     }
@@ -136,37 +159,43 @@ impl<const A: usize> Strategy<A> for Wave<A> {
     #[expect(clippy::cast_precision_loss, reason = "ticks are counted, far below 2^53")]
     fn extra(&mut self, receiver: usize, own: &State<A>, _held: &Held<A>) -> [f64; A] {
         self.end_waves();
-        let line = &mut self.lines[receiver];
-        line.count_to(self.tick);
-        let received = core::mem::replace(&mut line.received, [0.0; A]);
+        self.count_to(receiver, self.tick);
+        let received = core::mem::replace(&mut self.numbers[received_of(receiver)], [0.0; A]);
         let moved = |axis: usize| own.position[axis] - self.sampled[axis];
         core::array::from_fn(|axis| self.root * moved(axis) / self.period - received[axis] / self.every as f64)
     }
 
     fn sent(&mut self, own: &State<A>) {
-        self.sampled = own.position;
-        // Anew, so that what additions and subtractions round does not add up.
-        self.sum = [0.0; A];
-        for line in &self.lines {
-            for axis in 0..A {
-                self.sum[axis] += line.wave[axis];
-            }
-        }
+        self.sample(&own.position);
+        // What additions and subtractions round must not add up.
+        self.add_up();
     }
 
     fn accept(&mut self, other: usize, numbers: &[f64; A]) {
-        let line = &mut self.lines[other];
-        line.count_to(self.tick);
-        for ((sum, new), old) in self.sum.iter_mut().zip(numbers).zip(line.wave) {
+        self.count_to(other, self.tick);
+        let wave = &mut self.numbers[wave_of(other)];
+        for ((sum, new), old) in self.sum.iter_mut().zip(numbers).zip(&*wave) {
             *sum += new - old;
         }
-        line.wave = *numbers;
+        *wave = *numbers;
         if !self.holds {
-            line.end = self.tick + self.every;
-            self.ends.push_back((line.end, other));
+            let end = self.tick + self.every;
+            self.lines[other].end = end;
+            self.ends.push_back((end, other));
         }
     }
 
     /// Waves have no gains.
     fn set_gains(&mut self, _gains: Gains) {}
+
+    fn memory(&self) -> &[f64] {
+        self.numbers.as_flattened()
+    }
+
+    /// Waves that were in use keep the ticks that are left to them.
+    fn set_memory(&mut self, memory: &[f64]) {
+        self.numbers.as_flattened_mut().copy_from_slice(memory);
+        self.sampled = self.numbers[0].map(|wave| wave * self.period / self.root);
+        self.add_up();
+    }
 }

@@ -36,7 +36,7 @@ fn average_position_bears_the_coupling_that_a_server_does_not() {
 
 #[test]
 fn what_has_no_analysis_is_refused_by_name() {
-    for strategy in ["passivity-control", "set-position", "wave"] {
+    for strategy in ["passivity-control", "set-position"] {
         let scene = read(&format!("coordination/{strategy}.toml"), &[]);
         assert_eq!(analyse(&scene, Method::Reduced), Err(AnalysisError::NoAnalysis { strategy }));
     }

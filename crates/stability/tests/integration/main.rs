@@ -14,3 +14,4 @@ mod reduction;
 mod reference;
 mod strategies;
 mod watch;
+mod wave;

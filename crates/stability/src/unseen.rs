@@ -1,0 +1,106 @@
+//! Waves that bounce to and fro between copies and move nothing.
+//!
+//! Three copies or more can get waves whose forces add up to nothing: (1, −1) at the first, (1, −1) at the second, (1, −1) at the third, around and around.
+//! Such a motion of the waves lasts forever over links that lose nothing, no body feels it, and from waves at zero none arises. So it is no part of how
+//! the scene moves, and its eigenvalues, of modulus 1, say nothing of stability. What is left is the largest quotient in which every state is felt.
+
+use faer::{Mat, MatRef};
+
+use crate::{Matrix, StateKind, StateName};
+
+/// Below this, relative to the largest entry, a singular value counts as zero: far above rounding, and far below the parts of a wave that ticks are. What is
+/// taken for zero is in the error.
+const NOTHING: f64 = 1e-9;
+
+/// The part of a matrix in which every state is felt by a body, and what this adds to the error of its entries. `forces`: what the states add to the
+/// forces of the frame.
+pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (Matrix, f64) {
+    let size = matrix.rows();
+    let hidden: Vec<usize> = (0..size).filter(|state| is_hidden(states[*state].kind)).collect();
+    if !matrix.is_finite() || !forces.is_finite() {
+        return (matrix.clone(), 0.0);
+    }
+    let whole = Mat::from_fn(size, size, |row, column| matrix[(row, column)]);
+    let chosen = |of: &Matrix| Mat::from_fn(of.rows(), hidden.len(), |row, column| of[(row, hidden[column])]);
+    let scale = chosen(matrix).norm_max();
+    // The largest subspace without a force that a frame leads into itself (Wonham 1985, Section 4.3), smaller and smaller.
+    let forces = chosen(forces);
+    let silent = null_space(forces.as_ref(), forces.norm_max());
+    let mut unfelt = Mat::from_fn(size, hidden.len(), |row, column| if hidden[column] == row { 1.0 } else { 0.0 }) * silent;
+    loop {
+        if unfelt.ncols() == 0 {
+            return (matrix.clone(), 0.0);
+        }
+        let reached = &whole * &unfelt;
+        let outside = &reached - &unfelt * (unfelt.transpose() * &reached);
+        let inside = null_space(outside.as_ref(), scale);
+        if inside.ncols() == unfelt.ncols() {
+            let other = null_space(unfelt.transpose(), 1.0);
+            let quotient = other.transpose() * &whole * &other;
+            // The rounding of the products, and what is left of the subspace outside of itself.
+            let error = f64::EPSILON * crate::structure::count(size) * matrix.frobenius_norm() + outside.norm_l2();
+            return (Matrix::from_fn(quotient.nrows(), quotient.ncols(), |row, column| quotient[(row, column)]), error);
+        }
+        unfelt = &unfelt * inside;
+    }
+}
+
+/// Whether a state is felt only by what it does later.
+const fn is_hidden(kind: StateKind) -> bool {
+    match kind {
+        StateKind::DevicePosition { .. }
+        | StateKind::DeviceVelocity { .. }
+        | StateKind::ObjectPosition { .. }
+        | StateKind::ObjectVelocity { .. }
+        | StateKind::PendingCoupling { .. }
+        | StateKind::PendingForce { .. } => false,
+        StateKind::Memory { .. }
+        | StateKind::SamplePosition { .. }
+        | StateKind::SampleVelocity { .. }
+        | StateKind::SampleForce { .. }
+        | StateKind::SampleWave { .. } => true,
+    }
+}
+
+/// An orthonormal basis of the vectors that a matrix makes nothing of.
+fn null_space(matrix: MatRef<'_, f64>, scale: f64) -> Mat<f64> {
+    let columns = matrix.ncols();
+    let svd = if matrix.nrows() < columns { matrix.svd() } else { matrix.thin_svd() };
+    let Ok(svd) = svd else { return Mat::zeros(columns, 0) };
+    let values = svd.S().column_vector();
+    let rank = (0..values.nrows()).filter(|place| values[*place] > NOTHING * scale).count();
+    svd.V().subcols(rank, columns - rank).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(kinds: &[StateKind]) -> Vec<StateName> {
+        kinds.iter().map(|kind| StateName { peer: 0, kind: *kind }).collect()
+    }
+
+    /// A body that halves and feels a + b, where a becomes −b and b becomes −a: a − b goes on forever unfelt, a + b alternates and is felt.
+    #[test]
+    fn what_moves_no_body_is_left_out() {
+        let rows = [[0.5, 0.25, 0.25], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]];
+        let states = named(&[StateKind::ObjectVelocity { axis: 0 }, StateKind::Memory { number: 0 }, StateKind::Memory { number: 1 }]);
+        let forces = Matrix::from_fn(1, 3, |_, column| rows[0][column]);
+        let (left, error) = felt(&Matrix::from_fn(3, 3, |row, column| rows[row][column]), &forces, &states);
+        let found = crate::eigenvalues(&left);
+        assert_eq!(found.len(), 2);
+        for (found, expected) in found.iter().zip([-1.0, 0.5]) {
+            assert!((found - expected).norm() < 1e-14 + error && error < 1e-14, "{found} within {error:e}");
+        }
+    }
+
+    #[test]
+    fn what_is_felt_late_or_little_stays() {
+        // The last moves the one before it, by a millionth, and only that one moves the body.
+        let rows = [[0.5, 1.0, 0.0], [0.0, 0.0, 1e-6], [0.0, 0.0, 0.9]];
+        let states = named(&[StateKind::ObjectPosition { axis: 0 }, StateKind::Memory { number: 0 }, StateKind::Memory { number: 1 }]);
+        let matrix = Matrix::from_fn(3, 3, |row, column| rows[row][column]);
+        let forces = Matrix::from_fn(1, 3, |_, column| rows[0][column]);
+        assert_eq!(felt(&matrix, &forces, &states), (matrix, 0.0));
+    }
+}
