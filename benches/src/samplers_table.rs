@@ -22,7 +22,7 @@ fn main() -> Result<(), String> {
     let work = Work { rounds: effort.of(31, 9, 1), draws: effort.of(400_000, 400_000, 1000) };
     let Work { rounds, draws } = work;
     let look = effort.of(Look::CLOSE, Look::CLOSE, Look { places_a_cell: 1, places_a_side: 400, ..Look::CLOSE });
-    let what = "What a random delay costs, and how far from its law it is.";
+    let what = "The cost of a random delay, and its distance from its law.";
     println!("{}", effort.head("Samplers", what, "samplers-table", "docs/measured-samplers.md"));
     println!(
         "All laws have mean 24 and standard deviation 2; gamma and lognormal begin at 20. A draw includes its uniform word (SplitMix64); times are medians"

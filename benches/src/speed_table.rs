@@ -109,7 +109,7 @@ fn many_runs(work: Work) {
         "Runs of {seconds_a_run} simulated seconds of the mesh above that differ in their seed, as [a campaign](campaign.md) does them: {SIDE_BY_SIDE} side by side on one core, a number of"
     );
     println!(
-        "each in one register, compared with the same runs one at a time. What comes out is compared first, and is the same to the bit. Runs a second of"
+        "each in one register, compared with the same runs one at a time. The results are compared first, and are the same to the bit. Runs a second of"
     );
     println!("processor time, the median of {} rounds in which all of them alternate.\n", work.rounds);
     println!("| peers | links | one at a time | {SIDE_BY_SIDE} side by side | gain |");

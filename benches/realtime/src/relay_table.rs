@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let seconds = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(10);
     let span = Duration::from_secs(seconds);
     println!("# The relay: how late and how fast\n");
-    println!("What [`cohaptic relay`](relay.md) does on loopback. This page is written by\n");
+    println!("Lateness and speed of [`cohaptic relay`](relay.md) on loopback. This page is written by\n");
     println!("    cargo run --release -p cohaptic-benches-realtime --bin relay-table > docs/measured-relay.md\n");
     println!("and measured on: {}. Each row is a run of {seconds} s, all of them one after the other in one process, with the", machine::name());
     println!("generator and the sink in it, on the same cores. Datagrams carry {} bytes.\n", traffic::SIZE);

@@ -116,7 +116,7 @@ write are compared, and are the same to the byte."
                 "What does each method cost, and how wrong is it? Costs are measured, errors computed unless a note says otherwise; each method of a table has done the same work.
 The methods that are compared, against which reference, and how to read it: [accuracy.md](accuracy.md). In the plots, further left is cheaper, further down more exact."
             }
-            Self::Link => "What does a packet through one emulated link cost? What each stage adds: [measured-link.md](measured-link.md).",
+            Self::Link => "What does a packet through one emulated link cost? The cost of each stage: [measured-link.md](measured-link.md).",
             Self::Samplers => {
                 "What does a random delay cost, and how far is it from its law? Of each law, netem's table and the program's own draw; the ways between and what the columns
 are: [measured-samplers.md](measured-samplers.md)."

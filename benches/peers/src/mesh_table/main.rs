@@ -36,7 +36,7 @@ fn head() {
     println!("The same scenes on this project and on what others wrote, in one run. This page is written by\n");
     println!("    cd benches/peers && (cargo run --release --bin mesh-table && others/run) > ../../docs/measured-peers.md\n");
     println!("and measured on: {}. Processor time on one core, the median of {ROUNDS} rounds in which", machine());
-    println!("all alternate. What the columns leave out stands in [what the others do not model](#what-the-others-do-not-model).\n");
+    println!("all alternate. The columns leave out [what the others do not model](#what-the-others-do-not-model).\n");
 }
 
 fn mesh() {
@@ -145,7 +145,7 @@ fn links() {
         "A steady stream of 64-byte packets 1 µs apart over 10 ms, so that 10⁴ are on the way: offered, and polled when they come out, {PACKETS} of them. *Seen* is"
     );
     println!(
-        "what came out by the last packet sent, of a run with the same packets: how many, and mean and deviation of their delays. What each stage of a link costs:"
+        "what came out by the last packet sent, of a run with the same packets: how many, and mean and deviation of their delays. The cost of each stage of a link:"
     );
     println!("[measured-link.md](measured-link.md).\n");
     println!("| link | program | ns a packet | million packets/s | seen: out | delay \\[ms\\] |");

@@ -131,7 +131,7 @@ fn steady() {
         }
     }
     println!(
-        "\nAsked for is {ASKED_RATIO}× turmoil. What the test kit saves is the ticks in which nothing happens: with traffic like the paper's (3 hosts, every 8 ms) and in most programs"
+        "\nAsked for is {ASKED_RATIO}× turmoil. The test kit saves the ticks in which nothing happens: with traffic like the paper's (3 hosts, every 8 ms) and in most programs"
     );
     println!("(below) these are nearly all of them. Where each tick has datagrams, it is they that cost, with both.");
     println!(

@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let seconds = std::env::args().nth(1).map_or(Ok(10), |text| text.parse())?;
     let span = Duration::from_secs(seconds);
     println!("# Live sessions: how late\n");
-    println!("What the 1 kHz loop of [`cohaptic live`](live.md) does. This page is written by\n");
+    println!("Lateness of the 1 kHz loop of [`cohaptic live`](live.md), and its cost. This page is written by\n");
     println!("    cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md\n");
     println!("and measured on: {}. Each row is a run of {seconds} s, all of them one after the other in one process.\n", machine::name());
     loops(span)?;
@@ -100,7 +100,7 @@ fn row(name: &str, wishes: Wishes, run: &Loop) {
 fn at_the_door() -> Result<(), Box<dyn Error>> {
     println!("## Admission\n");
     println!(
-        "What it costs to decide about one datagram, and to make one ready: the median of {} rounds of {} on one thread, in processor time.",
+        "The cost to decide about one datagram, and to make one ready: the median of {} rounds of {} on one thread, in processor time.",
         admission::ROUNDS,
         admission::COUNT
     );

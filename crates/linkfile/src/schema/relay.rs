@@ -10,7 +10,7 @@ pub static ROOT: Table = Table::of(&[&[
     optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
     optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
     optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction of one pair each: its own keys are laid over those of [link]"),
-    optional("timeline", Form::List(&Form::Table(&TIMELINE)), "What changes while the relay runs"),
+    optional("timeline", Form::List(&Form::Table(&TIMELINE)), "Changes while the relay runs"),
 ]]);
 static RELAY: Table = Table::of(&[&[
     optional("title", Form::Text, "A line for people; without it the name of the file"),

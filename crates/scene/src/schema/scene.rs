@@ -30,9 +30,9 @@ pub(super) static ROOT: Table = Table::of(&[&[
     optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
     optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
     optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction of one pair each: its own keys are laid over those of [link]"),
-    optional("timeline", Form::List(&Form::Table(&TIMELINE)), "What changes while the scene runs"),
-    optional("measure", Form::Table(&MEASURE), "What a run is summed up by: numbers that are computed while it runs"),
-    optional("expect", Form::Table(&EXPECT), "What must come out: makes the scene a test for cohaptic check"),
+    optional("timeline", Form::List(&Form::Table(&TIMELINE)), "Changes while the scene runs"),
+    optional("measure", Form::Table(&MEASURE), "Numbers that sum a run up, computed while it runs"),
+    optional("expect", Form::Table(&EXPECT), "The result that must come out: makes the scene a test for cohaptic check"),
 ]]);
 
 static SCENE: Table = Table::of(&[&[

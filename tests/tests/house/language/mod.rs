@@ -11,7 +11,7 @@ use std::fs;
 
 use crate::{files, name, root};
 use markdown::{Block, Kind, blocks};
-use rules::{Finding, of_phrases, of_sentences};
+use rules::{Finding, of_phrases, of_sentences, of_subjects};
 
 /// Pages of the project, also those that programs write, but for the list of changes.
 fn pages() -> Vec<(String, String)> {
@@ -33,7 +33,14 @@ fn in_blocks(file: &str, blocks: &[Block]) -> Vec<Finding> {
 fn pages_keep_to_the_language() {
     let pages = pages();
     assert!(pages.len() > 10);
-    report(pages.iter().flat_map(|(page, text)| in_blocks(page, &blocks(text))).collect());
+    let found = pages.iter().flat_map(|(page, text)| {
+        let blocks = blocks(text);
+        // The forms of issues ask without a mark.
+        let looked_at = if page.starts_with(".github/") { &[] } else { &blocks[..] };
+        let subjects: Vec<_> = looked_at.iter().flat_map(|block| of_subjects(page, block)).collect();
+        in_blocks(page, &blocks).into_iter().chain(subjects)
+    });
+    report(found.collect());
 }
 
 #[test]

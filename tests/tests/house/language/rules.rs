@@ -166,6 +166,22 @@ pub(crate) fn of_sentences(file: &str, block: &Block) -> Vec<Finding> {
     long.map(finding).collect()
 }
 
+/// Sentences of a page that begin with "what" and ask nothing: their subject is a clause where a noun can stand.
+pub(crate) fn of_subjects(file: &str, block: &Block) -> Vec<Finding> {
+    if block.kind != Kind::Prose {
+        return Vec::new();
+    }
+    let text = block.text();
+    let begins = |start: usize| text[start..].starts_with("What ") && !is_question(&text, start);
+    let finding = |(start, _): (usize, usize)| Finding {
+        file: file.to_owned(),
+        line: block.line_at(start),
+        words: text[start..].chars().take(40).collect::<String>() + "…",
+        reason: "begin with the noun that is meant".to_owned(),
+    };
+    sentences(&text).into_iter().filter(|(start, _)| begins(*start)).map(finding).collect()
+}
+
 /// Phrases that are not used.
 pub(crate) fn of_phrases(file: &str, block: &Block) -> Vec<Finding> {
     let whole = block.text();
@@ -263,6 +279,13 @@ mod tests {
             let right = if right.starts_with("    ") { format!("\n{right}") } else { right.to_owned() };
             assert_eq!(found(&right), [""; 0], "{right}");
         }
+    }
+
+    #[test]
+    fn a_clause_as_subject_is_found() {
+        let of = |text: &str| blocks(text).iter().flat_map(|block| of_subjects("page.md", block)).map(|finding| finding.line).collect::<Vec<_>>();
+        assert_eq!(of("A link drops packets.\nIt counts. What passes\nis delivered.\n\n- What is lost, counts."), [2, 5]);
+        assert!(of("# What passes\n\nWhat passes? It says what passes. Whatever.").is_empty());
     }
 
     #[test]
