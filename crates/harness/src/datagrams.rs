@@ -54,7 +54,7 @@ impl<const A: usize> Datagrams<A> {
         Ok((handle, len))
     }
 
-    /// Stores a sample of that kind as [`Datagrams::store`] does: `numbers` has the extra numbers by the place of the receiver, or one entry for all.
+    /// Stores a sample of that kind as [`Datagrams::store`] does: `write` appends the extra numbers by the place of the receiver, or one entry for all.
     ///
     /// # Errors
     ///
@@ -65,13 +65,16 @@ impl<const A: usize> Datagrams<A> {
         axes: usize,
         kind: SampleKind,
         sample: &Sample<A>,
-        numbers: &[[f64; A]],
+        write: impl FnOnce(&mut Vec<[f64; A]>),
     ) -> Result<(Handle, usize), DecodeError> {
         let (handle, _) = self.store(copies, axes, |datagram| sample.encode(axes, datagram))?;
         let slot = handle.0.get() as usize - 1;
         if self.extras.len() <= slot {
             self.extras.resize(slot + 1, Vec::new());
         }
+        let numbers = &mut self.extras[slot];
+        numbers.clear();
+        write(numbers);
         // Encoded and read again, numbers keep their bits: all that can be refused is one that is not finite.
         let refused = (0..axes).find(|axis| numbers.iter().any(|numbers| !numbers[*axis].is_finite()));
         if let Some(axis) = refused {
@@ -79,9 +82,6 @@ impl<const A: usize> Datagrams<A> {
             self.release(handle);
             return Err(DecodeError::NotFinite { axis, quantity: "extra number" });
         }
-        let stored = &mut self.extras[slot];
-        stored.clear();
-        stored.extend_from_slice(numbers);
         Ok((handle, kind.datagram_len(axes)))
     }
 

@@ -93,7 +93,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         let stored = if self.kind == SampleKind::State {
             self.datagrams.store(copies, self.axes, |bytes| sample.encode(self.axes, bytes))
         } else {
-            self.datagrams.store_extended(copies, self.axes, self.kind, &sample, &[extra.numbers])
+            self.datagrams.store_extended(copies, self.axes, self.kind, &sample, |numbers| numbers.push(extra.numbers))
         };
         let (handle, len) = stored.expect("what was decoded can be decoded again");
         let (info, from) = (PacketInfo { size: Bytes::new(len as u64), ecn_capable: true }, NodeId::new(place));

@@ -35,8 +35,6 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     send_when: Option<SendWhen>,
     /// Up to which age receivers extrapolate samples \[s\], if they do.
     horizon: Option<f64>,
-    /// The extra numbers of the sample that is sent.
-    numbers: Vec<[f64; A]>,
     schedule: Schedule,
     /// The changes to come, the next one last.
     changes: Vec<Change>,
@@ -148,7 +146,6 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             members,
             network: network(scene, plan),
             datagrams: Datagrams::default(),
-            numbers: Vec::new(),
             schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock).enumerate()),
             changes: scene.timeline.iter().rev().cloned().collect(),
             coordination_factor: scene.coordination_factor(),
@@ -320,17 +317,19 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         let peer = &mut self.members[from].peer;
         let others = self.names.len() - 1;
         let sample = peer.next_sample(local_time);
-        self.numbers.clear();
-        if self.kind.is_personal() {
-            self.numbers.extend((0..others).map(|other| peer.extra(other)));
-            self.numbers.insert(from, [0.0; A]);
-        } else {
-            self.numbers.push(peer.extra(0));
-        }
-        peer.all_sent();
-        let role = peer.role();
+        let (role, kind) = (peer.role(), self.kind);
         let copies = if role == Role::Copy { others } else { 1 };
-        let Ok((handle, len)) = self.datagrams.store_extended(copies, self.axes, self.kind, &sample, &self.numbers) else {
+        let write = |numbers: &mut Vec<[f64; A]>| {
+            if kind.is_personal() {
+                numbers.extend((0..from).map(|other| peer.extra(other)));
+                numbers.push([0.0; A]);
+                numbers.extend((from..others).map(|other| peer.extra(other)));
+            } else {
+                numbers.push(peer.extra(0));
+            }
+            peer.all_sent();
+        };
+        let Ok((handle, len)) = self.datagrams.store_extended(copies, self.axes, kind, &sample, write) else {
             // The states are finite, or the run had ended, but a number made of them is not.
             self.finite = false;
             return None;

@@ -7,7 +7,6 @@
 //!
 //! All is counted at events: what a line has received since the last sample is its wave times the ticks it acted.
 
-use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
 use super::session::{ControllerKind, SessionParameters};
@@ -18,35 +17,40 @@ use crate::{Gains, Held, State};
 /// The words of `on-loss`, and what they mean.
 const ON_LOSS: &[(&str, &str)] = &[("zero", "no wave"), ("hold", "the last wave, which is not passive")];
 const HOLD: usize = 1;
+const NEVER: u64 = u64::MAX;
 
 /// The junction of a copy.
 #[derive(Clone, Debug)]
 pub struct Wave<const A: usize> {
     /// ρ [√(N·s/m)].
     root: f64,
-    /// M, and M·h \[s\].
+    /// M, and 1/M.
     every: u64,
-    period: f64,
+    share: f64,
+    /// ρ/(M·h), the wave of a motion of a metre in the ticks between samples [√W/m].
+    rate: f64,
     /// Whether a wave goes on when its ticks are over.
     holds: bool,
-    lines: Vec<Line>,
+    /// The ticks of each line: with 50 peers it pays that both of a line lie side by side.
+    ticks: Vec<Ticks>,
+    /// No wave ends before this tick.
+    next_end: u64,
     /// Where the copy was at the last sample.
     sampled: [f64; A],
-    /// All of them waves: ρ/(M·h)·`sampled`; then for each line sⱼ, and the sum of sⱼ over the ticks from the last sample to [`Line::since`].
+    /// All of them waves: ρ/(M·h)·`sampled`; then for each line sⱼ, and the sum of sⱼ over the ticks from the last sample to [`Ticks::since`].
     numbers: Vec<[f64; A]>,
     /// Σ sⱼ.
     sum: [f64; A],
-    /// The waves that end, with the tick of their end, in order.
-    ends: VecDeque<(u64, usize)>,
     /// The tick whose command comes next.
     tick: u64,
 }
 
 /// The ticks of a line, as seen from one of its ends.
 #[derive(Clone, Copy, Debug)]
-struct Line {
+struct Ticks {
+    /// Up to which tick its waves are counted.
     since: u64,
-    /// The tick at which sⱼ ends.
+    /// At which tick sⱼ ends: never, if it is 0 or held.
     end: u64,
 }
 
@@ -87,16 +91,19 @@ impl<const A: usize> ControllerKind<A> for Wave<A> {
     #[expect(clippy::cast_precision_loss, reason = "ticks are counted, far below 2^53")]
     fn new(session: &SessionParameters<A>) -> Self {
         let others = session.initial.len() - 1;
+        let root = libm::sqrt(2.0 * Self::damping(&session.law) / session.others());
+        let every = session.samples_every as f64;
         let mut wave = Self {
-            root: libm::sqrt(2.0 * Self::damping(&session.law) / session.others()),
+            root,
             every: session.samples_every,
-            period: session.samples_every as f64 * session.law.tick.as_secs_f64(),
+            share: 1.0 / every,
+            rate: root / (every * session.law.tick.as_secs_f64()),
             holds: session.law.own.get(1) == LawValue::Word(HOLD),
-            lines: alloc::vec![Line { since: 0, end: 0 }; others],
+            ticks: alloc::vec![Ticks { since: 0, end: NEVER }; others],
+            next_end: NEVER,
             sampled: [0.0; A],
             numbers: alloc::vec![[0.0; A]; 1 + 2 * others],
             sum: [0.0; A],
-            ends: VecDeque::new(),
             tick: 0,
         };
         wave.sample(&session.initial[session.place].position);
@@ -105,24 +112,34 @@ impl<const A: usize> ControllerKind<A> for Wave<A> {
 }
 
 impl<const A: usize> Wave<A> {
-    /// Ends the waves whose ticks are over.
+    /// Ends the waves whose ticks are over. Lines are looked at when a wave was to end, which is mostly replaced by then.
+    #[inline]
     fn end_waves(&mut self) {
-        while let Some(&(end, other)) = self.ends.front().filter(|(end, _)| *end <= self.tick) {
-            self.ends.pop_front();
-            if self.lines[other].end == end {
-                self.count_to(other, end);
-                let wave = &mut self.numbers[wave_of(other)];
-                for (sum, wave) in self.sum.iter_mut().zip(wave) {
-                    *sum -= *wave;
-                    *wave = 0.0;
-                }
+        if self.tick >= self.next_end {
+            self.end_due();
+        }
+    }
+
+    fn end_due(&mut self) {
+        self.next_end = NEVER;
+        for other in 0..self.ticks.len() {
+            let end = self.ticks[other].end;
+            if end > self.tick {
+                self.next_end = self.next_end.min(end);
+                continue;
             }
+            self.count_to(other, end);
+            let wave = core::mem::replace(&mut self.numbers[wave_of(other)], [0.0; A]);
+            for (sum, wave) in self.sum.iter_mut().zip(wave) {
+                *sum -= wave;
+            }
+            self.ticks[other].end = NEVER;
         }
     }
 
     #[expect(clippy::cast_precision_loss, reason = "ticks are counted, far below 2^53")]
     fn count_to(&mut self, other: usize, tick: u64) {
-        let ticks = (tick - core::mem::replace(&mut self.lines[other].since, tick)) as f64;
+        let ticks = (tick - core::mem::replace(&mut self.ticks[other].since, tick)) as f64;
         for axis in 0..A {
             self.numbers[received_of(other)][axis] += ticks * self.numbers[wave_of(other)][axis];
         }
@@ -130,13 +147,13 @@ impl<const A: usize> Wave<A> {
 
     fn sample(&mut self, position: &[f64; A]) {
         self.sampled = *position;
-        self.numbers[0] = position.map(|position| self.root * position / self.period);
+        self.numbers[0] = position.map(|position| self.rate * position);
     }
 
     /// Adds the waves up anew.
     fn add_up(&mut self) {
         self.sum = [0.0; A];
-        for other in 0..self.lines.len() {
+        for other in 0..self.ticks.len() {
             for (sum, wave) in self.sum.iter_mut().zip(self.numbers[wave_of(other)]) {
                 *sum += wave;
             }
@@ -156,13 +173,11 @@ impl<const A: usize> Strategy<A> for Wave<A> {
         Self::KIND
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "ticks are counted, far below 2^53")]
     fn extra(&mut self, receiver: usize, own: &State<A>, _held: &Held<A>) -> [f64; A] {
         self.end_waves();
         self.count_to(receiver, self.tick);
         let received = core::mem::replace(&mut self.numbers[received_of(receiver)], [0.0; A]);
-        let moved = |axis: usize| own.position[axis] - self.sampled[axis];
-        core::array::from_fn(|axis| self.root * moved(axis) / self.period - received[axis] / self.every as f64)
+        core::array::from_fn(|axis| self.rate * (own.position[axis] - self.sampled[axis]) - self.share * received[axis])
     }
 
     fn sent(&mut self, own: &State<A>) {
@@ -180,8 +195,8 @@ impl<const A: usize> Strategy<A> for Wave<A> {
         *wave = *numbers;
         if !self.holds {
             let end = self.tick + self.every;
-            self.lines[other].end = end;
-            self.ends.push_back((end, other));
+            self.ticks[other].end = end;
+            self.next_end = self.next_end.min(end);
         }
     }
 
@@ -195,7 +210,7 @@ impl<const A: usize> Strategy<A> for Wave<A> {
     /// Waves that were in use keep the ticks that are left to them.
     fn set_memory(&mut self, memory: &[f64]) {
         self.numbers.as_flattened_mut().copy_from_slice(memory);
-        self.sampled = self.numbers[0].map(|wave| wave * self.period / self.root);
+        self.sampled = self.numbers[0].map(|wave| wave / self.rate);
         self.add_up();
     }
 }
