@@ -6,12 +6,11 @@ use cohaptic_peer::Contact;
 use cohaptic_scene::{FromScene, Scene, Strategies};
 
 use crate::cost::eigenvalue_operations;
-use crate::full::{Trust, full};
+use crate::full::{Trust, full_along};
 use crate::network::NominalNetwork;
 use crate::parts::{Part, radius_of, reduced};
 use crate::spectrum::bounded_radius;
 use crate::structure::{Contacts, Structure, linear_law};
-use crate::unseen::felt;
 use crate::{AnalysisError, Radius, Unwatched, Verdict, Watch};
 
 /// How a verdict is reached.
@@ -44,7 +43,7 @@ impl Method {
 pub struct Analysis {
     /// The largest radius of all modes of contact, the rigid-body modes left out.
     pub radius: Radius,
-    /// How many rigid-body modes were removed: displacements of everything together, and of each device that touches nothing, per axis. Of the mode of
+    /// How many rigid-body modes were removed: displacements of everything together (with waves of each copy by itself), and of each device that touches nothing, per axis. Of the mode of
     /// contact with the largest radius.
     pub rigid_modes: usize,
     /// How many states are left: of bodies, of forces that wait to be applied, and of samples that are held or in flight.
@@ -205,26 +204,13 @@ fn push_through(
     let modes = combinations.iter().filter(|combination| !combination.contacts.at_wall).map(|combination| {
         let contacts = &combination.contacts;
         // With one-sided contacts every axis has combinations of its own.
-        let map = match combination.axes {
-            1 => full::<1, _>(scene, &network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
-            2 => full::<2, _>(scene, &network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
-            _ => full::<3, _>(scene, &network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
-        }?;
-        let (matrix, rounded) = match &map.forces {
-            Some(forces) => felt(&map.monodromy, forces, &map.states),
-            None => (map.monodromy, 0.0),
-        };
-        let radius = bounded_radius(&matrix, map.error + rounded);
+        let map = full_along(combination.axes, scene, &network, contacts, trust, watch, strategies)?;
+        let (rigid_modes, frame) = (map.rigid_modes, map.frame);
+        let (matrix, error) = map.felt();
+        let radius = bounded_radius(&matrix, error);
         watch.done(eigenvalue_operations(matrix.rows()));
         let part = Part::whole(radius, matrix.rows());
-        Ok(ContactMode {
-            contacts: combination.words.clone(),
-            radius,
-            parts: vec![part],
-            rigid_modes: map.rigid_modes,
-            dimension: matrix.rows(),
-            frame: map.frame,
-        })
+        Ok(ContactMode { contacts: combination.words.clone(), radius, parts: vec![part], rigid_modes, dimension: matrix.rows(), frame })
     });
     let mut analysis = combine(modes.collect::<Result<_, AnalysisError>>()?, Method::Full, &network, scene);
     if scene.object.enclosure.is_some() {

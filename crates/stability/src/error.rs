@@ -42,7 +42,7 @@ pub enum AnalysisError {
         /// Its name.
         strategy: &'static str,
     },
-    /// The strategy exchanges more than states, or is not linear.
+    /// The strategy is not linear.
     #[error("{strategy} coordination has no analysis: simulations tell whether it is stable, as in `cohaptic check` and `cohaptic run`")]
     NoAnalysis {
         /// Its name.

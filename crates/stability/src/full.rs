@@ -10,7 +10,7 @@ use std::time::Duration;
 use cohaptic_peer::coordination::Role;
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Acting, Contact, Device as _, Gains, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State, Strategy};
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Scene, Strategies};
 use cohaptic_units::Instant;
 
 use crate::cost::{full_operations, pushed_operations};
@@ -19,6 +19,7 @@ use crate::lifted::{Body, Lifted, Node, closer_of};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::structure::{Contacts, Structure, common_time, count, has_equal_clocks, linear_law};
 use crate::timetable::{Event, Instants, NodeClock, Timetable, UseOfHeld};
+use crate::unseen::felt;
 use crate::{AnalysisError, Matrix, StateKind, StateName, Watch};
 
 /// What the general path finds: the matrix of one frame in relative coordinates.
@@ -39,6 +40,15 @@ pub(crate) struct FullMap {
     pub(crate) forces: Option<Matrix>,
 }
 
+impl FullMap {
+    /// The part of the matrix that bodies feel, and the bound of the error of its entries.
+    pub(crate) fn felt(self) -> (Matrix, f64) {
+        let Some(forces) = &self.forces else { return (self.monodromy, self.error) };
+        let (felt, rounded) = felt(&self.monodromy, forces, &self.states);
+        (felt, self.error + rounded)
+    }
+}
+
 /// The facts about a strategy that are known before anything is pushed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Trust {
@@ -48,8 +58,25 @@ pub(crate) enum Trust {
     Nothing,
 }
 
+/// [`full`] along that many axes.
+pub(crate) fn full_along(
+    axes: usize,
+    scene: &Scene,
+    network: &NominalNetwork,
+    contacts: &Contacts,
+    trust: Trust,
+    watch: &dyn Watch,
+    strategies: &impl Strategies,
+) -> Result<FullMap, AnalysisError> {
+    match axes {
+        1 => full::<1, _>(scene, network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
+        2 => full::<2, _>(scene, network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
+        _ => full::<3, _>(scene, network, contacts, trust, watch, |peer| strategies.strategy(scene, peer)),
+    }
+}
+
 /// Pushes every unit vector through a frame of the scene, along A axes.
-pub(crate) fn full<const A: usize, S: Strategy<A>>(
+fn full<const A: usize, S: Strategy<A>>(
     scene: &Scene,
     network: &NominalNetwork,
     contacts: &Contacts,

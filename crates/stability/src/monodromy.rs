@@ -6,7 +6,7 @@ use std::time::Duration;
 use cohaptic_scene::{FromScene, Scene, Strategies};
 
 use crate::analysis::combinations;
-use crate::full::{FullMap, Trust, full};
+use crate::full::{FullMap, Trust, full_along};
 use crate::network::NominalNetwork;
 use crate::{AnalysisError, Matrix, Unwatched};
 
@@ -132,11 +132,7 @@ fn pushed(scene: &Scene, trust: Trust, strategies: &impl Strategies) -> Result<M
     let (Some(combination), None) = (linear.next(), linear.next()) else {
         return Err(AnalysisError::SeveralModes);
     };
-    let contacts = &combination.contacts;
-    let FullMap { monodromy, error, rigid_modes, frame, states, time, relative, forces: _ } = match combination.axes {
-        1 => full::<1, _>(scene, &network, contacts, trust, &Unwatched, |peer| strategies.strategy(scene, peer)),
-        2 => full::<2, _>(scene, &network, contacts, trust, &Unwatched, |peer| strategies.strategy(scene, peer)),
-        _ => full::<3, _>(scene, &network, contacts, trust, &Unwatched, |peer| strategies.strategy(scene, peer)),
-    }?;
+    let map = full_along(combination.axes, scene, &network, &combination.contacts, trust, &Unwatched, strategies)?;
+    let FullMap { monodromy, error, rigid_modes, frame, states, time, relative, forces: _ } = map;
     Ok(Monodromy { matrix: monodromy, states, frame, time, rigid_modes, error, relative })
 }

@@ -2,20 +2,109 @@
 
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::{Gains, Plant};
-use cohaptic_scene::Scene;
+use cohaptic_scene::{FromScene, Scene};
 
+use crate::analysis::{Combination, combinations};
+use crate::full::{FullMap, Trust, full_along};
 use crate::lifted::{Autonomous, Body, Lifted, Node};
 use crate::mean_square::{EqualScratch, Followed};
 use crate::network::NominalNetwork;
 use crate::parts::loose_device;
 use crate::spectrum::Workspace;
 use crate::stack_frame::{StackFrame, StackNode};
-use crate::structure::{Contacts, Structure};
-use crate::{AnalysisError, Matrix, Radius};
+use crate::structure::{Contacts, Structure, linear_law};
+use crate::{AnalysisError, Matrix, Radius, Unwatched};
 
 /// What about a linear scene does not change with its numbers.
+#[derive(Debug)]
+pub(crate) enum SceneRadius {
+    /// Its strategy is a law.
+    Parts(Box<PartsRadius>),
+    /// Only the general path follows it.
+    Whole(WholeRadius),
+}
+
+impl SceneRadius {
+    /// For scenes that differ in numbers only. Whether an arm ties the object to ground may differ too.
+    fn new(scenes: &[&Scene], network: &NominalNetwork, combination: &Combination) -> Result<Self, AnalysisError> {
+        if linear_law(scenes[0], 0).is_some() {
+            return Ok(Self::Parts(Box::new(PartsRadius::new(scenes, network, &combination.contacts)?)));
+        }
+        WholeRadius::new(scenes[0], network, combination).map(Self::Whole)
+    }
+
+    /// How the second moment is followed; an error says why it is not.
+    pub(crate) const fn followed(&self) -> Result<&Followed, &AnalysisError> {
+        match self {
+            Self::Parts(parts) => parts.followed.as_ref(),
+            Self::Whole(whole) => Err(&whole.unfollowed),
+        }
+    }
+
+    /// The classes, by their members.
+    pub(crate) fn classes(&self) -> &[Vec<usize>] {
+        match self {
+            Self::Parts(parts) => &parts.structure.classes,
+            Self::Whole(whole) => &whole.classes,
+        }
+    }
+
+    /// The largest radius of all parts. Without `BOUND` its error is zero and means nothing.
+    pub(crate) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Radius {
+        match self {
+            Self::Parts(parts) => parts.radius::<BOUND>(scene, scratch),
+            Self::Whole(whole) => whole.radius::<BOUND>(scene, &mut scratch.workspace),
+        }
+    }
+
+    /// The radius of the second moment over a frame, without a bound of its error; `None` if it is not followed here, or the numbers leave their range.
+    pub(crate) fn mean_square(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Option<f64> {
+        match self {
+            Self::Parts(parts) => parts.mean_square(scene, scratch),
+            Self::Whole(_) => None,
+        }
+    }
+}
+
+/// A scene that the general path follows, for each of its numbers anew.
+#[derive(Debug)]
+pub(crate) struct WholeRadius {
+    network: NominalNetwork,
+    contacts: Contacts,
+    axes: usize,
+    /// Every peer by itself.
+    classes: Vec<Vec<usize>>,
+    unfollowed: AnalysisError,
+}
+
+impl WholeRadius {
+    fn new(scene: &Scene, network: &NominalNetwork, combination: &Combination) -> Result<Self, AnalysisError> {
+        let whole = Self {
+            network: network.clone(),
+            contacts: combination.contacts.clone(),
+            axes: combination.axes,
+            classes: (0..scene.peers.len()).map(|peer| vec![peer]).collect(),
+            unfollowed: AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() },
+        };
+        // What is refused is refused for all numbers.
+        whole.map(scene)?;
+        Ok(whole)
+    }
+
+    fn map(&self, scene: &Scene) -> Result<FullMap, AnalysisError> {
+        full_along(self.axes, scene, &self.network, &self.contacts, Trust::Linear, &Unwatched, &FromScene)
+    }
+
+    fn radius<const BOUND: bool>(&self, scene: &Scene, workspace: &mut Workspace) -> Radius {
+        let Ok(map) = self.map(scene) else { return Radius::UNKNOWN };
+        let (matrix, error) = map.felt();
+        if BOUND { workspace.bounded_radius(&matrix, error) } else { Radius { value: workspace.radius(&matrix), error: 0.0 } }
+    }
+}
+
+/// What about a scene that is taken apart does not change with its numbers.
 #[derive(Clone, Debug)]
-pub(crate) struct SceneRadius {
+pub(crate) struct PartsRadius {
     structure: Structure,
     /// Whether something other than an arm ties the object to ground.
     tied: bool,
@@ -65,9 +154,8 @@ impl RadiusScratch {
     }
 }
 
-impl SceneRadius {
-    /// For scenes that differ in numbers only. Whether an arm ties the object to ground may differ too.
-    pub(crate) fn new(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
+impl PartsRadius {
+    fn new(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
         // Without arms, to see what else ties.
         let mut armless = scenes[0].clone();
         for spec in &mut armless.peers {
@@ -88,18 +176,7 @@ impl SceneRadius {
         Ok(Self { tied: structure.tied, together, apart, difference, followed, structure })
     }
 
-    /// How the second moment is followed; an error says why it is not.
-    pub(crate) const fn followed(&self) -> &Result<Followed, AnalysisError> {
-        &self.followed
-    }
-
-    /// The classes, by their members.
-    pub(crate) fn classes(&self) -> &[Vec<usize>] {
-        &self.structure.classes
-    }
-
-    /// The largest radius of all parts. Without `BOUND` its error is zero and means nothing.
-    pub(crate) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Radius {
+    fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Radius {
         self.refresh(scene, scratch);
         let RadiusScratch { nodes, bodies, together, apart, workspace, .. } = scratch;
         let structure = &self.structure;
@@ -118,8 +195,7 @@ impl SceneRadius {
         worst
     }
 
-    /// The radius of the second moment over a frame, without a bound of its error; `None` if it is not followed here, or the numbers leave their range.
-    pub(crate) fn mean_square(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Option<f64> {
+    fn mean_square(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Option<f64> {
         let square = |this: &Self, scratch: &mut RadiusScratch| this.radius::<false>(scene, scratch).value.powi(2);
         let Ok(Followed::Equal { frame, held }) = &self.followed else {
             return matches!(self.followed, Ok(Followed::Certain)).then(|| square(self, scratch));
@@ -216,6 +292,9 @@ fn part<const BOUND: bool>(stack: Option<&StackFrame>, lifted: &Lifted<'_>, matr
 /// The linear scenes that a scene falls into, one for each combination of contacts.
 pub(crate) fn scene_radii(scenes: &[&Scene]) -> Result<Vec<SceneRadius>, AnalysisError> {
     let network = NominalNetwork::of(scenes[0])?;
-    let combinations = crate::analysis::combinations(scenes[0])?;
-    combinations.iter().map(|combination| SceneRadius::new(scenes, &network, &combination.contacts)).collect()
+    let combinations = combinations(scenes[0])?;
+    // The general path leaves walls out.
+    let is_law = linear_law(scenes[0], 0).is_some();
+    let followed = combinations.iter().filter(|combination| is_law || !combination.contacts.at_wall);
+    followed.map(|combination| SceneRadius::new(scenes, &network, combination)).collect()
 }

@@ -51,6 +51,25 @@ fn agrees_everywhere(family: &Family, learned: &[bool]) {
     }
 }
 
+/// What only the general path follows is pushed through it for each of the values.
+#[test]
+fn waves_and_servers_are_families_too() {
+    let mut scratch = FamilyScratch::default();
+    for (strategy, keys) in [
+        ("wave", ["coordination.wave.impedance=1..60", "object.mass=0.1..1"]),
+        ("client-server", ["peer.coupling.stiffness=0..4000", "link.delay=0ms..20ms"]),
+    ] {
+        let family = family(&[&format!("coordination.strategy={strategy}")], &keys);
+        for share in [0.0, 0.25, 0.75] {
+            let values: Vec<f64> = family.keys().iter().map(|range| range.low + share * (range.high - range.low)).collect();
+            agrees(&family, &values, &mut scratch);
+        }
+    }
+    let random = family(&["coordination.strategy=wave", "link.loss=0.1"], &["object.mass=0.1..1"]);
+    assert!(random.radius(&[0.4], &mut scratch).unwrap().is_nominal);
+    assert!(try_family(&["coordination.strategy=passivity-control"], &[STIFFNESS]).is_err());
+}
+
 const STIFFNESS: &str = "coordination.stiffness=0..6000";
 const ARMED: &str = "peer.hand={ arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } }";
 
