@@ -97,7 +97,7 @@ impl Page {
             let date = machine::last_change(page).map_or_else(String::new, |date| format!(", last written {date}"));
             let _ = writeln!(text, "\n[{page}]({page}): {says}{date}.\n\n    {command}");
         }
-        text += "\n[measured-router.md](measured-router.md): how late the router and how fast. It needs root, and names its command.\n";
+        text += "\n[measured-router.md](measured-router.md): how late the router and how fast. It needs root, and its figures are copied from the output of the command that it names.\n";
         text
     }
 }
