@@ -81,7 +81,7 @@ impl Gain {
             .map(|state| {
                 let PerTick { device_position, device_velocity, copy_position, copy_velocity } = per_tick[state.peer];
                 // What is relative errs with what it is relative to.
-                let reference = |axis: usize| if relative[axis] { per_tick[0].copy_position } else { 0.0 };
+                let reference = |axis: usize| relative[state.peer][axis].map_or(0.0, |copy| per_tick[copy].copy_position);
                 match state.kind {
                     StateKind::DevicePosition { axis } => device_position + reference(axis),
                     StateKind::DeviceVelocity { .. } => device_velocity * time,
