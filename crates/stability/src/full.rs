@@ -58,7 +58,7 @@ pub(crate) enum Trust {
     Nothing,
 }
 
-/// [`full`] along that many axes.
+/// [`full`] along this number of axes.
 pub(crate) fn full_along(
     axes: usize,
     scene: &Scene,

@@ -86,7 +86,7 @@ impl WholeRadius {
             classes: (0..scene.peers.len()).map(|peer| vec![peer]).collect(),
             unfollowed: AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() },
         };
-        // What is refused is refused for all numbers.
+        // A scene that is refused is refused for all its numbers.
         whole.map(scene)?;
         Ok(whole)
     }

@@ -80,7 +80,7 @@ proptest! {
     #[test]
     fn waves_move_bodies_as_the_matrix_says(mut draft in linear()) {
         let matrix = monodromy(&draft.scene()).unwrap();
-        draft.duration = (matrix.frame.as_millis() as u64 + 1) * (FRAMES as u64 + 1);
+        draft.duration = (u64::try_from(matrix.frame.as_millis()).unwrap() + 1) * (FRAMES as u64 + 1);
         let log = run(&draft.scene(), Model::Least);
         let largest_row = (0..matrix.matrix.rows()).map(|row| matrix.matrix.row(row).iter().map(|entry| entry.abs()).sum::<f64>()).fold(0.0, f64::max);
         // No wave is on its way.

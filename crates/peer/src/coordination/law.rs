@@ -175,6 +175,16 @@ impl LawForm {
         }
     }
 
+    /// The form of values that are no `"auto"`.
+    #[must_use]
+    pub const fn without_automatic(self) -> Self {
+        match self {
+            Self::AutomaticDuration => Self::Duration,
+            Self::AutomaticDamping => Self::Damping,
+            Self::Duration | Self::Damping | Self::Impedance | Self::Energy | Self::Words(_) | Self::Peer => self,
+        }
+    }
+
     /// The word at that place; empty where values are no words.
     #[must_use]
     pub const fn word(self, place: usize) -> &'static str {

@@ -140,7 +140,9 @@ macro_rules! law_tables {
                 while place < parameters.len() {
                     let LawParameter { key, form, default, about, can_change } = parameters[place];
                     if !$changing || can_change {
-                        keys[law][count] = if $changing || default.is_empty() {
+                        keys[law][count] = if $changing {
+                            optional(key, form_of(form.without_automatic()), "From then on")
+                        } else if default.is_empty() {
                             optional(key, form_of(form), about)
                         } else {
                             usual(key, form_of(form), default, about)
@@ -185,8 +187,8 @@ macro_rules! law_tables {
         };
     };
 }
-law_tables!(false, "Parameters that this strategy alone has", LAW_KEYS, LAW_GROUPS, LAW_TABLES, LAWS);
-law_tables!(true, "Of this strategy: what changes", CHANGING_KEYS, CHANGING_GROUPS, CHANGING_TABLES, CHANGING_LAWS);
+law_tables!(false, "Own parameters", LAW_KEYS, LAW_GROUPS, LAW_TABLES, LAWS);
+law_tables!(true, "Own parameters", CHANGING_KEYS, CHANGING_GROUPS, CHANGING_TABLES, CHANGING_LAWS);
 
 const SCALINGS: [(&str, &str); 2] = [("none", "as they are written"), ("inverse-n", "times 4(N-1)/N^2 among N peers; of a coupling times 2/N")];
 

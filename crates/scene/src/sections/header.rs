@@ -155,12 +155,11 @@ fn read_changes(node: &Node, law: Coordination, changes: &mut Vec<ParameterChang
 }
 
 fn read_change(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawValue> {
-    let value = read_value(form, node, context)?;
-    if value == LawValue::Automatic {
+    if form != form.without_automatic() && node.as_text() == Some("auto") {
         context.fault_at(node, "\"auto\" is computed once, from the links at the beginning: expected a value");
         return None;
     }
-    Some(value)
+    read_value(form.without_automatic(), node, context)
 }
 
 fn read_value(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawValue> {

@@ -26,12 +26,12 @@ pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
     changed: Changed,
 }
 
-/// From whom a sample has arrived since the means were computed.
+/// The senders whose samples have arrived since the means were computed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Changed {
     Nothing,
     From(usize),
-    /// From several, or nothing was computed yet.
+    /// Several, or nothing was computed yet.
     More,
 }
 
