@@ -21,7 +21,7 @@ pub(crate) enum SceneRadius {
     /// Its strategy is a law.
     Parts(Box<PartsRadius>),
     /// Only the general path follows it.
-    Whole(WholeRadius),
+    Whole(Box<WholeRadius>),
 }
 
 impl SceneRadius {
@@ -30,7 +30,7 @@ impl SceneRadius {
         if linear_law(scenes[0], 0).is_some() {
             return Ok(Self::Parts(Box::new(PartsRadius::new(scenes, network, &combination.contacts)?)));
         }
-        WholeRadius::new(scenes[0], network, combination).map(Self::Whole)
+        WholeRadius::new(scenes[0], network, combination).map(|whole| Self::Whole(Box::new(whole)))
     }
 
     /// How the second moment is followed; an error says why it is not.
@@ -86,7 +86,7 @@ impl WholeRadius {
             classes: (0..scene.peers.len()).map(|peer| vec![peer]).collect(),
             unfollowed: AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() },
         };
-        // What is refused is refused for all numbers.
+        // A refusal holds for all numbers.
         whole.map(scene)?;
         Ok(whole)
     }

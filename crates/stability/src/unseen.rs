@@ -2,14 +2,14 @@
 //!
 //! Three copies or more can get waves whose forces add up to nothing: (1, −1) at the first, (1, −1) at the second, (1, −1) at the third, around and around.
 //! Such a motion of the waves lasts forever over links that lose nothing, no body feels it, and from waves at zero none arises. So it is no part of how
-//! the scene moves, and its eigenvalues, of modulus 1, say nothing of stability. What is left is the largest quotient in which every state is felt.
+//! the scene moves, and its eigenvalues, of modulus 1, say nothing of stability. The analysis keeps the largest quotient in which every state is felt.
 
 use faer::{Mat, MatRef};
 
 use crate::{Matrix, StateKind, StateName};
 
-/// Below this, relative to the largest entry, a singular value counts as zero: far above rounding, and far below the parts of a wave that ticks are. What is
-/// taken for zero is in the error.
+/// Below this, relative to the largest entry, a singular value counts as zero: far above rounding, and far below the share of one tick in a
+/// wave. The error covers values that are taken for zero.
 const NOTHING: f64 = 1e-9;
 
 /// The part of a matrix in which every state is felt by a body, and what this adds to the error of its entries. `forces`: what the states add to the
@@ -37,7 +37,7 @@ pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (M
         if inside.ncols() == unfelt.ncols() {
             let other = null_space(unfelt.transpose(), 1.0);
             let quotient = other.transpose() * &whole * &other;
-            // The rounding of the products, and what is left of the subspace outside of itself.
+            // The rounding of the products, and the part of the reached vectors that is outside of the subspace.
             let error = f64::EPSILON * crate::structure::count(size) * matrix.frobenius_norm() + outside.norm_l2();
             return (Matrix::from_fn(quotient.nrows(), quotient.ncols(), |row, column| quotient[(row, column)]), error);
         }

@@ -90,7 +90,7 @@ impl Settling {
     /// |z| at the beginning of a frame, from the motions of every peer, tick by tick. What was sent in the frames before must have been what is held and on the way.
     pub(crate) fn size(&self, draft: &Draft, motions: &[Vec<Motion>], frame: usize) -> f64 {
         let start = frame * self.ticks();
-        let reference = if self.monodromy.relative[0] { motions[0][start].object.0 } else { 0.0 };
+        let reference = if self.monodromy.relative[0][0].is_some() { motions[0][start].object.0 } else { 0.0 };
         let time = self.monodromy.time;
         let sample = |peer: usize, age: usize| {
             let every = (draft.update / 1000) as usize;
