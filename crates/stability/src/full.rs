@@ -3,6 +3,7 @@
 //! Real [`Peer`]s with real strategies are put into a state, stepped through one frame of the timetable, and looked at. Whatever strategy they run is
 //! analysed so, as long as it is linear; one that is not, or that depends on more than it shows, is found out and refused.
 
+mod layout;
 mod rigid;
 
 use std::time::Duration;
@@ -13,6 +14,7 @@ use cohaptic_peer::{Acting, Contact, Device as _, Gains, Hand, Held, ObjectCopy,
 use cohaptic_scene::{Scene, Strategies};
 use cohaptic_units::Instant;
 
+use self::layout::Layout;
 use crate::cost::{full_operations, pushed_operations};
 use crate::lifted::majorant::error_of;
 use crate::lifted::{Body, Lifted, Node, closer_of};
@@ -20,7 +22,7 @@ use crate::network::{LinkTiming, NominalNetwork};
 use crate::structure::{Contacts, Structure, common_time, count, has_equal_clocks, linear_law};
 use crate::timetable::{Event, Instants, NodeClock, Timetable, UseOfHeld};
 use crate::unseen::felt;
-use crate::{AnalysisError, Matrix, StateKind, StateName, Watch};
+use crate::{AnalysisError, Matrix, StateName, Watch};
 
 /// What the general path finds: the matrix of one frame in relative coordinates.
 #[derive(Clone, PartialEq, Debug)]
@@ -145,24 +147,6 @@ struct Pusher<const A: usize, S> {
     commanded: Vec<f64>,
     /// The largest number seen on the way of the unit vectors, for the bound of errors.
     growth: f64,
-}
-
-/// Where the states of each peer begin, and what they are.
-struct Layout {
-    first: Vec<usize>,
-    touching: Vec<bool>,
-    memory: Vec<usize>,
-    pending: Vec<bool>,
-    /// Where the samples of earlier frames of each peer begin, the newest first.
-    samples: Vec<usize>,
-    /// How many receivers have extra numbers in a sample, and whether those are waves.
-    receivers: usize,
-    has_waves: bool,
-    size: usize,
-    /// States that nothing depends on and that drift with everything else: positions of devices that touch nothing.
-    loose: Vec<usize>,
-    /// For each peer, whether something ties its copy to ground.
-    tied: Vec<bool>,
 }
 
 impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
@@ -449,91 +433,6 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 *entry = extra * self.extra[place];
             }
         }
-    }
-}
-
-impl Layout {
-    fn new<const A: usize, S: Strategy<A>>(
-        scene: &Scene,
-        contacts: &Contacts,
-        members: &[Member<A, S>],
-        timetable: &Timetable,
-        tied: Vec<bool>,
-    ) -> Self {
-        let mut layout = Self {
-            first: Vec::new(),
-            touching: contacts.touching.clone(),
-            memory: Vec::new(),
-            pending: Vec::new(),
-            samples: Vec::new(),
-            receivers: if members.iter().any(|member| member.kind().is_personal()) { members.len() - 1 } else { 0 },
-            has_waves: members.iter().any(|member| member.kind() == SampleKind::Wave),
-            size: 0,
-            loose: Vec::new(),
-            tied,
-        };
-        for (place, member) in members.iter().enumerate() {
-            let (pending, memory) = (scene.peers[place].compute_delay, member.strategy().memory().len());
-            layout.first.push(layout.size);
-            layout.pending.push(pending);
-            layout.memory.push(memory);
-            if !contacts.touching[place] && scene.device_plant(place).stiffness == 0.0 {
-                layout.loose.extend((0..A).map(|axis| layout.size + axis));
-            }
-            layout.size += 4 * A + if pending { 2 * A } else { 0 } + memory;
-        }
-        for depth in &timetable.depth {
-            layout.samples.push(layout.size);
-            layout.size += depth * layout.sample_len::<A>();
-        }
-        layout
-    }
-
-    /// Where the numbers stand that the strategy of a peer remembers.
-    fn memory_of<const A: usize>(&self, place: usize) -> std::ops::Range<usize> {
-        let first = self.first[place] + 4 * A + if self.pending[place] { 2 * A } else { 0 };
-        first..first + self.memory[place]
-    }
-
-    /// How many numbers a sample has.
-    const fn sample_len<const A: usize>(&self) -> usize {
-        (2 + self.receivers) * A
-    }
-
-    /// What every state is, in order.
-    fn names<const A: usize>(&self, depth: &[usize]) -> Vec<StateName> {
-        let mut names = Vec::with_capacity(self.size);
-        for peer in 0..self.first.len() {
-            let kinds: [fn(usize) -> StateKind; 6] = [
-                |axis| StateKind::DevicePosition { axis },
-                |axis| StateKind::DeviceVelocity { axis },
-                |axis| StateKind::ObjectPosition { axis },
-                |axis| StateKind::ObjectVelocity { axis },
-                |axis| StateKind::PendingCoupling { axis },
-                |axis| StateKind::PendingForce { axis },
-            ];
-            let count = if self.pending[peer] { 6 } else { 4 };
-            names.extend(kinds.iter().take(count).flat_map(|kind| (0..A).map(move |axis| StateName { peer, kind: kind(axis) })));
-            names.extend((0..self.memory[peer]).map(|number| StateName { peer, kind: StateKind::Memory { number } }));
-        }
-        for (peer, depth) in depth.iter().enumerate() {
-            for age in 1..=*depth {
-                names.extend((0..A).map(|axis| StateName { peer, kind: StateKind::SamplePosition { axis, age } }));
-                names.extend((0..A).map(|axis| StateName { peer, kind: StateKind::SampleVelocity { axis, age } }));
-                let extras = (0..self.receivers).flat_map(|other| (0..A).map(move |axis| (if other < peer { other } else { other + 1 }, axis)));
-                let kind = |axis, receiver| {
-                    if self.has_waves { StateKind::SampleWave { axis, age, receiver } } else { StateKind::SampleForce { axis, age, receiver } }
-                };
-                names.extend(extras.map(|(receiver, axis)| StateName { peer, kind: kind(axis, receiver) }));
-            }
-        }
-        names
-    }
-
-    /// The peer to which a state belongs.
-    fn owner(&self, place: usize) -> usize {
-        let firsts = if self.samples.first().is_some_and(|first| place >= *first) { &self.samples } else { &self.first };
-        firsts.partition_point(|first| *first <= place).saturating_sub(1)
     }
 }
 

@@ -31,7 +31,7 @@ pub struct Monodromy {
 }
 
 /// A state of a scene. Positions are in metres, relative to a copy ([`Monodromy::relative`]) where nothing ties them to ground; velocities are multiplied by
-/// a common time, forces and waves by a compliance.
+/// a common time, forces by a compliance, waves by the root of a time over a mass, times the time between samples.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StateName {
     /// Whose it is, by its place in [`Scene::peers`].

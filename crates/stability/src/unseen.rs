@@ -2,14 +2,14 @@
 //!
 //! Three copies or more can get waves whose forces add up to nothing: (1, −1) at the first, (1, −1) at the second, (1, −1) at the third, around and around.
 //! Such a motion of the waves lasts forever over links that lose nothing, no body feels it, and from waves at zero none arises. So it is no part of how
-//! the scene moves, and its eigenvalues, of modulus 1, say nothing of stability. The largest quotient in which every state is felt is left.
+//! the scene moves, and its eigenvalues, of modulus 1, say nothing of stability. The analysis keeps the largest quotient in which every state is felt.
 
 use faer::{Mat, MatRef};
 
 use crate::{Matrix, StateKind, StateName};
 
-/// Below this, relative to the largest entry, a singular value counts as zero: far above rounding, and far below the parts of a wave that ticks are. The
-/// error has the parts that are taken for zero.
+/// Below this, relative to the largest entry, a singular value counts as zero: far above rounding, and far below the share of one tick in a
+/// wave. The error covers values that are taken for zero.
 const NOTHING: f64 = 1e-9;
 
 /// The part of a matrix in which every state is felt by a body, and what this adds to the error of its entries. `forces`: what the states add to the

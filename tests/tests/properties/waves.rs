@@ -13,7 +13,7 @@ const FRAMES: usize = 4;
 
 /// Two or three peers over links of any constant delays and patterns of loss.
 fn linear() -> impl Strategy<Value = Draft> {
-    let link = (0..30_000_u64, 0..4_u64, 1..5_u64);
+    let link = (0..30_000_u64, 0..3_u64, 1..4_u64);
     (drafts::anything_among(2..=3_usize), vec(link, 6), 0.5..50.0, 0..2_usize).prop_map(|(mut draft, links, impedance, on_loss)| {
         (draft.strategy, draft.send_when, draft.integrator, draft.enclosure) = (Coordination::Wave, None, None, None);
         let settings = draft.settings.of_mut(Coordination::Wave);
@@ -75,7 +75,7 @@ fn bodies(monodromy: &Monodromy, draft: &Draft, log: &Log, frame: usize) -> Vec<
 }
 
 proptest! {
-    #![proptest_config(cases(60))]
+    #![proptest_config(cases(30))]
 
     #[test]
     fn waves_move_bodies_as_the_matrix_says(mut draft in linear()) {

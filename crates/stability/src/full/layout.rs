@@ -1,0 +1,113 @@
+//! Where the states of all peers stand in a vector.
+
+use cohaptic_peer::Strategy;
+use cohaptic_peer::wire::SampleKind;
+use cohaptic_scene::Scene;
+
+use super::Member;
+use crate::structure::Contacts;
+use crate::timetable::Timetable;
+use crate::{StateKind, StateName};
+
+/// Where the states of each peer begin, and what they are.
+pub(super) struct Layout {
+    pub(super) first: Vec<usize>,
+    pub(super) touching: Vec<bool>,
+    pub(super) memory: Vec<usize>,
+    pub(super) pending: Vec<bool>,
+    /// Where the samples of earlier frames of each peer begin, the newest first.
+    pub(super) samples: Vec<usize>,
+    /// How many receivers have extra numbers in a sample, and whether those are waves.
+    pub(super) receivers: usize,
+    pub(super) has_waves: bool,
+    pub(super) size: usize,
+    /// States that nothing depends on and that drift with everything else: positions of devices that touch nothing.
+    pub(super) loose: Vec<usize>,
+    /// For each peer, whether something ties its copy to ground.
+    pub(super) tied: Vec<bool>,
+}
+
+impl Layout {
+    pub(super) fn new<const A: usize, S: Strategy<A>>(
+        scene: &Scene,
+        contacts: &Contacts,
+        members: &[Member<A, S>],
+        timetable: &Timetable,
+        tied: Vec<bool>,
+    ) -> Self {
+        let mut layout = Self {
+            first: Vec::new(),
+            touching: contacts.touching.clone(),
+            memory: Vec::new(),
+            pending: Vec::new(),
+            samples: Vec::new(),
+            receivers: if members.iter().any(|member| member.kind().is_personal()) { members.len() - 1 } else { 0 },
+            has_waves: members.iter().any(|member| member.kind() == SampleKind::Wave),
+            size: 0,
+            loose: Vec::new(),
+            tied,
+        };
+        for (place, member) in members.iter().enumerate() {
+            let (pending, memory) = (scene.peers[place].compute_delay, member.strategy().memory().len());
+            layout.first.push(layout.size);
+            layout.pending.push(pending);
+            layout.memory.push(memory);
+            if !contacts.touching[place] && scene.device_plant(place).stiffness == 0.0 {
+                layout.loose.extend((0..A).map(|axis| layout.size + axis));
+            }
+            layout.size += 4 * A + if pending { 2 * A } else { 0 } + memory;
+        }
+        for depth in &timetable.depth {
+            layout.samples.push(layout.size);
+            layout.size += depth * layout.sample_len::<A>();
+        }
+        layout
+    }
+
+    /// Where the numbers stand that the strategy of a peer remembers.
+    pub(super) fn memory_of<const A: usize>(&self, place: usize) -> std::ops::Range<usize> {
+        let first = self.first[place] + 4 * A + if self.pending[place] { 2 * A } else { 0 };
+        first..first + self.memory[place]
+    }
+
+    /// How many numbers a sample has.
+    pub(super) const fn sample_len<const A: usize>(&self) -> usize {
+        (2 + self.receivers) * A
+    }
+
+    /// What every state is, in order.
+    pub(super) fn names<const A: usize>(&self, depth: &[usize]) -> Vec<StateName> {
+        let mut names = Vec::with_capacity(self.size);
+        for peer in 0..self.first.len() {
+            let kinds: [fn(usize) -> StateKind; 6] = [
+                |axis| StateKind::DevicePosition { axis },
+                |axis| StateKind::DeviceVelocity { axis },
+                |axis| StateKind::ObjectPosition { axis },
+                |axis| StateKind::ObjectVelocity { axis },
+                |axis| StateKind::PendingCoupling { axis },
+                |axis| StateKind::PendingForce { axis },
+            ];
+            let count = if self.pending[peer] { 6 } else { 4 };
+            names.extend(kinds.iter().take(count).flat_map(|kind| (0..A).map(move |axis| StateName { peer, kind: kind(axis) })));
+            names.extend((0..self.memory[peer]).map(|number| StateName { peer, kind: StateKind::Memory { number } }));
+        }
+        for (peer, depth) in depth.iter().enumerate() {
+            for age in 1..=*depth {
+                names.extend((0..A).map(|axis| StateName { peer, kind: StateKind::SamplePosition { axis, age } }));
+                names.extend((0..A).map(|axis| StateName { peer, kind: StateKind::SampleVelocity { axis, age } }));
+                let extras = (0..self.receivers).flat_map(|other| (0..A).map(move |axis| (if other < peer { other } else { other + 1 }, axis)));
+                let kind = |axis, receiver| {
+                    if self.has_waves { StateKind::SampleWave { axis, age, receiver } } else { StateKind::SampleForce { axis, age, receiver } }
+                };
+                names.extend(extras.map(|(receiver, axis)| StateName { peer, kind: kind(axis, receiver) }));
+            }
+        }
+        names
+    }
+
+    /// The peer to which a state belongs.
+    pub(super) fn owner(&self, place: usize) -> usize {
+        let firsts = if self.samples.first().is_some_and(|first| place >= *first) { &self.samples } else { &self.first };
+        firsts.partition_point(|first| *first <= place).saturating_sub(1)
+    }
+}
