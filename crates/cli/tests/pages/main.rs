@@ -96,6 +96,7 @@ pages! {
     reference_documents: "docs/reference-documents.md",
     reference_keys: "docs/reference-keys.md",
     reference_link_keys: "docs/reference-link-keys.md",
+    reference_network_keys: "docs/reference-network-keys.md",
     relay: "docs/relay.md",
     results: "docs/results.md",
     router: "docs/router.md",

@@ -7,15 +7,23 @@ use cohaptic_scene::schema::FileSchema;
 
 use super::{WRITTEN, entry, prose};
 
+const LINKS: &str = "reference-link-keys.md";
+const SCENES: &str = "reference-keys.md";
+const NETWORKS: &str = "reference-network-keys.md";
+
 /// Tables with fewer keys are written out wherever they stand.
 const SHORT: usize = 3;
 
-const OF_FILES: &str = "\
-Every key of [scenes](scenes.md), [relay files](relay.md) and [router files](router.md). Links have a [page of their own](reference-link-keys.md). Values with units are explained in
+const OF_SCENES: &str = "\
+Every key of [scenes](scenes.md). Links have a [page of their own](reference-link-keys.md). Values with units are explained in
 [scenes.md](scenes.md#how-values-are-written).
 
 Behind a key stand its form, and its default or whether it must be given. A key with points, `device.mass`, stands in a table: `device = { mass = 0.1 }`. Brackets, `position[]`, mark a list. A *required* key must be given. One that is *required for all* must be
 given there or in the table that holds for all, such as `[peer]`. Any other key without a default may be left out.
+";
+const OF_NETWORKS: &str = "\
+Every key of [relay files](relay.md) and [router files](router.md). Links have a [page of their own](reference-link-keys.md). The notation is that of
+[reference-keys.md](reference-keys.md).
 ";
 const OF_LINKS: &str = "\
 Every key of a link. [emulator-stages.md](emulator-stages.md) says exactly what each does to a packet. They are taken by `[link]`, `[[links]]`, `uplink` and `downlink` of
@@ -60,28 +68,24 @@ struct Reference {
     later: Vec<(String, &'static str, &'static Table)>,
 }
 
-/// Each page, named from the project's folder, with its text.
-pub(super) fn pages() -> [(&'static str, String); 2] {
-    let mut reference = Reference { page: "reference-link-keys.md", puts_off: true, ..Reference::default() };
-    let mut links = format!("# Reference: keys of links\n\n{WRITTEN}\n\n{OF_LINKS}\n");
+/// The name of each page in `docs`, with its text.
+pub(super) fn pages() -> [(&'static str, String); 3] {
+    let mut reference = Reference { page: LINKS, puts_off: true, ..Reference::default() };
+    let mut links = head("Reference: keys of links", OF_LINKS);
     links += &reference.section("##", "Keys of a link", &LINK_TABLE);
     links += &reference.section("##", "Modulators", &MODULATOR);
-    let mut files = format!("# Reference: keys of files\n\n{WRITTEN}\n\n{OF_FILES}\n");
-    (reference.page, reference.puts_off) = ("reference-keys.md", false);
-    for (kind, head, name) in
-        [(FileSchema::Scene, "Scenes", "Scene"), (FileSchema::Relay, "Relay files", "Relay"), (FileSchema::Router, "Router files", "Router")]
-    {
-        files += &format!("## {head}\n\n");
-        for key in kind.root().keys() {
-            let needed = if key.need == Need::Required { " Required." } else { "" };
-            let heading = format!("{name} {}", head_of(key));
-            files += &format!("### {heading}\n\n{}.{needed}", prose(key.about));
-            for (_, inner) in tables(&key.form) {
-                files += &reference.rest_of_section(&heading, inner);
-            }
-        }
+    (reference.page, reference.puts_off) = (SCENES, false);
+    let scenes = head("Reference: keys of scenes", OF_SCENES) + &reference.file(FileSchema::Scene, "##", "Scene");
+    reference.page = NETWORKS;
+    let mut networks = head("Reference: keys of relays and routers", OF_NETWORKS);
+    for (kind, heading, name) in [(FileSchema::Relay, "Relay files", "Relay"), (FileSchema::Router, "Router files", "Router")] {
+        networks += &format!("## {heading}\n\n{}", reference.file(kind, "###", name));
     }
-    [("docs/reference-keys.md", files.trim_end().to_owned() + "\n"), ("docs/reference-link-keys.md", links.trim_end().to_owned() + "\n")]
+    [(LINKS, links), (SCENES, scenes), (NETWORKS, networks)].map(|(page, text)| (page, text.trim_end().to_owned() + "\n"))
+}
+
+fn head(title: &str, introduction: &str) -> String {
+    format!("# {title}\n\n{WRITTEN}\n\n{introduction}\n")
 }
 
 /// How a table at the top of a file is written.
@@ -128,6 +132,20 @@ fn tables(form: &'static Form) -> Vec<(&'static str, &'static Table)> {
 }
 
 impl Reference {
+    /// A section for each table at the top of a file.
+    fn file(&mut self, kind: FileSchema, marks: &str, name: &str) -> String {
+        let mut text = String::new();
+        for key in kind.root().keys() {
+            let needed = if key.need == Need::Required { " Required." } else { "" };
+            let heading = format!("{name} {}", head_of(key));
+            text += &format!("{marks} {heading}\n\n{}.{needed}", prose(key.about));
+            for (_, inner) in tables(&key.form) {
+                text += &self.rest_of_section(&heading, inner);
+            }
+        }
+        text
+    }
+
     /// A table of its own, with those of its tables that are put off.
     fn section(&mut self, marks: &str, heading: &str, table_of: &'static Table) -> String {
         self.anchor = anchor(heading);
@@ -276,9 +294,9 @@ fn meanings(words: Words) -> Vec<String> {
 #[test]
 fn a_table_with_the_keys_of_another_one_names_it() {
     let pages = pages();
-    let [files, links] = pages.each_ref().map(|(_, text)| text.as_str());
-    assert!(files.contains("\n### Scene `[[peers]]`\n\nOne peer each") && files.contains("- …: All of [Scene [peer]](#scene-peer)\n"), "{files}");
-    assert!(files.contains("All of [Keys of a link](reference-link-keys.md#keys-of-a-link)"), "{files}");
-    assert!(files.contains("- `stiffness` (number ≥ 0 [N/m]; *required*): Gain on the difference of positions, K_T\n"), "{files}");
+    let [links, scenes, networks] = pages.each_ref().map(|(_, text)| text.as_str());
+    assert!(scenes.contains("\n## Scene `[[peers]]`\n\nOne peer each") && scenes.contains("- …: All of [Scene [peer]](#scene-peer)\n"), "{scenes}");
+    assert!(networks.contains("All of [Keys of a link](reference-link-keys.md#keys-of-a-link)"), "{networks}");
+    assert!(scenes.contains("- `stiffness` (number ≥ 0 [N/m]; *required*): Gain on the difference of positions, K_T\n"), "{scenes}");
     assert!(links.contains("\n### `jitter`\n") && links.contains("[table](#jitter)"), "{links}");
 }

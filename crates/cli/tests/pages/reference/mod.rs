@@ -63,7 +63,7 @@ fn the_page_of_documents_is_their_list() {
 #[test]
 fn the_pages_of_keys_are_the_catalogue() {
     for (name, text) in keys::pages() {
-        assert_page(name, &text);
+        assert_page(&format!("docs/{name}"), &text);
     }
 }
 

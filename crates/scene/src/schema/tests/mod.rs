@@ -268,7 +268,7 @@ fn the_reference_has_the_keys_of_the_catalogue() {
     assert_eq!(rows, cohaptic_linkfile::link::LINK_KEYS, "the list of the keys of a link");
 
     let listed: BTreeSet<&str> = tables().values().flat_map(|(_, table)| table.keys().map(|key| key.name)).collect();
-    let pages = links + &page("reference-keys.md");
+    let pages = links + &page("reference-keys.md") + &page("reference-network-keys.md");
     let mut named = BTreeSet::new();
     for row in pages.lines().filter(|line| line.starts_with("- `")) {
         let path = row.split('`').nth(1).unwrap();
@@ -277,7 +277,7 @@ fn the_reference_has_the_keys_of_the_catalogue() {
         }
     }
     // The tables at the top of a file are headings.
-    for heading in pages.lines().filter(|line| line.starts_with("### ")) {
+    for heading in pages.lines().filter(|line| line.starts_with("## ") || line.starts_with("### ")) {
         named.extend(heading.split('`').nth(1).map(|name| name.trim_matches(['[', ']']).split('.').next().unwrap_or_default()));
     }
     assert_eq!(named, listed);
