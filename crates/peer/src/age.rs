@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use crate::rotation::{Attitude, HeldAttitude, Rotation};
 use crate::wire::Sample;
 use crate::{Device, Peer, ReceiveError, Reception, State, Strategy};
 
@@ -50,6 +51,8 @@ struct Aged<const A: usize> {
     newest: State<A>,
     /// What was held when it came back.
     before: State<A>,
+    /// Its newest attitude and the one that was held when it came back, if the object turns: matrices and angular velocities in world axes are blended.
+    turned: Option<(HeldAttitude, HeldAttitude)>,
     /// From this number on a sample is a return.
     awaited: Option<u64>,
     returned: bool,
@@ -115,11 +118,31 @@ impl<const A: usize> Ages<A> {
         Ok(received)
     }
 
+    /// [`Ages::handle_sample`] with the attitude of the sender's copy.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Peer::handle_sample`]; nothing changed.
+    pub fn handle_attitude<D: Device<A>, S: Strategy<A>>(
+        &mut self,
+        peer: &mut Peer<A, D, S>,
+        sample: &Sample<A>,
+        attitude: &Attitude,
+    ) -> Result<Reception, ReceiveError> {
+        let received = peer.handle_attitude(sample, attitude)?;
+        let place = peer.place_of(sample.sender).filter(|_| received == Reception::Newest);
+        if let Some(aged) = self.aged.iter_mut().find(|aged| Some(aged.place) == place) {
+            aged.turned(sample.sequence, attitude);
+            aged.arrived(sample.sequence, sample.state);
+        }
+        Ok(received)
+    }
+
     /// Lets the ages count at the tick whose forces are computed next.
     ///
     /// Where nobody fades the mean is that of [`crate::Held::refresh`], to the bit.
     pub fn apply<D: Device<A>, S: Strategy<A>>(&mut self, peer: &mut Peer<A, D, S>) {
-        let (own, held, stale_mean) = peer.aged_parts();
+        let (own, held, stale_mean, rotation) = peer.aged_parts();
         if self.aged.is_empty() || !(*stale_mean || self.fading) {
             return;
         }
@@ -133,12 +156,27 @@ impl<const A: usize> Ages<A> {
             held.refresh();
         }
         *stale_mean = false;
+        if let Some(rotation) = rotation {
+            self.apply_turned(rotation);
+        }
+    }
+
+    fn apply_turned(&self, rotation: &mut Rotation) {
+        let own = rotation.own_held();
+        for aged in &self.aged {
+            if let Some(held) = aged.held_turned(&own) {
+                rotation.replace_held(aged.place, held);
+            }
+        }
+        rotation.refresh_held(self.fading.then_some(&own));
     }
 
     fn of<D: Device<A>, S: Strategy<A>>(&mut self, peer: &mut Peer<A, D, S>, place: usize) -> &mut Aged<A> {
         let index = self.aged.iter().position(|aged| aged.place == place).unwrap_or_else(|| {
-            let newest = *peer.aged_parts().1.state(place).expect("there is another peer in that place");
-            self.aged.push(Aged { place, age: Age::WHOLE, newest, before: newest, awaited: None, returned: false });
+            let (_, held, _, rotation) = peer.aged_parts();
+            let newest = *held.state(place).expect("there is another peer in that place");
+            let turned = rotation.map(|rotation| rotation.held(place)).map(|held| (held, held));
+            self.aged.push(Aged { place, age: Age::WHOLE, newest, before: newest, turned, awaited: None, returned: false });
             self.aged.len() - 1
         });
         &mut self.aged[index]
@@ -153,6 +191,25 @@ impl<const A: usize> Aged<A> {
             (self.awaited, self.returned) = (None, true);
         }
         self.newest = state;
+    }
+
+    /// An attitude that is newer than all before it.
+    fn turned(&mut self, sequence: u64, attitude: &Attitude) {
+        let returns = self.awaited.is_some_and(|first| sequence >= first);
+        let before = if returns { self.base_turned() } else { None };
+        if let Some((newest, kept)) = &mut self.turned {
+            *kept = before.unwrap_or(*kept);
+            *newest = HeldAttitude::of(attitude);
+        }
+    }
+
+    fn held_turned(&self, own: &HeldAttitude) -> Option<HeldAttitude> {
+        let (newest, _) = self.turned?;
+        if self.age.is_whole() { Some(newest) } else { self.base_turned().map(|base| own.mix(&base, self.age.weight)) }
+    }
+
+    fn base_turned(&self) -> Option<HeldAttitude> {
+        self.turned.map(|(newest, before)| if self.age.share < 1.0 { before.mix(&newest, self.age.share) } else { newest })
     }
 
     fn held(&self, own: &State<A>) -> State<A> {

@@ -84,6 +84,7 @@ mod number;
 mod object;
 mod peer;
 mod plant;
+pub mod rotation;
 mod send_when;
 mod signal;
 mod state;

@@ -1,10 +1,12 @@
 //! One participant, tick by tick.
 
+use alloc::boxed::Box;
 use core::time::Duration;
 
 use cohaptic_units::Instant;
 
 use crate::coordination::{LawValues, Prediction, Role};
+use crate::rotation::{Attitude, Rotation};
 use crate::tick::on_object;
 use crate::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
 use crate::{Contact, Context, Device, Enclosure, Gains, Held, ObjectCopy, State, Strategy};
@@ -51,6 +53,8 @@ pub struct Peer<const A: usize, D, S> {
     /// What the strategy asks for beyond what every strategy has.
     asked: Asked,
     held: Held<A>,
+    /// The part that turns, if the object has an inertia.
+    rotation: Option<Box<Rotation>>,
     /// Whether a sample has changed since the mean was computed.
     stale_mean: bool,
     next_sequence: u64,
@@ -145,7 +149,17 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             held.keep_ages(horizon);
         }
         let (asked, local_time) = (Asked::by(&strategy), Instant::ZERO);
-        Self { config, device, object, strategy, asked, held, stale_mean: false, next_sequence: 0, local_time, computed: none, applied: none }
+        let (rotation, stale_mean, next_sequence) = (None, false, 0);
+        Self { config, device, object, strategy, asked, held, rotation, stale_mean, next_sequence, local_time, computed: none, applied: none }
+    }
+
+    /// The peer with a copy that turns, for a strategy that is a law: its samples carry attitudes.
+    #[must_use]
+    pub fn with_rotation(mut self, rotation: Rotation) -> Self {
+        debug_assert!(self.asked.kind == SampleKind::State, "samples with attitudes have no extra numbers");
+        self.rotation = Some(Box::new(rotation));
+        (self.asked.kind, self.asked.any) = (SampleKind::Attitude, true);
+        self
     }
 
     /// Step 1: writes the sample that this peer sends now into `datagram` and gives its length. `local_time` is what the peer's own clock shows.
@@ -157,6 +171,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         let (kind, axes) = (self.asked.kind, self.config.axes);
         if kind == SampleKind::State {
             return sample.encode(axes, datagram);
+        }
+        if let Some(rotation) = &self.rotation {
+            return sample.encode_attitude(rotation.copy(), axes, datagram);
         }
         let numbers = self.extra(0);
         self.all_sent();
@@ -225,6 +242,10 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
     #[inline]
     pub fn handle_datagram(&mut self, datagram: &[u8]) -> Result<Reception, ReceiveError> {
+        if self.asked.kind == SampleKind::Attitude {
+            let (sample, attitude) = Sample::decode_attitude(datagram, self.config.axes)?;
+            return self.handle_attitude(&sample, &attitude);
+        }
         let (sample, extra) = Sample::decode_as(datagram, self.asked.kind, self.config.axes)?;
         if self.asked.kind.is_personal() && extra.receiver != self.config.place {
             return Err(ReceiveError::Receiver { receiver: extra.receiver });
@@ -262,6 +283,19 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         } else {
             Ok(Reception::Stale)
         }
+    }
+
+    /// [`Peer::handle_sample`] with the attitude of the sender's copy.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
+    pub fn handle_attitude(&mut self, sample: &Sample<A>, attitude: &Attitude) -> Result<Reception, ReceiveError> {
+        let received = self.handle_sample(sample)?;
+        if let (Reception::Newest, Some(place), Some(rotation)) = (received, self.place_of(sample.sender), &mut self.rotation) {
+            rotation.hold(place, attitude);
+        }
+        Ok(received)
     }
 
     /// Step 3: computes the forces of this tick, where the next one follows after the period of the tick.
@@ -312,6 +346,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         if self.asked.role == Role::Copy {
             self.object.advance(span, self.applied.on_object);
         }
+        if let Some(rotation) = &mut self.rotation {
+            rotation.advance(now, span);
+        }
         self.local_time = self.local_time.saturating_add(self.config.tick);
     }
 
@@ -347,6 +384,17 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// The copy of the object, to put it into a state.
     pub const fn object_mut(&mut self) -> &mut ObjectCopy<A> {
         &mut self.object
+    }
+
+    /// The part that turns, if the object has an inertia.
+    #[must_use]
+    pub fn rotation(&self) -> Option<&Rotation> {
+        self.rotation.as_deref()
+    }
+
+    /// The part that turns, to put it into a state or to change its gains.
+    pub fn rotation_mut(&mut self) -> Option<&mut Rotation> {
+        self.rotation.as_deref_mut()
     }
 
     /// Holds that state, sampled at `sent` on the sender's clock, from another peer (see [`Held::hold`]); the others count in order, with this peer left out.
@@ -436,9 +484,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         (sender != own && place < self.held.len()).then_some(place)
     }
 
-    /// What [`crate::Ages`] change: the peer's own state, what it holds, and whether a sample has changed since the mean was computed.
-    pub(crate) const fn aged_parts(&mut self) -> (&State<A>, &mut Held<A>, &mut bool) {
-        (self.object.state(), &mut self.held, &mut self.stale_mean)
+    /// What [`crate::Ages`] change: the peer's own state, what it holds, whether a sample has changed since the mean was computed, and the part that turns.
+    pub(crate) fn aged_parts(&mut self) -> (&State<A>, &mut Held<A>, &mut bool, Option<&mut Rotation>) {
+        (self.object.state(), &mut self.held, &mut self.stale_mean, self.rotation.as_deref_mut())
     }
 
     /// Brings up to date what some strategies ask for and most do not, and gives the coupling force if it was heard of.
@@ -448,6 +496,10 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         }
         if let Role::Client { server } = self.asked.role {
             self.object.set_state(*self.held.state(server).expect("the server is another peer"));
+        }
+        if let Some(rotation) = &mut self.rotation {
+            let PeerConfig { contact, coupling, compute_delay, .. } = &self.config;
+            return Some(rotation.compute(self.object.state(), &self.device.state(), *contact, coupling, *compute_delay));
         }
         self.strategy.heard_coupling()
     }

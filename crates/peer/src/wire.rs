@@ -1,11 +1,11 @@
-//! The wire format of a sample: one datagram, little-endian. Version 1 has 48 bytes and 16 for each axis, version 2 has 48 and 24.
+//! The wire format of a sample: one datagram, little-endian. Version 1 has 48 bytes and 16 for each axis, and 56 more for an attitude; version 2 has 48 and 24.
 //!
 //! ```text
 //! offset  size  field
 //!      0     4  "CHPT"
 //!      4     2  version, 1 or 2
 //!      6     1  axes, 1 to 3
-//!      7     1  version 1: zero; version 2: the kind of the extra number, 1 energy, 2 wave, 3 force
+//!      7     1  version 1: 1 with an attitude, 0 without; version 2: the kind of the extra number, 1 energy, 2 wave, 3 force
 //!      8     8  session: only peers of one session understand each other
 //!     16     4  sender: the place of the peer in the session
 //!     20     4  kinds 2 and 3: receiver, the place of the only peer that it is for; otherwise zero
@@ -13,6 +13,7 @@
 //!     32     8  send time \[ns\] on the sender's clock
 //!     40     8  zero
 //!     48 16/24  position \[m\], velocity [m/s] and, in version 2, the extra number on the first axis, then on the others
+//!     96    56  with an attitude: the unit quaternion w, x, y, z and the angular velocity about the three body axes [rad/s]
 //! ```
 //!
 //! Which sample is the newest follows from the sequence number alone. The send time is for laws that need the age of a sample, and for those who record or measure.
@@ -23,13 +24,15 @@
 use cohaptic_units::Instant;
 
 use crate::State;
+use crate::rotation::Attitude;
 
 /// The first four bytes.
 pub const MAGIC: [u8; 4] = *b"CHPT";
-/// The length of the largest datagram, with three axes and an extra number on each \[byte\].
-pub const MAX_LEN: usize = SampleKind::Force.datagram_len(3);
+/// The length of the largest datagram, with three axes and an attitude \[byte\].
+pub const MAX_LEN: usize = SampleKind::Attitude.datagram_len(3);
 
 const HEADER_LEN: usize = 48;
+const ATTITUDE_LEN: usize = 56;
 
 /// What a sample carries on each axis beyond position and velocity.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -37,6 +40,8 @@ pub enum SampleKind {
     /// Nothing: version 1.
     #[default]
     State,
+    /// The attitude of the body, the same for all receivers: version 1.
+    Attitude,
     /// An energy \[J\] that only grows, the same for all receivers. One that has fallen begins a new life of the sender.
     Energy,
     /// A wave [√W] for one receiver.
@@ -50,7 +55,7 @@ impl SampleKind {
     #[must_use]
     pub const fn version(self) -> u16 {
         match self {
-            Self::State => 1,
+            Self::State | Self::Attitude => 1,
             Self::Energy | Self::Wave | Self::Force => 2,
         }
     }
@@ -64,6 +69,10 @@ impl SampleKind {
     /// The length of a datagram \[byte\].
     #[must_use]
     pub const fn datagram_len(self, axes: usize) -> usize {
+        self.attitude_start(axes) + if matches!(self, Self::Attitude) { ATTITUDE_LEN } else { 0 }
+    }
+
+    const fn attitude_start(self, axes: usize) -> usize {
         HEADER_LEN + self.axis_len() * axes
     }
 
@@ -75,7 +84,7 @@ impl SampleKind {
     const fn code(self) -> u8 {
         match self {
             Self::State => 0,
-            Self::Energy => 1,
+            Self::Attitude | Self::Energy => 1,
             Self::Wave => 2,
             Self::Force => 3,
         }
@@ -147,6 +156,14 @@ pub enum DecodeError {
         /// The number of this session.
         expected: usize,
     },
+    /// It has an attitude where none is expected, or none where one is.
+    #[error("motion {found} in byte 7; expected {expected} (0 moves, 1 moves and turns)")]
+    Motion {
+        /// What it has.
+        found: u8,
+        /// That of this session.
+        expected: u8,
+    },
     /// Its length does not fit its number of axes.
     #[error("{found} bytes; expected {expected}")]
     Length {
@@ -163,9 +180,12 @@ pub enum DecodeError {
     NotFinite {
         /// Which axis, from 0.
         axis: usize,
-        /// Position, velocity or extra number.
+        /// Position, velocity, extra number, quaternion or angular velocity.
         quantity: &'static str,
     },
+    /// The quaternion of its attitude does not have the norm 1.
+    #[error("the quaternion of the attitude does not have the norm 1")]
+    NotUnit,
 }
 
 impl<const A: usize> Sample<A> {
@@ -208,6 +228,38 @@ impl<const A: usize> Sample<A> {
         kind.datagram_len(axes)
     }
 
+    /// Writes a sample of kind [`SampleKind::Attitude`], and gives the length.
+    ///
+    /// # Panics
+    ///
+    /// If `axes` is more than A or than 3.
+    pub fn encode_attitude(&self, attitude: &Attitude, axes: usize, datagram: &mut [u8; MAX_LEN]) -> usize {
+        let kind = SampleKind::Attitude;
+        let len = self.encode_as(kind, &Extra::NONE, axes, datagram);
+        for (bytes, number) in datagram[kind.attitude_start(axes)..].chunks_exact_mut(8).zip(attitude.orientation.iter().chain(&attitude.rate)) {
+            bytes.copy_from_slice(&number.to_le_bytes());
+        }
+        len
+    }
+
+    /// Reads a sample of kind [`SampleKind::Attitude`] and of `axes` axes, at most A.
+    ///
+    /// # Errors
+    ///
+    /// [`DecodeError`] for anything but such a sample with finite numbers and a quaternion of norm 1. Never panics.
+    pub fn decode_attitude(datagram: &[u8], axes: usize) -> Result<(Self, Attitude), DecodeError> {
+        let kind = SampleKind::Attitude;
+        let (sample, _) = Self::decode_as(datagram, kind, axes)?;
+        let numbers: [f64; 7] = core::array::from_fn(|number| f64::from_bits(word(datagram, kind.attitude_start(axes) + 8 * number)));
+        if let Some(place) = numbers.iter().position(|number| !number.is_finite()) {
+            let (axis, quantity) = if place < 4 { (place, "quaternion") } else { (place - 4, "angular velocity") };
+            return Err(DecodeError::NotFinite { axis, quantity });
+        }
+        let [w, x, y, z, rates @ ..] = numbers;
+        let attitude = Attitude { orientation: [w, x, y, z], rate: rates };
+        if attitude.is_unit() { Ok((sample, attitude)) } else { Err(DecodeError::NotUnit) }
+    }
+
     /// [`Sample::decode_as`] of version 1.
     ///
     /// # Errors
@@ -234,10 +286,10 @@ impl<const A: usize> Sample<A> {
             let number = f64::from_bits(word(numbers, start));
             if number.is_finite() { Ok(number) } else { Err(DecodeError::NotFinite { axis, quantity }) }
         };
-        for (axis, numbers) in body.chunks_exact(kind.axis_len()).enumerate().take(A) {
+        for (axis, numbers) in body.chunks_exact(kind.axis_len()).enumerate().take(A.min(axes)) {
             state.position[axis] = finite(numbers, 0, axis, "position")?;
             state.velocity[axis] = finite(numbers, 8, axis, "velocity")?;
-            if kind != SampleKind::State {
+            if kind.version() > 1 {
                 extra[axis] = finite(numbers, 16, axis, "extra number")?;
             }
         }
@@ -264,13 +316,14 @@ fn check_header(header: &[u8; HEADER_LEN], len: usize, kind: SampleKind, axes: u
     if usize::from(header[6]) != axes {
         return Err(DecodeError::Axes { found: header[6], expected: axes });
     }
-    if kind != SampleKind::State && header[7] != kind.code() {
-        return Err(DecodeError::Kind { found: header[7], expected: kind.code() });
+    if header[7] != kind.code() {
+        let (found, expected) = (header[7], kind.code());
+        return Err(if kind.version() == 1 { DecodeError::Motion { found, expected } } else { DecodeError::Kind { found, expected } });
     }
     if len != kind.datagram_len(axes) {
         return Err(DecodeError::Length { found: len, expected: kind.datagram_len(axes) });
     }
-    if header[7] != kind.code() || (!kind.is_personal() && header[20..24] != [0; 4]) || word(header, 40) != 0 {
+    if (!kind.is_personal() && header[20..24] != [0; 4]) || word(header, 40) != 0 {
         return Err(DecodeError::Reserved);
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! The wire format against random bytes, random edits, and a second reading of the table in its module doc.
 
 use cohaptic_peer::State;
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_units::Instant;
 use proptest::collection::vec;
@@ -27,7 +28,7 @@ proptest! {
         let mut bytes = [0xAA; MAX_LEN];
         let written = of_kind(kind, extra);
         let len = sample.encode_as(kind, &written, axes, &mut bytes);
-        prop_assert_eq!(len, 48 + if kind == SampleKind::State { 16 } else { 24 } * axes);
+        prop_assert_eq!(len, 48 + 8 * row_of(kind).2.len() * axes);
         prop_assert!(bytes[len..].iter().all(|byte| *byte == 0xAA), "encode writes no further than it says");
         let (read, found) = Sample::<3>::decode_as(&bytes[..len], kind, axes).unwrap();
         prop_assert_eq!(found.receiver, written.receiver);
@@ -43,6 +44,51 @@ proptest! {
             prop_assert_eq!((actual.0.to_bits(), actual.1.to_bits()), (expected.0.to_bits(), expected.1.to_bits()));
         }
     }
+
+    /// The 56 bytes behind the axes: a unit quaternion and the angular velocity, to the bit; anything else is refused for what it is.
+    #[test]
+    fn an_attitude_reads_back_to_the_bit(sample in sample(), turn in proptest::array::uniform3(-3.0..3.0_f64), rate in [finite(), finite(), finite()], edits in edits(), cut in 0..3_usize) {
+        let mut attitude = Attitude { rate, ..Attitude::REST };
+        attitude.turn(turn);
+        let mut bytes = [0xAA; MAX_LEN];
+        prop_assert_eq!(sample.encode_attitude(&attitude, 3, &mut bytes), 152);
+        prop_assert_eq!(Sample::<3>::decode_attitude(&bytes[..152], 3), Ok((sample, attitude)));
+        prop_assert_eq!(Sample::<3>::decode(&bytes[..152], 3), Err(DecodeError::Motion { found: 1, expected: 0 }));
+        let expected = match cut {
+            0 => None,
+            cut => Some(DecodeError::Length { found: 152 - cut, expected: 152 }),
+        };
+        for (place, number) in edits {
+            bytes[96 + 8 * place..104 + 8 * place].copy_from_slice(&number.to_le_bytes());
+        }
+        let numbers: Vec<f64> = bytes[96..152].chunks(8).map(|word| f64::from_le_bytes(word.try_into().unwrap())).collect();
+        let not_finite = numbers.iter().position(|number| !number.is_finite()).map(|place| match place {
+            0..4 => DecodeError::NotFinite { axis: place, quantity: "quaternion" },
+            _ => DecodeError::NotFinite { axis: place - 4, quantity: "angular velocity" },
+        });
+        let norm = numbers[..4].iter().map(|q| q * q).sum::<f64>();
+        let not_unit = ((norm - 1.0).abs() > 2.0_f64.powi(-20)).then_some(DecodeError::NotUnit);
+        let expected = expected.or(not_finite).or(not_unit);
+        prop_assert_eq!(Sample::<3>::decode_attitude(&bytes[..152 - cut], 3).err(), expected);
+    }
+
+    #[test]
+    fn random_bytes_are_no_attitude_and_never_a_panic(bytes in vec(any::<u8>(), 0..200), axes in 1..=3_usize) {
+        if let Ok((sample, attitude)) = Sample::<3>::decode_attitude(&bytes, axes) {
+            let mut again = [0; MAX_LEN];
+            let len = sample.encode_attitude(&attitude, axes, &mut again);
+            prop_assert_eq!(&again[..len], &bytes[..]);
+        }
+    }
+}
+
+fn finite() -> proptest::num::f64::Any {
+    POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO
+}
+
+/// Numbers in the place of some of the seven of an attitude.
+fn edits() -> impl Strategy<Value = Vec<(usize, f64)>> {
+    vec((0..7_usize, finite() | INFINITE | QUIET_NAN), 0..3)
 }
 
 /// Decodes and compares with what the table says of these bytes.
@@ -61,10 +107,11 @@ fn judge(bytes: &[u8], kind: SampleKind, axes: usize) -> Result<(), TestCaseErro
 }
 
 /// The version, byte 7 and the numbers on an axis of a kind, by the table.
-const fn row_of(kind: SampleKind) -> (u16, u8, &'static [&'static str]) {
+fn row_of(kind: SampleKind) -> (u16, u8, &'static [&'static str]) {
     const EXTENDED: &[&str] = &["position", "velocity", "extra number"];
     match kind {
         SampleKind::State => (1, 0, &["position", "velocity"]),
+        SampleKind::Attitude => unreachable!("attitudes have tests of their own"),
         SampleKind::Energy => (2, 1, EXTENDED),
         SampleKind::Wave => (2, 2, EXTENDED),
         SampleKind::Force => (2, 3, EXTENDED),
@@ -87,11 +134,12 @@ fn expected_error(bytes: &[u8], kind: SampleKind, axes: usize) -> Option<DecodeE
         Some(DecodeError::Version { found: version, expected: expected_version })
     } else if usize::from(bytes[6]) != axes {
         Some(DecodeError::Axes { found: bytes[6], expected: axes })
-    } else if expected_version == 2 && bytes[7] != code {
-        Some(DecodeError::Kind { found: bytes[7], expected: code })
+    } else if bytes[7] != code {
+        let (found, expected) = (bytes[7], code);
+        Some(if expected_version == 1 { DecodeError::Motion { found, expected } } else { DecodeError::Kind { found, expected } })
     } else if bytes.len() != expected_len {
         Some(DecodeError::Length { found: bytes.len(), expected: expected_len })
-    } else if bytes[7] != code || (40..48).chain(20..if code >= 2 { 20 } else { 24 }).any(|at| bytes[at] != 0) {
+    } else if (40..48).chain(20..if code >= 2 { 20 } else { 24 }).any(|at| bytes[at] != 0) {
         Some(DecodeError::Reserved)
     } else {
         let on_axis =
@@ -141,7 +189,6 @@ fn kind() -> impl Strategy<Value = SampleKind> {
 }
 
 fn extra() -> impl Strategy<Value = Extra<3>> {
-    let finite = || POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO;
     (any::<u32>(), [finite(), finite(), finite()]).prop_map(|(receiver, numbers)| Extra { receiver, numbers })
 }
 
@@ -151,7 +198,6 @@ fn of_kind(kind: SampleKind, extra: Extra<3>) -> Extra<3> {
 }
 
 fn sample() -> impl Strategy<Value = Sample<3>> {
-    let finite = || POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO;
     let place = move || [finite(), finite(), finite()];
     (any::<u64>(), any::<u32>(), any::<u64>(), any::<u64>(), place(), place()).prop_map(|(session, sender, sequence, sent, position, velocity)| {
         Sample { session, sender, sequence, sent: Instant::from_nanos(sent), state: State { position, velocity } }

@@ -1,0 +1,116 @@
+//! How a body is turned and how fast it turns.
+
+use super::algebra::{apply, cross, dot, scale};
+use super::{Matrix3, Real, Triple};
+
+/// The most by which the square of the norm of a received quaternion may differ from 1.
+pub const NORM_TOLERANCE: f64 = 1.0 / (1 << 20) as f64;
+
+/// Orientation and angular velocity of a body.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Attitude<N = f64> {
+    /// The unit quaternion (w, x, y, z) that turns body axes into world axes; q and −q are the same orientation.
+    pub orientation: [N; 4],
+    /// Angular velocity in body axes [rad/s].
+    pub rate: Triple<N>,
+}
+
+impl Attitude {
+    /// Not turned and at rest.
+    pub const REST: Self = Self { orientation: [1.0, 0.0, 0.0, 0.0], rate: [0.0; 3] };
+
+    /// Whether every component is a finite number.
+    #[must_use]
+    #[inline]
+    pub fn is_finite(&self) -> bool {
+        self.orientation.iter().chain(&self.rate).all(|number| number.is_finite())
+    }
+
+    /// Whether the quaternion has the norm 1, within [`NORM_TOLERANCE`] of its square.
+    #[must_use]
+    #[inline]
+    pub fn is_unit(&self) -> bool {
+        (squared_norm(&self.orientation) - 1.0).abs() <= NORM_TOLERANCE
+    }
+
+    /// The angle of the turn from this orientation to the other one, 0 to π \[rad\].
+    #[must_use]
+    pub fn angle_to(&self, other: &[f64; 4]) -> f64 {
+        let chord = |sign: f64| self.orientation.iter().zip(other).map(|(q, p)| (q - sign * p) * (q - sign * p)).sum::<f64>();
+        4.0 * libm::asin((0.5 * libm::sqrt(chord(1.0).min(chord(-1.0)))).min(1.0))
+    }
+}
+
+impl<N: Real> Attitude<N> {
+    /// R, which turns vectors in body axes into world axes. The norm of the quaternion cancels.
+    ///
+    /// R = I + 2/|q|²·(w·\[u\] + \[u\]²) with q = (w, u).
+    #[must_use]
+    #[inline(always)]
+    pub fn matrix(&self) -> Matrix3<N> {
+        let [w, x, y, z] = self.orientation;
+        let factor = N::of(2.0) * squared_norm(&self.orientation).recip();
+        let one = N::of(1.0);
+        [
+            [one - factor * (y * y + z * z), factor * (x * y - w * z), factor * (x * z + w * y)],
+            [factor * (x * y + w * z), one - factor * (x * x + z * z), factor * (y * z - w * x)],
+            [factor * (x * z - w * y), factor * (y * z + w * x), one - factor * (x * x + y * y)],
+        ]
+    }
+
+    /// The angular velocity in world axes [rad/s].
+    #[must_use]
+    #[inline(always)]
+    pub fn world_rate(&self) -> Triple<N> {
+        apply(&self.matrix(), self.rate)
+    }
+
+    /// Turns it by a rotation vector σ in body axes \[rad\], and brings the quaternion's norm back to 1 to first order.
+    #[inline(always)]
+    pub fn turn(&mut self, sigma: Triple<N>) {
+        let (cosine, sine) = N::half_turn(dot(sigma, sigma));
+        let (w, u) = (self.orientation[0], [self.orientation[1], self.orientation[2], self.orientation[3]]);
+        let by = scale(sigma, sine);
+        let turned = cross(u, by);
+        let q = [
+            w * cosine - dot(u, by),
+            w * by[0] + u[0] * cosine + turned[0],
+            w * by[1] + u[1] * cosine + turned[1],
+            w * by[2] + u[2] * cosine + turned[2],
+        ];
+        let unit = N::of(0.5) * (N::of(3.0) - squared_norm(&q));
+        self.orientation = q.map(|component| component * unit);
+    }
+}
+
+#[inline(always)]
+pub(super) fn squared_norm<N: Real>([w, x, y, z]: &[N; 4]) -> N {
+    *w * *w + *x * *x + *y * *y + *z * *z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quarter_turn_about_z_takes_x_to_y() {
+        let mut attitude = Attitude::REST;
+        attitude.turn([0.0, 0.0, core::f64::consts::FRAC_PI_2]);
+        let turned = apply(&attitude.matrix(), [1.0, 0.0, 0.0]);
+        assert!(turned[0].abs() < 1e-15 && (turned[1] - 1.0).abs() < 1e-15 && turned[2] == 0.0, "{turned:?}");
+        assert!((Attitude::REST.angle_to(&attitude.orientation) - core::f64::consts::FRAC_PI_2).abs() < 1e-15);
+        assert!((Attitude::REST.angle_to(&attitude.orientation.map(|q| -q)) - core::f64::consts::FRAC_PI_2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_matrix_has_no_norm_of_the_quaternion() {
+        let of = |scale: f64| Attitude { orientation: [0.5 * scale, -0.1 * scale, 0.7 * scale, 0.2 * scale], rate: [0.0; 3] }.matrix();
+        assert_eq!(of(1.0), of(4.0));
+    }
+
+    #[test]
+    fn an_angle_is_half_a_turn_at_most() {
+        let half = [0.0, 1.0, 0.0, 0.0];
+        assert!((Attitude::REST.angle_to(&half) - core::f64::consts::PI).abs() < 1e-15);
+    }
+}
