@@ -72,6 +72,9 @@ pub(crate) fn ticking<'a>(peers: impl Iterator<Item = &'a PeerSpec> + Clone) -> 
 
 fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice {
     let spec = &scene.peers[peer];
+    if scene.rotation.is_some() {
+        return DeviceChoice::Simulated;
+    }
     let touches_later = scene
         .timeline
         .iter()

@@ -11,7 +11,7 @@ use super::links;
 use super::network::Network;
 use super::packets::Packets;
 use super::plot::{self, Panel, Plot};
-use super::trajectory::Trajectory;
+use super::trajectory::{Trajectory, Turns};
 use crate::{Observer, PacketRow, Summary, TickRow};
 
 /// The name of a file, and the picture in it as SVG.
@@ -61,7 +61,7 @@ impl Recorder {
         Ok(Self {
             folder: folder.to_path_buf(),
             title: scene.title.clone(),
-            trajectory: Trajectory::create(folder, names.clone(), scene.axes)?,
+            trajectory: Trajectory::create(folder, names.clone(), scene.axes, Turns::of(scene))?,
             packets: Packets::create(folder, names.clone())?,
             plotted: Plotted { positions: bands(curves), forces: bands(curves), network: Network::new(scene, spans) },
             size: Size::default(),

@@ -2,6 +2,7 @@
 
 use super::algebra::{apply, cross, dot, scale};
 use super::{Matrix3, Real, Triple};
+use crate::State;
 
 /// The most by which the square of the norm of a received quaternion may differ from 1.
 pub const NORM_TOLERANCE: f64 = 1.0 / (1 << 20) as f64;
@@ -18,6 +19,13 @@ pub struct Attitude<N = f64> {
 impl Attitude {
     /// Not turned and at rest.
     pub const REST: Self = Self { orientation: [1.0, 0.0, 0.0, 0.0], rate: [0.0; 3] };
+
+    /// The motion of a point of the body, where `centre` is that of the centre of mass and `arm` goes from there to the point, in body axes \[m\]:
+    /// x = p + R·r, v = v + R(ω×r).
+    #[must_use]
+    pub fn point<const A: usize>(&self, arm: Triple, centre: &State<A>) -> State<A> {
+        point_of(&self.matrix(), self.rate, arm, centre)
+    }
 
     /// Whether every component is a finite number.
     #[must_use]
@@ -81,6 +89,14 @@ impl<N: Real> Attitude<N> {
         let unit = N::of(0.5) * (N::of(3.0) - squared_norm(&q));
         self.orientation = q.map(|component| component * unit);
     }
+}
+
+/// [`Attitude::point`] with R and ω.
+#[inline(always)]
+pub(super) fn point_of<const A: usize>(matrix: &Matrix3, rate: Triple, arm: Triple, centre: &State<A>) -> State<A> {
+    let (reach, swing) = (apply(matrix, arm), apply(matrix, cross(rate, arm)));
+    let moved = |own: &[f64; A], by: Triple| core::array::from_fn(|axis| own[axis] + by.get(axis).copied().unwrap_or(0.0));
+    State { position: moved(&centre.position, reach), velocity: moved(&centre.velocity, swing) }
 }
 
 #[inline(always)]
