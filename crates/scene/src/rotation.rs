@@ -152,3 +152,92 @@ impl RotationSpec {
         self.inertia.map(|moment| number * moment / mass)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use cohaptic_peer::wire::SampleKind;
+
+    use super::*;
+
+    const TEXT: &str = "\
+scene = { duration = \"1s\", axes = 3, count = 4 }
+object = { mass = 2, damping = 4, inertia = [0.1, 0.2, 0.3], orientation = [2, 0, 0, 0], angular-velocity = [0, 0, 3] }
+coordination = { strategy = \"proportional-derivative\", stiffness = 100, damping = 20, update = \"8ms\" }
+peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 0, 0] }
+";
+
+    fn scene(overrides: &[&str]) -> Result<Scene, String> {
+        let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+        Scene::parse(TEXT, Path::new("x.toml"), &overrides).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn each_element_of_the_mass_is_coordinated_and_damped_as_if_alone() {
+        let scene = scene(&[]).unwrap();
+        let config = scene.rotation_config(0).unwrap();
+        // Inertia is split as mass; damping is that of each copy; KT and BT count once for each other peer.
+        assert_eq!(config.copy, Spin { inertia: [0.1 / 4.0, 0.05, 0.3 / 4.0], damping: [0.2, 0.4, 0.3 * 4.0 / 2.0] });
+        assert_eq!(config.gains, Gains { stiffness: [15.0, 30.0, 45.0], damping: [3.0, 6.0, 9.0] });
+        let scaled = self::scene(&["coordination.scaling=inverse-n", "coordination.rotational-stiffness=8"]).unwrap();
+        // 4·3/16 times three others.
+        assert_eq!(scaled.rotation_gains(scaled.coordination.gains).unwrap().stiffness, [18.0; 3]);
+        assert_eq!(scene.sample_kind(), SampleKind::Attitude);
+    }
+
+    #[test]
+    fn a_device_begins_at_its_grasp_point() {
+        let scene = scene(&["peers=[{name=\"peer1\", orientation=[1, 0, 0, 1]}]"]).unwrap();
+        // A quarter turn about z: x goes to y; ω×r has the length 3 rad/s · 0.1 m, and points to −x.
+        let State { position, velocity } = scene.initial_device::<3>(0);
+        let apart = |a: [f64; 3], b: [f64; 3]| (0..3).map(|axis| (a[axis] - b[axis]).abs()).fold(0.0, f64::max);
+        assert!(apart(position, [0.0, 0.1, 0.0]) < 1e-16 && apart(velocity, [-0.3, 0.0, 0.0]) < 1e-15, "{position:?} {velocity:?}");
+        assert_eq!(scene.initial_device::<3>(1).position, [0.1, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn scenes_that_cannot_turn_are_refused() {
+        let refused = |overrides: &[&str], expected: &str| {
+            let error = scene(overrides).unwrap_err();
+            assert!(error.contains(expected), "{overrides:?}: {error}");
+        };
+        refused(&["object.inertia=[1, 1, 3]"], "object.inertia: a moment of inertia is above the sum of the two others");
+        refused(&["object.inertia=[1, 1, 0]"], "object.inertia");
+        refused(&["object.inertia=[1, 1]"], "expected a number [kg·m²], or a list of three");
+        refused(&["scene.axes=2", "peer.grasp=0"], "expected scene.axes = 3, or no object.inertia");
+        refused(&["object.orientation=[0, 0, 0, 0]"], "is no quaternion");
+        refused(&["object.orientation=[1, 0, 0]"], "is no quaternion");
+        refused(&["coordination.rotational-stiffness=[1, 1, 3]"], "a stiffness is above the sum of the two others");
+        refused(&["coordination.strategy=wave"], "the strategy wave has no torque for an object with an inertia");
+        refused(&["coordination.send-when={position=0.001}"], "dead bands say nothing of attitudes");
+        refused(&["peer.device.inertia=0.001"], "expected coupling.rotational-stiffness");
+        refused(&["peer.device.rotational-damping=0.001"], "expected device.inertia beside it");
+        refused(&["peer.coupling.rotational-damping=0.001"], "expected rotational-stiffness beside it");
+        refused(&["peer.hand={torque=[0, 0, 1]}"], "the torque of a hand needs a device that turns");
+        refused(&["peer.kind=falcon", "peer.device.inertia=0.001", "peer.coupling.rotational-stiffness=1"], "a Falcon turns nothing");
+        refused(&["simulation.rotation-steps=0"], "rotation-steps");
+    }
+
+    #[test]
+    fn keys_of_turns_need_an_inertia() {
+        let text = TEXT
+            .replace("inertia = [0.1, 0.2, 0.3], orientation = [2, 0, 0, 0], angular-velocity = [0, 0, 3]", "velocity = 0")
+            .replace(", grasp = [0.1, 0, 0]", "");
+        assert!(Scene::parse(&text, Path::new("x.toml"), &[]).unwrap().rotation.is_none());
+        for key in [
+            "object.rotational-damping=1",
+            "object.orientation=[1, 0, 0, 0]",
+            "object.angular-velocity=1",
+            "coordination.rotational-stiffness=1",
+            "simulation.rotation-steps=2",
+            "peer.grasp=[0, 0, 1]",
+            "peer.device.inertia=1",
+            "peer.hand={torque=[0, 0, 1]}",
+            "expect.rotation-discrepancy={max=1}",
+        ] {
+            let error = Scene::parse(&text, Path::new("x.toml"), &[key.to_owned()]).unwrap_err().to_string();
+            assert!(error.contains("this is about an object that turns: expected object.inertia, or no such key"), "{key}: {error}");
+        }
+    }
+}

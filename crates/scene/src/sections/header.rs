@@ -81,9 +81,9 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<(Co
     let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
     let update = table.required("update", "a duration above zero such as \"8ms\"", values::positive_duration);
     let send_when = table.maybe("send-when", read_send_when);
-    let settings = read_settings(&mut table);
     let stiffness_of_turns = table.maybe("rotational-stiffness", read_rotational_stiffness);
     let damping_of_turns = table.maybe("rotational-damping", read_rotational_damping);
+    let settings = read_settings(&mut table);
     table.finish();
     let spec = CoordinationSpec {
         strategy: strategy?,
