@@ -97,10 +97,9 @@ impl<const A: usize> Datagrams<A> {
         self.attitudes[slot] = attitude;
     }
 
-    /// The attitude of a datagram; `None` where the object does not turn.
-    #[inline]
-    pub(crate) fn attitude(&self, handle: Handle) -> Option<&Attitude> {
-        self.attitudes.get(handle.0.get() as usize - 1)
+    /// The attitude of a datagram; at rest where the object does not turn.
+    pub(crate) fn attitude(&self, handle: Handle) -> Attitude {
+        self.attitudes.get(handle.0.get() as usize - 1).copied().unwrap_or(Attitude::REST)
     }
 
     /// The extra numbers of a datagram for a receiver; zeros if it has none.

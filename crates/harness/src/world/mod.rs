@@ -350,8 +350,8 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             self.finite = false;
             return None;
         };
-        if let Some(rotation) = peer.rotation() {
-            self.datagrams.set_attitude(handle, *rotation.copy());
+        if kind == SampleKind::Attitude {
+            self.datagrams.set_attitude(handle, peer.attitude());
         }
         let (info, from) = (PacketInfo { size: Bytes::new(len as u64), ecn_capable: true }, NodeId::new(from));
         let sent = match role {
@@ -372,14 +372,16 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             if let Fate::Delivered(_) = event.fate {
                 let to = event.path.to.index();
                 let receiver = &mut self.members[to];
+                let extended;
                 let extra = if self.kind == SampleKind::State {
-                    Extra::NONE
+                    &Extra::NONE
                 } else {
-                    let place = if self.kind.is_personal() { u32::try_from(to).unwrap_or(u32::MAX) } else { 0 };
-                    Extra { receiver: place, numbers: self.datagrams.extra(event.payload, to) }
+                    let receiver = if self.kind.is_personal() { u32::try_from(to).unwrap_or(u32::MAX) } else { 0 };
+                    let numbers = self.datagrams.extra(event.payload, to);
+                    extended = Extra { receiver, numbers, attitude: self.datagrams.attitude(event.payload) };
+                    &extended
                 };
-                let attitude = self.datagrams.attitude(event.payload);
-                let sample = Arriving { sample: self.datagrams.sample(event.payload), kind: self.kind, extra, attitude, axes: self.axes };
+                let sample = Arriving { sample: self.datagrams.sample(event.payload), kind: self.kind, extra, axes: self.axes };
                 match self.remote.receive(now, &event, &sample, &mut receiver.peer) {
                     Some(Ok(Reception::Newest)) if watch.holds => {
                         observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
@@ -498,7 +500,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         }
         self.max_discrepancy = self.max_discrepancy.max(discrepancy);
         if let Some(turning) = &mut self.turning {
-            turning.measure();
+            turning.measure(|place| self.remote.is_there(place));
         }
         discrepancy
     }

@@ -1,6 +1,5 @@
 //! The questions of a running scene about its remote peers.
 
-use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{Device, Peer, ReceiveError, Reception, RestingDevice, Strategy};
 use cohaptic_units::Instant;
@@ -75,10 +74,7 @@ impl<const A: usize> Remote<A> for NoRemote {
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>> {
         Some(match &event.damage {
-            None => match sample.attitude {
-                Some(attitude) => receiver.handle_attitude(sample.sample, attitude),
-                None => receiver.handle_extended(sample.sample, &sample.extra.numbers),
-            },
+            None => receiver.handle_extended(sample.sample, sample.extra),
             Some(damage) => receiver.handle_datagram(sample.datagram(Some(damage), &mut [0; MAX_LEN])),
         })
     }
@@ -101,9 +97,7 @@ impl<const A: usize> Remote<A> for NoRemote {
 pub(crate) struct Arriving<'a, const A: usize> {
     pub(crate) sample: &'a Sample<A>,
     pub(crate) kind: SampleKind,
-    pub(crate) extra: Extra<A>,
-    /// How the sender's copy is turned, if the object turns.
-    pub(crate) attitude: Option<&'a Attitude>,
+    pub(crate) extra: &'a Extra<A>,
     /// How many axes the scene has.
     pub(crate) axes: usize,
 }
@@ -111,10 +105,7 @@ pub(crate) struct Arriving<'a, const A: usize> {
 impl<const A: usize> Arriving<'_, A> {
     /// Its bytes.
     pub(super) fn datagram<'b>(&self, damage: Option<&Damage>, buffer: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let len = match self.attitude {
-            Some(attitude) => self.sample.encode_attitude(attitude, self.axes, buffer),
-            None => self.sample.encode_as(self.kind, &self.extra, self.axes, buffer),
-        };
+        let len = self.sample.encode_as(self.kind, self.extra, self.axes, buffer);
         if let Some(damage) = damage {
             damage.apply(&mut buffer[..len]);
         }

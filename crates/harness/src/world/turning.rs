@@ -40,21 +40,21 @@ impl Turning {
         self.gains.pop()
     }
 
-    /// Takes the angles between the copies at their latest ticks into the largest one.
+    /// Takes the angles between the copies that are there, at their latest ticks, into the largest one.
     ///
     /// An angle between two copies is at most the sum of their angles to the first one: only pairs of which that is above the largest so far are looked at.
-    pub(super) fn measure(&mut self) {
-        let Some(first) = self.latest.first().copied() else { return };
-        for (angle, attitude) in self.angles.iter_mut().zip(&self.latest) {
-            *angle = first.angle_to(&attitude.orientation);
+    pub(super) fn measure(&mut self, is_there: impl Fn(usize) -> bool) {
+        let Some(first) = (0..self.latest.len()).find(|place| is_there(*place)).map(|place| self.latest[place]) else { return };
+        for (place, (angle, attitude)) in self.angles.iter_mut().zip(&self.latest).enumerate() {
+            *angle = if is_there(place) { first.angle_to(&attitude.orientation) } else { 0.0 };
             self.max_discrepancy = self.max_discrepancy.max(*angle);
         }
-        for one in 1..self.latest.len() {
+        for one in 0..self.latest.len() {
             if 2.0 * self.angles[one] <= self.max_discrepancy {
                 continue;
             }
             // One of a pair that is that far apart is at least half of it from the first.
-            for other in (1..self.latest.len()).filter(|other| *other != one) {
+            for other in (0..self.latest.len()).filter(|other| *other != one && is_there(*other)) {
                 if self.angles[one] + self.angles[other] > self.max_discrepancy {
                     let angle = self.latest[one].angle_to(&self.latest[other].orientation);
                     self.max_discrepancy = self.max_discrepancy.max(angle);
@@ -77,7 +77,7 @@ mod tests {
         };
         let latest: Vec<Attitude> = [[0.1, 0.0, 0.0], [0.0, 0.9, 0.3], [-1.2, 0.1, 0.0], [1.0, 0.4, 2.0], [0.0; 3]].map(turned).to_vec();
         let mut turning = Turning { gains: Vec::new(), angles: vec![0.0; 5], latest: latest.clone(), max_discrepancy: 0.0 };
-        turning.measure();
+        turning.measure(|_| true);
         let all = latest.iter().flat_map(|one| latest.iter().map(|other| one.angle_to(&other.orientation)));
         assert_eq!(turning.max_discrepancy.to_bits(), all.fold(0.0, f64::max).to_bits());
     }
