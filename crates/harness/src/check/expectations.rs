@@ -25,7 +25,7 @@ pub(crate) struct Watched {
 struct Positions {
     positions: Vec<WatchedPosition>,
     travels: Vec<WatchedTravel>,
-    /// What is expected of orientations, and what was seen.
+    /// Expectations of orientations, and the attitudes that were seen.
     expected: Vec<ExpectOrientation>,
     orientations: Vec<Option<Attitude>>,
 }

@@ -57,15 +57,15 @@ static OBJECT: Table = Table::of(&[&[
     optional(
         "inertia",
         vector(INERTIA),
-        "Principal moments of inertia of the whole object, which turns then; none above the sum of the others. Needs scene.axes = 3",
+        "Principal moments of inertia of the whole object, which turns then; none above the sum of the others; needs three axes",
     ),
     optional(
         "rotational-damping",
         vector(ROTATIONAL_DAMPING),
-        "Viscous damping of the turn of each copy, about its own axes; without it damping times inertia over mass",
+        "Viscous damping of the turn of each copy; without it damping times inertia over mass",
     ),
-    usual("orientation", QUATERNION, "[1, 0, 0, 0]", "How copies and devices are turned at the beginning: a quaternion w, x, y, z of any length"),
-    usual("angular-velocity", vector(RATE), "0", "With which angular velocity copies and devices begin, about their own axes"),
+    usual("orientation", QUATERNION, "[1, 0, 0, 0]", "Quaternion w, x, y, z of any length with which copies and devices begin"),
+    usual("angular-velocity", vector(RATE), "0", "Angular velocity in their own axes with which they begin"),
 ]]);
 static ENCLOSURE: Table = Table::of(&[&[
     required("min", vector(POSITION), "The lower end on each axis"),
@@ -86,7 +86,7 @@ const GAINS_OF_ALL: [Key; 9] = [
     optional(
         "rotational-stiffness",
         vector(ROTATIONAL_STIFFNESS),
-        "Gain on the turn between copies about their own axes, K_R; none above the sum of the others; without it K_T times inertia over mass",
+        "Gain on turns between copies, K_R; none above the sum of the others; without it K_T times inertia over mass",
     ),
     optional(
         "rotational-damping",
@@ -217,7 +217,7 @@ const SCALINGS: [(&str, &str); 2] = [("none", "as they are written"), ("inverse-
 static SIMULATION: Table = Table::of(&[&[
     usual("integrator", Form::Words(&INTEGRATORS), "\"exact\"", "How motion between ticks is computed"),
     usual("substeps", Form::Integer(1, u32::MAX as u64), "1", "Steps a tick; not with exact"),
-    usual("rotation-steps", Form::Integer(1, 10_000), "1", "Steps a tick of turns, beside those of substeps"),
+    usual("rotation-steps", Form::Integer(1, 10_000), "1", "Steps a tick of turns, times substeps"),
 ]]);
 const INTEGRATORS: [(&str, &str); 3] =
     [("exact", "the exact solution"), ("semi-implicit-euler", "the velocity first, then the position"), ("rk4", "Runge and Kutta's fourth order")];
@@ -233,9 +233,9 @@ const PEER: [Key; 18] = [
     optional("clock", Form::Table(&CLOCK), "How the peer's clock differs"),
     optional("position", vector(POSITION), "Where its copy and device begin; without it where the object does"),
     optional("velocity", vector(VELOCITY), "With which velocity they begin; without it that of the object"),
-    usual("grasp", vector(POSITION), "0", "Where the device grasps an object that turns: from its centre of mass, in its own axes"),
-    optional("orientation", QUATERNION, "How its copy and device are turned at the beginning; without it as the object"),
-    optional("angular-velocity", vector(RATE), "With which angular velocity they begin; without it that of the object"),
+    usual("grasp", vector(POSITION), "0", "Where the device grasps an object that turns, from its centre in its own axes"),
+    optional("orientation", QUATERNION, "As of the object"),
+    optional("angular-velocity", vector(RATE), "As of the object"),
     optional("uplink", Form::Table(&LINK_TABLE), "A line that all it sends passes before the links"),
     optional("downlink", Form::Table(&LINK_TABLE), "A line that all it receives passes after the links"),
     usual("kind", Form::Words(&KINDS), "\"simulated\"", "Where the peer lives in a live session"),
@@ -255,7 +255,7 @@ const CONTACTS: [(&str, &str); 2] = [("grasp", "held both ways"), ("none", "not 
 static DEVICE: Table = Table::of(&[&[
     somewhere("mass", number(MASS), "Mass of the device"),
     usual("damping", number(DAMPING), "0", "Viscous damping of the device"),
-    optional("inertia", vector(INERTIA), "Principal moments of inertia of a device with six degrees of freedom"),
+    optional("inertia", vector(INERTIA), "Moments of inertia of a device with six degrees of freedom"),
     usual("rotational-damping", vector(ROTATIONAL_DAMPING), "0", "Viscous damping of its turn"),
 ]]);
 static COUPLING: Table = Table::of(&[&[
@@ -295,12 +295,12 @@ static HAND_TABLE: Table = Table::of(&[&[
     optional("file", Form::File, "A recorded force: a CSV with the header t,fx (and fy, fz), in seconds and newtons"),
     optional("arm", Form::Table(&ARM), "An arm that adds its mass to the device and holds it with a damper and a spring"),
     optional("follows", Form::Table(&FOLLOWS), "Beside arm: the motion that it wants; without it to rest at 0"),
-    optional("torque", vector(TORQUE), "A constant torque on a device that turns, in world axes, alone or beside another key"),
+    optional("torque", vector(TORQUE), "A constant torque on a device that turns, in world axes"),
 ]]);
 static FORCE_SINE: Table = Table::of(&[
     &[required("amplitude", vector(FORCE), "Amplitude")],
     &SINE,
-    &[optional("torque", vector(TORQUE), "Amplitude of a torque that sways with it, on a device that turns, in world axes")],
+    &[optional("torque", vector(TORQUE), "Amplitude of a torque that sways with it")],
 ]);
 static MOTION_SINE: Table = Table::of(&[&[required("amplitude", vector(POSITION), "Amplitude")], &SINE]);
 const SINE: [Key; 2] =
