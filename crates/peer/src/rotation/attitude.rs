@@ -41,6 +41,17 @@ impl Attitude {
         (squared_norm(&self.orientation) - 1.0).abs() <= NORM_TOLERANCE
     }
 
+    /// The rotation vector of the orientation in world axes \[rad\]: its direction is the axis, its length the angle, 0 to π.
+    #[must_use]
+    pub fn rotation_vector(&self) -> Triple {
+        let sign = if self.orientation[0] < 0.0 { -1.0 } else { 1.0 };
+        let [w, x, y, z] = self.orientation.map(|q| sign * q);
+        let sine = libm::sqrt(x * x + y * y + z * z);
+        // The angle over the sine of half of it; 2 in the limit of no turn.
+        let factor = if sine > 0.0 { 2.0 * libm::atan2(sine, w) / sine } else { 2.0 };
+        [x, y, z].map(|u| factor * u)
+    }
+
     /// The angle of the turn from this orientation to the other one, 0 to π \[rad\].
     #[must_use]
     pub fn angle_to(&self, other: &[f64; 4]) -> f64 {
@@ -116,6 +127,18 @@ mod tests {
         assert!(turned[0].abs() < 1e-15 && (turned[1] - 1.0).abs() < 1e-15 && turned[2] == 0.0, "{turned:?}");
         assert!((Attitude::REST.angle_to(&attitude.orientation) - core::f64::consts::FRAC_PI_2).abs() < 1e-15);
         assert!((Attitude::REST.angle_to(&attitude.orientation.map(|q| -q)) - core::f64::consts::FRAC_PI_2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_rotation_vector_is_the_turn() {
+        for sigma in [[0.0; 3], [1e-12, 0.0, 0.0], [0.3, -1.0, 2.0], [-2.9, 0.1, 0.0]] {
+            let mut attitude = Attitude::REST;
+            attitude.turn(sigma);
+            for orientation in [attitude.orientation, attitude.orientation.map(|q| -q)] {
+                let found = Attitude { orientation, ..attitude }.rotation_vector();
+                assert!(found.iter().zip(&sigma).all(|(found, sigma)| (found - sigma).abs() < 1e-14), "{found:?} {sigma:?}");
+            }
+        }
     }
 
     #[test]

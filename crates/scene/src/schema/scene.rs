@@ -217,7 +217,7 @@ const SCALINGS: [(&str, &str); 2] = [("none", "as they are written"), ("inverse-
 static SIMULATION: Table = Table::of(&[&[
     usual("integrator", Form::Words(&INTEGRATORS), "\"exact\"", "How motion between ticks is computed"),
     usual("substeps", Form::Integer(1, u32::MAX as u64), "1", "Steps a tick; not with exact"),
-    usual("rotation-steps", Form::Integer(1, 10_000), "1", "Steps a tick of turns, times substeps"),
+    usual("rotation-steps", Form::Integer(1, 10_000), "1", "Steps of a turn in a tick, times substeps"),
 ]]);
 const INTEGRATORS: [(&str, &str); 3] =
     [("exact", "the exact solution"), ("semi-implicit-euler", "the velocity first, then the position"), ("rk4", "Runge and Kutta's fourth order")];
