@@ -9,6 +9,7 @@ mod late_samples;
 mod laws;
 mod local_lag;
 mod own_parts;
+mod rotation;
 mod smoothed_average_position;
 mod step_map;
 mod wire;
