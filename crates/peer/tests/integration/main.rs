@@ -12,6 +12,7 @@ mod own_parts;
 mod rotation;
 mod smoothed_average_position;
 mod step_map;
+mod turning_energy;
 mod wire;
 
 use proptest::prelude::ProptestConfig;
