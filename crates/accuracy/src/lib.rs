@@ -31,6 +31,7 @@ pub mod network;
 mod numbers;
 mod plots;
 pub mod real_time;
+pub mod rotation;
 mod row;
 mod subject;
 mod text;

@@ -1,12 +1,14 @@
 //! The subjects of the measurement.
 
-use crate::{AccuracyError, Options, Row, Watch, analysis, least, motion, network, real_time, time};
+use crate::{AccuracyError, Options, Row, Watch, analysis, least, motion, network, real_time, rotation, time};
 
 /// What a group of methods is for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Subject {
     /// Moving masses from tick to tick.
     Motion,
+    /// Turning bodies from tick to tick.
+    Rotation,
     /// When things happen: events in nanoseconds, or steps.
     Time,
     /// Random delays and losses.
@@ -21,13 +23,14 @@ pub enum Subject {
 
 impl Subject {
     /// Every subject, in the order in which they are measured and shown.
-    pub const ALL: [Self; 6] = [Self::Motion, Self::Time, Self::Network, Self::Analysis, Self::RealTime, Self::LeastModel];
+    pub const ALL: [Self; 7] = [Self::Motion, Self::Rotation, Self::Time, Self::Network, Self::Analysis, Self::RealTime, Self::LeastModel];
 
     /// The name, as on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Motion => "motion",
+            Self::Rotation => "rotation",
             Self::Time => "time",
             Self::Network => "network",
             Self::Analysis => "analysis",
@@ -39,6 +42,7 @@ impl Subject {
     pub(crate) fn rows(self, options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
         match self {
             Self::Motion => motion::rows(options, watch),
+            Self::Rotation => rotation::rows(options, watch),
             Self::Time => time::rows(options, watch),
             Self::Network => network::rows(options.of(network::Effort::FULL, network::Effort::QUICK), watch),
             Self::Analysis => analysis::rows(options.of(analysis::Effort::FULL, analysis::Effort::QUICK), watch),

@@ -44,7 +44,7 @@ pub(crate) struct AccuracyArguments {
     /// Fewer settings and less work: under a minute
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Only these: motion, time, network, analysis, real-time, least-model
+    /// Only these: motion, rotation, time, network, analysis, real-time, least-model
     #[arg(long, value_name = "SUBJECT", value_delimiter = ',', value_parser = subject)]
     pub(crate) only: Vec<Subject>,
     /// Print one JSON document and nothing else

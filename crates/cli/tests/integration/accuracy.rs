@@ -2,7 +2,7 @@
 
 use crate::desk::{Desk, parse};
 
-const NAMES: [&str; 6] = ["motion", "time", "network", "analysis", "real-time", "least-model"];
+const NAMES: [&str; 7] = ["motion", "rotation", "time", "network", "analysis", "real-time", "least-model"];
 
 #[test]
 fn a_file_in_place_of_the_folder_is_refused_before_anything_is_measured() {

@@ -9,8 +9,10 @@ mod late_samples;
 mod laws;
 mod local_lag;
 mod own_parts;
+mod rotation;
 mod smoothed_average_position;
 mod step_map;
+mod turning_energy;
 mod wire;
 
 use proptest::prelude::ProptestConfig;
