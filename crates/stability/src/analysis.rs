@@ -270,8 +270,14 @@ pub(crate) struct Combination {
 /// More combinations than this are refused.
 const MOST: u128 = 4096;
 
+/// Refuses an object that turns, whose torques are no part of the equations here.
+pub(crate) fn refuse_turns(scene: &Scene, what: &'static str) -> Result<(), AnalysisError> {
+    if scene.rotation.is_some() { Err(AnalysisError::Turns { what, why: String::new() }) } else { Ok(()) }
+}
+
 /// Every combination of contacts in which the scene is linear.
 pub(crate) fn combinations(scene: &Scene) -> Result<Vec<Combination>, AnalysisError> {
+    refuse_turns(scene, "the stability")?;
     let grasping = |peer: usize| scene.peers[peer].contact == Contact::Grasp;
     let pushing_along = |axis: usize| -> Vec<usize> {
         let pushes = |peer: &usize| matches!(scene.peers[*peer].contact, Contact::Push(direction) if direction.axis == axis);

@@ -48,6 +48,14 @@ pub enum AnalysisError {
         /// Its name.
         strategy: &'static str,
     },
+    /// The object turns, and this analysis does not follow that.
+    #[error("{what} of an object that turns is not analysed here{why}: expected a scene without object.inertia")]
+    Turns {
+        /// The analysis, or the part of the scene, that is refused.
+        what: &'static str,
+        /// Why, from the separating sign on; empty if there is no more to say.
+        why: String,
+    },
     /// Not all samples are sent.
     #[error(
         "with coordination.send-when a sample depends on how far things have moved, which is not linear: simulations tell whether the scene is stable"

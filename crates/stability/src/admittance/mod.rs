@@ -77,6 +77,7 @@ impl Admittance {
     /// As [`Admittance::of`], and [`AnalysisError::Stopped`] if the watch ends it.
     pub fn of_watched(scene: &Scene, peer: usize, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
         let spec = scene.peers.get(peer).ok_or(AdmittanceError::NoSuchPeer { peer, peers: scene.peers.len() })?;
+        crate::analysis::refuse_turns(scene, "the admittance")?;
         let network = NominalNetwork::of(scene)?;
         let (contacts, notes) = closed_contacts(scene, peer);
         let structure = Structure::with_alone(&[scene], &network, &contacts, Some(peer))?;
