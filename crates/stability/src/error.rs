@@ -48,13 +48,22 @@ pub enum AnalysisError {
         /// Its name.
         strategy: &'static str,
     },
-    /// The object turns, and this analysis does not follow that.
-    #[error("{what} of an object that turns is not analysed here{why}: expected a scene without object.inertia")]
+    /// The object turns, and its motion does not split into scenes of one axis.
+    #[error(
+        "{what} of an object that turns is analysed only where its motion splits into scenes of one axis, and here {why}; cohaptic stability point and \
+         simulations tell whether the scene is stable"
+    )]
     Turns {
-        /// The analysis, or the part of the scene, that is refused.
+        /// The analysis.
         what: &'static str,
-        /// Why, from the separating sign on; empty if there is no more to say.
-        why: String,
+        /// Why it does not split.
+        why: &'static str,
+    },
+    /// The object turns, and this analysis does not follow that.
+    #[error("{what} does not follow an object that turns: expected a scene without object.inertia")]
+    NoTurns {
+        /// The analysis.
+        what: &'static str,
     },
     /// Not all samples are sent.
     #[error(
