@@ -1,7 +1,7 @@
 //! A small displacement of where everything begins, to see whether it dies out.
 
 use cohaptic_peer::State;
-use cohaptic_peer::rotation::{Attitude, Rotation, Spin};
+use cohaptic_peer::rotation::{Attitude, Rotation};
 
 /// Beyond the places of all peers, so that no turn is like a displacement.
 const TURNS: usize = 1 << 24;
@@ -27,10 +27,8 @@ impl Disturbance {
         displaced
     }
 
-    /// Turns a peer's copy and device by as much as moves points at the radius of gyration so far.
-    pub(crate) fn turn(self, rotation: &mut Rotation, copy: &Spin, mass: f64, place: usize) {
-        // Angles times √(tr J/3m) are lengths.
-        let length = libm::sqrt(copy.inertia.iter().sum::<f64>() / (3.0 * mass));
+    /// Turns a peer's copy and device; angles times `length` are lengths \[m\].
+    pub(crate) fn turn(self, rotation: &mut Rotation, length: f64, place: usize) {
         let turned = |mut attitude: Attitude, body: usize| {
             let State { position, .. } = self.displace(State::<3>::REST, 3, TURNS + place, body);
             attitude.turn(position.map(|angle| angle / length));

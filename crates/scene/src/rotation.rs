@@ -91,6 +91,13 @@ impl Scene {
         Some(Spin { inertia: rotation.inertia.map(|moment| moment * share), damping })
     }
 
+    /// √(tr J/3m), the radius of gyration over √(3/2): angles times this are lengths of the motion of the object \[m\]; `None` if the object does not turn.
+    #[must_use]
+    pub fn gyration(&self) -> Option<f64> {
+        let rotation = self.rotation.as_ref()?;
+        Some((rotation.inertia.iter().sum::<f64>() / (3.0 * self.object.mass)).sqrt())
+    }
+
     /// KR and BR on the mean of the others about the body axes, scaled by the number of peers, where KT and BT are `gains`, those of the scene or those that
     /// the timeline sets; `None` if the object does not turn.
     #[must_use]

@@ -7,7 +7,7 @@ mod turning;
 use std::time::Duration;
 
 use cohaptic_peer::coordination::{LawValues, Role};
-use cohaptic_peer::rotation::Rotation;
+use cohaptic_peer::rotation::{Attitude, Rotation};
 use cohaptic_peer::wire::{Extra, SampleKind};
 use cohaptic_peer::{Clock, Contact, Device, Held, LastSent, ObjectCopy, Peer, Reception, RestingDevice, SendWhen, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Change, ChangeKind, Scene};
@@ -125,6 +125,17 @@ pub(crate) struct Bodies<const A: usize> {
     pub(crate) device: [f64; A],
     pub(crate) object: [f64; A],
     pub(crate) contact: Contact,
+    /// The point of the copy that the device grasps: its centre if the object does not turn.
+    pub(crate) grasp: [f64; A],
+    pub(crate) turns: Option<Turns>,
+}
+
+/// The attitudes of the two bodies of a peer; angles times `length` are lengths \[m\].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turns {
+    pub(crate) object: Attitude,
+    pub(crate) device: Option<Attitude>,
+    pub(crate) length: f64,
 }
 
 /// What one step of a run came to.
@@ -229,10 +240,16 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
 
     /// Where each peer's device and copy are, and whether they touch.
     pub(crate) fn bodies(&self) -> impl Iterator<Item = Bodies<A>> {
-        self.members.iter().map(|member| Bodies {
-            device: member.peer.device().state().position,
-            object: member.peer.object().state().position,
-            contact: member.peer.contact(),
+        let length = self.turning.as_ref().map_or(1.0, |turning| turning.length());
+        self.members.iter().map(move |member| {
+            let (object, rotation) = (member.peer.object().state(), member.peer.rotation());
+            Bodies {
+                device: member.peer.device().state().position,
+                object: object.position,
+                contact: member.peer.contact(),
+                grasp: rotation.map_or(object.position, |rotation| rotation.copy().point(rotation.config().grasp, object).position),
+                turns: rotation.map(|rotation| Turns { object: *rotation.copy(), device: rotation.device().copied(), length }),
+            }
         })
     }
 
@@ -611,8 +628,8 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
         let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
         let mut peer = Peer::new(scene.peer_config(place), device, object, strategy, Held::new(others));
         if let Some(mut rotation) = scene.rotation_of(place) {
-            if let (Some(disturbance), Some(spin)) = (disturbance, scene.copy_spin()) {
-                disturbance.turn(&mut rotation, &spin, scene.copy_mass(), place);
+            if let (Some(disturbance), Some(length)) = (disturbance, scene.gyration()) {
+                disturbance.turn(&mut rotation, length, place);
             }
             peer = peer.with_rotation(rotation);
         }

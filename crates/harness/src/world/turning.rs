@@ -15,6 +15,8 @@ pub(super) struct Turning {
     gains: Vec<Gains<Triple>>,
     /// The angle of each copy to the first \[rad\].
     angles: Vec<f64>,
+    /// √(tr J/3m): angles times this are lengths \[m\].
+    length: f64,
 }
 
 impl Turning {
@@ -32,7 +34,13 @@ impl Turning {
             | ChangeKind::SendWhen(_) => None,
         });
         let latest: Vec<Attitude> = rotation.peers.iter().map(|peer| peer.attitude).collect();
-        Some(Box::new(Self { gains: gains.collect(), angles: vec![0.0; latest.len()], latest, max_discrepancy: 0.0 }))
+        let length = scene.gyration()?;
+        Some(Box::new(Self { gains: gains.collect(), angles: vec![0.0; latest.len()], latest, max_discrepancy: 0.0, length }))
+    }
+
+    /// Angles times this are lengths \[m\].
+    pub(super) fn length(&self) -> f64 {
+        self.length
     }
 
     /// KR and BR from the change on that is due now.
@@ -76,7 +84,7 @@ mod tests {
             attitude
         };
         let latest: Vec<Attitude> = [[0.1, 0.0, 0.0], [0.0, 0.9, 0.3], [-1.2, 0.1, 0.0], [1.0, 0.4, 2.0], [0.0; 3]].map(turned).to_vec();
-        let mut turning = Turning { gains: Vec::new(), angles: vec![0.0; 5], latest: latest.clone(), max_discrepancy: 0.0 };
+        let mut turning = Turning { gains: Vec::new(), angles: vec![0.0; 5], latest: latest.clone(), max_discrepancy: 0.0, length: 1.0 };
         turning.measure(|_| true);
         let all = latest.iter().flat_map(|one| latest.iter().map(|other| one.angle_to(&other.orientation)));
         assert_eq!(turning.max_discrepancy.to_bits(), all.fold(0.0, f64::max).to_bits());

@@ -52,6 +52,16 @@ impl Attitude {
         [x, y, z].map(|u| factor * u)
     }
 
+    /// The rotation vector in world axes that turns another orientation into this one \[rad\], of length 0 to π.
+    #[must_use]
+    pub fn rotation_from(&self, other: &[f64; 4]) -> Triple {
+        let ([w, u @ ..], [a, b @ ..]) = (self.orientation, *other);
+        let turned = cross(u, b);
+        // q·p* with the conjugate p* = (a, −b).
+        let vector: Triple = core::array::from_fn(|axis| a * u[axis] - w * b[axis] - turned[axis]);
+        Self { orientation: [w * a + dot(u, b), vector[0], vector[1], vector[2]], rate: [0.0; 3] }.rotation_vector()
+    }
+
     /// The angle of the turn from this orientation to the other one, 0 to π \[rad\].
     #[must_use]
     pub fn angle_to(&self, other: &[f64; 4]) -> f64 {
@@ -139,6 +149,22 @@ mod tests {
                 assert!(found.iter().zip(&sigma).all(|(found, sigma)| (found - sigma).abs() < 1e-14), "{found:?} {sigma:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_rotation_between_two_is_in_world_axes() {
+        let turned = |sigma: Triple| {
+            let mut attitude = Attitude::REST;
+            attitude.turn(sigma);
+            attitude
+        };
+        let from = turned([0.4, 2.0, -0.7]);
+        // A turn in body axes is one in world axes about the turned axis.
+        let mut to = from;
+        to.turn([0.01, -0.02, 0.03]);
+        let expected = apply(&from.matrix(), [0.01, -0.02, 0.03]);
+        let found = to.rotation_from(&from.orientation);
+        assert!(found.iter().zip(&expected).all(|(found, expected)| (found - expected).abs() < 1e-15), "{found:?} {expected:?}");
     }
 
     #[test]
