@@ -2,7 +2,7 @@
 //
 // It joins a scene that runs under `cohaptic live`, simulates a haptic device, its own copy of the shared object and average-position coordination at
 // 1 kHz, and exchanges samples with the other peers through the session. C++17 and POSIX sockets, nothing else. The protocol is in
-// docs/live-protocol.md, the equations are in docs/model.md.
+// docs/live-protocol.md, the equations are in docs/model.md and, for an object that turns (--inertia), docs/rotation.md.
 //
 //     c++ -std=c++17 -O2 -Wall -Wextra -o udp_peer udp_peer.cpp
 //     ./udp_peer 127.0.0.1:7000 --session 42 --place 1 --peers 3 --force 0.5 --duration 5
@@ -145,22 +145,31 @@ struct State {
     double position = 0, velocity = 0;
 };
 using States = std::vector<State>; // one for each axis
+using Vector = std::array<double, 3>;
+using Matrix = std::array<Vector, 3>;
+
+// How a body is turned: a unit quaternion w, x, y, z, and the angular velocity about its own axes [rad/s].
+struct Attitude {
+    std::array<double, 4> quaternion{1, 0, 0, 0};
+    Vector rate{};
+};
 
 struct Sample {
     std::uint64_t session;
     std::uint32_t sender;
     std::uint64_t number, sent_ns;
     States states;
+    std::optional<Attitude> attitude; // if the object turns
 };
 
-constexpr std::size_t HEADER_LEN = 48;
+constexpr std::size_t HEADER_LEN = 48, ATTITUDE_LEN = 56;
 
 Bytes encode(const Sample &sample) {
     Bytes bytes;
     put(bytes, "CHPT");
     put(bytes, 1, 2);
     put(bytes, sample.states.size(), 1);
-    put(bytes, 0, 1);
+    put(bytes, sample.attitude ? 1 : 0, 1);
     put(bytes, sample.session, 8);
     put(bytes, sample.sender, 4);
     put(bytes, 0, 4);
@@ -168,18 +177,32 @@ Bytes encode(const Sample &sample) {
     put(bytes, sample.sent_ns, 8);
     put(bytes, 0, 8);
     for (const State &state : sample.states) put(bytes, state.position), put(bytes, state.velocity);
+    if (sample.attitude) {
+        for (const double q : sample.attitude->quaternion) put(bytes, q);
+        for (const double w : sample.attitude->rate) put(bytes, w);
+    }
     return bytes;
 }
 
 // Nothing for anything but a good sample of this session.
-std::optional<Sample> decode(const Bytes &bytes, std::uint64_t session, std::size_t axes) {
-    if (bytes.size() != HEADER_LEN + 16 * axes || !begins(bytes, "CHPT") || bytes[6] != axes) return {};
-    if (bytes[7] != 0 || get(bytes, 20, 4) != 0 || get(bytes, 40, 8) != 0 || get(bytes, 8, 8) != session) return {};
-    Sample sample{session, static_cast<std::uint32_t>(get(bytes, 16, 4)), get(bytes, 24, 8), get(bytes, 32, 8), {}};
-    for (std::size_t at = HEADER_LEN; at < bytes.size(); at += 16) {
+std::optional<Sample> decode(const Bytes &bytes, std::uint64_t session, std::size_t axes, bool turns) {
+    const std::size_t end = HEADER_LEN + 16 * axes;
+    if (bytes.size() != end + (turns ? ATTITUDE_LEN : 0) || !begins(bytes, "CHPT") || bytes[6] != axes) return {};
+    if (bytes[7] != (turns ? 1 : 0) || get(bytes, 20, 4) != 0 || get(bytes, 40, 8) != 0 || get(bytes, 8, 8) != session) return {};
+    Sample sample{session, static_cast<std::uint32_t>(get(bytes, 16, 4)), get(bytes, 24, 8), get(bytes, 32, 8), {}, {}};
+    for (std::size_t at = HEADER_LEN; at < end; at += 16) {
         const State state{get_double(bytes, at), get_double(bytes, at + 8)};
         if (!std::isfinite(state.position) || !std::isfinite(state.velocity)) return {};
         sample.states.push_back(state);
+    }
+    if (turns) {
+        Attitude attitude;
+        double norm = 0;
+        for (std::size_t i = 0; i < 4; ++i) attitude.quaternion[i] = get_double(bytes, end + 8 * i), norm += attitude.quaternion[i] * attitude.quaternion[i];
+        for (std::size_t i = 0; i < 3; ++i) attitude.rate[i] = get_double(bytes, end + 32 + 8 * i);
+        const bool finite = std::all_of(attitude.rate.begin(), attitude.rate.end(), [](double w) { return std::isfinite(w); });
+        if (!finite || !(std::abs(norm - 1) <= 0x1p-20)) return {};
+        sample.attitude = attitude;
     }
     return sample;
 }
@@ -187,6 +210,7 @@ std::optional<Sample> decode(const Bytes &bytes, std::uint64_t session, std::siz
 // What the door tells of the session.
 struct Welcome {
     std::size_t axes;
+    bool turns;
     std::uint32_t peers;
     std::uint64_t tick_ns, update_ns;
 };
@@ -224,7 +248,7 @@ class Joining {
         if (get(bytes, 8, 8) != session_ || get(bytes, 16, 4) != place_ || nonce != nonce_) return {};
         to_door_ = derive("cohaptic 1 to door", server_nonce);
         to_peer_ = derive("cohaptic 1 to peer", server_nonce);
-        return Welcome{bytes[6], static_cast<std::uint32_t>(get(bytes, 20, 4)), get(bytes, 56, 8), get(bytes, 64, 8)};
+        return Welcome{bytes[6], bytes[7] == 1, static_cast<std::uint32_t>(get(bytes, 20, 4)), get(bytes, 56, 8), get(bytes, 64, 8)};
     }
 
     Bytes seal(Bytes sample) const {
@@ -334,12 +358,79 @@ class Body {
     double position_per_velocity_, position_per_force_, velocity_lost_, velocity_per_force_;
 };
 
+// R, which turns vectors in body axes into world axes.
+Matrix matrix_of(const std::array<double, 4> &q) {
+    const auto [w, x, y, z] = q;
+    const double f = 2 / (w * w + x * x + y * y + z * z);
+    return {{{1 - f * (y * y + z * z), f * (x * y - w * z), f * (x * z + w * y)},
+             {f * (x * y + w * z), 1 - f * (x * x + z * z), f * (y * z - w * x)},
+             {f * (x * z - w * y), f * (y * z + w * x), 1 - f * (x * x + y * y)}}};
+}
+
+Vector times(const Matrix &m, const Vector &v) {
+    Vector result{};
+    for (std::size_t i = 0; i < 3; ++i) result[i] = m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2];
+    return result;
+}
+
+Matrix transposed(const Matrix &m) {
+    return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
+}
+
+Vector cross(const Vector &a, const Vector &b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+// A damped body that turns, in its principal axes: J·ω' + ω×Jω = τ − b·ω, by Runge and Kutta's fourth order.
+class Turn {
+  public:
+    Turn(const Vector &inertia, const Vector &damping, double step) : inertia_(inertia), damping_(damping), step_(step) {}
+
+    void move(const Vector &torque) {
+        const Numbers start{attitude.quaternion[0], attitude.quaternion[1], attitude.quaternion[2], attitude.quaternion[3],
+                            attitude.rate[0],       attitude.rate[1],       attitude.rate[2]};
+        const auto moved = [&](const Numbers &rise, double part) {
+            Numbers end = start;
+            for (std::size_t i = 0; i < end.size(); ++i) end[i] += part * rise[i];
+            return end;
+        };
+        const Numbers k1 = slope(start, torque), k2 = slope(moved(k1, step_ / 2), torque);
+        const Numbers k3 = slope(moved(k2, step_ / 2), torque), k4 = slope(moved(k3, step_), torque);
+        Numbers end = start;
+        for (std::size_t i = 0; i < end.size(); ++i) end[i] += step_ / 6 * (k1[i] + 2 * (k2[i] + k3[i]) + k4[i]);
+        const double norm = std::sqrt(end[0] * end[0] + end[1] * end[1] + end[2] * end[2] + end[3] * end[3]);
+        for (std::size_t i = 0; i < 4; ++i) attitude.quaternion[i] = end[i] / norm;
+        for (std::size_t i = 0; i < 3; ++i) attitude.rate[i] = end[4 + i];
+    }
+
+    Attitude attitude;
+
+  private:
+    using Numbers = std::array<double, 7>;
+
+    Numbers slope(const Numbers &state, const Vector &torque) const {
+        const Vector u{state[1], state[2], state[3]}, rate{state[4], state[5], state[6]};
+        const Vector spun = cross(u, rate), gyration = cross(rate, {inertia_[0] * rate[0], inertia_[1] * rate[1], inertia_[2] * rate[2]});
+        Numbers rise{-(u[0] * rate[0] + u[1] * rate[1] + u[2] * rate[2]) / 2};
+        for (std::size_t i = 0; i < 3; ++i) {
+            rise[1 + i] = (state[0] * rate[i] + spun[i]) / 2;
+            rise[4 + i] = (torque[i] - gyration[i] - damping_[i] * rate[i]) / inertia_[i];
+        }
+        return rise;
+    }
+
+    Vector inertia_, damping_;
+    double step_;
+};
+
 // What is held from another peer: the sample with the highest number; its initial state before the first.
 struct Sender {
     States states;
     std::optional<std::uint64_t> newest;
     std::optional<Clock::time_point> heard;
     std::uint64_t received = 0, late = 0;
+    Matrix matrix = matrix_of({1, 0, 0, 0});
+    Vector world_rate{};
 
     // Whether it is newer than what was held.
     bool take(Sample &&sample, Clock::time_point now) {
@@ -350,6 +441,10 @@ struct Sender {
         }
         newest = sample.number, heard = now;
         states = std::move(sample.states);
+        if (sample.attitude) {
+            matrix = matrix_of(sample.attitude->quaternion);
+            world_rate = times(matrix, sample.attitude->rate);
+        }
         return true;
     }
 };
@@ -369,6 +464,8 @@ struct Options {
     double force = 0, force_for = std::numeric_limits<double>::infinity();
     double object_mass = 0.45, object_damping = 0, device_mass = 0.1, device_damping = 5;
     Gains coupling{3500, 5}, coordination{300, 5};
+    std::optional<Vector> inertia; // of an object that turns
+    Vector grasp{};
 };
 
 constexpr milliseconds HELLO_EVERY{250};
@@ -382,7 +479,17 @@ class Peer {
           ticks_per_update_(std::max<std::uint64_t>(1, (session.update_ns + session.tick_ns / 2) / session.tick_ns)),
           device_(options.device_mass, options.device_damping, 1e-9 * static_cast<double>(session.tick_ns), session.axes),
           copy_(options.object_mass / session.peers, options.object_damping, 1e-9 * static_cast<double>(session.tick_ns), session.axes),
-          others_(session.peers, Sender{States(session.axes), {}, {}, 0, 0}), joinings_(joining_ ? 1 : 0) {}
+          others_(session.peers, Sender{States(session.axes), {}, {}, 0, 0}), joinings_(joining_ ? 1 : 0) {
+        if (!options.inertia) return;
+        // Gains and damping of the turn are those of the translation times J/m: each element of the mass as if it were alone.
+        Vector inertia{}, damping{};
+        for (std::size_t i = 0; i < 3; ++i) {
+            over_mass_[i] = (*options.inertia)[i] / options.object_mass;
+            inertia[i] = (*options.inertia)[i] / session.peers, damping[i] = options.object_damping * over_mass_[i];
+            device_.states[i].position = options.grasp[i];
+        }
+        turn_.emplace(inertia, damping, 1e-9 * static_cast<double>(session.tick_ns));
+    }
 
     // Runs for the duration, in ticks at fixed times: one that is late is made up for, so the peer's time never falls behind for good.
     void run() {
@@ -401,6 +508,10 @@ class Peer {
         print_array("position", copy_.states, &State::position);
         print_array("velocity", copy_.states, &State::velocity);
         print_array("device", device_.states, &State::position);
+        if (turn_) {
+            const auto &q = turn_->attitude.quaternion;
+            std::printf(", \"orientation\": [%.17g, %.17g, %.17g, %.17g]", q[0], q[1], q[2], q[3]);
+        }
         std::printf(", \"others\": [");
         const char *comma = "";
         for (std::uint32_t place = 0; place < session_.peers; ++place) {
@@ -418,7 +529,8 @@ class Peer {
     void tick(std::uint64_t k) {
         // 1. Sample and send.
         if (k % ticks_per_update_ == 0) {
-            const Bytes sample = encode({options_.session, options_.place, sent_++, k * session_.tick_ns, copy_.states});
+            const std::optional<Attitude> attitude = turn_ ? std::optional(turn_->attitude) : std::nullopt;
+            const Bytes sample = encode({options_.session, options_.place, sent_++, k * session_.tick_ns, copy_.states, attitude});
             door_.send(joining_ ? joining_->seal(sample) : sample);
         }
         // 2. Take in what has arrived; no more at one tick than can be new, so that a flood cannot stop the loop.
@@ -431,14 +543,25 @@ class Peer {
         begin_anew_after_silence(now);
         // 3. Forces. 4. Move.
         const double seconds = 1e-9 * static_cast<double>(k * session_.tick_ns);
-        for (std::size_t axis = 0; axis < session_.axes; ++axis) move(axis, axis == 0 && seconds < options_.force_for ? options_.force : 0);
+        // Of an object that turns the grasp point is held: xO + R·r, with the velocity vO + R·(ω×r).
+        Vector arm{}, swing{}, coupling{};
+        if (turn_) {
+            const Matrix matrix = matrix_of(turn_->attitude.quaternion);
+            arm = times(matrix, options_.grasp), swing = times(matrix, cross(turn_->attitude.rate, options_.grasp));
+        }
+        for (std::size_t axis = 0; axis < session_.axes; ++axis) {
+            const double force_of_hand = axis == 0 && seconds < options_.force_for ? options_.force : 0;
+            coupling[axis] = move(axis, force_of_hand, {arm[axis], swing[axis]});
+        }
+        if (turn_) turn_->move(torque(coupling));
     }
 
-    void move(std::size_t axis, double force_of_hand) {
+    // Gives FC. `grasp`: the motion of the grasp point relative to the centre of the copy.
+    double move(std::size_t axis, double force_of_hand, State grasp) {
         const State device = device_.states[axis], copy = copy_.states[axis];
         // (9) FC = KC·(xH − xO) + BC·(vH − vO): what the device does to the copy.
         const Gains &c = options_.coupling;
-        const double coupling = c.stiffness * (device.position - copy.position) + c.damping * (device.velocity - copy.velocity);
+        const double coupling = c.stiffness * (device.position - copy.position - grasp.position) + c.damping * (device.velocity - copy.velocity - grasp.velocity);
         // (10) FT = KT·(xO − xd) + BT·(vO − vd), towards the mean of the samples held from the others.
         const Gains &t = options_.coordination;
         double coordination = 0;
@@ -453,6 +576,36 @@ class Peer {
         }
         device_.move(axis, force_of_hand - coupling);
         copy_.move(axis, coupling - coordination);
+        return coupling;
+    }
+
+    // r×RᵀFC − τT in body axes, with τT = BR∘(ω − Rᵀ·w̄) − 2·vee sk(RᵀM̄·P) and P = diag(½·ΣKR − KR).
+    Vector torque(const Vector &coupling) const {
+        const Matrix to_body = transposed(matrix_of(turn_->attitude.quaternion));
+        Vector total = cross(options_.grasp, times(to_body, coupling));
+        if (session_.peers < 2) return total;
+        Matrix mean{};
+        Vector world_rate{};
+        for (std::uint32_t place = 0; place < session_.peers; ++place) {
+            if (place == options_.place) continue;
+            for (std::size_t i = 0; i < 3; ++i) {
+                world_rate[i] += others_[place].world_rate[i] / (session_.peers - 1);
+                for (std::size_t j = 0; j < 3; ++j) mean[i][j] += others_[place].matrix[i][j] / (session_.peers - 1);
+            }
+        }
+        const Vector rate = times(to_body, world_rate);
+        const double sum = options_.coordination.stiffness * (over_mass_[0] + over_mass_[1] + over_mass_[2]);
+        Matrix apart{};
+        for (std::size_t j = 0; j < 3; ++j) {
+            const double weight = sum / 2 - options_.coordination.stiffness * over_mass_[j];
+            const Vector column = times(to_body, {mean[0][j], mean[1][j], mean[2][j]});
+            for (std::size_t i = 0; i < 3; ++i) apart[i][j] = weight * column[i];
+        }
+        const Vector spring{apart[2][1] - apart[1][2], apart[0][2] - apart[2][0], apart[1][0] - apart[0][1]};
+        for (std::size_t i = 0; i < 3; ++i) {
+            total[i] += spring[i] - options_.coordination.damping * over_mass_[i] * (turn_->attitude.rate[i] - rate[i]);
+        }
+        return total;
     }
 
     bool handle(Bytes datagram, Clock::time_point now) {
@@ -464,7 +617,7 @@ class Peer {
             return true;
         }
         const std::optional<Bytes> plain = joining_ ? joining_->open(std::move(datagram)) : std::move(datagram);
-        std::optional<Sample> sample = plain ? decode(*plain, options_.session, session_.axes) : std::nullopt;
+        std::optional<Sample> sample = plain ? decode(*plain, options_.session, session_.axes, session_.turns) : std::nullopt;
         if (!sample || sample->sender >= session_.peers || sample->sender == options_.place) return false;
         if (others_[sample->sender].take(std::move(*sample), now)) heard_ = now;
         return true;
@@ -501,6 +654,8 @@ class Peer {
     const Welcome session_;
     const std::uint64_t ticks_per_update_;
     Body device_, copy_;
+    std::optional<Turn> turn_; // of an object that turns
+    Vector over_mass_{};       // J/m of the whole object
     std::vector<Sender> others_; // by place; that of this peer is not used
     std::uint64_t ticks_ = 0, sent_ = 0, ignored_ = 0, joinings_;
     Clock::time_point heard_ = Clock::now(); // anything new from anybody
@@ -548,6 +703,8 @@ constexpr const char *USAGE =
     "  --force-for S        how long the hand pushes, s [always]\n"
     "  --object-mass 0.45   of the whole object; each copy has its share, kg\n"
     "  --object-damping 0   of each copy, N·s/m\n"
+    "  --inertia X,Y,Z      of the whole object, about its own axes: it turns, kg·m² [it does not]\n"
+    "  --grasp 0,0,0        from its centre, in its own axes, m\n"
     "  --device-mass 0.1    kg\n"
     "  --device-damping 5   N·s/m\n"
     "  --coupling 3500,5    N/m, N·s/m\n"
@@ -565,6 +722,16 @@ Options parse(int argc, char **argv) {
         const auto number = [&] { return std::stod(value); };
         const auto whole = [&] { return std::stoull(value); };
         const auto gains = [&] { return Gains{std::stod(value), std::stod(value.substr(value.find(',') + 1))}; };
+        const auto vector = [&] {
+            Vector numbers{};
+            std::size_t at = 0;
+            for (double &component : numbers) {
+                component = std::stod(value.substr(at));
+                at = value.find(',', at) + 1;
+                if (&component != &numbers.back() && at == 0) throw std::invalid_argument(name + " needs three numbers");
+            }
+            return numbers;
+        };
         if (name == "--session") options.session = whole(), session = true;
         else if (name == "--place") options.place = static_cast<std::uint32_t>(whole()), place = true;
         else if (name == "--key-file") options.key_file = value;
@@ -582,6 +749,8 @@ Options parse(int argc, char **argv) {
         else if (name == "--device-damping") options.device_damping = number();
         else if (name == "--coupling") options.coupling = gains();
         else if (name == "--coordination") options.coordination = gains();
+        else if (name == "--inertia") options.inertia = vector();
+        else if (name == "--grasp") options.grasp = vector();
         else throw std::invalid_argument("there is no " + name);
     }
     if (!session || !place) throw std::invalid_argument("--session and --place are needed");
@@ -600,7 +769,7 @@ int main(int argc, char **argv) {
         Door door(options.door);
         std::optional<Joining> joining;
         const auto nanos = [](double millis) { return static_cast<std::uint64_t>(std::llround(1e6 * millis)); };
-        Welcome session{options.axes, options.peers, nanos(options.tick_ms), nanos(options.update_ms)};
+        Welcome session{options.axes, options.inertia.has_value(), options.peers, nanos(options.tick_ms), nanos(options.update_ms)};
         if (!options.key_file.empty()) {
             std::pair<Joining, Welcome> joined = join(door, read_key(options.key_file), options);
             joining = std::move(joined.first);
@@ -608,6 +777,9 @@ int main(int argc, char **argv) {
         }
         if (session.axes < 1 || session.axes > 3 || options.place >= session.peers || session.tick_ns == 0) {
             throw std::runtime_error("place, peers, axes and periods do not fit together");
+        }
+        if (session.turns != options.inertia.has_value() || (session.turns && session.axes != 3)) {
+            throw std::runtime_error("the object of the session turns if, and only if, --inertia is given, and it has three axes then");
         }
         Peer peer(options, door, std::move(joining), session);
         peer.run();

@@ -117,6 +117,7 @@ pub(super) struct Summary {
     pub(super) position: Vec<f64>,
     pub(super) velocity: Vec<f64>,
     pub(super) device: Vec<f64>,
+    pub(super) orientation: Option<[f64; 4]>,
     pub(super) others: Vec<Other>,
 }
 
@@ -148,6 +149,7 @@ pub(super) fn summary(running: Running) -> Summary {
         position: numbers("position"),
         velocity: numbers("velocity"),
         device: numbers("device"),
+        orientation: value["orientation"].as_array().map(|q| std::array::from_fn(|place| q[place].as_f64().unwrap())),
         others: others
             .map(|other| Other {
                 sender: other["sender"].as_u64().unwrap(),
