@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_harness::measures::MeasuredValue;
-use cohaptic_harness::{AccessSummary, Ending, LinkSummary, PeerSummary};
+use cohaptic_harness::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
 #[cfg(target_os = "linux")]
 use cohaptic_realtime::LatenessSummary;
 use cohaptic_scene::Scene;
@@ -28,6 +28,8 @@ pub(crate) fn peer(peer: &PeerSummary) -> impl Serialize {
         name: peer.name.as_str(),
         position_m: Components::new(&peer.position),
         velocity_m_s: Components::new(&peer.velocity),
+        #[serde(flatten)]
+        attitude: peer.attitude.map(|attitude| document! { orientation: attitude.orientation, angular_velocity_rad_s: attitude.rate }),
         stale_samples: peer.stale_samples,
         refused_samples: peer.refused_samples,
     }
@@ -40,6 +42,11 @@ impl Components {
             values => Self::More(values.to_vec()),
         }
     }
+}
+
+/// The largest angle between two copies; nothing where the object does not turn.
+pub(crate) fn rotation(summary: &Summary) -> Option<impl Serialize + use<>> {
+    summary.max_rotation_discrepancy.map(|angle| document! { max_rotation_discrepancy_rad: angle })
 }
 
 /// A link between two peers at the end of a run.

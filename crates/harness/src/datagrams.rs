@@ -2,6 +2,7 @@
 
 use std::num::NonZeroU32;
 
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{DecodeError, MAX_LEN, Sample, SampleKind};
 
 /// A datagram in the store.
@@ -18,6 +19,8 @@ pub(crate) struct Datagrams<const A: usize> {
     /// For each slot the extra numbers of its sample, by the place of the receiver; a single entry where they are the same for all. Empty where samples have
     /// none.
     extras: Vec<Vec<[f64; A]>>,
+    /// For each slot the attitude of its sample. Empty where the object does not turn.
+    attitudes: Vec<Attitude>,
 }
 
 #[derive(Clone, Debug)]
@@ -83,6 +86,20 @@ impl<const A: usize> Datagrams<A> {
             return Err(DecodeError::NotFinite { axis, quantity: "extra number" });
         }
         Ok((handle, kind.datagram_len(axes)))
+    }
+
+    /// Gives a datagram an attitude.
+    pub(crate) fn set_attitude(&mut self, handle: Handle, attitude: Attitude) {
+        let slot = handle.0.get() as usize - 1;
+        if self.attitudes.len() <= slot {
+            self.attitudes.resize(slot + 1, Attitude::REST);
+        }
+        self.attitudes[slot] = attitude;
+    }
+
+    /// The attitude of a datagram; at rest where the object does not turn.
+    pub(crate) fn attitude(&self, handle: Handle) -> Attitude {
+        self.attitudes.get(handle.0.get() as usize - 1).copied().unwrap_or(Attitude::REST)
     }
 
     /// The extra numbers of a datagram for a receiver; zeros if it has none.

@@ -1,6 +1,10 @@
 //! A small displacement of where everything begins, to see whether it dies out.
 
 use cohaptic_peer::State;
+use cohaptic_peer::rotation::{Attitude, Rotation};
+
+/// Beyond the places of all peers, so that no turn is like a displacement.
+const TURNS: usize = 1 << 24;
 
 /// Displaces each device and each copy by up to `size`, each differently, so that every mode of the relative motion is excited.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -21,5 +25,19 @@ impl Disturbance {
             *position += self.size * libm::cos(GOLDEN_ANGLE * f64::from(number));
         }
         displaced
+    }
+
+    /// Turns a peer's copy and device; angles times `length` are lengths \[m\].
+    pub(crate) fn turn(self, rotation: &mut Rotation, length: f64, place: usize) {
+        let turned = |mut attitude: Attitude, body: usize| {
+            let State { position, .. } = self.displace(State::<3>::REST, 3, TURNS + place, body);
+            attitude.turn(position.map(|angle| angle / length));
+            attitude
+        };
+        let (copy, device) = (*rotation.copy(), rotation.device().copied());
+        rotation.set_copy(turned(copy, 1));
+        if let Some(device) = device {
+            rotation.set_device(turned(device, 0));
+        }
     }
 }

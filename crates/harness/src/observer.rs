@@ -1,5 +1,6 @@
 //! The observer of a run.
 
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{PacketRecord, Path};
 
@@ -172,6 +173,21 @@ pub struct TickRow<'a> {
     pub coupling_force: &'a [f64],
     /// FT \[N\].
     pub coordination_force: &'a [f64],
+    /// How the peer is turned, if the object turns.
+    pub turn: Option<TurnRow<'a>>,
+}
+
+/// The turning part of one peer at one tick.
+#[derive(Clone, Copy, Debug)]
+pub struct TurnRow<'a> {
+    /// The attitude of its copy.
+    pub object: &'a Attitude,
+    /// The attitude of its device; `None` for one that does not turn.
+    pub device: Option<&'a Attitude>,
+    /// r×RᵀFC + τC: the torque of device and coupling on the copy, in its body axes \[N·m\].
+    pub coupling_torque: &'a [f64; 3],
+    /// τT, in the body axes of the copy, on which it acts with the opposite sign \[N·m\].
+    pub coordination_torque: &'a [f64; 3],
 }
 
 /// One peer over one step of its copy, from a tick to the next one of this peer. Slices have as many entries as the scene has axes.

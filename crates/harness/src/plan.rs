@@ -72,6 +72,9 @@ pub(crate) fn ticking<'a>(peers: impl Iterator<Item = &'a PeerSpec> + Clone) -> 
 
 fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice {
     let spec = &scene.peers[peer];
+    // A device that turns, or that begins with the motion of a point of a turning copy, is not at rest.
+    let turns = scene.rotation.as_ref().map(|rotation| &rotation.peers[peer]);
+    let moves = spec.velocity.iter().any(|v| *v != 0.0) || turns.is_some_and(|turns| turns.device.is_some() || turns.attitude.rate != [0.0; 3]);
     let touches_later = scene
         .timeline
         .iter()
@@ -80,7 +83,7 @@ fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice 
         scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Hand { peer: changed, hand: Some(_) } if *changed == peer));
     if spec.contact != Contact::None || touches_later {
         DeviceChoice::Simulated
-    } else if spec.hand.is_none() && !moved_later && spec.velocity.iter().all(|v| *v == 0.0) {
+    } else if spec.hand.is_none() && !moved_later && !moves {
         DeviceChoice::Resting
     } else if ticks_are_observed {
         DeviceChoice::Simulated

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkStats;
 
@@ -22,6 +23,8 @@ pub struct Summary {
     pub access_lines: Vec<AccessSummary>,
     /// The largest distance along an axis between two copies of the object at their latest ticks, over the whole run \[m\].
     pub max_discrepancy: f64,
+    /// The largest angle between two copies at their latest ticks, over the whole run \[rad\]; `None` if the object does not turn.
+    pub max_rotation_discrepancy: Option<f64>,
 }
 
 /// How a run ended.
@@ -44,6 +47,8 @@ pub struct PeerSummary {
     pub position: Vec<f64>,
     /// Velocity of its copy along each axis [m/s].
     pub velocity: Vec<f64>,
+    /// How its copy is turned; `None` if the object does not turn.
+    pub attitude: Option<Attitude>,
     /// How many samples arrived too late or repeated, and changed nothing.
     pub stale_samples: u64,
     /// Samples that arrived damaged and were refused by the decoder.

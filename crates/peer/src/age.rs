@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::rotation::{Attitude, HeldAttitude, Rotation};
-use crate::wire::Sample;
+use crate::wire::{Extra, Sample};
 use crate::{Device, Peer, ReceiveError, Reception, State, Strategy};
 
 /// The state held in place of that of a sender: weight·\[(1 − share)·before + share·newest\] + (1 − weight)·own, with its newest sample, the state held before it came
@@ -96,10 +96,10 @@ impl<const A: usize> Ages<A> {
     ///
     /// Those of [`Peer::handle_sample`]; nothing changed.
     pub fn handle_sample<D: Device<A>, S: Strategy<A>>(&mut self, peer: &mut Peer<A, D, S>, sample: &Sample<A>) -> Result<Reception, ReceiveError> {
-        self.handle_extended(peer, sample, &[0.0; A])
+        self.handle_extended(peer, sample, &Extra::NONE)
     }
 
-    /// [`Ages::handle_sample`] with the extra numbers of a sample for this peer.
+    /// [`Ages::handle_sample`] with what a sample for this peer says beyond position and velocity.
     ///
     /// # Errors
     ///
@@ -108,31 +108,12 @@ impl<const A: usize> Ages<A> {
         &mut self,
         peer: &mut Peer<A, D, S>,
         sample: &Sample<A>,
-        extra: &[f64; A],
+        extra: &Extra<A>,
     ) -> Result<Reception, ReceiveError> {
         let received = peer.handle_extended(sample, extra)?;
         let place = peer.place_of(sample.sender).filter(|_| received == Reception::Newest);
         if let Some(aged) = self.aged.iter_mut().find(|aged| Some(aged.place) == place) {
-            aged.arrived(sample.sequence, sample.state);
-        }
-        Ok(received)
-    }
-
-    /// [`Ages::handle_sample`] with the attitude of the sender's copy.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Peer::handle_sample`]; nothing changed.
-    pub fn handle_attitude<D: Device<A>, S: Strategy<A>>(
-        &mut self,
-        peer: &mut Peer<A, D, S>,
-        sample: &Sample<A>,
-        attitude: &Attitude,
-    ) -> Result<Reception, ReceiveError> {
-        let received = peer.handle_attitude(sample, attitude)?;
-        let place = peer.place_of(sample.sender).filter(|_| received == Reception::Newest);
-        if let Some(aged) = self.aged.iter_mut().find(|aged| Some(aged.place) == place) {
-            aged.turned(sample.sequence, attitude);
+            aged.turned(sample.sequence, &extra.attitude);
             aged.arrived(sample.sequence, sample.state);
         }
         Ok(received)

@@ -172,12 +172,9 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         if kind == SampleKind::State {
             return sample.encode(axes, datagram);
         }
-        if let Some(rotation) = &self.rotation {
-            return sample.encode_attitude(rotation.copy(), axes, datagram);
-        }
-        let numbers = self.extra(0);
+        let extra = Extra { receiver: 0, numbers: self.extra(0), attitude: self.attitude() };
         self.all_sent();
-        sample.encode_as(kind, &Extra { receiver: 0, numbers }, axes, datagram)
+        sample.encode_as(kind, &extra, axes, datagram)
     }
 
     /// Step 1 for a strategy whose samples are personal: hands `send` the place of each receiver in the session and the datagram for it, each with a sequence
@@ -191,7 +188,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
             }
             let numbers = self.extra(other);
             let sample = self.next_sample(local_time);
-            let len = sample.encode_as(kind, &Extra { receiver, numbers }, axes, &mut datagram);
+            let len = sample.encode_as(kind, &Extra { receiver, numbers, ..Extra::NONE }, axes, &mut datagram);
             send(receiver, &datagram[..len]);
         }
         self.all_sent();
@@ -218,6 +215,12 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.strategy.extra(receiver, self.object.state(), &self.held)
     }
 
+    /// The attitude of the copy, for samples that carry one.
+    #[must_use]
+    pub fn attitude(&self) -> Attitude {
+        self.rotation.as_ref().map_or(Attitude::REST, |rotation| *rotation.copy())
+    }
+
     /// The samples of this tick have been made for all receivers.
     pub fn all_sent(&mut self) {
         self.strategy.sent(self.object.state());
@@ -242,15 +245,11 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
     #[inline]
     pub fn handle_datagram(&mut self, datagram: &[u8]) -> Result<Reception, ReceiveError> {
-        if self.asked.kind == SampleKind::Attitude {
-            let (sample, attitude) = Sample::decode_attitude(datagram, self.config.axes)?;
-            return self.handle_attitude(&sample, &attitude);
-        }
         let (sample, extra) = Sample::decode_as(datagram, self.asked.kind, self.config.axes)?;
         if self.asked.kind.is_personal() && extra.receiver != self.config.place {
             return Err(ReceiveError::Receiver { receiver: extra.receiver });
         }
-        self.handle_extended(&sample, &extra.numbers)
+        self.handle_extended(&sample, &extra)
     }
 
     /// Step 2 with a datagram that was decoded already: many peers may receive the same one.
@@ -260,16 +259,16 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
     #[inline]
     pub fn handle_sample(&mut self, sample: &Sample<A>) -> Result<Reception, ReceiveError> {
-        self.handle_extended(sample, &[0.0; A])
+        self.handle_extended(sample, &Extra::NONE)
     }
 
-    /// [`Peer::handle_sample`] with the extra numbers of a sample for this peer.
+    /// [`Peer::handle_sample`] with what a sample for this peer says beyond position and velocity.
     ///
     /// # Errors
     ///
     /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
     #[inline]
-    pub fn handle_extended(&mut self, sample: &Sample<A>, extra: &[f64; A]) -> Result<Reception, ReceiveError> {
+    pub fn handle_extended(&mut self, sample: &Sample<A>, extra: &Extra<A>) -> Result<Reception, ReceiveError> {
         if sample.session != self.config.session {
             return Err(ReceiveError::Session { found: sample.session });
         }
@@ -277,25 +276,15 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         if self.held.accept(place, sample.sequence, sample.sent, sample.state) {
             self.stale_mean = true;
             if self.asked.kind != SampleKind::State {
-                self.strategy.accept(place, extra);
+                self.strategy.accept(place, &extra.numbers);
+                if let Some(rotation) = &mut self.rotation {
+                    rotation.hold(place, &extra.attitude);
+                }
             }
             Ok(Reception::Newest)
         } else {
             Ok(Reception::Stale)
         }
-    }
-
-    /// [`Peer::handle_sample`] with the attitude of the sender's copy.
-    ///
-    /// # Errors
-    ///
-    /// [`ReceiveError`] if it is not a sample for this peer; nothing changed.
-    pub fn handle_attitude(&mut self, sample: &Sample<A>, attitude: &Attitude) -> Result<Reception, ReceiveError> {
-        let received = self.handle_sample(sample)?;
-        if let (Reception::Newest, Some(place), Some(rotation)) = (received, self.place_of(sample.sender), &mut self.rotation) {
-            rotation.hold(place, attitude);
-        }
-        Ok(received)
     }
 
     /// Step 3: computes the forces of this tick, where the next one follows after the period of the tick.

@@ -91,18 +91,26 @@ impl SampleKind {
     }
 }
 
-/// What a sample of version 2 says beyond that of version 1.
+/// What a sample says beyond position and velocity.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Extra<const A: usize> {
     /// The place of the only peer that a sample of a personal kind is for; 0 for the other kinds.
     pub receiver: u32,
-    /// The extra number on each axis; zeros for [`SampleKind::State`].
+    /// The extra number on each axis; zeros in version 1.
     pub numbers: [f64; A],
+    /// The attitude of the copy, for [`SampleKind::Attitude`].
+    pub attitude: Attitude,
 }
 
 impl<const A: usize> Extra<A> {
-    /// Of a sample of version 1.
-    pub const NONE: Self = Self { receiver: 0, numbers: [0.0; A] };
+    /// Of a sample of kind [`SampleKind::State`].
+    pub const NONE: Self = Self { receiver: 0, numbers: [0.0; A], attitude: Attitude::REST };
+
+    /// Of a sample with that attitude.
+    #[must_use]
+    pub const fn turned(attitude: Attitude) -> Self {
+        Self { attitude, ..Self::NONE }
+    }
 }
 
 /// What a peer tells the others about its copy of the object.
@@ -225,39 +233,13 @@ impl<const A: usize> Sample<A> {
                 bytes.copy_from_slice(&number.to_le_bytes());
             }
         }
+        if kind == SampleKind::Attitude {
+            let numbers = extra.attitude.orientation.iter().chain(&extra.attitude.rate);
+            for (bytes, number) in datagram[kind.attitude_start(axes)..].chunks_exact_mut(8).zip(numbers) {
+                bytes.copy_from_slice(&number.to_le_bytes());
+            }
+        }
         kind.datagram_len(axes)
-    }
-
-    /// Writes a sample of kind [`SampleKind::Attitude`], and gives the length.
-    ///
-    /// # Panics
-    ///
-    /// If `axes` is more than A or than 3.
-    pub fn encode_attitude(&self, attitude: &Attitude, axes: usize, datagram: &mut [u8; MAX_LEN]) -> usize {
-        let kind = SampleKind::Attitude;
-        let len = self.encode_as(kind, &Extra::NONE, axes, datagram);
-        for (bytes, number) in datagram[kind.attitude_start(axes)..].chunks_exact_mut(8).zip(attitude.orientation.iter().chain(&attitude.rate)) {
-            bytes.copy_from_slice(&number.to_le_bytes());
-        }
-        len
-    }
-
-    /// Reads a sample of kind [`SampleKind::Attitude`] and of `axes` axes, at most A.
-    ///
-    /// # Errors
-    ///
-    /// [`DecodeError`] for anything but such a sample with finite numbers and a quaternion of norm 1. Never panics.
-    pub fn decode_attitude(datagram: &[u8], axes: usize) -> Result<(Self, Attitude), DecodeError> {
-        let kind = SampleKind::Attitude;
-        let (sample, _) = Self::decode_as(datagram, kind, axes)?;
-        let numbers: [f64; 7] = core::array::from_fn(|number| f64::from_bits(word(datagram, kind.attitude_start(axes) + 8 * number)));
-        if let Some(place) = numbers.iter().position(|number| !number.is_finite()) {
-            let (axis, quantity) = if place < 4 { (place, "quaternion") } else { (place - 4, "angular velocity") };
-            return Err(DecodeError::NotFinite { axis, quantity });
-        }
-        let [w, x, y, z, rates @ ..] = numbers;
-        let attitude = Attitude { orientation: [w, x, y, z], rate: rates };
-        if attitude.is_unit() { Ok((sample, attitude)) } else { Err(DecodeError::NotUnit) }
     }
 
     /// [`Sample::decode_as`] of version 1.
@@ -274,7 +256,7 @@ impl<const A: usize> Sample<A> {
     ///
     /// # Errors
     ///
-    /// [`DecodeError`] for anything but a sample of this kind with this number of axes and finite numbers. Never panics.
+    /// [`DecodeError`] for anything but a sample of this kind with this number of axes, finite numbers and, in an attitude, a quaternion of norm 1. Never panics.
     #[inline]
     pub fn decode_as(datagram: &[u8], kind: SampleKind, axes: usize) -> Result<(Self, Extra<A>), DecodeError> {
         let Some((header, body)) = datagram.split_first_chunk::<HEADER_LEN>() else {
@@ -300,8 +282,20 @@ impl<const A: usize> Sample<A> {
             sent: Instant::from_nanos(word(header, 32)),
             state,
         };
-        Ok((sample, Extra { receiver: half_word(header, 20), numbers: extra }))
+        let attitude = if kind == SampleKind::Attitude { decode_attitude(&datagram[kind.attitude_start(axes)..])? } else { Attitude::REST };
+        Ok((sample, Extra { receiver: half_word(header, 20), numbers: extra, attitude }))
     }
+}
+
+fn decode_attitude(bytes: &[u8]) -> Result<Attitude, DecodeError> {
+    let numbers: [f64; 7] = core::array::from_fn(|number| f64::from_bits(word(bytes, 8 * number)));
+    if let Some(place) = numbers.iter().position(|number| !number.is_finite()) {
+        let (axis, quantity) = if place < 4 { (place, "quaternion") } else { (place - 4, "angular velocity") };
+        return Err(DecodeError::NotFinite { axis, quantity });
+    }
+    let [w, x, y, z, rate @ ..] = numbers;
+    let attitude = Attitude { orientation: [w, x, y, z], rate };
+    if attitude.is_unit() { Ok(attitude) } else { Err(DecodeError::NotUnit) }
 }
 
 #[inline]
@@ -406,7 +400,7 @@ mod tests {
 
     #[test]
     fn version_2_has_an_extra_number_on_each_axis_and_a_receiver() {
-        let extra = Extra { receiver: 3, numbers: [0.125] };
+        let extra = Extra { receiver: 3, numbers: [0.125], ..Extra::NONE };
         let mut bytes = [0; MAX_LEN];
         assert_eq!(sample().encode_as(SampleKind::Wave, &extra, 1, &mut bytes), 72);
         assert_eq!(bytes[..8], *b"CHPT\x02\x00\x01\x02");
@@ -418,7 +412,7 @@ mod tests {
         assert_eq!(decode(SampleKind::Energy, &datagram()[..64]), Err(DecodeError::Version { found: 1, expected: 2 }));
         sample().encode_as(SampleKind::Energy, &Extra { receiver: 1, ..extra }, 1, &mut bytes);
         assert_eq!(decode(SampleKind::Energy, &bytes[..72]), Err(DecodeError::Reserved), "an energy is for all");
-        sample().encode_as(SampleKind::Force, &Extra { receiver: 1, numbers: [f64::NAN] }, 1, &mut bytes);
+        sample().encode_as(SampleKind::Force, &Extra { receiver: 1, numbers: [f64::NAN], ..Extra::NONE }, 1, &mut bytes);
         assert_eq!(decode(SampleKind::Force, &bytes[..72]), Err(DecodeError::NotFinite { axis: 0, quantity: "extra number" }));
     }
 }

@@ -148,6 +148,7 @@ mod tests {
                 }
                 crate::ChangeKind::Contact { .. }
                 | crate::ChangeKind::Hand { .. }
+                | crate::ChangeKind::HandTorque { .. }
                 | crate::ChangeKind::Coordination(_)
                 | crate::ChangeKind::Parameters(_)
                 | crate::ChangeKind::SendWhen(_) => panic!("{change:?}"),

@@ -5,12 +5,13 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use cohaptic_peer::coordination::{LawSettings, Pull};
-use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator, SendWhen};
+use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator, SendWhen, Signal};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::{DropCause, LinkModel};
 
 use cohaptic_linkfile::{LinkChange, LinkSelector, LinkTable};
 
+use crate::RotationSpec;
 use crate::measures::MeasureName;
 
 /// A scene, ready to be run. Every number in it has been checked; every peer it names exists.
@@ -28,6 +29,8 @@ pub struct Scene {
     pub axes: Axes,
     /// The shared virtual object.
     pub object: ObjectSpec,
+    /// How the object turns; `None`: it does not.
+    pub rotation: Option<Box<RotationSpec>>,
     /// How the copies are held together.
     pub coordination: CoordinationSpec,
     /// How motion between ticks is computed.
@@ -45,13 +48,16 @@ pub struct Scene {
 }
 
 impl fmt::Debug for Scene {
-    /// Measures are shown only where there are any: fingerprints of records are made of this text.
+    /// Turns and measures are shown only where there are any: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { file, title, duration, seed, axes, object, coordination, integrator, peers, links, timeline, measure, expect } = self;
+        let Self { file, title, duration, seed, axes, object, rotation, coordination, integrator, peers, links, timeline, measure, expect } = self;
         let mut shown = f.debug_struct("Scene");
         shown.field("file", file).field("title", title).field("duration", duration).field("seed", seed).field("axes", axes);
         shown.field("object", object).field("coordination", coordination).field("integrator", integrator).field("peers", peers);
         shown.field("links", links).field("timeline", timeline).field("expect", expect);
+        if let Some(rotation) = rotation {
+            shown.field("rotation", rotation);
+        }
         if let Some(measure) = measure {
             shown.field("measure", measure);
         }
@@ -338,6 +344,13 @@ pub enum ChangeKind {
         /// From now on.
         hand: Option<Hand>,
     },
+    /// The torque of a peer's hand changes. Only where the object turns, and after each change of a hand.
+    HandTorque {
+        /// Its place in [`Scene::peers`].
+        peer: usize,
+        /// In world axes from now on \[N·m\]; `None`: none.
+        torque: Option<Signal>,
+    },
     /// The coordination gains change, at every peer. As written, before scaling.
     Coordination(Gains),
     /// Parameters that strategies have of their own change, at every peer: those of all strategies, from now on.
@@ -363,17 +376,27 @@ pub struct Expect {
     pub delay: Vec<ExpectDelay>,
     /// The values of measures.
     pub measures: Vec<ExpectMeasure>,
+    /// The largest angle between two copies, over the whole run \[rad\].
+    pub rotation_discrepancy: Option<Bounds>,
+    /// How a copy is turned at an instant.
+    pub orientations: Vec<ExpectOrientation>,
 }
 
 impl fmt::Debug for Expect {
     /// Measures are shown only where there are any: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { stable, discrepancy, positions, travel, loss, delay, measures } = self;
+        let Self { stable, discrepancy, positions, travel, loss, delay, measures, rotation_discrepancy, orientations } = self;
         let mut shown = f.debug_struct("Expect");
         shown.field("stable", stable).field("discrepancy", discrepancy).field("positions", positions).field("travel", travel);
         shown.field("loss", loss).field("delay", delay);
         if !measures.is_empty() {
             shown.field("measures", measures);
+        }
+        if let Some(bounds) = rotation_discrepancy {
+            shown.field("rotation_discrepancy", bounds);
+        }
+        if !orientations.is_empty() {
+            shown.field("orientations", orientations);
         }
         shown.finish()
     }
@@ -394,6 +417,19 @@ impl Bounds {
     pub fn contain(&self, value: f64) -> bool {
         self.min.is_none_or(|min| value >= min) && self.max.is_none_or(|max| value <= max) && !value.is_nan()
     }
+}
+
+/// An expected orientation.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ExpectOrientation {
+    /// The place of the peer in [`Scene::peers`].
+    pub peer: usize,
+    /// When.
+    pub at: Instant,
+    /// The unit quaternion (w, x, y, z) that is expected.
+    pub of: [f64; 4],
+    /// The largest angle between the two \[rad\].
+    pub max: f64,
 }
 
 /// An expected position.

@@ -35,6 +35,20 @@ pub(crate) const POSITIVE_FORCE: Quantity = Quantity::positive("N");
 pub(crate) const POSITIVE_COUNTS: Quantity = Quantity::positive("counts/(N·m)");
 /// At least zero \[Hz\].
 pub(crate) const FREQUENCY: Quantity = Quantity::not_negative("Hz");
+/// Above zero [kg·m²].
+pub(crate) const INERTIA: Quantity = Quantity::positive("kg·m²");
+/// At least zero [N·m·s/rad].
+pub(crate) const ROTATIONAL_DAMPING: Quantity = Quantity::not_negative("N·m·s/rad");
+/// At least zero [N·m/rad].
+pub(crate) const ROTATIONAL_STIFFNESS: Quantity = Quantity::not_negative("N·m/rad");
+/// Any [rad/s].
+pub(crate) const RATE: Quantity = Quantity::any("rad/s");
+/// Any [N·m].
+pub(crate) const TORQUE: Quantity = Quantity::any("N·m");
+/// Any, of a quaternion.
+pub(crate) const COMPONENT: Quantity = Quantity::any("");
+/// At least zero \[rad\].
+pub(crate) const ANGLE_BOUND: Quantity = Quantity::not_negative("rad");
 /// Any \[rad\].
 pub(crate) const ANGLE: Quantity = Quantity::any("rad");
 

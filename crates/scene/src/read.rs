@@ -11,10 +11,10 @@ use cohaptic_linkfile::reading::{Context, Parsed, TableReader, default_title, pa
 use cohaptic_units::Instant;
 
 use crate::context::SceneContext;
-use crate::model::Scene;
+use crate::model::{ChangeKind, Scene};
 use crate::sections::{
-    Header, Measured, PeerSources, check_enough, read_coordination, read_expect, read_header, read_integrator, read_measure, read_names, read_object,
-    read_peers, read_timeline,
+    Header, Measured, PeerSources, Stepping, check_enough, read_coordination, read_expect, read_header, read_measure, read_names, read_object,
+    read_peers, read_stepping, read_timeline, refuse_rotational_keys, rotation,
 };
 
 impl Scene {
@@ -104,9 +104,14 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     let context = SceneContext { file, axes, live };
     // From here on the readers know axes, names and modulators.
     let object = root.required("object", "a table [object] with a mass", |node, _| read_object(node, context));
+    let (object, object_rotation) = object.unzip();
     let coordination_node = root.get("coordination");
     let coordination = root.required("coordination", "a table [coordination] with a strategy", |node, _| read_coordination(node, file));
-    let integrator = root.optional("simulation", cohaptic_peer::Integrator::default(), read_integrator);
+    let (coordination, rotation_gains) = coordination.unzip();
+    let stepping = root.optional("simulation", Stepping::default(), read_stepping);
+    if object_rotation == Some(None) {
+        refuse_rotational_keys(document, file);
+    }
     let defaults = root.get("peer");
     let update = coordination.as_ref().zip(coordination_node).map(|(coordination, node)| {
         let written = node.as_table().and_then(|table| table.get("update"));
@@ -114,13 +119,23 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     });
     let count_entry = header_node.and_then(Node::as_table).and_then(|table| table.get("count"));
     let peers = read_peers(PeerSources { defaults, entries: peers_node, count: count_entry, update }, object.as_ref(), context);
+    let rotation = match (object_rotation, rotation_gains, stepping, &peers) {
+        (Some(object), Some(gains), Some(stepping), Some(peers)) => rotation(object, gains, stepping.rotation_steps, peers, file),
+        _ => None,
+    };
+    let peers: Option<Vec<_>> = peers.map(|peers| peers.into_iter().map(|peer| peer.spec).collect());
     let (link, links) = (root.get("link"), root.get("links"));
     let links = read_links(link, links, file);
     if let Some(links) = &links {
         on_links(Instant::ZERO, LinkSelector::All, links);
     }
     let timeline_node = root.get("timeline");
-    let timeline = read_timeline(timeline_node, duration, links.as_ref(), peers.as_deref(), coordination.as_ref(), on_links, context);
+    let turns = rotation.as_ref().is_some_and(Option::is_some);
+    let timeline =
+        read_timeline(timeline_node, duration, links.as_ref(), peers.as_deref(), coordination.as_ref(), on_links, context).map(|mut changes| {
+            changes.retain(|change| turns || !matches!(change.what, ChangeKind::HandTorque { .. }));
+            changes
+        });
     let of = Measured { peers: peers.as_deref(), timeline: timeline.as_deref() };
     let measure = match root.get("measure") {
         Some(node) => read_measure(node, of, context).map(Some),
@@ -143,15 +158,16 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         seed: seed?,
         axes: axes?,
         object: object?,
+        rotation: rotation?,
         coordination: coordination?,
-        integrator: integrator?,
+        integrator: stepping?.integrator,
         peers: peers?,
         links: links.as_ref().and_then(LinkClasses::table)?,
         timeline: timeline?,
         measure: measure?,
         expect: expect?,
     };
-    let refused = match scene.refused_coordination() {
+    let refused = match scene.refused_coordination().or_else(|| scene.refused_rotation()) {
         None => scene.refused_changes().map(|refused| (timeline_node, refused)),
         Some(refused) => Some((coordination_node, refused)),
     };

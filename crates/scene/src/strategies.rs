@@ -70,7 +70,7 @@ impl Scene {
     /// What samples carry beyond the state.
     #[must_use]
     pub const fn sample_kind(&self) -> SampleKind {
-        self.coordination.strategy.kind()
+        if self.rotation.is_some() { SampleKind::Attitude } else { self.coordination.strategy.kind() }
     }
 
     /// The scene with these parameters of strategies.

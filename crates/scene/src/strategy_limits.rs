@@ -19,6 +19,7 @@ impl Scene {
             | ChangeKind::AllLinks(_)
             | ChangeKind::Contact { .. }
             | ChangeKind::Hand { .. }
+            | ChangeKind::HandTorque { .. }
             | ChangeKind::Coordination(_)
             | ChangeKind::SendWhen(_) => None,
         });

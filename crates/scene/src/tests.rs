@@ -104,7 +104,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "update =",
             "updat =",
-            "8:1: coordination.updat: unknown key: expected one of strategy, scaling, pull, stiffness, damping, update, send-when, smoothed-average-position, extrapolated, local-damping, local-lag, passivity-control, set-position, wave, client-server; did you mean \"update\"?",
+            "8:1: coordination.updat: unknown key: expected one of strategy, scaling, pull, stiffness, damping, update, send-when, rotational-stiffness, rotational-damping, smoothed-average-position, extrapolated, local-damping, local-lag, passivity-control, set-position, wave, client-server; did you mean \"update\"?",
         ),
         ("damping = 5.0 }\ncoupling", "dampening = 5.0 }\ncoupling", "10:24: peer.device.dampening: unknown key: expected one of mass, damping"),
         (

@@ -8,7 +8,8 @@ use cohaptic_scene::{FromScene, Scene, Strategies};
 use crate::cost::eigenvalue_operations;
 use crate::full::{Trust, full_along};
 use crate::network::NominalNetwork;
-use crate::parts::{Part, radius_of, reduced};
+use crate::parts::{Part, Reduced, radius_of, reduced};
+use crate::pieces::{self, Piece};
 use crate::spectrum::bounded_radius;
 use crate::structure::{Contacts, Structure, linear_law};
 use crate::{AnalysisError, Radius, Unwatched, Verdict, Watch};
@@ -44,7 +45,7 @@ pub struct Analysis {
     /// The largest radius of all modes of contact, the rigid-body modes left out.
     pub radius: Radius,
     /// How many rigid-body modes were removed: displacements of everything together (with waves of each copy by itself), and of each device that touches nothing, per axis. Of the mode of
-    /// contact with the largest radius.
+    /// contact with the largest radius; of an object that turns, of all its motions.
     pub rigid_modes: usize,
     /// How many states are left: of bodies, of forces that wait to be applied, and of samples that are held or in flight.
     pub dimension: usize,
@@ -52,7 +53,7 @@ pub struct Analysis {
     pub method: Method,
     /// The span that the radius is over: after it everything repeats.
     pub frame: Duration,
-    /// One entry for a linear scene; one for each combination of open and closed contacts otherwise.
+    /// One entry for a linear scene; one for each combination of open and closed contacts otherwise; and all this for each motion of an object that turns.
     pub modes: Vec<ContactMode>,
     /// What the verdict leaves out, in words.
     pub notes: Vec<String>,
@@ -64,11 +65,24 @@ impl Analysis {
     pub fn verdict(&self) -> Verdict {
         self.radius.verdict()
     }
+
+    /// Whether the verdict is that of the worst of several combinations of contacts.
+    #[must_use]
+    pub fn combines_contacts(&self) -> bool {
+        combines(&self.modes)
+    }
+}
+
+/// Whether any motion has several modes of contact.
+fn combines(modes: &[ContactMode]) -> bool {
+    modes.windows(2).any(|pair| pair[0].motion == pair[1].motion)
 }
 
 /// A combination of contacts in which the scene is linear.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ContactMode {
+    /// Of an object that turns: the components of its motion that move so, apart from all others, in words; otherwise empty.
+    pub motion: String,
     /// Which contacts are closed, in words; empty for a linear scene.
     pub contacts: String,
     /// The largest radius of its parts.
@@ -96,19 +110,23 @@ pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError>
 /// As for [`analyse`], and [`AnalysisError::Stopped`] if the watcher ends it.
 pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let equivalent = (0..scene.peers.len()).all(|peer| linear_law(scene, peer).is_some());
+    let pieces = match pieces::split(scene) {
+        Ok(pieces) => pieces,
+        Err(why) => return Err(AnalysisError::Turns { what: "the stability", why }),
+    };
     match method {
         // A strategy that cannot be taken apart goes the way of a user's own.
-        _ if !equivalent => push_through(scene, &combinations(scene)?, Trust::Nothing, &FromScene, watch),
-        Method::Full => push_through(scene, &combinations(scene)?, Trust::Linear, &FromScene, watch),
+        _ if !equivalent => push_through(scene, Trust::Nothing, &FromScene, watch),
+        Method::Full => push_through(scene, Trust::Linear, &FromScene, watch),
         Method::Reduced | Method::Determinant => {
             let network = NominalNetwork::of(scene)?;
-            let combinations = combinations(scene)?;
-            let modes = combinations.iter().map(|combination| {
+            let modes = pairs(&pieces, &mut false)?.into_iter().map(|(piece, combination)| {
                 if watch.stops() {
                     return Err(AnalysisError::Stopped);
                 }
-                let structure = Structure::of(&[scene], &network, &combination.contacts)?;
-                Ok(of_parts(combination, reduced(&structure, scene, combination.axes, method, watch)?))
+                let structure = Structure::of(&[&*piece.scene], &network, &combination.contacts)?;
+                let reduced = reduced(&structure, &piece.scene, combination.axes, method, watch)?;
+                Ok(of_parts(combination, reduced))
             });
             Ok(combine(modes.collect::<Result<_, AnalysisError>>()?, method, &network, scene))
         }
@@ -185,23 +203,37 @@ pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Resu
 /// }
 /// ```
 pub fn analyse_with(scene: &Scene, strategies: &impl Strategies) -> Result<Analysis, AnalysisError> {
-    let combinations = combinations(scene)?;
-    if combinations.iter().any(|combination| combination.axes != scene.axes.count()) {
+    pieces::refuse_turns(scene, "the analysis of a strategy of one's own")?;
+    if whole(scene)?.iter().any(|combination| combination.axes != scene.axes.count()) {
         return Err(AnalysisError::MixedAxes);
     }
-    push_through(scene, &combinations, Trust::Nothing, strategies, &Unwatched)
+    push_through(scene, Trust::Nothing, strategies, &Unwatched)
 }
 
-fn push_through(
-    scene: &Scene,
-    combinations: &[Combination],
-    trust: Trust,
-    strategies: &impl Strategies,
-    watch: &dyn Watch,
-) -> Result<Analysis, AnalysisError> {
+/// The pieces, each with its combinations of contacts; `combines` becomes true if any has several.
+pub(crate) fn pairs<'p, 's>(pieces: &'p [Piece<'s>], combines: &mut bool) -> Result<Vec<(&'p Piece<'s>, Combination)>, AnalysisError> {
+    let mut pairs = Vec::new();
+    for piece in pieces {
+        let combinations = combinations(piece)?;
+        *combines |= combinations.len() > 1;
+        pairs.extend(combinations.into_iter().map(|combination| (piece, combination)));
+    }
+    Ok(pairs)
+}
+
+/// The combinations of contacts of an object that does not turn.
+pub(crate) fn whole(scene: &Scene) -> Result<Vec<Combination>, AnalysisError> {
+    let mut all = Vec::new();
+    for piece in pieces::pieces(scene, "the matrix")? {
+        all.extend(combinations(&piece)?);
+    }
+    Ok(all)
+}
+
+fn push_through(scene: &Scene, trust: Trust, strategies: &impl Strategies, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
     // The walls of the simulator push and do not pull, so there is nothing linear to push through them.
-    let modes = combinations.iter().filter(|combination| !combination.contacts.at_wall).map(|combination| {
+    let modes = whole(scene)?.into_iter().filter(|combination| !combination.contacts.at_wall).map(|combination| {
         let contacts = &combination.contacts;
         // With one-sided contacts every axis has combinations of its own.
         let map = full_along(combination.axes, scene, &network, contacts, trust, watch, strategies)?;
@@ -210,7 +242,8 @@ fn push_through(
         let radius = bounded_radius(&matrix, error);
         watch.done(eigenvalue_operations(matrix.rows()));
         let part = Part::whole(radius, matrix.rows());
-        Ok(ContactMode { contacts: combination.words.clone(), radius, parts: vec![part], rigid_modes, dimension: matrix.rows(), frame })
+        let Combination { words: contacts, motion, .. } = combination;
+        Ok(ContactMode { motion, contacts, radius, parts: vec![part], rigid_modes, dimension: matrix.rows(), frame })
     });
     let mut analysis = combine(modes.collect::<Result<_, AnalysisError>>()?, Method::Full, &network, scene);
     if scene.object.enclosure.is_some() {
@@ -219,15 +252,26 @@ fn push_through(
     Ok(analysis)
 }
 
-fn of_parts(combination: &Combination, reduced: crate::parts::Reduced) -> ContactMode {
-    let crate::parts::Reduced { parts, rigid_modes, dimension, frame } = reduced;
-    ContactMode { contacts: combination.words.clone(), radius: radius_of(&parts), parts, rigid_modes, dimension, frame }
+fn of_parts(combination: Combination, reduced: Reduced) -> ContactMode {
+    let Combination { words: contacts, motion, .. } = combination;
+    let Reduced { parts, rigid_modes, dimension, frame } = reduced;
+    ContactMode { motion, contacts, radius: radius_of(&parts), parts, rigid_modes, dimension, frame }
+}
+
+/// The mode with the largest radius.
+fn largest<'a>(modes: impl Iterator<Item = &'a ContactMode>) -> Option<&'a ContactMode> {
+    modes.max_by(|one, other| one.radius.value.total_cmp(&other.radius.value))
 }
 
 pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &NominalNetwork, scene: &Scene) -> Analysis {
     let radius = modes.iter().map(|mode| mode.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 });
-    let largest = modes.iter().max_by(|one, other| one.radius.value.total_cmp(&other.radius.value));
-    let (rigid_modes, dimension, frame) = largest.map_or((0, 0, Duration::ZERO), |mode| (mode.rigid_modes, mode.dimension, mode.frame));
+    let mut motions: Vec<&str> = modes.iter().map(|mode| mode.motion.as_str()).collect();
+    motions.dedup();
+    let of_motion = |motion: &&str| largest(modes.iter().filter(|mode| mode.motion == *motion));
+    let all = motions.iter().filter_map(of_motion);
+    let (rigid_modes, dimension) = all.fold((0, 0), |(rigid_modes, dimension), mode| (rigid_modes + mode.rigid_modes, dimension + mode.dimension));
+    let largest = largest(modes.iter());
+    let frame = largest.map_or(Duration::ZERO, |mode| mode.frame);
     let determinant = largest.is_some_and(|mode| mode.parts.iter().any(|part| part.method == Method::Determinant));
     let method = match method {
         Method::Full => Method::Full,
@@ -239,14 +283,14 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
             }
         }
     };
-    let notes = notes(&network.notes, modes.len(), scene);
+    let notes = notes(&network.notes, combines(&modes), scene);
     Analysis { radius, rigid_modes, dimension, method, frame, modes, notes }
 }
 
 /// What a verdict leaves out, in addition to the notes so far.
-pub(crate) fn notes(said: &[String], combinations: usize, scene: &Scene) -> Vec<String> {
+pub(crate) fn notes(said: &[String], combines: bool, scene: &Scene) -> Vec<String> {
     let mut notes = said.to_vec();
-    if combinations > 1 {
+    if combines {
         notes.push(
             "the scene is not linear: every combination of its contacts is analysed as if it lasted, and the verdict is that of the worst; changing \
              between them is not covered"
@@ -256,22 +300,39 @@ pub(crate) fn notes(said: &[String], combinations: usize, scene: &Scene) -> Vec<
     if !scene.timeline.is_empty() {
         notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
     }
+    if scene.rotation.is_some() {
+        notes.push(UNLOADED.to_owned());
+    }
     notes
 }
+
+/// The note on an object that turns, whose equations are those of small motions.
+pub const UNLOADED: &str = "the object turns: the verdict is about small motions near rest, all copies together, with no hand pushing";
 
 /// Contacts that are closed together, and for how many axes they stand.
 #[derive(Clone, Debug)]
 pub(crate) struct Combination {
     pub(crate) contacts: Contacts,
     pub(crate) axes: usize,
+    /// See [`ContactMode::motion`].
+    pub(crate) motion: String,
     pub(crate) words: String,
+}
+
+impl Combination {
+    /// The motion and the contacts, in words.
+    pub(crate) fn name(&self) -> String {
+        let between = if self.motion.is_empty() || self.words.is_empty() { "" } else { ": " };
+        format!("{}{between}{}", self.motion, self.words)
+    }
 }
 
 /// More combinations than this are refused.
 const MOST: u128 = 4096;
 
 /// Every combination of contacts in which the scene is linear.
-pub(crate) fn combinations(scene: &Scene) -> Result<Vec<Combination>, AnalysisError> {
+pub(crate) fn combinations(piece: &Piece<'_>) -> Result<Vec<Combination>, AnalysisError> {
+    let Piece { scene, axes: copies, motion, absent } = piece;
     let grasping = |peer: usize| scene.peers[peer].contact == Contact::Grasp;
     let pushing_along = |axis: usize| -> Vec<usize> {
         let pushes = |peer: &usize| matches!(scene.peers[*peer].contact, Contact::Push(direction) if direction.axis == axis);
@@ -289,7 +350,8 @@ pub(crate) fn combinations(scene: &Scene) -> Result<Vec<Combination>, AnalysisEr
         let wall = if !at_wall { "" } else { "every copy at a wall" };
         if linear {
             let touching = (0..scene.peers.len()).map(grasping).collect();
-            all.push(Combination { contacts: Contacts { touching, at_wall }, axes, words: wall.to_owned() });
+            let contacts = Contacts { touching, at_wall, absent: absent.clone() };
+            all.push(Combination { contacts, axes: *copies, motion: motion.clone(), words: wall.to_owned() });
             continue;
         }
         for axis in 0..axes {
@@ -304,7 +366,9 @@ pub(crate) fn combinations(scene: &Scene) -> Result<Vec<Combination>, AnalysisEr
                 if at_wall {
                     words.push_str("; every copy at a wall");
                 }
-                all.push(Combination { contacts: Contacts { touching, at_wall }, axes: 1, words });
+                let contacts = Contacts { touching, at_wall, absent: absent.clone() };
+                // Of a scene of several axes, each has combinations of its own.
+                all.push(Combination { contacts, axes: copies / axes, motion: motion.clone(), words });
             }
         }
     }

@@ -48,6 +48,23 @@ pub enum AnalysisError {
         /// Its name.
         strategy: &'static str,
     },
+    /// The object turns, and its motion does not split into scenes of one axis.
+    #[error(
+        "{what} of an object that turns is analysed only where its motion splits into scenes of one axis, and here {why}; cohaptic stability point and \
+         simulations tell whether the scene is stable"
+    )]
+    Turns {
+        /// The analysis.
+        what: &'static str,
+        /// Why it does not split.
+        why: &'static str,
+    },
+    /// The object turns, and this analysis does not follow that.
+    #[error("{what} does not follow an object that turns: expected a scene without object.inertia")]
+    NoTurns {
+        /// The analysis.
+        what: &'static str,
+    },
     /// Not all samples are sent.
     #[error(
         "with coordination.send-when a sample depends on how far things have moved, which is not linear: simulations tell whether the scene is stable"

@@ -12,6 +12,7 @@ use crate::analysis::{Analysis, combinations, combine};
 use crate::lifted::Lifted;
 use crate::network::NominalNetwork;
 use crate::parts::{alone, lifted_part};
+use crate::pieces::{Piece, pieces};
 use crate::structure::{Structure, count};
 use crate::{AnalysisError, ContactMode, Matrix, Method, PartKind, Unwatched, Watch};
 
@@ -84,11 +85,21 @@ pub fn analyse_on(scene: &Scene, graph: &Graph) -> Result<Analysis, GraphError> 
 /// As for [`analyse_on`], and [`AnalysisError::Stopped`] if the watch ends it.
 pub fn analyse_on_watched(scene: &Scene, graph: &Graph, watch: &dyn Watch) -> Result<Analysis, GraphError> {
     let network = NominalNetwork::of(scene).map_err(GraphError::Analysis)?;
-    let combinations = combinations(scene).map_err(GraphError::Analysis)?;
+    let mut modes = Vec::new();
+    for piece in pieces(scene, "a graph")? {
+        modes.push(of_piece(&piece, graph, &network, watch)?);
+    }
+    Ok(combine(modes, Method::Reduced, &network, scene))
+}
+
+/// The modes of a scene that moves apart from all others.
+fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &dyn Watch) -> Result<ContactMode, GraphError> {
+    let scene = &*piece.scene;
+    let combinations = combinations(piece).map_err(GraphError::Analysis)?;
     let [combination] = combinations.as_slice() else {
         return Err(GraphError::NotLinear);
     };
-    let structure = Structure::of(&[scene], &network, &combination.contacts)?;
+    let structure = Structure::of(&[scene], network, &combination.contacts)?;
     let (Some(timetable), None) = (&structure.apart[0], structure.classes.get(1)) else {
         let peer = structure.classes.get(1).map_or(0, |class| class[0]);
         return Err(GraphError::Unequal { peer: scene.peers[peer].name.clone() });
@@ -125,8 +136,7 @@ pub fn analyse_on_watched(scene: &Scene, graph: &Graph, watch: &dyn Watch) -> Re
     }
     let radius = crate::parts::radius_of(&parts);
     let (rigid_modes, dimension) = (rigid_modes * combination.axes, (dimension - rigid_modes) * combination.axes);
-    let mode = ContactMode { contacts: String::new(), radius, parts, rigid_modes, dimension, frame: timetable.frame };
-    Ok(combine(vec![mode], Method::Reduced, &network, scene))
+    Ok(ContactMode { motion: piece.motion.clone(), contacts: String::new(), radius, parts, rigid_modes, dimension, frame: timetable.frame })
 }
 
 /// An eigenvalue of an averaging matrix; 1 is known exactly.

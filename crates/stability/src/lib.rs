@@ -43,6 +43,7 @@ mod mean_square;
 mod monodromy;
 mod network;
 mod parts;
+mod pieces;
 mod radius;
 mod scene_radius;
 mod spectrum;
@@ -54,7 +55,7 @@ mod watch;
 mod worst_case;
 
 pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, admittance, ideal};
-pub use analysis::{Analysis, ContactMode, Method, analyse, analyse_watched, analyse_with};
+pub use analysis::{Analysis, ContactMode, Method, UNLOADED, analyse, analyse_watched, analyse_with};
 pub use boundary::{Boundary, BoundaryError, BoundaryOptions, Crossing, Stretch};
 pub use cost::{FrameCost, eigenvalue_operations, full_operations};
 pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};

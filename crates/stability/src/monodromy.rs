@@ -5,9 +5,10 @@ use std::time::Duration;
 
 use cohaptic_scene::{FromScene, Scene, Strategies};
 
-use crate::analysis::combinations;
+use crate::analysis::whole;
 use crate::full::{FullMap, Trust, full_along};
 use crate::network::NominalNetwork;
+use crate::pieces::refuse_turns;
 use crate::{AnalysisError, Matrix, Unwatched};
 
 /// What one frame multiplies the relative state of a linear scene by.
@@ -126,8 +127,9 @@ pub fn monodromy_with(scene: &Scene, strategies: &impl Strategies) -> Result<Mon
 }
 
 fn pushed(scene: &Scene, trust: Trust, strategies: &impl Strategies) -> Result<Monodromy, AnalysisError> {
+    refuse_turns(scene, "the monodromy matrix")?;
     let network = NominalNetwork::of(scene)?;
-    let combinations = combinations(scene)?;
+    let combinations = whole(scene)?;
     let mut linear = combinations.iter().filter(|combination| !combination.contacts.at_wall);
     let (Some(combination), None) = (linear.next(), linear.next()) else {
         return Err(AnalysisError::SeveralModes);

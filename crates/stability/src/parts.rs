@@ -126,10 +126,10 @@ pub(crate) fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, me
     Ok(Part { kind, size, copies, radius, method: Method::Reduced })
 }
 
-/// The devices of a class if they touch nothing, and how many rigid-body modes they have along one axis.
+/// The devices of a class if there are any that touch nothing, and how many rigid-body modes they have along one axis.
 pub(crate) fn alone(structure: &Structure, scene: &Scene, class: usize, axes: usize) -> Option<(Part, usize)> {
     let members = &structure.classes[class];
-    (!structure.touching[class]).then(|| {
+    structure.has_loose_devices(class).then(|| {
         let (radius, size) = loose_device(structure, scene, class);
         (
             Part { kind: PartKind::LooseDevice { peer: members[0] }, size, copies: members.len() * axes, radius, method: Method::Reduced },

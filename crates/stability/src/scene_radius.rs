@@ -1,15 +1,18 @@
 //! Radii of one linear scene again and again, while its numbers change: nothing is kept but the radius, and nothing is computed twice.
 
+use std::borrow::Cow;
+
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::{Gains, Plant};
 use cohaptic_scene::{FromScene, Scene};
 
-use crate::analysis::{Combination, combinations};
+use crate::analysis::{Combination, pairs};
 use crate::full::{FullMap, Trust, full_along};
 use crate::lifted::{Autonomous, Body, Lifted, Node};
 use crate::mean_square::{EqualScratch, Followed};
 use crate::network::NominalNetwork;
 use crate::parts::loose_device;
+use crate::pieces::pieces;
 use crate::spectrum::Workspace;
 use crate::stack_frame::{StackFrame, StackNode};
 use crate::structure::{Contacts, Structure, linear_law};
@@ -17,7 +20,14 @@ use crate::{AnalysisError, Matrix, Radius, Unwatched};
 
 /// What about a linear scene does not change with its numbers.
 #[derive(Debug)]
-pub(crate) enum SceneRadius {
+pub(crate) struct SceneRadius {
+    /// Of an object that turns, the first of the components that it is about.
+    component: Option<String>,
+    kind: Kind,
+}
+
+#[derive(Debug)]
+enum Kind {
     /// Its strategy is a law.
     Parts(Box<PartsRadius>),
     /// Only the general path follows it.
@@ -27,43 +37,60 @@ pub(crate) enum SceneRadius {
 impl SceneRadius {
     /// For scenes that differ in numbers only. Whether an arm ties the object to ground may differ too.
     fn new(scenes: &[&Scene], network: &NominalNetwork, combination: &Combination) -> Result<Self, AnalysisError> {
-        if linear_law(scenes[0], 0).is_some() {
-            return Ok(Self::Parts(Box::new(PartsRadius::new(scenes, network, &combination.contacts)?)));
-        }
-        WholeRadius::new(scenes[0], network, combination).map(Box::new).map(Self::Whole)
+        let component = combination.motion.split(", ").next().filter(|name| !name.is_empty()).map(str::to_owned);
+        let views: Vec<Cow<'_, Scene>> = scenes.iter().filter_map(|scene| view(scene, component.as_deref())).collect();
+        let scenes: Vec<&Scene> = views.iter().map(AsRef::as_ref).collect();
+        let kind = if linear_law(scenes[0], 0).is_some() {
+            Kind::Parts(Box::new(PartsRadius::new(&scenes, network, &combination.contacts)?))
+        } else {
+            Kind::Whole(Box::new(WholeRadius::new(scenes[0], network, combination)?))
+        };
+        Ok(Self { component, kind })
     }
 
     /// How the second moment is followed; an error says why it is not.
     pub(crate) const fn followed(&self) -> Result<&Followed, &AnalysisError> {
-        match self {
-            Self::Parts(parts) => parts.followed.as_ref(),
-            Self::Whole(whole) => Err(&whole.unfollowed),
+        match &self.kind {
+            Kind::Parts(parts) => parts.followed.as_ref(),
+            Kind::Whole(whole) => Err(&whole.unfollowed),
         }
     }
 
     /// The classes, by their members.
     pub(crate) fn classes(&self) -> &[Vec<usize>] {
-        match self {
-            Self::Parts(parts) => &parts.structure.classes,
-            Self::Whole(whole) => &whole.classes,
+        match &self.kind {
+            Kind::Parts(parts) => &parts.structure.classes,
+            Kind::Whole(whole) => &whole.classes,
         }
     }
 
     /// The largest radius of all parts. Without `BOUND` its error is zero and means nothing.
     pub(crate) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Radius {
-        match self {
-            Self::Parts(parts) => parts.radius::<BOUND>(scene, scratch),
-            Self::Whole(whole) => whole.radius::<BOUND>(scene, &mut scratch.workspace),
+        let Some(scene) = view(scene, self.component.as_deref()) else { return Radius::UNKNOWN };
+        match &self.kind {
+            Kind::Parts(parts) => parts.radius::<BOUND>(&scene, scratch),
+            Kind::Whole(whole) => whole.radius::<BOUND>(&scene, &mut scratch.workspace),
         }
     }
 
     /// The radius of the second moment over a frame, without a bound of its error; `None` if it is not followed here, or the numbers leave their range.
     pub(crate) fn mean_square(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Option<f64> {
-        match self {
-            Self::Parts(parts) => parts.mean_square(scene, scratch),
-            Self::Whole(_) => None,
+        match &self.kind {
+            Kind::Parts(parts) => {
+                let scene = view(scene, self.component.as_deref())?;
+                parts.mean_square(&scene, scratch)
+            }
+            Kind::Whole(_) => None,
         }
     }
+}
+
+/// The scene, or its part with that component.
+fn view<'a>(scene: &'a Scene, component: Option<&str>) -> Option<Cow<'a, Scene>> {
+    let Some(component) = component else { return Some(Cow::Borrowed(scene)) };
+    let parts = scene.rotation_parts()?.ok()?.parts;
+    let part = parts.into_iter().find(|part| part.components.iter().any(|name| name == component))?;
+    Some(Cow::Owned(part.scene))
 }
 
 /// A scene that the general path follows, for each of its numbers anew.
@@ -227,7 +254,7 @@ impl PartsRadius {
     /// Brings the nodes up to date; step maps only where a body has changed.
     fn refresh(&self, scene: &Scene, scratch: &mut RadiusScratch) {
         let classes = self.structure.classes.len();
-        let loose = |class: usize| (!self.structure.touching[class]).then(|| loose_device(&self.structure, scene, class).0);
+        let loose = |class: usize| self.structure.has_loose_devices(class).then(|| loose_device(&self.structure, scene, class).0);
         if scratch.nodes.len() != classes {
             scratch.nodes = self.structure.nodes(scene);
             let bodies = |class: usize| Bodies {
@@ -292,9 +319,10 @@ fn part<const BOUND: bool>(stack: Option<&StackFrame>, lifted: &Lifted<'_>, matr
 /// The linear scenes that a scene falls into, one for each combination of contacts.
 pub(crate) fn scene_radii(scenes: &[&Scene]) -> Result<Vec<SceneRadius>, AnalysisError> {
     let network = NominalNetwork::of(scenes[0])?;
-    let combinations = combinations(scenes[0])?;
+    let pieces = pieces(scenes[0], "the stability")?;
     // The general path leaves walls out.
     let is_law = linear_law(scenes[0], 0).is_some();
-    let followed = combinations.iter().filter(|combination| is_law || !combination.contacts.at_wall);
-    followed.map(|combination| SceneRadius::new(scenes, &network, combination)).collect()
+    let combinations = pairs(&pieces, &mut false)?.into_iter().map(|(_, combination)| combination);
+    let followed = combinations.filter(|combination| is_law || !combination.contacts.at_wall);
+    followed.map(|combination| SceneRadius::new(scenes, &network, &combination)).collect()
 }

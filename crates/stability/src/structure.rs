@@ -23,6 +23,8 @@ pub(crate) struct Contacts {
     pub(crate) touching: Vec<bool>,
     /// Whether every copy is at a wall of the enclosure.
     pub(crate) at_wall: bool,
+    /// For each peer, whether it has no device at all.
+    pub(crate) absent: Vec<bool>,
 }
 
 /// The classes of a scene and what happens among them in a frame.
@@ -32,6 +34,8 @@ pub(crate) struct Structure {
     pub(crate) classes: Vec<Vec<usize>>,
     /// For each class, whether its members touch the object.
     pub(crate) touching: Vec<bool>,
+    /// For each class, whether its members have no device.
+    pub(crate) absent: Vec<bool>,
     pub(crate) at_wall: bool,
     /// A frame of the classes' averages.
     pub(crate) timetable: Timetable,
@@ -63,6 +67,7 @@ impl Structure {
                 Some(place) != alone
                     && Some(class[0]) != alone
                     && contacts.touching[class[0]] == contacts.touching[place]
+                    && contacts.absent[class[0]] == contacts.absent[place]
                     && scenes.iter().all(|scene| alike(&scene.peers[class[0]], &scene.peers[place], contacts.touching[place]))
             });
             match found {
@@ -101,7 +106,8 @@ impl Structure {
         let arm = |class: &Vec<usize>| contacts.touching[class[0]] && scene.device_plant(class[0]).stiffness > 0.0;
         let tied = contacts.at_wall || silent || classes.iter().any(arm);
         let touching = classes.iter().map(|class| contacts.touching[class[0]]).collect();
-        Ok(Self { classes, touching, at_wall: contacts.at_wall, timetable, apart, weights, tied, peers })
+        let absent = classes.iter().map(|class| contacts.absent[class[0]]).collect();
+        Ok(Self { classes, touching, absent, at_wall: contacts.at_wall, timetable, apart, weights, tied, peers })
     }
 
     /// The linear form of the law of a class.
@@ -137,6 +143,11 @@ impl Structure {
             wall: scene.object.enclosure.filter(|_| self.at_wall).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping }),
             compute_delay: spec.compute_delay,
         }
+    }
+
+    /// Whether the members of a class have devices that touch nothing.
+    pub(crate) fn has_loose_devices(&self, class: usize) -> bool {
+        !self.touching[class] && !self.absent[class]
     }
 
     /// The weight with which a difference within a class comes back: −1/(N−1).

@@ -15,6 +15,7 @@ mod measures;
 mod own_strategies;
 mod parameter_changes;
 mod replay;
+mod rotation;
 mod symmetry;
 mod waves;
 

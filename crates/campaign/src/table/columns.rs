@@ -27,6 +27,9 @@ pub(crate) fn columns(variations: &[Variation], verdicts: bool, roster: &Roster)
     columns.push(always("ended_at_s", Kind::Number));
     columns.push(always("ticks", Kind::Integer));
     columns.push(always("max_discrepancy_m", Kind::Number));
+    if roster.turns {
+        columns.push(column("max_rotation_discrepancy_rad".to_owned(), Kind::Number, true));
+    }
     for (place, peer) in roster.peers.iter().enumerate() {
         for (quantity, unit) in [("position", "m"), ("velocity", "m_s")] {
             for (axis, letter) in AXES.iter().enumerate().take(roster.axes) {
@@ -68,6 +71,9 @@ pub(crate) struct Roster {
     pub(crate) fewest_axes: usize,
     /// Whether any run has a line that a peer sends or receives through.
     pub(crate) access_lines: bool,
+    /// Whether the object turns in any run.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(crate) turns: bool,
     /// The names of all measures of any run.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub(crate) measures: BTreeSet<String>,
@@ -79,7 +85,7 @@ impl Roster {
         let axes = scene.axes.count();
         let access_lines = scene.peers.iter().any(|peer| peer.uplink.is_some() || peer.downlink.is_some());
         let measures = scene.measure.iter().flat_map(|measure| &measure.names).map(|name| name.text(scene)).collect();
-        Self { always: peers.len(), peers, axes, fewest_axes: axes, access_lines, measures }
+        Self { always: peers.len(), peers, axes, fewest_axes: axes, access_lines, turns: scene.rotation.is_some(), measures }
     }
 
     /// The measures in the order of their columns: which one, the place of its peer in the roster, and its name.
@@ -106,6 +112,7 @@ impl Roster {
         self.axes = self.axes.max(other.axes);
         self.fewest_axes = self.fewest_axes.min(other.fewest_axes);
         self.access_lines |= other.access_lines;
+        self.turns |= other.turns;
         self.measures.extend(other.measures.iter().cloned());
     }
 }
@@ -116,7 +123,7 @@ mod tests {
 
     fn roster(peers: &[&str], axes: usize) -> Roster {
         let peers: Vec<String> = peers.iter().map(|name| (*name).to_owned()).collect();
-        Roster { always: peers.len(), peers, axes, fewest_axes: axes, access_lines: false, measures: BTreeSet::new() }
+        Roster { always: peers.len(), peers, axes, fewest_axes: axes, access_lines: false, turns: false, measures: BTreeSet::new() }
     }
 
     #[test]

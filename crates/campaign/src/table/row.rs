@@ -47,6 +47,9 @@ pub(crate) fn row<'a>(
     row.push(Value::Number(ended));
     row.push(integer(summary.ticks));
     row.push(Value::Number(summary.max_discrepancy));
+    if roster.turns {
+        row.push(summary.max_rotation_discrepancy.map_or(Value::Absent, Value::Number));
+    }
     for (place, name) in roster.peers.iter().enumerate() {
         let peer = place_of(summary, place, name).map(|place| &summary.peers[place]);
         for quantity in [peer.map(|peer| &peer.position), peer.map(|peer| &peer.velocity)] {

@@ -100,6 +100,12 @@ shipped![
     "network/two-axes",
     "live/three-falcons",
     "live/two-and-a-program",
+    "rigid/damped-spin",
+    "rigid/damping-bound",
+    "rigid/free-top",
+    "rigid/half-turn",
+    "rigid/precession",
+    "rigid/tray",
     "counterexamples/ap-unaffected",
     "counterexamples/below-the-bound",
     "counterexamples/both-stable",
@@ -118,6 +124,7 @@ shipped![
     "counterexamples/set-position-undamped",
     "counterexamples/stability-tests",
     "counterexamples/tick-counts",
+    "counterexamples/turning-half-damping",
     "counterexamples/wave-held",
 ];
 

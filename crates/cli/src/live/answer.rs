@@ -12,7 +12,7 @@ use cohaptic_units::print::{Counted, Span};
 use serde::Serialize;
 
 use crate::document_schema::document;
-use crate::documents::{access_line, ending_name, lateness, measures_of, micros, peer, peer_link};
+use crate::documents::{access_line, ending_name, lateness, measures_of, micros, peer, peer_link, rotation};
 use crate::measures::measured_lines;
 use crate::output;
 use crate::realtime::{late, notes};
@@ -44,6 +44,8 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
         links: summary.links.iter().map(|link| peer_link(scene, link)).collect::<Vec<_>>(),
         access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
         max_discrepancy_m: summary.max_discrepancy,
+        #[serde(flatten)]
+        rotation: rotation(summary),
         #[serde(flatten)]
         measures: measures_of(scene, &report.measures),
         #[serde(flatten)]

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::Run;
 use crate::document_schema::document;
-use crate::documents::{access_line, ending_name, measures_of, peer, peer_link};
+use crate::documents::{access_line, ending_name, measures_of, peer, peer_link, rotation};
 use crate::measures::measured_lines;
 use crate::{output, terminal_plot};
 
@@ -29,6 +29,8 @@ pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option
         links: summary.links.iter().map(|link| peer_link(scene, link)).collect::<Vec<_>>(),
         access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
         max_discrepancy_m: summary.max_discrepancy,
+        #[serde(flatten)]
+        rotation: rotation(summary),
         #[serde(flatten)]
         measures: measures_of(scene, &run.measured),
         files: run.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
@@ -58,6 +60,9 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
     line(format!("  {simulated} simulated, {}, in {:.3} s: {factor:.0} times real time", Counted(summary.ticks, "tick"), run.wall_s));
     let apart = if summary.max_discrepancy > SANE_POSITION { ": they came apart" } else { "" };
     line(format!("  largest discrepancy between two copies: {}{apart}", length(summary.max_discrepancy)));
+    if let Some(angle) = summary.max_rotation_discrepancy {
+        line(format!("  largest angle between two copies: {}", angle_text(angle)));
+    }
     for peer in summary.peers.iter().take(MOST_PEERS) {
         let position: Vec<String> = peer.position.iter().map(|x| length(*x)).collect();
         line(format!("  {} ends at {}", peer.name, position.join(", ")));
@@ -75,6 +80,10 @@ const MOST_PEERS: usize = 8;
 
 pub(crate) fn length(metres: f64) -> String {
     if metres.abs() < 1e4 { format!("{:.3} mm", metres * 1e3) } else { format!("{metres:.3e} m") }
+}
+
+pub(crate) fn angle_text(radians: f64) -> String {
+    format!("{radians:.4} rad ({:.2}°)", radians.to_degrees())
 }
 
 /// What became of all packets, end to end.

@@ -11,7 +11,7 @@ use cohaptic_scene::{Scene, scene_content_of_text};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::{DropCause, LinkName, LinkStats};
 
-use super::answer::{length, packets};
+use super::answer::{angle_text, length, packets};
 use super::command_line;
 use crate::arguments::RunArguments;
 use crate::expectations::{BARS, OutcomeDocument, columns};
@@ -69,6 +69,9 @@ fn facts<'a>(arguments: &RunArguments, scene: &Scene, overrides: &[String], summ
         ("Seed", scene.seed.to_string().into()),
         ("Fingerprint of the scene", Html::code(&scene.clone().fingerprint().to_string())),
     ];
+    if let Some(angle) = summary.max_rotation_discrepancy {
+        facts.insert(2, ("Largest angle between two copies", angle_text(angle).into()));
+    }
     if !overrides.is_empty() {
         let keys = overrides.iter().map(|key| Html::code(key));
         facts.push(("Overrides", keys.reduce(|before, key| before.and(", ").and(key)).unwrap_or_default()));

@@ -99,6 +99,7 @@ pages! {
     reference_network_keys: "docs/reference-network-keys.md",
     relay: "docs/relay.md",
     results: "docs/results.md",
+    rotation: "docs/rotation.md",
     router: "docs/router.md",
     scenes: "docs/scenes.md",
     stability: "docs/stability.md",
@@ -107,6 +108,7 @@ pages! {
     tutorial_laboratory: "docs/tutorial-laboratory.md",
     tutorial_network_test: "docs/tutorial-network-test.md",
     tutorial_paper: "docs/tutorial-paper.md",
+    tutorial_tray: "docs/tutorial-tray.md",
 }
 
 fn root() -> PathBuf {

@@ -231,7 +231,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
                 Samples::Broadcast(_) => 0,
                 Samples::PerPacket(samples) => samples.stale_samples(place, run),
             };
-            PeerSummary { name: peer.name.clone(), position, velocity, stale_samples, refused_samples: 0 }
+            PeerSummary { name: peer.name.clone(), position, velocity, attitude: None, stale_samples, refused_samples: 0 }
         });
         let places = 0..self.shape.peers;
         let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
@@ -244,6 +244,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             links: links.collect(),
             access_lines: Vec::new(),
             max_discrepancy: self.max_discrepancy[run],
+            max_rotation_discrepancy: None,
         };
         self.blocks.end(run);
         self.summaries[run] = Some(summary);

@@ -42,6 +42,7 @@ impl Shape {
         let clock = scene.peers.first()?.clock;
         let fits = plan.ticking == Ticking::Lockstep
             && !plan.general_links
+            && scene.rotation.is_none()
             && scene.timeline.is_empty()
             && scene.coordination.send_when.is_none()
             && scene.duration <= LONGEST

@@ -3,7 +3,8 @@
 use std::convert::Infallible;
 use std::time::Duration;
 
-use cohaptic_scene::{Bounds, Expect, ExpectDelay, ExpectLoss, LinkSelector, MeasureName, Scene};
+use cohaptic_peer::rotation::Attitude;
+use cohaptic_scene::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectOrientation, LinkSelector, MeasureName, Scene};
 use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 use cohaptic_wan::{DropCause, LinkName, LinkStats};
@@ -24,6 +25,9 @@ pub(crate) struct Watched {
 struct Positions {
     positions: Vec<WatchedPosition>,
     travels: Vec<WatchedTravel>,
+    /// Expectations of orientations, and the attitudes that were seen.
+    expected: Vec<ExpectOrientation>,
+    orientations: Vec<Option<Attitude>>,
 }
 
 #[derive(Debug)]
@@ -60,7 +64,12 @@ impl Positions {
             start: scene.peers[expected.peer].position[expected.axis],
             reached: None,
         };
-        Self { positions: expect.positions.iter().map(position).collect(), travels: expect.travel.iter().map(travel).collect() }
+        Self {
+            positions: expect.positions.iter().map(position).collect(),
+            travels: expect.travel.iter().map(travel).collect(),
+            expected: expect.orientations.clone(),
+            orientations: vec![None; expect.orientations.len()],
+        }
     }
 }
 
@@ -68,12 +77,16 @@ impl Observer for Positions {
     type Error = Infallible;
 
     fn wants_ticks(&self) -> bool {
-        !self.positions.is_empty() || !self.travels.is_empty()
+        !self.positions.is_empty() || !self.travels.is_empty() || !self.expected.is_empty()
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
         for watched in self.positions.iter_mut().filter(|watched| watched.peer == row.peer && row.at <= watched.at) {
             watched.seen = Some(row.object.position[watched.axis]);
+        }
+        if let Some(turn) = &row.turn {
+            let due = |(expected, _): &(&ExpectOrientation, _)| expected.peer == row.peer && row.at <= expected.at;
+            self.expected.iter().zip(&mut self.orientations).filter(due).for_each(|(_, seen)| *seen = Some(*turn.object));
         }
         for watched in self.travels.iter_mut().filter(|watched| watched.peer == row.peer && watched.reached.is_none()) {
             if (row.object.position[watched.axis] - watched.start).abs() >= watched.distance {
@@ -113,6 +126,19 @@ impl Watched {
             outcomes.push(match watched.reached {
                 None => Outcome::nothing("travel", what, "s", &expected.bounds, "not reached"),
                 Some(at) => Outcome::number("travel", what, "s", &expected.bounds, at.as_secs_f64()),
+            });
+        }
+        if let (Some(bounds), Some(angle)) = (&expect.rotation_discrepancy, summary.max_rotation_discrepancy) {
+            outcomes.push(Outcome::number("rotation-discrepancy", "largest angle between copies".to_owned(), "rad", bounds, angle));
+        }
+        for (expected, seen) in expect.orientations.iter().zip(&watched.orientations) {
+            let what = format!("angle of {}'s copy from the orientation expected at {}", name(expected.peer), expected.at);
+            let at_the_end = expected.at >= Instant::ZERO.saturating_add(scene.duration);
+            let seen = if at_the_end { summary.peers[expected.peer].attitude } else { *seen };
+            let bounds = Bounds { min: None, max: Some(expected.max) };
+            outcomes.push(match seen {
+                None => Outcome::nothing("orientation", what, "rad", &bounds, &format!("{} has not ticked by then", name(expected.peer))),
+                Some(seen) => Outcome::number("orientation", what, "rad", &bounds, seen.angle_to(&expected.of)),
             });
         }
         outcomes.extend(expect.loss.iter().map(|expected| loss(scene, expected, summary)));

@@ -5,7 +5,7 @@ use cohaptic_scene::Bounds;
 /// What was expected, what came out, and whether that is as expected.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Outcome {
-    /// The section of `[expect]`: `stable`, `discrepancy`, `position`, `travel`, `loss`, `delay` or `measures`.
+    /// The section of `[expect]`: `stable`, `discrepancy`, `position`, `travel`, `rotation-discrepancy`, `orientation`, `loss`, `delay` or `measures`.
     pub key: &'static str,
     /// The quantity that is compared, in words: `mean delay on left->right`.
     pub name: String,

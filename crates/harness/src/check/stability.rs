@@ -129,10 +129,12 @@ fn verdict(initial: f64, early: f64, late: f64) -> Stability {
 /// The largest difference between the two runs in a relative position along an axis \[m\].
 fn relative_displacement<const A: usize>(nominal: &World<A, BuiltInStrategy<A>>, disturbed: &World<A, BuiltInStrategy<A>>) -> f64 {
     let (mut low, mut high, mut stretch) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A], 0.0_f64);
+    // How copies that turn differ, in world axes, times a length.
+    let (mut least, mut greatest) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for (one, other) in nominal.bodies().zip(disturbed.bodies()) {
         for axis in 0..A {
             let copy = other.object[axis] - one.object[axis];
-            let device = other.device[axis] - one.device[axis];
+            let device = (other.device[axis] - one.device[axis]) - (other.grasp[axis] - one.grasp[axis]);
             low[axis] = low[axis].min(copy);
             high[axis] = high[axis].max(copy);
             let touches = match one.contact {
@@ -141,11 +143,23 @@ fn relative_displacement<const A: usize>(nominal: &World<A, BuiltInStrategy<A>>,
                 Contact::Push(direction) => direction.axis == axis,
             };
             if touches {
-                stretch = stretch.max((device - copy).abs());
+                stretch = stretch.max(device.abs());
+            }
+        }
+        if let (Some(one), Some(other), contact) = (one.turns, other.turns, one.contact) {
+            let copy = other.object.rotation_from(&one.object.orientation).map(|angle| angle * one.length);
+            for axis in 0..3 {
+                least[axis] = least[axis].min(copy[axis]);
+                greatest[axis] = greatest[axis].max(copy[axis]);
+            }
+            if let (Some(before), Some(after), Contact::Grasp) = (one.device, other.device, contact) {
+                let device = after.rotation_from(&before.orientation).map(|angle| angle * one.length);
+                stretch = (0..3).map(|axis| (device[axis] - copy[axis]).abs()).fold(stretch, f64::max);
             }
         }
     }
-    (0..A).map(|axis| high[axis] - low[axis]).fold(stretch, f64::max)
+    let turned = if least[0].is_finite() { (0..3).map(|axis| greatest[axis] - least[axis]).fold(0.0, f64::max) } else { 0.0 };
+    (0..A).map(|axis| high[axis] - low[axis]).fold(stretch.max(turned), f64::max)
 }
 
 #[cfg(test)]

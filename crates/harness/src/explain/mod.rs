@@ -149,6 +149,7 @@ impl Rows {
     fn peers(&mut self, scene: &Scene, plan: &Plan) {
         let copy = if scene.object.split_mass { "the mass of the object is split" } else { "every copy has the whole mass" };
         self.model("object", format!("{} of {} kg", Counted(scene.peers.len(), "copy"), Number(scene.copy_mass())), copy);
+        self.rotation(scene);
         for (group, peers) in groups(scene, plan) {
             let part = format!("peer {}", names(&peers));
             match group {
@@ -161,6 +162,32 @@ impl Rows {
         }
         if scene.peers.iter().all(|peer| !peer.compute_delay) {
             self.leave_out("computed forces from the last tick: no peer has a compute-delay");
+        }
+    }
+
+    fn rotation(&mut self, scene: &Scene) {
+        let (Some(rotation), Some(copy)) = (&scene.rotation, scene.copy_spin()) else { return };
+        let triple = |numbers: [f64; 3]| numbers.map(|number| Number(number).to_string()).join(", ");
+        self.model(
+            "rotation",
+            format!("copies with moments of inertia {} kg·m², damped by {} N·m·s/rad", triple(copy.inertia), triple(copy.damping)),
+            "object.inertia; each takes part in the inertia as in the mass",
+        );
+        if let Some(gains) = scene.rotation_gains(scene.coordination.gains) {
+            let gains = format!("KR = {} N·m/rad, BR = {} N·m·s/rad about body axes", triple(gains.stiffness), triple(gains.damping));
+            self.model("coordination of turns", gains, "the mean of the matrices held, which is no rotation, gives the mean torque");
+        }
+        let method = match scene.integrator {
+            Integrator::Exact => "exponential of the damped turn, fourth order in the gyroscopic term",
+            Integrator::SemiImplicitEuler { .. } => "explicit Euler on quaternion and angular velocity",
+            Integrator::RungeKutta4 { .. } => "Runge-Kutta of order 4 on quaternion and angular velocity",
+        };
+        self.model("turns", format!("{method}, {} a tick", Counted(rotation.steps, "step")), "torques are held in body axes over a tick");
+        let turning = rotation.peers.iter().filter(|peer| peer.device.is_some()).count();
+        if turning == 0 {
+            self.leave_out("turns of devices: no device has an inertia");
+        } else {
+            self.model("devices that turn", format!("{turning}"), "device.inertia");
         }
     }
 

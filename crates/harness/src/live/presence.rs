@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use cohaptic_peer::wire::{MAX_LEN, Sample};
+use cohaptic_peer::wire::{Extra, MAX_LEN, Sample};
 use cohaptic_peer::{Age, Ages, Device, Peer, ReceiveError, Reception, Strategy};
 use cohaptic_scene::{PeerKind, Scene};
 use cohaptic_units::Instant;
@@ -111,7 +111,7 @@ impl<const A: usize> RemotePeers<A> {
         now: Instant,
         ends: (usize, usize),
         sample: &Sample<A>,
-        extra: &[f64; A],
+        extra: &Extra<A>,
         peer: &mut Peer<A, D, S>,
     ) -> Result<Reception, ReceiveError> {
         let (from, to) = ends;

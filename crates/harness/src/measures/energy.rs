@@ -25,6 +25,8 @@ pub(super) struct Energy {
     /// Σ over peers, in the order of steps.
     injected: f64,
     peak: f64,
+    /// Whether the object turns: the work of torques is not counted, so W has no value.
+    turns: bool,
 }
 
 /// W of one copy.
@@ -74,7 +76,7 @@ impl Accumulator for Energy {
 
     fn new(asked: &Asked<'_>) -> Self {
         let peers = (0..asked.scene.peers.len()).map(|place| PeerEnergy::new(asked.scene, place)).collect();
-        Self { peers, injected: 0.0, peak: 0.0 }
+        Self { peers, injected: 0.0, peak: 0.0, turns: asked.scene.rotation.is_some() }
     }
 
     fn on_step(&mut self, row: &StepRow<'_>) {
@@ -90,6 +92,9 @@ impl Accumulator for Energy {
     }
 
     fn value(&self, figure: Figure, peer: Option<usize>, _elapsed: Duration) -> Option<f64> {
+        if self.turns {
+            return None;
+        }
         match (figure, peer) {
             (Figure::Peak, _) => Some(self.peak),
             (Figure::AtEnd, Some(peer)) => self.peers.get(peer)?.injected,

@@ -11,7 +11,7 @@ use super::links;
 use super::network::Network;
 use super::packets::Packets;
 use super::plot::{self, Panel, Plot};
-use super::trajectory::Trajectory;
+use super::trajectory::{Trajectory, Turns};
 use crate::{Observer, PacketRow, Summary, TickRow};
 
 /// The name of a file, and the picture in it as SVG.
@@ -35,6 +35,8 @@ struct Plotted {
     positions: Bands,
     forces: Bands,
     network: Network,
+    /// The rotation vectors of the copies and their lengths, if the object turns.
+    orientations: Option<Bands>,
 }
 
 /// The spans of time of a plot, and the most numbers that all curves of a plot may hold together.
@@ -61,9 +63,14 @@ impl Recorder {
         Ok(Self {
             folder: folder.to_path_buf(),
             title: scene.title.clone(),
-            trajectory: Trajectory::create(folder, names.clone(), scene.axes)?,
+            trajectory: Trajectory::create(folder, names.clone(), scene.axes, Turns::of(scene))?,
             packets: Packets::create(folder, names.clone())?,
-            plotted: Plotted { positions: bands(curves), forces: bands(curves), network: Network::new(scene, spans) },
+            plotted: Plotted {
+                positions: bands(curves),
+                forces: bands(curves),
+                network: Network::new(scene, spans),
+                orientations: scene.rotation.is_some().then(|| bands(4 * names.len())),
+            },
             size: Size::default(),
             names,
         })
@@ -93,7 +100,7 @@ impl Recorder {
         let Self { folder, title, names, trajectory, packets, plotted, size } = self;
         let mut files = vec![trajectory.finish()?, packets.finish()?, links::write(&folder, summary)?];
         let mut pictures = Vec::new();
-        for (file, bands, what, axis, scale, sane) in [
+        let mut drawn = vec![
             ("positions.svg", &plotted.positions, "position of each copy", Axis::new("Position").symbol("x_O").unit("cm"), 100.0, SANE_POSITION),
             (
                 "forces.svg",
@@ -103,9 +110,25 @@ impl Recorder {
                 1.0,
                 SANE_FORCE,
             ),
-        ] {
+        ];
+        if let Some(orientations) = &plotted.orientations {
+            let axis = Axis::new("Turn").unit("°");
+            drawn.push((
+                "orientations.svg",
+                orientations,
+                "orientation of each copy",
+                axis,
+                180.0 / std::f64::consts::PI,
+                2.0 * std::f64::consts::PI,
+            ));
+        }
+        for (file, bands, what, axis, scale, sane) in drawn {
             let by_axis = bands.split(bands.curves() / names.len());
-            let heading = |along: usize| if by_axis.len() == 1 { String::new() } else { format!("along {}", AXES[along]) };
+            let heading = |along: usize| match (file, by_axis.len()) {
+                ("orientations.svg", _) => TURNS[along].to_owned(),
+                (_, 1) => String::new(),
+                _ => format!("along {}", AXES[along]),
+            };
             let panel = |(along, bands)| Panel { title: heading(along), axis: axis.clone(), names: &names, bands, scale, sane };
             let panels: Vec<Panel<'_>> = by_axis.iter().enumerate().map(panel).collect();
             let plot = Plot { title: format!("{title}: {what}"), panels };
@@ -120,6 +143,8 @@ impl Recorder {
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
+/// The components of a rotation vector, in world axes, and its length.
+const TURNS: [&str; 4] = ["about x", "about y", "about z", "angle"];
 
 impl Observer for Recorder {
     type Error = RecordError;
@@ -137,6 +162,12 @@ impl Observer for Recorder {
             let curve = axis * self.names.len() + row.peer;
             self.plotted.positions.add(curve, row.at, row.object.position[axis]);
             self.plotted.forces.add(curve, row.at, row.coordination_force[axis]);
+        }
+        if let (Some(turn), Some(orientations)) = (&row.turn, &mut self.plotted.orientations) {
+            let [x, y, z] = turn.object.rotation_vector();
+            for (part, value) in [x, y, z, (x * x + y * y + z * z).sqrt()].into_iter().enumerate() {
+                orientations.add(part * self.names.len() + row.peer, row.at, value);
+            }
         }
         self.trajectory.on_tick(row)
     }

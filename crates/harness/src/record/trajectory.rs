@@ -2,30 +2,66 @@
 
 use std::path::Path;
 
-use cohaptic_scene::Axes;
+use cohaptic_peer::rotation::Attitude;
+use cohaptic_scene::{Axes, Scene};
 use cohaptic_units::print::Seconds;
 
 use super::file::{RecordFile, push_display, push_f64};
 use crate::TickRow;
 use crate::record::RecordError;
 
-/// Columns `t,peer,xh,vh,xo,vo,xd,vd,fc,ft`; with more axes, `yh,vyh,yo,vyo,yd,vyd,fcy,fty` and the same with z behind them.
+/// What turns in a scene.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Turns {
+    Nothing,
+    /// The copies of the object.
+    Copies,
+    /// Copies, and at least one device.
+    Devices,
+}
+
+impl Turns {
+    pub(crate) fn of(scene: &Scene) -> Self {
+        match &scene.rotation {
+            None => Self::Nothing,
+            Some(rotation) if rotation.peers.iter().all(|peer| peer.device.is_none()) => Self::Copies,
+            Some(_) => Self::Devices,
+        }
+    }
+}
+
+fn push_attitude(line: &mut Vec<u8>, attitude: &Attitude) {
+    for number in attitude.orientation.iter().chain(&attitude.rate) {
+        line.push(b',');
+        push_f64(line, *number);
+    }
+}
+
+/// Columns `t,peer,xh,vh,xo,vo,xd,vd,fc,ft`; with more axes, `yh,vyh,yo,vyo,yd,vyd,fcy,fty` and the same with z behind them. Where the object turns, the
+/// attitude of the copy and the torques follow, and if any device turns its attitude, empty for others.
 #[derive(Debug)]
 pub(crate) struct Trajectory {
     file: RecordFile,
     names: Vec<String>,
+    turn: Turns,
     line: Vec<u8>,
 }
 
 impl Trajectory {
-    pub(crate) fn create(folder: &Path, names: Vec<String>, axes: Axes) -> Result<Self, RecordError> {
+    pub(crate) fn create(folder: &Path, names: Vec<String>, axes: Axes, turn: Turns) -> Result<Self, RecordError> {
         let mut file = RecordFile::create(folder.join("trajectory.csv"))?;
         file.write(b"t,peer,xh,vh,xo,vo,xd,vd,fc,ft")?;
         for axis in ["y", "z"].into_iter().take(axes.count() - 1) {
             file.write(format!(",{axis}h,v{axis}h,{axis}o,v{axis}o,{axis}d,v{axis}d,fc{axis},ft{axis}").as_bytes())?;
         }
+        if turn != Turns::Nothing {
+            file.write(b",qw,qx,qy,qz,wx,wy,wz,tcx,tcy,tcz,ttx,tty,ttz")?;
+        }
+        if turn == Turns::Devices {
+            file.write(b",qhw,qhx,qhy,qhz,whx,why,whz")?;
+        }
         file.write(b"\n")?;
-        Ok(Self { file, names, line: Vec::new() })
+        Ok(Self { file, names, turn, line: Vec::new() })
     }
 
     pub(crate) fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
@@ -44,6 +80,18 @@ impl Trajectory {
             for force in [row.coupling_force[axis], row.coordination_force[axis]] {
                 line.push(b',');
                 push_f64(line, force);
+            }
+        }
+        if let Some(turn) = &row.turn {
+            push_attitude(line, turn.object);
+            for torque in turn.coupling_torque.iter().chain(turn.coordination_torque) {
+                line.push(b',');
+                push_f64(line, *torque);
+            }
+            match turn.device {
+                Some(device) => push_attitude(line, device),
+                None if self.turn == Turns::Devices => line.extend_from_slice(b",,,,,,,"),
+                None => {}
             }
         }
         line.push(b'\n');

@@ -87,7 +87,12 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
             }
         }
         self.latest[place] = sample.state.position;
-        self.members[place].peer.object_mut().set_state(sample.state);
+        let peer = &mut self.members[place].peer;
+        peer.object_mut().set_state(sample.state);
+        if let (Some(rotation), Some(turning)) = (peer.rotation_mut(), &mut self.turning) {
+            rotation.set_copy(extra.attitude);
+            turning.latest[place] = extra.attitude;
+        }
         self.change(at);
         let copies = if self.kind.is_personal() { 1 } else { peers - 1 };
         let stored = if self.kind == SampleKind::State {
@@ -96,6 +101,9 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
             self.datagrams.store_extended(copies, self.axes, self.kind, &sample, |numbers| numbers.push(extra.numbers))
         };
         let (handle, len) = stored.expect("what was decoded can be decoded again");
+        if self.kind == SampleKind::Attitude {
+            self.datagrams.set_attitude(handle, extra.attitude);
+        }
         let (info, from) = (PacketInfo { size: Bytes::new(len as u64), ecn_capable: true }, NodeId::new(place));
         let sent = if self.kind.is_personal() {
             self.network.handle_packet(at, from, NodeId::new(extra.receiver as usize), info, handle)
@@ -203,12 +211,12 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
             return None;
         }
         Some(match &event.damage {
-            None => self.take_in(now, ends, sample.sample, &sample.extra.numbers, receiver),
+            None => self.take_in(now, ends, sample.sample, sample.extra, receiver),
             Some(damage) => match Sample::decode_as(sample.datagram(Some(damage), &mut buffer), sample.kind, sample.axes) {
                 Ok((_, extra)) if sample.kind.is_personal() && extra.receiver as usize != ends.1 => {
                     Err(ReceiveError::Receiver { receiver: extra.receiver })
                 }
-                Ok((damaged, extra)) => self.take_in(now, ends, &damaged, &extra.numbers, receiver),
+                Ok((damaged, extra)) => self.take_in(now, ends, &damaged, &extra, receiver),
                 Err(error) => Err(error.into()),
             },
         })

@@ -2,10 +2,12 @@
 
 mod live;
 mod remote;
+mod turning;
 
 use std::time::Duration;
 
 use cohaptic_peer::coordination::{LawValues, Role};
+use cohaptic_peer::rotation::{Attitude, Rotation};
 use cohaptic_peer::wire::{Extra, SampleKind};
 use cohaptic_peer::{Clock, Contact, Device, Held, LastSent, ObjectCopy, Peer, Reception, RestingDevice, SendWhen, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Change, ChangeKind, Scene};
@@ -14,12 +16,13 @@ use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, 
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
-use crate::observer::{HoldRow, InstantRow, Observer, SendRow, StateRow, StepRow, TickRow};
+use crate::observer::{HoldRow, InstantRow, Observer, SendRow, StateRow, StepRow, TickRow, TurnRow};
 use crate::plan::{DeviceChoice, Plan};
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
 
 pub(crate) use remote::{Arriving, NoRemote, Remote};
+use turning::Turning;
 
 /// A scene in the middle of a run; E holds its remote peers.
 pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
@@ -45,6 +48,8 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     now: Instant,
     /// Where each copy was at its latest tick.
     latest: Vec<[f64; A]>,
+    /// The attitudes of the copies, if the object turns.
+    turning: Option<Box<Turning>>,
     max_discrepancy: f64,
     finite: bool,
     /// The peers that tick at the present instant, if not all local ones.
@@ -120,6 +125,17 @@ pub(crate) struct Bodies<const A: usize> {
     pub(crate) device: [f64; A],
     pub(crate) object: [f64; A],
     pub(crate) contact: Contact,
+    /// The point of the copy that the device grasps: its centre if the object does not turn.
+    pub(crate) grasp: [f64; A],
+    pub(crate) turns: Option<Turns>,
+}
+
+/// The attitudes of the two bodies of a peer; angles times `length` are lengths \[m\].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turns {
+    pub(crate) object: Attitude,
+    pub(crate) device: Option<Attitude>,
+    pub(crate) length: f64,
 }
 
 /// What one step of a run came to.
@@ -143,6 +159,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             send_when: scene.coordination.send_when,
             horizon: members[0].peer.strategy().horizon(),
             parameters: parameter_changes(scene),
+            turning: Turning::new(scene),
             members,
             network: network(scene, plan),
             datagrams: Datagrams::default(),
@@ -204,6 +221,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 name: name.clone(),
                 position: position[..self.axes].to_vec(),
                 velocity: velocity[..self.axes].to_vec(),
+                attitude: member.peer.rotation().map(|rotation| *rotation.copy()),
                 stale_samples: member.stale_samples,
                 refused_samples: member.refused_samples,
             }
@@ -216,15 +234,22 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             links: self.link_summaries(),
             access_lines: self.access_summaries(),
             max_discrepancy: self.max_discrepancy,
+            max_rotation_discrepancy: self.turning.as_ref().map(|turning| turning.max_discrepancy),
         }
     }
 
     /// Where each peer's device and copy are, and whether they touch.
     pub(crate) fn bodies(&self) -> impl Iterator<Item = Bodies<A>> {
-        self.members.iter().map(|member| Bodies {
-            device: member.peer.device().state().position,
-            object: member.peer.object().state().position,
-            contact: member.peer.contact(),
+        let length = self.turning.as_ref().map_or(1.0, |turning| turning.length());
+        self.members.iter().map(move |member| {
+            let (object, rotation) = (member.peer.object().state(), member.peer.rotation());
+            Bodies {
+                device: member.peer.device().state().position,
+                object: object.position,
+                contact: member.peer.contact(),
+                grasp: rotation.map_or(object.position, |rotation| rotation.copy().point(rotation.config().grasp, object).position),
+                turns: rotation.map(|rotation| Turns { object: *rotation.copy(), device: rotation.device().copied(), length }),
+            }
         })
     }
 
@@ -250,6 +275,11 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
                     DeviceModel::Unsimulated(_) => {}
                 },
+                ChangeKind::HandTorque { peer, torque } => {
+                    if let Some(rotation) = self.members[peer].peer.rotation_mut() {
+                        rotation.set_hand(torque);
+                    }
+                }
                 ChangeKind::SendWhen(when) => self.send_when = Some(when),
                 ChangeKind::Parameters(_) => {
                     let ParameterChange { own, damping } = self.parameters.pop().expect("there is one for each of these changes");
@@ -261,6 +291,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 ChangeKind::Coordination(gains) => {
                     for member in &mut self.members {
                         member.peer.strategy_mut().set_gains(gains.scaled(self.coordination_factor));
+                    }
+                    if let Some(gains) = self.turning.as_mut().and_then(|turning| turning.next_gains()) {
+                        self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).for_each(|rotation| rotation.set_gains(gains));
                     }
                 }
             }
@@ -334,6 +367,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             self.finite = false;
             return None;
         };
+        if kind == SampleKind::Attitude {
+            self.datagrams.set_attitude(handle, peer.attitude());
+        }
         let (info, from) = (PacketInfo { size: Bytes::new(len as u64), ecn_capable: true }, NodeId::new(from));
         let sent = match role {
             Role::Copy => self.network.handle_broadcast(now, from, info, handle),
@@ -353,11 +389,14 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             if let Fate::Delivered(_) = event.fate {
                 let to = event.path.to.index();
                 let receiver = &mut self.members[to];
+                let extended;
                 let extra = if self.kind == SampleKind::State {
-                    Extra::NONE
+                    &Extra::NONE
                 } else {
-                    let place = if self.kind.is_personal() { u32::try_from(to).unwrap_or(u32::MAX) } else { 0 };
-                    Extra { receiver: place, numbers: self.datagrams.extra(event.payload, to) }
+                    let receiver = if self.kind.is_personal() { u32::try_from(to).unwrap_or(u32::MAX) } else { 0 };
+                    let numbers = self.datagrams.extra(event.payload, to);
+                    extended = Extra { receiver, numbers, attitude: self.datagrams.attitude(event.payload) };
+                    &extended
                 };
                 let sample = Arriving { sample: self.datagrams.sample(event.payload), kind: self.kind, extra, axes: self.axes };
                 match self.remote.receive(now, &event, &sample, &mut receiver.peer) {
@@ -407,6 +446,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             let forces = member.peer.compute_over(now, span);
             let object = member.peer.object().state();
             self.latest[place] = object.position;
+            if let (Some(turning), Some(rotation)) = (&mut self.turning, member.peer.rotation()) {
+                turning.latest[place] = *rotation.copy();
+            }
             if watch.ticks {
                 let axes = self.axes;
                 let device = member.peer.device().state();
@@ -418,6 +460,12 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     target: row(&forces.target, axes),
                     coupling_force: &forces.coupling[..axes],
                     coordination_force: &forces.coordination[..axes],
+                    turn: member.peer.rotation().map(|rotation| TurnRow {
+                        object: rotation.copy(),
+                        device: rotation.device(),
+                        coupling_torque: &rotation.computed().coupling,
+                        coordination_torque: &rotation.computed().coordination,
+                    }),
                 })?;
             }
             member.tick += 1;
@@ -434,6 +482,11 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     /// The work of each peer that ticks, where all tick and nobody watches: it took 10 % off a tick.
     #[inline]
     fn move_together(&mut self, now: Instant, span: Duration) {
+        if let Some(turning) = &mut self.turning {
+            for (latest, rotation) in turning.latest.iter_mut().zip(self.members.iter().filter_map(|member| member.peer.rotation())) {
+                *latest = *rotation.copy();
+            }
+        }
         let mut finite = true;
         for (member, latest) in self.members.iter_mut().zip(&mut self.latest) {
             member.peer.compute_over(now, span);
@@ -463,6 +516,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             discrepancy = discrepancy.max(high[axis] - low[axis]);
         }
         self.max_discrepancy = self.max_discrepancy.max(discrepancy);
+        if let Some(turning) = &mut self.turning {
+            turning.measure(|place| self.remote.is_there(place));
+        }
         discrepancy
     }
 
@@ -557,8 +613,10 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
     fn new(scene: &Scene, plan: &Plan, initial: &[State<A>], disturbance: Option<Disturbance>, place: usize, strategy: S) -> Self {
         let spec = &scene.peers[place];
         let (clock, integrator) = (spec.clock, scene.integrator);
-        let displaced =
-            |body| disturbance.map_or(initial[place], |disturbance| disturbance.displace(initial[place], scene.axes.count(), place, body));
+        let displaced = |body| {
+            let state = if body == 0 { scene.initial_device(place) } else { initial[place] };
+            disturbance.map_or(state, |disturbance| disturbance.displace(state, scene.axes.count(), place, body))
+        };
         let device = match plan.devices[place] {
             DeviceChoice::Resting | DeviceChoice::Unobserved => DeviceModel::Unsimulated(RestingDevice { position: displaced(0).position }.into()),
             DeviceChoice::Simulated => {
@@ -568,8 +626,15 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
         let object = ObjectCopy::new(scene.copy_config(place), displaced(1), integrator, &clock);
         let others = initial.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
         let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
+        let mut peer = Peer::new(scene.peer_config(place), device, object, strategy, Held::new(others));
+        if let Some(mut rotation) = scene.rotation_of(place) {
+            if let (Some(disturbance), Some(length)) = (disturbance, scene.gyration()) {
+                disturbance.turn(&mut rotation, length, place);
+            }
+            peer = peer.with_rotation(rotation);
+        }
         Self {
-            peer: Peer::new(scene.peer_config(place), device, object, strategy, Held::new(others)),
+            peer,
             clock,
             tick: 0,
             next_send: spec.phase,
@@ -588,7 +653,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
             DeviceModel::Unsimulated(device) => device.state().is_finite(),
             DeviceModel::Simulated(device) => device.state().is_finite(),
         };
-        self.peer.object().state().is_finite() & device
+        self.peer.object().state().is_finite() & device & self.peer.rotation().is_none_or(Rotation::is_finite)
     }
 }
 

@@ -74,7 +74,7 @@ impl<const A: usize> Remote<A> for NoRemote {
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>> {
         Some(match &event.damage {
-            None => receiver.handle_extended(sample.sample, &sample.extra.numbers),
+            None => receiver.handle_extended(sample.sample, sample.extra),
             Some(damage) => receiver.handle_datagram(sample.datagram(Some(damage), &mut [0; MAX_LEN])),
         })
     }
@@ -97,7 +97,7 @@ impl<const A: usize> Remote<A> for NoRemote {
 pub(crate) struct Arriving<'a, const A: usize> {
     pub(crate) sample: &'a Sample<A>,
     pub(crate) kind: SampleKind,
-    pub(crate) extra: Extra<A>,
+    pub(crate) extra: &'a Extra<A>,
     /// How many axes the scene has.
     pub(crate) axes: usize,
 }
@@ -105,7 +105,7 @@ pub(crate) struct Arriving<'a, const A: usize> {
 impl<const A: usize> Arriving<'_, A> {
     /// Its bytes.
     pub(super) fn datagram<'b>(&self, damage: Option<&Damage>, buffer: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let len = self.sample.encode_as(self.kind, &self.extra, self.axes, buffer);
+        let len = self.sample.encode_as(self.kind, self.extra, self.axes, buffer);
         if let Some(damage) = damage {
             damage.apply(&mut buffer[..len]);
         }

@@ -57,10 +57,13 @@ pub(crate) fn scene(kinds: &'static [&'static str]) -> impl Strategy<Value = Str
         (any::<bool>(), option::weighted(0.2, link()), option::weighted(0.2, link())),
     );
     let changes = vec((1..30_u64, link()), 0..4);
-    (header, vec(peer, 2..=4), link(), link(), changes, any::<bool>()).prop_map(|(header, peers, usual, own, changes, regular)| {
+    (header, vec(peer, 2..=4), (link(), link()), changes, any::<bool>(), any::<bool>()).prop_map(|(header, peers, (usual, own), changes, regular, turns)| {
         let (duration, seed, axes, strategy, compute_delay) = header;
+        // In space an object turns in half of the cases, and so does every other device.
+        let turns = turns && axes == 3;
+        let inertia = if turns { "inertia = [0.001, 0.002, 0.0025]\nangular-velocity = [1, 2, 0]\n" } else { "" };
         let mut text = format!(
-            "[scene]\nduration = \"{duration}ms\"\nseed = {seed}\naxes = {axes}\n[object]\nmass = 0.6\ndamping = 0.5\n\
+            "[scene]\nduration = \"{duration}ms\"\nseed = {seed}\naxes = {axes}\n[object]\nmass = 0.6\ndamping = 0.5\n{inertia}\
              [coordination]\nstrategy = \"{strategy}\"\nstiffness = 700.0\ndamping = 4.0\nupdate = \"4ms\"\n\
              [peer]\ndevice = {{ mass = 0.1, damping = 5.0 }}\ncoupling = {{ stiffness = 900.0, damping = 3.0 }}\n\
              compute-delay = {}\nsilence = {{ after = \"9ms\", fade = \"6ms\" }}\n",
@@ -72,6 +75,12 @@ pub(crate) fn scene(kinds: &'static [&'static str]) -> impl Strategy<Value = Str
             if !regular {
                 let (offset, drift) = (offset.unwrap_or(0), drift.unwrap_or(0));
                 text += &format!("tick = \"{tick}\"\nclock = {{ offset = \"{offset}us\", drift = \"{drift}ppm\" }}\n");
+            }
+            if turns {
+                text += &format!("grasp = [0.0{number}, 0.02, 0]\norientation = [1, 0.{number}, 0, 0.1]\n");
+            }
+            if turns && kind != "falcon" && number % 2 == 0 {
+                text += "device = { inertia = 0.0002, rotational-damping = 0.001 }\ncoupling = { rotational-stiffness = 2, rotational-damping = 0.002 }\n";
             }
             if moves {
                 text += &format!("velocity = 0.0{}\n", number + 1);

@@ -220,8 +220,9 @@ impl AdmissionControl {
         }
         let tick = seat.tick();
         let axes = u8::try_from(self.axes).expect("at most three");
-        let Self { peers, update, .. } = *self;
-        let welcome = Welcome { axes, session, place, peers, client_nonce, server_nonce, tick, update };
+        let Self { peers, update, kind, .. } = *self;
+        let turns = kind == SampleKind::Attitude;
+        let welcome = Welcome { axes, turns, session, place, peers, client_nonce, server_nonce, tick, update };
         Ok(Admission::Reply { to: from, bytes: welcome.encode(key) })
     }
 

@@ -19,12 +19,16 @@ pub enum Refusal {
     Version,
     /// With another number of axes.
     Axes,
+    /// With an attitude where the object does not turn, or without one where it does.
+    Motion,
     /// Of a length that does not fit what it is.
     Length,
     /// A byte that must be zero is not.
     Reserved,
     /// A position or a velocity is infinite or not a number.
     NotFinite,
+    /// The quaternion of its attitude does not have the norm 1.
+    NotUnit,
     /// A position or a velocity is beyond the [`Limits`](super::Limits) of the session.
     OutOfRange,
     /// The number of the sample is 2⁴⁰ or more.
@@ -53,15 +57,17 @@ pub enum Refusal {
 
 impl Refusal {
     /// Every cause, in the order of its counters.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 22] = [
         Self::TooShort,
         Self::Oversized,
         Self::Magic,
         Self::Version,
         Self::Axes,
+        Self::Motion,
         Self::Length,
         Self::Reserved,
         Self::NotFinite,
+        Self::NotUnit,
         Self::OutOfRange,
         Self::SequenceRange,
         Self::ForeignSession,
@@ -85,9 +91,11 @@ impl Refusal {
             Self::Magic => "magic",
             Self::Version => "version",
             Self::Axes => "axes",
+            Self::Motion => "motion",
             Self::Length => "length",
             Self::Reserved => "reserved",
             Self::NotFinite => "not-finite",
+            Self::NotUnit => "not-unit",
             Self::OutOfRange => "out-of-range",
             Self::SequenceRange => "sequence-range",
             Self::ForeignSession => "foreign-session",
@@ -109,8 +117,10 @@ impl Refusal {
             DecodeError::Magic => Self::Magic,
             DecodeError::Version { .. } | DecodeError::Kind { .. } => Self::Version,
             DecodeError::Axes { .. } => Self::Axes,
+            DecodeError::Motion { .. } => Self::Motion,
             DecodeError::Length { .. } => Self::Length,
             DecodeError::NotFinite { .. } => Self::NotFinite,
+            DecodeError::NotUnit => Self::NotUnit,
             // What a later version of the decoder may find wrong is a byte that this one does not know.
             DecodeError::Reserved => Self::Reserved,
         }

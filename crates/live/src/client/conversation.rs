@@ -76,7 +76,7 @@ pub struct Client {
     key: Option<SessionKey>,
     info: Option<SessionInfo>,
     kind: SampleKind,
-    /// The extra numbers of the sample that was heard last.
+    /// What the sample that was heard last says beyond position and velocity.
     extra: Extra<3>,
     /// The present joining, with a key and after the first welcome.
     joined: Option<Joined>,
@@ -121,10 +121,16 @@ impl Client {
         Self { kind, ..self }
     }
 
-    /// The extra numbers of the sample that [`Client::handle_datagram`] gave last.
+    /// What the sample that [`Client::handle_datagram`] gave last says beyond position and velocity.
     #[must_use]
     pub const fn extra(&self) -> &Extra<3> {
         &self.extra
+    }
+
+    /// What samples of the session carry beyond the state; with a key, as the welcome says.
+    #[must_use]
+    pub const fn kind(&self) -> SampleKind {
+        self.kind
     }
 
     /// The session's parameters; `None` before the first welcome.
@@ -182,6 +188,7 @@ impl Client {
             let welcome = joined.welcome();
             let (axes, peers, tick, update) = (usize::from(welcome.axes), welcome.peers, welcome.tick, welcome.update);
             self.info = Some(SessionInfo { axes, peers, tick, update });
+            self.kind = joined.kind();
             self.joined = Some(joined);
             self.joining = None;
             self.joinings += 1;

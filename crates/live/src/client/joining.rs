@@ -18,7 +18,7 @@ pub struct Joining {
 }
 
 impl Joining {
-    /// For a session whose samples are states. With a nonce, which must never have been used before.
+    /// For a session whose samples are states, or carry attitudes, which the welcome says. With a nonce, which must never have been used before.
     #[must_use]
     pub fn new(session: u64, place: Place, key: &SessionKey, client_nonce: Nonce) -> Self {
         Self { hello: Hello { session, place, client_nonce }, key: key.clone(), kind: SampleKind::State }
@@ -59,7 +59,8 @@ impl Joining {
             return Err(WelcomeError::Other);
         }
         let keys = JoiningKeys::derive(&self.key, session, place, client_nonce, welcome.server_nonce);
-        Ok(Joined { welcome, keys, kind: self.kind })
+        let kind = if welcome.turns { SampleKind::Attitude } else { self.kind };
+        Ok(Joined { welcome, keys, kind })
     }
 }
 
@@ -87,6 +88,12 @@ impl Joined {
     #[must_use]
     pub const fn welcome(&self) -> &Welcome {
         &self.welcome
+    }
+
+    /// What samples of the session carry beyond the state.
+    #[must_use]
+    pub const fn kind(&self) -> SampleKind {
+        self.kind
     }
 
     /// Writes a sample for the session and gives its length; `None` if `sample` is longer than a sample.

@@ -5,7 +5,7 @@
 //!      0     4  "CHPW"
 //!      4     2  version, 1
 //!      6     1  axes, 1 to 3
-//!      7     1  zero
+//!      7     1  1 if samples carry attitudes, else 0
 //!      8     8  session
 //!     16     4  place, as in the hello
 //!     20     4  number of peers of the scene
@@ -29,6 +29,8 @@ pub const WELCOME_MAGIC: [u8; 4] = *b"CHPW";
 pub struct Welcome {
     /// How many axes a sample has.
     pub axes: u8,
+    /// Whether samples carry attitudes: the object turns.
+    pub turns: bool,
     /// The session.
     pub session: u64,
     /// The seat.
@@ -54,6 +56,7 @@ impl Welcome {
         body[0..4].copy_from_slice(&WELCOME_MAGIC);
         body[4..6].copy_from_slice(&VERSION.to_le_bytes());
         body[6] = self.axes;
+        body[7] = u8::from(self.turns);
         body[8..16].copy_from_slice(&self.session.to_le_bytes());
         body[16..20].copy_from_slice(&self.place.0.to_le_bytes());
         body[20..24].copy_from_slice(&self.peers.to_le_bytes());
@@ -75,6 +78,7 @@ impl Welcome {
         verify(key, body, tag)?;
         let welcome = Self {
             axes: body[6],
+            turns: body[7] == 1,
             session: u64::from_le_bytes(part(body, 8)),
             place: Place(u32::from_le_bytes(part(body, 16))),
             peers: u32::from_le_bytes(part(body, 20)),
@@ -83,7 +87,7 @@ impl Welcome {
             tick: Duration::from_nanos(u64::from_le_bytes(part(body, 56))),
             update: Duration::from_nanos(u64::from_le_bytes(part(body, 64))),
         };
-        let sound = body[7] == 0 && (1..=3).contains(&welcome.axes) && welcome.place.0 < welcome.peers;
+        let sound = body[7] <= 1 && (1..=3).contains(&welcome.axes) && welcome.place.0 < welcome.peers;
         if sound && !welcome.tick.is_zero() && !welcome.update.is_zero() { Ok(welcome) } else { Err(HandshakeError::Reserved) }
     }
 }

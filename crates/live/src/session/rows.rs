@@ -1,7 +1,8 @@
 //! Rows of a session with numbers of their own, so that another thread can write them.
 
 use cohaptic_harness::live::{Input, InputRow};
-use cohaptic_harness::{StateRow, TickRow};
+use cohaptic_harness::{StateRow, TickRow, TurnRow};
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::MAX_LEN;
 use cohaptic_scene::LinkKeys;
 use cohaptic_units::Instant;
@@ -18,6 +19,15 @@ pub(super) struct TickCopy {
     object: Numbers,
     target: Numbers,
     forces: Numbers,
+    turn: Option<TurnCopy>,
+}
+
+/// A [`TurnRow`].
+#[derive(Debug)]
+struct TurnCopy {
+    object: Attitude,
+    device: Option<Attitude>,
+    torques: [[f64; 3]; 2],
 }
 
 impl TickCopy {
@@ -29,6 +39,11 @@ impl TickCopy {
             object: state(row.object),
             target: state(row.target),
             forces: [padded(row.coupling_force), padded(row.coordination_force)],
+            turn: row.turn.map(|turn| TurnCopy {
+                object: *turn.object,
+                device: turn.device.copied(),
+                torques: [*turn.coupling_torque, *turn.coordination_torque],
+            }),
         }
     }
 
@@ -41,6 +56,12 @@ impl TickCopy {
             target: row(&self.target, axes),
             coupling_force: &self.forces[0][..axes],
             coordination_force: &self.forces[1][..axes],
+            turn: self.turn.as_ref().map(|turn| TurnRow {
+                object: &turn.object,
+                device: turn.device.as_ref(),
+                coupling_torque: &turn.torques[0],
+                coordination_torque: &turn.torques[1],
+            }),
         }
     }
 }

@@ -56,7 +56,7 @@ fn every_flipped_bit_of_what_the_door_sends_is_refused() {
     }
     assert_eq!(joined.open(&out[..95]), Err(OpenError::Length { found: 95, expected: 96 }));
     assert_eq!(joined.open(&[]), Err(OpenError::Length { found: 0, expected: 96 }));
-    assert_eq!(joined.seal(&[0; 121], &mut out), None);
+    assert_eq!(joined.seal(&[0; 153], &mut out), None);
 }
 
 #[test]

@@ -70,7 +70,7 @@ fn samples_go_to_who_is_present_and_to_nobody_else() {
     assert_eq!(out[..64], sample(0, 0));
     assert_eq!(door.seal(at(100), SEAT, &sample(0, 1), &mut out), None, "silent for as long as a peer may be");
     assert_eq!(door.seal(at(0), Place(0), &sample(2, 1), &mut out), None, "no seat");
-    assert_eq!(door.seal(at(0), SEAT, &[0; 121], &mut out), None, "longer than a sample");
+    assert_eq!(door.seal(at(0), SEAT, &[0; 153], &mut out), None, "longer than a sample");
     assert_eq!((door.stats().sent, door.stats().nobody_there), (1, 4));
 }
 
@@ -90,13 +90,13 @@ fn each_fault_has_its_own_count() {
     };
     refuse(Refusal::TooShort, &[]);
     refuse(Refusal::TooShort, &sample(1, 0)[..47]);
-    refuse(Refusal::Oversized, &[0; 153]);
+    refuse(Refusal::Oversized, &[0; 185]);
     refuse(Refusal::Oversized, &[b'C'; 65_507]);
     refuse(Refusal::Magic, &edited(0, b'X'));
     refuse(Refusal::Version, &edited(4, 2));
     refuse(Refusal::Axes, &edited(6, 2));
     refuse(Refusal::Length, &sample(1, 0)[..63]);
-    refuse(Refusal::Reserved, &edited(7, 1));
+    refuse(Refusal::Motion, &edited(7, 1));
     refuse(Refusal::NotFinite, &with_state(f64::NAN, 0.0));
     refuse(Refusal::NotFinite, &with_state(0.0, f64::INFINITY));
     refuse(Refusal::ForeignSession, &edited(8, 43));

@@ -37,6 +37,7 @@ fn the_code_makes_the_bytes_of_the_page() {
     assert_eq!(joining.hello()[..], bytes("hello"));
 
     let welcome = Welcome {
+        turns: false,
         axes: 1,
         session: SESSION,
         place: Place(1),

@@ -2,6 +2,7 @@
 
 use super::algebra::{apply, cross, dot, scale};
 use super::{Matrix3, Real, Triple};
+use crate::State;
 
 /// The most by which the square of the norm of a received quaternion may differ from 1.
 pub const NORM_TOLERANCE: f64 = 1.0 / (1 << 20) as f64;
@@ -19,6 +20,13 @@ impl Attitude {
     /// Not turned and at rest.
     pub const REST: Self = Self { orientation: [1.0, 0.0, 0.0, 0.0], rate: [0.0; 3] };
 
+    /// The motion of a point of the body, where `centre` is that of the centre of mass and `arm` goes from there to the point, in body axes \[m\]:
+    /// x = p + R·r, v = v + R(ω×r).
+    #[must_use]
+    pub fn point<const A: usize>(&self, arm: Triple, centre: &State<A>) -> State<A> {
+        point_of(&self.matrix(), self.rate, arm, centre)
+    }
+
     /// Whether every component is a finite number.
     #[must_use]
     #[inline]
@@ -31,6 +39,27 @@ impl Attitude {
     #[inline]
     pub fn is_unit(&self) -> bool {
         (squared_norm(&self.orientation) - 1.0).abs() <= NORM_TOLERANCE
+    }
+
+    /// The rotation vector of the orientation in world axes \[rad\]: its direction is the axis, its length the angle, 0 to π.
+    #[must_use]
+    pub fn rotation_vector(&self) -> Triple {
+        let sign = if self.orientation[0] < 0.0 { -1.0 } else { 1.0 };
+        let [w, x, y, z] = self.orientation.map(|q| sign * q);
+        let sine = libm::sqrt(x * x + y * y + z * z);
+        // The angle over the sine of half of it; 2 in the limit of no turn.
+        let factor = if sine > 0.0 { 2.0 * libm::atan2(sine, w) / sine } else { 2.0 };
+        [x, y, z].map(|u| factor * u)
+    }
+
+    /// The rotation vector in world axes that turns another orientation into this one \[rad\], of length 0 to π.
+    #[must_use]
+    pub fn rotation_from(&self, other: &[f64; 4]) -> Triple {
+        let ([w, u @ ..], [a, b @ ..]) = (self.orientation, *other);
+        let turned = cross(u, b);
+        // q·p* with the conjugate p* = (a, −b).
+        let vector: Triple = core::array::from_fn(|axis| a * u[axis] - w * b[axis] - turned[axis]);
+        Self { orientation: [w * a + dot(u, b), vector[0], vector[1], vector[2]], rate: [0.0; 3] }.rotation_vector()
     }
 
     /// The angle of the turn from this orientation to the other one, 0 to π \[rad\].
@@ -83,6 +112,14 @@ impl<N: Real> Attitude<N> {
     }
 }
 
+/// [`Attitude::point`] with R and ω.
+#[inline(always)]
+pub(super) fn point_of<const A: usize>(matrix: &Matrix3, rate: Triple, arm: Triple, centre: &State<A>) -> State<A> {
+    let (reach, swing) = (apply(matrix, arm), apply(matrix, cross(rate, arm)));
+    let moved = |own: &[f64; A], by: Triple| core::array::from_fn(|axis| own[axis] + by.get(axis).copied().unwrap_or(0.0));
+    State { position: moved(&centre.position, reach), velocity: moved(&centre.velocity, swing) }
+}
+
 #[inline(always)]
 pub(super) fn squared_norm<N: Real>([w, x, y, z]: &[N; 4]) -> N {
     *w * *w + *x * *x + *y * *y + *z * *z
@@ -100,6 +137,34 @@ mod tests {
         assert!(turned[0].abs() < 1e-15 && (turned[1] - 1.0).abs() < 1e-15 && turned[2] == 0.0, "{turned:?}");
         assert!((Attitude::REST.angle_to(&attitude.orientation) - core::f64::consts::FRAC_PI_2).abs() < 1e-15);
         assert!((Attitude::REST.angle_to(&attitude.orientation.map(|q| -q)) - core::f64::consts::FRAC_PI_2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_rotation_vector_is_the_turn() {
+        for sigma in [[0.0; 3], [1e-12, 0.0, 0.0], [0.3, -1.0, 2.0], [-2.9, 0.1, 0.0]] {
+            let mut attitude = Attitude::REST;
+            attitude.turn(sigma);
+            for orientation in [attitude.orientation, attitude.orientation.map(|q| -q)] {
+                let found = Attitude { orientation, ..attitude }.rotation_vector();
+                assert!(found.iter().zip(&sigma).all(|(found, sigma)| (found - sigma).abs() < 1e-14), "{found:?} {sigma:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_rotation_between_two_is_in_world_axes() {
+        let turned = |sigma: Triple| {
+            let mut attitude = Attitude::REST;
+            attitude.turn(sigma);
+            attitude
+        };
+        let from = turned([0.4, 2.0, -0.7]);
+        // A turn in body axes is one in world axes about the turned axis.
+        let mut to = from;
+        to.turn([0.01, -0.02, 0.03]);
+        let expected = apply(&from.matrix(), [0.01, -0.02, 0.03]);
+        let found = to.rotation_from(&from.orientation);
+        assert!(found.iter().zip(&expected).all(|(found, expected)| (found - expected).abs() < 1e-15), "{found:?} {expected:?}");
     }
 
     #[test]

@@ -6,8 +6,9 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 
 use super::algebra::{add, apply, apply_transposed, cross, subtract};
+use super::attitude::point_of;
 use super::held::HeldAttitude;
-use super::{Attitude, HeldAttitudes, Matrix3, RotationStep, Spin, Triple, aligning_torque, turning_torque};
+use super::{Attitude, HeldAttitudes, RotationStep, Spin, Triple, aligning_torque, turning_torque};
 use crate::{Clock, Contact, Gains, Integrator, Signal, State};
 
 /// What the turning part of a peer is.
@@ -109,6 +110,12 @@ impl Rotation {
         Self { copy, device, held, stale: false, computed: Torques::NONE, applied: Torques::NONE, config }
     }
 
+    /// Whether all that turns is a finite number.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.copy.attitude.is_finite() && self.device.as_ref().is_none_or(|device| device.attitude.is_finite())
+    }
+
     /// The attitude of the copy.
     #[must_use]
     pub const fn copy(&self) -> &Attitude {
@@ -201,7 +208,7 @@ impl Rotation {
         }
         let RotationConfig { grasp, gains, .. } = &self.config;
         let (matrix, rate) = (self.copy.attitude.matrix(), self.copy.attitude.rate);
-        let at = grasp_point(&matrix, rate, *grasp, centre);
+        let at = point_of(&matrix, rate, *grasp, centre);
         let force: [f64; A] = from_fn(|axis| contact.force_along(axis, coupling, device.along(axis).relative_to(at.along(axis))));
         let lever = cross(*grasp, apply_transposed(&matrix, triple(&force)));
         let mut torques = Torques { coupling: lever, coordination: aligning_torque((&matrix, rate), self.held.mean(), gains), device: [0.0; 3] };
@@ -225,10 +232,4 @@ impl Rotation {
             device.advance(span, add(hand, self.applied.device), &self.config);
         }
     }
-}
-
-/// The motion of a grasp point on a body with that matrix and angular velocity.
-pub(crate) fn grasp_point<const A: usize>(matrix: &Matrix3, rate: Triple, grasp: Triple, centre: &State<A>) -> State<A> {
-    let (arm, swing) = (apply(matrix, grasp), apply(matrix, cross(rate, grasp)));
-    State { position: from_fn(|axis| centre.position[axis] + arm[axis]), velocity: from_fn(|axis| centre.velocity[axis] + swing[axis]) }
 }

@@ -51,8 +51,8 @@ proptest! {
         let mut attitude = Attitude { rate, ..Attitude::REST };
         attitude.turn(turn);
         let mut bytes = [0xAA; MAX_LEN];
-        prop_assert_eq!(sample.encode_attitude(&attitude, 3, &mut bytes), 152);
-        prop_assert_eq!(Sample::<3>::decode_attitude(&bytes[..152], 3), Ok((sample, attitude)));
+        prop_assert_eq!(sample.encode_as(SampleKind::Attitude, &Extra::turned(attitude), 3, &mut bytes), 152);
+        prop_assert_eq!(Sample::<3>::decode_as(&bytes[..152], SampleKind::Attitude, 3), Ok((sample, Extra::turned(attitude))));
         prop_assert_eq!(Sample::<3>::decode(&bytes[..152], 3), Err(DecodeError::Motion { found: 1, expected: 0 }));
         let expected = match cut {
             0 => None,
@@ -69,14 +69,14 @@ proptest! {
         let norm = numbers[..4].iter().map(|q| q * q).sum::<f64>();
         let not_unit = ((norm - 1.0).abs() > 2.0_f64.powi(-20)).then_some(DecodeError::NotUnit);
         let expected = expected.or(not_finite).or(not_unit);
-        prop_assert_eq!(Sample::<3>::decode_attitude(&bytes[..152 - cut], 3).err(), expected);
+        prop_assert_eq!(Sample::<3>::decode_as(&bytes[..152 - cut], SampleKind::Attitude, 3).err(), expected);
     }
 
     #[test]
     fn random_bytes_are_no_attitude_and_never_a_panic(bytes in vec(any::<u8>(), 0..200), axes in 1..=3_usize) {
-        if let Ok((sample, attitude)) = Sample::<3>::decode_attitude(&bytes, axes) {
+        if let Ok((sample, extra)) = Sample::<3>::decode_as(&bytes, SampleKind::Attitude, axes) {
             let mut again = [0; MAX_LEN];
-            let len = sample.encode_attitude(&attitude, axes, &mut again);
+            let len = sample.encode_as(SampleKind::Attitude, &extra, axes, &mut again);
             prop_assert_eq!(&again[..len], &bytes[..]);
         }
     }
@@ -189,12 +189,13 @@ fn kind() -> impl Strategy<Value = SampleKind> {
 }
 
 fn extra() -> impl Strategy<Value = Extra<3>> {
-    (any::<u32>(), [finite(), finite(), finite()]).prop_map(|(receiver, numbers)| Extra { receiver, numbers })
+    (any::<u32>(), [finite(), finite(), finite()]).prop_map(|(receiver, numbers)| Extra { receiver, numbers, ..Extra::NONE })
 }
 
 /// Without what samples of a kind do not have.
 fn of_kind(kind: SampleKind, extra: Extra<3>) -> Extra<3> {
-    Extra { receiver: if kind.is_personal() { extra.receiver } else { 0 }, numbers: if kind == SampleKind::State { [0.0; 3] } else { extra.numbers } }
+    let numbers = if kind == SampleKind::State { [0.0; 3] } else { extra.numbers };
+    Extra { receiver: if kind.is_personal() { extra.receiver } else { 0 }, numbers, ..Extra::NONE }
 }
 
 fn sample() -> impl Strategy<Value = Sample<3>> {

@@ -13,8 +13,8 @@ use cohaptic_linkfile::schema::{
 
 use crate::measures::{Measure, Scope};
 use crate::quantities::{
-    ADDED_MASS, ANGLE, DAMPING, DISTANCE, ENERGY, FORCE, FREQUENCY, IMPEDANCE, MASS, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS, VELOCITY,
-    WALL_STIFFNESS,
+    ADDED_MASS, ANGLE, ANGLE_BOUND, COMPONENT, DAMPING, DISTANCE, ENERGY, FORCE, FREQUENCY, IMPEDANCE, INERTIA, MASS, POSITION, POSITIVE_COUNTS,
+    POSITIVE_FORCE, RATE, ROTATIONAL_DAMPING, ROTATIONAL_STIFFNESS, STIFFNESS, TORQUE, VELOCITY, WALL_STIFFNESS,
 };
 
 const MOST: u64 = i64::MAX.unsigned_abs();
@@ -54,6 +54,18 @@ static OBJECT: Table = Table::of(&[&[
     usual("position", vector(POSITION), "0", "Where copies and devices begin"),
     usual("velocity", vector(VELOCITY), "0", "With which velocity copies and devices begin"),
     optional("enclosure", Form::Table(&ENCLOSURE), "Walls that limit the travel of every copy"),
+    optional(
+        "inertia",
+        vector(INERTIA),
+        "Principal moments of inertia of the whole object, which turns then; none above the sum of the others; needs three axes",
+    ),
+    optional(
+        "rotational-damping",
+        vector(ROTATIONAL_DAMPING),
+        "Viscous damping of the turn of each copy; without it damping times inertia over mass",
+    ),
+    usual("orientation", QUATERNION, "[1, 0, 0, 0]", "Quaternion w, x, y, z of any length with which copies and devices begin"),
+    usual("angular-velocity", vector(RATE), "0", "Angular velocity in their own axes with which they begin"),
 ]]);
 static ENCLOSURE: Table = Table::of(&[&[
     required("min", vector(POSITION), "The lower end on each axis"),
@@ -63,7 +75,7 @@ static ENCLOSURE: Table = Table::of(&[&[
 ]]);
 
 static COORDINATION: Table = Table::of(&[&GAINS_OF_ALL, LAWS.split_at(count_laws(false)).0]);
-const GAINS_OF_ALL: [Key; 7] = [
+const GAINS_OF_ALL: [Key; 9] = [
     required("strategy", Form::Words(&STRATEGIES), "Where each copy is drawn to"),
     required("stiffness", number(STIFFNESS), "Gain on the difference of positions, K_T"),
     usual("damping", number(DAMPING), "0", "Gain on the difference of velocities, B_T"),
@@ -71,6 +83,16 @@ const GAINS_OF_ALL: [Key; 7] = [
     optional("send-when", Form::Table(&SEND_WHEN), "Which of these samples are sent; without it all"),
     usual("scaling", Form::Words(&SCALINGS), "\"none\"", "How both gains follow the number of peers"),
     usual("pull", Form::Words(&PULLS), "\"mean\"", "Whether both gains count once, or once for each other peer"),
+    optional(
+        "rotational-stiffness",
+        vector(ROTATIONAL_STIFFNESS),
+        "Gain on turns between copies, K_R; none above the sum of the others; without it K_T times inertia over mass",
+    ),
+    optional(
+        "rotational-damping",
+        vector(ROTATIONAL_DAMPING),
+        "Gain on the difference of angular velocities, B_R; without it B_T times inertia over mass",
+    ),
 ];
 static SEND_WHEN: Table = Table::of(&[&[
     optional("velocity", Form::Probability, "The velocity differs from the one sent last by this part of its size, below 100%"),
@@ -195,11 +217,12 @@ const SCALINGS: [(&str, &str); 2] = [("none", "as they are written"), ("inverse-
 static SIMULATION: Table = Table::of(&[&[
     usual("integrator", Form::Words(&INTEGRATORS), "\"exact\"", "How motion between ticks is computed"),
     usual("substeps", Form::Integer(1, u32::MAX as u64), "1", "Steps a tick; not with exact"),
+    usual("rotation-steps", Form::Integer(1, 10_000), "1", "Steps of a turn in a tick, times substeps"),
 ]]);
 const INTEGRATORS: [(&str, &str); 3] =
     [("exact", "the exact solution"), ("semi-implicit-euler", "the velocity first, then the position"), ("rk4", "Runge and Kutta's fourth order")];
 
-const PEER: [Key; 15] = [
+const PEER: [Key; 18] = [
     somewhere("device", Form::Table(&DEVICE), "The haptic device"),
     somewhere("coupling", Form::Table(&COUPLING), "Spring and damper between device and copy; not needed where contact is none"),
     usual("contact", Form::AnyOf(const { &[Form::Words(&CONTACTS), Form::Table(&PUSH)] }), "\"grasp\"", "How the device touches the object"),
@@ -210,6 +233,9 @@ const PEER: [Key; 15] = [
     optional("clock", Form::Table(&CLOCK), "How the peer's clock differs"),
     optional("position", vector(POSITION), "Where its copy and device begin; without it where the object does"),
     optional("velocity", vector(VELOCITY), "With which velocity they begin; without it that of the object"),
+    usual("grasp", vector(POSITION), "0", "Where the device grasps an object that turns, from its centre in its own axes"),
+    optional("orientation", QUATERNION, "As of the object"),
+    optional("angular-velocity", vector(RATE), "As of the object"),
     optional("uplink", Form::Table(&LINK_TABLE), "A line that all it sends passes before the links"),
     optional("downlink", Form::Table(&LINK_TABLE), "A line that all it receives passes after the links"),
     usual("kind", Form::Words(&KINDS), "\"simulated\"", "Where the peer lives in a live session"),
@@ -226,12 +252,22 @@ const KINDS: [(&str, &str); 3] = [
 ];
 const CONTACTS: [(&str, &str); 2] = [("grasp", "held both ways"), ("none", "not touched")];
 
-static DEVICE: Table =
-    Table::of(&[&[somewhere("mass", number(MASS), "Mass of the device"), usual("damping", number(DAMPING), "0", "Viscous damping of the device")]]);
+static DEVICE: Table = Table::of(&[&[
+    somewhere("mass", number(MASS), "Mass of the device"),
+    usual("damping", number(DAMPING), "0", "Viscous damping of the device"),
+    optional("inertia", vector(INERTIA), "Moments of inertia of a device with six degrees of freedom"),
+    usual("rotational-damping", vector(ROTATIONAL_DAMPING), "0", "Viscous damping of its turn"),
+]]);
 static COUPLING: Table = Table::of(&[&[
     somewhere("stiffness", number(STIFFNESS), "Stiffness between device and copy, K_C"),
     usual("damping", number(DAMPING), "0", "Damping between device and copy, B_C"),
-    usual("scaling", Form::Words(&SCALINGS), "\"none\"", "How both follow the number of peers"),
+    usual("scaling", Form::Words(&SCALINGS), "\"none\"", "How all follow the number of peers"),
+    optional(
+        "rotational-stiffness",
+        number(ROTATIONAL_STIFFNESS),
+        "Stiffness between the turns of device and copy, K_CR; needed with device.inertia",
+    ),
+    usual("rotational-damping", number(ROTATIONAL_DAMPING), "0", "Damping between their turns, B_CR"),
 ]]);
 static PUSH: Table = Table::of(&[&[required("push", Form::Words(&DIRECTIONS), "A finger that can push in that direction and cannot pull")]]);
 const DIRECTIONS: [(&str, &str); 6] =
@@ -259,8 +295,13 @@ static HAND_TABLE: Table = Table::of(&[&[
     optional("file", Form::File, "A recorded force: a CSV with the header t,fx (and fy, fz), in seconds and newtons"),
     optional("arm", Form::Table(&ARM), "An arm that adds its mass to the device and holds it with a damper and a spring"),
     optional("follows", Form::Table(&FOLLOWS), "Beside arm: the motion that it wants; without it to rest at 0"),
+    optional("torque", vector(TORQUE), "A constant torque on a device that turns, in world axes"),
 ]]);
-static FORCE_SINE: Table = Table::of(&[&[required("amplitude", vector(FORCE), "Amplitude")], &SINE]);
+static FORCE_SINE: Table = Table::of(&[
+    &[required("amplitude", vector(FORCE), "Amplitude")],
+    &SINE,
+    &[optional("torque", vector(TORQUE), "Amplitude of a torque that sways with it")],
+]);
 static MOTION_SINE: Table = Table::of(&[&[required("amplitude", vector(POSITION), "Amplitude")], &SINE]);
 const SINE: [Key; 2] =
     [required("frequency", number(FREQUENCY), "Frequency"), usual("phase", number(ANGLE), "0", "Phase at the beginning of the scene")];
@@ -341,7 +382,17 @@ static EXPECT: Table = Table::of(&[&[
     optional("loss", Form::List(&Form::Table(&EXPECT_LOSS)), "Which fraction of what was offered was dropped"),
     optional("delay", Form::List(&Form::Table(&EXPECT_DELAY)), "The mean delay of what was delivered"),
     optional("measures", Form::List(&Form::Table(&EXPECT_MEASURE)), "The values of measures"),
+    optional("rotation-discrepancy", Form::Table(&RADIANS), "The largest angle between two copies"),
+    optional("orientation", Form::List(&Form::Table(&EXPECT_ORIENTATION)), "How copies are turned at some time"),
 ]]);
+static RADIANS: Table = Table::of(&[&[optional("min", number(ANGLE_BOUND), "At least"), optional("max", number(ANGLE_BOUND), "At most")]]);
+static EXPECT_ORIENTATION: Table = Table::of(&[&[
+    required("peer", Form::Text, "The name of a peer"),
+    required("at", Form::Duration, "When, from the beginning of the scene"),
+    required("of", QUATERNION, "A quaternion w, x, y, z of any length"),
+    required("max", number(ANGLE_BOUND), "The largest angle between the two"),
+]]);
+const QUATERNION: Form = Form::List(&number(COMPONENT));
 static METRES: Table = Table::of(&[&METRE_BOUNDS]);
 const METRE_BOUNDS: [Key; 2] = [optional("min", number(POSITION), "At least"), optional("max", number(POSITION), "At most")];
 const TIME_BOUNDS: [Key; 2] = [optional("min", Form::Duration, "At least"), optional("max", Form::Duration, "At most")];

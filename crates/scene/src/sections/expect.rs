@@ -10,9 +10,10 @@ use cohaptic_linkfile::reading::{Context, TableReader};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::DropCause;
 
+use super::rotation::read_orientation;
 use crate::context::{SceneContext, read_axis};
-use crate::model::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectMeasure, ExpectPosition, ExpectTravel, PeerSpec};
-use crate::quantities::{DISTANCE, POSITION};
+use crate::model::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectMeasure, ExpectOrientation, ExpectPosition, ExpectTravel, PeerSpec};
+use crate::quantities::{ANGLE_BOUND, DISTANCE, POSITION};
 use crate::sections::read_measure_name;
 
 /// Reads the expectations. `duration` and `peers` are `None` where they were refused; `has_probe` says whether the impedance of a hand is measured.
@@ -25,7 +26,10 @@ pub(crate) fn read_expect(
 ) -> Option<Expect> {
     let mut table = TableReader::new(node, *context, "a table such as [expect]")?;
     let stable = table.maybe("stable", values::boolean);
-    let discrepancy = table.maybe("discrepancy", read_discrepancy);
+    let discrepancy = table.maybe("discrepancy", |node, context| read_discrepancy(node, context, POSITION));
+    let turned = table.maybe("rotation-discrepancy", |node, context| read_discrepancy(node, context, ANGLE_BOUND));
+    let orientations =
+        table.optional("orientation", Vec::new(), |node, file| each(node, file, |entry| read_expected_orientation(entry, duration, context)));
     let positions = table.optional("position", Vec::new(), |node, file| each(node, file, |entry| read_position(entry, duration, context)));
     let travel = table.optional("travel", Vec::new(), |node, file| each(node, file, |entry| read_travel(entry, context)));
     let loss = table.optional("loss", Vec::new(), |node, context| each(node, context, |entry| read_loss(entry, peers, context)));
@@ -40,6 +44,8 @@ pub(crate) fn read_expect(
         loss: loss?,
         delay: delay?,
         measures: measures?,
+        rotation_discrepancy: turned?,
+        orientations: orientations?,
     })
 }
 
@@ -49,9 +55,9 @@ fn each<T>(node: &Node, context: Context<'_>, read: impl Fn(&Node) -> Option<T>)
     read.into_iter().collect()
 }
 
-fn read_discrepancy(node: &Node, context: Context<'_>) -> Option<Bounds> {
+fn read_discrepancy(node: &Node, context: Context<'_>, quantity: Quantity) -> Option<Bounds> {
     let mut table = TableReader::new(node, context, "a table such as { max = 0.001 }")?;
-    let bounds = read_bounds(&mut table, node, context, POSITION);
+    let bounds = read_bounds(&mut table, node, context, quantity);
     table.finish();
     bounds
 }
@@ -59,7 +65,16 @@ fn read_discrepancy(node: &Node, context: Context<'_>) -> Option<Bounds> {
 fn read_position(node: &Node, duration: Option<Duration>, context: SceneContext<'_>) -> Option<ExpectPosition> {
     let mut table = TableReader::new(node, *context, "a table such as { peer = \"left\", at = \"1s\", min = 0.1 }")?;
     let peer = table.required("peer", "the name of a peer", read_peer_name);
-    let at = table.required("at", "a time such as \"1s\"", |node, context| {
+    let at = read_at(&mut table, duration);
+    let axis = table.optional("axis", 0, |node, _| read_axis(node, context));
+    let bounds = read_bounds(&mut table, node, *context, POSITION);
+    table.finish();
+    Some(ExpectPosition { peer: peer?, axis: axis?, at: at?, bounds: bounds? })
+}
+
+/// `at`: a time within the scene.
+fn read_at(table: &mut TableReader<'_>, duration: Option<Duration>) -> Option<Instant> {
+    table.required("at", "a time such as \"1s\"", |node, context| {
         let at = values::instant(node, context)?;
         let last = Instant::ZERO.saturating_add(duration?);
         if at > last {
@@ -67,11 +82,17 @@ fn read_position(node: &Node, duration: Option<Duration>, context: SceneContext<
             return None;
         }
         Some(at)
-    });
-    let axis = table.optional("axis", 0, |node, _| read_axis(node, context));
-    let bounds = read_bounds(&mut table, node, *context, POSITION);
+    })
+}
+
+fn read_expected_orientation(node: &Node, duration: Option<Duration>, context: SceneContext<'_>) -> Option<ExpectOrientation> {
+    let mut table = TableReader::new(node, *context, "a table such as { peer = \"left\", at = \"1s\", of = [1, 0, 0, 0], max = 0.01 }")?;
+    let peer = table.required("peer", "the name of a peer", read_peer_name);
+    let at = read_at(&mut table, duration);
+    let of = table.required("of", "a quaternion, a list of four numbers w, x, y, z", read_orientation);
+    let max = table.required("max", &ANGLE_BOUND.expected(), |node, context| ANGLE_BOUND.read(node, context));
     table.finish();
-    Some(ExpectPosition { peer: peer?, axis: axis?, at: at?, bounds: bounds? })
+    Some(ExpectOrientation { peer: peer?, at: at?, of: of?, max: max? })
 }
 
 fn read_travel(node: &Node, context: SceneContext<'_>) -> Option<ExpectTravel> {

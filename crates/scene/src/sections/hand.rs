@@ -28,7 +28,11 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
     let file = table.entry("file");
     let arm = table.entry("arm");
     let follows = table.entry("follows");
+    let torque = table.entry("torque");
     table.finish();
+    if torque.is_some() && [force, sine, file, arm].iter().all(Option::is_none) {
+        return Some(None);
+    }
     let chosen = only_one(node, *context, &[force, sine, file, arm], EXPECTED)?;
     if let (Some(follows), None) = (follows, arm) {
         context.fault(follows.key, &follows.node.path, "only an arm follows a wanted motion: expected arm = { mass, damping, stiffness } beside it");
@@ -37,7 +41,7 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
     let value = &*chosen.node;
     let signal = match chosen.name.as_str() {
         "force" => Signal::Constant(read_vector(FORCE, value, context, Spread::Refused)?),
-        "sine" => read_sine(value, context, FORCE)?,
+        "sine" => read_sine(value, context, FORCE, &["torque"])?,
         "file" => Signal::Table(read_motion_file(value, context, Columns::Force)?),
         _ => {
             let arm = read_arm(value, *context);
@@ -69,13 +73,15 @@ fn read_follows(node: &Node, context: SceneContext<'_>) -> Option<Signal> {
     let value = &*chosen.node;
     match chosen.name.as_str() {
         "position" => Some(Signal::Constant(read_vector(POSITION, value, context, Spread::Refused)?)),
-        "sine" => read_sine(value, context, POSITION),
+        "sine" => read_sine(value, context, POSITION, &[]),
         _ => Some(Signal::Table(read_motion_file(value, context, Columns::Position)?)),
     }
 }
 
-fn read_sine(node: &Node, context: SceneContext<'_>, quantity: Quantity) -> Option<Signal> {
+/// A sine. `beside`: keys of the same table that somebody else reads.
+fn read_sine(node: &Node, context: SceneContext<'_>, quantity: Quantity, beside: &[&'static str]) -> Option<Signal> {
     let mut table = TableReader::new(node, *context, "a table such as { amplitude = 2.0, frequency = 0.7, phase = 0.0 }")?;
+    table.know(beside);
     let amplitude = table.required("amplitude", &quantity.expected(), |node, _| read_vector(quantity, node, context, Spread::Refused));
     let frequency = table.required("frequency", &FREQUENCY.expected(), |node, context| FREQUENCY.read(node, context));
     let phase = table.optional("phase", 0.0, |node, context| ANGLE.read(node, context));

@@ -8,13 +8,17 @@ use cohaptic_linkfile::mesh::read_peer_name;
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
 use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue, LawValues, Pull};
+use cohaptic_peer::rotation::Triple;
 use cohaptic_peer::{Coordination, Gains, Integrator, SendWhen};
 
+use super::rotation::{read_rotational_damping, read_rotational_stiffness};
 use crate::model::{Axes, CoordinationSpec, Scaling};
 use crate::quantities::{DAMPING, DISTANCE, ENERGY, IMPEDANCE, STIFFNESS};
 
 /// The most peers that `count` makes: a slip of the finger must not take all memory. Each takes about two kilobytes.
 const MOST_PEERS: u64 = 1_000_000;
+/// A tick may not take for ever.
+const MOST_ROTATION_STEPS: u64 = 10_000;
 
 /// `[scene]`. A field is `None` where it was refused.
 #[derive(Debug, Default)]
@@ -26,6 +30,20 @@ pub(crate) struct Header {
     pub(crate) axes: Option<Axes>,
     /// `Some(None)`: not given.
     pub(crate) count: Option<Option<u64>>,
+}
+
+/// `[simulation]`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Stepping {
+    pub(crate) integrator: Integrator,
+    /// Steps a tick of what turns.
+    pub(crate) rotation_steps: u32,
+}
+
+impl Default for Stepping {
+    fn default() -> Self {
+        Self { integrator: Integrator::default(), rotation_steps: 1 }
+    }
 }
 
 pub(crate) fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
@@ -50,8 +68,8 @@ fn read_axes(node: &Node, context: Context<'_>) -> Option<Axes> {
     }
 }
 
-/// `[coordination]`.
-pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<CoordinationSpec> {
+/// `[coordination]`: the controller, and the gains on turns as written.
+pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<(CoordinationSpec, Gains<Option<Triple>>)> {
     let mut table = TableReader::new(node, context, "a table such as [coordination]")?;
     let strategies: Vec<_> = Coordination::ALL.iter().map(|strategy| (strategy.name(), *strategy)).collect();
     let names = strategies.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
@@ -63,9 +81,11 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<Coo
     let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
     let update = table.required("update", "a duration above zero such as \"8ms\"", values::positive_duration);
     let send_when = table.maybe("send-when", read_send_when);
+    let stiffness_of_turns = table.maybe("rotational-stiffness", read_rotational_stiffness);
+    let damping_of_turns = table.maybe("rotational-damping", read_rotational_damping);
     let settings = read_settings(&mut table);
     table.finish();
-    Some(CoordinationSpec {
+    let spec = CoordinationSpec {
         strategy: strategy?,
         scaling: scaling?,
         pull: pull?,
@@ -73,7 +93,8 @@ pub(crate) fn read_coordination(node: &Node, context: Context<'_>) -> Option<Coo
         settings: settings?,
         update: update?,
         send_when: send_when?,
-    })
+    };
+    Some((spec, Gains { stiffness: stiffness_of_turns?, damping: damping_of_turns? }))
 }
 
 /// `send-when`.
@@ -191,7 +212,7 @@ pub(crate) fn read_scaling(node: &Node, context: Context<'_>) -> Option<Scaling>
 }
 
 /// `[simulation]`.
-pub(crate) fn read_integrator(node: &Node, context: Context<'_>) -> Option<Integrator> {
+pub(crate) fn read_stepping(node: &Node, context: Context<'_>) -> Option<Stepping> {
     let mut table = TableReader::new(node, context, "a table such as [simulation]")?;
     let names = [("exact", Method::Exact), ("semi-implicit-euler", Method::SemiImplicitEuler), ("rk4", Method::RungeKutta4)];
     let method = table.optional("integrator", Method::Exact, |node, context| values::choice(node, context, &names));
@@ -202,13 +223,17 @@ pub(crate) fn read_integrator(node: &Node, context: Context<'_>) -> Option<Integ
         }
         values::integer(node, context, 1..=u64::from(u32::MAX), "a number of steps a tick, an integer from 1 to 4294967295")
     });
+    let rotation_steps = table.optional("rotation-steps", 1, |node, context| {
+        values::integer(node, context, 1..=MOST_ROTATION_STEPS, &format!("a number of steps a tick, an integer from 1 to {MOST_ROTATION_STEPS}"))
+    });
     table.finish();
     let steps = u32::try_from(substeps?.unwrap_or(1)).ok()?;
-    Some(match method? {
+    let integrator = match method? {
         Method::Exact => Integrator::Exact,
         Method::SemiImplicitEuler => Integrator::SemiImplicitEuler { steps },
         Method::RungeKutta4 => Integrator::RungeKutta4 { steps },
-    })
+    };
+    Some(Stepping { integrator, rotation_steps: u32::try_from(rotation_steps?).ok()? })
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -9,11 +9,13 @@ mod motion_file;
 mod object;
 mod peer;
 mod peers;
+mod rotation;
 mod timeline;
 
 pub(crate) use expect::read_expect;
-pub(crate) use header::{Header, read_coordination, read_header, read_integrator};
+pub(crate) use header::{Header, Stepping, read_coordination, read_header, read_stepping};
 pub(crate) use measure::{Measured, read_measure, read_measure_name};
 pub(crate) use object::read_object;
 pub(crate) use peers::{PeerSources, check_enough, read_names, read_peers};
+pub(crate) use rotation::{refuse_rotational_keys, rotation};
 pub(crate) use timeline::read_timeline;

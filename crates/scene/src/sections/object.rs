@@ -5,11 +5,13 @@ use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{TableReader, values};
 use cohaptic_peer::Enclosure;
 
+use super::rotation::{ObjectRotation, read_object_rotation};
 use crate::context::SceneContext;
 use crate::model::ObjectSpec;
 use crate::quantities::{DAMPING, MASS, POSITION, Spread, VELOCITY, WALL_STIFFNESS, read_vector};
 
-pub(crate) fn read_object(node: &Node, context: SceneContext<'_>) -> Option<ObjectSpec> {
+/// The object, and how it turns if it does.
+pub(crate) fn read_object(node: &Node, context: SceneContext<'_>) -> Option<(ObjectSpec, Option<ObjectRotation>)> {
     let mut table = TableReader::new(node, *context, "a table such as [object]")?;
     let mass = table.required("mass", &MASS.expected(), |node, context| MASS.read(node, context));
     let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
@@ -17,8 +19,10 @@ pub(crate) fn read_object(node: &Node, context: SceneContext<'_>) -> Option<Obje
     let position = table.optional("position", [0.0; 3], |node, _| read_position(node, context));
     let velocity = table.optional("velocity", [0.0; 3], |node, _| read_velocity(node, context));
     let enclosure = table.maybe("enclosure", |node, _| read_enclosure(node, context));
+    let rotation = read_object_rotation(&mut table, context);
     table.finish();
-    Some(ObjectSpec { mass: mass?, damping: damping?, split_mass: split_mass?, position: position?, velocity: velocity?, enclosure: enclosure? })
+    let (position, velocity, enclosure) = (position?, velocity?, enclosure?);
+    Some((ObjectSpec { mass: mass?, damping: damping?, split_mass: split_mass?, position, velocity, enclosure }, rotation?))
 }
 
 /// Where something begins.

@@ -6,6 +6,7 @@ use cohaptic_linkfile::document::{Node, Value, quote};
 use cohaptic_linkfile::link::read_link;
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, values};
+use cohaptic_peer::rotation::Spin;
 use cohaptic_peer::{Clock, Contact, DeviceConfig, Direction, Drift, Gains, Hand};
 use cohaptic_units::print::Span;
 use cohaptic_wan::LinkModel;
@@ -14,6 +15,7 @@ use super::hand::read_hand;
 use super::header::read_scaling;
 use super::kind::{FALCON_DEVICE, STILL_DEVICE, read_kind};
 use super::object::{read_position, read_velocity};
+use super::rotation::{PeerRotationKeys, read_coupling_rotation, read_device_rotation, read_hand_torque, read_peer_rotation};
 use crate::context::{SceneContext, check_axis};
 use crate::model::{PeerKind, Scaling};
 use crate::quantities::{DAMPING, MASS, STIFFNESS};
@@ -36,6 +38,7 @@ pub(crate) struct PeerKeys {
     pub(crate) hand: Option<Hand>,
     pub(crate) position: Option<[f64; 3]>,
     pub(crate) velocity: Option<[f64; 3]>,
+    pub(crate) rotation: PeerRotationKeys,
     pub(crate) uplink: Option<LinkModel>,
     pub(crate) downlink: Option<LinkModel>,
 }
@@ -80,9 +83,11 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, beside: &[&'stat
         table.miss("coupling", COUPLING);
     }
     let hand = table.optional("hand", None, |node, _| read_hand(node, context));
+    let torque = table.get("hand").map_or(Some(None), |node| read_hand_torque(node, context));
     let clock = table.optional("clock", (Duration::ZERO, Drift::default()), read_clock);
     let position = table.maybe("position", |node, _| read_position(node, context));
     let velocity = table.maybe("velocity", |node, _| read_velocity(node, context));
+    let turned = read_peer_rotation(&mut table);
     let uplink = table.maybe("uplink", |node, context| read_link(node, context, &[]));
     let downlink = table.maybe("downlink", |node, context| read_link(node, context, &[]));
     table.finish();
@@ -101,17 +106,25 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, beside: &[&'stat
         }
     }
     let (offset, drift) = clock?;
+    let (device, coupling) = (device?, coupling?);
+    let rotation = PeerRotationKeys {
+        device: device.and_then(|(_, turned)| turned),
+        coupling: coupling.and_then(|(_, _, turned)| turned),
+        torque: torque?,
+        ..turned?
+    };
     Some(PeerKeys {
         kind: kind?,
         clock: Clock { tick: tick?, offset, drift },
         phase: phase?,
         compute_delay: compute_delay? == 1,
         contact: contact?,
-        device: device?.or(absent).unwrap_or(STILL_DEVICE),
-        coupling: coupling?,
+        device: device.map(|(device, _)| device).or(absent).unwrap_or(STILL_DEVICE),
+        coupling: coupling.map(|(gains, scaling, _)| (gains, scaling)),
         hand: hand?,
         position: position?,
         velocity: velocity?,
+        rotation,
         uplink: uplink?,
         downlink: downlink?,
     })
@@ -160,21 +173,25 @@ fn read_direction(node: &Node, context: SceneContext<'_>) -> Option<Direction> {
     Some(direction)
 }
 
-fn read_device(node: &Node, context: Context<'_>, expected: &str) -> Option<DeviceConfig> {
+/// A device, and how it turns if it does.
+fn read_device(node: &Node, context: Context<'_>, expected: &str) -> Option<(DeviceConfig, Option<Spin>)> {
     let mut table = TableReader::new(node, context, expected)?;
     let mass = table.required("mass", &MASS.expected(), |node, context| MASS.read(node, context));
     let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
+    let turned = read_device_rotation(&mut table);
     table.finish();
-    Some(DeviceConfig { mass: mass?, damping: damping? })
+    Some((DeviceConfig { mass: mass?, damping: damping? }, turned?))
 }
 
-fn read_coupling(node: &Node, context: Context<'_>) -> Option<(Gains, Scaling)> {
+/// A coupling, how it is scaled, and how it turns if it does.
+fn read_coupling(node: &Node, context: Context<'_>) -> Option<(Gains, Scaling, Option<Gains>)> {
     let mut table = TableReader::new(node, context, COUPLING)?;
     let stiffness = table.required("stiffness", &STIFFNESS.expected(), |node, context| STIFFNESS.read(node, context));
     let damping = table.optional("damping", 0.0, |node, context| DAMPING.read(node, context));
     let scaling = table.optional("scaling", Scaling::None, read_scaling);
+    let turned = read_coupling_rotation(&mut table);
     table.finish();
-    Some((Gains { stiffness: stiffness?, damping: damping? }, scaling?))
+    Some((Gains { stiffness: stiffness?, damping: damping? }, scaling?, turned?))
 }
 
 fn read_clock(node: &Node, context: Context<'_>) -> Option<(Duration, Drift)> {

@@ -3,12 +3,13 @@
 use core::time::Duration;
 use std::collections::BTreeMap;
 
-use cohaptic_linkfile::document::{BEGINNING, Entry, Node, join, quote};
+use cohaptic_linkfile::document::{BEGINNING, Entry, Node, Place, join, quote};
 use cohaptic_linkfile::reading::{Context, Names, one_of, values};
 use cohaptic_peer::Gains;
 use cohaptic_units::print::Counted;
 
 use super::peer::{NESTED, PeerKeys, read_peer};
+use super::rotation::PeerRotationKeys;
 use crate::context::SceneContext;
 use crate::model::{ObjectSpec, PeerSpec, Scaling};
 
@@ -84,8 +85,18 @@ pub(crate) struct PeerSources<'a> {
     pub(crate) update: Option<(Duration, &'a Node)>,
 }
 
+/// A peer as it is written.
+#[derive(Clone, Debug)]
+pub(crate) struct PeerRead {
+    pub(crate) spec: PeerSpec,
+    /// What it says of an object that turns.
+    pub(crate) rotation: PeerRotationKeys,
+    /// Where it is made.
+    pub(crate) place: Place,
+}
+
 /// Every peer, in the order of the names. `None` where one was refused.
-pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, context: SceneContext<'_>) -> Option<Vec<PeerSpec>> {
+pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, context: SceneContext<'_>) -> Option<Vec<PeerRead>> {
     if let Some(node) = sources.defaults {
         // On their own, so that a fault in a default that every peer replaces is found too.
         read_peer(node, context.of_part(), &[], None);
@@ -100,13 +111,20 @@ pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, 
     let names = context.names?;
     // What a peer without an entry is like; read only if there is one.
     let shared = if entries.len() < names.len() { Some(read_peer(base, context, &[], sources.update)?) } else { None };
-    let mut keys: BTreeMap<usize, PeerKeys> = BTreeMap::new();
+    let mut keys: BTreeMap<usize, (PeerKeys, Place)> = BTreeMap::new();
     for (entry, own) in entries.iter().zip(own) {
         let name = entry.as_table().and_then(|table| table.get("name")).and_then(|name| name.node.as_text())?;
-        keys.insert(names.index(name)?, own?);
+        keys.insert(names.index(name)?, (own?, entry.place));
     }
     let named = names.as_slice().iter().enumerate();
-    named.map(|(place, name)| Some(spec(name, keys.remove(&place).or_else(|| shared.clone())?, object?))).collect()
+    let made = sources.count.map_or(base.place, |entry| entry.key);
+    named
+        .map(|(place, name)| {
+            let (keys, place) = keys.remove(&place).or_else(|| Some((shared.clone()?, made)))?;
+            let rotation = keys.rotation.clone();
+            Some(PeerRead { spec: spec(name, keys, object?), rotation, place })
+        })
+        .collect()
 }
 
 fn read_entry(entry: &Node, base: &Node, update: Option<(Duration, &Node)>, context: SceneContext<'_>) -> Option<PeerKeys> {

@@ -8,12 +8,13 @@ use cohaptic_linkfile::link::is_empty;
 use cohaptic_linkfile::mesh::{LinkClasses, OnLinks, read_key_changes, read_links_between, read_peer_name};
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, only_one, values};
-use cohaptic_peer::{Contact, Gains, Hand, SendWhen};
+use cohaptic_peer::{Contact, Gains, Hand, SendWhen, Signal};
 use cohaptic_units::Instant;
 
 use super::hand::read_hand;
 use super::header::{ParameterChange, read_parameter_changes, read_send_when};
 use super::peer::read_contact;
+use super::rotation::read_hand_torque;
 use crate::context::SceneContext;
 use crate::model::{Change, ChangeKind, CoordinationSpec, PeerSpec};
 use crate::quantities::{DAMPING, STIFFNESS};
@@ -28,7 +29,7 @@ struct Planned<'a> {
 #[derive(Debug)]
 enum PlannedKind<'a> {
     Links { selector: LinkSelector, set: &'a Node },
-    Peer { peer: usize, contact: Option<(Contact, &'a Node)>, hand: Option<(Option<Hand>, &'a Node)> },
+    Peer { peer: usize, contact: Option<(Contact, &'a Node)>, hand: Option<(Option<Hand>, &'a Node)>, torque: Option<Signal> },
     Coordination { stiffness: Option<f64>, damping: Option<f64>, send_when: Option<SendWhen>, parameters: Vec<ParameterChange> },
 }
 
@@ -63,12 +64,15 @@ pub(crate) fn read_timeline(
                 on_links(at, selector, &links);
                 changes.push(Change { at, what });
             }
-            PlannedKind::Peer { peer, contact, hand } => {
+            PlannedKind::Peer { peer, contact, hand, torque } => {
                 let spec = peers?.get(peer)?;
                 complete &= contact.is_none_or(|(contact, node)| contact_is_possible(spec, contact, node, *context));
                 complete &= hand.as_ref().is_none_or(|(hand, node)| hand_is_possible(spec, hand.as_ref(), node, *context));
                 changes.extend(contact.map(|(contact, _)| Change { at, what: ChangeKind::Contact { peer, contact } }));
-                changes.extend(hand.map(|(hand, _)| Change { at, what: ChangeKind::Hand { peer, hand } }));
+                if let Some((hand, _)) = hand {
+                    changes.push(Change { at, what: ChangeKind::Hand { peer, hand } });
+                    changes.push(Change { at, what: ChangeKind::HandTorque { peer, torque } });
+                }
             }
             PlannedKind::Coordination { stiffness, damping, send_when, parameters } => {
                 if stiffness.is_some() || damping.is_some() {
@@ -122,8 +126,10 @@ fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: SceneCont
         PlannedKind::Links { selector: selector?, set }
     } else {
         let peer = read_peer_name(&target.node, *context);
-        let (contact, hand) = read_peer_changes(&set?.node, context)?;
-        PlannedKind::Peer { peer: peer?, contact, hand }
+        let set = &*set?.node;
+        let (contact, hand) = read_peer_changes(set, context)?;
+        let torque = set.as_table().and_then(|set| set.get("hand")).map_or(Some(None), |hand| read_hand_torque(&hand.node, context));
+        PlannedKind::Peer { peer: peer?, contact, hand, torque: torque? }
     };
     Some(Planned { at: at?, what })
 }

@@ -77,6 +77,7 @@ impl Admittance {
     /// As [`Admittance::of`], and [`AnalysisError::Stopped`] if the watch ends it.
     pub fn of_watched(scene: &Scene, peer: usize, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
         let spec = scene.peers.get(peer).ok_or(AdmittanceError::NoSuchPeer { peer, peers: scene.peers.len() })?;
+        crate::pieces::refuse_turns(scene, "the admittance")?;
         let network = NominalNetwork::of(scene)?;
         let (contacts, notes) = closed_contacts(scene, peer);
         let structure = Structure::with_alone(&[scene], &network, &contacts, Some(peer))?;
@@ -239,7 +240,8 @@ fn closed_contacts(scene: &Scene, peer: usize) -> (Contacts, Vec<String>) {
     if !scene.timeline.is_empty() {
         notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
     }
-    (Contacts { touching, at_wall: false }, notes)
+    let absent = vec![false; scene.peers.len()];
+    (Contacts { touching, at_wall: false, absent }, notes)
 }
 
 /// Why there is no admittance.

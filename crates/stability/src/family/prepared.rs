@@ -82,9 +82,12 @@ impl Prepared {
         set(&self.others, values, scene);
         match mean_square_watched(scene, &Limits { watch, ..Limits::of_unknowns(usize::MAX) }) {
             Ok(found) => Ok(Cell { radius: found.radius, is_nominal: false }),
-            Err(AnalysisError::ChanceWithoutMoments { .. } | AnalysisError::TooManyMoments { .. } | AnalysisError::OtherStrategy { .. }) => {
-                Ok(Cell { radius: self.radius::<BOUND>(scene, scratch).over(2), is_nominal: true })
-            }
+            Err(
+                AnalysisError::ChanceWithoutMoments { .. }
+                | AnalysisError::TooManyMoments { .. }
+                | AnalysisError::OtherStrategy { .. }
+                | AnalysisError::Turns { .. },
+            ) => Ok(Cell { radius: self.radius::<BOUND>(scene, scratch).over(2), is_nominal: true }),
             Err(error) => Err(error),
         }
     }

@@ -38,11 +38,12 @@ pub(crate) use self::equal::{Equal, EqualScratch};
 use self::law::{LinkLaw, is_random};
 use self::positive::{Positive, radius_watched};
 use self::symmetric::Symmetric;
-use crate::analysis::{Combination, combinations};
+use crate::analysis::{Combination, UNLOADED, pairs};
 use crate::cost::PASSES;
 use crate::lifted::{Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
+use crate::pieces::pieces;
 use crate::structure::{Contacts, Structure, count, linear_law};
 use crate::timetable::{Instants, NodeClock, Timetable};
 use crate::{AnalysisError, FrameCost, Limits, Matrix, Method, Radius, Verdict, Watch};
@@ -136,11 +137,12 @@ pub fn mean_square_within(scene: &Scene, most: usize) -> Result<MeanSquare, Anal
 pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSquare, AnalysisError> {
     let limits = &Limits { unknowns: limits.unknowns.min(MOST_UNKNOWNS), ..*limits };
     let network = NominalNetwork::of(scene)?;
-    let combinations = combinations(scene)?;
+    let pieces = pieces(scene, "the mean square")?;
     let mut notes = Vec::new();
+    let mut combines = false;
     let mut found: Option<MeanSquare> = None;
-    for combination in &combinations {
-        let one = of_contacts(scene, &network, combination, limits, &mut notes)?;
+    for (piece, combination) in pairs(&pieces, &mut combines)? {
+        let one = of_contacts(&piece.scene, &network, &combination, limits, &mut notes)?;
         found = Some(match found {
             None => one,
             Some(before) => {
@@ -151,11 +153,14 @@ pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSqu
             }
         });
     }
-    if combinations.len() > 1 {
+    if combines {
         notes.push("every combination of contacts is analysed as if it lasted; changing between them is not covered".to_owned());
     }
     if !scene.timeline.is_empty() {
         notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
+    }
+    if scene.rotation.is_some() {
+        notes.push(UNLOADED.to_owned());
     }
     notes.dedup();
     let none = MeanSquare {

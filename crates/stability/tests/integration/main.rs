@@ -12,6 +12,7 @@ mod mean_square;
 mod random;
 mod reduction;
 mod reference;
+mod rotation;
 mod strategies;
 mod watch;
 mod wave;

@@ -31,6 +31,7 @@ impl LinkFile {
                 // They change the ends of the links.
                 ChangeKind::Contact { .. }
                 | ChangeKind::Hand { .. }
+                | ChangeKind::HandTorque { .. }
                 | ChangeKind::Coordination(_)
                 | ChangeKind::Parameters(_)
                 | ChangeKind::SendWhen(_) => {}

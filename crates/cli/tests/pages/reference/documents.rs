@@ -102,6 +102,7 @@ const DOCUMENTS: [Document; 21] = [
     Document {
         command: "run",
         lines: &[
+            "cohaptic run scenarios/rigid/tray.toml --json",
             "cohaptic run scenarios/network/shared-access-line.toml --against scene.seed=2 --measure all --json --out out",
             "cohaptic live scenarios/live/two-and-a-program.toml --for 50ms --listen 127.0.0.1:0 --no-priority --out session > said && \
              cohaptic run scenarios/live/two-and-a-program.toml --inputs session/inputs.csv --force --json",
@@ -116,10 +117,15 @@ const DOCUMENTS: [Document; 21] = [
                 "peers[].name, peers[].position_m, peers[].velocity_m_s",
                 "state of the copy at the peer's first tick at or after the end: a number with one axis, else a list",
             ),
+            (
+                "peers[].orientation, peers[].angular_velocity_rad_s",
+                "where the object turns: quaternion w, x, y, z and angular velocity about the axes of the copy",
+            ),
             ("peers[].stale_samples, peers[].refused_samples", "samples that came too late to be used, and that arrived damaged"),
             ("links[].from, links[].to, links[].@Counters", "by sender, then receiver"),
             ("access_lines[].peer, access_lines[].line, access_lines[].@Counters", "`line` is `uplink` or `downlink`"),
             ("max_discrepancy_m", "[discrepancy](model.md#discrepancy)"),
+            ("max_rotation_discrepancy_rad", "where the object turns: the largest angle between two copies"),
             ("measures.NAME", "each [measure](#measures) that is asked for; `null` where it has no value"),
             ("files", "paths written by `--out`"),
             ("replayed_otherwise", "with `--inputs --force`: what differs from the scene of the session"),
@@ -133,7 +139,10 @@ const DOCUMENTS: [Document; 21] = [
             ("scenes[].file, scenes[].passed, scenes[].failures", "in the order of the files; `failures` is a list of texts"),
             ("scenes[].expects", "whether the scene has an `[expect]`"),
             ("scenes[].notes", "what was judged in another way than with more time"),
-            ("scenes[].expectations[].expectation", "`stable`, `discrepancy`, `position`, `travel`, `loss`, `delay` or `measures`"),
+            (
+                "scenes[].expectations[].expectation",
+                "`stable`, `discrepancy`, `position`, `travel`, `rotation-discrepancy`, `orientation`, `loss`, `delay` or `measures`",
+            ),
             (
                 "scenes[].expectations[].name, scenes[].expectations[].expected, scenes[].expectations[].found",
                 "the quantity, the expected value and the outcome, in words",

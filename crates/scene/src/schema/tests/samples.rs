@@ -8,8 +8,8 @@ use cohaptic_linkfile::router::RouterFile;
 use crate::schema::FileSchema;
 use crate::{Scene, SceneError, scene_files};
 
-/// Every table and every key that the shipped scenes leave out, in three scenes.
-pub(super) const SCENES: [&str; 3] = [
+/// Every table and every key that the shipped scenes leave out, in four scenes.
+pub(super) const SCENES: [&str; 4] = [
     r#"
     scene = { duration = "4s" }
     object = { mass = 1, enclosure = { min = -1, max = 1, stiffness = 100, damping = 1 } }
@@ -80,6 +80,22 @@ pub(super) const SCENES: [&str; 3] = [
     links = [{ from = "peer1", to = "peer2", trace = { file = "data/path.csv" } }, { from = "peer2", to = "peer1", trace = { file = "data/line.trace" } }]
     simulation = {}
     measure = { travel = {} }
+    "#,
+    r#"
+    scene = { duration = "4s", axes = 3 }
+    object = { mass = 1, inertia = [0.01, 0.02, 0.02], rotational-damping = 0.001, angular-velocity = [0, 0, 1] }
+    coordination = { strategy = "average-position", stiffness = 1, update = "8ms", rotational-stiffness = [1, 1, 1], rotational-damping = 0.1 }
+    simulation = {}
+    peer = { device = { mass = 1 }, coupling = { stiffness = 1 } }
+    peers = [
+        { name = "a", device = { inertia = 0.001 }, coupling = { rotational-stiffness = 1 }, hand = { torque = [0, 0, 0.1] } },
+        { name = "b", device = { inertia = 0.001 }, coupling = { rotational-stiffness = 1 }, hand = { sine = { amplitude = [0, 0, 0], frequency = 1, torque = [0, 1, 0] } } },
+        { name = "c", grasp = [0.1, 0, 0], orientation = [1, 0, 0, 0.1], angular-velocity = 0 },
+    ]
+    timeline = [{ at = "2s", peer = "a", set = { hand = { force = [1, 0, 0], torque = [0, 0, 0.2] } } }]
+    [expect]
+    rotation-discrepancy = { max = 1 }
+    orientation = [{ peer = "a", at = "1s", of = [1, 0, 0, 0], max = 3 }]
     "#,
 ];
 

@@ -59,8 +59,9 @@ pub use self::error::SceneWorstCaseError;
 use self::channel::{Channel, Link};
 use self::prepared::{Prepared, Search};
 use super::gripenberg::Effort;
-use crate::analysis::{Combination, combinations, notes};
+use crate::analysis::{Combination, notes, pairs};
 use crate::network::NominalNetwork;
+use crate::pieces::pieces;
 use crate::{AnalysisError, Part, PartKind, Unwatched, Watch};
 
 /// What the network may do.
@@ -208,10 +209,11 @@ pub fn worst_case(scene: &Scene, patterns: &Patterns, effort: &Effort) -> Result
 /// As for [`worst_case`], and [`AnalysisError::Stopped`] if the watch ends it.
 pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, watch: &dyn Watch) -> Result<SceneWorstCase, SceneWorstCaseError> {
     let network = patterns.network(scene)?;
-    let combinations = combinations(scene)?;
-    let found: Vec<Vec<WorstPart>> = combinations
+    let pieces = pieces(scene, "the worst case")?;
+    let mut combines = false;
+    let found: Vec<Vec<WorstPart>> = pairs(&pieces, &mut combines)?
         .par_iter()
-        .map(|combination| of_combination(scene, &network, combination, patterns, (effort, watch)))
+        .map(|(piece, combination)| of_combination(&piece.scene, &network, combination, patterns, (effort, watch)))
         .collect::<Result<_, _>>()?;
     let parts: Vec<WorstPart> = found.into_iter().flatten().collect();
     let largest = |value: fn(&WorstPart) -> f64| parts.iter().map(value).fold(0.0, f64::max);
@@ -222,7 +224,7 @@ pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, w
     if patterns.delay.is_some() {
         said.push("what the links of the scene do is replaced by the interval of delays".to_owned());
     }
-    let notes = notes(&said, combinations.len(), scene);
+    let notes = notes(&said, combines, scene);
     Ok(SceneWorstCase { lower, upper, certificate, links: patterns.links, step: scene.coordination.update, parts, part, notes })
 }
 
@@ -266,7 +268,7 @@ fn of_combination(
         let certificate = found.certificate.as_ref().map(super::Certificate::rate);
         Ok(WorstPart {
             kind: search.kind,
-            contacts: combination.words.clone(),
+            contacts: combination.name(),
             dimension: search.automaton.size(),
             lower: found.lower,
             upper: certificate.map_or(found.upper, |rate| found.upper.min(rate)),
@@ -281,7 +283,7 @@ fn of_combination(
         let (lower, upper) = ((device.radius.value - device.radius.error).max(0.0), device.radius.value + device.radius.error);
         WorstPart {
             kind: device.kind,
-            contacts: combination.words.clone(),
+            contacts: combination.name(),
             dimension: device.size,
             lower,
             upper,

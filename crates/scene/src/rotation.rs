@@ -1,0 +1,250 @@
+//! An object that turns: its inertia, and all that follows from it.
+
+use cohaptic_peer::coordination::Pull;
+use cohaptic_peer::rotation::{Attitude, DeviceRotation, HeldAttitudes, Rotation, RotationConfig, Spin, Triple};
+use cohaptic_peer::{Coordination, Gains, Signal, State};
+
+use crate::{ChangeKind, Scene};
+
+/// How the object of a scene turns.
+#[derive(Clone, PartialEq, Debug)]
+pub struct RotationSpec {
+    /// The principal moments of inertia of the whole object [kg·m²], each above zero and none above the sum of the others. Body axes are the principal axes.
+    pub inertia: Triple,
+    /// Viscous damping of the turn of each copy about the body axes [N·m·s/rad]; `None`: the damping of the object times inertia over mass.
+    pub damping: Option<Triple>,
+    /// KR [N·m/rad] and BR [N·m·s/rad] about the body axes, before scaling; `None`: KT and BT times inertia over mass.
+    pub gains: Gains<Option<Triple>>,
+    /// Steps of the turn in a tick, at least 1.
+    pub steps: u32,
+    /// The turning part of each peer, in the order of [`Scene::peers`].
+    pub peers: Vec<PeerRotation>,
+}
+
+/// How a peer takes part in the turn of the object.
+#[derive(Clone, PartialEq, Debug)]
+pub struct PeerRotation {
+    /// Where its device grasps the copy, from the centre of mass in body axes \[m\].
+    pub grasp: Triple,
+    /// The attitude with which its copy begins, and its device if that turns.
+    pub attitude: Attitude,
+    /// Its device, if that turns.
+    pub device: Option<DeviceRotationSpec>,
+}
+
+/// A device with six degrees of freedom.
+#[derive(Clone, PartialEq, Debug)]
+pub struct DeviceRotationSpec {
+    /// Its inertia and damping, in handle axes.
+    pub handle: Spin,
+    /// KCR [N·m/rad] and BCR [N·m·s/rad], before scaling.
+    pub coupling: Gains,
+    /// The torque of the hand in world axes \[N·m\]; `None`: none.
+    pub torque: Option<Signal>,
+}
+
+impl Scene {
+    /// The turning part of a peer, with every scaling applied; `None` if the object does not turn.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn rotation_of(&self, place: usize) -> Option<Rotation> {
+        let rotation = self.rotation.as_ref()?;
+        let others = rotation.peers.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, peer)| peer.attitude);
+        let held = HeldAttitudes::new(others);
+        Some(Rotation::new(self.rotation_config(place)?, rotation.peers[place].attitude, held, &self.peers[place].clock))
+    }
+
+    /// What the turning part of a peer is made from, with every scaling applied; `None` if the object does not turn.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn rotation_config(&self, place: usize) -> Option<RotationConfig> {
+        let rotation = self.rotation.as_ref()?;
+        let PeerRotation { grasp, device, .. } = &rotation.peers[place];
+        let spec = &self.peers[place];
+        let device = device.as_ref().map(|device| DeviceRotation {
+            handle: device.handle,
+            coupling: device.coupling.scaled(spec.coupling_scaling.coupling_factor(self.peers.len())),
+            hand: device.torque.clone(),
+        });
+        Some(RotationConfig {
+            copy: self.copy_spin()?,
+            grasp: *grasp,
+            gains: self.rotation_gains(self.coordination.gains)?,
+            device,
+            integrator: self.integrator,
+            steps: rotation.steps,
+        })
+    }
+
+    /// Inertia and damping of the turn of each copy; `None` if the object does not turn. Inertia is split as mass is.
+    #[must_use]
+    pub fn copy_spin(&self) -> Option<Spin> {
+        let rotation = self.rotation.as_ref()?;
+        let share = self.copy_mass() / self.object.mass;
+        let damping = rotation.damping.unwrap_or_else(|| rotation.over_mass(self.object.mass, self.object.damping));
+        Some(Spin { inertia: rotation.inertia.map(|moment| moment * share), damping })
+    }
+
+    /// √(tr J/3m), the radius of gyration over √(3/2): angles times this are lengths of the motion of the object \[m\]; `None` if the object does not turn.
+    #[must_use]
+    pub fn gyration(&self) -> Option<f64> {
+        let rotation = self.rotation.as_ref()?;
+        Some((rotation.inertia.iter().sum::<f64>() / (3.0 * self.object.mass)).sqrt())
+    }
+
+    /// KR and BR on the mean of the others about the body axes, scaled by the number of peers, where KT and BT are `gains`, those of the scene or those that
+    /// the timeline sets; `None` if the object does not turn.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
+    pub fn rotation_gains(&self, gains: Gains) -> Option<Gains<Triple>> {
+        let rotation = self.rotation.as_ref()?;
+        let pull = match self.coordination.strategy.pull() {
+            Pull::Mean => 1.0,
+            Pull::Sum => (self.peers.len() - 1) as f64,
+        };
+        let factor = pull * self.coordination_factor();
+        let of = |own: Option<Triple>, gain: f64| own.unwrap_or_else(|| rotation.over_mass(self.object.mass, gain)).map(|gain| gain * factor);
+        Some(Gains { stiffness: of(rotation.gains.stiffness, gains.stiffness), damping: of(rotation.gains.damping, gains.damping) })
+    }
+
+    /// Where the device of a peer begins: at the grasp point of its copy.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn initial_device<const A: usize>(&self, place: usize) -> State<A> {
+        let copy = self.initial_state(place);
+        match &self.rotation {
+            Some(rotation) => rotation.peers[place].attitude.point(rotation.peers[place].grasp, &copy),
+            None => copy,
+        }
+    }
+
+    /// Why the object cannot turn in this scene; `None` if it can, or if it does not turn.
+    pub(crate) fn refused_rotation(&self) -> Option<String> {
+        let rotation = self.rotation.as_ref()?;
+        let strategy = self.coordination.strategy;
+        let turns = [Coordination::AveragePosition, Coordination::ProportionalDerivative, Coordination::Extrapolated];
+        if !turns.contains(&strategy) {
+            let names: Vec<&str> = turns.iter().map(|strategy| strategy.name()).collect();
+            return Some(format!(
+                "the strategy {} has no torque for an object with an inertia: expected one of {}",
+                strategy.name(),
+                names.join(", ")
+            ));
+        }
+        let turns = |place: usize| rotation.peers[place].device.is_some();
+        let pushed = self.timeline.iter().find_map(|change| match &change.what {
+            ChangeKind::HandTorque { peer, torque: Some(_) } if !turns(*peer) => Some(*peer),
+            _ => None,
+        });
+        if let Some(peer) = pushed {
+            let name = &self.peers[peer].name;
+            return Some(format!("the timeline gives the hand of peer \"{name}\" a torque, whose device does not turn: expected device.inertia"));
+        }
+        self.leaves_out_samples().then(|| "dead bands say nothing of attitudes: expected no send-when with an object with an inertia".to_owned())
+    }
+}
+
+impl RotationSpec {
+    /// A number that belongs to a mass, for the inertia of it: as if each element of the mass had it alone.
+    fn over_mass(&self, mass: f64, number: f64) -> Triple {
+        self.inertia.map(|moment| number * moment / mass)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use cohaptic_peer::wire::SampleKind;
+
+    use super::*;
+
+    const TEXT: &str = "\
+scene = { duration = \"1s\", axes = 3, count = 4 }
+object = { mass = 2, damping = 4, inertia = [0.1, 0.2, 0.3], orientation = [2, 0, 0, 0], angular-velocity = [0, 0, 3] }
+coordination = { strategy = \"proportional-derivative\", stiffness = 100, damping = 20, update = \"8ms\" }
+peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 0, 0] }
+";
+
+    fn scene(overrides: &[&str]) -> Result<Scene, String> {
+        let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+        Scene::parse(TEXT, Path::new("x.toml"), &overrides).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn each_element_of_the_mass_is_coordinated_and_damped_as_if_alone() {
+        let scene = scene(&[]).unwrap();
+        let config = scene.rotation_config(0).unwrap();
+        // Inertia is split as mass; damping is that of each copy; KT and BT count once for each other peer.
+        assert_eq!(config.copy, Spin { inertia: [0.1 / 4.0, 0.05, 0.3 / 4.0], damping: [0.2, 0.4, 0.3 * 4.0 / 2.0] });
+        assert_eq!(config.gains, Gains { stiffness: [15.0, 30.0, 45.0], damping: [3.0, 6.0, 9.0] });
+        let scaled = self::scene(&["coordination.scaling=inverse-n", "coordination.rotational-stiffness=8"]).unwrap();
+        // 4·3/16 times three others.
+        assert_eq!(scaled.rotation_gains(scaled.coordination.gains).unwrap().stiffness, [18.0; 3]);
+        assert_eq!(scene.sample_kind(), SampleKind::Attitude);
+    }
+
+    #[test]
+    fn a_device_begins_at_its_grasp_point() {
+        let scene = scene(&["peers=[{name=\"peer1\", orientation=[1, 0, 0, 1]}]"]).unwrap();
+        // A quarter turn about z: x goes to y; ω×r has the length 3 rad/s · 0.1 m, and points to −x.
+        let State { position, velocity } = scene.initial_device::<3>(0);
+        let apart = |a: [f64; 3], b: [f64; 3]| (0..3).map(|axis| (a[axis] - b[axis]).abs()).fold(0.0, f64::max);
+        assert!(apart(position, [0.0, 0.1, 0.0]) < 1e-16 && apart(velocity, [-0.3, 0.0, 0.0]) < 1e-15, "{position:?} {velocity:?}");
+        assert_eq!(scene.initial_device::<3>(1).position, [0.1, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn scenes_that_cannot_turn_are_refused() {
+        let refused = |overrides: &[&str], expected: &str| {
+            let error = scene(overrides).unwrap_err();
+            assert!(error.contains(expected), "{overrides:?}: {error}");
+        };
+        refused(&["object.inertia=[1, 1, 3]"], "object.inertia: a moment of inertia is above the sum of the two others");
+        refused(&["object.inertia=[1, 1, 0]"], "object.inertia");
+        refused(&["object.inertia=[1, 1]"], "expected a number [kg·m²], or a list of three");
+        refused(&["scene.axes=2", "peer.grasp=0"], "expected scene.axes = 3, or no object.inertia");
+        refused(&["object.orientation=[0, 0, 0, 0]"], "is no quaternion");
+        refused(&["object.orientation=[1, 0, 0]"], "is no quaternion");
+        refused(&["coordination.rotational-stiffness=[1, 1, 3]"], "a stiffness is above the sum of the two others");
+        refused(&["coordination.strategy=wave"], "the strategy wave has no torque for an object with an inertia");
+        refused(&["coordination.send-when={position=0.001}"], "dead bands say nothing of attitudes");
+        refused(&["peer.device.inertia=0.001"], "expected coupling.rotational-stiffness");
+        refused(&["peer.device.rotational-damping=0.001"], "expected device.inertia beside it");
+        refused(&["peer.coupling.rotational-damping=0.001"], "expected rotational-stiffness beside it");
+        refused(&["peer.hand={torque=[0, 0, 1]}"], "the torque of a hand needs a device that turns");
+        refused(&["peer.kind=falcon", "peer.device.inertia=0.001", "peer.coupling.rotational-stiffness=1"], "a Falcon turns nothing");
+        refused(&["simulation.rotation-steps=0"], "rotation-steps");
+    }
+
+    #[test]
+    fn keys_of_turns_need_an_inertia() {
+        let text = TEXT
+            .replace("inertia = [0.1, 0.2, 0.3], orientation = [2, 0, 0, 0], angular-velocity = [0, 0, 3]", "velocity = 0")
+            .replace(", grasp = [0.1, 0, 0]", "");
+        assert!(Scene::parse(&text, Path::new("x.toml"), &[]).unwrap().rotation.is_none());
+        for key in [
+            "object.rotational-damping=1",
+            "object.orientation=[1, 0, 0, 0]",
+            "object.angular-velocity=1",
+            "coordination.rotational-stiffness=1",
+            "simulation.rotation-steps=2",
+            "peer.grasp=[0, 0, 1]",
+            "peer.device.inertia=1",
+            "peer.hand={torque=[0, 0, 1]}",
+            "expect.rotation-discrepancy={max=1}",
+        ] {
+            let error = Scene::parse(&text, Path::new("x.toml"), &[key.to_owned()]).unwrap_err().to_string();
+            assert!(error.contains("this is about an object that turns: expected object.inertia, or no such key"), "{key}: {error}");
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! The one-axis scenes into which an object that turns splits exactly, linearised at rest.
+//!
+//! A copy has y = (δp, δθ) in body axes, mass matrix M = diag(m·I, J), and is grasped at z = G·y with G = \[I, −\[r\]\]:
+//! M·ÿ = Gᵀ·FC + (0, τC) − diag(KT·I, KR)·(y − ȳ) − … (docs/stability.md).
+//!
+//! **Grasped at the centre**, r = 0, nothing of this mixes two of the six components: each is a scene of one axis.
+//!
+//! **One grasp r, default gains.** Gains and damping are multiples of M then, diag(KT·I, KR) = KT/m·M and so on, and all that drives the copies is Gᵀ·FC. With
+//! W = G·M⁻¹·Gᵀ = I/m − \[r\]·J⁻¹·\[r\] the grasp point obeys z̈ = W·FC − KT/m·(z − z̄) − BT/m·(ż − ż̄) − bO/m·ż. Device and coupling are equal along all directions, so
+//! along an eigenvector of W with the eigenvalue μ this is a scene of mass 1/μ with KT, BT and bO divided by m·μ. Of y three components N·y are left, with
+//! N·M⁻¹·Gᵀ = 0: no hand drives them, and they obey the equation of a copy of mass m that nobody touches. Held samples, means and step maps act on all components
+//! alike, so the split holds for any links, clocks and delays.
+
+use cohaptic_peer::rotation::Triple;
+use cohaptic_peer::{Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains, Hand, Integrator, Signal};
+
+use crate::{Axes, CoordinationSpec, ObjectSpec, PeerKind, PeerSpec, RotationSpec, Scene};
+
+/// How the motion of an object that turns splits.
+#[derive(Clone, PartialEq, Debug)]
+pub struct RotationParts {
+    /// Why it does, in words.
+    pub reason: &'static str,
+    /// The scenes.
+    pub parts: Vec<RotationPart>,
+}
+
+/// One or several equal components of the motion of an object that turns, as a scene of one axis, at rest.
+///
+/// About an axis that turns, "mass" means an inertia, and so on: the numbers are those of the turn, in its units.
+#[derive(Clone, PartialEq, Debug)]
+pub struct RotationPart {
+    /// The equal components: `x`, `y`, `z`, `rx`, `ry`, `rz`; or `touched 1` to `touched 3` and `pivot 1` to `pivot 3`.
+    pub components: Vec<String>,
+    /// The scene of each of them.
+    pub scene: Scene,
+    /// For each peer, whether it has a device in this component; where not, that of the scene stands for nothing.
+    pub devices: Vec<bool>,
+}
+
+impl RotationPart {
+    /// Its components, in words.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.components.join(", ")
+    }
+}
+
+impl Scene {
+    /// The one-axis scenes into which the motion near rest splits exactly, or why there are none; `None` if the object does not turn.
+    ///
+    /// Hands that only push are left out, and so are the timeline and initial motions. Samples of the whole scene are longer than those of a part.
+    #[must_use]
+    pub fn rotation_parts(&self) -> Option<Result<RotationParts, &'static str>> {
+        let rotation = self.rotation.as_ref()?;
+        if matches!(self.integrator, Integrator::SemiImplicitEuler { .. }) {
+            return Some(Err("with semi-implicit-euler turns move by another step than translations"));
+        }
+        let grasps = || rotation.peers.iter().zip(&self.peers).filter(|(_, spec)| spec.contact != Contact::None).map(|(peer, _)| peer.grasp);
+        if grasps().all(|grasp| grasp == [0.0; 3]) {
+            let parts = merged((0..3).map(|axis| self.translation(axis)).chain((0..3).map(|axis| self.turn(rotation, axis))));
+            return Some(Ok(RotationParts { reason: "the object is held at its centre alone, so no force turns it", parts }));
+        }
+        let grasp = grasps().next()?;
+        Some(self.why_not_pivots(rotation, grasp).map_or_else(
+            || {
+                let touched = effective_masses(self.object.mass, rotation.inertia, grasp).into_iter().enumerate();
+                let touched = touched.map(|(place, mass)| self.with_mass(format!("touched {}", place + 1), mass, true));
+                let pivots = (1..=3).map(|place| self.with_mass(format!("pivot {place}"), self.object.mass, false));
+                let reason = "all who touch the object do so at one point, and gains and damping of turns are the default ones";
+                Ok(RotationParts { reason, parts: merged(touched.chain(pivots)) })
+            },
+            Err,
+        ))
+    }
+
+    /// Why the scene does not split into touched scenes and pivots.
+    fn why_not_pivots(&self, rotation: &RotationSpec, grasp: Triple) -> Option<&'static str> {
+        let mut peers = rotation.peers.iter().zip(&self.peers);
+        let touches = |spec: &PeerSpec| spec.contact != Contact::None;
+        if peers.clone().any(|(peer, spec)| touches(spec) && peer.grasp != grasp) {
+            Some("the object is held at different points")
+        } else if peers.any(|(peer, spec)| peer.device.is_some() || matches!(spec.contact, Contact::Push(_))) {
+            Some("a device turns, or a finger pushes, off the centre")
+        } else if rotation.damping.is_some() || rotation.gains.stiffness.is_some() || rotation.gains.damping.is_some() {
+            Some("gains or damping of turns are not the default ones")
+        } else if self.coordination.strategy == Coordination::Extrapolated {
+            Some("positions are extrapolated and orientations are not")
+        } else if self.object.enclosure.is_some() {
+            Some("walls act on the centre and hands do not")
+        } else if rotation.steps > 1 && self.integrator != Integrator::Exact {
+            Some("turns take other steps than translations")
+        } else {
+            None
+        }
+    }
+
+    /// The translation along an axis.
+    fn translation(&self, axis: usize) -> RotationPart {
+        let along = |number: f64| [number, 0.0, 0.0];
+        let enclosure = self.object.enclosure.map(|wall| Enclosure { min: along(wall.min[axis]), max: along(wall.max[axis]), ..wall });
+        let object = ObjectSpec { enclosure, ..self.object_at_rest() };
+        let peers = self.peers.iter().map(|spec| {
+            let contact = match spec.contact {
+                Contact::Push(direction) if direction.axis == axis => Contact::Push(Direction { axis: 0, ..direction }),
+                Contact::Push(_) | Contact::None => Contact::None,
+                Contact::Grasp => Contact::Grasp,
+            };
+            PeerSpec { contact, ..at_rest(spec) }
+        });
+        let scene = Self { object, peers: peers.collect(), ..self.without_turns(self.coordination) };
+        RotationPart { components: vec![["x", "y", "z"][axis].to_owned()], scene, devices: vec![true; self.peers.len()] }
+    }
+
+    /// The turn about an axis of an object that is held at its centre.
+    fn turn(&self, rotation: &RotationSpec, axis: usize) -> RotationPart {
+        let over_mass = |number: f64| number * rotation.inertia[axis] / self.object.mass;
+        let of = |own: Option<Triple>, usual: f64| own.map_or_else(|| over_mass(usual), |own| own[axis]);
+        let damping = of(rotation.damping, self.object.damping);
+        let object = ObjectSpec { mass: rotation.inertia[axis], damping, enclosure: None, ..self.object_at_rest() };
+        let (usual, own) = (self.coordination.gains, &rotation.gains);
+        let gains = Gains { stiffness: of(own.stiffness, usual.stiffness), damping: of(own.damping, usual.damping) };
+        let strategy = match self.coordination.strategy {
+            // Orientations are held as they came.
+            Coordination::Extrapolated => Coordination::AveragePosition,
+            other => other,
+        };
+        let peers = rotation.peers.iter().zip(&self.peers).map(|(peer, spec)| {
+            let spec = PeerSpec { hand: None, ..at_rest(spec) };
+            match &peer.device {
+                // A frictionless finger turns nothing.
+                Some(device) => {
+                    let contact = if spec.contact == Contact::Grasp { Contact::Grasp } else { Contact::None };
+                    let handle = DeviceConfig { mass: device.handle.inertia[axis], damping: device.handle.damping[axis] };
+                    PeerSpec { contact, device: handle, coupling: device.coupling, ..spec }
+                }
+                None => untouched(spec),
+            }
+        });
+        let mut scene = Self { object, peers: peers.collect(), ..self.without_turns(CoordinationSpec { strategy, gains, ..self.coordination }) };
+        if let Integrator::RungeKutta4 { steps } = self.integrator {
+            scene.integrator = Integrator::RungeKutta4 { steps: steps.saturating_mul(rotation.steps) };
+        }
+        let devices = rotation.peers.iter().map(|peer| peer.device.is_some()).collect();
+        RotationPart { components: vec![["rx", "ry", "rz"][axis].to_owned()], scene, devices }
+    }
+
+    /// The scene with an object of that mass, and gains and damping in proportion.
+    fn with_mass(&self, component: String, mass: f64, touched: bool) -> RotationPart {
+        let share = mass / self.object.mass;
+        let object = ObjectSpec { mass, damping: self.object.damping * share, ..self.object_at_rest() };
+        let coordination = CoordinationSpec { gains: self.coordination.gains.scaled(share), ..self.coordination };
+        let peers = self.peers.iter().map(|spec| if touched { at_rest(spec) } else { untouched(at_rest(spec)) });
+        let scene = Self { object, peers: peers.collect(), ..self.without_turns(coordination) };
+        RotationPart { components: vec![component], scene, devices: vec![touched; self.peers.len()] }
+    }
+
+    fn object_at_rest(&self) -> ObjectSpec {
+        ObjectSpec { position: [0.0; 3], velocity: [0.0; 3], ..self.object.clone() }
+    }
+
+    /// The scene along one axis with that coordination and none of what is only for a run.
+    fn without_turns(&self, coordination: CoordinationSpec) -> Self {
+        Self { axes: Axes::One, rotation: None, coordination, timeline: Vec::new(), measure: None, expect: None, ..self.clone() }
+    }
+}
+
+/// A peer that begins at rest, whose hand does nothing but hold.
+fn at_rest(spec: &PeerSpec) -> PeerSpec {
+    let hand = spec.hand.as_ref().and_then(Hand::arm).map(|arm| Hand::Arm { arm, follows: Signal::Constant([0.0; 3]) });
+    PeerSpec { kind: PeerKind::Simulated, hand, position: [0.0; 3], velocity: [0.0; 3], ..spec.clone() }
+}
+
+/// A peer without a device: one that touches nothing and is equal to all others of that kind.
+fn untouched(spec: PeerSpec) -> PeerSpec {
+    PeerSpec { contact: Contact::None, device: DeviceConfig { mass: 1.0, damping: 0.0 }, hand: None, ..spec }
+}
+
+/// Parts with equal scenes as one, in the order of the first of each.
+fn merged(parts: impl Iterator<Item = RotationPart>) -> Vec<RotationPart> {
+    let mut merged: Vec<RotationPart> = Vec::new();
+    for part in parts {
+        match merged.iter_mut().find(|one| one.scene == part.scene && one.devices == part.devices) {
+            Some(one) => one.components.extend(part.components),
+            None => merged.push(part),
+        }
+    }
+    merged
+}
+
+/// 1/μ of the eigenvalues μ of W = I/m − \[r\]·J⁻¹·\[r\], r ≠ 0: along r first, then across it, the larger mass first.
+///
+/// Along r, μ = 1/m. With unit vectors u, v across it, uᵀWu = 1/m + r²·vᵀJ⁻¹v, vᵀWv = 1/m + r²·uᵀJ⁻¹u and uᵀWv = −r²·uᵀJ⁻¹v.
+fn effective_masses(mass: f64, inertia: Triple, grasp: Triple) -> [f64; 3] {
+    let cross = |a: Triple, b: Triple| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let length = |a: Triple| a[0].hypot(a[1]).hypot(a[2]);
+    let unit = |a: Triple| a.map(|component| component / length(a));
+    let radius = length(grasp);
+    let along = unit(grasp);
+    // The axis that is farthest from r gives the first vector across it.
+    let least = (0..3).min_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs())).unwrap_or(0);
+    let axis = core::array::from_fn(|component| if component == least { 1.0 } else { 0.0 });
+    let u = unit(cross(along, axis));
+    let v = cross(along, u);
+    let weighed = |a: Triple, b: Triple| radius * radius * (0..3).map(|axis| a[axis] * b[axis] / inertia[axis]).sum::<f64>();
+    let (of_u, of_v, of_both) = (weighed(v, v), weighed(u, u), -weighed(u, v));
+    let (middle, apart) = (1.0 / mass + 0.5 * (of_u + of_v), (0.5 * (of_u - of_v)).hypot(of_both));
+    [mass, 1.0 / (middle - apart), 1.0 / (middle + apart)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r#"
+        scene        = { duration = "1s", count = 3, axes = 3 }
+        object       = { mass = 0.5, damping = 2, inertia = [1.2e-4, 2e-4, 2.6e-4] }
+        coordination = { strategy = "proportional-derivative", stiffness = 1000, damping = 5, update = "8ms" }
+        peer         = { device = { mass = 0.1, damping = 5 }, coupling = { stiffness = 3500, damping = 5 } }
+        link         = { delay = "8ms" }
+    "#;
+
+    fn scene(overrides: &[&str]) -> Scene {
+        let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+        Scene::parse(TEXT, "turns.toml".as_ref(), &overrides).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn names(scene: &Scene) -> Vec<String> {
+        scene.rotation_parts().unwrap().unwrap().parts.iter().map(RotationPart::name).collect()
+    }
+
+    /// Trace, sum of the squares of all entries, and determinant of W, entry by entry.
+    #[test]
+    fn the_effective_masses_are_those_of_the_matrix() {
+        let (mass, inertia) = (0.45, [1.2e-4, 2e-4, 2.6e-4]);
+        for r in [[0.03, 0.0, 0.0], [0.01, -0.02, 0.025], [-0.02, 0.02, 0.02], [0.0, 1e-4, 3.0]] {
+            let bracket = [[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]];
+            let entry = |i: usize, j: usize| {
+                let turned: f64 = (0..3).map(|k| bracket[i][k] * bracket[k][j] / inertia[k]).sum();
+                (if i == j { 1.0 / mass } else { 0.0 }) - turned
+            };
+            let w: [[f64; 3]; 3] = core::array::from_fn(|i| core::array::from_fn(|j| entry(i, j)));
+            let found = effective_masses(mass, inertia, r).map(|mass| 1.0 / mass);
+            let close = |a: f64, b: f64| assert!((a - b).abs() <= 1e-12 * b.abs(), "{r:?}: {a} is not {b}");
+            close(found.iter().sum(), w[0][0] + w[1][1] + w[2][2]);
+            close(found.iter().map(|mu| mu * mu).sum(), w.iter().flatten().map(|entry| entry * entry).sum());
+            let minor = |a: usize, b: usize| w[1][a] * w[2][b] - w[1][b] * w[2][a];
+            let determinant = w[0][0] * minor(1, 2) - w[0][1] * minor(0, 2) + w[0][2] * minor(0, 1);
+            assert!((found.iter().product::<f64>() / determinant - 1.0).abs() < 1e-9, "{r:?}");
+        }
+    }
+
+    #[test]
+    fn held_at_the_centre_translations_and_turns_are_apart() {
+        assert_eq!(names(&scene(&[])), ["x, y, z", "rx", "ry", "rz"]);
+        // Of the peer that touches nothing the grasp says nothing.
+        assert_eq!(names(&scene(&["peers.peer1.grasp=[0.1, 0, 0]", "peers.peer1.contact=none", "object.inertia=1e-4"])), ["x, y, z", "rx, ry, rz"]);
+        let split = scene(&["object.split-mass=true", "coordination.rotational-damping=0.25", "coordination.scaling=inverse-n"]);
+        let parts = split.rotation_parts().unwrap().unwrap().parts;
+        let rx = &parts[1].scene;
+        assert_eq!((rx.copy_mass(), rx.object.damping), (0.4e-4, 2.0 * 1.2e-4 / 0.5));
+        let whole = split.rotation_gains(split.coordination.gains).unwrap();
+        // N − 1 of the strategy is in its law.
+        let gains = rx.coordination_gains(rx.coordination.gains);
+        assert!((2.0 * gains.stiffness / whole.stiffness[0] - 1.0).abs() < 1e-15 && (2.0 * gains.damping / whole.damping[0] - 1.0).abs() < 1e-15);
+        assert_eq!(parts.iter().map(|part| part.devices[0]).collect::<Vec<_>>(), [true, false, false, false]);
+    }
+
+    #[test]
+    fn a_finger_pushes_along_its_axis_alone() {
+        let found = scene(&["peers.peer2.contact.push=-y"]).rotation_parts().unwrap().unwrap();
+        assert_eq!(found.parts.iter().map(RotationPart::name).collect::<Vec<_>>(), ["x, z", "y", "rx", "ry", "rz"]);
+        assert_eq!(found.parts[0].scene.peers[1].contact, Contact::None);
+        assert_eq!(found.parts[1].scene.peers[1].contact, Contact::Push(Direction { axis: 0, positive: false }));
+    }
+
+    #[test]
+    fn held_at_one_point_there_are_touched_scenes_and_pivots() {
+        let held = |more: &[&str]| scene(&[&["peer.grasp=[0.01, -0.02, 0.025]"], more].concat());
+        assert_eq!(names(&held(&[])), ["touched 1", "touched 2", "touched 3", "pivot 1, pivot 2, pivot 3"]);
+        for (more, why) in [
+            ("peers.peer3.grasp=[0.01, -0.02, 0.02]", "different points"),
+            ("coordination.rotational-stiffness=1", "default"),
+            ("object.rotational-damping=1", "default"),
+            ("coordination.strategy=extrapolated", "extrapolated"),
+            ("simulation.integrator=semi-implicit-euler", "another step"),
+            ("peers.peer3.contact.push=-y", "finger"),
+        ] {
+            let error = held(&[more]).rotation_parts().unwrap().unwrap_err();
+            assert!(error.contains(why), "{more}: {error}");
+        }
+    }
+}

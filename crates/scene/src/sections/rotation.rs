@@ -1,0 +1,235 @@
+//! The keys of an object that turns, which stand in several tables and all need `object.inertia`.
+
+use cohaptic_linkfile::document::{Entry, Node, Value};
+use cohaptic_linkfile::reading::values::{self, Quantity, ReadNumber as _};
+use cohaptic_linkfile::reading::{Context, TableReader};
+use cohaptic_peer::rotation::{Attitude, Spin, Triple};
+use cohaptic_peer::{Gains, Signal};
+use cohaptic_units::Hertz;
+
+use super::peers::PeerRead;
+use crate::context::SceneContext;
+use crate::model::Axes;
+use crate::quantities::{
+    ANGLE, COMPONENT, FREQUENCY, INERTIA, POSITION, RATE, ROTATIONAL_DAMPING, ROTATIONAL_STIFFNESS, Spread, TORQUE, read_vector,
+};
+use crate::{DeviceRotationSpec, PeerRotation, RotationSpec};
+
+/// Keys that have no meaning without an inertia of the object, wherever they stand.
+const ROTATIONAL: [&str; 8] =
+    ["rotational-damping", "rotational-stiffness", "orientation", "angular-velocity", "grasp", "torque", "rotation-steps", "rotation-discrepancy"];
+
+/// The keys under `[object]`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct ObjectRotation {
+    inertia: Triple,
+    damping: Option<Triple>,
+    attitude: Attitude,
+}
+
+/// The keys of a peer; each is `None` where it is not given.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct PeerRotationKeys {
+    pub(crate) grasp: Option<Triple>,
+    pub(crate) orientation: Option<[f64; 4]>,
+    pub(crate) rate: Option<Triple>,
+    pub(crate) device: Option<Spin>,
+    pub(crate) coupling: Option<Gains>,
+    pub(crate) torque: Option<Signal>,
+}
+
+/// The keys of `[object]`; `Some(None)` without an inertia.
+pub(super) fn read_object_rotation(table: &mut TableReader<'_>, context: SceneContext<'_>) -> Option<Option<ObjectRotation>> {
+    let inertia = table.maybe("inertia", |node, file| read_inertia(node, file, context.axes));
+    let damping = table.maybe("rotational-damping", |node, context| read_triple(ROTATIONAL_DAMPING, node, context));
+    let orientation = table.optional("orientation", Attitude::REST.orientation, read_orientation);
+    let rate = table.optional("angular-velocity", [0.0; 3], |node, context| read_triple(RATE, node, context));
+    let (damping, orientation, rate) = (damping?, orientation?, rate?);
+    Some(inertia?.map(|inertia| ObjectRotation { inertia, damping, attitude: Attitude { orientation, rate } }))
+}
+
+fn read_inertia(node: &Node, file: Context<'_>, axes: Option<Axes>) -> Option<Triple> {
+    let inertia = read_triple(INERTIA, node, file)?;
+    if axes.is_some_and(|axes| axes != Axes::Three) {
+        file.fault_at(node, "an object with an inertia turns in space: expected scene.axes = 3, or no object.inertia");
+        return None;
+    }
+    check_triangle(&inertia, "a moment of inertia", node, file).then_some(inertia)
+}
+
+/// Refuses three numbers of which one is above the sum of the others.
+fn check_triangle(numbers: &Triple, name: &str, node: &Node, context: Context<'_>) -> bool {
+    let sum: f64 = numbers.iter().sum();
+    // Equal but for rounding is a body without thickness.
+    let above = numbers.iter().any(|number| *number > 0.5 * sum * (1.0 + 1e-12));
+    if above {
+        context.fault_at(node, format!("{name} is above the sum of the two others: expected three numbers of which none is"));
+    }
+    !above
+}
+
+/// A number for all three axes of a body, or a list of three.
+fn read_triple(quantity: Quantity, node: &Node, context: Context<'_>) -> Option<Triple> {
+    let Value::List(elements) = &node.value else { return quantity.read(node, context).map(|number| [number; 3]) };
+    let numbers: Vec<Option<f64>> = elements.iter().map(|element| quantity.read(element, context)).collect();
+    let numbers: Vec<f64> = numbers.into_iter().collect::<Option<_>>()?;
+    let triple = Triple::try_from(numbers).ok();
+    if triple.is_none() {
+        context.fault_at(node, format!("a list of {}: expected a number [{}], or a list of three", elements.len(), quantity.unit()));
+    }
+    triple
+}
+
+/// KR: of its three numbers none may be above the sum of the others.
+pub(super) fn read_rotational_stiffness(node: &Node, context: Context<'_>) -> Option<Triple> {
+    let stiffness = read_triple(ROTATIONAL_STIFFNESS, node, context)?;
+    check_triangle(&stiffness, "a stiffness", node, context).then_some(stiffness)
+}
+
+pub(super) fn read_rotational_damping(node: &Node, context: Context<'_>) -> Option<Triple> {
+    read_triple(ROTATIONAL_DAMPING, node, context)
+}
+
+/// A quaternion of any length above zero, as one of length 1.
+pub(super) fn read_orientation(node: &Node, context: Context<'_>) -> Option<[f64; 4]> {
+    const EXPECTED: &str = "a quaternion, a list of four numbers w, x, y, z that are not all zero";
+    let elements = values::list(node, context, EXPECTED)?;
+    let numbers: Vec<Option<f64>> = elements.iter().map(|element| COMPONENT.read(element, context)).collect();
+    let numbers: Vec<f64> = numbers.into_iter().collect::<Option<_>>()?;
+    let unit = <[f64; 4]>::try_from(numbers).ok().and_then(|quaternion| {
+        // Scaled first, so that no square overflows or vanishes.
+        let largest = quaternion.iter().fold(0.0_f64, |largest, component| largest.max(component.abs()));
+        let scaled = quaternion.map(|component| component / largest);
+        let norm = scaled.iter().map(|component| component * component).sum::<f64>().sqrt();
+        (largest > 0.0).then(|| scaled.map(|component| component / norm))
+    });
+    if unit.is_none() {
+        context.fault_at(node, format!("{} is no quaternion: expected {EXPECTED}", values::written(node)));
+    }
+    unit
+}
+
+/// `grasp`, `orientation` and `angular-velocity` of a peer.
+pub(super) fn read_peer_rotation(table: &mut TableReader<'_>) -> Option<PeerRotationKeys> {
+    let grasp = table.maybe("grasp", |node, context| read_triple(POSITION, node, context));
+    let orientation = table.maybe("orientation", read_orientation);
+    let rate = table.maybe("angular-velocity", |node, context| read_triple(RATE, node, context));
+    Some(PeerRotationKeys { grasp: grasp?, orientation: orientation?, rate: rate?, ..PeerRotationKeys::default() })
+}
+
+/// `inertia` and `rotational-damping` of a device; `Some(None)` for one that does not turn.
+pub(super) fn read_device_rotation(table: &mut TableReader<'_>) -> Option<Option<Spin>> {
+    let inertia = table.maybe("inertia", |node, context| {
+        let inertia = read_triple(INERTIA, node, context)?;
+        check_triangle(&inertia, "a moment of inertia", node, context).then_some(inertia)
+    });
+    let damping = table.optional("rotational-damping", [0.0; 3], |node, context| {
+        if inertia == Some(None) {
+            context.fault_at(node, "a device without an inertia does not turn: expected device.inertia beside it");
+            return None;
+        }
+        read_rotational_damping(node, context)
+    });
+    let (inertia, damping) = (inertia?, damping?);
+    Some(inertia.map(|inertia| Spin { inertia, damping }))
+}
+
+/// `rotational-stiffness` and `rotational-damping` of a coupling; `Some(None)` without a stiffness.
+pub(super) fn read_coupling_rotation(table: &mut TableReader<'_>) -> Option<Option<Gains>> {
+    let stiffness = table.maybe("rotational-stiffness", |node, context| ROTATIONAL_STIFFNESS.read(node, context));
+    let damping = table.optional("rotational-damping", 0.0, |node, context| {
+        if stiffness == Some(None) {
+            context.fault_at(node, "a coupling that turns needs a stiffness: expected rotational-stiffness beside it");
+            return None;
+        }
+        ROTATIONAL_DAMPING.read(node, context)
+    });
+    let (stiffness, damping) = (stiffness?, damping?);
+    Some(stiffness.map(|stiffness| Gains { stiffness, damping }))
+}
+
+/// The torque of a hand; `Some(None)` without one.
+pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option<Option<Signal>> {
+    let Some(table) = hand.as_table() else { return Some(None) };
+    let sine = table.get("sine").and_then(|sine| sine.node.as_table());
+    match (table.get("torque"), sine.and_then(|sine| Some((sine, sine.get("torque")?)))) {
+        (None, None) => Some(None),
+        (Some(constant), None) => Some(Some(Signal::Constant(read_vector(TORQUE, &constant.node, context, Spread::Refused)?))),
+        (None, Some((sine, torque))) => {
+            let amplitude = read_vector(TORQUE, &torque.node, context, Spread::Refused);
+            // Faults of these two are those of the force.
+            let number = |key: &str, quantity: Quantity| sine.get(key).and_then(|entry| quantity.read(&entry.node, *context));
+            let (frequency, phase) = (number("frequency", FREQUENCY)?, number("phase", ANGLE).unwrap_or(0.0));
+            Some(Some(Signal::Sine { amplitude: amplitude?, frequency: Hertz(frequency), phase }))
+        }
+        (Some(constant), Some(_)) => {
+            context.fault(constant.key, &constant.node.path, "a torque stands beside sine.torque: expected one of the two");
+            None
+        }
+    }
+}
+
+/// How the object and the peers turn; `Some(None)` without an inertia. `object` has the keys under `[object]`, `gains` those under `[coordination]`.
+pub(crate) fn rotation(
+    object: Option<ObjectRotation>,
+    gains: Gains<Option<Triple>>,
+    steps: u32,
+    peers: &[PeerRead],
+    context: Context<'_>,
+) -> Option<Option<Box<RotationSpec>>> {
+    let Some(ObjectRotation { inertia, damping, attitude }) = object else { return Some(None) };
+    let peers: Vec<Option<PeerRotation>> = peers.iter().map(|read| peer_rotation(read, attitude, context)).collect();
+    let peers: Option<Vec<PeerRotation>> = peers.into_iter().collect();
+    Some(Some(Box::new(RotationSpec { inertia, damping, gains, steps, peers: peers? })))
+}
+
+fn peer_rotation(read: &PeerRead, attitude: Attitude, context: Context<'_>) -> Option<PeerRotation> {
+    let PeerRotationKeys { grasp, orientation, rate, device, coupling, torque } = &read.rotation;
+    let name = &read.spec.name;
+    let refuse = |message: String| {
+        context.fault(read.place, "peers", message);
+        None
+    };
+    let device = match device {
+        Some(_) if matches!(read.spec.kind, crate::PeerKind::Falcon(..)) => {
+            return refuse(format!("peer \"{name}\": a Falcon turns nothing: expected a device without an inertia"));
+        }
+        Some(handle) => {
+            let touches = read.spec.contact == cohaptic_peer::Contact::Grasp;
+            let Some(coupling) = coupling.or((!touches).then_some(Gains { stiffness: 0.0, damping: 0.0 })) else {
+                return refuse(format!("peer \"{name}\": a device that turns needs a coupling that turns: expected coupling.rotational-stiffness"));
+            };
+            Some(DeviceRotationSpec { handle: *handle, coupling, torque: torque.clone() })
+        }
+        None if torque.is_some() => {
+            return refuse(format!("peer \"{name}\": the torque of a hand needs a device that turns: expected device.inertia"));
+        }
+        None => None,
+    };
+    let own = Attitude { orientation: orientation.unwrap_or(attitude.orientation), rate: rate.unwrap_or(attitude.rate) };
+    Some(PeerRotation { grasp: grasp.unwrap_or([0.0; 3]), attitude: own, device })
+}
+
+/// Refuses keys of an object that turns in a scene whose object does not.
+pub(crate) fn refuse_rotational_keys(document: &Node, context: Context<'_>) {
+    const MESSAGE: &str = "this is about an object that turns: expected object.inertia, or no such key";
+    let refuse = |entry: &Entry| context.fault(entry.key, &entry.node.path, MESSAGE);
+    match &document.value {
+        Value::Table(table) => {
+            for entry in &table.0 {
+                let of_device = entry.name == "inertia" && entry.node.path != "object.inertia";
+                if of_device || ROTATIONAL.contains(&entry.name.as_str()) {
+                    refuse(entry);
+                } else {
+                    refuse_rotational_keys(&entry.node, context);
+                }
+            }
+        }
+        Value::List(elements) => {
+            for element in elements {
+                refuse_rotational_keys(element, context);
+            }
+        }
+        Value::Text(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date => {}
+    }
+}

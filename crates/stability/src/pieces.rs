@@ -1,0 +1,44 @@
+//! The scenes as which a scene is analysed: itself, or the one-axis scenes into which an object that turns splits.
+
+use std::borrow::Cow;
+
+use cohaptic_scene::{RotationPart, RotationParts, Scene};
+
+use crate::AnalysisError;
+
+/// A scene that moves apart from all others.
+#[derive(Clone, Debug)]
+pub(crate) struct Piece<'a> {
+    pub(crate) scene: Cow<'a, Scene>,
+    /// Along how many equal axes it moves.
+    pub(crate) axes: usize,
+    /// Of an object that turns, the components of its motion; otherwise empty.
+    pub(crate) motion: String,
+    /// The peers that have no device in it.
+    pub(crate) absent: Vec<bool>,
+}
+
+/// The pieces of a scene; what does not split has none, and the error says why.
+pub(crate) fn split(scene: &Scene) -> Result<Vec<Piece<'_>>, &'static str> {
+    let Some(parts) = scene.rotation_parts() else {
+        let (axes, absent) = (scene.axes.count(), vec![false; scene.peers.len()]);
+        return Ok(vec![Piece { scene: Cow::Borrowed(scene), axes, motion: String::new(), absent }]);
+    };
+    let RotationParts { parts, .. } = parts?;
+    let piece = |part: RotationPart| {
+        let (axes, motion) = (part.components.len(), part.name());
+        let absent = part.devices.iter().map(|device| !device).collect();
+        Piece { scene: Cow::Owned(part.scene), axes, motion, absent }
+    };
+    Ok(parts.into_iter().map(piece).collect())
+}
+
+/// [`split`] for an analysis of pieces alone.
+pub(crate) fn pieces<'a>(scene: &'a Scene, what: &'static str) -> Result<Vec<Piece<'a>>, AnalysisError> {
+    split(scene).map_err(|why| AnalysisError::Turns { what, why })
+}
+
+/// Refuses an object that turns, for an analysis that does not follow it at all.
+pub(crate) fn refuse_turns(scene: &Scene, what: &'static str) -> Result<(), AnalysisError> {
+    if scene.rotation.is_some() { Err(AnalysisError::NoTurns { what }) } else { Ok(()) }
+}
