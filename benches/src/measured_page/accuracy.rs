@@ -16,15 +16,10 @@ const FOLDER: &str = "out/measured/accuracy";
 const IMAGES: &str = "images/measured";
 
 /// A subject, a plot of it (as the file is called), and what it shows.
-const PLOTS: [(&str, &str, &str); 13] = [
+const PLOTS: [(&str, &str, &str); 12] = [
     ("motion", "motion-coupled-peers-position-m", "The error of a position against the time of a tick, of two peers who hold the object"),
     ("motion", "motion-one-sided-contact-position-m", "The same for contact that can push and not pull"),
     ("motion", "motion-stiff-coupling-critical-stiffness-n-m", "The error of the predicted stability boundary against the time of a tick"),
-    (
-        "rotation",
-        "rotation-free-top-near-its-unstable-axis-angle-rad",
-        "The error of the orientation against the time of a second of motion, of a free top",
-    ),
     ("time", "time-1-ms-ticks-clocks-0-37-ms-apart-mean-delay-s", "The error of the mean delay against the time of a packet: steps, and events"),
     ("time", "time-1-ms-ticks-clocks-0-37-ms-apart-wrong-verdicts-1", "The share of wrong verdicts on stability against the time of a packet"),
     ("network", "network-delay-normal-kolmogorov-distance-1", "The distance of a sampler from the normal law against the time of a draw"),
