@@ -19,8 +19,8 @@ const EXAMPLES: [(&str, &str); 6] = [
     ("queue", "{ limit = \"100 packets\" }"),
 ];
 
-/// Keys that are not proposed: they mean something only together with others.
-const NOT_PROPOSED: [&str; 4] = ["count", "substeps", "netem-profile", "name"];
+/// Keys that are not proposed: they mean something only together with others, some of them with an inertia of the object.
+const NOT_PROPOSED: [&str; 8] = ["count", "substeps", "netem-profile", "name", "orientation", "angular-velocity", "grasp", "rotation-steps"];
 
 /// A scene as text. `other_number`: how many peers the shipped scene has, if this one has another number.
 pub(super) fn scene(scene: &toml::Table, name: &str, other_number: Option<usize>) -> String {

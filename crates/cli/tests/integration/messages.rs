@@ -83,7 +83,7 @@ const OTHERS: &[Bad] = &[
     bad("run \u{202e}two.toml --set link.dlay=1", "\\u{202e}two.toml: cannot be read: No such file or directory (os error 2)"),
     bad(
         "run two.toml --set simulation.substep=\u{202e}1",
-        "--set simulation.substep=\\u{202e}1: simulation.substep: unknown key: expected one of integrator, substeps; did you mean \"substeps\"?\n |\n | \
+        "--set simulation.substep=\\u{202e}1: simulation.substep: unknown key: expected one of integrator, substeps, rotation-steps; did you mean \"substeps\"?\n |\n | \
          simulation.substep=\\u{202e}1\n |            ^^^^^^^",
     ),
     bad(
