@@ -33,7 +33,7 @@ fn found(overrides: &[&str]) -> MeanSquare {
 fn both_ways(overrides: &[&str]) -> (Radius, Radius) {
     let scene = scene(overrides);
     let network = NominalNetwork::of(&scene).unwrap();
-    let contacts = combinations(&scene).unwrap().remove(0).contacts;
+    let contacts = crate::analysis::whole(&scene).unwrap().remove(0).contacts;
     let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
     let one = symmetric(&scene, &network, &structure, &Limits::of_unknowns(MOST_UNKNOWNS), &mut Vec::new()).unwrap().unwrap();
     let other = one_by_one(&scene, &network, &structure, &contacts, &[], &Limits::of_unknowns(MOST_UNKNOWNS), &mut Vec::new()).unwrap();
@@ -88,7 +88,7 @@ fn by_symmetry_and_one_by_one_agree() {
 fn by_noise(overrides: &[&str]) -> f64 {
     let scene = scene(overrides);
     let network = NominalNetwork::of(&scene).unwrap();
-    let contacts = combinations(&scene).unwrap().remove(0).contacts;
+    let contacts = crate::analysis::whole(&scene).unwrap().remove(0).contacts;
     let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
     let Followed::Equal { frame, .. } = Followed::of(&scene, &network, &structure).unwrap() else { panic!("{overrides:?}: not equal peers") };
     let node = structure.node(&scene, 0);
@@ -119,7 +119,7 @@ fn the_noise_of_losses_makes_the_radius_of_the_second_moment() {
             let overrides = [link, &[count.as_str()]].concat();
             let scene = scene(&overrides);
             let network = NominalNetwork::of(&scene).unwrap();
-            let contacts = combinations(&scene).unwrap().remove(0).contacts;
+            let contacts = crate::analysis::whole(&scene).unwrap().remove(0).contacts;
             let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
             let expected = symmetric(&scene, &network, &structure, &Limits::of_unknowns(MOST_UNKNOWNS), &mut Vec::new()).unwrap().unwrap().radius;
             let found = by_noise(&overrides);
@@ -367,7 +367,7 @@ fn the_mean_of_many_runs_is_what_the_operator_says() {
     let (loss, explicit) = (0.4, Explicit { peers: 2, frames: 1 });
     let scene = scene(&["scene.count=2", "link.loss=0.4"]);
     let network = NominalNetwork::of(&scene).unwrap();
-    let contacts = combinations(&scene).unwrap().remove(0).contacts;
+    let contacts = crate::analysis::whole(&scene).unwrap().remove(0).contacts;
     let structure = Structure::of(&[&scene], &network, &contacts).unwrap();
     let timetable = Timetable::new(&[NodeClock::of(&scene, 0), NodeClock::of(&scene, 1)], &[]).unwrap();
     let instants = Instants::of(&timetable, 2);

@@ -35,7 +35,7 @@ fn patterns(losses_in_a_row: u32, delay: Option<(u64, u64)>, links: Links) -> Pa
 /// The switched systems of a linear scene; of each peer by itself, if not `reduced`.
 fn prepared(scene: &Scene, patterns: &Patterns, reduced: bool) -> Prepared {
     let network = patterns.network(scene).unwrap();
-    let contacts = combinations(scene).unwrap().swap_remove(0).contacts;
+    let contacts = crate::analysis::whole(scene).unwrap().swap_remove(0).contacts;
     let structure =
         if reduced { structure(scene, &network, &contacts, patterns).unwrap() } else { Structure::of_each(scene, &network, &contacts).unwrap() };
     Prepared::of(scene, &network, &structure, patterns).unwrap()
