@@ -1,7 +1,7 @@
 //! Whether a scene is stable, by analysis where that is a matter of seconds and leaves nothing out.
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{AnalysisError, Judgement, Limits, Method, NOMINAL, QUICK_UNKNOWNS, has_chance, judge_watched};
+use cohaptic_stability::{AnalysisError, Judgement, Limits, Method, NOMINAL, QUICK_UNKNOWNS, UNLOADED, has_chance, judge_watched};
 
 use crate::analysis_watch::{Interruptible, OPERATIONS_A_SECOND};
 
@@ -17,9 +17,9 @@ pub(crate) enum Quick {
 }
 
 /// Whether a scene is stable, by analysis, if that takes at most `seconds` by the estimate. One that is not linear, that changes on its way, or whose chance has
-/// no second moment that can be followed in that time, is left to a simulation.
+/// no second moment that can be followed in that time, is left to a simulation, as is an object that turns and does more than small motions near rest.
 pub(crate) fn quick_verdict(scene: &Scene, seconds: f64) -> Quick {
-    if !scene.timeline.is_empty() {
+    if !scene.timeline.is_empty() || !scene.turns_about_rest() {
         return Quick::Simulate(None);
     }
     let limits = Limits { unknowns: QUICK_UNKNOWNS, operations: seconds * OPERATIONS_A_SECOND, watch: &Interruptible };
@@ -30,6 +30,7 @@ pub(crate) fn quick_verdict(scene: &Scene, seconds: f64) -> Quick {
     };
     let refused = judgement.analysis.notes.iter().find_map(|note| note.strip_prefix(NOMINAL)).map(str::to_owned);
     // Without a second moment, whatever was replaced by something nominal is better simulated as it is.
-    let nominal = judgement.mean_square.is_none() && (has_chance(scene) || !judgement.analysis.notes.is_empty());
-    if judgement.analysis.modes.len() > 1 || nominal { Quick::Simulate(refused) } else { Quick::Known(Box::new(judgement)) }
+    let is_left_out = judgement.analysis.notes.iter().any(|note| note != UNLOADED);
+    let nominal = judgement.mean_square.is_none() && (has_chance(scene) || is_left_out);
+    if judgement.analysis.combines_contacts() || nominal { Quick::Simulate(refused) } else { Quick::Known(Box::new(judgement)) }
 }

@@ -74,6 +74,28 @@ impl Scene {
         ))
     }
 
+    /// Whether small motions near rest are all that an object that turns does: copies begin together and at rest, and no hand pushes. Also true if the object does
+    /// not turn.
+    #[must_use]
+    pub fn turns_about_rest(&self) -> bool {
+        let Some(rotation) = &self.rotation else { return true };
+        let zero = |vector: &[f64; 3]| *vector == [0.0; 3];
+        let (first, peers) = (rotation.peers[0].attitude, rotation.peers.iter().zip(&self.peers));
+        let is_idle = |signal: &Signal| matches!(signal, Signal::Constant(constant) if zero(constant));
+        peers.enumerate().all(|(place, (peer, spec))| {
+            let together = spec.position == self.peers[0].position && peer.attitude.angle_to(&first.orientation) == 0.0;
+            let start = self.initial_device::<3>(place).position;
+            let idle = match &spec.hand {
+                None => true,
+                Some(Hand::Force(force)) => is_idle(force),
+                // An arm that wants its device where it begins.
+                Some(Hand::Arm { follows, .. }) => matches!(follows, Signal::Constant(wanted) if *wanted == start),
+            };
+            let untwisted = peer.device.as_ref().and_then(|device| device.torque.as_ref()).is_none_or(is_idle);
+            together && zero(&spec.velocity) && zero(&peer.attitude.rate) && idle && untwisted
+        })
+    }
+
     /// Why the scene does not split into touched scenes and pivots.
     fn why_not_pivots(&self, rotation: &RotationSpec, grasp: Triple) -> Option<&'static str> {
         let mut peers = rotation.peers.iter().zip(&self.peers);

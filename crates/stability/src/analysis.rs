@@ -12,7 +12,7 @@ use crate::parts::{Part, Reduced, radius_of, reduced};
 use crate::pieces::{self, Piece};
 use crate::spectrum::bounded_radius;
 use crate::structure::{Contacts, Structure, linear_law};
-use crate::{AnalysisError, Radius, Unwatched, Verdict, Watch};
+use crate::{AnalysisError, Radius, Unwatched, Verdict, Watch, turning};
 
 /// How a verdict is reached.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -111,8 +111,8 @@ pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError>
 pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let equivalent = (0..scene.peers.len()).all(|peer| linear_law(scene, peer).is_some());
     let pieces = match pieces::split(scene) {
-        Ok(pieces) => pieces,
-        Err(why) => return Err(AnalysisError::Turns { what: "the stability", why }),
+        Ok(pieces) if scene.rotation.is_none() || method != Method::Full => pieces,
+        _ => return turning::analyse(scene, method, watch),
     };
     match method {
         // A strategy that cannot be taken apart goes the way of a user's own.

@@ -50,8 +50,8 @@ pub enum AnalysisError {
     },
     /// The object turns, and its motion does not split into scenes of one axis.
     #[error(
-        "{what} of an object that turns is analysed only where its motion splits into scenes of one axis, and here {why}; cohaptic stability point and \
-         simulations tell whether the scene is stable"
+        "{what} of an object that turns is analysed only where its motion splits into scenes of one axis, and here it does not: {why}; \
+         simulations tell what the scene does"
     )]
     Turns {
         /// The analysis.

@@ -50,11 +50,12 @@ mod spectrum;
 mod stack_frame;
 mod structure;
 mod timetable;
+mod turning;
 mod unseen;
 mod watch;
 mod worst_case;
 
-pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, admittance, ideal};
+pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, PushedAxis, admittance, ideal};
 pub use analysis::{Analysis, ContactMode, Method, UNLOADED, analyse, analyse_watched, analyse_with};
 pub use boundary::{Boundary, BoundaryError, BoundaryOptions, Crossing, Stretch};
 pub use cost::{FrameCost, eigenvalue_operations, full_operations};

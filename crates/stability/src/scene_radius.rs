@@ -12,11 +12,11 @@ use crate::lifted::{Autonomous, Body, Lifted, Node};
 use crate::mean_square::{EqualScratch, Followed};
 use crate::network::NominalNetwork;
 use crate::parts::loose_device;
-use crate::pieces::pieces;
+use crate::pieces::split;
 use crate::spectrum::Workspace;
 use crate::stack_frame::{StackFrame, StackNode};
 use crate::structure::{Contacts, Structure, linear_law};
-use crate::{AnalysisError, Matrix, Radius, Unwatched};
+use crate::{AnalysisError, Matrix, Radius, Unwatched, turning};
 
 /// What about a linear scene does not change with its numbers.
 #[derive(Debug)]
@@ -32,6 +32,26 @@ enum Kind {
     Parts(Box<PartsRadius>),
     /// Only the general path follows it.
     Whole(Box<WholeRadius>),
+    /// Of an object that turns, whose motion does not split.
+    Turning(Box<TurningRadius>),
+}
+
+/// An object that turns, analysed for each of its numbers anew.
+#[derive(Debug)]
+struct TurningRadius {
+    network: NominalNetwork,
+    /// Every peer by itself.
+    classes: Vec<Vec<usize>>,
+    unfollowed: AnalysisError,
+}
+
+impl TurningRadius {
+    fn new(scene: &Scene, network: NominalNetwork, why: &'static str) -> Result<Self, AnalysisError> {
+        // A scene that is refused is refused for all its numbers.
+        turning::radius(scene, &network)?;
+        let classes = (0..scene.peers.len()).map(|peer| vec![peer]).collect();
+        Ok(Self { network, classes, unfollowed: AnalysisError::Turns { what: "the mean square", why } })
+    }
 }
 
 impl SceneRadius {
@@ -53,6 +73,7 @@ impl SceneRadius {
         match &self.kind {
             Kind::Parts(parts) => parts.followed.as_ref(),
             Kind::Whole(whole) => Err(&whole.unfollowed),
+            Kind::Turning(turning) => Err(&turning.unfollowed),
         }
     }
 
@@ -61,6 +82,7 @@ impl SceneRadius {
         match &self.kind {
             Kind::Parts(parts) => &parts.structure.classes,
             Kind::Whole(whole) => &whole.classes,
+            Kind::Turning(turning) => &turning.classes,
         }
     }
 
@@ -70,6 +92,7 @@ impl SceneRadius {
         match &self.kind {
             Kind::Parts(parts) => parts.radius::<BOUND>(&scene, scratch),
             Kind::Whole(whole) => whole.radius::<BOUND>(&scene, &mut scratch.workspace),
+            Kind::Turning(of) => turning::radius(&scene, &of.network).unwrap_or(Radius::UNKNOWN),
         }
     }
 
@@ -80,7 +103,7 @@ impl SceneRadius {
                 let scene = view(scene, self.component.as_deref())?;
                 parts.mean_square(&scene, scratch)
             }
-            Kind::Whole(_) => None,
+            Kind::Whole(_) | Kind::Turning(_) => None,
         }
     }
 }
@@ -319,7 +342,13 @@ fn part<const BOUND: bool>(stack: Option<&StackFrame>, lifted: &Lifted<'_>, matr
 /// The linear scenes that a scene falls into, one for each combination of contacts.
 pub(crate) fn scene_radii(scenes: &[&Scene]) -> Result<Vec<SceneRadius>, AnalysisError> {
     let network = NominalNetwork::of(scenes[0])?;
-    let pieces = pieces(scenes[0], "the stability")?;
+    let pieces = match split(scenes[0]) {
+        Ok(pieces) => pieces,
+        Err(why) => {
+            let turning = TurningRadius::new(scenes[0], network, why)?;
+            return Ok(vec![SceneRadius { component: None, kind: Kind::Turning(Box::new(turning)) }]);
+        }
+    };
     // The general path leaves walls out.
     let is_law = linear_law(scenes[0], 0).is_some();
     let combinations = pairs(&pieces, &mut false)?.into_iter().map(|(_, combination)| combination);

@@ -8,7 +8,7 @@
 use std::time::Duration;
 
 use cohaptic_peer::Gains;
-use cohaptic_scene::{PeerSpec, Scene};
+use cohaptic_scene::{PeerRotation, PeerSpec, Scene};
 
 use crate::lifted::{Body, Lifted, Node, Sampling};
 use crate::linear_form::LinearLaw;
@@ -45,6 +45,8 @@ pub(crate) struct Structure {
     pub(crate) weights: Matrix,
     /// Whether something ties the object to ground: an arm's stiffness, a wall, or a peer that holds forever what it began with.
     pub(crate) tied: bool,
+    /// Whether some peer holds forever what it began with.
+    pub(crate) silent: bool,
     pub(crate) peers: usize,
 }
 
@@ -68,7 +70,10 @@ impl Structure {
                     && Some(class[0]) != alone
                     && contacts.touching[class[0]] == contacts.touching[place]
                     && contacts.absent[class[0]] == contacts.absent[place]
-                    && scenes.iter().all(|scene| alike(&scene.peers[class[0]], &scene.peers[place], contacts.touching[place]))
+                    && scenes.iter().all(|scene| {
+                        let touching = contacts.touching[place];
+                        alike(&scene.peers[class[0]], &scene.peers[place], touching) && turn_alike(scene, class[0], place, touching)
+                    })
             });
             match found {
                 Some(class) => classes[class].push(place),
@@ -107,7 +112,7 @@ impl Structure {
         let tied = contacts.at_wall || silent || classes.iter().any(arm);
         let touching = classes.iter().map(|class| contacts.touching[class[0]]).collect();
         let absent = classes.iter().map(|class| contacts.absent[class[0]]).collect();
-        Ok(Self { classes, touching, absent, at_wall: contacts.at_wall, timetable, apart, weights, tied, peers })
+        Ok(Self { classes, touching, absent, at_wall: contacts.at_wall, timetable, apart, weights, tied, silent, peers })
     }
 
     /// The linear form of the law of a class.
@@ -242,6 +247,15 @@ fn alike(one: &PeerSpec, other: &PeerSpec, touching: bool) -> bool {
     let same_device = || (one.device, plant(one)) == (other.device, plant(other));
     let same_coupling = || (one.coupling, one.coupling_scaling) == (other.coupling, other.coupling_scaling);
     same_clock && same_device() && (!touching || same_coupling())
+}
+
+/// Whether two copies turn by the same equations, if the object turns.
+fn turn_alike(scene: &Scene, one: usize, other: usize, touching: bool) -> bool {
+    scene.rotation.as_ref().is_none_or(|rotation| {
+        let (one, other) = (&rotation.peers[one], &rotation.peers[other]);
+        let device = |peer: &PeerRotation| peer.device.as_ref().map(|device| (device.handle, device.coupling));
+        device(one) == device(other) && (!touching || one.grasp == other.grasp)
+    })
 }
 
 /// Splits classes until every link between two classes is the same.

@@ -67,11 +67,11 @@ pub(super) fn describe(peer: &str, curves: &[Curve]) -> String {
         if let Some(warning) = curve.warning() {
             let _ = writeln!(text, "  WARNING: {warning}");
         }
-        let _ = writeln!(
-            text,
-            "\n  velocity over force at the device of {peer}, compared with that of a free mass of {} kg",
-            cohaptic_units::print::Number(curve.mass)
-        );
+        let (what, free) =
+            if curve.admittance.is_turn() { ("angular velocity over torque", "free turn") } else { ("velocity over force", "free mass") };
+        let [.., unit] = units(curve);
+        let mass = cohaptic_units::print::Number(curve.mass);
+        let _ = writeln!(text, "\n  {what} at the device of {peer}, compared with that of a {free} of {mass} {unit}");
         table(&mut text, curve);
         let _ = writeln!(text, "\n  moved slowly, {peer} feels");
         felt(&mut text, curve);
@@ -102,12 +102,21 @@ fn significant(hz: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
+/// Of a spring, a viscosity and an inertia.
+fn units(curve: &Curve) -> [&'static str; 3] {
+    if curve.admittance.is_turn() { ["N·m/rad", "N·m·s/rad", "kg·m²"] } else { ["N/m", "N·s/m", "kg"] }
+}
+
 /// What a slow hand feels: a spring only where something ties the object to ground.
 fn felt(text: &mut String, curve: &Curve) {
     let fit = curve.fit;
+    let [spring, viscosity, inertia] = units(curve);
     let tied = fit.stiffness.value != 0.0 || fit.stiffness.error != 0.0;
-    let rows =
-        [("a spring of", fit.stiffness, "N/m", tied), ("a viscosity of", fit.viscosity, "N·s/m", true), ("an inertia of", fit.inertia, "kg", true)];
+    let rows = [
+        ("a spring of", fit.stiffness, spring, tied),
+        ("a viscosity of", fit.viscosity, viscosity, true),
+        ("an inertia of", fit.inertia, inertia, true),
+    ];
     for (what, estimate, unit, _) in rows.into_iter().filter(|(.., shown)| *shown) {
         let _ = writeln!(text, "    {what:<16}{}", limit(estimate, unit));
     }

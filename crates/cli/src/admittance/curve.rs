@@ -31,7 +31,7 @@ pub(super) struct Curve {
     pub(super) fit: LowFrequencyFit,
     /// Where links leave something to chance: the second moment of the scene, or why it cannot be followed.
     pub(super) chance: Option<Result<MeanSquare, AnalysisError>>,
-    /// The mass of the whole object \[kg\].
+    /// The mass of the whole object \[kg\], or its inertia about the axis [kg·m²].
     pub(super) mass: f64,
 }
 
@@ -48,11 +48,13 @@ impl Subject {
         let scene = scene.map_err(|error| failure::of_variant(error, variant.option, &variant.overrides))?;
         let peer = place_of(&arguments.peer, &scene, &variant)?;
         let ended = || Failure::Interrupted("the analysis was ended before its first point".to_owned());
-        let admittance = Admittance::of_watched(&scene, peer, watch).map_err(|error| match error {
+        let admittance = Admittance::along_watched(&scene, peer, arguments.axis.map(Into::into), watch).map_err(|error| match error {
             AdmittanceError::Analysis(AnalysisError::Stopped) => ended(),
-            error @ (AdmittanceError::NoSuchPeer { .. } | AdmittanceError::Frequency { .. } | AdmittanceError::Analysis(_)) => {
-                not_analysed(file, &error)
-            }
+            error @ (AdmittanceError::NoSuchPeer { .. }
+            | AdmittanceError::NoSuchAxis { .. }
+            | AdmittanceError::DoesNotTurn { .. }
+            | AdmittanceError::Frequency { .. }
+            | AdmittanceError::Analysis(_)) => not_analysed(file, &error),
         })?;
         let chance = has_chance(&scene).then(|| mean_square_watched(&scene, &Limits { watch, ..Limits::of_unknowns(QUICK_UNKNOWNS) }));
         if chance == Some(Err(AnalysisError::Stopped)) {
@@ -80,7 +82,7 @@ impl Curve {
     pub(super) fn of(Subject { variant, scene, admittance, chance }: Subject, frequencies: &[f64], watch: &dyn Watch) -> Result<Self, Failure> {
         let response = admittance.response_watched(frequencies, watch).map_err(|error| Failure::Input(error.to_string()))?;
         let fit = admittance.fit_low_frequency();
-        let (name, overrides, mass) = (variant.name, variant.overrides, scene.object.mass);
+        let (name, overrides, mass) = (variant.name, variant.overrides, admittance.object_mass());
         Ok(Self { name, overrides, title: scene.title, admittance, response, fit, chance, mass })
     }
 

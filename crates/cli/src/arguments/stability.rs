@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueEnum};
-use cohaptic_stability::Method;
+use cohaptic_stability::{Method, PushedAxis};
 
 use super::examples::{self, after};
 use super::numbers::{any_integer, integer, real, some, threads};
@@ -56,6 +56,30 @@ pub(crate) struct PointArguments {
     /// How many products of matrices the search for the worst case may look at
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 100_000)]
     pub(crate) products: u64,
+}
+
+/// Along or about which axis a device is pushed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub(crate) enum AxisName {
+    X,
+    Y,
+    Z,
+    Rx,
+    Ry,
+    Rz,
+}
+
+impl From<AxisName> for PushedAxis {
+    fn from(axis: AxisName) -> Self {
+        match axis {
+            AxisName::X => Self::X,
+            AxisName::Y => Self::Y,
+            AxisName::Z => Self::Z,
+            AxisName::Rx => Self::Rx,
+            AxisName::Ry => Self::Ry,
+            AxisName::Rz => Self::Rz,
+        }
+    }
 }
 
 /// Which links share their fate.
@@ -183,6 +207,9 @@ pub(crate) struct AdmittanceArguments {
     /// The peer whose device is pushed
     #[arg(long, value_name = "NAME")]
     pub(crate) peer: String,
+    /// Along which axis it is pushed, or of an object that turns and is held at its centre about which axis [default: that of its own one-sided contact, or x]
+    #[arg(long, value_enum, value_name = "AXIS")]
+    pub(crate) axis: Option<AxisName>,
     /// The lowest frequency [default: 0.01]
     #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
     pub(crate) from: Option<f64>,

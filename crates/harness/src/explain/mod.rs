@@ -5,7 +5,7 @@ mod links;
 
 use cohaptic_peer::coordination::{Law, LawValue, Pull, UsedGains};
 use cohaptic_peer::{Contact, Hand, Integrator, SendWhen};
-use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, Scaling, Scene};
+use cohaptic_scene::{ChangeKind, FromScene, PeerSpec, RotationPart, RotationParts, Scaling, Scene};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
 
@@ -85,6 +85,7 @@ pub fn explain(scene: &Scene) -> Explanation {
     rows.clock_and_motion(scene, &plan);
     rows.peers(scene, &plan);
     rows.coordination(scene);
+    rows.turns(scene);
     rows.network(scene);
     if let Some(measure) = &scene.measure {
         let count = Counted(measure.names.len(), "number");
@@ -236,6 +237,18 @@ impl Rows {
             format!("{len} bytes {receivers} every {}{}", Span(spec.update), dead_bands(spec.send_when.as_ref())),
             "encoded, sent and decoded as they would be live",
         );
+    }
+
+    /// How the stability of an object that turns is analysed.
+    fn turns(&mut self, scene: &Scene) {
+        match scene.rotation_parts() {
+            None => {}
+            Some(Ok(RotationParts { reason, parts })) => {
+                let names: Vec<String> = parts.iter().map(RotationPart::name).collect();
+                self.model("stability of an object that turns", format!("scenes of one axis that do not mix: {}", names.join("; ")), reason);
+            }
+            Some(Err(why)) => self.model("stability of an object that turns", "all six components of each copy together, linearised at rest", why),
+        }
     }
 
     fn network(&mut self, scene: &Scene) {

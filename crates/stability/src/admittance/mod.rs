@@ -20,7 +20,7 @@ use crate::network::NominalNetwork;
 use crate::parts::{radius_of, reduced};
 use crate::structure::{Contacts, Structure, count};
 use crate::timetable::{Event, NodeClock, Timetable};
-use crate::{AnalysisError, Matrix, Method, Radius, Unwatched, Verdict, Watch};
+use crate::{AnalysisError, Matrix, Method, Radius, UNLOADED, Unwatched, Verdict, Watch};
 
 pub use low_frequency::{Estimate, LowFrequencyFit};
 pub use response::{AdmittancePoint, FrequencyResponse, ideal};
@@ -49,6 +49,9 @@ pub struct Admittance {
     highest: f64,
     radius: Radius,
     notes: Vec<String>,
+    /// The mass of the whole object, or its inertia about the axis.
+    mass: f64,
+    is_turn: bool,
 }
 
 /// The admittance of the peer in that place of [`Scene::peers`] at those frequencies \[Hz\].
@@ -76,11 +79,53 @@ impl Admittance {
     ///
     /// As [`Admittance::of`], and [`AnalysisError::Stopped`] if the watch ends it.
     pub fn of_watched(scene: &Scene, peer: usize, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
+        Self::along_watched(scene, peer, None, watch)
+    }
+
+    /// [`Admittance::of_watched`] along an axis, or about one, where force over velocity means torque over angular velocity; `None`: along the axis that the peer
+    /// pushes along, or the first.
+    ///
+    /// # Errors
+    ///
+    /// As [`Admittance::of_watched`]; if the scene has no such axis or the device of the peer does not turn; and for an object that turns and is not held at its
+    /// centre.
+    pub fn along_watched(scene: &Scene, peer: usize, axis: Option<PushedAxis>, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
         let spec = scene.peers.get(peer).ok_or(AdmittanceError::NoSuchPeer { peer, peers: scene.peers.len() })?;
-        crate::pieces::refuse_turns(scene, "the admittance")?;
+        let first = match spec.contact {
+            Contact::Push(direction) => direction.axis,
+            Contact::Grasp | Contact::None => 0,
+        };
+        let axis = axis.unwrap_or(PushedAxis::ALL[first]);
         let network = NominalNetwork::of(scene)?;
-        let (contacts, notes) = closed_contacts(scene, peer);
-        let structure = Structure::with_alone(&[scene], &network, &contacts, Some(peer))?;
+        let Some(parts) = scene.rotation_parts() else {
+            let place = axis.place();
+            return if place < scene.axes.count() {
+                Self::in_scene(scene, peer, place, &network, watch)
+            } else {
+                Err(AdmittanceError::NoSuchAxis { axis: axis.word() })
+            };
+        };
+        let off_centre = |why| AnalysisError::Turns { what: "the admittance", why };
+        let parts = parts.map_err(off_centre)?.parts;
+        let found = parts.iter().find(|part| part.components.iter().any(|component| component == axis.word()));
+        let part = found.ok_or_else(|| off_centre("the object is held off its centre"))?;
+        if !part.devices[peer] {
+            return Err(AdmittanceError::DoesNotTurn { axis: axis.word(), peer: spec.name.clone() });
+        }
+        let mut admittance = Self::in_scene(&part.scene, peer, 0, &network, watch)?;
+        admittance.is_turn = axis.place() > 2;
+        admittance.notes.push(UNLOADED.to_owned());
+        if !scene.timeline.is_empty() {
+            admittance.notes.push(TIMELINE.to_owned());
+        }
+        Ok(admittance)
+    }
+
+    /// Along that axis of a scene that does not turn.
+    fn in_scene(scene: &Scene, peer: usize, axis: usize, network: &NominalNetwork, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
+        let spec = &scene.peers[peer];
+        let (contacts, notes) = closed_contacts(scene, axis);
+        let structure = Structure::with_alone(&[scene], network, &contacts, Some(peer))?;
         let mut admittance = Self::of_classes(scene, structure, peer, watch)?;
         if !contacts.touching[peer] {
             let device = scene.device_plant(peer);
@@ -99,7 +144,7 @@ impl Admittance {
         let time = structure.time(scene, &nodes);
         let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
         let Structure { timetable, weights, tied, .. } = structure;
-        Ok(Self { nodes, weights, timetable, time, tied, pushed, highest: 0.0, radius, notes: Vec::new() })
+        Ok(Self { nodes, weights, timetable, time, tied, pushed, highest: 0.0, radius, notes: Vec::new(), mass: scene.object.mass, is_turn: false })
     }
 
     /// The admittance at a frequency \[Hz\].
@@ -183,6 +228,18 @@ impl Admittance {
         self.radius.verdict()
     }
 
+    /// The mass of the whole object \[kg\], or its inertia about the axis [kg·m²].
+    #[must_use]
+    pub const fn object_mass(&self) -> f64 {
+        self.mass
+    }
+
+    /// Whether it is angular velocity over torque.
+    #[must_use]
+    pub const fn is_turn(&self) -> bool {
+        self.is_turn
+    }
+
     /// The parts left out or taken as closed, in words.
     #[must_use]
     pub fn notes(&self) -> &[String] {
@@ -221,13 +278,41 @@ impl Admittance {
     }
 }
 
-/// All one-sided contacts along the axis of the peer closed, no copy at a wall; and that in words.
-fn closed_contacts(scene: &Scene, peer: usize) -> (Contacts, Vec<String>) {
+/// The axis along which a device is pushed, or about which it is turned.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[expect(missing_docs, reason = "x, y and z along the axes of the world, rx, ry and rz about those of the object")]
+pub enum PushedAxis {
+    X,
+    Y,
+    Z,
+    Rx,
+    Ry,
+    Rz,
+}
+
+impl PushedAxis {
+    /// All of them, in order.
+    pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
+
+    /// The word in options: `x` to `rz`.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        ["x", "y", "z", "rx", "ry", "rz"][self.place()]
+    }
+
+    const fn place(self) -> usize {
+        self as usize
+    }
+}
+
+const TIMELINE: &str = "the timeline is left out: the scene is analysed as it begins";
+
+/// All one-sided contacts along an axis closed, no copy at a wall; and that in words.
+fn closed_contacts(scene: &Scene, axis: usize) -> (Contacts, Vec<String>) {
     let pushes = |peer: usize| match scene.peers[peer].contact {
         Contact::Push(direction) => Some(direction.axis),
         Contact::Grasp | Contact::None => None,
     };
-    let axis = pushes(peer).unwrap_or(0);
     let touching = |peer: usize| scene.peers[peer].contact == Contact::Grasp || pushes(peer) == Some(axis);
     let touching: Vec<bool> = (0..scene.peers.len()).map(touching).collect();
     let mut notes = Vec::new();
@@ -238,7 +323,7 @@ fn closed_contacts(scene: &Scene, peer: usize) -> (Contacts, Vec<String>) {
         notes.push("the enclosure is left out: the object is away from its walls".to_owned());
     }
     if !scene.timeline.is_empty() {
-        notes.push("the timeline is left out: the scene is analysed as it begins".to_owned());
+        notes.push(TIMELINE.to_owned());
     }
     let absent = vec![false; scene.peers.len()];
     (Contacts { touching, at_wall: false, absent }, notes)
@@ -252,6 +337,10 @@ pub enum AdmittanceError {
     NoSuchPeer { peer: usize, peers: usize },
     #[error("{hz} Hz: expected a frequency above 0 and at most {highest} Hz, half the rate of the peer's ticks")]
     Frequency { hz: f64, highest: f64 },
+    #[error("the scene has no axis {axis}: expected one of those of scene.axes, or an object with an inertia")]
+    NoSuchAxis { axis: &'static str },
+    #[error("the device of {peer} does not turn, so nothing moves it about {axis}: expected device.inertia")]
+    DoesNotTurn { axis: &'static str, peer: String },
     /// The scene cannot be analysed.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),

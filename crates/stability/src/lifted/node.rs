@@ -20,9 +20,14 @@ pub(crate) struct Body {
 
 impl Body {
     pub(crate) fn new(plant: Plant, integrator: Integrator, clock: &Clock) -> Self {
+        Self::from_steps(clock, |span| plant.step(span, integrator))
+    }
+
+    /// From the step over each span.
+    pub(crate) fn from_steps(clock: &Clock, step: impl Fn(Duration) -> StepMap) -> Self {
         let (short, long) = clock.spans();
-        let first = plant.step(short, integrator);
-        Self { short: (short, first), long: if long == short { first } else { plant.step(long, integrator) } }
+        let first = step(short);
+        Self { short: (short, first), long: if long == short { first } else { step(long) } }
     }
 
     pub(crate) fn map(&self, span: Duration) -> &StepMap {

@@ -17,6 +17,9 @@ pub(super) fn of(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorst
     let constant = time_constant(analysis);
     let modes = analysis.modes.iter().map(|mode| {
         document! {
+            // Of an object that turns, the components of its motion; absent otherwise.
+            #[serde(flatten)]
+            motion: (!mode.motion.is_empty()).then(|| document! { motion: mode.motion.clone() }),
             contacts: mode.contacts.as_str(),
             verdict: mode.radius.verdict().word(),
             spectral_radius: mode.radius.value,
@@ -111,13 +114,16 @@ pub(super) fn describe(scene: &Scene, judgement: &Judgement, worst: Option<&Scen
         count => format!("{count} rigid-body modes removed"),
     };
     let states = if analysis.dimension == 1 { "state" } else { "states" };
-    line(format!("{} {states}, {rigid}; method: {}", analysis.dimension, method(analysis.method)));
+    let way =
+        if scene.rotation.is_some() && analysis.method == Method::Full { "full (the whole state, linearised)" } else { method(analysis.method) };
+    line(format!("{} {states}, {rigid}; method: {way}", analysis.dimension));
     if analysis.modes.len() > 1 {
         modes(analysis, &mut line);
     }
     if let Some(mode) = worst_mode(analysis).filter(|mode| mode.parts.len() > 1) {
         line(String::new());
-        line(if mode.contacts.is_empty() { "parts that do not mix".to_owned() } else { format!("parts that do not mix, {}", mode.contacts) });
+        let name = [mode.motion.as_str(), mode.contacts.as_str()].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ");
+        line(if name.is_empty() { "parts that do not mix".to_owned() } else { format!("parts that do not mix, {name}") });
         for part in &mode.parts {
             line(format!("  {:<44}{:>4} states, {:>4} times  {}", name(scene, part), part.size, part.copies, number(part.radius)));
         }
@@ -173,11 +179,18 @@ fn worst_case(worst: &SceneWorstCase, said: &[String], line: &mut impl FnMut(Str
 
 fn modes(analysis: &Analysis, line: &mut impl FnMut(String)) {
     line(String::new());
-    line(format!("{} combinations of contacts, the worst first", analysis.modes.len()));
+    let turns = analysis.modes.iter().any(|mode| !mode.motion.is_empty());
+    line(match (turns, analysis.combines_contacts()) {
+        (false, _) => format!("{} combinations of contacts, the worst first", analysis.modes.len()),
+        (true, false) => "motions that do not mix, the worst first".to_owned(),
+        (true, true) => "motions that do not mix, each with its combinations of contacts, the worst first".to_owned(),
+    });
     let mut sorted: Vec<&ContactMode> = analysis.modes.iter().collect();
     sorted.sort_by(|one, other| other.radius.value.total_cmp(&one.radius.value));
     for mode in sorted.iter().take(MOST_MODES) {
-        let contacts = if mode.contacts.is_empty() { "away from the walls" } else { &mode.contacts };
+        let away = if mode.motion.is_empty() || analysis.combines_contacts() { "away from the walls" } else { "" };
+        let contacts = if mode.contacts.is_empty() { away } else { &mode.contacts };
+        let contacts = [mode.motion.as_str(), contacts].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(": ");
         line(format!("  {contacts:<44}{:<9} {}", mode.radius.verdict().word(), number(mode.radius)));
     }
     if sorted.len() > MOST_MODES {

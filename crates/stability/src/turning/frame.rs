@@ -1,0 +1,234 @@
+//! One frame of copies that turn, unit vector by unit vector.
+
+use cohaptic_peer::Motion;
+
+use super::node::Node;
+use super::rigid::Displacement;
+use crate::cost::{full_operations, pushed_operations};
+use crate::structure::count;
+use crate::timetable::{Event, Instants, Timetable};
+use crate::{Matrix, Watch};
+
+/// The numbers of a sample: the components of the copy and their velocities.
+pub(super) const SAMPLE: usize = 12;
+
+/// Nodes that are coupled through samples.
+///
+/// The state has, for each node, its components and then their velocities, those of the device likewise, and the forces that wait; then, for each node, the samples
+/// of earlier frames, the newest first.
+#[derive(Clone, Debug)]
+pub(super) struct Turning<'a> {
+    pub(super) nodes: &'a [Node],
+    /// The weight of each node's samples (column) in each node's target (row).
+    pub(super) weights: &'a Matrix,
+    pub(super) timetable: &'a Timetable,
+    /// What velocities are multiplied by \[s\].
+    pub(super) time: f64,
+    /// The displacements that nothing resists, which are taken out.
+    pub(super) free: Vec<Displacement>,
+}
+
+impl Turning<'_> {
+    /// The matrix of a frame, displacements of everything taken out, and a bound of the error of its entries; `None` if the watch ends it.
+    pub(super) fn monodromy(&self, watch: &dyn Watch) -> Option<(Matrix, f64)> {
+        let (size, events) = (self.size(), self.timetable.events.len());
+        watch.expects(full_operations(size, events, 6));
+        let moved: Vec<Vec<f64>> = self.free.iter().map(|free| self.displaced(&free.copy)).collect();
+        let kept = self.kept();
+        let mut matrix = Matrix::zeros(kept.len(), kept.len());
+        let (mut unit, mut growth) = (vec![0.0; size], 1.0_f64);
+        for (column, state) in kept.iter().enumerate() {
+            if watch.stops() {
+                return None;
+            }
+            unit[*state] = 1.0;
+            let reached = self.pushed(&unit, &mut growth);
+            unit[*state] = 0.0;
+            for (row, target) in kept.iter().enumerate() {
+                let along: f64 = self.free.iter().zip(&moved).map(|(free, moved)| reached[free.reference] * moved[*target]).sum();
+                matrix[(row, column)] = reached[*target] - along;
+            }
+            watch.done(pushed_operations(events, 6));
+        }
+        let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
+        // As for the general path of objects that do not turn: each tick rounds, and the rest of the frame magnifies that by at most about the growth.
+        let error = 10.0 * f64::EPSILON * count(ticks) * growth * growth * count(kept.len()).sqrt();
+        Some((matrix, error))
+    }
+
+    /// The states but for the references, and but for those that nothing depends on.
+    pub(super) fn kept(&self) -> Vec<usize> {
+        let firsts = self.firsts();
+        let mut left_out: Vec<usize> = self.free.iter().map(|free| free.reference).collect();
+        for (node, first) in self.nodes.iter().zip(&firsts) {
+            left_out.extend(node.loose().map(|component| first + 12 + component));
+        }
+        (0..self.size()).filter(|state| !left_out.contains(state)).collect()
+    }
+
+    /// Where the states of each node begin.
+    fn firsts(&self) -> Vec<usize> {
+        self.nodes.iter().scan(0, |next, node| Some(std::mem::replace(next, *next + node.states()))).collect()
+    }
+
+    pub(super) fn size(&self) -> usize {
+        self.nodes.iter().map(Node::states).sum::<usize>() + SAMPLE * self.timetable.depth.iter().sum::<usize>()
+    }
+
+    /// The state in which every copy, and what was sampled of it, is displaced so, and every device that touches it with it.
+    pub(super) fn displaced(&self, copy: &[f64; 6]) -> Vec<f64> {
+        let mut state = vec![0.0; self.size()];
+        for (node, first) in self.nodes.iter().zip(self.firsts()) {
+            state[first..first + 6].copy_from_slice(copy);
+            if node.touching {
+                for (component, grip) in node.grip.iter().enumerate() {
+                    state[first + 12 + component] = dot(grip, copy);
+                }
+            }
+        }
+        let samples: usize = self.nodes.iter().map(Node::states).sum();
+        for sample in state[samples..].chunks_exact_mut(SAMPLE) {
+            sample[..6].copy_from_slice(copy);
+        }
+        state
+    }
+
+    /// Where a frame leads from the state; `growth` becomes the largest number on the way if that is larger.
+    pub(super) fn pushed(&self, state: &[f64], growth: &mut f64) -> Vec<f64> {
+        let nodes = self.nodes.len();
+        let firsts = self.firsts();
+        let mut peers: Vec<Moving> = self.nodes.iter().zip(&firsts).map(|(node, first)| Moving::read(node, &state[*first..], self.time)).collect();
+        // Oldest first.
+        let mut next: usize = self.nodes.iter().map(Node::states).sum();
+        let mut samples: Vec<Vec<[Motion; 6]>> = Vec::with_capacity(nodes);
+        for depth in &self.timetable.depth {
+            let earlier = state[next..next + depth * SAMPLE].chunks_exact(SAMPLE).map(|sample| motions(sample, self.time));
+            samples.push(earlier.rev().collect());
+            next += depth * SAMPLE;
+        }
+        let instants = Instants::of(self.timetable, nodes);
+        let mut held: Vec<Option<i64>> = vec![None; nodes * nodes];
+        for (to, from, sample) in &self.timetable.held {
+            held[to * nodes + from] = Some(*sample);
+        }
+        for event in &self.timetable.events {
+            match *event {
+                Event::Sample { node } => samples[node].push(peers[node].copy),
+                Event::Deliver { from, to, sample } => held[to * nodes + from] = Some(sample),
+                Event::Tick { node: to, at, span } => {
+                    let node = &self.nodes[to];
+                    let mut drawn = [0.0; 6];
+                    for from in 0..nodes {
+                        let Some(number) = held[to * nodes + from] else { continue };
+                        let age = instants.age(from, number, at, self.timetable.frame).min(node.horizon);
+                        let earlier = i64::try_from(self.timetable.depth[from]).unwrap_or(0);
+                        let sample = &samples[from][usize::try_from(earlier + number).unwrap_or(0)];
+                        for (axis, force) in drawn.iter_mut().enumerate() {
+                            let (gains, moved) = (&node.heard[axis], &sample[axis]);
+                            *force += self.weights[(to, from)]
+                                * (gains.stiffness * moved.position + (gains.damping + node.ahead[axis] * age) * moved.velocity);
+                        }
+                    }
+                    peers[to].tick(node, &drawn, span);
+                    *growth = growth.max(peers[to].largest(self.time));
+                }
+            }
+        }
+        let mut reached = vec![0.0; state.len()];
+        for ((node, peer), first) in self.nodes.iter().zip(&peers).zip(&firsts) {
+            peer.write(node, &mut reached[*first..], self.time);
+        }
+        let mut next: usize = self.nodes.iter().map(Node::states).sum();
+        for (samples, depth) in samples.iter().zip(&self.timetable.depth) {
+            for sample in samples.iter().rev().take(*depth) {
+                write(sample, &mut reached[next..], self.time);
+                next += SAMPLE;
+            }
+        }
+        reached
+    }
+}
+
+/// A node on its way.
+#[derive(Clone, Debug)]
+struct Moving {
+    copy: [Motion; 6],
+    device: Vec<Motion>,
+    /// The forces that act next, if they are applied a tick late.
+    on_copy: [f64; 6],
+    on_device: Vec<f64>,
+}
+
+impl Moving {
+    fn read(node: &Node, state: &[f64], time: f64) -> Self {
+        let devices = node.device.len();
+        let device = |component: usize| Motion { position: state[12 + component], velocity: state[12 + devices + component] / time };
+        let waiting = |component: usize| state[12 + 2 * devices + component] / (time * node.mobility);
+        let on_copy = std::array::from_fn(|axis| if node.compute_delay { waiting(axis) } else { 0.0 });
+        let on_device = (0..devices).map(|axis| if node.compute_delay && node.touching { waiting(6 + axis) } else { 0.0 }).collect();
+        Self { copy: motions(state, time), device: (0..devices).map(device).collect(), on_copy, on_device }
+    }
+
+    fn write(&self, node: &Node, state: &mut [f64], time: f64) {
+        write(&self.copy, state, time);
+        let devices = self.device.len();
+        for (component, motion) in self.device.iter().enumerate() {
+            state[12 + component] = motion.position;
+            state[12 + devices + component] = motion.velocity * time;
+        }
+        if node.compute_delay {
+            let waiting = self.on_copy.iter().chain(if node.touching { self.on_device.as_slice() } else { &[] });
+            for (entry, force) in state[12 + 2 * devices..].iter_mut().zip(waiting) {
+                *entry = force * time * node.mobility;
+            }
+        }
+    }
+
+    /// One tick under the forces of samples that draw the copy.
+    fn tick(&mut self, node: &Node, drawn: &[f64; 6], span: std::time::Duration) {
+        let mut on_copy: [f64; 6] = std::array::from_fn(|axis| drawn[axis] - node.own[axis].force(self.copy[axis]));
+        let mut on_device = vec![0.0; self.device.len()];
+        if node.touching {
+            let (positions, velocities) = (self.copy.map(|motion| motion.position), self.copy.map(|motion| motion.velocity));
+            for (component, grip) in node.grip.iter().enumerate() {
+                let held = Motion { position: dot(grip, &positions), velocity: dot(grip, &velocities) };
+                let force = node.coupling[component].force(self.device[component].relative_to(held));
+                on_device[component] = -force;
+                for (axis, sum) in on_copy.iter_mut().enumerate() {
+                    *sum += grip[axis] * force;
+                }
+            }
+        }
+        if node.compute_delay {
+            std::mem::swap(&mut self.on_copy, &mut on_copy);
+            std::mem::swap(&mut self.on_device, &mut on_device);
+        }
+        for ((motion, body), force) in self.copy.iter_mut().zip(&node.copy).zip(on_copy) {
+            body.map(span).advance(motion, force);
+        }
+        for ((motion, body), force) in self.device.iter_mut().zip(&node.device).zip(on_device) {
+            body.map(span).advance(motion, force);
+        }
+    }
+
+    /// The largest component, with its velocity as a length.
+    fn largest(&self, time: f64) -> f64 {
+        let size = |motion: &Motion| motion.position.abs() + time * motion.velocity.abs();
+        self.copy.iter().chain(&self.device).map(size).fold(0.0, f64::max)
+    }
+}
+
+fn motions(numbers: &[f64], time: f64) -> [Motion; 6] {
+    std::array::from_fn(|axis| Motion { position: numbers[axis], velocity: numbers[6 + axis] / time })
+}
+
+fn write(motions: &[Motion; 6], numbers: &mut [f64], time: f64) {
+    for (axis, motion) in motions.iter().enumerate() {
+        numbers[axis] = motion.position;
+        numbers[6 + axis] = motion.velocity * time;
+    }
+}
+
+fn dot(row: &[f64; 6], components: &[f64; 6]) -> f64 {
+    row.iter().zip(components).map(|(by, component)| by * component).sum()
+}

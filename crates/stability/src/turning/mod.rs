@@ -1,0 +1,111 @@
+//! The general path of objects that turn: all six components of each copy together, linearised at rest.
+//!
+//! Copies are together and at rest, in body axes, y = (δp, δθ), M = diag(m·I, J), G = \[I, −\[r\]\]:
+//!
+//! ```text
+//! M·ÿ = Gᵀ·FC + (0, τC) − diag(KT·I, KR)·(y − ȳ) − diag(BT·I, BR)·(ẏ − ẏ̄) − diag(bO·I, bR)·ẏ
+//! FC = KC·(δx − G·y) + BC·(δvH − G·ẏ),   τC = KCR·(δθH − δθ) + BCR·(δωH − δω)
+//! ```
+//!
+//! The terms that a peer has beyond these are products of small ones. Frames, samples and delays are those of [`crate::full`]; each component moves by the step
+//! map of one axis. Angles are multiplied by √(tr J/3m), so that all states are lengths. Peers that are equal, in their grasps too, are taken together.
+
+mod frame;
+mod node;
+mod rigid;
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use cohaptic_peer::Contact;
+use cohaptic_scene::Scene;
+
+use self::frame::Turning;
+use self::node::Node;
+use crate::analysis::{Analysis, ContactMode, combine};
+use crate::cost::eigenvalue_operations;
+use crate::network::NominalNetwork;
+use crate::parts::radius_of;
+use crate::spectrum::bounded_radius;
+use crate::structure::{Contacts, Structure, common_time};
+use crate::timetable::Timetable;
+use crate::{AnalysisError, Matrix, Method, Part, PartKind, Radius, Watch};
+
+/// Analyses an object that turns. [`Method::Full`] takes each peer by itself.
+pub(crate) fn analyse(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
+    let network = NominalNetwork::of(scene)?;
+    let mode = mode(scene, &network, method, watch)?;
+    let mut analysis = combine(vec![mode], method, &network, scene);
+    if scene.object.enclosure.is_some() {
+        analysis.notes.push("the enclosure is left out: the scene is analysed away from its walls".to_owned());
+    }
+    Ok(analysis)
+}
+
+/// The largest radius of all parts.
+pub(crate) fn radius(scene: &Scene, network: &NominalNetwork) -> Result<Radius, AnalysisError> {
+    mode(scene, network, Method::Reduced, &crate::Unwatched).map(|mode| mode.radius)
+}
+
+fn mode(scene: &Scene, network: &NominalNetwork, method: Method, watch: &dyn Watch) -> Result<ContactMode, AnalysisError> {
+    let contacts = contacts(scene)?;
+    let one_by_one = method == Method::Full;
+    let structure = if one_by_one { Structure::of_each(scene, network, &contacts)? } else { Structure::of(&[scene], network, &contacts)? };
+    let nodes: Vec<Node> = structure.classes.iter().map(|class| Node::of(scene, class[0])).collect();
+    let peers = structure.classes.iter().zip(&structure.touching).map(|(class, touching)| (class[0], *touching));
+    let time = common_time(scene, structure.timetable.frame, structure.law(scene, 0).held_by(), peers, false);
+    let free = if structure.silent { Vec::new() } else { rigid::displacements(&nodes) };
+    let together = Turning { nodes: &nodes, weights: &structure.weights, timetable: &structure.timetable, time, free };
+    let kind = if one_by_one { PartKind::Whole } else { PartKind::Together };
+    let mut parts = vec![part(&together, kind, 1, method, watch)?];
+    let mut dimension = 0;
+    let mut rigid_modes = together.free.len();
+    let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
+    for (class, members) in structure.classes.iter().enumerate() {
+        let node = &nodes[class];
+        rigid_modes += members.len() * node.loose().count();
+        dimension += members.len() * (node.states() + frame::SAMPLE * structure.timetable.depth[class]);
+        let Some(timetable) = &structure.apart[class] else { continue };
+        let apart = Turning { nodes: &nodes[class..=class], weights: &weight, timetable, time, free: Vec::new() };
+        let part = part(&apart, PartKind::Apart { peer: members[0] }, members.len() - 1, method, watch)?;
+        parts.push(Part { radius: part.radius.over(repeats(&structure.timetable, timetable)), ..part });
+    }
+    Ok(ContactMode {
+        motion: "translations and turns together".to_owned(),
+        contacts: String::new(),
+        radius: radius_of(&parts),
+        parts,
+        rigid_modes,
+        dimension: dimension - rigid_modes,
+        frame: structure.timetable.frame,
+    })
+}
+
+/// How many frames of a class on its own the frame of all takes.
+fn repeats(all: &Timetable, own: &Timetable) -> u32 {
+    let nanos = |frame: Duration| frame.as_nanos().max(1);
+    u32::try_from(nanos(all.frame) / nanos(own.frame)).unwrap_or(u32::MAX)
+}
+
+fn part(turning: &Turning<'_>, kind: PartKind, copies: usize, method: Method, watch: &dyn Watch) -> Result<Part, AnalysisError> {
+    let (matrix, error) = turning.monodromy(watch).ok_or(AnalysisError::Stopped)?;
+    // Eigenvalues cannot ask.
+    if watch.stops() {
+        return Err(AnalysisError::Stopped);
+    }
+    let radius = bounded_radius(&matrix, error);
+    watch.done(eigenvalue_operations(matrix.rows()));
+    let method = if method == Method::Full { Method::Full } else { Method::Reduced };
+    Ok(Part { kind, size: matrix.rows(), copies, radius, method })
+}
+
+/// Who holds the object. A finger would push along an axis of the world.
+fn contacts(scene: &Scene) -> Result<Contacts, AnalysisError> {
+    if scene.peers.iter().any(|spec| matches!(spec.contact, Contact::Push(_))) {
+        let why = scene.rotation_parts().and_then(Result::err).unwrap_or("all components are taken together");
+        return Err(AnalysisError::Turns { what: "a one-sided contact", why });
+    }
+    let touching = scene.peers.iter().map(|spec| spec.contact == Contact::Grasp).collect();
+    Ok(Contacts { touching, at_wall: false, absent: vec![false; scene.peers.len()] })
+}
