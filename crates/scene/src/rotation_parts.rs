@@ -57,7 +57,7 @@ impl Scene {
             return Some(Err("with semi-implicit-euler turns move by another step than translations"));
         }
         let grasps = || rotation.peers.iter().zip(&self.peers).filter(|(_, spec)| spec.contact != Contact::None).map(|(peer, _)| peer.grasp);
-        if grasps().all(|grasp| grasp == [0.0; 3]) {
+        if grasps().all(is_zero) {
             let parts = merged((0..3).map(|axis| self.translation(axis)).chain((0..3).map(|axis| self.turn(rotation, axis))));
             return Some(Ok(RotationParts { reason: "the object is held at its centre alone, so no force turns it", parts }));
         }
@@ -79,20 +79,19 @@ impl Scene {
     #[must_use]
     pub fn turns_about_rest(&self) -> bool {
         let Some(rotation) = &self.rotation else { return true };
-        let zero = |vector: &[f64; 3]| *vector == [0.0; 3];
         let (first, peers) = (rotation.peers[0].attitude, rotation.peers.iter().zip(&self.peers));
-        let is_idle = |signal: &Signal| matches!(signal, Signal::Constant(constant) if zero(constant));
+        let is_idle = |signal: &Signal| matches!(signal, Signal::Constant(constant) if is_zero(*constant));
         peers.enumerate().all(|(place, (peer, spec))| {
-            let together = spec.position == self.peers[0].position && peer.attitude.angle_to(&first.orientation) == 0.0;
+            let together = same(spec.position, self.peers[0].position) && peer.attitude.angle_to(&first.orientation) == 0.0;
             let start = self.initial_device::<3>(place).position;
             let idle = match &spec.hand {
                 None => true,
                 Some(Hand::Force(force)) => is_idle(force),
                 // An arm that wants its device where it begins.
-                Some(Hand::Arm { follows, .. }) => matches!(follows, Signal::Constant(wanted) if *wanted == start),
+                Some(Hand::Arm { follows, .. }) => matches!(follows, Signal::Constant(wanted) if same(*wanted, start)),
             };
             let untwisted = peer.device.as_ref().and_then(|device| device.torque.as_ref()).is_none_or(is_idle);
-            together && zero(&spec.velocity) && zero(&peer.attitude.rate) && idle && untwisted
+            together && is_zero(spec.velocity) && is_zero(peer.attitude.rate) && idle && untwisted
         })
     }
 
@@ -100,7 +99,7 @@ impl Scene {
     fn why_not_pivots(&self, rotation: &RotationSpec, grasp: Triple) -> Option<&'static str> {
         let mut peers = rotation.peers.iter().zip(&self.peers);
         let touches = |spec: &PeerSpec| spec.contact != Contact::None;
-        if peers.clone().any(|(peer, spec)| touches(spec) && peer.grasp != grasp) {
+        if peers.clone().any(|(peer, spec)| touches(spec) && !same(peer.grasp, grasp)) {
             Some("the object is held at different points")
         } else if peers.any(|(peer, spec)| peer.device.is_some() || matches!(spec.contact, Contact::Push(_))) {
             Some("a device turns, or a finger pushes, off the centre")
@@ -142,11 +141,9 @@ impl Scene {
         let object = ObjectSpec { mass: rotation.inertia[axis], damping, enclosure: None, ..self.object_at_rest() };
         let (usual, own) = (self.coordination.gains, &rotation.gains);
         let gains = Gains { stiffness: of(own.stiffness, usual.stiffness), damping: of(own.damping, usual.damping) };
-        let strategy = match self.coordination.strategy {
-            // Orientations are held as they came.
-            Coordination::Extrapolated => Coordination::AveragePosition,
-            other => other,
-        };
+        // Orientations are held as they came.
+        let is_extrapolated = self.coordination.strategy == Coordination::Extrapolated;
+        let strategy = if is_extrapolated { Coordination::AveragePosition } else { self.coordination.strategy };
         let peers = rotation.peers.iter().zip(&self.peers).map(|(peer, spec)| {
             let spec = PeerSpec { hand: None, ..at_rest(spec) };
             match &peer.device {
@@ -187,6 +184,15 @@ impl Scene {
     }
 }
 
+/// Whether two vectors have equal numbers.
+fn same(one: Triple, other: Triple) -> bool {
+    is_zero(std::array::from_fn(|axis| one[axis] - other[axis]))
+}
+
+fn is_zero(vector: Triple) -> bool {
+    vector.iter().all(|component| *component == 0.0)
+}
+
 /// A peer that begins at rest, whose hand does nothing but hold.
 fn at_rest(spec: &PeerSpec) -> PeerSpec {
     let hand = spec.hand.as_ref().and_then(Hand::arm).map(|arm| Hand::Arm { arm, follows: Signal::Constant([0.0; 3]) });
@@ -221,7 +227,7 @@ fn effective_masses(mass: f64, inertia: Triple, grasp: Triple) -> [f64; 3] {
     let along = unit(grasp);
     // The axis that is farthest from r gives the first vector across it.
     let least = (0..3).min_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs())).unwrap_or(0);
-    let axis = core::array::from_fn(|component| if component == least { 1.0 } else { 0.0 });
+    let axis = std::array::from_fn(|component| if component == least { 1.0 } else { 0.0 });
     let u = unit(cross(along, axis));
     let v = cross(along, u);
     let weighed = |a: Triple, b: Triple| radius * radius * (0..3).map(|axis| a[axis] * b[axis] / inertia[axis]).sum::<f64>();

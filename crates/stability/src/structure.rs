@@ -254,7 +254,7 @@ fn turn_alike(scene: &Scene, one: usize, other: usize, touching: bool) -> bool {
     scene.rotation.as_ref().is_none_or(|rotation| {
         let (one, other) = (&rotation.peers[one], &rotation.peers[other]);
         let device = |peer: &PeerRotation| peer.device.as_ref().map(|device| (device.handle, device.coupling));
-        device(one) == device(other) && (!touching || one.grasp == other.grasp)
+        device(one) == device(other) && (!touching || one.grasp.iter().zip(&other.grasp).all(|(one, other)| one - other == 0.0))
     })
 }
 
