@@ -74,7 +74,8 @@ fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice 
     let spec = &scene.peers[peer];
     // A device that turns, or that begins with the motion of a point of a turning copy, is not at rest.
     let turns = scene.rotation.as_ref().map(|rotation| &rotation.peers[peer]);
-    let moves = spec.velocity.iter().any(|v| *v != 0.0) || turns.is_some_and(|turns| turns.device.is_some() || turns.attitude.rate != [0.0; 3]);
+    let moves = spec.velocity.iter().any(|v| *v != 0.0)
+        || turns.is_some_and(|turns| turns.device.is_some() || turns.attitude.rate.iter().any(|rate| *rate != 0.0));
     let touches_later = scene
         .timeline
         .iter()

@@ -4,7 +4,7 @@ use cohaptic_peer::coordination::Pull;
 use cohaptic_peer::rotation::{Attitude, DeviceRotation, HeldAttitudes, Rotation, RotationConfig, Spin, Triple};
 use cohaptic_peer::{Coordination, Gains, Signal, State};
 
-use crate::{ChangeKind, Scene};
+use crate::{Change, ChangeKind, Scene};
 
 /// How the object of a scene turns.
 #[derive(Clone, PartialEq, Debug)]
@@ -141,12 +141,9 @@ impl Scene {
             ));
         }
         let turns = |place: usize| rotation.peers[place].device.is_some();
-        let pushed = self.timeline.iter().find_map(|change| match &change.what {
-            ChangeKind::HandTorque { peer, torque: Some(_) } if !turns(*peer) => Some(*peer),
-            _ => None,
-        });
-        if let Some(peer) = pushed {
-            let name = &self.peers[peer].name;
+        let pushes = |change: &&Change| matches!(change.what, ChangeKind::HandTorque { peer, torque: Some(_) } if !turns(peer));
+        if let Some(Change { what: ChangeKind::HandTorque { peer, .. }, .. }) = self.timeline.iter().find(pushes) {
+            let name = &self.peers[*peer].name;
             return Some(format!("the timeline gives the hand of peer \"{name}\" a torque, whose device does not turn: expected device.inertia"));
         }
         self.leaves_out_samples().then(|| "dead bands say nothing of attitudes: expected no send-when with an object with an inertia".to_owned())
@@ -189,7 +186,7 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         assert_eq!(config.gains, Gains { stiffness: [15.0, 30.0, 45.0], damping: [3.0, 6.0, 9.0] });
         let scaled = self::scene(&["coordination.scaling=inverse-n", "coordination.rotational-stiffness=8"]).unwrap();
         // 4·3/16 times three others.
-        assert_eq!(scaled.rotation_gains(scaled.coordination.gains).unwrap().stiffness, [18.0; 3]);
+        assert_eq!(scaled.rotation_gains(scaled.coordination.gains).map(|gains| gains.stiffness), Some([18.0; 3]));
         assert_eq!(scene.sample_kind(), SampleKind::Attitude);
     }
 
@@ -200,7 +197,7 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         let State { position, velocity } = scene.initial_device::<3>(0);
         let apart = |a: [f64; 3], b: [f64; 3]| (0..3).map(|axis| (a[axis] - b[axis]).abs()).fold(0.0, f64::max);
         assert!(apart(position, [0.0, 0.1, 0.0]) < 1e-16 && apart(velocity, [-0.3, 0.0, 0.0]) < 1e-15, "{position:?} {velocity:?}");
-        assert_eq!(scene.initial_device::<3>(1).position, [0.1, 0.0, 0.0]);
+        assert!(apart(scene.initial_device::<3>(1).position, [0.1, 0.0, 0.0]) < 1e-16);
     }
 
     #[test]

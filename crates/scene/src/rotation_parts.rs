@@ -178,7 +178,7 @@ impl Scene {
         ObjectSpec { position: [0.0; 3], velocity: [0.0; 3], ..self.object.clone() }
     }
 
-    /// The scene along one axis with that coordination and none of what is only for a run.
+    /// The scene along one axis with that coordination, without timeline, measures and expectations.
     fn without_turns(&self, coordination: CoordinationSpec) -> Self {
         Self { axes: Axes::One, rotation: None, coordination, timeline: Vec::new(), measure: None, expect: None, ..self.clone() }
     }
@@ -221,7 +221,9 @@ fn merged(parts: impl Iterator<Item = RotationPart>) -> Vec<RotationPart> {
 /// Along r, μ = 1/m. With unit vectors u, v across it, uᵀWu = 1/m + r²·vᵀJ⁻¹v, vᵀWv = 1/m + r²·uᵀJ⁻¹u and uᵀWv = −r²·uᵀJ⁻¹v.
 fn effective_masses(mass: f64, inertia: Triple, grasp: Triple) -> [f64; 3] {
     let cross = |a: Triple, b: Triple| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let length = |a: Triple| a[0].hypot(a[1]).hypot(a[2]);
+    // Roots of sums of squares are the same on all platforms, which the hypot of the standard library is not.
+    let hypot = |a: f64, b: f64| (a * a + b * b).sqrt();
+    let length = |a: Triple| hypot(hypot(a[0], a[1]), a[2]);
     let unit = |a: Triple| a.map(|component| component / length(a));
     let radius = length(grasp);
     let along = unit(grasp);
@@ -232,7 +234,7 @@ fn effective_masses(mass: f64, inertia: Triple, grasp: Triple) -> [f64; 3] {
     let v = cross(along, u);
     let weighed = |a: Triple, b: Triple| radius * radius * (0..3).map(|axis| a[axis] * b[axis] / inertia[axis]).sum::<f64>();
     let (of_u, of_v, of_both) = (weighed(v, v), weighed(u, u), -weighed(u, v));
-    let (middle, apart) = (1.0 / mass + 0.5 * (of_u + of_v), (0.5 * (of_u - of_v)).hypot(of_both));
+    let (middle, apart) = (1.0 / mass + 0.5 * (of_u + of_v), hypot(0.5 * (of_u - of_v), of_both));
     [mass, 1.0 / (middle - apart), 1.0 / (middle + apart)]
 }
 

@@ -70,7 +70,7 @@ impl Turning {
                 text += "device = { inertia = 0.0001 }\ncoupling = { rotational-stiffness = 0.5, rotational-damping = 0.001 }\n";
             }
         }
-        Scene::parse(&text, Path::new("turning.toml"), &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
+        Scene::parse(&text, Path::new("turning.toml"), &[]).unwrap_or_else(|error| unreachable!("{error}\n{text}"))
     }
 
     /// Each copy at each tick: position, velocity and attitude, if the object turns.

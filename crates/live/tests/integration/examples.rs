@@ -49,7 +49,7 @@ impl Mechanics {
             ("--force", force.to_string()),
         ];
         let triple = |[x, y, z]: [f64; 3]| format!("{x},{y},{z}");
-        let turning = turning.into_iter().flat_map(|(inertia, grasp)| [("--inertia", triple(*inertia)), ("--grasp", triple(*grasp))]);
+        let turning = turning.iter().flat_map(|(inertia, grasp)| [("--inertia", triple(*inertia)), ("--grasp", triple(*grasp))]);
         options.into_iter().chain(turning).flat_map(|(name, value)| [name.to_owned(), value]).collect()
     }
 

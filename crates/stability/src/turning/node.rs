@@ -88,9 +88,9 @@ impl Node {
     }
 
     /// The components of a device that touches nothing and that nothing holds: where it is, nothing depends on.
-    pub(super) fn loose(&self) -> std::ops::Range<usize> {
+    pub(super) fn loose(&self) -> impl Iterator<Item = usize> {
         let held = if self.armed { 3 } else { 0 };
-        held..if self.touching { held } else { self.device.len() }
+        held..if self.touching { 0 } else { self.device.len() }
     }
 }
 

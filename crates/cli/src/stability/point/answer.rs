@@ -122,8 +122,8 @@ pub(super) fn describe(scene: &Scene, judgement: &Judgement, worst: Option<&Scen
     }
     if let Some(mode) = worst_mode(analysis).filter(|mode| mode.parts.len() > 1) {
         line(String::new());
-        let name = [mode.motion.as_str(), mode.contacts.as_str()].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ");
-        line(if name.is_empty() { "parts that do not mix".to_owned() } else { format!("parts that do not mix, {name}") });
+        let of_mode = [mode.motion.as_str(), mode.contacts.as_str()].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ");
+        line(if of_mode.is_empty() { "parts that do not mix".to_owned() } else { format!("parts that do not mix, {of_mode}") });
         for part in &mode.parts {
             line(format!("  {:<44}{:>4} states, {:>4} times  {}", name(scene, part), part.size, part.copies, number(part.radius)));
         }
