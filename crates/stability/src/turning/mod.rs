@@ -100,7 +100,7 @@ fn part(turning: &Turning<'_>, kind: PartKind, copies: usize, method: Method, wa
     Ok(Part { kind, size: matrix.rows(), copies, radius, method })
 }
 
-/// Who holds the object. A finger would push along an axis of the world.
+/// The peers whose devices hold the object. A finger would push along an axis of the world.
 fn contacts(scene: &Scene) -> Result<Contacts, AnalysisError> {
     if scene.peers.iter().any(|spec| matches!(spec.contact, Contact::Push(_))) {
         let why = scene.rotation_parts().and_then(Result::err).unwrap_or("all components are taken together");
