@@ -4,7 +4,7 @@ use cohaptic_peer::Strategy;
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_scene::{Axes, FromScene, Scene, Strategies};
 
-use crate::arrays::{Arrays, Shape};
+use crate::arrays::{self, Shape};
 use crate::disturbance::Disturbance;
 use crate::observer::{INSTANTS_BETWEEN_QUESTIONS, Observer};
 use crate::plan::{Model, Plan};
@@ -68,12 +68,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         assert!(too_large(self.scene).is_none(), "a scene with more peers than a simulation takes is not run");
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         if let Some((shape, law)) = self.arrays(&plan, Watch::of(observer)) {
-            let keep_going = |now| observer.keep_going(now);
-            let [summary] = match plan.axes {
-                Axes::One => Arrays::<1, 1>::new([self.scene], shape, [law]).run(keep_going),
-                Axes::Two => Arrays::<2, 1>::new([self.scene], shape, [law]).run(keep_going),
-                Axes::Three => Arrays::<3, 1>::new([self.scene], shape, [law]).run(keep_going),
-            };
+            let [summary] = arrays::run([self.scene], shape, [law], |now| observer.keep_going(now));
             return Ok(summary);
         }
         match plan.axes {

@@ -12,7 +12,7 @@ use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkName, LinkStats};
 
 use super::quads::{self, Quad};
 use super::{Sample, others};
-use crate::arrays::blocks::Blocks;
+use crate::arrays::bodies::Bodies;
 
 /// Ticks ahead that lie in the wheel; what arrives later than that is kept aside.
 const HORIZON: u64 = 256;
@@ -26,18 +26,18 @@ fn slot(tick: u64) -> usize {
 
 /// The links, the samples in flight, and those that each peer holds of each other.
 #[derive(Clone, Debug)]
-pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
+pub(in crate::arrays) struct PerPacket<const P: usize, const L: usize> {
     peers: usize,
     ticks: Ticks,
     end: Instant,
     /// By sender, then receiver, then run; the diagonal is never used.
     links: DirectLinks,
-    wheel: Box<[Bucket<A>; 256]>,
-    beyond: BTreeMap<u64, Bucket<A>>,
+    wheel: Box<[Bucket<P>; 256]>,
+    beyond: BTreeMap<u64, Bucket<P>>,
     /// Memory of buckets that were emptied, the latest last: it is what the cache holds. It took 5 % off a tick of ten peers whose packets arrive together.
-    emptied: Vec<Vec<Packet<A>>>,
-    /// Samples held, by axis, then receiver, then sender with the receiver left out. Each receiver has [`row_of`] places, of which the last may be empty.
-    held: [Vec<Quad<L>>; A],
+    emptied: Vec<Vec<Packet<P>>>,
+    /// Samples held, by pair of numbers, then receiver, then sender with the receiver left out. Each receiver has [`row_of`] places, of which the last may be empty.
+    held: [Vec<Quad<L>>; P],
     /// By place, then run: the lowest sequence number that is newer than the sample held.
     next: Vec<u64>,
     /// By receiver: bit r says whether a sample has arrived in run r since the means were computed.
@@ -48,28 +48,28 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
 
 /// The samples in force at a tick.
 #[derive(Clone, Debug)]
-struct Bucket<const A: usize> {
-    packets: Vec<Packet<A>>,
+struct Bucket<const P: usize> {
+    packets: Vec<Packet<P>>,
     /// Whether one of them overtook another that may be here too.
     is_mixed: bool,
 }
 
-impl<const A: usize> Default for Bucket<A> {
+impl<const P: usize> Default for Bucket<P> {
     fn default() -> Self {
         Self { packets: Vec::new(), is_mixed: false }
     }
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Packet<const A: usize> {
+struct Packet<const P: usize> {
     arrival: Instant,
     sequence: u64,
     /// Where its receiver holds what it says.
     place: u32,
     receiver: u16,
     run: u16,
-    position: [f64; A],
-    velocity: [f64; A],
+    position: [f64; P],
+    velocity: [f64; P],
 }
 
 /// How many places a receiver has for what it holds: whole quads.
@@ -101,9 +101,9 @@ impl Ticks {
     }
 }
 
-impl<const A: usize, const L: usize> PerPacket<A, L> {
+impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
-    pub(in crate::arrays) fn new(scenes: &[&Scene], end: Instant, tick_nanos: u64) -> Self {
+    pub(in crate::arrays) fn new<const A: usize>(scenes: &[&Scene], bodies: &impl Bodies<A, P>, end: Instant, tick_nanos: u64) -> Self {
         let peers = scenes[0].peers.len();
         let mut links = DirectLinks::new(end);
         for from in 0..peers {
@@ -131,11 +131,11 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             stale: vec![0; peers * L],
         };
         for sender in 0..peers {
-            let sample = Sample::<A, L>::initial(scenes, sender);
+            let sample: Sample<P, L> = bodies.sample(sender);
             for receiver in (0..peers).filter(|receiver| *receiver != sender) {
-                for (axis, run) in (0..A).flat_map(|axis| (0..L).map(move |run| (axis, run))) {
+                for (pair, run) in (0..P).flat_map(|pair| (0..L).map(move |run| (pair, run))) {
                     let place = receiver * row_of(peers) + sender - usize::from(sender > receiver);
-                    quads::set(&mut single.held[axis], place, run, sample.position[axis][run], sample.velocity[axis][run]);
+                    quads::set(&mut single.held[pair], place, run, sample.position[pair][run], sample.velocity[pair][run]);
                 }
             }
         }
@@ -145,8 +145,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// A peer sends to all others. A run that has ended goes on sending; nobody looks.
     #[inline(never)]
     #[expect(clippy::cast_possible_truncation, reason = "there are at most 4096 peers, and eight runs")]
-    pub(in crate::arrays) fn send(&mut self, tick: u64, now: Instant, sender: usize, blocks: &Blocks<A>) {
-        let sample = Sample::<A, L>::of(blocks, sender);
+    pub(in crate::arrays) fn send<const A: usize>(&mut self, tick: u64, now: Instant, sender: usize, bodies: &impl Bodies<A, P>) {
+        let sample: Sample<P, L> = bodies.sample(sender);
         let Self { peers, ticks, links, wheel, beyond, emptied, .. } = self;
         let (row, places) = (*peers * L, row_of(*peers));
         let mut arrivals = Arrivals::NONE;
@@ -171,8 +171,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                     place: (receiver * places + sender - usize::from(sender > receiver)) as u32,
                     receiver: receiver as u16,
                     run: run as u16,
-                    position: std::array::from_fn(|axis| sample.position[axis][run]),
-                    velocity: std::array::from_fn(|axis| sample.velocity[axis][run]),
+                    position: std::array::from_fn(|pair| sample.position[pair][run]),
+                    velocity: std::array::from_fn(|pair| sample.velocity[pair][run]),
                 });
             }
         }
@@ -184,7 +184,11 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     }
 
     /// How what a peer holds in a run moves on, in the order in which the peer holds it. `sent` says when a sample of a sender was sent.
-    pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
+    pub(in crate::arrays) fn moving<const A: usize>(
+        &self,
+        (peer, run): (usize, usize),
+        sent: impl Fn(usize, u64) -> Instant,
+    ) -> impl Iterator<Item = Moving<A>> {
         let first = peer * row_of(self.peers);
         (0..self.peers - 1).map(move |place| {
             let sender = place + usize::from(place >= peer);
@@ -203,16 +207,16 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
 
     /// The means are those of the samples held.
     #[inline(always)]
-    pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks<A>) {
+    pub(in crate::arrays) fn refresh<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
         let count = others(self.peers);
         for peer in 0..self.peers {
             if std::mem::take(&mut self.changed[peer]) == 0 {
                 continue;
             }
             let quads = row_of(self.peers) / 4;
-            for axis in 0..A {
-                let (x, v) = quads::mean(&self.held[axis][peer * quads..(peer + 1) * quads], count);
-                blocks.set_target(axis, peer, x, v);
+            for pair in 0..P {
+                let (x, v) = quads::mean(&self.held[pair][peer * quads..(peer + 1) * quads], count);
+                bodies.set_target(pair, peer, x, v);
             }
         }
     }
@@ -255,7 +259,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     }
 
     #[inline(always)]
-    fn receive(&mut self, packet: &Packet<A>) {
+    fn receive(&mut self, packet: &Packet<P>) {
         let (place, run) = (packet.place as usize, usize::from(packet.run));
         let next = &mut self.next[place * L + run];
         if packet.sequence < *next {
@@ -263,8 +267,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             return;
         }
         *next = packet.sequence + 1;
-        for axis in 0..A {
-            quads::set(&mut self.held[axis], place, run, packet.position[axis], packet.velocity[axis]);
+        for pair in 0..P {
+            quads::set(&mut self.held[pair], place, run, packet.position[pair], packet.velocity[pair]);
         }
         self.changed[usize::from(packet.receiver)] |= 1 << packet.run;
     }
