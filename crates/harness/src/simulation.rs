@@ -68,8 +68,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         assert!(too_large(self.scene).is_none(), "a scene with more peers than a simulation takes is not run");
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         if let Some((shape, law)) = self.arrays(&plan, Watch::of(observer)) {
-            let [summary] = arrays::run([self.scene], shape, [law], |now| observer.keep_going(now));
-            return Ok(summary);
+            return Ok(arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now)));
         }
         match plan.axes {
             Axes::One => run_to_end(self.world::<1, _>(&plan, NoRemote), observer),
