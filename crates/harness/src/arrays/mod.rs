@@ -60,10 +60,9 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     /// The scenes at their beginning, all of that shape.
     pub(crate) fn new(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L]) -> Self {
         let places = Places { peers: shape.peers, runs: L };
-        let tick_nanos = nanos(shape.tick);
         let samples = match shape.delay {
-            Some(delay) => Samples::Broadcast(Broadcast::new(&scenes, nanos(delay).div_ceil(tick_nanos))),
-            None => Samples::PerPacket(PerPacket::new(&scenes, shape.end, tick_nanos)),
+            Some(delay) => Samples::Broadcast(Broadcast::new(&scenes, nanos(delay).div_ceil(nanos(shape.tick)))),
+            None => Samples::PerPacket(PerPacket::new(&scenes, &shape)),
         };
         Self {
             law: law_of_lanes(&laws),
@@ -95,7 +94,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         let mut tick = 0;
         loop {
             let now = Instant::from_nanos(tick * tick_nanos);
-            if tick > 0 && tick % u64::from(INSTANTS_BETWEEN_QUESTIONS) == 0 {
+            if is_asked_before(tick) {
                 let before = Instant::from_nanos((tick - 1) * tick_nanos);
                 if !keep_going(before) {
                     self.end_all(tick, |_| Ending::Interrupted(before));
@@ -104,7 +103,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             }
             if now >= self.shape.end {
                 if let Samples::PerPacket(samples) = &mut self.samples {
-                    samples.finish(tick);
+                    samples.finish(self.shape.before(tick));
                 }
                 let end = self.shape.end;
                 self.end_all(tick, |finite| if finite { Ending::Complete } else { Ending::Diverged(end) });
@@ -122,6 +121,9 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     /// Everything that happens at a tick.
     #[inline(always)]
     fn step(&mut self, law: &impl LawOfLanes, tick: u64, now: Instant) {
+        if self.shape.has_queues && is_asked_before(tick) {
+            self.pass(tick);
+        }
         if tick == self.earliest_send {
             self.send(tick, now);
         }
@@ -182,10 +184,18 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             *next += self.shape.send_every;
             match &mut self.samples {
                 Samples::Broadcast(samples) => samples.send(tick, peer, &self.blocks),
-                Samples::PerPacket(samples) => samples.send(tick, now, peer, &self.blocks),
+                Samples::PerPacket(samples) => samples.send(tick, (now, until(&self.shape, tick, *next)), peer, &self.blocks),
             }
         }
         self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
+    }
+
+    /// Queues did nothing yet that happens at this tick or later.
+    #[cold]
+    fn pass(&mut self, tick: u64) {
+        if let Samples::PerPacket(samples) = &mut self.samples {
+            samples.pass(self.shape.before(tick), |sender| until(&self.shape, tick, self.next_send[sender]));
+        }
     }
 
     /// Ends the runs that have diverged before that tick, and says whether none is left.
@@ -299,6 +309,17 @@ impl<W: LawOfLanes, const A: usize, const L: usize> NullaryFnOnce for Motion<'_,
         }
         self.blocks.advance::<L>(self.law)
     }
+}
+
+/// Whether the observer is asked, before that tick, whether to go on.
+fn is_asked_before(tick: u64) -> bool {
+    tick > 0 && tick.is_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS))
+}
+
+/// Until when a queue may look at this tick: until its sender sends next, and not beyond the latest tick before the run may be interrupted.
+fn until(shape: &Shape, tick: u64, next_send: u64) -> Instant {
+    let asked = (tick + 1).next_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS));
+    Instant::from_nanos(next_send.min(asked - 1) * nanos(shape.tick))
 }
 
 /// A span of at most a year.

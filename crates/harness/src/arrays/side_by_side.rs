@@ -41,7 +41,7 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
 /// peers half of it. Where each packet has an arrival of its own, that is most of the work and done for each run by itself: eight runs of three peers take
 /// half, of ten peers five sixths, and from sixteen peers on more than alone, since eight times the samples in flight do not fit into the nearest cache.
 fn pays(shape: &Shape, alike: usize) -> bool {
-    if shape.delay.is_some() { alike >= 5 } else { alike >= 7 && shape.peers <= 12 }
+    if shape.delay.is_some() { alike >= 5 } else { alike >= 7 && shape.peers <= 12 && !shape.has_queues }
 }
 
 /// Whether two scenes can be run side by side.

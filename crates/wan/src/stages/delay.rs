@@ -288,22 +288,52 @@ impl DelayStage {
             StageLaw::Correlated(correlated) => {
                 let Correlated { checked, chain } = &mut **correlated;
                 let fresh = standard_normal(word, || more.next_word());
-                let z = match *chain {
-                    None => fresh,
-                    Some((before, at)) => {
-                        let phi = match checked.memory {
-                            Memory::None => 0.0,
-                            Memory::PerPacket(phi) => phi,
-                            Memory::InTime { tau_nanos } => libm::exp(-nanos(now.saturating_duration_since(at)) / tau_nanos),
-                        };
-                        phi * before + libm::sqrt((1.0 - phi) * (1.0 + phi)) * fresh
-                    }
-                };
+                let z = chain.map_or(fresh, |(before, at)| {
+                    let phi = match checked.memory {
+                        Memory::None => 0.0,
+                        Memory::PerPacket(phi) => phi,
+                        Memory::InTime { tau_nanos } => libm::exp(-nanos(now.saturating_duration_since(at)) / tau_nanos),
+                    };
+                    phi * before + fresh_share(phi) * fresh
+                });
                 *chain = Some((z, now));
                 count(checked.law.at_normal(z))
             }
         }
     }
+}
+
+/// Correlated delays of many links, each of which keeps its own chain.
+#[derive(Clone, Debug)]
+pub(crate) struct CorrelatedDelays {
+    checked: Arc<Checked>,
+    phi: f64,
+    fresh_share: f64,
+}
+
+impl CorrelatedDelays {
+    /// Those of a delay, if it is correlated from packet to packet.
+    pub(crate) fn new(delay: &Delay) -> Option<Self> {
+        let checked = delay.jitter.as_ref()?;
+        let Memory::PerPacket(phi) = checked.memory else { return None };
+        Some(Self { checked: Arc::clone(checked), phi, fresh_share: fresh_share(phi) })
+    }
+
+    /// The delay \[ns\] of a packet. `chain` is the latest value of its link's chain, NaN before the first packet.
+    #[inline(always)]
+    pub(crate) fn draw_nanos(&self, chain: &mut f64, word: u64, packet: PacketDraws) -> u64 {
+        let fresh = in_the_core(word).unwrap_or_else(|| {
+            let mut more = packet.more(Purpose::Jitter);
+            outside_the_core(word, || more.next_word())
+        });
+        *chain = if chain.is_nan() { fresh } else { self.phi * *chain + self.fresh_share * fresh };
+        count(self.checked.law.at_normal(*chain))
+    }
+}
+
+/// What a fresh number adds to a chain of variance one.
+fn fresh_share(phi: f64) -> f64 {
+    libm::sqrt((1.0 - phi) * (1.0 + phi))
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a span enters a random law as a real number")]

@@ -8,11 +8,12 @@ use std::collections::BTreeMap;
 use cohaptic_peer::Moving;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
-use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkName, LinkStats};
+use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkModel, LinkName, LinkStats, PacketInfo, SteppedLinks};
 
 use super::quads::{self, Quad};
 use super::{Sample, others};
 use crate::arrays::blocks::Blocks;
+use crate::arrays::{Shape, nanos};
 
 /// Ticks ahead that lie in the wheel; what arrives later than that is kept aside.
 const HORIZON: u64 = 256;
@@ -28,14 +29,10 @@ fn slot(tick: u64) -> usize {
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     peers: usize,
-    ticks: Ticks,
     end: Instant,
     /// By sender, then receiver, then run; the diagonal is never used.
-    links: DirectLinks,
-    wheel: Box<[Bucket<A>; 256]>,
-    beyond: BTreeMap<u64, Bucket<A>>,
-    /// Memory of buckets that were emptied, the latest last: it is what the cache holds. It took 5 % off a tick of ten peers whose packets arrive together.
-    emptied: Vec<Vec<Packet<A>>>,
+    links: Links<A>,
+    in_flight: InFlight<A>,
     /// Samples held, by axis, then receiver, then sender with the receiver left out. Each receiver has [`row_of`] places, of which the last may be empty.
     held: [Vec<Quad<L>>; A],
     /// By place, then run: the lowest sequence number that is newer than the sample held.
@@ -44,6 +41,24 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     changed: Vec<u8>,
     /// By receiver, then run: samples that arrived after a newer one.
     stale: Vec<u64>,
+}
+
+/// The links, with what all samples have in common if links ask.
+#[derive(Clone, Debug)]
+enum Links<const A: usize> {
+    Direct(DirectLinks),
+    /// They are told when each sender sends next.
+    Stepped(SteppedLinks<Packet<A>>, PacketInfo),
+}
+
+/// The samples in flight, by the tick at which they are in force.
+#[derive(Clone, Debug)]
+struct InFlight<const A: usize> {
+    ticks: Ticks,
+    wheel: Box<[Bucket<A>; 256]>,
+    beyond: BTreeMap<u64, Bucket<A>>,
+    /// Memory of buckets that were emptied, the latest last: it is what the cache holds. It took 5 % off a tick of ten peers whose packets arrive together.
+    emptied: Vec<Vec<Packet<A>>>,
 }
 
 /// The samples in force at a tick.
@@ -103,28 +118,37 @@ impl Ticks {
 
 impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
-    pub(in crate::arrays) fn new(scenes: &[&Scene], end: Instant, tick_nanos: u64) -> Self {
+    pub(in crate::arrays) fn new(scenes: &[&Scene], shape: &Shape) -> Self {
         let peers = scenes[0].peers.len();
-        let mut links = DirectLinks::new(end);
+        let mut links = match shape.has_queues {
+            false => Links::Direct(DirectLinks::new(shape.end, shape.size)),
+            true => Links::Stepped(SteppedLinks::new(shape.end), PacketInfo { size: shape.size, ecn_capable: true }),
+        };
         for from in 0..peers {
             for to in 0..peers {
                 for scene in scenes {
                     // The diagonal has a link that nothing is ever sent over, so that a place is found by multiplying.
                     let (from, to) = if from == to { (0, 1) } else { (from, to) };
                     let name = LinkName::between(&scene.peers[from].name, &scene.peers[to].name);
-                    assert!(links.add(scene.seed, &name, scene.links.between(from, to)), "the shape of a scene says that its links are direct");
+                    let model: &LinkModel = scene.links.between(from, to);
+                    match &mut links {
+                        Links::Direct(links) => assert!(links.add(scene.seed, &name, model), "the shape of a scene says that its links are direct"),
+                        Links::Stepped(links, _) => links.add(scene.seed, &name, model.clone()),
+                    }
                 }
             }
         }
         let row = row_of(peers);
         let mut single = Self {
             peers,
-            ticks: Ticks::new(tick_nanos),
-            end,
+            end: shape.end,
             links,
-            wheel: Box::new(std::array::from_fn(|_| Bucket::default())),
-            beyond: BTreeMap::new(),
-            emptied: Vec::new(),
+            in_flight: InFlight {
+                ticks: Ticks::new(nanos(shape.tick)),
+                wheel: Box::new(std::array::from_fn(|_| Bucket::default())),
+                beyond: BTreeMap::new(),
+                emptied: Vec::new(),
+            },
             held: std::array::from_fn(|_| (0..peers).flat_map(|_| quads::empty(peers - 1)).collect()),
             next: vec![0; peers * row * L],
             changed: vec![u8::MAX; peers],
@@ -142,39 +166,62 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         single
     }
 
-    /// A peer sends to all others. A run that has ended goes on sending; nobody looks.
+    /// A peer sends to all others, and then nothing until `next`, or until [`PerPacket::pass`] if that is earlier. A run that has ended goes on sending; nobody
+    /// looks.
     #[inline(never)]
     #[expect(clippy::cast_possible_truncation, reason = "there are at most 4096 peers, and eight runs")]
-    pub(in crate::arrays) fn send(&mut self, tick: u64, now: Instant, sender: usize, blocks: &Blocks<A>) {
+    pub(in crate::arrays) fn send(&mut self, tick: u64, (now, next): (Instant, Instant), sender: usize, blocks: &Blocks<A>) {
         let sample = Sample::<A, L>::of(blocks, sender);
-        let Self { peers, ticks, links, wheel, beyond, emptied, .. } = self;
+        let Self { peers, links, in_flight, .. } = self;
         let (row, places) = (*peers * L, row_of(*peers));
-        let mut arrivals = Arrivals::NONE;
-        for first in (0..row).step_by(DirectLinks::AT_ONCE) {
-            // Lanes links lead to eight receivers of one run or to one receiver of eight runs; some of them, or all, to the sender itself.
-            let own = (sender * L).wrapping_sub(first);
-            let but = if own < DirectLinks::AT_ONCE { ((1_u16 << L) - 1) << own } else { 0 };
-            links.offer(now, LinkId::new(sender * row + first), DirectLinks::AT_ONCE.min(row - first), but as u8, &mut arrivals);
-            for place in arrivals.places() {
-                let (receiver, run, at) = ((first + place) / L, (first + place) % L, arrivals.at[place]);
-                // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
-                let ticks = ticks.count(at.as_nanos() - now.as_nanos());
-                let due = tick.saturating_add(ticks);
-                let bucket = if ticks < HORIZON { &mut wheel[slot(due)] } else { beyond.entry(due).or_default() };
-                if bucket.packets.capacity() == 0 {
-                    bucket.packets = emptied.pop().unwrap_or_default();
-                }
-                bucket.is_mixed |= arrivals.overtakes(place);
-                bucket.packets.push(Packet {
-                    arrival: at,
-                    sequence: arrivals.sequences[place],
-                    place: (receiver * places + sender - usize::from(sender > receiver)) as u32,
-                    receiver: receiver as u16,
-                    run: run as u16,
-                    position: std::array::from_fn(|axis| sample.position[axis][run]),
-                    velocity: std::array::from_fn(|axis| sample.velocity[axis][run]),
-                });
+        let packet = |place: usize, arrival: Instant, sequence: u64| {
+            let (receiver, run) = (place / L, place % L);
+            Packet {
+                arrival,
+                sequence,
+                place: (receiver * places + sender - usize::from(sender > receiver)) as u32,
+                receiver: receiver as u16,
+                run: run as u16,
+                position: std::array::from_fn(|axis| sample.position[axis][run]),
+                velocity: std::array::from_fn(|axis| sample.velocity[axis][run]),
             }
+        };
+        match links {
+            Links::Direct(links) => {
+                let mut arrivals = Arrivals::NONE;
+                for first in (0..row).step_by(DirectLinks::AT_ONCE) {
+                    // Lanes links lead to eight receivers of one run or to one receiver of eight runs; some of them, or all, to the sender itself.
+                    let own = (sender * L).wrapping_sub(first);
+                    let but = if own < DirectLinks::AT_ONCE { ((1_u16 << L) - 1) << own } else { 0 };
+                    links.offer(now, LinkId::new(sender * row + first), DirectLinks::AT_ONCE.min(row - first), but as u8, &mut arrivals);
+                    for place in arrivals.places() {
+                        let packet = packet(first + place, arrivals.at[place], arrivals.sequences[place]);
+                        in_flight.push((tick, now), packet, arrivals.overtakes(place));
+                    }
+                }
+            }
+            Links::Stepped(links, info) => {
+                for place in (0..row).filter(|place| place / L != sender) {
+                    let link = LinkId::new(sender * row + place);
+                    let packet = packet(place, now, links.offered(link));
+                    // Packets leave the stages of a link in no order of their arrival.
+                    links.offer((now, next), link, *info, packet, |arrival, packet| in_flight.push((tick, now), Packet { arrival, ..packet }, true));
+                }
+            }
+        }
+    }
+
+    /// Time passes on the links of all senders until `next` of each; until the latest tick, which is this one, it has.
+    #[cold]
+    pub(in crate::arrays) fn pass(&mut self, latest: (u64, Instant), next: impl Fn(usize) -> Instant) {
+        let Self { peers, links: Links::Stepped(links, _), in_flight, .. } = self else { return };
+        let row = *peers * L;
+        for (sender, place) in
+            (0..*peers).flat_map(|sender| (0..row).map(move |place| (sender, place))).filter(|(sender, place)| place / L != *sender)
+        {
+            links.pass(next(sender), LinkId::new(sender * row + place), |arrival, packet| {
+                in_flight.push(latest, Packet { arrival, ..packet }, true);
+            });
         }
     }
 
@@ -217,22 +264,16 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// At the end of the scene, which is at or before that tick: what has arrived by then.
-    pub(in crate::arrays) fn finish(&mut self, tick: u64) {
-        self.take_in(tick, self.end);
+    /// At the end of the scene, which is at or before the tick after the latest: what has arrived by then.
+    pub(in crate::arrays) fn finish(&mut self, latest: (u64, Instant)) {
+        self.pass(latest, |_| Instant::MAX);
+        self.take_in(latest.0 + 1, self.end);
     }
 
     /// Takes in the samples that are due at that tick and arrived by `until`.
     #[inline(never)]
     fn take_in(&mut self, tick: u64, until: Instant) {
-        let place = slot(tick);
-        if !self.beyond.is_empty() {
-            self.come_near(tick);
-        }
-        let mut bucket = std::mem::take(&mut self.wheel[place]);
-        if bucket.packets.is_empty() {
-            return;
-        }
+        let Some(mut bucket) = self.in_flight.due(tick) else { return };
         if bucket.is_mixed {
             bucket.packets.sort_unstable_by_key(|packet| (packet.arrival, packet.sequence));
         }
@@ -241,17 +282,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 self.receive(&packet);
             }
         }
-        self.emptied.push(bucket.packets);
-    }
-
-    /// The samples that are due at that tick and were sent long ago.
-    #[cold]
-    fn come_near(&mut self, tick: u64) {
-        if let Some(bucket) = self.beyond.remove(&tick) {
-            let near = &mut self.wheel[slot(tick)];
-            near.packets.extend(bucket.packets);
-            near.is_mixed = true;
-        }
+        self.in_flight.emptied.push(bucket.packets);
     }
 
     #[inline(always)]
@@ -273,12 +304,16 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     ///
     /// `sent` says when a packet of a sender was sent.
     pub(in crate::arrays) fn end_early(&mut self, run: usize, sent: impl Fn(usize, u64) -> Instant) {
-        for bucket in self.wheel.iter().chain(self.beyond.values()) {
+        for bucket in self.in_flight.wheel.iter().chain(self.in_flight.beyond.values()) {
             for packet in bucket.packets.iter().filter(|packet| usize::from(packet.run) == run) {
                 let receiver = usize::from(packet.receiver);
                 let place = packet.place as usize - receiver * row_of(self.peers);
                 let sender = place + usize::from(place >= receiver);
-                self.links.forget(LinkId::new((sender * self.peers + receiver) * L + run), sent(sender, packet.sequence), packet.arrival);
+                let (link, sent) = (LinkId::new((sender * self.peers + receiver) * L + run), sent(sender, packet.sequence));
+                match &mut self.links {
+                    Links::Direct(links) => links.forget(link, sent, packet.arrival),
+                    Links::Stepped(links, _) => links.forget(link, sent, packet.arrival),
+                }
             }
         }
     }
@@ -290,7 +325,46 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
 
     /// The counters of a link.
     pub(in crate::arrays) fn stats(&self, from: usize, to: usize, run: usize) -> LinkStats {
-        self.links.stats(LinkId::new((from * self.peers + to) * L + run))
+        let link = LinkId::new((from * self.peers + to) * L + run);
+        match &self.links {
+            Links::Direct(links) => links.stats(link),
+            Links::Stepped(links, _) => links.stats(link),
+        }
+    }
+}
+
+impl<const A: usize> InFlight<A> {
+    /// A packet that is known at this tick and instant; whether it may arrive in another order than it was put here.
+    #[inline(always)]
+    fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, is_mixed: bool) {
+        // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
+        let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
+        let due = tick.saturating_add(ticks);
+        let bucket = if ticks < HORIZON { &mut self.wheel[slot(due)] } else { self.beyond.entry(due).or_default() };
+        if bucket.packets.capacity() == 0 {
+            bucket.packets = self.emptied.pop().unwrap_or_default();
+        }
+        bucket.is_mixed |= is_mixed;
+        bucket.packets.push(packet);
+    }
+
+    /// The samples that are due at that tick, if there are any.
+    fn due(&mut self, tick: u64) -> Option<Bucket<A>> {
+        if !self.beyond.is_empty() {
+            self.come_near(tick);
+        }
+        let bucket = std::mem::take(&mut self.wheel[slot(tick)]);
+        (!bucket.packets.is_empty()).then_some(bucket)
+    }
+
+    /// The samples that are due at that tick and were sent long ago.
+    #[cold]
+    fn come_near(&mut self, tick: u64) {
+        if let Some(bucket) = self.beyond.remove(&tick) {
+            let near = &mut self.wheel[slot(tick)];
+            near.packets.extend(bucket.packets);
+            near.is_mixed = true;
+        }
     }
 }
 
