@@ -29,6 +29,11 @@ impl<const A: usize, const L: usize> Sample<A, L> {
         }
     }
 
+    /// That of a run.
+    fn state(&self, run: usize) -> State<A> {
+        State { position: self.position.map(|runs| runs[run]), velocity: self.velocity.map(|runs| runs[run]) }
+    }
+
     /// What a peer sends now.
     #[inline(always)]
     fn of(blocks: &Blocks<A>, peer: usize) -> Self {

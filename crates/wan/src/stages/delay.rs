@@ -341,6 +341,9 @@ fn nanos(span: Duration) -> f64 {
     span.as_nanos() as f64
 }
 
+/// 2^51.
+const SMALL: f64 = 2_251_799_813_685_248.0;
+
 /// The nearest whole number, of two the even one; saturates beyond 2^63.
 ///
 /// Adding 1.5·2^52 leaves no room for a fraction, and the whole number in the lower bits: below 2^51 that is `rint` in an addition and a subtraction, where
@@ -349,14 +352,14 @@ fn nanos(span: Duration) -> f64 {
 #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "saturates; a difference of bits that may be negative")]
 fn nearest(number: f64) -> i64 {
     const ROOM: f64 = 6_755_399_441_055_744.0;
-    const SMALL: f64 = 2_251_799_813_685_248.0;
     if number.abs() < SMALL { (number + ROOM).to_bits().wrapping_sub(ROOM.to_bits()) as i64 } else { libm::rint(number) as i64 }
 }
 
-/// A delay as a whole number of nanoseconds.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "laws are not below their floor; saturates beyond 584 years")]
+/// A delay as a whole number of nanoseconds: laws are not below their floor.
+#[inline]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates beyond 584 years")]
 fn count(nanos: f64) -> u64 {
-    libm::rint(nanos) as u64
+    if nanos < SMALL { nearest(nanos).cast_unsigned() } else { libm::rint(nanos) as u64 }
 }
 
 /// The parameters of the delay and of its jitter.

@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use cohaptic_peer::Moving;
+use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -21,6 +21,8 @@ pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
     /// The samples held from each sender but the first, by axis, as the first peer holds it; and from the first.
     held: [Vec<Quad<L>>; A],
     first: Sample<A, L>,
+    /// The sums of what is held from all, if their means are exact.
+    sums: Option<ExactMeans<A>>,
     /// How many samples of each sender have arrived.
     arrived: Vec<u64>,
     changed: Changed,
@@ -53,12 +55,15 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
             peers,
             held: std::array::from_fn(|_| quads::empty(peers - 1)),
             first: Sample::initial(scenes, 0),
+            sums: None,
             arrived: vec![0; peers],
             changed: Changed::More,
         };
         for sender in 0..peers {
             broadcast.hold(sender, &Sample::initial(scenes, sender));
         }
+        broadcast.sums =
+            (peers > EXACT_FROM).then(|| ExactMeans::new((0..peers).map(|sender| broadcast.held_from(sender)).collect::<Vec<_>>().iter()));
         broadcast
     }
 
@@ -79,8 +84,20 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         }
     }
 
+    /// What is held from a sender in the first run: others with this number of peers there are not.
+    fn held_from(&self, sender: usize) -> State<A> {
+        match sender.checked_sub(1) {
+            None => self.first.state(0),
+            Some(place) => quads::state(&self.held, place, 0),
+        }
+    }
+
     #[inline(always)]
     fn hold(&mut self, sender: usize, sample: &Sample<A, L>) {
+        if self.sums.is_some() {
+            let before = self.held_from(sender);
+            self.sums.iter_mut().for_each(|sums| sums.replace(&before, &sample.state(0)));
+        }
         let Some(place) = sender.checked_sub(1) else {
             self.first = *sample;
             return;
@@ -118,6 +135,10 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         if std::mem::replace(&mut self.changed, Changed::Nothing) == Changed::Nothing {
             return;
         }
+        if self.sums.is_some() {
+            self.refresh_exactly(blocks);
+            return;
+        }
         let count = others(self.peers);
         for axis in 0..A {
             let held = &mut self.held[axis];
@@ -133,6 +154,18 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
             // And back.
             for peer in (1..self.peers).rev() {
                 quads::swap(held, peer - 1, &mut own);
+            }
+        }
+    }
+
+    /// [`Broadcast::refresh`] of many: what all hold together without the receiver's own.
+    #[cold]
+    fn refresh_exactly(&mut self, blocks: &mut Blocks<A>) {
+        let Some(sums) = &self.sums else { return };
+        for peer in 0..self.peers {
+            let mean = sums.mean_without(&self.held_from(peer), self.peers - 1);
+            for axis in 0..A {
+                blocks.set_target(axis, peer, [mean.position[axis]; L], [mean.velocity[axis]; L]);
             }
         }
     }

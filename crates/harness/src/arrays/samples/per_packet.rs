@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use cohaptic_peer::Moving;
+use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkModel, LinkName, LinkStats, PacketInfo, SteppedLinks};
@@ -35,6 +35,8 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     in_flight: InFlight<A>,
     /// Samples held, by axis, then receiver, then sender with the receiver left out. Each receiver has [`row_of`] places, of which the last may be empty.
     held: [Vec<Quad<L>>; A],
+    /// By receiver the sums of what it holds, if the means are exact: then there is one run.
+    sums: Vec<ExactMeans<A>>,
     /// By place, then run: the lowest sequence number that is newer than the sample held.
     next: Vec<u64>,
     /// By receiver: bit r says whether a sample has arrived in run r since the means were computed.
@@ -150,6 +152,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 emptied: Vec::new(),
             },
             held: std::array::from_fn(|_| (0..peers).flat_map(|_| quads::empty(peers - 1)).collect()),
+            sums: Vec::new(),
             next: vec![0; peers * row * L],
             changed: vec![u8::MAX; peers],
             stale: vec![0; peers * L],
@@ -162,6 +165,11 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                     quads::set(&mut single.held[axis], place, run, sample.position[axis][run], sample.velocity[axis][run]);
                 }
             }
+        }
+        if peers > EXACT_FROM {
+            let held = |receiver: usize| (0..peers - 1).map(move |place| receiver * row_of(peers) + place);
+            let states = |receiver: usize| held(receiver).map(|place| quads::state(&single.held, place, 0)).collect::<Vec<_>>();
+            single.sums = (0..peers).map(|receiver| ExactMeans::new(states(receiver).iter())).collect();
         }
         single
     }
@@ -256,6 +264,13 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             if std::mem::take(&mut self.changed[peer]) == 0 {
                 continue;
             }
+            if let Some(sums) = self.sums.get(peer) {
+                let mean = sums.mean(self.peers - 1);
+                for axis in 0..A {
+                    blocks.set_target(axis, peer, [mean.position[axis]; L], [mean.velocity[axis]; L]);
+                }
+                continue;
+            }
             let quads = row_of(self.peers) / 4;
             for axis in 0..A {
                 let (x, v) = quads::mean(&self.held[axis][peer * quads..(peer + 1) * quads], count);
@@ -294,6 +309,10 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             return;
         }
         *next = packet.sequence + 1;
+        if let Some(sums) = self.sums.get_mut(usize::from(packet.receiver)) {
+            let now = State { position: packet.position, velocity: packet.velocity };
+            sums.replace(&quads::state(&self.held, place, 0), &now);
+        }
         for axis in 0..A {
             quads::set(&mut self.held[axis], place, run, packet.position[axis], packet.velocity[axis]);
         }
