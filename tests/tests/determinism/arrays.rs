@@ -8,13 +8,13 @@ use cohaptic_tests::{Draft, cases, drafts, shipped_scenes};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
-fn run(scene: &Scene, model: Model) -> Summary {
+pub(super) fn run(scene: &Scene, model: Model) -> Summary {
     let Ok(summary) = Simulation::new(scene, model).run(&mut NoObserver);
     summary
 }
 
 /// What two runs differ in, first of all; `PartialEq` would let a zero pass for another one.
-fn difference(one: &Summary, other: &Summary) -> Option<String> {
+pub(super) fn difference(one: &Summary, other: &Summary) -> Option<String> {
     let (one, other) = (format!("{one:#?}"), format!("{other:#?}"));
     let (line, (found, expected)) = one.lines().zip(other.lines()).enumerate().find(|(_, (a, b))| a != b)?;
     Some(format!("line {line}: {found} is not {expected}"))
@@ -72,7 +72,7 @@ impl Observer for Impatient {
     }
 }
 
-fn run_interrupted(scene: &Scene, model: Model, breaths: u32) -> Summary {
+pub(super) fn run_interrupted(scene: &Scene, model: Model, breaths: u32) -> Summary {
     let Ok(summary) = Simulation::new(scene, model).run(&mut Impatient(breaths));
     summary
 }

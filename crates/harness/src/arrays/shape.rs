@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_peer::wire::SampleKind;
+use cohaptic_peer::{Coordination, EXACT_FROM, Integrator};
 use cohaptic_scene::{Scene, Strategies};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DirectLinks, LinkModel, SteppedLinks};
@@ -22,6 +22,8 @@ pub(crate) struct Shape {
     pub(super) lag: usize,
     pub(super) peers: usize,
     pub(super) axes: usize,
+    /// How turns between ticks are computed, and by how many steps a tick, if the object turns.
+    pub(super) turns: Option<(Integrator, u32)>,
     pub(super) tick: Duration,
     pub(super) end: Instant,
     /// Ticks from one sample to the next.
@@ -52,15 +54,17 @@ impl Shape {
     }
 
     /// The shape of a scene that can be run in arrays: everybody ticks together, nothing changes on the way, and no link counts or damages what is inside.
-    /// `None` for any other, and for strategies that are no law of the registry.
+    /// `None` for any other, for strategies that are no law of the registry, and on an object that turns for laws with a past, which may have one of its
+    /// attitudes, and for exact means.
     pub(crate) fn of(scene: &Scene, plan: &Plan, strategies: &impl Strategies) -> Option<(Self, BuiltIn)> {
         // All tick together, so that all have one law.
         let law = strategies.law(scene, 0)?;
         let clock = scene.peers.first()?.clock;
-        let size = Bytes::new(SampleKind::State.datagram_len(scene.axes.count()) as u64);
+        let kind = if scene.rotation.is_some() { SampleKind::Attitude } else { SampleKind::State };
+        let size = Bytes::new(kind.datagram_len(scene.axes.count()) as u64);
         let fits = plan.ticking == Ticking::Lockstep
             && !plan.general_links
-            && scene.rotation.is_none()
+            && (scene.rotation.is_none() || Law::<f64>::lag(&law) == 0 && Law::<f64>::memory(&law) == 0 && scene.peers.len() <= EXACT_FROM)
             && scene.timeline.is_empty()
             && scene.coordination.send_when.is_none()
             && scene.duration <= LONGEST
@@ -75,6 +79,7 @@ impl Shape {
                 lag: Law::<f64>::lag(&law),
                 peers: scene.peers.len(),
                 axes: plan.axes.count(),
+                turns: scene.rotation.as_ref().map(|rotation| (scene.integrator, rotation.steps)),
                 tick: clock.tick,
                 end: Instant::ZERO.saturating_add(scene.duration),
                 send_every: u64::try_from(scene.coordination.update.as_nanos() / clock.tick.as_nanos()).unwrap_or(u64::MAX),

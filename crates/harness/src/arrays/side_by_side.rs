@@ -1,10 +1,10 @@
 //! Many runs, those of one shape at the same time.
 
 use cohaptic_peer::EXACT_FROM;
-use cohaptic_scene::{Axes, FromScene, Scene};
+use cohaptic_scene::{FromScene, Scene};
 
+use super::Shape;
 use super::lanes::WIDTH;
-use super::{Arrays, Shape};
 use crate::plan::{Model, Plan};
 use crate::{NoObserver, Simulation, Summary};
 
@@ -60,10 +60,6 @@ fn shape(scene: &Scene) -> Option<Shape> {
 fn run_lanes(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
     let lanes: [&Scene; WIDTH] = std::array::from_fn(|lane| &scenes[lane.min(scenes.len() - 1)]);
     let laws = lanes.map(|scene| scene.law(0).expect("scenes of a shape have a law"));
-    let summaries = match lanes[0].axes {
-        Axes::One => Arrays::<1, WIDTH>::new(lanes, shape, laws).run(|_| true),
-        Axes::Two => Arrays::<2, WIDTH>::new(lanes, shape, laws).run(|_| true),
-        Axes::Three => Arrays::<3, WIDTH>::new(lanes, shape, laws).run(|_| true),
-    };
+    let summaries = super::run(lanes, shape, laws, |_| true);
     summaries.into_iter().take(scenes.len()).collect()
 }

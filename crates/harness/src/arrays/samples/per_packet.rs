@@ -12,7 +12,7 @@ use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkModel, LinkName, LinkStats
 
 use super::quads::{self, Quad};
 use super::{Sample, others};
-use crate::arrays::blocks::Blocks;
+use crate::arrays::bodies::Bodies;
 use crate::arrays::{Shape, nanos};
 
 /// Ticks ahead that lie in the wheel; what arrives later than that is kept aside.
@@ -27,16 +27,16 @@ fn slot(tick: u64) -> usize {
 
 /// The links, the samples in flight, and those that each peer holds of each other.
 #[derive(Clone, Debug)]
-pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
+pub(in crate::arrays) struct PerPacket<const P: usize, const L: usize> {
     peers: usize,
     end: Instant,
     /// By sender, then receiver, then run; the diagonal is never used.
-    links: Links<A>,
-    in_flight: InFlight<A>,
-    /// Samples held, by axis, then receiver, then sender with the receiver left out. Each receiver has [`row_of`] places, of which the last may be empty.
-    held: [Vec<Quad<L>>; A],
+    links: Links<P>,
+    in_flight: InFlight<P>,
+    /// Samples held, by pair of numbers, then receiver, then sender with the receiver left out. Each receiver has [`row_of`] places, of which the last may be empty.
+    held: [Vec<Quad<L>>; P],
     /// By receiver the sums of what it holds, if the means are exact: then there is one run.
-    sums: Vec<ExactMeans<A>>,
+    sums: Vec<ExactMeans<P>>,
     /// By place, then run: the lowest sequence number that is newer than the sample held.
     next: Vec<u64>,
     /// By receiver: bit r says whether a sample has arrived in run r since the means were computed.
@@ -47,46 +47,46 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
 
 /// The links, with what all samples have in common if links ask.
 #[derive(Clone, Debug)]
-enum Links<const A: usize> {
+enum Links<const P: usize> {
     Direct(DirectLinks),
     /// They are told when each sender sends next.
-    Stepped(SteppedLinks<Packet<A>>, PacketInfo),
+    Stepped(SteppedLinks<Packet<P>>, PacketInfo),
 }
 
 /// The samples in flight, by the tick at which they are in force.
 #[derive(Clone, Debug)]
-struct InFlight<const A: usize> {
+struct InFlight<const P: usize> {
     ticks: Ticks,
-    wheel: Box<[Bucket<A>; 256]>,
-    beyond: BTreeMap<u64, Bucket<A>>,
+    wheel: Box<[Bucket<P>; 256]>,
+    beyond: BTreeMap<u64, Bucket<P>>,
     /// Memory of buckets that were emptied, the latest last: it is what the cache holds. It took 5 % off a tick of ten peers whose packets arrive together.
-    emptied: Vec<Vec<Packet<A>>>,
+    emptied: Vec<Vec<Packet<P>>>,
 }
 
 /// The samples in force at a tick.
 #[derive(Clone, Debug)]
-struct Bucket<const A: usize> {
-    packets: Vec<Packet<A>>,
+struct Bucket<const P: usize> {
+    packets: Vec<Packet<P>>,
     /// Whether one of them overtook another that may be here too.
     is_mixed: bool,
 }
 
-impl<const A: usize> Default for Bucket<A> {
+impl<const P: usize> Default for Bucket<P> {
     fn default() -> Self {
         Self { packets: Vec::new(), is_mixed: false }
     }
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Packet<const A: usize> {
+struct Packet<const P: usize> {
     arrival: Instant,
     sequence: u64,
     /// Where its receiver holds what it says.
     place: u32,
     receiver: u16,
     run: u16,
-    position: [f64; A],
-    velocity: [f64; A],
+    position: [f64; P],
+    velocity: [f64; P],
 }
 
 /// How many places a receiver has for what it holds: whole quads.
@@ -118,9 +118,9 @@ impl Ticks {
     }
 }
 
-impl<const A: usize, const L: usize> PerPacket<A, L> {
+impl<const P: usize, const L: usize> PerPacket<P, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
-    pub(in crate::arrays) fn new(scenes: &[&Scene], shape: &Shape) -> Self {
+    pub(in crate::arrays) fn new<const A: usize>(scenes: &[&Scene], bodies: &impl Bodies<A, P>, shape: &Shape) -> Self {
         let peers = scenes[0].peers.len();
         let mut links = match shape.has_queues {
             false => Links::Direct(DirectLinks::new(shape.end, shape.size)),
@@ -158,11 +158,11 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             stale: vec![0; peers * L],
         };
         for sender in 0..peers {
-            let sample = Sample::<A, L>::initial(scenes, sender);
+            let sample: Sample<P, L> = bodies.sample(sender);
             for receiver in (0..peers).filter(|receiver| *receiver != sender) {
-                for (axis, run) in (0..A).flat_map(|axis| (0..L).map(move |run| (axis, run))) {
+                for (pair, run) in (0..P).flat_map(|pair| (0..L).map(move |run| (pair, run))) {
                     let place = receiver * row_of(peers) + sender - usize::from(sender > receiver);
-                    quads::set(&mut single.held[axis], place, run, sample.position[axis][run], sample.velocity[axis][run]);
+                    quads::set(&mut single.held[pair], place, run, sample.position[pair][run], sample.velocity[pair][run]);
                 }
             }
         }
@@ -178,8 +178,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// looks.
     #[inline(never)]
     #[expect(clippy::cast_possible_truncation, reason = "there are at most 4096 peers, and eight runs")]
-    pub(in crate::arrays) fn send(&mut self, tick: u64, (now, next): (Instant, Instant), sender: usize, blocks: &Blocks<A>) {
-        let sample = Sample::<A, L>::of(blocks, sender);
+    pub(in crate::arrays) fn send<const A: usize>(&mut self, tick: u64, (now, next): (Instant, Instant), sender: usize, bodies: &impl Bodies<A, P>) {
+        let sample: Sample<P, L> = bodies.sample(sender);
         let Self { peers, links, in_flight, .. } = self;
         let (row, places) = (*peers * L, row_of(*peers));
         let packet = |place: usize, arrival: Instant, sequence: u64| {
@@ -190,8 +190,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 place: (receiver * places + sender - usize::from(sender > receiver)) as u32,
                 receiver: receiver as u16,
                 run: run as u16,
-                position: std::array::from_fn(|axis| sample.position[axis][run]),
-                velocity: std::array::from_fn(|axis| sample.velocity[axis][run]),
+                position: std::array::from_fn(|pair| sample.position[pair][run]),
+                velocity: std::array::from_fn(|pair| sample.velocity[pair][run]),
             }
         };
         match links {
@@ -239,7 +239,11 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     }
 
     /// How what a peer holds in a run moves on, in the order in which the peer holds it. `sent` says when a sample of a sender was sent.
-    pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
+    pub(in crate::arrays) fn moving<const A: usize>(
+        &self,
+        (peer, run): (usize, usize),
+        sent: impl Fn(usize, u64) -> Instant,
+    ) -> impl Iterator<Item = Moving<A>> {
         let first = peer * row_of(self.peers);
         (0..self.peers - 1).map(move |place| {
             let sender = place + usize::from(place >= peer);
@@ -258,7 +262,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
 
     /// The means are those of the samples held.
     #[inline(always)]
-    pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks<A>) {
+    pub(in crate::arrays) fn refresh<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
         let count = others(self.peers);
         for peer in 0..self.peers {
             if std::mem::take(&mut self.changed[peer]) == 0 {
@@ -266,15 +270,15 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             }
             if let Some(sums) = self.sums.get(peer) {
                 let mean = sums.mean(self.peers - 1);
-                for axis in 0..A {
-                    blocks.set_target(axis, peer, [mean.position[axis]; L], [mean.velocity[axis]; L]);
+                for pair in 0..P {
+                    bodies.set_target(pair, peer, [mean.position[pair]; L], [mean.velocity[pair]; L]);
                 }
                 continue;
             }
             let quads = row_of(self.peers) / 4;
-            for axis in 0..A {
-                let (x, v) = quads::mean(&self.held[axis][peer * quads..(peer + 1) * quads], count);
-                blocks.set_target(axis, peer, x, v);
+            for pair in 0..P {
+                let (x, v) = quads::mean(&self.held[pair][peer * quads..(peer + 1) * quads], count);
+                bodies.set_target(pair, peer, x, v);
             }
         }
     }
@@ -301,7 +305,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     }
 
     #[inline(always)]
-    fn receive(&mut self, packet: &Packet<A>) {
+    fn receive(&mut self, packet: &Packet<P>) {
         let (place, run) = (packet.place as usize, usize::from(packet.run));
         let next = &mut self.next[place * L + run];
         if packet.sequence < *next {
@@ -313,8 +317,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             let now = State { position: packet.position, velocity: packet.velocity };
             sums.replace(&quads::state(&self.held, place, 0), &now);
         }
-        for axis in 0..A {
-            quads::set(&mut self.held[axis], place, run, packet.position[axis], packet.velocity[axis]);
+        for pair in 0..P {
+            quads::set(&mut self.held[pair], place, run, packet.position[pair], packet.velocity[pair]);
         }
         self.changed[usize::from(packet.receiver)] |= 1 << packet.run;
     }
@@ -352,10 +356,10 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     }
 }
 
-impl<const A: usize> InFlight<A> {
+impl<const P: usize> InFlight<P> {
     /// A packet that is known at this tick and instant; whether it may arrive in another order than it was put here.
     #[inline(always)]
-    fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, is_mixed: bool) {
+    fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<P>, is_mixed: bool) {
         // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
         let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
         let due = tick.saturating_add(ticks);
@@ -368,7 +372,7 @@ impl<const A: usize> InFlight<A> {
     }
 
     /// The samples that are due at that tick, if there are any.
-    fn due(&mut self, tick: u64) -> Option<Bucket<A>> {
+    fn due(&mut self, tick: u64) -> Option<Bucket<P>> {
         if !self.beyond.is_empty() {
             self.come_near(tick);
         }
