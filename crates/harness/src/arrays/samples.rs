@@ -6,6 +6,7 @@ pub(super) use per_packet::PerPacket;
 use cohaptic_peer::State;
 
 mod broadcast;
+mod in_flight;
 mod per_packet;
 mod quads;
 

@@ -9,7 +9,7 @@ use cohaptic_scene::{Scene, Strategies};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DirectLinks, LinkModel, SteppedLinks};
 
-use super::nanos;
+use super::{nanos, threads};
 use crate::plan::{Plan, Ticking};
 
 /// What two scenes must have in common to be run side by side.
@@ -46,6 +46,11 @@ impl Shape {
     pub(super) fn before(&self, tick: u64) -> (u64, Instant) {
         let before = tick.saturating_sub(1);
         (before, Instant::from_nanos(before * nanos(self.tick)))
+    }
+
+    /// How many of some threads pay for a run.
+    pub(crate) fn threads_that_pay(&self, threads: usize) -> usize {
+        threads::that_pay(self, threads)
     }
 
     /// Whether a run that diverges is to be run once more with events: queues have looked ahead of the end.

@@ -46,19 +46,20 @@ struct Sent<const P: usize, const L: usize> {
 
 impl<const P: usize, const L: usize> Broadcast<P, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
-    pub(in crate::arrays) fn new<const A: usize>(bodies: &impl Bodies<A, P>, peers: usize, delay_ticks: u64) -> Self {
+    pub(in crate::arrays) fn new(initial: &[Sample<P, L>], delay_ticks: u64) -> Self {
+        let peers = initial.len();
         let mut broadcast = Self {
             delay_ticks,
             on_the_way: VecDeque::new(),
             peers,
             held: std::array::from_fn(|_| quads::empty(peers - 1)),
-            first: bodies.sample(0),
+            first: initial[0],
             sums: None,
             arrived: vec![0; peers],
             changed: Changed::More,
         };
-        for sender in 0..peers {
-            broadcast.hold(sender, &bodies.sample(sender));
+        for (sender, sample) in initial.iter().enumerate() {
+            broadcast.hold(sender, sample);
         }
         broadcast.sums =
             (peers > EXACT_FROM).then(|| ExactMeans::new((0..peers).map(|sender| broadcast.held_from(sender)).collect::<Vec<_>>().iter()));

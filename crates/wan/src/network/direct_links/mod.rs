@@ -139,7 +139,10 @@ impl DirectLinks {
         (arrivals.arrive, arrivals.overtake) = (0, 0);
         let first = first.index();
         let (links, span) = (&mut self.links[first..first + count], (now, self.until));
+        // Drawing for eight links what two need takes longer than one by one.
+        let are_few = count == Self::AT_ONCE && excluded.count_zeros() <= 2;
         match &mut self.kinds[..] {
+            _ if are_few => self.offer_one_by_one(now, first, count, excluded, arrivals),
             [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() => {
                 alike(kind.is_random, links, span, excluded, arrivals, |_, words, packet| kind.fate(now, words, packet));
             }
