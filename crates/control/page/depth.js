@@ -84,7 +84,8 @@ function drawDepth(context, known, width, height, passed) {
   parts.forEach((part, k) => {
     const [left, top] = [((k % columns) * width) / columns, (Math.floor(k / columns) * height) / rows];
     const area = { left, right: left + width / columns, top: top + 4, bottom: top + height / rows - 4 };
-    drawPart(context, part, area, half, parts.length > 1 || known.length <= 6);
+    drawPart(context, part, area, half, parts.length === 1 && known.length <= 6);
+    if (parts.length > 1) drawName(context, part[0].peer, area.left + 8, area.top + 12);
   });
 }
 
@@ -120,20 +121,21 @@ function drawPart(context, part, area, half, named) {
   for (const body of part) drawTrail(context, body.index, view.place);
   const faces = part.flatMap((body) => facesOf(body, half, view));
   faces.sort((one, other) => other.depth - one.depth);
-  for (const face of faces) drawFace(context, face);
-  for (const body of part) if (body.device && body.held) drawSpring(context, body, view, named || isOld(body.peer));
+  // Many faces that lie on one another would be as good as opaque.
+  for (const face of faces) drawFace(context, face, 2 / (part.length + 1));
+  for (const body of part) if (body.device && body.held) drawSpring(context, body, view, named || (part.length > 1 && isOld(body.peer)));
   context.restore();
 }
 
 const isOld = (peer) => peer.status === 'stale' || peer.status === 'absent';
 
-/** A grid below, with the length of its squares, and where x, y and z point. */
+/** A grid below; in the first part of the picture with the length of its squares. */
 function drawFloor(context, view, area) {
   const { middle, radius } = stage;
-  const step = round125(radius / 2.5);
-  const low = middle[2] - radius * 0.72;
-  const from = [0, 1].map((axis) => Math.ceil((middle[axis] - radius) / step));
-  const to = [0, 1].map((axis) => Math.floor((middle[axis] + radius) / step));
+  const step = round125(radius / 4);
+  const low = middle[2] - radius * 0.5;
+  const from = [0, 1].map((axis) => Math.ceil((middle[axis] - 0.9 * radius) / step));
+  const to = [0, 1].map((axis) => Math.floor((middle[axis] + 0.9 * radius) / step));
   context.globalAlpha = 1;
   context.lineWidth = 1;
   context.strokeStyle = ink.line;
@@ -151,11 +153,21 @@ function drawFloor(context, view, area) {
     }
   }
   context.stroke();
-  const corner = [area.left + 34, area.bottom - 30];
-  const origin = view.place(middle);
-  context.strokeStyle = context.fillStyle = ink.soft;
-  context.textAlign = 'center';
+  if (area.left > 0 || area.top > 4) return;
+  context.fillStyle = ink.soft;
   context.textBaseline = 'middle';
+  context.textAlign = 'right';
+  context.fillText('squares of ' + (step >= 0.5 ? step + ' m' : Number((step * 100).toPrecision(3)) + ' cm'), area.right - 10, area.bottom - 10);
+  if (area.right - area.left > 200) drawAxes(context, view, [area.left + 34, area.bottom - 30]);
+  context.textBaseline = 'alphabetic';
+}
+
+/** Where x, y and z point. */
+function drawAxes(context, view, corner) {
+  const { middle } = stage;
+  const origin = view.place(middle);
+  context.strokeStyle = ink.soft;
+  context.textAlign = 'center';
   ['x', 'y', 'z'].forEach((name, axis) => {
     const end = view.place(middle.map((value, k) => value + (k === axis ? 20 / view.unit : 0)));
     const [dx, dy] = [end.x - origin.x, end.y - origin.y];
@@ -165,9 +177,6 @@ function drawFloor(context, view, area) {
     context.stroke();
     if (Math.hypot(dx, dy) > 5) context.fillText(name, corner[0] + 1.4 * dx, corner[1] + 1.4 * dy);
   });
-  context.textAlign = 'right';
-  context.fillText('squares of ' + (step >= 0.5 ? step + ' m' : Number((step * 100).toPrecision(3)) + ' cm'), area.right - 10, area.bottom - 10);
-  context.textBaseline = 'alphabetic';
 }
 
 /** The faces of a copy that are seen. */
@@ -189,26 +198,26 @@ function outline(context, points) {
 }
 
 /** One face. Copies lie within one another, so faces let through what is behind them. */
-function drawFace(context, { body, normal, points, sign }) {
+function drawFace(context, { body, normal, points, sign }, weight) {
   const old = isOld(body.peer);
   context.strokeStyle = context.fillStyle = colour(body.index);
   context.lineJoin = 'round';
   context.setLineDash(old ? [4, 3] : []);
   outline(context, points);
-  context.globalAlpha = (old ? 0.05 : 0.12) + (old ? 0 : 0.14) * Math.max(0, dot3(normal, [-0.3, -0.5, 0.81]));
+  context.globalAlpha = weight * (old ? 0.05 : 0.14 + 0.2 * Math.max(0, dot3(normal, [-0.3, -0.5, 0.81])));
   context.fill();
   context.globalAlpha = old ? 0.6 : 1;
   context.lineWidth = 1.8;
   context.stroke();
   if (sign) {
     outline(context, sign);
-    context.globalAlpha = 0.6;
+    context.globalAlpha = 0.7 * weight;
     context.fill();
   }
   context.setLineDash([]);
 }
 
-/** The spring from the point at which a copy is held to the device: soft where it pulls little, red where it pulls as hard as ever. */
+/** The spring from the point at which a copy is held to the device, the redder the harder it pulls, and the force on the copy as an arrow. */
 function drawSpring(context, body, view, named) {
   const [held, device] = [view.place(body.held), view.place(body.device)];
   const force = Math.hypot(...body.peer.force.map(Number));
@@ -234,6 +243,7 @@ function drawSpring(context, body, view, named) {
     }
     context.globalAlpha = 1;
   }
+  if (force > 0.02 * mostForce) drawArrow(context, body, view, device);
   if (body.deviceTurned) drawHandle(context, body, view, device);
   context.fillStyle = colour(body.index);
   context.strokeStyle = ink.text;
@@ -245,10 +255,33 @@ function drawSpring(context, body, view, named) {
   context.arc(device.x, device.y, 5, 0, 7);
   context.fill();
   context.stroke();
-  if (!named) return;
+  if (named) drawName(context, body.peer, device.x + 9, device.y - 6);
+}
+
+function drawName(context, peer, x, y) {
+  context.globalAlpha = 1;
   context.fillStyle = ink.text;
   context.textAlign = 'left';
-  context.fillText(body.peer.name + (isOld(body.peer) ? ' (' + body.peer.status + ')' : ''), device.x + 9, device.y - 6);
+  context.fillText(peer.name + (isOld(peer) ? ' (' + peer.status + ')' : ''), x, y);
+}
+
+/** The force on a copy, from its device on: as long as it is strong. */
+function drawArrow(context, body, view, device) {
+  const end = view.place(add3(body.device, body.peer.force, 48 / view.unit / mostForce));
+  const [dx, dy] = [end.x - device.x, end.y - device.y];
+  const length = Math.hypot(dx, dy);
+  if (length < 7) return;
+  const head = [(5 * dx) / length, (5 * dy) / length];
+  context.strokeStyle = ink.bad;
+  context.lineWidth = 2;
+  context.beginPath();
+  context.moveTo(device.x, device.y);
+  context.lineTo(end.x, end.y);
+  for (const side of [-0.6, 0.6]) {
+    context.moveTo(end.x, end.y);
+    context.lineTo(end.x - head[0] + side * head[1], end.y - head[1] - side * head[0]);
+  }
+  context.stroke();
 }
 
 /** The axes of a device that turns. */
