@@ -203,15 +203,12 @@ fn drawn(browser: &mut Browser) -> [f64; 2] {
 }
 
 /// Puts a slider there as its keys do.
-fn look_from(browser: &mut Browser, slider: &str, degrees: i32) {
+fn look_from(browser: &mut Browser, slider: &str, degrees: i64) {
     browser.value(&format!("document.getElementById({slider:?}).focus()"));
-    let key = if degrees < browser.value(&format!("Number(document.getElementById({slider:?}).value)")).as_f64().map_or(0, |now| now as i32) {
-        ("ArrowLeft", 37)
-    } else {
-        ("ArrowRight", 39)
-    };
+    let now = browser.value(&format!("Number(document.getElementById({slider:?}).value)")).as_i64().unwrap();
+    let (key, code) = if degrees < now { ("ArrowLeft", 37) } else { ("ArrowRight", 39) };
     while browser.value(&format!("document.getElementById({slider:?}).value")) != json!(degrees.to_string()) {
-        browser.press(key.0, key.1);
+        browser.press(key, code);
     }
     // Two frames: one that begins after the key, and its end.
     browser.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))");
@@ -225,12 +222,12 @@ fn an_object_that_turns_is_drawn_in_depth() {
     let half = core::f64::consts::FRAC_1_SQRT_2;
     let still = json!([{ "name": "prefers-color-scheme", "value": "light" }, { "name": "prefers-reduced-motion", "value": "reduce" }]);
     browser.call("Emulation.setEmulatedMedia", json!({ "features": still }));
-    for (orientation, told, [x, y]) in [([1.0, 0.0, 0.0, 0.0], "0.0, 0.0, 0.0°", [0.4, 0.3]), ([half, 0.0, 0.0, half], "0.0, 0.0, 90.0°", [0.3, 0.4])]
-    {
-        let run = Run::turned(orientation);
+    let as_it_is = (Run::turned([1.0, 0.0, 0.0, 0.0]), "0.0, 0.0, 0.0°", [0.4, 0.3]);
+    let by_a_quarter = (Run::turned([half, 0.0, 0.0, half]), "0.0, 0.0, 90.0°", [0.3, 0.4]);
+    for (run, told, [x, y]) in [&as_it_is, &by_a_quarter] {
         browser.open(&run.server().url());
         wait_painted(&mut browser, "copies", "--c0");
-        assert_eq!(text(&mut browser, "#peers td:nth-of-type(3)"), told);
+        assert_eq!(text(&mut browser, "#peers td:nth-of-type(3)"), *told);
         look_from(&mut browser, "around", 0);
         look_from(&mut browser, "above", 90);
         let [across, up] = drawn(&mut browser);
