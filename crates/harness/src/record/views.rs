@@ -82,7 +82,7 @@ impl Views {
                 for arm in &self.traced[peer] {
                     // A peer that ticks less often than spans end has none in some.
                     let trace = poses(peer).flatten().map(|pose| flat(pose.point(*arm)));
-                    panel = panel.with(Line::new(trace, thin.solid()));
+                    panel = panel.with(Line::new(trace, thin));
                 }
                 let before = thirds.iter().filter_map(|span| poses(peer).nth(*span).flatten());
                 panel = panel.with(Line::runs(before.map(|pose| closed(outline(pose))), thin));
