@@ -5,7 +5,8 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
-use super::algebra::{add, apply, apply_transposed, cross, subtract};
+use super::algebra::{add, subtract};
+use super::alignment::{in_body_axes, lever, reaction};
 use super::attitude::point_of;
 use super::held::HeldAttitude;
 use super::{Attitude, HeldAttitudes, RotationStep, Spin, Triple, aligning_torque, turning_torque};
@@ -210,13 +211,13 @@ impl Rotation {
         let (matrix, rate) = (self.copy.attitude.matrix(), self.copy.attitude.rate);
         let at = point_of(&matrix, rate, *grasp, centre);
         let force: [f64; A] = from_fn(|axis| contact.force_along(axis, coupling, device.along(axis).relative_to(at.along(axis))));
-        let lever = cross(*grasp, apply_transposed(&matrix, triple(&force)));
+        let lever = lever(&matrix, *grasp, triple(&force));
         let mut torques = Torques { coupling: lever, coordination: aligning_torque((&matrix, rate), self.held.mean(), gains), device: [0.0; 3] };
         if let (Some(handle), Some(DeviceRotation { coupling, .. }), Contact::Grasp) = (&self.device, &self.config.device, contact) {
             let turned = handle.attitude.matrix();
             let torque = turning_torque((&matrix, rate), (&turned, handle.attitude.rate), coupling);
             torques.coupling = add(lever, torque);
-            torques.device = apply_transposed(&turned, apply(&matrix, torque)).map(|component| -component);
+            torques.device = reaction(&matrix, &turned, torque);
         }
         self.applied = if late { core::mem::replace(&mut self.computed, torques) } else { torques };
         self.computed = torques;
@@ -228,7 +229,7 @@ impl Rotation {
         self.copy.advance(span, subtract(self.applied.coupling, self.applied.coordination), &self.config);
         if let Some(device) = &mut self.device {
             let hand = self.config.device.as_ref().and_then(|device| device.hand.as_ref());
-            let hand = hand.map_or([0.0; 3], |hand| apply_transposed(&device.attitude.matrix(), hand.value::<3>(now)));
+            let hand = hand.map_or([0.0; 3], |hand| in_body_axes(&device.attitude.matrix(), hand.value::<3>(now)));
             device.advance(span, add(hand, self.applied.device), &self.config);
         }
     }

@@ -106,9 +106,26 @@ impl Spin {
     }
 }
 
+impl<C> RotationStep<C> {
+    /// How the turn is computed.
+    #[must_use]
+    #[inline(always)]
+    pub const fn method(&self) -> RotationMethod {
+        self.method
+    }
+
+    /// How many steps the span is divided into.
+    #[must_use]
+    #[inline(always)]
+    pub const fn steps(&self) -> u32 {
+        self.steps
+    }
+}
+
 impl<C: Copy> RotationStep<C> {
     /// Each coefficient replaced by what `coefficient` makes of it, always in one order.
     #[must_use]
+    #[inline(always)]
     pub fn map<D: Copy>(&self, mut coefficient: impl FnMut(&C) -> D) -> RotationStep<D> {
         let h = coefficient(&self.h);
         let mut triple = |triple: &Triple<C>| -> Triple<D> { from_fn(|axis| coefficient(&triple[axis])) };
@@ -130,14 +147,25 @@ impl<N: Real> RotationStep<N> {
     /// Turns a body over the span under a torque that is held in body axes [N·m].
     #[inline(always)]
     pub fn advance(&self, body: &mut Attitude<N>, torque: Triple<N>) {
-        let forced = by_component(torque, self.mobility);
+        let forced = self.forced(torque);
         for _ in 0..self.steps {
             match self.method {
-                RotationMethod::Exponential => self.exponential(body, forced),
+                RotationMethod::Exponential => {
+                    let (rate, sigma) = self.exponential(body.rate, forced);
+                    body.rate = rate;
+                    body.turn(sigma);
+                }
                 RotationMethod::Euler => self.euler(body, forced),
                 RotationMethod::RungeKutta4 => self.runge_kutta(body, forced),
             }
         }
+    }
+
+    /// The angular acceleration by a torque, τ/J [rad/s²].
+    #[must_use]
+    #[inline(always)]
+    pub fn forced(&self, torque: Triple<N>) -> Triple<N> {
+        by_component(torque, self.mobility)
     }
 
     /// γ(ω): the angular acceleration by the gyroscopic term.
@@ -146,9 +174,11 @@ impl<N: Real> RotationStep<N> {
         by_component(self.gyration, [rate[1] * rate[2], rate[2] * rate[0], rate[0] * rate[1]])
     }
 
+    /// One of the steps by [`RotationMethod::Exponential`]: the angular velocity after it, and the rotation vector σ of its turn, in body axes. `forced`: that of
+    /// [`RotationStep::forced`].
+    #[must_use]
     #[inline(always)]
-    fn exponential(&self, body: &mut Attitude<N>, forced: Triple<N>) {
-        let rate = body.rate;
+    pub fn exponential(&self, rate: Triple<N>, forced: Triple<N>) -> (Triple<N>, Triple<N>) {
         let [e, g] = self.whole;
         let [e_half, g_half] = self.half;
         let [a, b, c, d, drift] = self.weights;
@@ -165,8 +195,7 @@ impl<N: Real> RotationStep<N> {
         let magnus = scale(cross(rate, after), self.h * self.h * N::of(1.0 / 12.0));
         let free = add(by_component(g, rate), by_component(drift, push));
         let sigma = add(free, add(add(by_component(c, middle), by_component(d, fourth)), magnus));
-        body.rate = after;
-        body.turn(sigma);
+        (after, sigma)
     }
 
     /// ω̇ of the equation of motion.
