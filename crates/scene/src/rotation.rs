@@ -98,6 +98,16 @@ impl Scene {
         Some((rotation.inertia.iter().sum::<f64>() / (3.0 * self.object.mass)).sqrt())
     }
 
+    /// The edges of the box of even density that has the mass and the inertia of the object, along the body axes \[m\]: a = √(6·(Jy + Jz − Jx)/m), and the same
+    /// for b and c. The object is drawn as this box. `None` if the object does not turn.
+    #[must_use]
+    pub fn even_box(&self) -> Option<Triple> {
+        let inertia = self.rotation.as_ref()?.inertia;
+        let twice: f64 = inertia.iter().sum();
+        // Rounding may leave a plate less than no thickness.
+        Some(inertia.map(|moment| (6.0 * (twice - 2.0 * moment).max(0.0) / self.object.mass).sqrt()))
+    }
+
     /// KR and BR on the mean of the others about the body axes, scaled by the number of peers, where KT and BT are `gains`, those of the scene or those that
     /// the timeline sets; `None` if the object does not turn.
     #[must_use]
@@ -188,6 +198,18 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         // 4·3/16 times three others.
         assert_eq!(scaled.rotation_gains(scaled.coordination.gains).map(|gains| gains.stiffness), Some([18.0; 3]));
         assert_eq!(scene.sample_kind(), SampleKind::Attitude);
+    }
+
+    /// A box of 0.3 × 0.2 × 0.1 m with 2 kg has J = m/12·(b² + c²), …
+    #[test]
+    fn a_box_has_the_inertia_of_the_object() {
+        let edges: [f64; 3] = [0.3, 0.2, 0.1];
+        let of = |one: usize, other: usize| 2.0 / 12.0 * (edges[one] * edges[one] + edges[other] * edges[other]);
+        let scene = scene(&[&format!("object.inertia=[{}, {}, {}]", of(1, 2), of(0, 2), of(0, 1))]).unwrap();
+        let found = scene.even_box().unwrap();
+        assert!((0..3).all(|axis| (found[axis] - edges[axis]).abs() < 1e-15), "{found:?}");
+        let plate = self::scene(&["object.inertia=[0.1, 0.2, 0.3]"]).unwrap().even_box().unwrap();
+        assert!(plate[2] < 1e-7 && plate[0] > plate[1], "{plate:?}");
     }
 
     #[test]
