@@ -79,7 +79,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         assert!(too_large(self.scene).is_none(), "a scene with more peers than a simulation takes is not run");
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         if let Some((shape, law)) = self.arrays(&plan, Watch::of(observer)) {
-            let threads = shape.threads_that_pay(self.threads);
+            let threads = self.threads.min(shape.threads().0);
             if threads > 1
                 && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
             {

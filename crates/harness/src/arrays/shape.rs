@@ -48,9 +48,9 @@ impl Shape {
         (before, Instant::from_nanos(before * nanos(self.tick)))
     }
 
-    /// How many of some threads pay for a run.
-    pub(crate) fn threads_that_pay(&self, threads: usize) -> usize {
-        threads::that_pay(self, threads)
+    /// How many threads pay for a run at most, and why no more.
+    pub(crate) fn threads(&self) -> (usize, &'static str) {
+        threads::that_pay(self)
     }
 
     /// Whether a run that diverges is to be run once more with events: queues have looked ahead of the end.

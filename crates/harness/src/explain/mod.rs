@@ -91,13 +91,16 @@ pub fn explain(scene: &Scene) -> Explanation {
         let count = Counted(measure.names.len(), "number");
         rows.model("measures", format!("{count}, computed tick by tick"), "[measure]: the run is watched, so it has events whatever else it needs");
     }
-    let in_arrays = scene.measure.is_none() && Shape::of(scene, &plan, &FromScene).is_some();
-    if in_arrays {
+    let arrays = Shape::of(scene, &plan, &FromScene).filter(|_| scene.measure.is_none());
+    let in_arrays = arrays.is_some();
+    if let Some((shape, _)) = arrays {
         rows.model(
             "runs that nobody watches",
             "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
-            "all tick together, nothing changes on the way, and over the links nothing waits; a run that is recorded has events",
+            "all tick together, nothing changes on the way, and no link counts or damages packets; a run that is recorded has events",
         );
+        let (threads, why) = shape.threads();
+        rows.model("threads of such a run", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);
     }
     let nanos = if in_arrays { IN_ARRAYS } else { WITH_EVENTS };
     Explanation { dimensions: dimensions(scene, &plan), cost: cost(scene, &nanos), models: rows.models, left_out: rows.left_out }
