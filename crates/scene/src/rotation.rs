@@ -75,7 +75,7 @@ impl Scene {
         Some(RotationConfig {
             copy: self.copy_spin()?,
             grasp: *grasp,
-            gains: self.rotation_gains(self.coordination.gains)?,
+            gains: self.rotation_gains(self.coordination.gains, &rotation.gains)?,
             device,
             integrator: self.integrator,
             steps: rotation.steps,
@@ -98,11 +98,11 @@ impl Scene {
         Some((rotation.inertia.iter().sum::<f64>() / (3.0 * self.object.mass)).sqrt())
     }
 
-    /// KR and BR on the mean of the others about the body axes, scaled by the number of peers, where KT and BT are `gains`, those of the scene or those that
-    /// the timeline sets; `None` if the object does not turn.
+    /// KR and BR on the mean of the others about the body axes, scaled by the number of peers; `None` if the object does not turn. `gains`: KT and BT, `given`: KR
+    /// and BR as written, both those of the scene or those that the timeline sets.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-    pub fn rotation_gains(&self, gains: Gains) -> Option<Gains<Triple>> {
+    pub fn rotation_gains(&self, gains: Gains, given: &Gains<Option<Triple>>) -> Option<Gains<Triple>> {
         let rotation = self.rotation.as_ref()?;
         let pull = match self.coordination.strategy.pull() {
             Pull::Mean => 1.0,
@@ -110,7 +110,38 @@ impl Scene {
         };
         let factor = pull * self.coordination_factor();
         let of = |own: Option<Triple>, gain: f64| own.unwrap_or_else(|| rotation.over_mass(self.object.mass, gain)).map(|gain| gain * factor);
-        Some(Gains { stiffness: of(rotation.gains.stiffness, gains.stiffness), damping: of(rotation.gains.damping, gains.damping) })
+        Some(Gains { stiffness: of(given.stiffness, gains.stiffness), damping: of(given.damping, gains.damping) })
+    }
+
+    /// [`Scene::rotation_gains`] at the beginning and after each change of KT and BT or of KR and BR in the timeline; nothing if the object does not turn.
+    ///
+    /// Default gains follow KT and BT. A gain that the timeline sets is a given one from then on. Of each KR, given as a whole or J times a number, no component is
+    /// above the sum of the others.
+    pub fn rotation_gains_in_time(&self) -> impl Iterator<Item = Gains<Triple>> {
+        let begins = self.rotation.as_ref().map(|rotation| (self.coordination.gains, rotation.gains));
+        let changes = begins.into_iter().flat_map(|begins| {
+            self.timeline.iter().scan(begins, |(gains, given), change| {
+                let changed = match change.what {
+                    ChangeKind::Coordination(changed) => {
+                        *gains = changed;
+                        true
+                    }
+                    ChangeKind::RotationalGains(changed) => {
+                        *given = Gains { stiffness: changed.stiffness.or(given.stiffness), damping: changed.damping.or(given.damping) };
+                        true
+                    }
+                    ChangeKind::Link(_)
+                    | ChangeKind::AllLinks(_)
+                    | ChangeKind::Contact { .. }
+                    | ChangeKind::Hand { .. }
+                    | ChangeKind::HandTorque { .. }
+                    | ChangeKind::Parameters(_)
+                    | ChangeKind::SendWhen(_) => false,
+                };
+                Some(changed.then_some((*gains, *given)))
+            })
+        });
+        begins.into_iter().chain(changes.flatten()).filter_map(|(gains, given)| self.rotation_gains(gains, &given))
     }
 
     /// Where the device of a peer begins: at the grasp point of its copy.
@@ -186,8 +217,28 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         assert_eq!(config.gains, Gains { stiffness: [15.0, 30.0, 45.0], damping: [3.0, 6.0, 9.0] });
         let scaled = self::scene(&["coordination.scaling=inverse-n", "coordination.rotational-stiffness=8"]).unwrap();
         // 4·3/16 times three others.
-        assert_eq!(scaled.rotation_gains(scaled.coordination.gains).map(|gains| gains.stiffness), Some([18.0; 3]));
+        assert_eq!(scaled.rotation_gains_in_time().next().map(|gains| gains.stiffness), Some([18.0; 3]));
         assert_eq!(scene.sample_kind(), SampleKind::Attitude);
+    }
+
+    #[test]
+    fn gains_of_turns_follow_those_of_translations_until_they_are_given() {
+        let scene = scene(&[
+            "timeline=[{at=\"0.1s\", coordination={stiffness=200}}, {at=\"0.2s\", coordination={rotational-stiffness=[1, 2, 3]}}, \
+             {at=\"0.3s\", coordination={stiffness=400, damping=40}}, {at=\"0.4s\", coordination={damping=80, rotational-damping=5}}]",
+        ])
+        .unwrap();
+        // Three others; J/m = (0.05, 0.1, 0.15).
+        let found: Vec<_> = scene.rotation_gains_in_time().map(|gains| (gains.stiffness, gains.damping)).collect();
+        let expected = [
+            ([15.0, 30.0, 45.0], [3.0, 6.0, 9.0]),
+            ([30.0, 60.0, 90.0], [3.0, 6.0, 9.0]),
+            ([3.0, 6.0, 9.0], [3.0, 6.0, 9.0]),
+            ([3.0, 6.0, 9.0], [6.0, 12.0, 18.0]),
+            ([3.0, 6.0, 9.0], [12.0, 24.0, 36.0]),
+            ([3.0, 6.0, 9.0], [15.0; 3]),
+        ];
+        assert_eq!(found, expected);
     }
 
     #[test]
@@ -220,6 +271,7 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         refused(&["peer.coupling.rotational-damping=0.001"], "expected rotational-stiffness beside it");
         refused(&["peer.hand={torque=[0, 0, 1]}"], "the torque of a hand needs a device that turns");
         refused(&["peer.kind=falcon", "peer.device.inertia=0.001", "peer.coupling.rotational-stiffness=1"], "a Falcon turns nothing");
+        refused(&["timeline=[{at=\"0s\", coordination={rotational-stiffness=[1, 1, 3]}}]"], "a stiffness is above the sum of the two others");
         refused(&["simulation.rotation-steps=0"], "rotation-steps");
     }
 
@@ -239,6 +291,7 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
             "peer.device.inertia=1",
             "peer.hand={torque=[0, 0, 1]}",
             "expect.rotation-discrepancy={max=1}",
+            "timeline=[{at=\"0s\", coordination={rotational-damping=1}}]",
         ] {
             let error = Scene::parse(&text, Path::new("x.toml"), &[key.to_owned()]).unwrap_err().to_string();
             assert!(error.contains("this is about an object that turns: expected object.inertia, or no such key"), "{key}: {error}");

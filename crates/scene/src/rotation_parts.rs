@@ -289,7 +289,7 @@ mod tests {
         let parts = split.rotation_parts().unwrap().unwrap().parts;
         let rx = &parts[1].scene;
         assert_eq!((rx.copy_mass(), rx.object.damping), (0.4e-4, 2.0 * 1.2e-4 / 0.5));
-        let whole = split.rotation_gains(split.coordination.gains).unwrap();
+        let whole = split.rotation_gains_in_time().next().unwrap();
         // N − 1 of the strategy is in its law.
         let gains = rx.coordination_gains(rx.coordination.gains);
         assert!((2.0 * gains.stiffness / whole.stiffness[0] - 1.0).abs() < 1e-15 && (2.0 * gains.damping / whole.damping[0] - 1.0).abs() < 1e-15);

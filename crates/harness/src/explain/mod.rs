@@ -174,7 +174,7 @@ impl Rows {
             format!("copies with moments of inertia {} kg·m², damped by {} N·m·s/rad", triple(copy.inertia), triple(copy.damping)),
             "object.inertia; each takes part in the inertia as in the mass",
         );
-        if let Some(gains) = scene.rotation_gains(scene.coordination.gains) {
+        if let Some(gains) = scene.rotation_gains_in_time().next() {
             let gains = format!("KR = {} N·m/rad, BR = {} N·m·s/rad about body axes", triple(gains.stiffness), triple(gains.damping));
             self.model("coordination of turns", gains, "the mean of the matrices held, which is no rotation, gives the mean torque");
         }

@@ -292,11 +292,16 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     for member in &mut self.members {
                         member.peer.strategy_mut().set_gains(gains.scaled(self.coordination_factor));
                     }
-                    if let Some(gains) = self.turning.as_mut().and_then(|turning| turning.next_gains()) {
-                        self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).for_each(|rotation| rotation.set_gains(gains));
-                    }
+                    self.change_gains_of_turns();
                 }
+                ChangeKind::RotationalGains(_) => self.change_gains_of_turns(),
             }
+        }
+    }
+
+    fn change_gains_of_turns(&mut self) {
+        if let Some(gains) = self.turning.as_mut().and_then(|turning| turning.next_gains()) {
+            self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).for_each(|rotation| rotation.set_gains(gains));
         }
     }
 

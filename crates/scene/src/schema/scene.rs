@@ -330,9 +330,11 @@ const SET_OF_PEER: [Key; 2] = [
     optional("hand", HAND, "Of a peer: what the user does"),
 ];
 static CHANGES: Table = Table::of(&[&CHANGES_OF_ALL, CHANGING_LAWS.split_at(count_laws(true)).0]);
-const CHANGES_OF_ALL: [Key; 3] = [
+const CHANGES_OF_ALL: [Key; 5] = [
     optional("stiffness", number(STIFFNESS), "Gain on the difference of positions; without it as it was"),
     optional("damping", number(DAMPING), "Gain on the difference of velocities; without it as it was"),
+    optional("rotational-stiffness", vector(ROTATIONAL_STIFFNESS), "Gain on turns between copies; without it as it was"),
+    optional("rotational-damping", vector(ROTATIONAL_DAMPING), "Gain on the difference of angular velocities; without it as it was"),
     optional("send-when", Form::Table(&SEND_WHEN), "Which samples are sent; without it as it was"),
 ];
 
