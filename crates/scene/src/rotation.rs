@@ -1,6 +1,6 @@
 //! An object that turns: its inertia, and all that follows from it.
 
-use cohaptic_peer::coordination::Pull;
+use cohaptic_peer::coordination::{Pull, UsedGains};
 use cohaptic_peer::rotation::{Attitude, DeviceRotation, HeldAttitudes, Rotation, RotationConfig, Spin, Triple};
 use cohaptic_peer::{Coordination, Gains, Signal, State};
 
@@ -54,7 +54,8 @@ impl Scene {
         let rotation = self.rotation.as_ref()?;
         let others = rotation.peers.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, peer)| peer.attitude);
         let held = HeldAttitudes::new(others);
-        Some(Rotation::new(self.rotation_config(place)?, rotation.peers[place].attitude, held, &self.peers[place].clock))
+        let turning = Rotation::new(self.rotation_config(place)?, rotation.peers[place].attitude, held, &self.peers[place].clock);
+        Some(turning.with_law(&self.turn_law(place)?, self.own_rotational_damping(place)))
     }
 
     /// What the turning part of a peer is made from, with every scaling applied; `None` if the object does not turn.
@@ -73,7 +74,7 @@ impl Scene {
             hand: device.torque.clone(),
         });
         Some(RotationConfig {
-            copy: self.copy_spin()?,
+            copy: self.damped_spin(place)?,
             grasp: *grasp,
             gains: self.rotation_gains(self.coordination.gains, &rotation.gains)?,
             device,
@@ -82,7 +83,18 @@ impl Scene {
         })
     }
 
-    /// Inertia and damping of the turn of each copy; `None` if the object does not turn. Inertia is split as mass is.
+    /// [`Scene::copy_spin`] with the damping of the strategy.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn damped_spin(&self, place: usize) -> Option<Spin> {
+        let (Spin { inertia, damping }, own) = (self.copy_spin()?, self.own_rotational_damping(place));
+        Some(Spin { inertia, damping: std::array::from_fn(|axis| damping[axis] + own[axis]) })
+    }
+
+    /// Inertia and damping of the turn of each copy, without the damping of the strategy; `None` if the object does not turn. Inertia is split as mass is.
     #[must_use]
     pub fn copy_spin(&self) -> Option<Spin> {
         let rotation = self.rotation.as_ref()?;
@@ -110,7 +122,11 @@ impl Scene {
         };
         let factor = pull * self.coordination_factor();
         let of = |own: Option<Triple>, gain: f64| own.unwrap_or_else(|| rotation.over_mass(self.object.mass, gain)).map(|gain| gain * factor);
-        Some(Gains { stiffness: of(given.stiffness, gains.stiffness), damping: of(given.damping, gains.damping) })
+        let damping = match self.coordination.strategy.gains() {
+            UsedGains::Both => of(given.damping, gains.damping),
+            UsedGains::Stiffness | UsedGains::Neither => [0.0; 3],
+        };
+        Some(Gains { stiffness: of(given.stiffness, gains.stiffness), damping })
     }
 
     /// [`Scene::rotation_gains`] at the beginning and after each change of KT and BT or of KR and BR in the timeline; nothing if the object does not turn.
@@ -162,12 +178,12 @@ impl Scene {
     pub(crate) fn refused_rotation(&self) -> Option<String> {
         let rotation = self.rotation.as_ref()?;
         let strategy = self.coordination.strategy;
-        let turns = [Coordination::AveragePosition, Coordination::ProportionalDerivative, Coordination::Extrapolated];
-        if !turns.contains(&strategy) {
-            let names: Vec<&str> = turns.iter().map(|strategy| strategy.name()).collect();
+        if let Some(why) = why_no_torque(strategy) {
+            let turning = Coordination::ALL.iter().filter(|strategy| why_no_torque(**strategy).is_none());
+            let names: Vec<&str> = turning.map(|strategy| strategy.name()).collect();
+            let name = strategy.name();
             return Some(format!(
-                "the strategy {} has no torque for an object with an inertia: expected one of {}",
-                strategy.name(),
+                "the strategy {name} has no torque for an object with an inertia, because {why}: expected one of {}",
                 names.join(", ")
             ));
         }
@@ -181,9 +197,26 @@ impl Scene {
     }
 }
 
+/// Why a strategy has no torque; `None` if it has one.
+const fn why_no_torque(strategy: Coordination) -> Option<&'static str> {
+    match strategy {
+        Coordination::AveragePosition
+        | Coordination::ProportionalDerivative
+        | Coordination::SmoothedAveragePosition
+        | Coordination::Extrapolated
+        | Coordination::LocalDamping
+        | Coordination::LocalLag => None,
+        Coordination::PassivityControl | Coordination::SetPosition => {
+            Some("it keeps energies along axes that all copies have in common, and copies that turn have none")
+        }
+        Coordination::Wave => Some("both ends of a line have its axis in common, and copies that turn have none"),
+        Coordination::ClientServer => Some("samples of its clients are those of devices, and say nothing of their turns"),
+    }
+}
+
 impl RotationSpec {
     /// A number that belongs to a mass, for the inertia of it: as if each element of the mass had it alone.
-    fn over_mass(&self, mass: f64, number: f64) -> Triple {
+    pub(crate) fn over_mass(&self, mass: f64, number: f64) -> Triple {
         self.inertia.map(|moment| number * moment / mass)
     }
 }
@@ -222,11 +255,27 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
     }
 
     #[test]
+    fn a_law_damps_turns_as_it_damps_translations() {
+        let damped = |overrides: &[&str]| {
+            let scene = scene(&[&["coordination.strategy=local-damping"], overrides].concat()).unwrap();
+            let (config, own) = (scene.rotation_config(0).unwrap(), scene.own_rotational_damping(0));
+            assert_eq!(config.gains.damping, [0.0; 3]);
+            assert_eq!(config.copy.damping, std::array::from_fn(|axis| scene.copy_spin().unwrap().damping[axis] + own[axis]));
+            own
+        };
+        // J/m = (0.05, 0.1, 0.15); KR at most 15, and samples at most 8 ms old and a tick.
+        assert_eq!(damped(&["coordination.local-damping.damping=8"]), [0.4, 0.8, 8.0 * 0.3 / 2.0]);
+        let found = damped(&["coordination.local-damping.age=8ms"]);
+        assert!(found.iter().all(|damping| (damping / (15.0 * 9e-3) - 1.0).abs() < 1e-15), "{found:?}");
+        let split = damped(&["coordination.local-damping.age=8ms", "coordination.rotational-stiffness=[4, 2, 3]", "coordination.scaling=inverse-n"]);
+        assert!(split.iter().all(|damping| (damping / (0.75 * 4.0 * 9e-3) - 1.0).abs() < 1e-15), "{split:?}");
+        assert_eq!(scene(&["coordination.strategy=local-lag", "link={delay=\"8ms\"}"]).unwrap().own_rotational_damping(0), [0.0; 3]);
+    }
+
+    #[test]
     fn gains_of_turns_follow_those_of_translations_until_they_are_given() {
-        let scene = scene(&[
-            "timeline=[{at=\"0.1s\", coordination={stiffness=200}}, {at=\"0.2s\", coordination={rotational-stiffness=[1, 2, 3]}}, \
-             {at=\"0.3s\", coordination={stiffness=400, damping=40}}, {at=\"0.4s\", coordination={damping=80, rotational-damping=5}}]",
-        ])
+        let scene = scene(&["timeline=[{at=\"0.1s\", coordination={stiffness=200}}, {at=\"0.2s\", coordination={rotational-stiffness=[1, 2, 3]}}, \
+             {at=\"0.3s\", coordination={stiffness=400, damping=40}}, {at=\"0.4s\", coordination={damping=80, rotational-damping=5}}]"])
         .unwrap();
         // Three others; J/m = (0.05, 0.1, 0.15).
         let found: Vec<_> = scene.rotation_gains_in_time().map(|gains| (gains.stiffness, gains.damping)).collect();
@@ -264,7 +313,17 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         refused(&["object.orientation=[0, 0, 0, 0]"], "is no quaternion");
         refused(&["object.orientation=[1, 0, 0]"], "is no quaternion");
         refused(&["coordination.rotational-stiffness=[1, 1, 3]"], "a stiffness is above the sum of the two others");
-        refused(&["coordination.strategy=wave"], "the strategy wave has no torque for an object with an inertia");
+        for (strategy, why) in
+            [("wave", "axis in common"), ("set-position", "energies"), ("passivity-control", "energies"), ("client-server", "clients")]
+        {
+            let name = format!("coordination.strategy={strategy}");
+            refused(&[&name], &format!("the strategy {strategy} has no torque for an object with an inertia, because "));
+            refused(&[&name], why);
+            refused(
+                &[&name],
+                "expected one of average-position, proportional-derivative, smoothed-average-position, extrapolated, local-damping, local-lag",
+            );
+        }
         refused(&["coordination.send-when={position=0.001}"], "dead bands say nothing of attitudes");
         refused(&["peer.device.inertia=0.001"], "expected coupling.rotational-stiffness");
         refused(&["peer.device.rotational-damping=0.001"], "expected device.inertia beside it");

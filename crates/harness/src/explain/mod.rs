@@ -178,6 +178,10 @@ impl Rows {
             let gains = format!("KR = {} N·m/rad, BR = {} N·m·s/rad about body axes", triple(gains.stiffness), triple(gains.damping));
             self.model("coordination of turns", gains, "the mean of the matrices held, which is no rotation, gives the mean torque");
         }
+        let own = scene.own_rotational_damping(0);
+        if own.iter().any(|damping| *damping > 0.0) {
+            self.model("damping of turns", format!("another {} N·m·s/rad of each copy", triple(own)), "the strategy damps each copy");
+        }
         let method = match scene.integrator {
             Integrator::Exact => "exponential of the damped turn, fourth order in the gyroscopic term",
             Integrator::SemiImplicitEuler { .. } => "explicit Euler on quaternion and angular velocity",

@@ -6,8 +6,8 @@ mod turning;
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::{LawValues, Role};
-use cohaptic_peer::rotation::{Attitude, Rotation};
+use cohaptic_peer::coordination::{BuiltIn, LawValues, Role};
+use cohaptic_peer::rotation::{Attitude, Rotation, Triple};
 use cohaptic_peer::wire::{Extra, SampleKind};
 use cohaptic_peer::{Clock, Contact, Device, Held, LastSent, ObjectCopy, Peer, Reception, RestingDevice, SendWhen, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Change, ChangeKind, Scene};
@@ -64,6 +64,8 @@ struct ParameterChange {
     own: LawValues,
     /// For each peer β, and the damping of its copy with it [N·s/m].
     damping: Vec<(f64, f64)>,
+    /// For each peer, if the object turns, the law of its turns, β about each axis, and the damping of the turn of its copy with it [N·m·s/rad].
+    turns: Vec<(BuiltIn, Triple, Triple)>,
 }
 
 /// The changes of parameters in the timeline, the first one last.
@@ -72,7 +74,9 @@ fn parameter_changes(scene: &Scene) -> Vec<ParameterChange> {
         let ChangeKind::Parameters(settings) = &change.what else { return None };
         let then = scene.with_parameters(settings);
         let damping = (0..then.peers.len()).map(|place| (then.own_damping(place), then.copy_config(place).damping)).collect();
-        Some(ParameterChange { own: *settings.of(scene.coordination.strategy), damping })
+        let turns = |place: usize| Some((then.turn_law(place)?, then.own_rotational_damping(place), then.damped_spin(place)?.damping));
+        let turns = (0..then.peers.len()).filter_map(turns).collect();
+        Some(ParameterChange { own: *settings.of(scene.coordination.strategy), damping, turns })
     };
     scene.timeline.iter().rev().filter_map(change).collect()
 }
@@ -282,7 +286,11 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 }
                 ChangeKind::SendWhen(when) => self.send_when = Some(when),
                 ChangeKind::Parameters(_) => {
-                    let ParameterChange { own, damping } = self.parameters.pop().expect("there is one for each of these changes");
+                    let ParameterChange { own, damping, turns } = self.parameters.pop().expect("there is one for each of these changes");
+                    for (rotation, (law, own_damping, damping)) in self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).zip(turns)
+                    {
+                        rotation.set_law(&law, own_damping, damping);
+                    }
                     for (member, (own_damping, damping)) in self.members.iter_mut().zip(damping) {
                         member.peer.set_parameters(&own, own_damping, damping);
                     }
@@ -457,6 +465,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             if watch.ticks {
                 let axes = self.axes;
                 let device = member.peer.device().state();
+                let coordination_torque = member.peer.rotation().map_or([0.0; 3], Rotation::coordination_torque);
                 observer.on_tick(&TickRow {
                     at: now,
                     peer: place,
@@ -469,7 +478,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                         object: rotation.copy(),
                         device: rotation.device(),
                         coupling_torque: &rotation.computed().coupling,
-                        coordination_torque: &rotation.computed().coordination,
+                        coordination_torque: &coordination_torque,
                     }),
                 })?;
             }

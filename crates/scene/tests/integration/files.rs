@@ -121,9 +121,17 @@ fn a_hand_file_gives_torques_beside_forces_and_wanted_motions() {
     for (hand, overrides, expected) in [
         ("{ file = \"hand.csv\", torque = [0, 0, 7] }", &[][..], "peers.a.hand.torque: a torque stands beside the torques of a file"),
         (&format!("{{ {arm}, torque = [0, 0, 7] }}"), &[], "beside the torques of a file"),
-        ("{ file = \"hand.csv\" }", &["peers.a.device={mass=0.1}", "peer={device={mass=0.1},coupling={stiffness=1}}"], "a torque needs a device that turns: expected device.inertia"),
+        (
+            "{ file = \"hand.csv\" }",
+            &["peers.a.device={mass=0.1}", "peer={device={mass=0.1},coupling={stiffness=1}}"],
+            "the torque of a hand needs a device that turns: expected device.inertia",
+        ),
         ("\"none\"", &["peer={device={mass=0.1},coupling={stiffness=1}}"], "the timeline gives the hand of peer \"b\" a torque"),
-        ("{ file = \"force.csv\" }", &["object={mass=1}"], "hand.csv:1:12: timeline.0.set.hand.file: column tx: a torque needs an object that turns"),
+        (
+            "{ file = \"force.csv\" }",
+            &["object={mass=1}", "peer={device={mass=0.1},coupling={stiffness=1}}"],
+            "hand.csv:1:12: timeline.0.set.hand.file: column tx: a torque needs an object that turns",
+        ),
     ] {
         let error = read(hand, overrides).unwrap_err().to_string();
         assert!(error.contains(expected), "{hand}: {error}");
