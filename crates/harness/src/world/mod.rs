@@ -16,7 +16,7 @@ use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, 
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
-use crate::observer::{HoldRow, InstantRow, Observer, SendRow, StateRow, StepRow, TickRow, TurnRow};
+use crate::observer::{HoldRow, InstantRow, Observer, SendRow, StateRow, StepRow, TickRow, TurnRow, TurnStepRow};
 use crate::plan::{DeviceChoice, Plan};
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
@@ -603,7 +603,17 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         let coordination = if self.peer.compute_delay() { late } else { commanded };
         let before = self.moved_by_coordination();
         let acting = *self.peer.applied();
+        let turn = self.peer.rotation().map(|rotation| TurnStepRow {
+            span,
+            before: rotation.copy().rate,
+            after: [0.0; 3],
+            travel: rotation.travel(span),
+            held_torque: rotation.on_copy(),
+            coordination_torque: rotation.applied().coordination,
+            own_damping: rotation.own_damping(),
+        });
         self.peer.advance(now, span);
+        let turn = turn.map(|turn| TurnStepRow { after: self.peer.attitude().rate, ..turn });
         let after = self.moved_by_coordination();
         let coordination = if self.peer.role() == Role::Copy { coordination } else { acting.coupling };
         observer.on_step(&StepRow {
@@ -614,6 +624,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
             held_force: &acting.on_object[..axes],
             coordination_force: &coordination[..axes],
             own_damping: self.peer.own_damping(),
+            turn,
         })
     }
 

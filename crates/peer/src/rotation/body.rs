@@ -190,6 +190,19 @@ impl Rotation {
         self.own_damping
     }
 
+    /// The integral of the angular velocity of the copy in its axes over the step to the next tick \[rad\], between [`crate::Peer::compute`] and [`crate::Peer::advance`].
+    #[must_use]
+    pub fn travel(&self, span: Duration) -> Triple {
+        let step = self.copy.spin.step(span, self.config.integrator, self.config.steps);
+        step.travel(&mut self.copy.attitude.clone(), self.on_copy())
+    }
+
+    /// The torque that is held on the copy over the tick that begins now, without its damping, in body axes \[N·m\].
+    #[must_use]
+    pub fn on_copy(&self) -> Triple {
+        subtract(self.applied.coupling, self.applied.coordination)
+    }
+
     /// What the peer is.
     #[must_use]
     pub const fn config(&self) -> &RotationConfig {
@@ -286,7 +299,7 @@ impl Rotation {
 
     /// Moves to the next tick under the torques that act over it, which are held in body axes.
     pub(crate) fn advance(&mut self, now: Instant, span: Duration) {
-        self.copy.advance(span, subtract(self.applied.coupling, self.applied.coordination), &self.config);
+        self.copy.advance(span, self.on_copy(), &self.config);
         if let Some(device) = &mut self.device {
             let hand = self.config.device.as_ref().and_then(|device| device.hand.as_ref());
             let hand = hand.map_or([0.0; 3], |hand| apply_transposed(&device.attitude.matrix(), hand.value::<3>(now)));
