@@ -259,17 +259,21 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         let damped = |overrides: &[&str]| {
             let scene = scene(&[&["coordination.strategy=local-damping"], overrides].concat()).unwrap();
             let (config, own) = (scene.rotation_config(0).unwrap(), scene.own_rotational_damping(0));
-            assert_eq!(config.gains.damping, [0.0; 3]);
-            assert_eq!(config.copy.damping, std::array::from_fn(|axis| scene.copy_spin().unwrap().damping[axis] + own[axis]));
+            let ground = scene.copy_spin().unwrap().damping;
+            let gains = Gains { stiffness: config.gains.stiffness, damping: [0.0; 3] };
+            let copy = Spin { inertia: config.copy.inertia, damping: std::array::from_fn(|axis| ground[axis] + own[axis]) };
+            assert_eq!((config.gains, config.copy), (gains, copy));
             own
         };
         // J/m = (0.05, 0.1, 0.15); KR at most 15, and samples at most 8 ms old and a tick.
-        assert_eq!(damped(&["coordination.local-damping.damping=8"]), [0.4, 0.8, 8.0 * 0.3 / 2.0]);
+        let close = |found: [f64; 3], expected: [f64; 3]| (0..3).all(|axis| (found[axis] - expected[axis]).abs() <= 1e-15 * expected[axis]);
+        let given = damped(&["coordination.local-damping.damping=8"]);
+        assert!(close(given, [0.4, 0.8, 1.2]), "{given:?}");
         let found = damped(&["coordination.local-damping.age=8ms"]);
-        assert!(found.iter().all(|damping| (damping / (15.0 * 9e-3) - 1.0).abs() < 1e-15), "{found:?}");
+        assert!(close(found, [15.0 * 9e-3; 3]), "{found:?}");
         let split = damped(&["coordination.local-damping.age=8ms", "coordination.rotational-stiffness=[4, 2, 3]", "coordination.scaling=inverse-n"]);
-        assert!(split.iter().all(|damping| (damping / (0.75 * 4.0 * 9e-3) - 1.0).abs() < 1e-15), "{split:?}");
-        assert_eq!(scene(&["coordination.strategy=local-lag", "link={delay=\"8ms\"}"]).unwrap().own_rotational_damping(0), [0.0; 3]);
+        assert!(close(split, [0.75 * 4.0 * 9e-3; 3]), "{split:?}");
+        assert!(close(scene(&["coordination.strategy=local-lag", "link={delay=\"8ms\"}"]).unwrap().own_rotational_damping(0), [0.0; 3]));
     }
 
     #[test]

@@ -194,7 +194,8 @@ impl Rotation {
     #[must_use]
     pub fn travel(&self, span: Duration) -> Triple {
         let step = self.copy.spin.step(span, self.config.integrator, self.config.steps);
-        step.travel(&mut self.copy.attitude.clone(), self.on_copy())
+        let mut body = self.copy.attitude;
+        step.travel(&mut body, self.on_copy())
     }
 
     /// The torque that is held on the copy over the tick that begins now, without its damping, in body axes \[N·m\].

@@ -105,10 +105,8 @@ fn a_hand_file_gives_torques_beside_forces_and_wanted_motions() {
     };
     let torque = |hand: &str| {
         let scene = read(hand, &[]).unwrap_or_else(|error| panic!("{error}"));
-        let changed = scene.timeline.iter().find_map(|change| match &change.what {
-            ChangeKind::HandTorque { peer: 1, torque } => torque.clone(),
-            _ => None,
-        });
+        let torque_of = |what: &ChangeKind| if let ChangeKind::HandTorque { peer: 1, torque } = what { torque.clone() } else { None };
+        let changed = scene.timeline.iter().find_map(|change| torque_of(&change.what));
         assert_eq!(changed.map(|torque| torque.value(Instant::ZERO)), Some([4.0, 5.0, 6.0]));
         let device = scene.rotation.unwrap().peers[0].device.clone().unwrap();
         device.torque.map(|torque| torque.value::<3>(Instant::ZERO))
