@@ -39,6 +39,7 @@ mod plan;
 pub mod record;
 mod schedule;
 mod simulation;
+mod spread;
 mod summary;
 mod world;
 

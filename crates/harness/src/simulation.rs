@@ -3,8 +3,9 @@
 use cohaptic_peer::Strategy;
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_scene::{Axes, FromScene, Scene, Strategies};
+use cohaptic_units::Instant;
 
-use crate::arrays::{Arrays, Shape};
+use crate::arrays::{self, Shape};
 use crate::disturbance::Disturbance;
 use crate::observer::{INSTANTS_BETWEEN_QUESTIONS, Observer};
 use crate::plan::{Model, Plan};
@@ -68,13 +69,13 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         assert!(too_large(self.scene).is_none(), "a scene with more peers than a simulation takes is not run");
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         if let Some((shape, law)) = self.arrays(&plan, Watch::of(observer)) {
-            let keep_going = |now| observer.keep_going(now);
-            let [summary] = match plan.axes {
-                Axes::One => Arrays::<1, 1>::new([self.scene], shape, [law]).run(keep_going),
-                Axes::Two => Arrays::<2, 1>::new([self.scene], shape, [law]).run(keep_going),
-                Axes::Three => Arrays::<3, 1>::new([self.scene], shape, [law]).run(keep_going),
-            };
-            return Ok(summary);
+            let looks_ahead = shape.looks_ahead();
+            let [summary] = arrays::run([self.scene], shape, [law], |now| observer.keep_going(now));
+            // The counters of queues that have looked ahead are those of a later instant.
+            let has_looked_too_far = looks_ahead && matches!(summary.ending, Ending::Diverged(at) if at - Instant::ZERO < self.scene.duration);
+            if !has_looked_too_far {
+                return Ok(summary);
+            }
         }
         match plan.axes {
             Axes::One => run_to_end(self.world::<1, _>(&plan, NoRemote), observer),

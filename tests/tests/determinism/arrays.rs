@@ -8,13 +8,13 @@ use cohaptic_tests::{Draft, cases, drafts, shipped_scenes};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
-fn run(scene: &Scene, model: Model) -> Summary {
+pub(super) fn run(scene: &Scene, model: Model) -> Summary {
     let Ok(summary) = Simulation::new(scene, model).run(&mut NoObserver);
     summary
 }
 
 /// What two runs differ in, first of all; `PartialEq` would let a zero pass for another one.
-fn difference(one: &Summary, other: &Summary) -> Option<String> {
+pub(super) fn difference(one: &Summary, other: &Summary) -> Option<String> {
     let (one, other) = (format!("{one:#?}"), format!("{other:#?}"));
     let (line, (found, expected)) = one.lines().zip(other.lines()).enumerate().find(|(_, (a, b))| a != b)?;
     Some(format!("line {line}: {found} is not {expected}"))
@@ -22,9 +22,14 @@ fn difference(one: &Summary, other: &Summary) -> Option<String> {
 
 /// Three peers for three seconds, over links with these keys.
 fn three(link: &str) -> Scene {
+    mesh(3, link)
+}
+
+/// That number of peers.
+fn mesh(peers: usize, link: &str) -> Scene {
     let text = format!(
         r#"
-        scene = {{ duration = "3s", count = 3 }}
+        scene = {{ duration = "3s", count = {peers} }}
         object = {{ mass = 0.45 }}
         coordination = {{ strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }}
         peer = {{ device = {{ mass = 0.1, damping = 5.0 }}, coupling = {{ stiffness = 3500.0, damping = 5.0 }} }}
@@ -67,7 +72,7 @@ impl Observer for Impatient {
     }
 }
 
-fn run_interrupted(scene: &Scene, model: Model, breaths: u32) -> Summary {
+pub(super) fn run_interrupted(scene: &Scene, model: Model, breaths: u32) -> Summary {
     let Ok(summary) = Simulation::new(scene, model).run(&mut Impatient(breaths));
     summary
 }
@@ -123,6 +128,18 @@ fn shipped_scenes_side_by_side_come_to_what_each_comes_to_alone() {
     assert_eq!(together.len(), scenes.len());
     for (scene, together) in scenes.iter().zip(&together) {
         assert_eq!(difference(together, &run(scene, Model::Least)), None, "{}", scene.title);
+    }
+}
+
+/// Of 257 peers on the means are exact, whether samples travel together or each by itself.
+#[test]
+fn many_peers_come_to_the_same() {
+    for link in ["delay = \"3ms\"", "delay = \"3ms\", jitter = \"400us\", loss = \"5%\""] {
+        let mut scene = mesh(260, link);
+        scene.peers.iter_mut().zip(0..).for_each(|(peer, place)| peer.phase = place % 8);
+        scene.duration = Duration::from_millis(24);
+        let [least, general] = [Model::Least, Model::General].map(|model| run(&scene, model));
+        assert_eq!(difference(&least, &general), None, "{link}");
     }
 }
 

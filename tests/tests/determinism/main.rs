@@ -5,3 +5,4 @@ mod arrays;
 mod bystander;
 mod models;
 mod threads;
+mod turning_arrays;

@@ -13,6 +13,7 @@ use cohaptic_units::Instant;
 
 use super::lanes::{Lanes, Mask, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
+use super::samples::Sample;
 
 /// All bodies on all axes.
 #[derive(Clone, Debug)]
@@ -35,15 +36,15 @@ pub(super) struct Blocks<const A: usize> {
     /// Hands whose force varies: peer, run and force.
     hands: Vec<(usize, usize, HandForce<A>)>,
     /// The runs that have not ended.
-    goes_on: Mask,
+    pub(super) goes_on: Mask,
 }
 
 /// Position and velocity of eight bodies along one axis.
-type Motions = Motion<Lanes>;
+pub(super) type Motions = Motion<Lanes>;
 
 /// Lanes devices with their copies of the object, along one axis.
 #[derive(Clone, Debug)]
-struct Block {
+pub(super) struct Block {
     device: Motions,
     object: Motions,
     /// The mean of the samples held.
@@ -90,6 +91,23 @@ struct Forces {
     coupling: Lanes,
     /// FC − FT, and the walls.
     on_object: Lanes,
+}
+
+/// What devices hold.
+pub(super) trait Grasped {
+    /// FC in the place of a block; `None` if devices hold the centres of their copies.
+    fn coupling(&self, place: usize) -> Option<&Lanes>;
+}
+
+/// They hold the centres of their copies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Centres;
+
+impl Grasped for Centres {
+    #[inline(always)]
+    fn coupling(&self, _place: usize) -> Option<&Lanes> {
+        None
+    }
 }
 
 /// Forces that are applied a tick late.
@@ -174,9 +192,9 @@ impl<const A: usize> Blocks<A> {
             late.extend((0..places.blocks()).map(|_| Late { computed: Forces::NONE, is_late: Mask::NONE }));
             for (spot, peer, run) in places.all(axis) {
                 let (spec, config) = (&scenes[run].peers[peer], scenes[run].peer_config(peer));
-                let initial: State<A> = scenes[run].initial_state(peer);
+                let (initial, device): (State<A>, State<A>) = (scenes[run].initial_state(peer), scenes[run].initial_device(peer));
                 let block: &mut Block = &mut blocks[spot.block];
-                block.device.position.0[spot.lane] = initial.position[axis];
+                block.device.position.0[spot.lane] = device.position[axis];
                 set_lane(&mut block.object, spot.lane, initial.along(axis));
                 late[spot.block].is_late.set(spot.lane, config.compute_delay);
                 block.touch(axis, spot.lane, config.contact);
@@ -187,7 +205,7 @@ impl<const A: usize> Blocks<A> {
                 let map = step(spec.device.plant(spec.hand.as_ref()), run);
                 block.is_tied |= !map.is_free();
                 set_map(&mut block.device_map, spot.lane, &map);
-                block.device.velocity.0[spot.lane] = initial.velocity[axis];
+                block.device.velocity.0[spot.lane] = device.velocity[axis];
                 block.coupling.stiffness.0[spot.lane] = config.coupling.stiffness;
                 block.coupling.damping.0[spot.lane] = config.coupling.damping;
                 let hand = &hands[peer * places.runs + run].2;
@@ -213,12 +231,28 @@ impl<const A: usize> Blocks<A> {
         }
     }
 
-    /// A copy of the object.
+    /// Position and velocity of a copy of the object.
     #[inline(always)]
     pub(super) fn object(&self, axis: usize, peer: usize, run: usize) -> (f64, f64) {
         let Spot { block, lane } = self.places.spot(axis, peer, run);
         let Motion { position, velocity } = lane_of(&self.blocks[block].object, lane);
         (position, velocity)
+    }
+
+    /// Copies and devices in that place.
+    #[inline(always)]
+    pub(super) fn block(&self, place: usize) -> &Block {
+        &self.blocks[place]
+    }
+
+    /// Puts positions and velocities of a peer into what it sends.
+    #[inline(always)]
+    pub(super) fn add_to<const P: usize, const L: usize>(&self, sample: &mut Sample<P, L>, peer: usize) {
+        for axis in 0..A {
+            for run in 0..L {
+                (sample.position[axis][run], sample.velocity[axis][run]) = self.object(axis, peer, run);
+            }
+        }
     }
 
     /// Replaces the mean of the samples that a peer holds, in all runs.
@@ -269,9 +303,9 @@ impl<const A: usize> Blocks<A> {
         }
     }
 
-    /// Everybody computes forces by the law and moves to the next tick.
+    /// Everybody computes forces by the law and moves to the next tick. `grasped` says what devices hold.
     #[inline(always)]
-    pub(super) fn advance<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L> {
+    pub(super) fn advance<const L: usize>(&mut self, law: &impl LawOfLanes, grasped: &impl Grasped) -> Moved<L> {
         let (mut discrepancy, mut size) = ([0.0; L], Lanes::ZERO);
         let per_axis = self.places.blocks();
         let (remembered, lag) = (law.remembered() * WIDTH, law.looks_back());
@@ -286,10 +320,12 @@ impl<const A: usize> Blocks<A> {
                 let memory = if remembered > 0 { &mut self.memory[place * remembered..(place + 1) * remembered] } else { &mut [] };
                 low = block.object.position.smaller(low);
                 high = block.object.position.larger(high);
-                if self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
+                let coupling = grasped.coupling(place);
+                if coupling.is_none() && self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
                     block.tick(law, &past, lead, memory, &self.object_map);
                 } else {
-                    let mut forces = block.forces(law, &past, lead, memory);
+                    let coupling = coupling.copied().unwrap_or_else(|| block.coupling(&block.object));
+                    let mut forces = block.forces(coupling, law, &past, lead, memory);
                     if let Some(walls) = &self.walls {
                         block.add_walls(walls, &mut forces.on_object);
                     }
@@ -432,20 +468,33 @@ impl Block {
         }
     }
 
-    /// The forces of a tick without walls.
+    /// The motion of a copy.
     #[inline(always)]
-    fn forces<L: LawOfLanes>(&self, law: &L, past: &Motions, lead: &Lanes, memory: &mut [f64]) -> Forces {
+    pub(super) fn object_of(&self, lane: usize) -> Motion {
+        lane_of(&self.object, lane)
+    }
+
+    /// FC of devices that touch these points.
+    #[inline(always)]
+    pub(super) fn coupling(&self, points: &Motions) -> Lanes {
+        let apart = |lane| lane_of(&self.device, lane).relative_to(lane_of(points, lane));
         let mut coupling = Lanes::ZERO;
         for lane in 0..WIDTH {
-            coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), self.apart(lane));
+            coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), apart(lane));
         }
         coupling = coupling & self.grasps;
         if let Some(contacts) = &self.contacts {
             for lane in 0..WIDTH {
                 let gains = self.coupling.map(|gain| gain.0[lane]);
-                coupling.0[lane] = contacts[lane].force_along(self.axis, &gains, self.apart(lane));
+                coupling.0[lane] = contacts[lane].force_along(self.axis, &gains, apart(lane));
             }
         }
+        coupling
+    }
+
+    /// The forces of a tick without walls.
+    #[inline(always)]
+    fn forces<L: LawOfLanes>(&self, coupling: Lanes, law: &L, past: &Motions, lead: &Lanes, memory: &mut [f64]) -> Forces {
         let mut on_copy = Lanes::ZERO;
         let remembered = law.remembered();
         for lane in 0..WIDTH {
@@ -455,12 +504,6 @@ impl Block {
             on_copy.0[lane] = on_object(coupling.0[lane], coordination);
         }
         Forces { coupling, on_object: on_copy }
-    }
-
-    /// The motion of a device relative to its copy.
-    #[inline(always)]
-    fn apart(&self, lane: usize) -> Motion {
-        lane_of(&self.device, lane).relative_to(lane_of(&self.object, lane))
     }
 
     #[inline(never)]

@@ -8,15 +8,18 @@
 //! With events, a second of ten peers takes 5.1 times as long over constant delays, and 2.0 times over jitter and loss.
 
 mod blocks;
+mod bodies;
 mod lanes;
 mod place;
 mod samples;
 mod shape;
 mod side_by_side;
+mod turn;
+mod turning;
 
 use cohaptic_peer::Lead;
 use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor};
-use cohaptic_scene::Scene;
+use cohaptic_scene::{Axes, Scene};
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkStats;
 use pulp::NullaryFnOnce;
@@ -24,20 +27,32 @@ use pulp::NullaryFnOnce;
 use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
 use crate::summary::{Ending, LinkSummary, PeerSummary, Summary};
 use blocks::{Blocks, LawOfLanes, Moved, law_of_lanes};
+use bodies::Bodies;
 use lanes::Lanes;
 use place::Places;
 use samples::{Broadcast, PerPacket};
 pub(crate) use shape::Shape;
 pub use side_by_side::{run_side_by_side, same_shape};
+use turning::{PAIRS, TurningBlocks};
 
-/// L runs of scenes of one shape with A axes.
+/// L runs of scenes of that shape with these laws, to their ends. `keep_going` is asked as [`crate::Observer::keep_going`] is.
+pub(crate) fn run<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; L], keep_going: impl FnMut(Instant) -> bool) -> [Summary; L] {
+    match scenes[0].axes {
+        Axes::Three if scenes[0].rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, L>::new(scenes, shape, laws).run(keep_going),
+        Axes::One => Arrays::<Blocks<1>, 1, 1, L>::new(scenes, shape, laws).run(keep_going),
+        Axes::Two => Arrays::<Blocks<2>, 2, 2, L>::new(scenes, shape, laws).run(keep_going),
+        Axes::Three => Arrays::<Blocks<3>, 3, 3, L>::new(scenes, shape, laws).run(keep_going),
+    }
+}
+
+/// L runs of scenes of one shape with A axes, with bodies of that kind.
 #[derive(Debug)]
-pub(crate) struct Arrays<'a, const A: usize, const L: usize> {
+struct Arrays<'a, B, const A: usize, const P: usize, const L: usize> {
     scenes: [&'a Scene; L],
     shape: Shape,
     law: BuiltIn<Lanes>,
-    blocks: Blocks<A>,
-    samples: Samples<A, L>,
+    bodies: B,
+    samples: Samples<P, L>,
     /// Up to which age samples are extrapolated in each run \[s\], and how far they have come by peer and run, if the law does that.
     leads: Option<([f64; L], Vec<[Lead<A>; L]>)>,
     /// The tick at which each peer sends next.
@@ -51,23 +66,23 @@ pub(crate) struct Arrays<'a, const A: usize, const L: usize> {
 
 /// How samples travel.
 #[derive(Debug)]
-enum Samples<const A: usize, const L: usize> {
-    Broadcast(Broadcast<A, L>),
-    PerPacket(PerPacket<A, L>),
+enum Samples<const P: usize, const L: usize> {
+    Broadcast(Broadcast<P, L>),
+    PerPacket(PerPacket<P, L>),
 }
 
-impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
+impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'a, B, A, P, L> {
     /// The scenes at their beginning, all of that shape.
-    pub(crate) fn new(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L]) -> Self {
+    fn new(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L]) -> Self {
         let places = Places { peers: shape.peers, runs: L };
-        let tick_nanos = nanos(shape.tick);
+        let bodies = B::new(places, &scenes, &laws[0]);
         let samples = match shape.delay {
-            Some(delay) => Samples::Broadcast(Broadcast::new(&scenes, nanos(delay).div_ceil(tick_nanos))),
-            None => Samples::PerPacket(PerPacket::new(&scenes, shape.end, tick_nanos)),
+            Some(delay) => Samples::Broadcast(Broadcast::new(&bodies, shape.peers, nanos(delay).div_ceil(nanos(shape.tick)))),
+            None => Samples::PerPacket(PerPacket::new(&scenes, &bodies, &shape)),
         };
         Self {
             law: law_of_lanes(&laws),
-            blocks: Blocks::new(places, &scenes, &laws[0]),
+            bodies,
             leads: Law::<f64>::horizon(&laws[0])
                 .is_some()
                 .then(|| (laws.map(|law| Law::<f64>::horizon(&law).unwrap_or(0.0)), vec![[Lead::STALE; L]; shape.peers])),
@@ -84,7 +99,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     }
 
     /// Runs all of them to their end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
-    pub(crate) fn run(self, mut keep_going: impl FnMut(Instant) -> bool) -> [Summary; L] {
+    fn run(self, mut keep_going: impl FnMut(Instant) -> bool) -> [Summary; L] {
         // A copy, so that the law is a constant of the loop and nothing that is written can change it.
         let law = self.law;
         law.visit(ToEnd { arrays: self, keep_going: &mut keep_going })
@@ -95,7 +110,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         let mut tick = 0;
         loop {
             let now = Instant::from_nanos(tick * tick_nanos);
-            if tick > 0 && tick % u64::from(INSTANTS_BETWEEN_QUESTIONS) == 0 {
+            if is_asked_before(tick) {
                 let before = Instant::from_nanos((tick - 1) * tick_nanos);
                 if !keep_going(before) {
                     self.end_all(tick, |_| Ending::Interrupted(before));
@@ -104,7 +119,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             }
             if now >= self.shape.end {
                 if let Samples::PerPacket(samples) = &mut self.samples {
-                    samples.finish(tick);
+                    samples.finish(self.shape.before(tick));
                 }
                 let end = self.shape.end;
                 self.end_all(tick, |finite| if finite { Ending::Complete } else { Ending::Diverged(end) });
@@ -122,6 +137,9 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     /// Everything that happens at a tick.
     #[inline(always)]
     fn step(&mut self, law: &impl LawOfLanes, tick: u64, now: Instant) {
+        if self.shape.has_queues && is_asked_before(tick) {
+            self.pass(tick);
+        }
         if tick == self.earliest_send {
             self.send(tick, now);
         }
@@ -129,7 +147,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             Samples::Broadcast(samples) => samples.deliver(tick),
             Samples::PerPacket(samples) => samples.deliver(tick),
         }
-        self.blocks.move_hands(now);
+        self.bodies.move_hands(now);
         if self.leads.is_some() {
             self.extrapolate(now);
         }
@@ -143,7 +161,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     /// Means and motion of a tick.
     #[inline(always)]
     fn motion(&mut self, law: &impl LawOfLanes) -> Moved<L> {
-        let motion = Motion { law, samples: &mut self.samples, blocks: &mut self.blocks };
+        let motion = Motion { law, samples: &mut self.samples, bodies: &mut self.bodies };
         // With wide registers a run of three or ten peers over constant delays takes six tenths of the time.
         self.processor.dispatch(motion)
     }
@@ -169,7 +187,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
                 lead.at(now)
             });
             for axis in 0..A {
-                self.blocks.set_lead::<L>(axis, peer, values.map(|value| value[axis]));
+                self.bodies.translations_mut().set_lead::<L>(axis, peer, values.map(|value| value[axis]));
             }
         }
     }
@@ -181,11 +199,19 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             }
             *next += self.shape.send_every;
             match &mut self.samples {
-                Samples::Broadcast(samples) => samples.send(tick, peer, &self.blocks),
-                Samples::PerPacket(samples) => samples.send(tick, now, peer, &self.blocks),
+                Samples::Broadcast(samples) => samples.send(tick, peer, &self.bodies),
+                Samples::PerPacket(samples) => samples.send(tick, (now, until(&self.shape, tick, *next)), peer, &self.bodies),
             }
         }
         self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
+    }
+
+    /// Queues did nothing yet that happens at this tick or later.
+    #[cold]
+    fn pass(&mut self, tick: u64) {
+        if let Samples::PerPacket(samples) = &mut self.samples {
+            samples.pass(self.shape.before(tick), |sender| until(&self.shape, tick, self.next_send[sender]));
+        }
     }
 
     /// Ends the runs that have diverged before that tick, and says whether none is left.
@@ -226,12 +252,12 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             samples.end_early(run, |sender, sequence| Instant::from_nanos((phases[sender] + sequence * send_every) * nanos(*tick)));
         }
         let peers = self.scenes[run].peers.iter().enumerate().map(|(place, peer)| {
-            let (position, velocity) = (0..A).map(|axis| self.blocks.object(axis, place, run)).unzip();
+            let (position, velocity) = (0..A).map(|axis| self.bodies.translations().object(axis, place, run)).unzip();
             let stale_samples = match &self.samples {
                 Samples::Broadcast(_) => 0,
                 Samples::PerPacket(samples) => samples.stale_samples(place, run),
             };
-            PeerSummary { name: peer.name.clone(), position, velocity, attitude: None, stale_samples, refused_samples: 0 }
+            PeerSummary { name: peer.name.clone(), position, velocity, attitude: self.bodies.attitude(place, run), stale_samples, refused_samples: 0 }
         });
         let places = 0..self.shape.peers;
         let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
@@ -244,9 +270,9 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
             links: links.collect(),
             access_lines: Vec::new(),
             max_discrepancy: self.max_discrepancy[run],
-            max_rotation_discrepancy: None,
+            max_rotation_discrepancy: self.bodies.max_rotation_discrepancy(run),
         };
-        self.blocks.end(run);
+        self.bodies.translations_mut().end(run);
         self.summaries[run] = Some(summary);
     }
 
@@ -267,12 +293,12 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
 
 /// A run to its end. The loop is compiled for each law: where it chooses between laws at every tick, a run of three peers over constant delays takes a sixth
 /// longer.
-struct ToEnd<'a, 'k, const A: usize, const L: usize> {
-    arrays: Arrays<'a, A, L>,
+struct ToEnd<'a, 'k, B, const A: usize, const P: usize, const L: usize> {
+    arrays: Arrays<'a, B, A, P, L>,
     keep_going: &'k mut dyn FnMut(Instant) -> bool,
 }
 
-impl<const A: usize, const L: usize> LawVisitor<Lanes> for ToEnd<'_, '_, A, L> {
+impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> LawVisitor<Lanes> for ToEnd<'_, '_, B, A, P, L> {
     type Output = [Summary; L];
 
     #[inline(never)]
@@ -282,23 +308,34 @@ impl<const A: usize, const L: usize> LawVisitor<Lanes> for ToEnd<'_, '_, A, L> {
 }
 
 /// Means and motion of a tick, compiled once for any processor and once for one that has AVX2: with wider registers, and not one rounding less.
-struct Motion<'a, W, const A: usize, const L: usize> {
+struct Motion<'a, W, B, const A: usize, const P: usize, const L: usize> {
     law: &'a W,
-    samples: &'a mut Samples<A, L>,
-    blocks: &'a mut Blocks<A>,
+    samples: &'a mut Samples<P, L>,
+    bodies: &'a mut B,
 }
 
-impl<W: LawOfLanes, const A: usize, const L: usize> NullaryFnOnce for Motion<'_, W, A, L> {
+impl<W: LawOfLanes, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnOnce for Motion<'_, W, B, A, P, L> {
     type Output = Moved<L>;
 
     #[inline(always)]
     fn call(self) -> Moved<L> {
         match self.samples {
-            Samples::Broadcast(samples) => samples.refresh(self.blocks),
-            Samples::PerPacket(samples) => samples.refresh(self.blocks),
+            Samples::Broadcast(samples) => samples.refresh(self.bodies),
+            Samples::PerPacket(samples) => samples.refresh(self.bodies),
         }
-        self.blocks.advance::<L>(self.law)
+        self.bodies.advance::<L>(self.law)
     }
+}
+
+/// Whether the observer is asked, before that tick, whether to go on.
+fn is_asked_before(tick: u64) -> bool {
+    tick > 0 && tick.is_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS))
+}
+
+/// Until when a queue may look at this tick: until its sender sends next, and not beyond the latest tick before the run may be interrupted.
+fn until(shape: &Shape, tick: u64, next_send: u64) -> Instant {
+    let asked = (tick + 1).next_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS));
+    Instant::from_nanos(next_send.min(asked - 1) * nanos(shape.tick))
 }
 
 /// A span of at most a year.

@@ -1,44 +1,27 @@
-//! Samples between peers: those in flight, and those that each peer holds of the others.
-
-use cohaptic_peer::State;
-use cohaptic_scene::Scene;
-
-use super::blocks::Blocks;
+//! Samples between peers: those in flight, and those that each peer holds of the others. A sample is P pairs of numbers.
 
 pub(super) use broadcast::Broadcast;
 pub(super) use per_packet::PerPacket;
+
+use cohaptic_peer::State;
 
 mod broadcast;
 mod per_packet;
 mod quads;
 
-/// A sample of every run, along all axes.
+/// A sample of every run: pairs of numbers, of which those of the axes are positions and velocities.
 #[derive(Clone, Copy, Debug)]
-struct Sample<const A: usize, const L: usize> {
-    position: [[f64; L]; A],
-    velocity: [[f64; L]; A],
+pub(super) struct Sample<const P: usize, const L: usize> {
+    pub(super) position: [[f64; L]; P],
+    pub(super) velocity: [[f64; L]; P],
 }
 
-impl<const A: usize, const L: usize> Sample<A, L> {
-    /// Where a peer begins.
-    fn initial(scenes: &[&Scene], peer: usize) -> Self {
-        let states: Vec<State<A>> = scenes.iter().map(|scene| scene.initial_state(peer)).collect();
-        Self {
-            position: std::array::from_fn(|axis| std::array::from_fn(|run| states[run].position[axis])),
-            velocity: std::array::from_fn(|axis| std::array::from_fn(|run| states[run].velocity[axis])),
-        }
-    }
+impl<const P: usize, const L: usize> Sample<P, L> {
+    pub(super) const ZERO: Self = Self { position: [[0.0; L]; P], velocity: [[0.0; L]; P] };
 
-    /// What a peer sends now.
-    #[inline(always)]
-    fn of(blocks: &Blocks<A>, peer: usize) -> Self {
-        let mut sample = Self { position: [[0.0; L]; A], velocity: [[0.0; L]; A] };
-        for axis in 0..A {
-            for run in 0..L {
-                (sample.position[axis][run], sample.velocity[axis][run]) = blocks.object(axis, peer, run);
-            }
-        }
-        sample
+    /// That of a run.
+    fn state(&self, run: usize) -> State<P> {
+        State { position: self.position.map(|runs| runs[run]), velocity: self.velocity.map(|runs| runs[run]) }
     }
 }
 

@@ -1,9 +1,10 @@
 //! Many runs, those of one shape at the same time.
 
-use cohaptic_scene::{Axes, FromScene, Scene};
+use cohaptic_peer::EXACT_FROM;
+use cohaptic_scene::{FromScene, Scene};
 
+use super::Shape;
 use super::lanes::WIDTH;
-use super::{Arrays, Shape};
 use crate::plan::{Model, Plan};
 use crate::{NoObserver, Simulation, Summary};
 
@@ -40,8 +41,9 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
 /// Lanes that nobody needs cost what the others do. Where samples travel together, eight runs of three peers take a third of the time of eight alone, of ten
 /// peers half of it. Where each packet has an arrival of its own, that is most of the work and done for each run by itself: eight runs of three peers take
 /// half, of ten peers five sixths, and from sixteen peers on more than alone, since eight times the samples in flight do not fit into the nearest cache.
+/// Exact means are those of one run.
 fn pays(shape: &Shape, alike: usize) -> bool {
-    if shape.delay.is_some() { alike >= 5 } else { alike >= 7 && shape.peers <= 12 }
+    if shape.delay.is_some() { alike >= 5 && shape.peers <= EXACT_FROM } else { alike >= 7 && shape.peers <= 12 && !shape.has_queues }
 }
 
 /// Whether two scenes can be run side by side.
@@ -58,10 +60,6 @@ fn shape(scene: &Scene) -> Option<Shape> {
 fn run_lanes(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
     let lanes: [&Scene; WIDTH] = std::array::from_fn(|lane| &scenes[lane.min(scenes.len() - 1)]);
     let laws = lanes.map(|scene| scene.law(0).expect("scenes of a shape have a law"));
-    let summaries = match lanes[0].axes {
-        Axes::One => Arrays::<1, WIDTH>::new(lanes, shape, laws).run(|_| true),
-        Axes::Two => Arrays::<2, WIDTH>::new(lanes, shape, laws).run(|_| true),
-        Axes::Three => Arrays::<3, WIDTH>::new(lanes, shape, laws).run(|_| true),
-    };
+    let summaries = super::run(lanes, shape, laws, |_| true);
     summaries.into_iter().take(scenes.len()).collect()
 }

@@ -238,7 +238,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             links: self.link_summaries(),
             access_lines: self.access_summaries(),
             max_discrepancy: self.max_discrepancy,
-            max_rotation_discrepancy: self.turning.as_ref().map(|turning| turning.max_discrepancy),
+            max_rotation_discrepancy: self.turning.as_ref().map(|turning| turning.spread.angle()),
         }
     }
 

@@ -6,7 +6,7 @@
 
 use core::array::from_fn;
 
-use super::algebra::{add, apply, apply_transposed, by_component, scale, subtract, transposed_product, twice_axial};
+use super::algebra::{add, apply, apply_transposed, by_component, cross, scale, subtract, transposed_product, twice_axial};
 use super::{Matrix3, Real, Triple};
 use crate::Gains;
 
@@ -42,4 +42,25 @@ pub fn turning_torque<N: Real>(copy: (&Matrix3<N>, Triple<N>), device: (&Matrix3
     let apart = transposed_product(copy.0, device.0);
     let spring = scale(twice_axial(&apart), coupling.stiffness * N::of(0.5));
     add(spring, scale(subtract(apply(&apart, device.1), copy.1), coupling.damping))
+}
+
+/// The torque \[N·m\], in the body axes of a copy, of the force FC that grasps it at `grasp` from its centre: r×RᵀFC.
+#[must_use]
+#[inline(always)]
+pub fn lever<N: Real>(copy: &Matrix3<N>, grasp: Triple<N>, force: Triple<N>) -> Triple<N> {
+    cross(grasp, in_body_axes(copy, force))
+}
+
+/// The torque \[N·m\] on a device, in handle axes, of the τC that it exerts on a copy: −RHᵀ·R·τC.
+#[must_use]
+#[inline(always)]
+pub fn reaction<N: Real>(copy: &Matrix3<N>, device: &Matrix3<N>, torque: Triple<N>) -> Triple<N> {
+    in_body_axes(device, apply(copy, torque)).map(|component| -component)
+}
+
+/// A vector in world axes, in the axes of a body with that R: Rᵀ·v.
+#[must_use]
+#[inline(always)]
+pub fn in_body_axes<N: Real>(matrix: &Matrix3<N>, vector: Triple<N>) -> Triple<N> {
+    apply_transposed(matrix, vector)
 }

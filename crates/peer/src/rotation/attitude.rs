@@ -97,7 +97,12 @@ impl<N: Real> Attitude<N> {
     /// Turns it by a rotation vector σ in body axes \[rad\], and brings the quaternion's norm back to 1 to first order.
     #[inline(always)]
     pub fn turn(&mut self, sigma: Triple<N>) {
-        let (cosine, sine) = N::half_turn(dot(sigma, sigma));
+        self.turn_by(sigma, N::half_turn(dot(sigma, sigma)));
+    }
+
+    /// [`Attitude::turn`] with [`Real::half_turn`] of the square of |σ|.
+    #[inline(always)]
+    pub fn turn_by(&mut self, sigma: Triple<N>, (cosine, sine): (N, N)) {
         let (w, u) = (self.orientation[0], [self.orientation[1], self.orientation[2], self.orientation[3]]);
         let by = scale(sigma, sine);
         let turned = cross(u, by);
@@ -113,8 +118,9 @@ impl<N: Real> Attitude<N> {
 }
 
 /// [`Attitude::point`] with R and ω.
+#[must_use]
 #[inline(always)]
-pub(super) fn point_of<const A: usize>(matrix: &Matrix3, rate: Triple, arm: Triple, centre: &State<A>) -> State<A> {
+pub fn point_of<const A: usize>(matrix: &Matrix3, rate: Triple, arm: Triple, centre: &State<A>) -> State<A> {
     let (reach, swing) = (apply(matrix, arm), apply(matrix, cross(rate, arm)));
     let moved = |own: &[f64; A], by: Triple| core::array::from_fn(|axis| own[axis] + by.get(axis).copied().unwrap_or(0.0));
     State { position: moved(&centre.position, reach), velocity: moved(&centre.velocity, swing) }

@@ -6,7 +6,8 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
-use super::algebra::{add, apply, apply_transposed, by_component, cross, subtract};
+use super::algebra::{add, by_component, subtract};
+use super::alignment::{in_body_axes, lever, reaction};
 use super::attitude::point_of;
 use super::held::HeldAttitude;
 use super::law::TurnLaw;
@@ -280,7 +281,7 @@ impl Rotation {
         let (matrix, rate) = (self.copy.attitude.matrix(), self.copy.attitude.rate);
         let at = point_of(&matrix, rate, *grasp, centre);
         let force: [f64; A] = from_fn(|axis| contact.force_along(axis, coupling, device.along(axis).relative_to(at.along(axis))));
-        let lever = cross(*grasp, apply_transposed(&matrix, triple(&force)));
+        let lever = lever(&matrix, *grasp, triple(&force));
         let (own, mean) = ((&matrix, rate), self.held.mean());
         let coordination = match &mut self.law {
             Some(law) => law.torque(own, mean, gains),
@@ -291,7 +292,7 @@ impl Rotation {
             let turned = handle.attitude.matrix();
             let torque = turning_torque((&matrix, rate), (&turned, handle.attitude.rate), coupling);
             torques.coupling = add(lever, torque);
-            torques.device = apply_transposed(&turned, apply(&matrix, torque)).map(|component| -component);
+            torques.device = reaction(&matrix, &turned, torque);
         }
         self.applied = if late { core::mem::replace(&mut self.computed, torques) } else { torques };
         self.computed = torques;
@@ -303,7 +304,7 @@ impl Rotation {
         self.copy.advance(span, self.on_copy(), &self.config);
         if let Some(device) = &mut self.device {
             let hand = self.config.device.as_ref().and_then(|device| device.hand.as_ref());
-            let hand = hand.map_or([0.0; 3], |hand| apply_transposed(&device.attitude.matrix(), hand.value::<3>(now)));
+            let hand = hand.map_or([0.0; 3], |hand| in_body_axes(&device.attitude.matrix(), hand.value::<3>(now)));
             device.advance(span, add(hand, self.applied.device), &self.config);
         }
     }

@@ -106,9 +106,26 @@ impl Spin {
     }
 }
 
+impl<C> RotationStep<C> {
+    /// How the turn is computed.
+    #[must_use]
+    #[inline(always)]
+    pub const fn method(&self) -> RotationMethod {
+        self.method
+    }
+
+    /// How many steps the span is divided into.
+    #[must_use]
+    #[inline(always)]
+    pub const fn steps(&self) -> u32 {
+        self.steps
+    }
+}
+
 impl<C: Copy> RotationStep<C> {
     /// Each coefficient replaced by what `coefficient` makes of it, always in one order.
     #[must_use]
+    #[inline(always)]
     pub fn map<D: Copy>(&self, mut coefficient: impl FnMut(&C) -> D) -> RotationStep<D> {
         let h = coefficient(&self.h);
         let mut triple = |triple: &Triple<C>| -> Triple<D> { from_fn(|axis| coefficient(&triple[axis])) };
@@ -136,11 +153,17 @@ impl<N: Real> RotationStep<N> {
     /// [`RotationStep::advance`], which gives the integral of the angular velocity in body axes over the span too \[rad\]: times the torque it is the work of that.
     #[inline(always)]
     pub fn travel(&self, body: &mut Attitude<N>, torque: Triple<N>) -> Triple<N> {
-        let forced = by_component(torque, self.mobility);
+        let forced = self.forced(torque);
         let mut travel = [N::of(0.0); 3];
         for _ in 0..self.steps {
             let more = match self.method {
-                RotationMethod::Exponential => self.exponential(body, forced),
+                RotationMethod::Exponential => {
+                    let before = body.rate;
+                    let (rate, sigma) = self.exponential(before, forced);
+                    body.rate = rate;
+                    body.turn(sigma);
+                    subtract(sigma, self.magnus(before, rate))
+                }
                 RotationMethod::Euler => self.euler(body, forced),
                 RotationMethod::RungeKutta4 => self.runge_kutta(body, forced),
             };
@@ -149,15 +172,30 @@ impl<N: Real> RotationStep<N> {
         travel
     }
 
+    /// The angular acceleration by a torque, τ/J [rad/s²].
+    #[must_use]
+    #[inline(always)]
+    pub fn forced(&self, torque: Triple<N>) -> Triple<N> {
+        by_component(torque, self.mobility)
+    }
+
     /// γ(ω): the angular acceleration by the gyroscopic term.
     #[inline(always)]
     fn gyrate(&self, rate: Triple<N>) -> Triple<N> {
         by_component(self.gyration, [rate[1] * rate[2], rate[2] * rate[0], rate[0] * rate[1]])
     }
 
+    /// What a turn about an axis that moves has beyond the integral of the angular velocity: h²/12·ω×ω⁺.
     #[inline(always)]
-    fn exponential(&self, body: &mut Attitude<N>, forced: Triple<N>) -> Triple<N> {
-        let rate = body.rate;
+    fn magnus(&self, before: Triple<N>, after: Triple<N>) -> Triple<N> {
+        scale(cross(before, after), self.h * self.h * N::of(1.0 / 12.0))
+    }
+
+    /// One of the steps by [`RotationMethod::Exponential`]: the angular velocity after it, and the rotation vector σ of its turn, in body axes. `forced`: that of
+    /// [`RotationStep::forced`].
+    #[must_use]
+    #[inline(always)]
+    pub fn exponential(&self, rate: Triple<N>, forced: Triple<N>) -> (Triple<N>, Triple<N>) {
         let [e, g] = self.whole;
         let [e_half, g_half] = self.half;
         let [a, b, c, d, drift] = self.weights;
@@ -171,13 +209,10 @@ impl<N: Real> RotationStep<N> {
         let fourth = subtract(self.gyrate(add(free, scale(by_component(g_half, third), N::of(2.0)))), first);
         let middle = add(second, third);
         let after = add(free, add(by_component(a, middle), by_component(b, fourth)));
-        let magnus = scale(cross(rate, after), self.h * self.h * N::of(1.0 / 12.0));
+        let magnus = self.magnus(rate, after);
         let free = add(by_component(g, rate), by_component(drift, push));
         let sigma = add(free, add(add(by_component(c, middle), by_component(d, fourth)), magnus));
-        body.rate = after;
-        body.turn(sigma);
-        // Magnus: the turn is the integral of ω, and that term of its not being about one axis.
-        subtract(sigma, magnus)
+        (after, sigma)
     }
 
     /// ω̇ of the equation of motion.

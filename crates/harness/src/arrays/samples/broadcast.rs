@@ -4,23 +4,24 @@
 
 use std::collections::VecDeque;
 
-use cohaptic_peer::Moving;
-use cohaptic_scene::Scene;
+use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
 use cohaptic_units::Instant;
 
 use super::quads::{self, Quad};
 use super::{Sample, others};
-use crate::arrays::blocks::Blocks;
+use crate::arrays::bodies::Bodies;
 
 /// The samples in flight, and those held from each sender.
 #[derive(Clone, Debug)]
-pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
+pub(in crate::arrays) struct Broadcast<const P: usize, const L: usize> {
     delay_ticks: u64,
-    on_the_way: VecDeque<Sent<A, L>>,
+    on_the_way: VecDeque<Sent<P, L>>,
     peers: usize,
-    /// The samples held from each sender but the first, by axis, as the first peer holds it; and from the first.
-    held: [Vec<Quad<L>>; A],
-    first: Sample<A, L>,
+    /// The samples held from each sender but the first, by pair of numbers, as the first peer holds it; and from the first.
+    held: [Vec<Quad<L>>; P],
+    first: Sample<P, L>,
+    /// The sums of what is held from all, if their means are exact.
+    sums: Option<ExactMeans<P>>,
     /// How many samples of each sender have arrived.
     arrived: Vec<u64>,
     changed: Changed,
@@ -36,37 +37,39 @@ enum Changed {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Sent<const A: usize, const L: usize> {
+struct Sent<const P: usize, const L: usize> {
     /// The tick at which it is in force.
     due: u64,
     sender: usize,
-    sample: Sample<A, L>,
+    sample: Sample<P, L>,
 }
 
-impl<const A: usize, const L: usize> Broadcast<A, L> {
+impl<const P: usize, const L: usize> Broadcast<P, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
-    pub(in crate::arrays) fn new(scenes: &[&Scene], delay_ticks: u64) -> Self {
-        let peers = scenes[0].peers.len();
+    pub(in crate::arrays) fn new<const A: usize>(bodies: &impl Bodies<A, P>, peers: usize, delay_ticks: u64) -> Self {
         let mut broadcast = Self {
             delay_ticks,
             on_the_way: VecDeque::new(),
             peers,
             held: std::array::from_fn(|_| quads::empty(peers - 1)),
-            first: Sample::initial(scenes, 0),
+            first: bodies.sample(0),
+            sums: None,
             arrived: vec![0; peers],
             changed: Changed::More,
         };
         for sender in 0..peers {
-            broadcast.hold(sender, &Sample::initial(scenes, sender));
+            broadcast.hold(sender, &bodies.sample(sender));
         }
+        broadcast.sums =
+            (peers > EXACT_FROM).then(|| ExactMeans::new((0..peers).map(|sender| broadcast.held_from(sender)).collect::<Vec<_>>().iter()));
         broadcast
     }
 
     /// A peer sends to all others.
     #[inline(always)]
-    pub(in crate::arrays) fn send(&mut self, tick: u64, sender: usize, blocks: &Blocks<A>) {
+    pub(in crate::arrays) fn send<const A: usize>(&mut self, tick: u64, sender: usize, bodies: &impl Bodies<A, P>) {
         let due = tick.saturating_add(self.delay_ticks);
-        self.on_the_way.push_back(Sent { due, sender, sample: Sample::of(blocks, sender) });
+        self.on_the_way.push_back(Sent { due, sender, sample: bodies.sample(sender) });
     }
 
     /// What has arrived is held from now on.
@@ -79,21 +82,37 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         }
     }
 
+    /// What is held from a sender in the first run: others with this number of peers there are not.
+    fn held_from(&self, sender: usize) -> State<P> {
+        match sender.checked_sub(1) {
+            None => self.first.state(0),
+            Some(place) => quads::state(&self.held, place, 0),
+        }
+    }
+
     #[inline(always)]
-    fn hold(&mut self, sender: usize, sample: &Sample<A, L>) {
+    fn hold(&mut self, sender: usize, sample: &Sample<P, L>) {
+        if self.sums.is_some() {
+            let before = self.held_from(sender);
+            self.sums.iter_mut().for_each(|sums| sums.replace(&before, &sample.state(0)));
+        }
         let Some(place) = sender.checked_sub(1) else {
             self.first = *sample;
             return;
         };
-        for axis in 0..A {
+        for pair in 0..P {
             for run in 0..L {
-                quads::set(&mut self.held[axis], place, run, sample.position[axis][run], sample.velocity[axis][run]);
+                quads::set(&mut self.held[pair], place, run, sample.position[pair][run], sample.velocity[pair][run]);
             }
         }
     }
 
     /// How what a peer holds in a run moves on, in the order in which the peer holds it. `sent` says when a sample of a sender was sent.
-    pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
+    pub(in crate::arrays) fn moving<const A: usize>(
+        &self,
+        (peer, run): (usize, usize),
+        sent: impl Fn(usize, u64) -> Instant,
+    ) -> impl Iterator<Item = Moving<A>> {
         (0..self.peers).filter(move |sender| *sender != peer).map(move |sender| Moving {
             sent: self.arrived[sender].checked_sub(1).map_or(Instant::ZERO, |newest| sent(sender, newest)),
             velocity: std::array::from_fn(|axis| match sender.checked_sub(1) {
@@ -114,25 +133,41 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
 
     /// The means are those of the samples held.
     #[inline(always)]
-    pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks<A>) {
+    pub(in crate::arrays) fn refresh<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
         if std::mem::replace(&mut self.changed, Changed::Nothing) == Changed::Nothing {
             return;
         }
+        if self.sums.is_some() {
+            self.refresh_exactly(bodies);
+            return;
+        }
         let count = others(self.peers);
-        for axis in 0..A {
-            let held = &mut self.held[axis];
+        for pair in 0..P {
+            let held = &mut self.held[pair];
             // From one receiver to the next, its own sample is replaced by that of the receiver before.
-            let mut own = (self.first.position[axis], self.first.velocity[axis]);
+            let mut own = (self.first.position[pair], self.first.velocity[pair]);
             for peer in 0..self.peers {
                 if peer > 0 {
                     quads::swap(held, peer - 1, &mut own);
                 }
                 let (x, v) = quads::mean(held, count);
-                blocks.set_target(axis, peer, x, v);
+                bodies.set_target(pair, peer, x, v);
             }
             // And back.
             for peer in (1..self.peers).rev() {
                 quads::swap(held, peer - 1, &mut own);
+            }
+        }
+    }
+
+    /// [`Broadcast::refresh`] of many: what all hold together without the receiver's own.
+    #[cold]
+    fn refresh_exactly<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
+        let Some(sums) = &self.sums else { return };
+        for peer in 0..self.peers {
+            let mean = sums.mean_without(&self.held_from(peer), self.peers - 1);
+            for pair in 0..P {
+                bodies.set_target(pair, peer, [mean.position[pair]; L], [mean.velocity[pair]; L]);
             }
         }
     }

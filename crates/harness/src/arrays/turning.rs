@@ -1,0 +1,248 @@
+//! The bodies of an object that turns: what goes, and beside it attitudes and torques, eight lanes at a time.
+//!
+//! What a lane computes is what [`cohaptic_peer::rotation::Rotation`] does, with the same functions in the same order, so every bit is the same.
+
+use cohaptic_peer::coordination::BuiltIn;
+use cohaptic_peer::rotation::{Attitude, DeviceRotation, RotationConfig, Spin};
+use cohaptic_peer::{Clock, Contact};
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+use pulp::NullaryFnOnce;
+
+use super::blocks::{Blocks, Grasped, LawOfLanes, Moved};
+use super::bodies::Bodies;
+use super::lanes::{Lanes, WIDTH, larger, smaller};
+use super::place::{Places, Spot};
+use super::samples::Sample;
+use super::turn::{Handles, Shared, Steps, Turn};
+use crate::spread::{Spread, squared_chord};
+
+/// Pairs of numbers of a sample: three of positions and velocities, then R by rows and the angular velocity in world axes.
+pub(super) const PAIRS: usize = 9;
+
+/// All bodies of an object that turns.
+#[derive(Clone, Debug)]
+pub(super) struct TurningBlocks {
+    places: Places,
+    translations: Blocks<3>,
+    turns: Vec<Turn>,
+    shared: Shared,
+    /// FC along each axis, by the place of its block.
+    coupling: Vec<Lanes>,
+    /// How far copies are turned apart, in each run.
+    spreads: Vec<Spread>,
+    processor: pulp::Arch,
+}
+
+/// What devices hold of copies that turn: points off their centres.
+struct Points<'a>(&'a [Lanes]);
+
+impl Grasped for Points<'_> {
+    #[inline(always)]
+    fn coupling(&self, place: usize) -> Option<&Lanes> {
+        Some(&self.0[place])
+    }
+}
+
+impl TurningBlocks {
+    /// Torques and turns of a tick, and the coupling forces. Gives the sum of the sizes of all that turns.
+    #[inline(always)]
+    fn turn(&mut self) -> Lanes {
+        let per_axis = self.places.blocks();
+        let mut size = Lanes::ZERO;
+        for (place, turn) in self.turns.iter_mut().enumerate() {
+            let blocks = [0, 1, 2].map(|axis| self.translations.block(axis * per_axis + place));
+            let coupling = turn.tick(&self.shared, blocks);
+            for (axis, coupling) in coupling.into_iter().enumerate() {
+                self.coupling[axis * per_axis + place] = coupling;
+            }
+            size = size + turn.size();
+        }
+        size
+    }
+
+    /// Whether no two copies of a run are farther apart than any were so far: the two longest chords to the reference of each run.
+    #[inline(always)]
+    fn two_longest(&self) -> [Lanes; 2] {
+        let references: [[f64; 4]; WIDTH] = std::array::from_fn(|lane| {
+            let run = lane % self.places.runs;
+            self.orientation(self.spreads[run].reference(), run)
+        });
+        let (mut first, mut second) = (Lanes::ZERO, Lanes::ZERO);
+        let last = self.places.peers * self.places.runs;
+        for (place, turn) in self.turns.iter().enumerate() {
+            let mut squares = Lanes::ZERO;
+            for lane in 0..WIDTH {
+                squares.0[lane] = squared_chord(&references[lane], &turn.attitude.orientation.map(|part| part.0[lane]));
+            }
+            // Those beyond the last repeat it, which would count twice.
+            if (place + 1) * WIDTH > last {
+                squares.0[last - place * WIDTH..].fill(0.0);
+            }
+            for lane in 0..WIDTH {
+                let (square, longest) = (squares.0[lane], first.0[lane]);
+                first.0[lane] = larger(square, longest);
+                second.0[lane] = larger(smaller(square, longest), second.0[lane]);
+            }
+        }
+        [first, second]
+    }
+
+    /// Takes in how far copies are turned apart, before they move.
+    fn measure(&mut self, two_longest: &[Lanes; 2]) {
+        let Places { peers, runs } = self.places;
+        let [first, second] = two_longest;
+        for run in 0..runs {
+            let (mut two, mut lane) = ([0.0; 2], run);
+            while lane < WIDTH {
+                let (a, b) = (first.0[lane], second.0[lane]);
+                two = [larger(a, two[0]), larger(smaller(a, two[0]), larger(b, two[1]))];
+                lane += runs;
+            }
+            if !self.spreads[run].holds(two) {
+                let mut spread = std::mem::take(&mut self.spreads[run]);
+                spread.take((0..peers).map(|peer| self.orientation(peer, run)));
+                self.spreads[run] = spread;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn orientation(&self, peer: usize, run: usize) -> [f64; 4] {
+        let Spot { block, lane } = self.places.spot(0, peer, run);
+        self.turns[block].attitude.orientation.map(|part| part.0[lane])
+    }
+
+    #[cold]
+    fn look_at_each(&self, finite: &mut [bool]) {
+        for (Spot { block, lane }, _, run) in self.places.all(0) {
+            finite[run] &= self.turns[block].is_finite(lane);
+        }
+    }
+}
+
+/// What is computed of turns at a tick, whatever the law.
+struct Turned<'a>(&'a mut TurningBlocks);
+
+impl NullaryFnOnce for Turned<'_> {
+    type Output = Lanes;
+
+    #[inline(always)]
+    fn call(self) -> Lanes {
+        let two_longest = self.0.two_longest();
+        self.0.measure(&two_longest);
+        self.0.turn()
+    }
+}
+
+impl Bodies<3, PAIRS> for TurningBlocks {
+    fn new(places: Places, scenes: &[&Scene], law: &BuiltIn) -> Self {
+        let clock: &Clock = &scenes[0].peers[0].clock;
+        let config = |peer: usize, run: usize| scenes[run].rotation_config(peer).expect("the shape of the scenes says that their objects turn");
+        let step = |spin: Spin, config: &RotationConfig| spin.step(clock.tick, config.integrator, config.steps);
+        let of_runs: Vec<RotationConfig> = (0..places.runs).map(|run| config(0, run)).collect();
+        let mut turns = vec![Turn::at_rest(); places.blocks()];
+        for (Spot { block, lane }, peer, run) in places.all(0) {
+            let (turn, spec, config) = (&mut turns[block], &scenes[run].peers[peer], config(peer, run));
+            let attitude = scenes[run].rotation.as_ref().map_or(Attitude::REST, |rotation| rotation.peers[peer].attitude);
+            turn.begin(lane, attitude, config.grasp, spec.compute_delay);
+            if let Some(DeviceRotation { handle, coupling, hand }) = &config.device {
+                let handles = turn.handles.get_or_insert_with(|| Box::new(Handles::none(&step(*handle, &config))));
+                handles.begin(lane, attitude, &step(*handle, &config), coupling, spec.contact == Contact::Grasp);
+                handles.hands[lane].clone_from(hand);
+            }
+        }
+        let of_lanes = |lane: usize| &of_runs[lane % places.runs];
+        let mut shared = Shared { step: Steps::of(&step(of_runs[0].copy, &of_runs[0])), gains: of_runs[0].gains.map(|_| [Lanes::ZERO; 3]) };
+        for lane in 0..WIDTH {
+            let config = of_lanes(lane);
+            shared.step.set(lane, &step(config.copy, config));
+            for axis in 0..3 {
+                shared.gains.stiffness[axis].0[lane] = config.gains.stiffness[axis];
+                shared.gains.damping[axis].0[lane] = config.gains.damping[axis];
+            }
+        }
+        Self {
+            places,
+            translations: Blocks::new(places, scenes, law),
+            turns,
+            shared,
+            coupling: vec![Lanes::ZERO; 3 * places.blocks()],
+            spreads: vec![Spread::default(); places.runs],
+            processor: pulp::Arch::new(),
+        }
+    }
+
+    #[inline(always)]
+    fn translations(&self) -> &Blocks<3> {
+        &self.translations
+    }
+
+    #[inline(always)]
+    fn translations_mut(&mut self) -> &mut Blocks<3> {
+        &mut self.translations
+    }
+
+    #[inline(always)]
+    fn sample<const L: usize>(&self, peer: usize) -> Sample<PAIRS, L> {
+        let mut sample = Sample::ZERO;
+        self.translations.add_to(&mut sample, peer);
+        for run in 0..L {
+            let Spot { block, lane } = self.places.spot(0, peer, run);
+            let attitude = self.turns[block].attitude(lane);
+            let numbers = attitude.matrix().into_iter().flatten().chain(attitude.world_rate());
+            for (place, number) in numbers.enumerate() {
+                let pair = if place % 2 == 0 { &mut sample.position } else { &mut sample.velocity };
+                pair[3 + place / 2][run] = number;
+            }
+        }
+        sample
+    }
+
+    #[inline(always)]
+    fn set_target<const L: usize>(&mut self, pair: usize, peer: usize, x: [f64; L], v: [f64; L]) {
+        let Some(pair) = pair.checked_sub(3) else {
+            self.translations.set_target(pair, peer, x, v);
+            return;
+        };
+        for run in 0..L {
+            let Spot { block, lane } = self.places.spot(0, peer, run);
+            let mean = &mut self.turns[block].mean;
+            (mean[2 * pair].0[lane], mean[2 * pair + 1].0[lane]) = (x[run], v[run]);
+        }
+        if L < WIDTH && peer + 1 == self.places.peers {
+            let Spot { block, lane } = self.places.spot(0, peer, L - 1);
+            let mean = &mut self.turns[block].mean;
+            mean[2 * pair].0[lane..].fill(x[L - 1]);
+            mean[2 * pair + 1].0[lane..].fill(v[L - 1]);
+        }
+    }
+
+    fn move_hands(&mut self, now: Instant) {
+        self.translations.move_hands(now);
+        for handles in self.turns.iter_mut().filter_map(|turn| turn.handles.as_mut()) {
+            handles.move_hands(now);
+        }
+    }
+
+    #[inline(always)]
+    fn advance<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L> {
+        let processor = self.processor;
+        let size = processor.dispatch(Turned(self));
+        let mut moved = self.translations.advance::<L>(law, &Points(&self.coupling));
+        let size = size & self.translations.goes_on;
+        if !(size.0.iter().sum::<f64>() < f64::INFINITY) {
+            self.look_at_each(&mut moved.finite);
+        }
+        moved
+    }
+
+    fn attitude(&self, peer: usize, run: usize) -> Option<Attitude> {
+        let Spot { block, lane } = self.places.spot(0, peer, run);
+        Some(self.turns[block].attitude(lane))
+    }
+
+    fn max_rotation_discrepancy(&self, run: usize) -> Option<f64> {
+        Some(self.spreads[run].angle())
+    }
+}

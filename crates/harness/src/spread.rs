@@ -1,0 +1,146 @@
+//! The largest angle between two of the copies of an object that turns.
+
+/// The largest angle between two copies so far.
+///
+/// Angles grow with the chords between quaternions, 2·sin(θ/4), which are compared instead. A chord is at most the sum of the chords to a third copy, which
+/// spares most pairs: one copy is the reference, and pairs are looked at only where the two longest chords to it are together longer than the longest so far.
+/// Then the copy that is farthest from the reference is another one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Spread {
+    /// The square of the longest chord.
+    longest: f64,
+    reference: usize,
+    copies: Vec<[f64; 4]>,
+    near: Vec<f64>,
+    far: Vec<f64>,
+}
+
+/// The square of the chord between two orientations, of which q and −q are one.
+#[inline(always)]
+pub(crate) fn squared_chord(one: &[f64; 4], other: &[f64; 4]) -> f64 {
+    let square = |sign: f64| {
+        let [w, x, y, z] = std::array::from_fn(|part| (one[part] - sign * other[part]) * (one[part] - sign * other[part]));
+        w + x + y + z
+    };
+    let (equal, opposite) = (square(1.0), square(-1.0));
+    if equal < opposite { equal } else { opposite }
+}
+
+/// The longest and the next of some chords, of which these are the squares.
+#[inline(always)]
+fn two_longest(squares: &[f64]) -> [f64; 2] {
+    let two = squares.iter().fold([0.0, 0.0], |[first, second], square| {
+        if *square > first {
+            [*square, first]
+        } else if *square > second {
+            [first, *square]
+        } else {
+            [first, second]
+        }
+    });
+    two.map(f64::sqrt)
+}
+
+impl Spread {
+    /// The largest angle \[rad\].
+    pub(crate) fn angle(&self) -> f64 {
+        4.0 * libm::asin((0.5 * libm::sqrt(self.longest)).min(1.0))
+    }
+
+    /// The copy to which chords are measured, if all are there.
+    #[inline(always)]
+    pub(crate) fn reference(&self) -> usize {
+        self.reference
+    }
+
+    /// Whether no two of the copies can be farther apart than any were so far, if these are the squares of the longest chord to the reference and of the next.
+    #[inline(always)]
+    pub(crate) fn holds(&self, two_longest: [f64; 2]) -> bool {
+        let [first, second] = two_longest.map(f64::sqrt);
+        first + second <= self.longest.sqrt()
+    }
+
+    /// Takes in all pairs of the copies that are there now.
+    pub(crate) fn take(&mut self, copies: impl Iterator<Item = [f64; 4]>) {
+        self.copies.clear();
+        self.copies.extend(copies);
+        let reference = if self.reference < self.copies.len() { self.reference } else { 0 };
+        let Some(of_reference) = self.copies.get(reference) else { return };
+        chords(of_reference, &self.copies, &mut self.near);
+        let near = two_longest(&self.near);
+        if near[0] + near[1] <= self.longest.sqrt() {
+            return;
+        }
+        let farthest = (0..self.copies.len()).max_by(|one, other| self.near[*one].total_cmp(&self.near[*other])).unwrap_or(0);
+        chords(&self.copies[farthest], &self.copies, &mut self.far);
+        let far = two_longest(&self.far);
+        self.longest = self.near.iter().chain(&self.far).fold(self.longest, |longest, square| longest.max(*square));
+        self.look_at_pairs();
+        if far[0] + far[1] < near[0] + near[1] {
+            self.reference = farthest;
+        }
+    }
+
+    /// The pairs that chords to reference and farthest copy do not rule out. One of a pair is at least half of the pair's chord away from either.
+    fn look_at_pairs(&mut self) {
+        let Self { longest, copies, near, far, .. } = self;
+        let count = |squares: &[f64]| squares.iter().filter(|square| 4.0 * **square > *longest).count();
+        let few = if count(near) < count(far) { &*near } else { &*far };
+        let above = |squares: &[f64], one: usize, other: usize, longest: f64| squares[one].sqrt() + squares[other].sqrt() > longest.sqrt();
+        for one in 0..copies.len() {
+            for other in 0..copies.len() {
+                if 4.0 * few[one] > *longest && above(near, one, other, *longest) && above(far, one, other, *longest) {
+                    *longest = longest.max(squared_chord(&copies[one], &copies[other]));
+                }
+            }
+        }
+    }
+}
+
+fn chords(from: &[f64; 4], copies: &[[f64; 4]], squares: &mut Vec<f64>) {
+    squares.clear();
+    squares.extend(copies.iter().map(|copy| squared_chord(from, copy)));
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_peer::rotation::Attitude;
+
+    use super::*;
+
+    fn turned(sigma: [f64; 3]) -> Attitude {
+        let mut attitude = Attitude::REST;
+        attitude.turn(sigma);
+        attitude
+    }
+
+    /// Copies that wander, with outliers at the first and at the last place: over time, the largest angle of all pairs at all instants.
+    #[test]
+    fn the_largest_angle_is_that_of_all_pairs() {
+        for outlier in [0, 4, 8] {
+            let (mut spread, mut largest) = (Spread::default(), 0.0_f64);
+            for instant in 0..60_u32 {
+                let copies: Vec<Attitude> = (0..9_u32)
+                    .map(|place| {
+                        let phase = f64::from(instant) * 0.1 + f64::from(place);
+                        let size = if place == outlier { 1.1 } else { 0.3 };
+                        let copy = turned([size * phase.sin(), size * (1.3 * phase).cos(), size * (0.7 * phase).sin()]);
+                        if place % 2 == 0 { copy } else { Attitude { orientation: copy.orientation.map(|q| -q), ..copy } }
+                    })
+                    .collect();
+                spread.take(copies.iter().map(|copy| copy.orientation));
+                let all = copies.iter().flat_map(|one| copies.iter().map(|other| one.angle_to(&other.orientation)));
+                largest = all.fold(largest, f64::max);
+                assert!((spread.angle() - largest).abs() <= 4.0 * f64::EPSILON, "{outlier} at {instant}: {} is not {largest}", spread.angle());
+            }
+        }
+    }
+
+    #[test]
+    fn one_copy_is_nowhere_apart() {
+        let mut spread = Spread::default();
+        spread.take(std::iter::empty());
+        spread.take([turned([1.0, 2.0, 0.0]).orientation].into_iter());
+        assert_eq!(spread.angle(), 0.0);
+    }
+}

@@ -1,0 +1,131 @@
+//! An object that turns is run in arrays too, alone and beside others of its shape: what its events come to, to the bit.
+
+use std::time::Duration;
+
+use cohaptic_harness::{Model, run_side_by_side, same_shape};
+use cohaptic_peer::rotation::{Attitude, Spin, Triple};
+use cohaptic_peer::{Coordination, Gains, Signal};
+use cohaptic_scene::{DeviceRotationSpec, PeerRotation, RotationSpec, Scene};
+use cohaptic_tests::{Draft, cases, drafts};
+use cohaptic_units::Hertz;
+use proptest::collection::vec;
+use proptest::option;
+use proptest::prelude::*;
+use proptest::sample::select;
+
+use super::arrays::{difference, run, run_interrupted};
+
+/// Components of both signs, and now and then a zero of either sign.
+fn triple(size: f64) -> impl Strategy<Value = Triple> + Clone {
+    let component = prop_oneof![6 => -size..size, 1 => Just(0.0), 1 => Just(-0.0)];
+    [component.clone(), component.clone(), component]
+}
+
+/// Principal moments of a body, each the sum of two positive numbers.
+fn inertia() -> impl Strategy<Value = Triple> + Clone {
+    let part = prop_oneof![3 => 1e-5..1e-3_f64, 1 => Just(1e-4)];
+    [part.clone(), part.clone(), part].prop_map(|[a, b, c]| [b + c, c + a, a + b])
+}
+
+fn attitude() -> impl Strategy<Value = Attitude> + Clone {
+    let rate = prop_oneof![3 => triple(5.0), 1 => triple(2000.0), 1 => Just([0.0; 3])];
+    let turn = prop_oneof![3 => triple(2.0), 1 => Just([0.0; 3])];
+    (turn, rate, any::<bool>()).prop_map(|(turn, rate, other_sign)| {
+        let mut attitude = Attitude { rate, ..Attitude::REST };
+        attitude.turn(turn);
+        Attitude { orientation: attitude.orientation.map(|q| if other_sign { -q } else { q }), ..attitude }
+    })
+}
+
+fn torque() -> impl Strategy<Value = Option<Signal>> + Clone {
+    let sine =
+        (triple(0.05), 0.1..60.0, -3.0..3.0).prop_map(|(amplitude, frequency, phase)| Signal::Sine { amplitude, frequency: Hertz(frequency), phase });
+    option::of(prop_oneof![triple(0.05).prop_map(Signal::Constant), sine])
+}
+
+fn peer() -> impl Strategy<Value = PeerRotation> + Clone {
+    let gains = (0.0..2.0, 0.0..0.01).prop_map(|(stiffness, damping)| Gains { stiffness, damping });
+    let device = (inertia(), triple(1e-3), gains, torque()).prop_map(|(inertia, damping, coupling, torque)| DeviceRotationSpec {
+        handle: Spin { inertia, damping: damping.map(f64::abs) },
+        coupling,
+        torque,
+    });
+    (prop_oneof![triple(0.05), Just([0.0; 3])], attitude(), option::of(device)).prop_map(|(grasp, attitude, device)| PeerRotation {
+        grasp,
+        attitude,
+        device,
+    })
+}
+
+fn rotation(peers: usize) -> impl Strategy<Value = RotationSpec> {
+    let gains = (option::of(0.001..0.5_f64), option::of(triple(0.01)));
+    let gains = gains
+        .prop_map(|(stiffness, damping)| Gains { stiffness: stiffness.map(|k| [k, 0.9 * k, 1.1 * k]), damping: damping.map(|b| b.map(f64::abs)) });
+    (inertia(), option::of(triple(0.01)), gains, 1..3_u32, vec(peer(), peers)).prop_map(|(inertia, damping, gains, steps, peers)| RotationSpec {
+        inertia,
+        damping: damping.map(|b| b.map(f64::abs)),
+        gains,
+        steps,
+        peers,
+    })
+}
+
+/// This number of scenes of one shape, with objects that turn.
+fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<Scene>> {
+    let of_draft = |drafts: Vec<Draft>| {
+        let peers = drafts[0].peers.len();
+        let rotations = vec(rotation(peers), drafts.len());
+        let laws = select(&[Coordination::AveragePosition, Coordination::ProportionalDerivative, Coordination::Extrapolated][..]);
+        (Just(drafts), rotations, laws, any::<bool>())
+    };
+    drafts::alike(scenes).prop_flat_map(of_draft).prop_map(|(mut drafts, rotations, law, fast)| {
+        let (integrator, settings) = (drafts[0].integrator, drafts[0].settings);
+        drafts
+            .iter_mut()
+            .zip(&rotations)
+            .map(|(draft, rotation)| {
+                (draft.axes, draft.strategy, draft.integrator, draft.settings) = (3, law, integrator, settings);
+                let mut scene = draft.scene();
+                // Some turn so fast that it is their end.
+                let speed = if fast { 1.0 } else { 1e-2 };
+                scene.rotation = Some(Box::new(RotationSpec { steps: rotations[0].steps, ..rotation.clone() }));
+                for peer in scene.rotation.iter_mut().flat_map(|rotation| &mut rotation.peers) {
+                    peer.attitude.rate = peer.attitude.rate.map(|rate| speed * rate);
+                }
+                scene
+            })
+            .collect()
+    })
+}
+
+proptest! {
+    #![proptest_config(cases(600))]
+
+    #[test]
+    fn one_that_turns_comes_to_what_its_events_come_to(scenes in alike(Just(1))) {
+        prop_assert!(same_shape(&scenes[0], &scenes[0]), "it is run in arrays");
+        let difference = difference(&run(&scenes[0], Model::Least), &run(&scenes[0], Model::General));
+        prop_assert!(difference.is_none(), "{}", difference.unwrap());
+    }
+}
+
+proptest! {
+    #![proptest_config(cases(150))]
+
+    #[test]
+    fn those_that_turn_side_by_side_come_to_what_each_comes_to_alone(scenes in alike(5..=9_usize)) {
+        let together = run_side_by_side(&scenes);
+        for (scene, together) in scenes.iter().zip(&together) {
+            let difference = difference(together, &run(scene, Model::General));
+            prop_assert!(difference.is_none(), "{}", difference.unwrap());
+        }
+    }
+
+    #[test]
+    fn one_that_turns_and_is_interrupted_comes_to_the_same(mut scenes in alike(Just(1))) {
+        scenes[0].duration = Duration::from_millis(2500);
+        let interrupted = |model| run_interrupted(&scenes[0], model, 1);
+        let difference = difference(&interrupted(Model::Least), &interrupted(Model::General));
+        prop_assert!(difference.is_none(), "{}", difference.unwrap());
+    }
+}
