@@ -177,9 +177,13 @@ impl Rows {
             format!("copies with moments of inertia {} kg·m², damped by {} N·m·s/rad", triple(copy.inertia), triple(copy.damping)),
             "object.inertia; each takes part in the inertia as in the mass",
         );
-        if let Some(gains) = scene.rotation_gains(scene.coordination.gains) {
+        if let Some(gains) = scene.rotation_gains_in_time().next() {
             let gains = format!("KR = {} N·m/rad, BR = {} N·m·s/rad about body axes", triple(gains.stiffness), triple(gains.damping));
             self.model("coordination of turns", gains, "the mean of the matrices held, which is no rotation, gives the mean torque");
+        }
+        let own = scene.own_rotational_damping(0);
+        if own.iter().any(|damping| *damping > 0.0) {
+            self.model("damping of turns", format!("another {} N·m·s/rad of each copy", triple(own)), "the strategy damps each copy");
         }
         let method = match scene.integrator {
             Integrator::Exact => "exponential of the damped turn, fourth order in the gyroscopic term",

@@ -28,7 +28,7 @@ use crate::cost::eigenvalue_operations;
 use crate::network::NominalNetwork;
 use crate::parts::radius_of;
 use crate::spectrum::bounded_radius;
-use crate::structure::{Contacts, Structure, common_time};
+use crate::structure::{Contacts, Structure, common_time, linear_law};
 use crate::timetable::Timetable;
 use crate::{AnalysisError, Matrix, Method, Part, PartKind, Radius, Watch};
 
@@ -100,8 +100,12 @@ fn part(turning: &Turning<'_>, kind: PartKind, copies: usize, method: Method, wa
     Ok(Part { kind, size: matrix.rows(), copies, radius, method })
 }
 
-/// The peers whose devices hold the object. A finger would push along an axis of the world.
+/// The peers whose devices hold the object. A finger would push along an axis of the world, and a law that looks back or remembers torques would be another state.
 fn contacts(scene: &Scene) -> Result<Contacts, AnalysisError> {
+    if linear_law(scene, 0).is_some_and(|law| law.lag > 0 || !law.memory.is_empty()) {
+        let why = scene.rotation_parts().and_then(Result::err).unwrap_or("all components are taken together");
+        return Err(AnalysisError::Turns { what: scene.coordination.strategy.name(), why });
+    }
     if scene.peers.iter().any(|spec| matches!(spec.contact, Contact::Push(_))) {
         let why = scene.rotation_parts().and_then(Result::err).unwrap_or("all components are taken together");
         return Err(AnalysisError::Turns { what: "a one-sided contact", why });
