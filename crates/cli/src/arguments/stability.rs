@@ -207,9 +207,12 @@ pub(crate) struct AdmittanceArguments {
     /// The peer whose device is pushed
     #[arg(long, value_name = "NAME")]
     pub(crate) peer: String,
-    /// Along which axis it is pushed, or of an object that turns and is held at its centre about which axis [default: that of its own one-sided contact, or x]
+    /// Along which axis it is pushed, or of a device that turns about which axis it is twisted [default: that of its own one-sided contact, or x]
     #[arg(long, value_enum, value_name = "AXIS")]
     pub(crate) axis: Option<AxisName>,
+    /// Along or about which axis its motion is looked at, where the object turns [default: that of the push]
+    #[arg(long, value_enum, value_name = "AXIS")]
+    pub(crate) seen: Option<AxisName>,
     /// The lowest frequency [default: 0.01]
     #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
     pub(crate) from: Option<f64>,

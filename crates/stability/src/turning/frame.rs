@@ -17,7 +17,7 @@ pub(super) const SAMPLE: usize = 12;
 /// The state has, for each node, its components and then their velocities, those of the device likewise, and the forces that wait; then, for each node, the samples
 /// of earlier frames, the newest first.
 #[derive(Clone, Debug)]
-pub(super) struct Turning<'a> {
+pub(crate) struct Turning<'a> {
     pub(super) nodes: &'a [Node],
     /// The weight of each node's samples (column) in each node's target (row).
     pub(super) weights: &'a Matrix,
@@ -28,9 +28,17 @@ pub(super) struct Turning<'a> {
     pub(super) free: Vec<Displacement>,
 }
 
+/// What happens at a tick: it sees the node, the instant in the frame \[ns\] and the device before it moves, and may push one of the device's components.
+pub(crate) type Hand<'h> = dyn FnMut(usize, u64, &[Motion]) -> Option<(usize, f64)> + 'h;
+
 impl Turning<'_> {
     /// The matrix of a frame, displacements of everything taken out, and a bound of the error of its entries; `None` if the watch ends it.
     pub(super) fn monodromy(&self, watch: &dyn Watch) -> Option<(Matrix, f64)> {
+        self.monodromy_under(&mut |_, _, _| None, watch)
+    }
+
+    /// [`Turning::monodromy`]; the hand sees the frame of each unit vector, in the order of [`Turning::kept`].
+    pub(crate) fn monodromy_under(&self, hand: &mut Hand<'_>, watch: &dyn Watch) -> Option<(Matrix, f64)> {
         let (size, events) = (self.size(), self.timetable.events.len());
         watch.expects(full_operations(size, events, 6));
         let moved: Vec<Vec<f64>> = self.free.iter().map(|free| self.displaced(&free.copy)).collect();
@@ -42,11 +50,10 @@ impl Turning<'_> {
                 return None;
             }
             unit[*state] = 1.0;
-            let reached = self.pushed(&unit, &mut growth);
+            let reached = self.pushed_under(&unit, &mut growth, hand);
             unit[*state] = 0.0;
-            for (row, target) in kept.iter().enumerate() {
-                let along: f64 = self.free.iter().zip(&moved).map(|(free, moved)| reached[free.reference] * moved[*target]).sum();
-                matrix[(row, column)] = reached[*target] - along;
+            for (row, entry) in self.relative(&reached, &kept, &moved).enumerate() {
+                matrix[(row, column)] = entry;
             }
             watch.done(pushed_operations(events, 6));
         }
@@ -54,6 +61,31 @@ impl Turning<'_> {
         // As for the general path of objects that do not turn: each tick rounds, and the rest of the frame magnifies that by at most about the growth.
         let error = 10.0 * f64::EPSILON * count(ticks) * growth * growth * count(kept.len()).sqrt();
         Some((matrix, error))
+    }
+
+    /// Where a frame leads from rest, in the numbers of [`Turning::monodromy`], under what a hand does.
+    pub(crate) fn forced(&self, hand: &mut Hand<'_>) -> Vec<f64> {
+        let moved: Vec<Vec<f64>> = self.free.iter().map(|free| self.displaced(&free.copy)).collect();
+        let reached = self.pushed_under(&vec![0.0; self.size()], &mut 0.0, hand);
+        self.relative(&reached, &self.kept(), &moved).collect()
+    }
+
+    /// The states that are kept, less the displacements of everything.
+    fn relative<'r>(&'r self, reached: &'r [f64], kept: &'r [usize], moved: &'r [Vec<f64>]) -> impl Iterator<Item = f64> + 'r {
+        kept.iter().map(move |target| {
+            let along: f64 = self.free.iter().zip(moved).map(|(free, moved)| reached[free.reference] * moved[*target]).sum();
+            reached[*target] - along
+        })
+    }
+
+    /// Whether some displacement of everything moves that component of the device of a node.
+    pub(crate) fn moves_freely(&self, node: usize, component: usize) -> bool {
+        let node = &self.nodes[node];
+        if node.touching {
+            self.free.iter().any(|free| dot(&node.grip[component], &free.copy) != 0.0)
+        } else {
+            node.loose().any(|loose| loose == component)
+        }
     }
 
     /// The states but for the references, and but for those that nothing depends on.
@@ -94,7 +126,13 @@ impl Turning<'_> {
     }
 
     /// Where a frame leads from the state; `growth` becomes the largest number on the way if that is larger.
+    #[cfg(test)]
     pub(super) fn pushed(&self, state: &[f64], growth: &mut f64) -> Vec<f64> {
+        self.pushed_under(state, growth, &mut |_, _, _| None)
+    }
+
+    /// Where a frame leads from the state under what a hand does.
+    fn pushed_under(&self, state: &[f64], growth: &mut f64, hand: &mut Hand<'_>) -> Vec<f64> {
         let nodes = self.nodes.len();
         let firsts = self.firsts();
         let mut peers: Vec<Moving> = self.nodes.iter().zip(&firsts).map(|(node, first)| Moving::read(node, &state[*first..], self.time)).collect();
@@ -129,7 +167,8 @@ impl Turning<'_> {
                                 * (gains.stiffness * moved.position + (gains.damping + node.ahead[axis] * age) * moved.velocity);
                         }
                     }
-                    peers[to].tick(node, &drawn, span);
+                    let push = hand(to, at, &peers[to].device);
+                    peers[to].tick(node, &drawn, push, span);
                     *growth = growth.max(peers[to].largest(self.time));
                 }
             }
@@ -184,8 +223,8 @@ impl Moving {
         }
     }
 
-    /// One tick under the forces of samples that draw the copy.
-    fn tick(&mut self, node: &Node, drawn: &[f64; 6], span: std::time::Duration) {
+    /// One tick under the forces of samples that draw the copy, and a hand that pushes a component of the device.
+    fn tick(&mut self, node: &Node, drawn: &[f64; 6], push: Option<(usize, f64)>, span: std::time::Duration) {
         let mut on_copy: [f64; 6] = std::array::from_fn(|axis| drawn[axis] - node.own[axis].force(self.copy[axis]));
         let mut on_device = vec![0.0; self.device.len()];
         if node.touching {
@@ -202,6 +241,9 @@ impl Moving {
         if node.compute_delay {
             std::mem::swap(&mut self.on_copy, &mut on_copy);
             std::mem::swap(&mut self.on_device, &mut on_device);
+        }
+        if let Some((component, force)) = push {
+            on_device[component] += force;
         }
         for ((motion, body), force) in self.copy.iter_mut().zip(&node.copy).zip(on_copy) {
             body.map(span).advance(motion, force);

@@ -21,8 +21,9 @@ use std::time::Duration;
 use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
 
-use self::frame::Turning;
-use self::node::Node;
+pub(crate) use self::frame::Turning;
+pub(crate) use self::node::Node;
+use self::rigid::Displacement;
 use crate::analysis::{Analysis, ContactMode, combine};
 use crate::cost::eigenvalue_operations;
 use crate::network::NominalNetwork;
@@ -48,26 +49,67 @@ pub(crate) fn radius(scene: &Scene, network: &NominalNetwork) -> Result<Radius, 
     mode(scene, network, Method::Reduced, &crate::Unwatched).map(|mode| mode.radius)
 }
 
+/// The classes of a scene that turns, and what of them moves.
+#[derive(Clone, Debug)]
+pub(crate) struct Together {
+    pub(crate) structure: Structure,
+    nodes: Vec<Node>,
+    time: f64,
+    free: Vec<Displacement>,
+}
+
+impl Together {
+    fn new(scene: &Scene, structure: Structure) -> Self {
+        let nodes: Vec<Node> = structure.classes.iter().map(|class| Node::of(scene, class[0])).collect();
+        let peers = structure.classes.iter().zip(&structure.touching).map(|(class, touching)| (class[0], *touching));
+        let time = common_time(scene, structure.timetable.frame, structure.law(scene, 0).held_by(), peers, false);
+        let free = if structure.silent { Vec::new() } else { rigid::displacements(&nodes) };
+        Self { structure, nodes, time, free }
+    }
+
+    /// With one peer in a class of its own.
+    pub(crate) fn with_alone(scene: &Scene, network: &NominalNetwork, alone: usize) -> Result<Self, AnalysisError> {
+        Ok(Self::new(scene, Structure::with_alone(&[scene], network, &contacts(scene)?, Some(alone))?))
+    }
+
+    /// The system of the classes' averages.
+    pub(crate) fn turning(&self) -> Turning<'_> {
+        let Self { structure, nodes, time, free } = self;
+        Turning { nodes, weights: &structure.weights, timetable: &structure.timetable, time: *time, free: free.clone() }
+    }
+
+    /// The node of a class.
+    pub(crate) fn node(&self, class: usize) -> &Node {
+        &self.nodes[class]
+    }
+
+    /// What velocities are multiplied by \[s\].
+    pub(crate) const fn time(&self) -> f64 {
+        self.time
+    }
+}
+
 fn mode(scene: &Scene, network: &NominalNetwork, method: Method, watch: &dyn Watch) -> Result<ContactMode, AnalysisError> {
     let contacts = contacts(scene)?;
     let one_by_one = method == Method::Full;
     let structure = if one_by_one { Structure::of_each(scene, network, &contacts)? } else { Structure::of(&[scene], network, &contacts)? };
-    let nodes: Vec<Node> = structure.classes.iter().map(|class| Node::of(scene, class[0])).collect();
-    let peers = structure.classes.iter().zip(&structure.touching).map(|(class, touching)| (class[0], *touching));
-    let time = common_time(scene, structure.timetable.frame, structure.law(scene, 0).held_by(), peers, false);
-    let free = if structure.silent { Vec::new() } else { rigid::displacements(&nodes) };
-    let together = Turning { nodes: &nodes, weights: &structure.weights, timetable: &structure.timetable, time, free };
-    let kind = if one_by_one { PartKind::Whole } else { PartKind::Together };
-    let mut parts = vec![part(&together, kind, 1, method, watch)?];
+    mode_of(&Together::new(scene, structure), method, watch)
+}
+
+/// The parts of classes.
+pub(crate) fn mode_of(together: &Together, method: Method, watch: &dyn Watch) -> Result<ContactMode, AnalysisError> {
+    let (structure, turning) = (&together.structure, together.turning());
+    let kind = if method == Method::Full { PartKind::Whole } else { PartKind::Together };
+    let mut parts = vec![part(&turning, kind, 1, method, watch)?];
     let mut dimension = 0;
-    let mut rigid_modes = together.free.len();
+    let mut rigid_modes = turning.free.len();
     let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
     for (class, members) in structure.classes.iter().enumerate() {
-        let node = &nodes[class];
+        let node = together.node(class);
         rigid_modes += members.len() * node.loose().count();
         dimension += members.len() * (node.states() + frame::SAMPLE * structure.timetable.depth[class]);
         let Some(timetable) = &structure.apart[class] else { continue };
-        let apart = Turning { nodes: &nodes[class..=class], weights: &weight, timetable, time, free: Vec::new() };
+        let apart = Turning { nodes: std::slice::from_ref(node), weights: &weight, timetable, time: together.time, free: Vec::new() };
         let part = part(&apart, PartKind::Apart { peer: members[0] }, members.len() - 1, method, watch)?;
         parts.push(Part { radius: part.radius.over(repeats(&structure.timetable, timetable)), ..part });
     }

@@ -9,7 +9,7 @@ use crate::structure::linear_law;
 
 /// A peer, or what a class of equal peers has in common. Angles are multiplied by [`Node::length`], and torques divided by it.
 #[derive(Clone, Debug)]
-pub(super) struct Node {
+pub(crate) struct Node {
     /// p and θ.
     pub(super) copy: Vec<Body>,
     /// x, and θH if the device turns.
@@ -17,7 +17,7 @@ pub(super) struct Node {
     /// For each component of the device, the gains of its coupling to the copy.
     pub(super) coupling: Vec<Gains>,
     /// For each component of the device, the row of the copy's components that it is held to.
-    pub(super) grip: Vec<[f64; 6]>,
+    pub(crate) grip: Vec<[f64; 6]>,
     pub(super) touching: bool,
     /// What draws each component of the copy back by its own state, and towards that of a sample.
     pub(super) own: [Gains; 6],
@@ -30,9 +30,9 @@ pub(super) struct Node {
     pub(super) armed: bool,
     pub(super) grasp: Triple,
     /// √(tr J/3m) \[m\].
-    pub(super) length: f64,
+    pub(crate) length: f64,
     /// How far a force moves the copy within a tick, over a second [m/(N·s)].
-    pub(super) mobility: f64,
+    pub(crate) mobility: f64,
 }
 
 impl Node {

@@ -4,7 +4,7 @@ use super::node::Node;
 
 /// The components of the copies under a displacement that nothing resists: y of all of them, and which of the components of the first copy tells how far it is.
 #[derive(Clone, PartialEq, Debug)]
-pub(super) struct Displacement {
+pub(crate) struct Displacement {
     pub(super) copy: [f64; 6],
     pub(super) reference: usize,
 }
