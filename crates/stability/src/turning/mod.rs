@@ -11,6 +11,7 @@
 //! map of one axis. Angles are multiplied by √(tr J/3m), so that all states are lengths. Peers that are equal, in their grasps too, are taken together.
 
 mod frame;
+mod load;
 mod node;
 mod rigid;
 #[cfg(test)]
@@ -22,16 +23,18 @@ use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
 
 pub(crate) use self::frame::Turning;
+use self::load::{Loaded, Pose};
 pub(crate) use self::node::Node;
 use self::rigid::Displacement;
 use crate::analysis::{Analysis, ContactMode, combine};
 use crate::cost::eigenvalue_operations;
 use crate::network::NominalNetwork;
 use crate::parts::radius_of;
-use crate::spectrum::bounded_radius;
+use crate::scene_radius::worse;
+use crate::spectrum::{Workspace, bounded_radius};
 use crate::structure::{Contacts, Structure, common_time};
 use crate::timetable::Timetable;
-use crate::{AnalysisError, Matrix, Method, Part, PartKind, Radius, Watch};
+use crate::{AnalysisError, Matrix, Method, Part, PartKind, Radius, UNLOADED, Unwatched, Watch};
 
 /// Analyses an object that turns. [`Method::Full`] takes each peer by itself.
 pub(crate) fn analyse(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
@@ -44,9 +47,56 @@ pub(crate) fn analyse(scene: &Scene, method: Method, watch: &dyn Watch) -> Resul
     Ok(analysis)
 }
 
-/// The largest radius of all parts.
-pub(crate) fn radius(scene: &Scene, network: &NominalNetwork) -> Result<Radius, AnalysisError> {
-    mode(scene, network, Method::Reduced, &crate::Unwatched).map(|mode| mode.radius)
+/// Analyses an object that turns about where constant forces of the hands leave it at rest, each peer by itself.
+pub(crate) fn analyse_loaded(scene: &Scene, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
+    let network = NominalNetwork::of(scene)?;
+    let (together, poses) = loaded(scene, &network)?;
+    let mode = mode_of(&together, Method::Full, watch)?;
+    let mut analysis = combine(vec![mode], Method::Full, &network, scene);
+    analysis.notes.retain(|note| note != UNLOADED);
+    let pairs = || poses.iter().flat_map(|one| poses.iter().map(move |other| (one, other)));
+    let apart = |one: &Pose, other: &Pose| (0..3).map(|axis| (one.centre[axis] - other.centre[axis]).powi(2)).sum::<f64>().sqrt();
+    let distance = pairs().map(|(one, other)| apart(one, other)).fold(0.0, f64::max);
+    let angle = pairs().map(|(one, other)| one.attitude.angle_to(&other.attitude.orientation)).fold(0.0, f64::max);
+    analysis.notes.push(format!(
+        "the object turns: the verdict is about small motions near the rest under the constant forces of the hands, copies {distance:.3e} m and {angle:.3e} rad apart"
+    ));
+    if scene.object.enclosure.is_some() {
+        analysis.notes.push("the enclosure is left out: the scene is analysed away from its walls".to_owned());
+    }
+    Ok(analysis)
+}
+
+/// The peers of a scene about the rest that hands with constant forces leave it at, and where that is.
+fn loaded(scene: &Scene, network: &NominalNetwork) -> Result<(Together, Vec<Pose>), AnalysisError> {
+    let structure = Structure::of_each(scene, network, &contacts(scene)?)?;
+    if structure.silent {
+        return Err(AnalysisError::NoRest { why: "a link never delivers, and what is held of the beginning is a load of its own".to_owned() });
+    }
+    let mut together = Together::new(scene, structure);
+    let loaded = Loaded::new(scene, &together.nodes)?;
+    let poses = loaded.rest()?;
+    let (nodes, candidates) = (loaded.stressed(&poses), loaded.together(&poses));
+    (together.nodes, together.free) = (nodes, Vec::new());
+    together.free = rigid::unmoved(&together.turning(), candidates);
+    Ok((together, poses))
+}
+
+/// The largest radius of all parts, without a bound.
+pub(crate) fn radius(together: &Together, workspace: &mut Workspace) -> Radius {
+    let structure = &together.structure;
+    let mut of = |turning: &Turning<'_>| {
+        let (matrix, _) = turning.monodromy(&Unwatched).expect("without a watch nothing ends it");
+        Radius { value: workspace.radius(&matrix), error: 0.0 }
+    };
+    let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
+    let mut worst = of(&together.turning());
+    for (class, timetable) in structure.apart.iter().enumerate() {
+        let Some(timetable) = timetable else { continue };
+        let radius = of(&together.apart(class, timetable, &weight)).over(repeats(&structure.timetable, timetable));
+        worst = worse::<false>(worst, radius);
+    }
+    worst
 }
 
 /// The classes of a scene that turns, and what of them moves.
@@ -59,7 +109,7 @@ pub(crate) struct Together {
 }
 
 impl Together {
-    fn new(scene: &Scene, structure: Structure) -> Self {
+    pub(crate) fn new(scene: &Scene, structure: Structure) -> Self {
         let nodes: Vec<Node> = structure.classes.iter().map(|class| Node::of(scene, class[0])).collect();
         let peers = structure.classes.iter().zip(&structure.touching).map(|(class, touching)| (class[0], *touching));
         let time = common_time(scene, structure.timetable.frame, structure.law(scene, 0).held_by(), peers, false);
@@ -76,6 +126,11 @@ impl Together {
     pub(crate) fn turning(&self) -> Turning<'_> {
         let Self { structure, nodes, time, free } = self;
         Turning { nodes, weights: &structure.weights, timetable: &structure.timetable, time: *time, free: free.clone() }
+    }
+
+    /// How the members of a class differ.
+    fn apart<'t>(&'t self, class: usize, timetable: &'t Timetable, weight: &'t Matrix) -> Turning<'t> {
+        Turning { nodes: &self.nodes[class..=class], weights: weight, timetable, time: self.time, free: Vec::new() }
     }
 
     /// The node of a class.
@@ -109,7 +164,7 @@ pub(crate) fn mode_of(together: &Together, method: Method, watch: &dyn Watch) ->
         rigid_modes += members.len() * node.loose().count();
         dimension += members.len() * (node.states() + frame::SAMPLE * structure.timetable.depth[class]);
         let Some(timetable) = &structure.apart[class] else { continue };
-        let apart = Turning { nodes: std::slice::from_ref(node), weights: &weight, timetable, time: together.time, free: Vec::new() };
+        let apart = together.apart(class, timetable, &weight);
         let part = part(&apart, PartKind::Apart { peer: members[0] }, members.len() - 1, method, watch)?;
         parts.push(Part { radius: part.radius.over(repeats(&structure.timetable, timetable)), ..part });
     }
@@ -143,7 +198,7 @@ fn part(turning: &Turning<'_>, kind: PartKind, copies: usize, method: Method, wa
 }
 
 /// The peers whose devices hold the object. A finger would push along an axis of the world.
-fn contacts(scene: &Scene) -> Result<Contacts, AnalysisError> {
+pub(crate) fn contacts(scene: &Scene) -> Result<Contacts, AnalysisError> {
     if scene.peers.iter().any(|spec| matches!(spec.contact, Contact::Push(_))) {
         let why = scene.rotation_parts().and_then(Result::err).unwrap_or("all components are taken together");
         return Err(AnalysisError::Turns { what: "a one-sided contact", why });

@@ -4,6 +4,7 @@ use cohaptic_peer::rotation::{Spin, Triple};
 use cohaptic_peer::{Contact, Gains, Integrator, Plant, StepMap};
 use cohaptic_scene::Scene;
 
+use super::load::Stress;
 use crate::lifted::Body;
 use crate::structure::linear_law;
 
@@ -29,6 +30,8 @@ pub(crate) struct Node {
     /// Whether an arm with a stiffness holds the device.
     pub(super) armed: bool,
     pub(super) grasp: Triple,
+    /// What a load changes: rows of `grip` and gains of turns that it replaces are those of a node without.
+    pub(super) stress: Option<Box<Stress>>,
     /// √(tr J/3m) \[m\].
     pub(crate) length: f64,
     /// How far a force moves the copy within a tick, over a second [m/(N·s)].
@@ -76,6 +79,7 @@ impl Node {
             compute_delay: spec.compute_delay,
             armed: device_plant.stiffness > 0.0,
             grasp: config.grasp,
+            stress: None,
             length,
             mobility: spec.clock.tick.as_secs_f64() / mass,
         }
