@@ -353,7 +353,7 @@ fn a_load_leaves_fewer_displacements_that_nothing_resists() {
     let none = scene(&[]);
     let network = NominalNetwork::of(&none).unwrap();
     assert_eq!(loaded(&none, &network).unwrap().0.free.len(), 6);
-    let (about_load, about_rest) = (analyse_loaded(&none, &crate::Unwatched).unwrap(), analyse(&none, Method::Full, &crate::Unwatched).unwrap());
+    let (about_load, about_rest) = (analyse_loaded(&none, &Unwatched).unwrap(), analyse(&none, Method::Full, &Unwatched).unwrap());
     assert!((about_load.radius.value - about_rest.radius.value).abs() <= about_load.radius.error + about_rest.radius.error);
 }
 
@@ -365,7 +365,7 @@ fn without_rest_there_is_no_verdict() {
         (&["peers.a.hand={ sine = { amplitude = [1, 0, 0], frequency = 1 } }"], "the hand of a does not stay"),
         (&["links=[{ from = 'a', to = 'b', loss = 1 }]"], "a link never delivers"),
     ] {
-        let error = analyse_loaded(&scene(overrides), &crate::Unwatched).unwrap_err().to_string();
+        let error = analyse_loaded(&scene(overrides), &Unwatched).unwrap_err().to_string();
         assert!(error.contains(why), "{overrides:?}: {error}");
     }
 }
