@@ -207,8 +207,8 @@ fn the_admittance_of_a_turn_is_that_of_its_scene() {
         assert!((found.value - expected.value).norm() <= found.error + expected.error, "{found:?} {expected:?}");
     }
     assert!(matches!(about(&[], PushedAxis::Rx), Err(AdmittanceError::DoesNotTurn { axis: "rx", .. })));
-    let error = about(&["peer.grasp=[0.01, 0, 0]"], PushedAxis::X).unwrap_err();
-    assert!(error.to_string().contains("the object is held off its centre"), "{error}");
+    let error = about(&["peer.grasp=[0.01, 0, 0]", "peers.peer2.contact.push=+x"], PushedAxis::X).unwrap_err();
+    assert!(error.to_string().starts_with("a one-sided contact of an object that turns"), "{error}");
     assert!(matches!(Admittance::along_watched(&one, 0, Some(PushedAxis::Rx), &Unwatched), Err(AdmittanceError::NoSuchAxis { axis: "rx" })));
 }
 
