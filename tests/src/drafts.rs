@@ -208,21 +208,16 @@ pub fn fixed_link() -> impl Strategy<Value = String> + Clone {
     prop_oneof![Just(String::new()), (0..6000_u32).prop_map(|us| format!("delay = \"{us}us\""))]
 }
 
+/// Keys of a link that knows at once when a packet arrives: in half of the cases of nothing but a constant delay.
+pub fn direct_link() -> impl Strategy<Value = String> + Clone {
+    prop_oneof![link(), (0..40_000_u32).prop_map(|us| format!("delay = \"{us}us\", jitter = \"0s\""))]
+}
+
 /// Keys of a link of any kind.
 pub fn link() -> impl Strategy<Value = String> + Clone {
-    link_with(true)
-}
-
-/// Keys of a link of a kind in which no packet waits for another: in half of the cases of nothing but a constant delay.
-pub fn direct_link() -> impl Strategy<Value = String> + Clone {
-    prop_oneof![link_with(false), (0..40_000_u32).prop_map(|us| format!("delay = \"{us}us\", jitter = \"0s\""))]
-}
-
-/// Keys of a link that may have a rate, or not.
-fn link_with(may_have_rate: bool) -> impl Strategy<Value = String> + Clone {
     let delay = prop_oneof![Just(None), (0..40_000_u32).prop_map(Some)];
     // In parts per thousand of the delay: a uniform law reaches √3 of it.
-    let jitter = option::of((1..550_u32, any::<bool>(), any::<bool>()));
+    let jitter = option::of((1..550_u32, any::<bool>(), any::<bool>(), option::of(0.1..0.9)));
     let loss = prop_oneof![
         2 => Just(None),
         1 => (0.0..0.5).prop_map(|p: f64| Some(format!("loss = {p:?}"))),
@@ -230,15 +225,17 @@ fn link_with(may_have_rate: bool) -> impl Strategy<Value = String> + Clone {
             Some(format!("loss = {{ gilbert-elliott = {{ p = {p:?}, r = {r:?}, h = {h:?}, k = {k:?} }} }}"))
         }),
     ];
-    let rate = option::of((30..1000_u32, 0..60_u32, option::of((1..6_u32, any::<bool>()))));
+    let rate = option::of((30..1000_u32, 0..60_u32, option::of((1..6_u32, 0..3_usize, 0..4_usize))));
     let outage = option::weighted(0.3, (0..60_u32, 1..60_u32));
-    (delay, jitter, loss, rate, outage).prop_map(move |(delay, jitter, loss, rate, outage)| {
+    let copies = option::weighted(0.2, 0.01..0.3);
+    (delay, jitter, loss, rate, outage, copies).prop_map(|(delay, jitter, loss, rate, outage, copies)| {
         let mut keys = Vec::new();
         if let Some(us) = delay {
             keys.push(format!("delay = \"{us}us\""));
-            if let Some((part, normal, in_order)) = jitter {
+            if let Some((part, normal, in_order, correlation)) = jitter {
                 let distribution = if normal { "normal" } else { "uniform" };
-                keys.push(format!("jitter = {{ sd = \"{}ns\", distribution = \"{distribution}\" }}", us * part));
+                let memory = correlation.map_or_else(String::new, |rho: f64| format!(", correlation = {rho:?}"));
+                keys.push(format!("jitter = {{ sd = \"{}ns\", distribution = \"{distribution}\"{memory} }}", us * part));
                 keys.push(format!("order = \"{}\"", if in_order { "in-order" } else { "allow-reordering" }));
             } else {
                 // Laid over another link, a shorter delay must not be left with its jitter.
@@ -246,13 +243,15 @@ fn link_with(may_have_rate: bool) -> impl Strategy<Value = String> + Clone {
             }
         }
         keys.extend(loss);
-        if let Some((kbit, overhead, queue)) = rate.filter(|_| may_have_rate) {
+        if let Some((kbit, overhead, queue)) = rate {
             keys.push(format!("rate = \"{kbit}kbit\", overhead = \"{overhead}B\""));
-            if let Some((limit, packets)) = queue {
-                let limit = if packets { format!("{limit} packets") } else { format!("{}B", 150 * limit) };
-                keys.push(format!("queue = {{ limit = \"{limit}\" }}"));
+            if let Some((limit, unit, discipline)) = queue {
+                let limit = [format!("{limit} packets"), format!("{}B", 150 * limit), format!("{}us", 1700 * limit)][unit].clone();
+                let discipline = ["tail-drop", "tail-drop", "head-drop", "codel"][discipline];
+                keys.push(format!("queue = {{ limit = \"{limit}\", discipline = \"{discipline}\" }}"));
             }
         }
+        keys.extend(copies.map(|copies: f64| format!("duplicate = {copies:?}")));
         if let Some((from, length)) = outage {
             keys.push(format!("outage = [{{ from = \"{from}ms\", to = \"{}ms\" }}]", from + length));
         }

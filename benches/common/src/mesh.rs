@@ -74,7 +74,12 @@ impl Mesh {
     /// The scene as a file.
     #[must_use]
     pub fn text(self, ticks: u64, seed: u64) -> String {
-        let impairments = if self.impaired { "jitter = \"2ms\"\nloss = \"1%\"" } else { "" };
+        Self::text_over(self.peers, if self.impaired { "jitter = \"2ms\"\nloss = \"1%\"" } else { "" }, ticks, seed)
+    }
+
+    /// The scene of that number of peers as a file, with these keys of links beside the delay.
+    #[must_use]
+    pub fn text_over(peers: usize, links: &str, ticks: u64, seed: u64) -> String {
         format!(
             r#"
             [scene]
@@ -97,15 +102,9 @@ impl Mesh {
             hand = {{ force = {HAND_FORCE} }}
             [link]
             delay = "24ms"
-            {impairments}
+            {links}
             "#,
-            GAINS.stiffness,
-            GAINS.damping,
-            DEVICE.mass,
-            DEVICE.damping,
-            COUPLING.stiffness,
-            COUPLING.damping,
-            peers = self.peers,
+            GAINS.stiffness, GAINS.damping, DEVICE.mass, DEVICE.damping, COUPLING.stiffness, COUPLING.damping,
         )
     }
 

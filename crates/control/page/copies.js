@@ -4,22 +4,54 @@
 let bodies = [];
 let view = null;
 let trails = [];
+/** The object, if it turns: its edges. */
+let shape = null;
 
 /** How long a trail is [ms], and how fast the picture follows [ms]. */
 const TRAIL = 2500;
 const FOLLOW = 60;
+/** Who wants less motion sees what was measured, ten times a second, and no trails. */
+const still = matchMedia('(prefers-reduced-motion: reduce)');
+const share = (passed) => (still.matches ? 1 : 1 - Math.exp(-passed / FOLLOW));
 
-function takePeers(peers) {
+function takePeers(peers, body) {
+  shape = body || null;
   $('people').hidden = peers.length === 0;
   const moving = peers.some((peer) => peer.position.length > 0);
-  $('copies').hidden = !moving;
+  $('stage').hidden = !moving;
+  $('eye').hidden = shape === null;
+  $('apart').parentElement.hidden = peers.length < 2;
+  $('turned').hidden = shape === null;
   if (bodies.length !== peers.length) {
     bodies = [];
     trails = [];
     view = null;
   }
-  bodies = peers.map((peer, i) => ({ peer, at: bodies[i] && bodies[i].at.length === peer.position.length ? bodies[i].at : [...peer.position] }));
+  bodies = peers.map((peer, index) => ({
+    at: [...peer.position],
+    turned: isAll(peer.orientation, 4) ? peer.orientation : [1, 0, 0, 0],
+    ...(bodies[index] && bodies[index].at.length === peer.position.length ? bodies[index] : {}),
+    peer,
+    index,
+  }));
   showPeers(peers);
+}
+
+/** Whether these are that many numbers. */
+const isAll = (values, many) => Array.isArray(values) && values.length === many && values.every(Number.isFinite);
+
+/** Takes the picture a part of the way from what it shows to what was measured. */
+function follow(body, passed) {
+  const { peer } = body;
+  const part = share(passed);
+  const between = (from, to) => from.map((value, axis) => value + (to[axis] - value) * part);
+  body.at = between(body.at, peer.position);
+  if (!body.at.every(Number.isFinite)) body.at = [...peer.position];
+  if (!shape) return;
+  if (isAll(peer.orientation, 4)) body.turned = towards(body.turned, peer.orientation, part);
+  const device = peer.device || {};
+  body.device = isAll(device.position, 3) ? between(body.device || device.position, device.position) : null;
+  body.deviceTurned = isAll(device.orientation, 4) ? towards(body.deviceTurned || device.orientation, device.orientation, part) : null;
 }
 
 const PRESENCE = { here: 'here', present: 'present', stale: 'stale', absent: 'absent' };
@@ -36,9 +68,9 @@ function showPeers(peers) {
       name.append(make('span', 'swatch'), make('span'));
       const status = make('td');
       status.append(make('span', 'pill'));
-      tr.append(name, status, make('td', 'n'), make('td', 'n'));
+      tr.append(name, status, make('td', 'n'), make('td', 'n'), make('td', 'n'));
     }
-    const [name, status, position, force] = tr.cells;
+    const [name, status, position, turn, force] = tr.cells;
     name.firstChild.style.background = colour(i);
     put(name.lastChild, peer.name);
     name.title = peer.kind;
@@ -49,6 +81,8 @@ function showPeers(peers) {
     pill.className = 'pill ' + peer.status;
     tr.classList.toggle('old', peer.status === 'stale' || peer.status === 'absent');
     put(position, peer.position.length ? place(peer.position) : '–');
+    turn.hidden = shape === null;
+    put(turn, isAll(peer.orientation, 4) ? turnOf(peer.orientation).map((angle) => signed(angle.toFixed(1))).join(', ') + '°' : '–');
     put(force, peer.force.length ? peer.force.map((f) => (f === null ? '–' : signed(f.toFixed(2)))).join(', ') + ' N' : '–');
   });
 }
@@ -56,19 +90,21 @@ function showPeers(peers) {
 /** Draws the copies; called for each frame of the screen while there are any. */
 function drawCopies(passed) {
   const canvas = $('copies');
-  if (canvas.hidden || $('people').hidden) return;
+  if ($('stage').hidden || $('people').hidden) return;
+  canvas.classList.toggle('depth', shape !== null);
   canvas.classList.toggle('plane', bodies.some((body) => body.peer.position.length > 1));
   const { context, width, height } = prepare(canvas);
   const known = bodies.filter((body) => body.peer.position.length > 0 && body.peer.position.every(Number.isFinite));
   if (known.length === 0 || width === 0) return;
   const flat = known.every((body) => body.peer.position.length === 1);
-  for (const body of known) {
-    body.at = body.at.map((at, axis) => at + (body.peer.position[axis] - at) * (1 - Math.exp(-passed / FOLLOW)));
-    if (!body.at.every(Number.isFinite)) body.at = [...body.peer.position];
-  }
+  for (const body of known) follow(body, passed);
   const now = performance.now();
   trails.push({ now, at: bodies.map((body) => body.at) });
-  while (trails.length > 0 && trails[0].now < now - TRAIL) trails.shift();
+  while (trails.length > 0 && trails[0].now < now - (still.matches ? 0 : TRAIL)) trails.shift();
+  if (shape) {
+    drawDepth(context, known, width, height, passed);
+    return;
+  }
   const area = { left: 16, right: width - 16, top: 14, bottom: height - 26 };
   look(known, flat, area);
   const x = (m) => (area.left + area.right) / 2 + (m - view.x) * view.scale;
@@ -77,22 +113,36 @@ function drawCopies(passed) {
   axes(context, area, x, flat, height);
   const size = Math.max(9, Math.min(30, (flat ? lane : height) * (flat ? 0.6 : 0.09)));
   bodies.forEach((body, i) => {
-    if (!known.includes(body)) return;
-    context.strokeStyle = colour(i);
-    context.lineWidth = 2;
-    for (let k = 1; k < trails.length; k += 1) {
-      const [from, to] = [trails[k - 1].at[i], trails[k].at[i]];
-      if (!from || !to || from.length !== body.at.length || to.length !== body.at.length) continue;
-      context.globalAlpha = 0.5 * (1 - (now - trails[k].now) / TRAIL);
-      context.beginPath();
-      context.moveTo(x(from[0]), y(from, i));
-      context.lineTo(x(to[0]), y(to, i));
-      context.stroke();
-    }
+    if (known.includes(body)) drawTrail(context, i, (at) => ({ x: x(at[0]), y: y(at, i) }));
   });
   bodies.forEach((body, i) => {
     if (known.includes(body)) cube(context, x(body.at[0]), y(body.at, i), size, colour(i), body.peer, flat && lane >= 13);
   });
+}
+
+/** Where a copy was, the longer ago the fainter; in few strokes, for there are many copies. */
+function drawTrail(context, i, where) {
+  const STROKES = 12;
+  const now = performance.now();
+  const alike = (at) => at && at.length === bodies[i].at.length && at.every(Number.isFinite);
+  context.strokeStyle = colour(i);
+  context.lineWidth = 2;
+  let stroke = -1;
+  for (let k = 1; k < trails.length; k += 1) {
+    const [from, to] = [trails[k - 1].at[i], trails[k].at[i]];
+    if (!alike(from) || !alike(to)) continue;
+    const next = Math.floor(STROKES * Math.max(0, 1 - (now - trails[k].now) / TRAIL));
+    const [begin, end] = [where(from), where(to)];
+    if (next !== stroke) {
+      if (stroke >= 0) context.stroke();
+      context.globalAlpha = (0.5 * (next + 0.5)) / STROKES;
+      context.beginPath();
+      stroke = next;
+    }
+    context.moveTo(begin.x, begin.y);
+    context.lineTo(end.x, end.y);
+  }
+  if (stroke >= 0) context.stroke();
 }
 
 /** Where the picture looks: wide enough for all trails, and steady. */

@@ -14,7 +14,7 @@ function take(state) {
   showRun(state);
   makeRows(state.links);
   showRows(state.links);
-  takePeers(state.peers);
+  takePeers(state.peers, state.body);
   showClocks(state.clocks);
   showMeasures(state.measures || []);
   showCauses($('drops'), state.links[chosen] ? state.links[chosen].dropped : {}, 'nothing');
@@ -54,6 +54,7 @@ function showTrouble() {
 
 readInk();
 makeSliders();
+makeEye();
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
   readInk();
   recolourRows();

@@ -59,7 +59,7 @@ let ink = {};
 function readInk() {
   const style = getComputedStyle(document.documentElement);
   const of = (name) => style.getPropertyValue(name).trim();
-  ink = { text: of('--ink'), accent: of('--accent'), soft: of('--soft'), line: of('--line'), faint: of('--faint'), ground: of('--card'), series: [] };
+  ink = { text: of('--ink'), accent: of('--accent'), bad: of('--bad'), soft: of('--soft'), line: of('--line'), faint: of('--faint'), ground: of('--card'), series: [] };
   for (let i = 0; i < 8; i += 1) ink.series.push(of('--c' + i));
 }
 const colour = (i) => ink.series[i % ink.series.length];

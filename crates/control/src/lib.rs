@@ -29,7 +29,7 @@
 //!     }
 //! }
 //!
-//! let description = Description { kind: Kind::Relay, title: "a test".to_owned(), links: vec![], peers: vec![], clocks: vec![], measures: vec![] };
+//! let description = Description { kind: Kind::Relay, title: "a test".to_owned(), links: vec![], peers: vec![], clocks: vec![], measures: vec![], body: None };
 //! let board = Arc::new(Board::new(description));
 //! let server = serve(ServerConfig::new(([127, 0, 0, 1], 0).into()), Arc::clone(&board), Box::new(NoLinks))?;
 //! assert!(board.publish(Arc::new(Snapshot::default())).is_ok());
@@ -49,6 +49,6 @@ mod views;
 
 pub use board::{Board, Latest, LinkEditor};
 pub use server::{ServeError, Server, ServerConfig, serve};
-pub use snapshot::{Description, Kind, LinkName, MeasureLabel, PeerName};
-pub use snapshot::{LinkCounters, PeerView, Presence, Quantiles, Snapshot};
+pub use snapshot::{Body, Description, Kind, LinkName, MeasureLabel, PeerName};
+pub use snapshot::{LinkCounters, PeerView, Presence, Quantiles, Snapshot, TurnView};
 pub use token::{Token, TokenError};

@@ -86,6 +86,19 @@ pub struct PeerView {
     pub position: Vec<f64>,
     /// The force that its user feels, for each axis \[N\]; empty if it is not known.
     pub force: Vec<f64>,
+    /// How it is turned; `None` if the object does not turn.
+    pub turn: Option<TurnView>,
+}
+
+/// How a participant is turned, and where its device is: what a picture in depth needs. Orientations are unit quaternions (w, x, y, z) from body to world axes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct TurnView {
+    /// The orientation of its copy.
+    pub orientation: [f64; 4],
+    /// Where its device is \[m\]; `None` if that is not known here.
+    pub device: Option<[f64; 3]>,
+    /// The orientation of its device; `None` for one that does not turn.
+    pub device_orientation: Option<[f64; 4]>,
 }
 
 /// Whether a participant takes part.
@@ -119,7 +132,7 @@ impl Presence {
 }
 
 /// The run, in names. The numbers of a [`Snapshot`](crate::Snapshot) stand in the same order.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct Description {
     /// Which command runs.
     pub kind: Kind,
@@ -133,6 +146,17 @@ pub struct Description {
     pub clocks: Vec<String>,
     /// The measures that are computed while it runs, or none.
     pub measures: Vec<MeasureLabel>,
+    /// The object, if it turns.
+    pub body: Option<Body>,
+}
+
+/// An object that turns, in its body axes.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Body {
+    /// The edges of the box as which it is drawn \[m\].
+    pub edges: [f64; 3],
+    /// Where each participant grasps it, from the centre of mass \[m\], in the order of [`Description::peers`].
+    pub grasps: Vec<[f64; 3]>,
 }
 
 /// The command that runs.

@@ -1,4 +1,4 @@
-//! The JSON shapes of the routes: spans in seconds, sizes in bytes, positions in metres, forces in newtons.
+//! The JSON shapes of the routes: spans in seconds, sizes in bytes, positions in metres, forces in newtons, orientations as quaternions (w, x, y, z).
 
 use core::time::Duration;
 
@@ -23,6 +23,9 @@ pub(crate) fn state(description: &Description, latest: &Latest) -> Value {
     });
     if !description.measures.is_empty() {
         state["measures"] = measures(description, snapshot).into();
+    }
+    if let Some(body) = &description.body {
+        state["body"] = json!({ "edges": body.edges });
     }
     state
 }
@@ -87,14 +90,23 @@ fn peers(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
     let none = PeerView::default();
     let peer = |(number, name): (usize, &crate::PeerName)| {
         let view = snapshot.peers.get(number).unwrap_or(&none);
-        json!({
+        let mut shown = json!({
             "name": name.name,
             "kind": name.kind,
             "status": view.status.name(),
             "age_s": view.age.map(|age| age.as_secs_f64()),
             "position": view.position,
             "force": view.force,
-        })
+        });
+        if let Some(body) = &description.body {
+            shown["grasp"] = json!(body.grasps.get(number));
+            shown["orientation"] = json!(view.turn.map(|turn| turn.orientation));
+            shown["device"] = json!({
+                "position": view.turn.and_then(|turn| turn.device),
+                "orientation": view.turn.and_then(|turn| turn.device_orientation),
+            });
+        }
+        shown
     };
     description.peers.iter().enumerate().map(peer).collect()
 }

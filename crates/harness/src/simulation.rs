@@ -3,6 +3,7 @@
 use cohaptic_peer::Strategy;
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_scene::{Axes, FromScene, Scene, Strategies};
+use cohaptic_units::Instant;
 
 use crate::arrays::{self, Shape};
 use crate::disturbance::Disturbance;
@@ -33,6 +34,7 @@ pub struct Simulation<'a, S = FromScene> {
     scene: &'a Scene,
     model: Model,
     disturbance: Option<Disturbance>,
+    threads: usize,
     strategies: S,
 }
 
@@ -40,11 +42,11 @@ impl<'a> Simulation<'a> {
     /// A scene that is ready to run with the strategy that it names.
     #[must_use]
     pub const fn new(scene: &'a Scene, model: Model) -> Self {
-        Self { scene, model, disturbance: None, strategies: FromScene }
+        Self { scene, model, disturbance: None, threads: 1, strategies: FromScene }
     }
 
     pub(crate) const fn disturbed(scene: &'a Scene, model: Model, disturbance: Disturbance) -> Self {
-        Self { scene, model, disturbance: Some(disturbance), strategies: FromScene }
+        Self { scene, model, disturbance: Some(disturbance), threads: 1, strategies: FromScene }
     }
 }
 
@@ -52,7 +54,16 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     /// A scene that is ready to run with strategies of the caller's own in place of the one that it names.
     #[must_use]
     pub const fn with_strategies(scene: &'a Scene, model: Model, strategies: S) -> Self {
-        Self { scene, model, disturbance: None, strategies }
+        Self { scene, model, disturbance: None, threads: 1, strategies }
+    }
+
+    /// Takes up to that number of threads for a run, where they pay: the same to the bit for any number.
+    #[must_use]
+    pub const fn on_threads(self, threads: usize) -> Self
+    where
+        S: Copy,
+    {
+        Self { threads, ..self }
     }
 
     /// Runs the scene from its beginning to its end, until it diverges, or until the observer ends it.
@@ -68,7 +79,19 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         assert!(too_large(self.scene).is_none(), "a scene with more peers than a simulation takes is not run");
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         if let Some((shape, law)) = self.arrays(&plan, Watch::of(observer)) {
-            return Ok(arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now)));
+            let threads = self.threads.min(shape.threads().0);
+            if threads > 1
+                && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
+            {
+                return Ok(summary);
+            }
+            let looks_ahead = shape.looks_ahead();
+            let summary = arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now));
+            // The counters of queues that have looked ahead are those of a later instant.
+            let has_looked_too_far = looks_ahead && matches!(summary.ending, Ending::Diverged(at) if at - Instant::ZERO < self.scene.duration);
+            if !has_looked_too_far {
+                return Ok(summary);
+            }
         }
         match plan.axes {
             Axes::One => run_to_end(self.world::<1, _>(&plan, NoRemote), observer),

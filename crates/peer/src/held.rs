@@ -1,19 +1,26 @@
 //! The newest sample from each of the other peers, and their mean.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use cohaptic_units::Instant;
 
 use crate::State;
+use crate::exact_means::ExactMeans;
 use crate::lead::{Lead, Moving};
 
 /// What a peer knows of the others: per sender, the sample with the highest sequence number that has arrived.
 ///
 /// Before anything has arrived from a sender it holds the sender's initial state. The mean is kept until a sample changes it.
+///
+/// Of fewer than [`EXACT_FROM`] samples it is a sum in a fixed order over their number; of more it is the exact mean, rounded once ([`ExactSum`](crate::ExactSum)), and takes a
+/// time that does not grow with their number.
 #[derive(Clone, Debug)]
 pub struct Held<const A: usize> {
     samples: Vec<HeldSample<A>>,
     mean: State<A>,
+    /// The sums of what is held, from [`EXACT_FROM`] samples on.
+    sums: Option<Box<ExactMeans<A>>>,
     /// How each sample moves on while it is held, if anybody asks for it.
     motions: Option<Motions<A>>,
 }
@@ -43,12 +50,19 @@ impl<const A: usize> Motions<A> {
     }
 }
 
+/// From that number of samples on their mean is exact but for one rounding.
+///
+/// A sum in a fixed order takes a time that grows with their number, and binds all who compute it to that order. Below this number it takes less time than
+/// exact sums do.
+pub const EXACT_FROM: usize = 256;
+
 impl<const A: usize> Held<A> {
     /// Holds the initial state of each other peer, in the order of the peers with the holder left out.
     #[must_use]
     pub fn new(initial: impl IntoIterator<Item = State<A>>) -> Self {
-        let samples = initial.into_iter().map(|state| HeldSample { state, next: 0 }).collect();
-        let mut held = Self { samples, mean: State::REST, motions: None };
+        let samples: Vec<_> = initial.into_iter().map(|state| HeldSample { state, next: 0 }).collect();
+        let sums = (samples.len() >= EXACT_FROM).then(|| Box::new(ExactMeans::new(samples.iter().map(|sample| &sample.state))));
+        let mut held = Self { samples, mean: State::REST, sums, motions: None };
         held.refresh();
         held
     }
@@ -116,11 +130,10 @@ impl<const A: usize> Held<A> {
     /// If there is no sender in that place.
     #[inline]
     pub fn accept(&mut self, place: usize, sequence: u64, sent: Instant, state: State<A>) -> bool {
-        let held = &mut self.samples[place];
-        let newer = sequence >= held.next;
+        let newer = sequence >= self.samples[place].next;
         if newer {
             // A sequence number of 2^64 − 1 is the last there can be: nothing is newer.
-            *held = HeldSample { state, next: sequence.saturating_add(1) };
+            self.replace(place, HeldSample { state, next: sequence.saturating_add(1) });
             if let Some(motions) = &mut self.motions {
                 motions.set(place, Moving { sent, velocity: state.velocity });
             }
@@ -134,7 +147,7 @@ impl<const A: usize> Held<A> {
     ///
     /// If there is no sender in that place.
     pub fn hold(&mut self, place: usize, sent: Instant, state: State<A>) {
-        self.samples[place] = HeldSample { state, next: 0 };
+        self.replace(place, HeldSample { state, next: 0 });
         if let Some(motions) = &mut self.motions {
             motions.set(place, Moving { sent, velocity: state.velocity });
         }
@@ -142,10 +155,18 @@ impl<const A: usize> Held<A> {
 
     /// Replaces the state held from a sender, whose newest sample stays as new as it was, and the velocity with which it moves on.
     pub(crate) fn replace_state(&mut self, place: usize, state: State<A>, velocity: [f64; A]) {
-        self.samples[place].state = state;
+        self.replace(place, HeldSample { state, ..self.samples[place] });
         if let Some(motions) = &mut self.motions {
             motions.set(place, Moving { velocity, ..motions.samples[place] });
         }
+    }
+
+    #[inline]
+    fn replace(&mut self, place: usize, sample: HeldSample<A>) {
+        if let Some(sums) = &mut self.sums {
+            sums.replace(&self.samples[place].state, &sample.state);
+        }
+        self.samples[place] = sample;
     }
 
     /// [`Held::refresh`] for a mean of the differences from the holder's own state, so that senders that are held exactly there leave exactly that.
@@ -165,10 +186,14 @@ impl<const A: usize> Held<A> {
 
     /// Computes the mean anew.
     ///
-    /// Four partial sums, added in pairs: the same order whatever the machine, a quarter of the latency of one sum, and an error of at most
+    /// Below [`EXACT_FROM`] samples four partial sums, added in pairs: the same order whatever the machine, a quarter of the latency of one sum, and an error of at most
     /// (n/4 + 2)·2⁻⁵³·Σ|x|, a quarter of that of one sum.
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub fn refresh(&mut self) {
+        if let Some(sums) = &self.sums {
+            self.mean = sums.mean(self.samples.len());
+            return;
+        }
         if self.samples.is_empty() {
             return;
         }
@@ -246,6 +271,25 @@ mod tests {
         assert_eq!(lead(&mut held, 40), [-0.048]);
         held.replace_state(1, at(3.0), [0.0]);
         assert_eq!(lead(&mut held, 40), [-0.015]);
+    }
+
+    /// Whatever came before, and in whatever order: the mean of equal states is that state, of others the nearest to theirs.
+    #[test]
+    fn the_mean_of_many_is_exact() {
+        let count = EXACT_FROM;
+        let value = |place: usize| 0.1 + (place as f64).sin() * 1e-3;
+        let mut held = Held::new((0..count).map(|place| at(value(place))));
+        let mut reversed = Held::new((0..count).rev().map(|place| at(value(place))));
+        assert_eq!(held.mean(), reversed.mean());
+        for place in 0..count {
+            held.accept(place, 0, Instant::ZERO, at(1e9 / (place as f64 + 1.0)));
+            held.accept(place, 1, Instant::ZERO, at(0.1));
+            reversed.hold(count - 1 - place, Instant::ZERO, at(0.3));
+            reversed.replace_state(count - 1 - place, at(0.1), [0.0]);
+        }
+        held.refresh();
+        reversed.refresh();
+        assert_eq!((*held.mean(), *reversed.mean()), (at(0.1), at(0.1)));
     }
 
     #[test]

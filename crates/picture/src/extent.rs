@@ -35,6 +35,17 @@ impl Extent {
         }
     }
 
+    /// The span of a linear axis; `None` of a logarithmic one.
+    pub(crate) fn span(self) -> Option<f64> {
+        (self.scale == Scale::Linear).then_some(self.high - self.low)
+    }
+
+    /// A linear axis with another span about the same middle.
+    pub(crate) fn spanning(self, span: f64) -> Self {
+        let middle = 0.5 * (self.low + self.high);
+        if self.scale == Scale::Linear { Self { low: middle - 0.5 * span, high: middle + 0.5 * span, ..self } } else { self }
+    }
+
     /// Where a value lies: 0 at the low end, 1 at the high one. Not finite if it has no place.
     pub(crate) fn place(self, value: f64) -> f64 {
         match self.scale {

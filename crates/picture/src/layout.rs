@@ -62,6 +62,13 @@ pub(crate) struct AxisLayout {
 }
 
 impl AxisLayout {
+    /// Leaves ticks out that are not on the axis.
+    fn leave_out_beyond(&mut self, extent: Extent) {
+        if let Some(ticks) = &mut self.ticks {
+            ticks.marks.retain(|(value, _)| (0.0..=1.0).contains(&extent.place(*value)));
+        }
+    }
+
     /// How wide the labels of the ticks are.
     pub(crate) fn widest(&self, font: f64) -> f64 {
         let labels = self.ticks.iter().flat_map(|ticks| &ticks.marks).filter(|_| self.labelled);
@@ -86,7 +93,8 @@ impl Layout {
         if let Some(whole) = picture.size.height {
             height = (whole / count(picture.rows())).max(least);
         }
-        let mut attempt = Attempt::new(picture, height);
+        let extents = picture.extents();
+        let mut attempt = Attempt::new(picture, height, &extents);
         if let Some(whole) = picture.size.height {
             for _ in 0..12 {
                 let over = attempt.layout.height - whole;
@@ -94,12 +102,38 @@ impl Layout {
                     break;
                 }
                 height = (height - over / count(picture.rows())).max(least);
-                attempt = Attempt::new(picture, height);
+                attempt = Attempt::new(picture, height, &extents);
             }
             attempt.layout.height = attempt.layout.height.max(whole);
         }
+        if picture.equal_units {
+            let whole = attempt.layout.height;
+            // Other ticks have labels of other widths, which leave another width to the plots; this settles at once.
+            for _ in 0..3 {
+                attempt = Attempt::new(picture, height, &equal_units(&attempt.layout.panels, &extents));
+            }
+            attempt.layout.height = attempt.layout.height.max(whole);
+            let settled = equal_units(&attempt.layout.panels, &extents);
+            for (panel, extents) in attempt.layout.panels.iter_mut().zip(settled) {
+                panel.extents = extents;
+                panel.x.leave_out_beyond(extents.x);
+                panel.y.leave_out_beyond(extents.y);
+            }
+        }
         attempt.layout
     }
+}
+
+/// The axes of all panels, widened so that a unit has one length everywhere: the largest at which all that is shown fits.
+fn equal_units(panels: &[PanelLayout], shown: &[Extents]) -> Vec<Extents> {
+    let sides = |panel: &PanelLayout, shown: &Extents| [(panel.frame.width(), shown.x), (panel.frame.height(), shown.y)];
+    let scales = panels.iter().zip(shown).flat_map(|(panel, shown)| sides(panel, shown)).filter_map(|(length, extent)| Some(length / extent.span()?));
+    let scale = scales.fold(f64::INFINITY, f64::min);
+    let widened = |(panel, shown): (&PanelLayout, &Extents)| {
+        let [x, y] = sides(panel, shown).map(|(length, extent)| extent.spanning(length / scale));
+        Extents { x, y }
+    };
+    panels.iter().zip(shown).map(widened).collect()
 }
 
 struct Attempt {
@@ -107,7 +141,7 @@ struct Attempt {
 }
 
 impl Attempt {
-    fn new(picture: &Picture, plot_height: f64) -> Self {
+    fn new(picture: &Picture, plot_height: f64, extents: &[Extents]) -> Self {
         let (font, width, columns, rows) = (picture.size.font, picture.size.width, picture.columns_shown(), picture.rows());
         let margin = MARGIN * font;
         let title = picture.title.wrapped(TITLE * font, width - 2.0 * margin, 8);
@@ -116,7 +150,6 @@ impl Attempt {
             + LEADING * font * (TITLE * count(title.len()) + count(notes.len()))
             + if title.is_empty() && notes.is_empty() { 0.0 } else { 0.3 * font };
 
-        let extents = picture.extents();
         let at_ends: Vec<bool> = picture.panels.iter().map(|panel| panel.labels_at_ends && EndLabel::fit(panel, font, plot_height)).collect();
         let entries = entries(&picture.panels, &at_ends);
         let narrow = picture.legend == LegendPlace::Right;
@@ -265,5 +298,33 @@ impl Panel {
     /// The heat map with the colour bar: the first.
     pub(crate) fn heat_map(&self) -> Option<&HeatMap> {
         self.contents.iter().find_map(|content| if let Content::HeatMap(map) = content { Some(map) } else { None })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Axis, Line, Look, Size};
+
+    #[test]
+    fn equal_units_are_equal_in_all_panels_of_any_size() {
+        let panel =
+            |x: f64, y: f64| Panel::new(Axis::new("x").unit("cm"), Axis::new("y").unit("cm")).with(Line::new([(-x, 0.0), (x, y)], Look::of(0)));
+        let sizes = [Size::PAGE, Size::ONE_COLUMN, Size::pixels(900.0, 300.0).unwrap(), Size::pixels(400.0, 2000.0).unwrap()];
+        for size in sizes {
+            let picture =
+                Picture::new("three").size(size).columns(3).equal_units().panels([panel(20.0, 30.0), panel(20.0, 0.01), panel(1234.5, 1e-3)]);
+            let layout = Layout::of(&picture);
+            let unit = |length: f64, extent: Extent| length / (extent.high - extent.low);
+            let units =
+                layout.panels.iter().flat_map(|panel| [unit(panel.frame.width(), panel.extents.x), unit(panel.frame.height(), panel.extents.y)]);
+            let units: Vec<f64> = units.collect();
+            assert!(units.iter().all(|one| (one / units[0] - 1.0).abs() < 1e-9), "{units:?}");
+            for (panel, shown) in layout.panels.iter().zip(picture.extents()) {
+                let holds = |wide: Extent, shown: Extent| wide.low <= shown.low + 1e-9 && wide.high >= shown.high - 1e-9;
+                assert!(holds(panel.extents.x, shown.x) && holds(panel.extents.y, shown.y), "all that is shown is within");
+                assert!(panel.x.ticks.as_ref().is_some_and(|ticks| !ticks.marks.is_empty()));
+            }
+        }
     }
 }

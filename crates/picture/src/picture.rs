@@ -22,6 +22,7 @@ pub struct Picture {
     pub(crate) shared_y: bool,
     pub(crate) legend: LegendPlace,
     pub(crate) aspect: f64,
+    pub(crate) equal_units: bool,
 }
 
 impl Picture {
@@ -39,6 +40,7 @@ impl Picture {
             shared_y: false,
             legend: LegendPlace::default(),
             aspect: 0.6,
+            equal_units: false,
         }
     }
 
@@ -109,6 +111,12 @@ impl Picture {
     #[must_use]
     pub fn aspect(self, aspect: f64) -> Self {
         Self { aspect: if aspect.is_finite() { aspect.clamp(0.1, 3.0) } else { self.aspect }, ..self }
+    }
+
+    /// With one scale for all linear axes: a unit is as long along x as along y, and in each panel. Axes are widened at both ends for it.
+    #[must_use]
+    pub fn equal_units(self) -> Self {
+        Self { equal_units: true, ..self }
     }
 
     /// Columns that have room for a plot with its labels.

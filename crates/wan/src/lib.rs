@@ -77,6 +77,7 @@ pub use line::pipeline::TimeWentBack;
 pub use link::Link;
 pub use network::direct_links::{Arrivals, DirectLinks};
 pub use network::id::{LinkId, NodeId, Path};
+pub use network::stepped_links::SteppedLinks;
 pub use network::{AccessLine, Network, NetworkConfig, NetworkError};
 pub use packet::PacketInfo;
 pub use packet::damage::Damage;

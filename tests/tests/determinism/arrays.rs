@@ -22,17 +22,25 @@ pub(super) fn difference(one: &Summary, other: &Summary) -> Option<String> {
 
 /// Three peers for three seconds, over links with these keys.
 fn three(link: &str) -> Scene {
-    let text = format!(
+    mesh(3, link)
+}
+
+/// That number of peers.
+fn mesh(peers: usize, link: &str) -> Scene {
+    Scene::parse(&mesh_text(peers, link), "mesh.toml".as_ref(), &[]).unwrap()
+}
+
+fn mesh_text(peers: usize, link: &str) -> String {
+    format!(
         r#"
-        scene = {{ duration = "3s", count = 3 }}
+        scene = {{ duration = "3s", count = {peers} }}
         object = {{ mass = 0.45 }}
         coordination = {{ strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }}
         peer = {{ device = {{ mass = 0.1, damping = 5.0 }}, coupling = {{ stiffness = 3500.0, damping = 5.0 }} }}
         peers = [{{ name = "peer1", hand = {{ force = 1.5 }} }}]
         link = {{ {link} }}
         "#
-    );
-    Scene::parse(&text, "three.toml".as_ref(), &[]).unwrap()
+    )
 }
 
 /// Eight of them with different seeds, the fourth of which diverges.
@@ -123,6 +131,57 @@ fn shipped_scenes_side_by_side_come_to_what_each_comes_to_alone() {
     assert_eq!(together.len(), scenes.len());
     for (scene, together) in scenes.iter().zip(&together) {
         assert_eq!(difference(together, &run(scene, Model::Least)), None, "{}", scene.title);
+    }
+}
+
+/// One run on several threads: links of all kinds, phases of all peers, laws that look back, extrapolate or remember, runs that diverge and that are
+/// interrupted.
+#[test]
+fn threads_come_to_what_one_comes_to() {
+    let links = [
+        "delay = \"24ms\", jitter = \"3ms\", loss = \"5%\"",
+        "delay = \"0s\", loss = \"5%\"",
+        "delay = \"9ms\", jitter = \"2ms\", rate = \"100kbit\", queue = { limit = \"3 packets\", discipline = \"codel\" }",
+        "delay = \"9ms\", jitter = { sd = \"2ms\", correlation = 0.5 }, loss = { gilbert-elliott = { p = 0.05, r = 0.3 } }, rate = \"200kbit\"",
+    ];
+    let laws: [&[&str]; 4] = [
+        &["coordination.strategy=average-position"],
+        &["coordination.strategy=proportional-derivative"],
+        &["coordination.strategy=extrapolated", "coordination.extrapolated.horizon=30ms"],
+        &["coordination.strategy=smoothed-average-position", "coordination.smoothed-average-position.lag=5ms"],
+    ];
+    for (place, (link, law)) in links.iter().zip(laws).enumerate() {
+        let law: Vec<String> = law.iter().map(|setting| (*setting).to_owned()).collect();
+        let mut scene = Scene::parse(&mesh_text(26, link), "mesh.toml".as_ref(), &law).unwrap();
+        scene.duration = Duration::from_millis(1100);
+        if place % 2 == 1 {
+            scene.peers.iter_mut().zip(0..).for_each(|(peer, place)| (peer.phase, peer.compute_delay) = (place % 8, place % 3 == 0));
+        }
+        let mut diverges = scene.clone();
+        diverges.coordination.gains = diverges.coordination.gains.scaled(3e4);
+        scene.coordination.gains = scene.coordination.gains.scaled(0.05);
+        for scene in [&scene, &diverges] {
+            let general = run(scene, Model::General);
+            for threads in [2, 3, 64] {
+                let Ok(summary) = Simulation::new(scene, Model::Least).on_threads(threads).run(&mut NoObserver);
+                assert_eq!(difference(&summary, &general), None, "{link}, {threads} threads");
+            }
+        }
+        let Ok(interrupted) = Simulation::new(&scene, Model::Least).on_threads(2).run(&mut Impatient(1));
+        assert!(matches!(interrupted.ending, Ending::Interrupted(_)));
+        assert_eq!(difference(&interrupted, &run_interrupted(&scene, Model::General, 1)), None, "{link}");
+    }
+}
+
+/// Of 257 peers on the means are exact, whether samples travel together or each by itself.
+#[test]
+fn many_peers_come_to_the_same() {
+    for link in ["delay = \"3ms\"", "delay = \"3ms\", jitter = \"400us\", loss = \"5%\""] {
+        let mut scene = mesh(260, link);
+        scene.peers.iter_mut().zip(0..).for_each(|(peer, place)| peer.phase = place % 8);
+        scene.duration = Duration::from_millis(24);
+        let [least, general] = [Model::Least, Model::General].map(|model| run(&scene, model));
+        assert_eq!(difference(&least, &general), None, "{link}");
     }
 }
 

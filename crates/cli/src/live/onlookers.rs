@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Receiver;
 
-use cohaptic_control::{Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Presence as Shown, Snapshot};
+use cohaptic_control::{
+    Body, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Presence as Shown, Snapshot, TurnView,
+};
 use cohaptic_harness::live::Presence;
 use cohaptic_live::session::{LinkStatus, PeerStatus};
 use cohaptic_live::{Conductor, LinkChange, Refusal, Status};
@@ -75,6 +77,11 @@ pub(super) fn description(scene: &Scene, pairs: &[(usize, usize)]) -> Descriptio
         peers: scene.peers.iter().map(|peer| PeerName { name: peer.name.clone(), kind: peer.kind.name().to_owned() }).collect(),
         clocks: vec!["tick".to_owned(), "release".to_owned()],
         measures: scene.measure.iter().flat_map(|measure| &measure.names).map(label).collect(),
+        body: scene
+            .rotation
+            .as_ref()
+            .zip(scene.even_box())
+            .map(|(rotation, edges)| Body { edges, grasps: rotation.peers.iter().map(|peer| peer.grasp).collect() }),
     }
 }
 
@@ -116,7 +123,12 @@ fn view(peer: &PeerStatus, axes: usize, now: Instant) -> PeerView {
         Presence::Stale(_) => Shown::Stale,
     };
     let age = state.heard.map(|heard| now.saturating_duration_since(heard));
-    PeerView { status, age, position: state.object.position[..axes].to_vec(), force: peer.force[..axes].to_vec() }
+    let turn = state.turn.map(|turn| TurnView {
+        orientation: turn.object.orientation,
+        device: state.device.map(|device| device.position),
+        device_orientation: turn.device.map(|device| device.orientation),
+    });
+    PeerView { status, age, position: state.object.position[..axes].to_vec(), force: peer.force[..axes].to_vec(), turn }
 }
 
 /// Keys that links have from an instant on: the links by their numbers.

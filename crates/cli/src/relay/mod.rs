@@ -104,6 +104,7 @@ fn description(setup: &Setup) -> Description {
         peers: Vec::new(),
         clocks: vec!["release".to_owned()],
         measures: Vec::new(),
+        body: None,
     }
 }
 

@@ -155,7 +155,15 @@ fn description(file: &RouterFile) -> Description {
         })
     });
     let clocks = vec!["release".to_owned()];
-    Description { kind: Kind::Router, title: output::path(&file.file), links: lanes.collect(), peers: Vec::new(), clocks, measures: Vec::new() }
+    Description {
+        kind: Kind::Router,
+        title: output::path(&file.file),
+        links: lanes.collect(),
+        peers: Vec::new(),
+        clocks,
+        measures: Vec::new(),
+        body: None,
+    }
 }
 
 fn snapshot(report: &Report, validity: Validity) -> Snapshot {

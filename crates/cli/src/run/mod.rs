@@ -142,7 +142,10 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
 
 fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>, observer: &mut O) -> Result<Summary, O::Error> {
     match what {
-        What::Simulated => Simulation::new(scene, if arguments.general { Model::General } else { Model::Least }).run(observer),
+        What::Simulated => {
+            let threads = arguments.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
+            Simulation::new(scene, if arguments.general { Model::General } else { Model::Least }).on_threads(threads).run(observer)
+        }
         What::Replayed(inputs) => replay(scene, inputs, observer),
     }
 }

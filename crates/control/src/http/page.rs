@@ -17,6 +17,7 @@ const SCRIPT: &str = concat!(
     include_str!("../../page/links.js"),
     include_str!("../../page/editor.js"),
     include_str!("../../page/copies.js"),
+    include_str!("../../page/depth.js"),
     include_str!("../../page/facts.js"),
     include_str!("../../page/main.js"),
 );

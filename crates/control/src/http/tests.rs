@@ -11,7 +11,7 @@ use tokio::runtime::{Builder, Runtime};
 use tower::ServiceExt as _;
 
 use super::{App, router};
-use crate::{Board, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, Snapshot};
+use crate::{Board, Body as ObjectBody, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Snapshot, TurnView};
 
 const TOKEN: &str = "a-token-of-more-than-22-characters";
 
@@ -58,6 +58,7 @@ impl Site {
                 MeasureLabel { name: "energy_j".to_owned(), unit: "J", about: "Energy" },
                 MeasureLabel { name: "travel_s".to_owned(), unit: "s", about: "Travel" },
             ],
+            body: None,
         };
         let board = Arc::new(Board::new(description));
         let counters = LinkCounters { offered: 7, dropped: vec![("loss", 2)], ..LinkCounters::default() };
@@ -114,9 +115,34 @@ fn the_state_has_measures_where_the_run_has_some() {
     let measure = |name: &str, value: Value, unit: &str, about: &str| json!({ "name": name, "value": value, "unit": unit, "about": about });
     let expected = [measure("energy_j", 0.25.into(), "J", "Energy"), measure("travel_s", Value::Null, "s", "Travel")];
     assert_eq!(site.ask("GET", "/api/state", "").json()["measures"], json!(expected));
-    let description = Description { kind: Kind::Router, title: String::new(), links: vec![], peers: vec![], clocks: vec![], measures: vec![] };
+    let description =
+        Description { kind: Kind::Router, title: String::new(), links: vec![], peers: vec![], clocks: vec![], measures: vec![], body: None };
     let state = crate::views::state(&description, &Board::new(description.clone()).latest());
     assert!(!state.as_object().unwrap().contains_key("measures"));
+}
+
+/// Turned a quarter about z, with a device that turns; the second one is not known yet.
+#[test]
+fn attitudes_are_in_the_state_of_an_object_that_turns_alone() {
+    let names = |name: &str| PeerName { name: name.to_owned(), kind: "simulated".to_owned() };
+    let peers = vec![names("left"), names("right")];
+    let still = Description { kind: Kind::Live, title: String::new(), links: vec![], peers, clocks: vec![], measures: vec![], body: None };
+    let body = ObjectBody { edges: [0.4, 0.3, 0.0], grasps: vec![[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0]] };
+    let half = core::f64::consts::FRAC_1_SQRT_2;
+    let turn = TurnView { orientation: [half, 0.0, 0.0, half], device: Some([0.0, 0.2, 0.1]), device_orientation: Some([1.0, 0.0, 0.0, 0.0]) };
+    let shown = |description: &Description, turn: Option<TurnView>| {
+        let board = Board::new(description.clone());
+        board.publish(Arc::new(Snapshot { peers: vec![PeerView { turn, ..PeerView::default() }], ..Snapshot::default() })).unwrap();
+        crate::views::state(description, &board.latest())
+    };
+    let state = shown(&Description { body: Some(body), ..still.clone() }, Some(turn));
+    assert_eq!(state["body"], json!({ "edges": [0.4, 0.3, 0.0] }));
+    assert_eq!(state["peers"][0]["grasp"], json!([0.2, 0.0, 0.0]));
+    assert_eq!(state["peers"][0]["orientation"], json!([half, 0.0, 0.0, half]));
+    assert_eq!(state["peers"][0]["device"], json!({ "position": [0.0, 0.2, 0.1], "orientation": [1.0, 0.0, 0.0, 0.0] }));
+    assert_eq!(state["peers"][1]["orientation"], Value::Null);
+    let state = shown(&still, None).to_string();
+    assert!(["body", "grasp", "orientation", "device"].iter().all(|key| !state.contains(key)), "{state}");
 }
 
 #[test]

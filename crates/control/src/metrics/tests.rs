@@ -115,6 +115,7 @@ fn example(strange: &str) -> (Description, Latest) {
         peers: vec![PeerName { name: strange.to_owned(), kind: "simulated".to_owned() }],
         clocks: vec![format!("tick{strange}")],
         measures: Vec::new(),
+        body: None,
     };
     let spans = Quantiles {
         count: 1000,
@@ -136,8 +137,13 @@ fn example(strange: &str) -> (Description, Latest) {
         mean_delay: Some(Duration::from_millis(24)),
         recent_delay: spans,
     };
-    let peer =
-        PeerView { status: Presence::Stale, age: Some(Duration::from_millis(1500)), position: vec![0.25, f64::NAN], force: vec![f64::NEG_INFINITY] };
+    let peer = PeerView {
+        status: Presence::Stale,
+        age: Some(Duration::from_millis(1500)),
+        position: vec![0.25, f64::NAN],
+        force: vec![f64::NEG_INFINITY],
+        turn: None,
+    };
     let snapshot = Snapshot {
         elapsed: Duration::from_millis(12_500),
         invalid: Some("a tick came 3 ms too late".to_owned()),

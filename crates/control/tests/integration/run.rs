@@ -7,8 +7,8 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use cohaptic_control::{
-    Board, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Presence, Quantiles, Server, ServerConfig,
-    Snapshot, serve,
+    Board, Body, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Presence, Quantiles, Server, ServerConfig,
+    Snapshot, TurnView, serve,
 };
 
 pub(crate) const TOKEN: &str = "a-token-of-more-than-22-characters";
@@ -57,11 +57,23 @@ pub(crate) struct Run {
 impl Run {
     /// Nothing is published by itself.
     pub(crate) fn still(links: usize, peers: usize) -> Self {
-        Self::at(links, peers, 0)
+        Self::of(description(links, peers), 0)
     }
 
-    fn at(links: usize, peers: usize, port: u16) -> Self {
-        let board = Arc::new(Board::new(description(links, peers)));
+    /// One peer with a plate of 0.4 m × 0.3 m at the origin, which is turned so and stays so.
+    pub(crate) fn turned(orientation: [f64; 4]) -> Self {
+        let body = Some(Body { edges: [0.4, 0.3, 0.0], grasps: vec![[0.2, 0.15, 0.0]] });
+        let run = Self::of(Description { body, ..description(1, 1) }, 0);
+        let turn = Some(TurnView { orientation, device: None, device_orientation: None });
+        let mut snapshot = snapshot(Duration::from_secs(3), 1, 1, 3);
+        snapshot.peers[0] = PeerView { position: vec![0.0; 3], turn, ..snapshot.peers[0].clone() };
+        run.board.publish(Arc::new(snapshot)).unwrap();
+        run
+    }
+
+    fn of(description: Description, port: u16) -> Self {
+        let links = description.links.len();
+        let board = Arc::new(Board::new(description));
         let told = Told::default();
         let keys =
             (0..links).map(|link| vec![("delay".to_owned(), format!("\"{}ms\"", 24 + link)), ("loss".to_owned(), "\"1%\"".to_owned())]).collect();
@@ -73,7 +85,7 @@ impl Run {
 
     /// Publishes 20 times a second. `port` 0: any.
     pub(crate) fn moving(links: usize, peers: usize, axes: usize, port: u16) -> Self {
-        let mut run = Self::at(links, peers, port);
+        let mut run = Self::of(description(links, peers), port);
         let (board, ended) = (Arc::clone(&run.board), Arc::clone(&run.ended));
         run.publisher = Some(std::thread::spawn(move || {
             let begin = Instant::now();
@@ -125,6 +137,7 @@ fn description(links: usize, peers: usize) -> Description {
         peers: (0..peers).map(|number| PeerName { name: name(number), kind: "simulated Falcon".to_owned() }).collect(),
         clocks: vec!["tick".to_owned(), "release".to_owned()],
         measures: ["energy_j", "travel_s"].map(measure).to_vec(),
+        body: None,
     }
 }
 
@@ -168,6 +181,7 @@ fn snapshot(elapsed: Duration, links: usize, peers: usize, axes: usize) -> Snaps
             },
             age: (number > 0).then(|| Duration::from_secs_f64(if stale { 2.3 } else { 0.012 })),
             position: (0..axes).map(place).collect(),
+            turn: None,
             force: (0..axes).map(|axis| 2.0 * (t + axis as f64).cos()).collect(),
         }
     };

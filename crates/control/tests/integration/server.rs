@@ -26,8 +26,15 @@ impl LinkEditor for NoLinks {
 }
 
 fn empty_board() -> Arc<Board> {
-    let description =
-        Description { kind: Kind::Router, title: String::new(), links: Vec::new(), peers: Vec::new(), clocks: Vec::new(), measures: Vec::new() };
+    let description = Description {
+        kind: Kind::Router,
+        title: String::new(),
+        links: Vec::new(),
+        peers: Vec::new(),
+        clocks: Vec::new(),
+        measures: Vec::new(),
+        body: None,
+    };
     Arc::new(Board::new(description))
 }
 

@@ -183,7 +183,7 @@ impl<const A: usize> Blocks<A> {
         let step = |plant: Plant, run: usize| plant.step(tick, scenes[run].integrator);
         let hands: Vec<(usize, usize, HandForce<A>)> = (0..places.peers)
             .flat_map(|peer| (0..places.runs).map(move |run| (peer, run)))
-            .map(|(peer, run)| (peer, run, HandForce::of(scenes[run].peers[peer].hand.as_ref())))
+            .map(|(peer, run)| (peer, run, HandForce::of(scenes[run].peers[places.first + peer].hand.as_ref())))
             .collect();
         let mut blocks = Vec::with_capacity(A * places.blocks());
         let mut late = Vec::with_capacity(A * places.blocks());
@@ -191,8 +191,9 @@ impl<const A: usize> Blocks<A> {
             blocks.extend((0..places.blocks()).map(|_| Block::empty(axis)));
             late.extend((0..places.blocks()).map(|_| Late { computed: Forces::NONE, is_late: Mask::NONE }));
             for (spot, peer, run) in places.all(axis) {
-                let (spec, config) = (&scenes[run].peers[peer], scenes[run].peer_config(peer));
-                let (initial, device): (State<A>, State<A>) = (scenes[run].initial_state(peer), scenes[run].initial_device(peer));
+                let member = places.first + peer;
+                let (spec, config) = (&scenes[run].peers[member], scenes[run].peer_config(member));
+                let (initial, device): (State<A>, State<A>) = (scenes[run].initial_state(member), scenes[run].initial_device(member));
                 let block: &mut Block = &mut blocks[spot.block];
                 block.device.position.0[spot.lane] = device.position[axis];
                 set_lane(&mut block.object, spot.lane, initial.along(axis));
@@ -214,7 +215,7 @@ impl<const A: usize> Blocks<A> {
         }
         let any_late = scenes.iter().any(|scene| scene.peers.iter().any(|peer| peer.compute_delay));
         let walls: Vec<Option<Enclosure>> = scenes.iter().map(|scene| scene.object.enclosure).collect();
-        let touches = |peer: usize, run: usize| scenes[run].peers[peer].contact != Contact::None;
+        let touches = |peer: usize, run: usize| scenes[run].peers[places.first + peer].contact != Contact::None;
         let varies = |(peer, run, hand): &(usize, usize, HandForce<A>)| hand.constant().is_none() && touches(*peer, *run);
         Self {
             leads: if Law::<f64>::horizon(law).is_some() { vec![Lanes::ZERO; blocks.len()] } else { Vec::new() },
@@ -237,6 +238,12 @@ impl<const A: usize> Blocks<A> {
         let Spot { block, lane } = self.places.spot(axis, peer, run);
         let Motion { position, velocity } = lane_of(&self.blocks[block].object, lane);
         (position, velocity)
+    }
+
+    /// Along each axis the least and the greatest position of the copies of a run.
+    pub(super) fn extremes(&self, run: usize) -> [(f64, f64); A] {
+        let places = |axis: usize| (0..self.places.peers).map(move |peer| self.object(axis, peer, run).0);
+        std::array::from_fn(|axis| places(axis).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (smaller(x, low), larger(x, high))))
     }
 
     /// Copies and devices in that place.

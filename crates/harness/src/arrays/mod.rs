@@ -14,8 +14,11 @@ mod place;
 mod samples;
 mod shape;
 mod side_by_side;
+mod threads;
 mod turn;
 mod turning;
+
+use std::ops::Range;
 
 use cohaptic_peer::Lead;
 use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor};
@@ -30,7 +33,7 @@ use blocks::{Blocks, LawOfLanes, Moved, law_of_lanes};
 use bodies::Bodies;
 use lanes::Lanes;
 use place::Places;
-use samples::{Broadcast, PerPacket};
+use samples::{Broadcast, PerPacket, Sample};
 pub(crate) use shape::Shape;
 pub use side_by_side::{run_side_by_side, same_shape};
 use turning::{PAIRS, TurningBlocks};
@@ -53,23 +56,57 @@ fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; 
     }
 }
 
-/// L runs of scenes of one shape with A axes, with bodies of that kind.
+/// A run of a scene on that number of threads, to its end; `None` if it diverged: another without threads says when.
+pub(crate) fn run_on_threads(
+    scene: &Scene,
+    shape: &Shape,
+    law: BuiltIn,
+    threads: usize,
+    keep_going: &mut dyn FnMut(Instant) -> bool,
+) -> Option<Summary> {
+    match scene.axes {
+        Axes::One => threads::run::<Blocks<1>, 1, 1>(scene, shape, law, threads, keep_going),
+        Axes::Two => threads::run::<Blocks<2>, 2, 2>(scene, shape, law, threads, keep_going),
+        Axes::Three => threads::run::<Blocks<3>, 3, 3>(scene, shape, law, threads, keep_going),
+    }
+}
+
+/// Some or all peers of L runs of scenes of one shape with A axes, with bodies of that kind.
 #[derive(Debug)]
 struct Arrays<'a, B, const A: usize, const P: usize, const L: usize> {
     scenes: [&'a Scene; L],
     shape: Shape,
     law: BuiltIn<Lanes>,
+    /// The peers that are here; they are counted from 0 in what follows, unless it is said otherwise.
+    members: Range<usize>,
     bodies: B,
     samples: Samples<P, L>,
     /// Up to which age samples are extrapolated in each run \[s\], and how far they have come by peer and run, if the law does that.
     leads: Option<([f64; L], Vec<[Lead<A>; L]>)>,
-    /// The tick at which each peer sends next.
+    /// The tick at which each peer of the scene sends next.
     next_send: Vec<u64>,
     earliest_send: u64,
+    /// The peers of the scene that send now, and what each sent last, where each link is one by itself.
+    senders: Vec<usize>,
+    sent: Vec<Sample<P, L>>,
     max_discrepancy: [f64; L],
     finite: [bool; L],
     summaries: [Option<Summary>; L],
     processor: pulp::Arch,
+}
+
+/// Where the samples of peers come from that are not here.
+trait Others<const P: usize, const L: usize> {
+    /// At that tick these peers send; puts what those of them send that are elsewhere into their places. In the places of those that are here it is already.
+    fn exchange(&mut self, senders: &[usize], sent: &mut [Sample<P, L>]);
+}
+
+/// All peers are here.
+struct Nowhere;
+
+impl<const P: usize, const L: usize> Others<P, L> for Nowhere {
+    #[inline(always)]
+    fn exchange(&mut self, _senders: &[usize], _sent: &mut [Sample<P, L>]) {}
 }
 
 /// How samples travel.
@@ -82,23 +119,31 @@ enum Samples<const P: usize, const L: usize> {
 impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'a, B, A, P, L> {
     /// The scenes at their beginning, all of that shape.
     fn new(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L]) -> Self {
-        let places = Places { peers: shape.peers, runs: L };
-        let tick_nanos = nanos(shape.tick);
-        let bodies = B::new(places, &scenes, &laws[0]);
+        let members = 0..shape.peers;
+        let bodies = bodies_of::<B, A, P, L>(&scenes, &members, &laws);
+        let initial: Vec<Sample<P, L>> = members.clone().map(|peer| bodies.sample(peer)).collect();
+        Self::of_members(scenes, shape, laws, members, bodies, &initial)
+    }
+
+    /// Those peers with their bodies; `initial` has the samples with which all peers of the scene begin.
+    fn of_members(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L], members: Range<usize>, bodies: B, initial: &[Sample<P, L>]) -> Self {
         let samples = match shape.delay {
-            Some(delay) => Samples::Broadcast(Broadcast::new(&bodies, shape.peers, nanos(delay).div_ceil(tick_nanos))),
-            None => Samples::PerPacket(PerPacket::new(&scenes, &bodies, shape.end, tick_nanos)),
+            Some(delay) => Samples::Broadcast(Broadcast::new(initial, nanos(delay).div_ceil(nanos(shape.tick)))),
+            None => Samples::PerPacket(PerPacket::new(&scenes, initial, &shape, members.clone())),
         };
         Self {
             law: law_of_lanes(&laws),
             bodies,
             leads: Law::<f64>::horizon(&laws[0])
                 .is_some()
-                .then(|| (laws.map(|law| Law::<f64>::horizon(&law).unwrap_or(0.0)), vec![[Lead::STALE; L]; shape.peers])),
+                .then(|| (laws.map(|law| Law::<f64>::horizon(&law).unwrap_or(0.0)), vec![[Lead::STALE; L]; members.len()])),
             scenes,
-            samples,
             earliest_send: shape.phases.iter().copied().min().unwrap_or(u64::MAX),
             next_send: shape.phases.clone(),
+            senders: Vec::new(),
+            sent: if matches!(samples, Samples::PerPacket(_)) { initial.to_vec() } else { Vec::new() },
+            samples,
+            members,
             shape,
             max_discrepancy: [0.0; L],
             finite: [true; L],
@@ -119,7 +164,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         let mut tick = 0;
         loop {
             let now = Instant::from_nanos(tick * tick_nanos);
-            if tick > 0 && tick % u64::from(INSTANTS_BETWEEN_QUESTIONS) == 0 {
+            if is_asked_before(tick) {
                 let before = Instant::from_nanos((tick - 1) * tick_nanos);
                 if !keep_going(before) {
                     self.end_all(tick, |_| Ending::Interrupted(before));
@@ -128,7 +173,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
             }
             if now >= self.shape.end {
                 if let Samples::PerPacket(samples) = &mut self.samples {
-                    samples.finish(tick);
+                    samples.finish(self.shape.before(tick));
                 }
                 let end = self.shape.end;
                 self.end_all(tick, |finite| if finite { Ending::Complete } else { Ending::Diverged(end) });
@@ -137,7 +182,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
             if self.finite.contains(&false) && self.end_diverged(tick, now) {
                 break;
             }
-            self.step(law, tick, now);
+            self.step(law, tick, now, &mut Nowhere);
             tick += 1;
         }
         self.summaries.map(|summary| summary.expect("every run has ended"))
@@ -145,9 +190,12 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 
     /// Everything that happens at a tick.
     #[inline(always)]
-    fn step(&mut self, law: &impl LawOfLanes, tick: u64, now: Instant) {
+    fn step(&mut self, law: &impl LawOfLanes, tick: u64, now: Instant, others: &mut impl Others<P, L>) {
+        if self.shape.has_queues && is_asked_before(tick) {
+            self.pass(tick);
+        }
         if tick == self.earliest_send {
-            self.send(tick, now);
+            self.send(tick, now, others);
         }
         match &mut self.samples {
             Samples::Broadcast(samples) => samples.deliver(tick),
@@ -198,7 +246,8 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         }
     }
 
-    fn send(&mut self, tick: u64, now: Instant) {
+    fn send(&mut self, tick: u64, now: Instant, others: &mut impl Others<P, L>) {
+        self.senders.clear();
         for (peer, next) in self.next_send.iter_mut().enumerate() {
             if *next != tick {
                 continue;
@@ -206,10 +255,27 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
             *next += self.shape.send_every;
             match &mut self.samples {
                 Samples::Broadcast(samples) => samples.send(tick, peer, &self.bodies),
-                Samples::PerPacket(samples) => samples.send(tick, now, peer, &self.bodies),
+                Samples::PerPacket(_) => {
+                    self.senders.push(peer);
+                    if self.members.contains(&peer) {
+                        self.sent[peer] = self.bodies.sample(peer - self.members.start);
+                    }
+                }
             }
         }
+        if let Samples::PerPacket(samples) = &mut self.samples {
+            others.exchange(&self.senders, &mut self.sent);
+            samples.send((tick, now), &self.senders, &self.sent, |sender| until(&self.shape, tick, self.next_send[sender]));
+        }
         self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
+    }
+
+    /// Queues did nothing yet that happens at this tick or later.
+    #[cold]
+    fn pass(&mut self, tick: u64) {
+        if let Samples::PerPacket(samples) = &mut self.samples {
+            samples.pass(self.shape.before(tick), |sender| until(&self.shape, tick, self.next_send[sender]));
+        }
     }
 
     /// Ends the runs that have diverged before that tick, and says whether none is left.
@@ -233,10 +299,13 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
 
     /// Writes down the results of a run after that number of ticks.
     fn end(&mut self, run: usize, ticks: u64, ending: Ending) {
-        let stop = match ending {
-            Ending::Complete => self.shape.end,
-            Ending::Diverged(at) | Ending::Interrupted(at) => at,
-        };
+        let until = self.stop(run, ticks, ending);
+        self.summaries[run] = Some(summary(std::slice::from_ref(self), run, ticks, ending, until, self.max_discrepancy[run]));
+        self.bodies.translations_mut().end(run);
+    }
+
+    /// A run ends after that number of ticks: nothing is on the way any more. Gives until when packets were delivered.
+    fn stop(&mut self, run: usize, ticks: u64, ending: Ending) -> Instant {
         // Packets are delivered up to the latest tick, and to the end of the scene if that was reached.
         let delivered_until = match ending {
             Ending::Complete => self.shape.end,
@@ -249,32 +318,21 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
             let Shape { tick, send_every, phases, .. } = &self.shape;
             samples.end_early(run, |sender, sequence| Instant::from_nanos((phases[sender] + sequence * send_every) * nanos(*tick)));
         }
-        let peers = self.scenes[run].peers.iter().enumerate().map(|(place, peer)| {
-            let (position, velocity) = (0..A).map(|axis| self.bodies.translations().object(axis, place, run)).unzip();
-            let stale_samples = match &self.samples {
-                Samples::Broadcast(_) => 0,
-                Samples::PerPacket(samples) => samples.stale_samples(place, run),
-            };
-            PeerSummary { name: peer.name.clone(), position, velocity, attitude: self.bodies.attitude(place, run), stale_samples, refused_samples: 0 }
-        });
-        let places = 0..self.shape.peers;
-        let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to);
-        let links = pairs.map(|(from, to)| LinkSummary { from, to, stats: self.link_stats(from, to, run, ticks, delivered_until) });
-        let summary = Summary {
-            ending,
-            duration: stop - Instant::ZERO,
-            ticks,
-            peers: peers.collect(),
-            links: links.collect(),
-            access_lines: Vec::new(),
-            max_discrepancy: self.max_discrepancy[run],
-            max_rotation_discrepancy: self.bodies.max_rotation_discrepancy(run),
-        };
-        self.bodies.translations_mut().end(run);
-        self.summaries[run] = Some(summary);
+        delivered_until
     }
 
-    /// The counters of a link after that number of ticks, if what arrives by an instant is delivered.
+    /// What came out for a peer.
+    fn peer_summary(&self, peer: usize, run: usize) -> PeerSummary {
+        let (position, velocity) = (0..A).map(|axis| self.bodies.translations().object(axis, peer, run)).unzip();
+        let stale_samples = match &self.samples {
+            Samples::Broadcast(_) => 0,
+            Samples::PerPacket(samples) => samples.stale_samples(peer, run),
+        };
+        let name = self.scenes[run].peers[self.members.start + peer].name.clone();
+        PeerSummary { name, position, velocity, attitude: self.bodies.attitude(peer, run), stale_samples, refused_samples: 0 }
+    }
+
+    /// The counters of the link from a peer of the scene to one that is here, after that number of ticks, if what arrives by an instant is delivered.
     fn link_stats(&self, from: usize, to: usize, run: usize, ticks: u64, until: Instant) -> LinkStats {
         let delay = match (&self.samples, self.shape.delay) {
             (Samples::PerPacket(samples), _) => return samples.stats(from, to, run),
@@ -287,6 +345,46 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         let delivered = last.map_or(0, |last| sent_before(last.saturating_add(1).min(ticks)));
         LinkStats::counted(offered, delivered, u128::from(delivered) * u128::from(delay), [])
     }
+}
+
+/// What a run came to after that number of ticks, with the packets that arrived by an instant; the peers are here and there.
+fn summary<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
+    parts: &[Arrays<'_, B, A, P, L>],
+    run: usize,
+    ticks: u64,
+    ending: Ending,
+    until: Instant,
+    max_discrepancy: f64,
+) -> Summary {
+    let stop = match ending {
+        Ending::Complete => parts[0].shape.end,
+        Ending::Diverged(at) | Ending::Interrupted(at) => at,
+    };
+    let members = || parts.iter().flat_map(|part| (0..part.members.len()).map(move |peer| (part, peer)));
+    let pairs = (0..parts[0].shape.peers).flat_map(|from| members().enumerate().map(move |(to, member)| (from, to, member)));
+    let links = pairs.filter(|(from, to, _)| from != to).map(|(from, to, (part, peer))| {
+        let stats = part.link_stats(from, peer, run, ticks, until);
+        LinkSummary { from, to, stats }
+    });
+    Summary {
+        ending,
+        duration: stop - Instant::ZERO,
+        ticks,
+        peers: members().map(|(part, peer)| part.peer_summary(peer, run)).collect(),
+        links: links.collect(),
+        access_lines: Vec::new(),
+        max_discrepancy,
+        max_rotation_discrepancy: parts[0].bodies.max_rotation_discrepancy(run),
+    }
+}
+
+/// The bodies of some peers.
+fn bodies_of<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
+    scenes: &[&Scene; L],
+    members: &Range<usize>,
+    laws: &[BuiltIn; L],
+) -> B {
+    B::new(Places { first: members.start, peers: members.len(), runs: L }, scenes, &laws[0])
 }
 
 /// A run to its end. The loop is compiled for each law: where it chooses between laws at every tick, a run of three peers over constant delays takes a sixth
@@ -323,6 +421,17 @@ impl<W: LawOfLanes, B: Bodies<A, P>, const A: usize, const P: usize, const L: us
         }
         self.bodies.advance::<L>(self.law)
     }
+}
+
+/// Whether the observer is asked, before that tick, whether to go on.
+fn is_asked_before(tick: u64) -> bool {
+    tick > 0 && tick.is_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS))
+}
+
+/// Until when a queue may look at this tick: until its sender sends next, and not beyond the latest tick before the run may be interrupted.
+fn until(shape: &Shape, tick: u64, next_send: u64) -> Instant {
+    let asked = (tick + 1).next_multiple_of(u64::from(INSTANTS_BETWEEN_QUESTIONS));
+    Instant::from_nanos(next_send.min(asked - 1) * nanos(shape.tick))
 }
 
 /// A span of at most a year.

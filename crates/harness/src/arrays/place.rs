@@ -9,9 +9,11 @@ pub(super) struct Spot {
     pub(super) lane: usize,
 }
 
-/// Bodies by axis, then peer, then run; each axis begins a block of its own, so that work along an axis is work on whole blocks.
+/// Some or all peers of a scene, counted from 0: bodies by axis, then peer, then run; each axis begins a block of its own, so that work along an axis is work on whole blocks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Places {
+    /// The peer of the scene that is the first here: others may be elsewhere.
+    pub(super) first: usize,
     pub(super) peers: usize,
     pub(super) runs: usize,
 }

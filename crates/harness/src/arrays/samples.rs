@@ -3,7 +3,10 @@
 pub(super) use broadcast::Broadcast;
 pub(super) use per_packet::PerPacket;
 
+use cohaptic_peer::State;
+
 mod broadcast;
+mod in_flight;
 mod per_packet;
 mod quads;
 
@@ -16,6 +19,11 @@ pub(super) struct Sample<const P: usize, const L: usize> {
 
 impl<const P: usize, const L: usize> Sample<P, L> {
     pub(super) const ZERO: Self = Self { position: [[0.0; L]; P], velocity: [[0.0; L]; P] };
+
+    /// That of a run.
+    fn state(&self, run: usize) -> State<P> {
+        State { position: self.position.map(|runs| runs[run]), velocity: self.velocity.map(|runs| runs[run]) }
+    }
 }
 
 /// How many others there are, as a number to divide by.

@@ -3,11 +3,13 @@
 use std::time::Duration;
 
 use cohaptic_peer::coordination::{BuiltIn, Law};
-use cohaptic_peer::{Coordination, Integrator};
+use cohaptic_peer::wire::SampleKind;
+use cohaptic_peer::{Coordination, EXACT_FROM, Integrator};
 use cohaptic_scene::{Scene, Strategies};
-use cohaptic_units::Instant;
-use cohaptic_wan::LinkModel;
+use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::{DirectLinks, LinkModel, SteppedLinks};
 
+use super::{nanos, threads};
 use crate::plan::{Plan, Ticking};
 
 /// What two scenes must have in common to be run side by side.
@@ -28,6 +30,10 @@ pub(crate) struct Shape {
     pub(super) send_every: u64,
     /// The tick at which each peer sends first.
     pub(super) phases: Vec<u64>,
+    /// The size of a sample.
+    pub(super) size: Bytes,
+    /// Whether the fate of a packet on some link may depend on later ones.
+    pub(super) has_queues: bool,
     /// The delay of all links, if they do nothing but delay, all alike.
     pub(super) delay: Option<Duration>,
 }
@@ -36,22 +42,41 @@ pub(crate) struct Shape {
 const LONGEST: Duration = Duration::from_secs(365 * 86_400);
 
 impl Shape {
-    /// The shape of a scene that can be run in arrays: everybody ticks together, nothing changes on the way, and over the links nothing waits. `None` for
-    /// any other, for strategies that are no law of the registry, and for laws with a past on an object that turns: they may have one of its attitudes.
+    /// The tick before one, and when it is.
+    pub(super) fn before(&self, tick: u64) -> (u64, Instant) {
+        let before = tick.saturating_sub(1);
+        (before, Instant::from_nanos(before * nanos(self.tick)))
+    }
+
+    /// How many threads pay for a run at most, and why no more.
+    pub(crate) fn threads(&self) -> (usize, &'static str) {
+        threads::that_pay(self)
+    }
+
+    /// Whether a run that diverges is to be run once more with events: queues have looked ahead of the end.
+    pub(crate) const fn looks_ahead(&self) -> bool {
+        self.has_queues
+    }
+
+    /// The shape of a scene that can be run in arrays: everybody ticks together, nothing changes on the way, and no link counts or damages what is inside.
+    /// `None` for any other, for strategies that are no law of the registry, and on an object that turns for laws with a past, which may have one of its
+    /// attitudes, and for exact means.
     pub(crate) fn of(scene: &Scene, plan: &Plan, strategies: &impl Strategies) -> Option<(Self, BuiltIn)> {
         // All tick together, so that all have one law.
         let law = strategies.law(scene, 0)?;
         let clock = scene.peers.first()?.clock;
+        let kind = if scene.rotation.is_some() { SampleKind::Attitude } else { SampleKind::State };
+        let size = Bytes::new(kind.datagram_len(scene.axes.count()) as u64);
         let fits = plan.ticking == Ticking::Lockstep
             && !plan.general_links
-            && (scene.rotation.is_none() || Law::<f64>::lag(&law) == 0 && Law::<f64>::memory(&law) == 0)
+            && (scene.rotation.is_none() || Law::<f64>::lag(&law) == 0 && Law::<f64>::memory(&law) == 0 && scene.peers.len() <= EXACT_FROM)
             && scene.timeline.is_empty()
             && scene.coordination.send_when.is_none()
             && scene.duration <= LONGEST
             && clock.tick <= LONGEST
             && scene.peers.len() <= usize::from(u16::MAX)
             && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none())
-            && scene.links.used().all(|(link, _)| link.is_direct());
+            && scene.links.used().all(|(link, _)| DirectLinks::takes(link, size) || SteppedLinks::takes(link));
         fits.then(|| {
             let shape = Self {
                 law: scene.coordination.strategy,
@@ -64,6 +89,8 @@ impl Shape {
                 end: Instant::ZERO.saturating_add(scene.duration),
                 send_every: u64::try_from(scene.coordination.update.as_nanos() / clock.tick.as_nanos()).unwrap_or(u64::MAX),
                 phases: scene.peers.iter().map(|peer| peer.phase).collect(),
+                size,
+                has_queues: !scene.links.used().all(|(link, _)| DirectLinks::takes(link, size)),
                 delay: one_delay(scene),
             };
             (shape, law)

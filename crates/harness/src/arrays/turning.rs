@@ -90,7 +90,7 @@ impl TurningBlocks {
 
     /// Takes in how far copies are turned apart, before they move.
     fn measure(&mut self, two_longest: &[Lanes; 2]) {
-        let Places { peers, runs } = self.places;
+        let Places { peers, runs, .. } = self.places;
         let [first, second] = two_longest;
         for run in 0..runs {
             let (mut two, mut lane) = ([0.0; 2], run);

@@ -25,5 +25,5 @@ pub use presence::{Datagram, Transmit};
 pub use recorded::{RecordedScene, SceneDifference};
 pub use replay::replay;
 pub use rows::InputLine;
-pub use scene::{LiveScene, PeerState};
+pub use scene::{LiveScene, PeerState, TurnState};
 pub use seat::{Presence, SampleError, SeatStats};

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use cohaptic_peer::State;
 use cohaptic_peer::coordination::BuiltInStrategy;
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_scene::{Axes, LinkKeys, Scene};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, LinkStats};
@@ -68,6 +69,17 @@ pub struct PeerState {
     pub device: Option<State<3>>,
     /// Its copy of the object; for a peer in another process, what its newest sample says of it (where it begins, before the first).
     pub object: State<3>,
+    /// How copy and device are turned; `None` if the object does not turn.
+    pub turn: Option<TurnState>,
+}
+
+/// How one peer is turned, at the same instants as its [`PeerState`].
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct TurnState {
+    /// The attitude of its device; `None` for one that does not turn, or in another process.
+    pub device: Option<Attitude>,
+    /// The attitude of its copy.
+    pub object: Attitude,
 }
 
 impl LiveScene {
@@ -224,7 +236,8 @@ impl LiveScene {
         let presence = self.presence(peer)?;
         each!(&self.world, world => {
             let (device, object) = world.states(peer)?;
-            Some(PeerState { presence, heard: world.heard(peer), device: device.map(|state| widen(&state)), object: widen(&object) })
+            let device = device.map(|state| widen(&state));
+            Some(PeerState { presence, heard: world.heard(peer), device, object: widen(&object), turn: world.turn(peer) })
         })
     }
 

@@ -7,6 +7,7 @@
 //! | `links.csv` | one row a link or access line: its counters at the end |
 //! | `inputs.csv` | of a live session: one row a thing that came in from outside |
 //! | `positions.svg`, `forces.svg` | plots over time |
+//! | `orientations.svg`, `views.svg` | of an object that turns: rotation vectors over time; the copies from three sides |
 //! | `network.svg` | delays, losses and the distribution of the delay of up to six links |
 //!
 //! A file is written under the name `….partial` and takes its own name when it is whole. Numbers are written with the fewest digits that read back
@@ -21,6 +22,7 @@ mod packets;
 mod plot;
 mod recorder;
 mod trajectory;
+mod views;
 
 pub use band::Bands;
 pub use file::{RecordError, RecordFile};

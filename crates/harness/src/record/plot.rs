@@ -28,7 +28,7 @@ pub(crate) struct Panel<'a> {
 }
 
 /// More curves than this are drawn in one look and not named.
-const MOST_NAMED: usize = 10;
+pub(super) const MOST_NAMED: usize = 10;
 
 /// Writes a picture.
 pub(crate) fn write(path: PathBuf, svg: &str) -> Result<PathBuf, RecordError> {
@@ -52,7 +52,7 @@ impl Plot<'_> {
     }
 }
 
-const CUT: &str = "What goes far beyond is cut off.";
+pub(super) const CUT: &str = "What goes far beyond is cut off.";
 
 /// The panel, and whether something is cut off.
 fn drawn(panel: &Panel<'_>) -> (cohaptic_picture::Panel, bool) {

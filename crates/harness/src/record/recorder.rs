@@ -12,6 +12,7 @@ use super::network::Network;
 use super::packets::Packets;
 use super::plot::{self, Panel, Plot};
 use super::trajectory::{Trajectory, Turns};
+use super::views::Views;
 use crate::{Observer, PacketRow, Summary, TickRow};
 
 /// The name of a file, and the picture in it as SVG.
@@ -37,6 +38,8 @@ struct Plotted {
     network: Network,
     /// The rotation vectors of the copies and their lengths, if the object turns.
     orientations: Option<Bands>,
+    /// Their poses, if it turns.
+    views: Option<Views>,
 }
 
 /// The spans of time of a plot, and the most numbers that all curves of a plot may hold together.
@@ -70,6 +73,7 @@ impl Recorder {
                 forces: bands(curves),
                 network: Network::new(scene, spans),
                 orientations: scene.rotation.is_some().then(|| bands(4 * names.len())),
+                views: Views::new(scene, spans),
             },
             size: Size::default(),
             names,
@@ -134,6 +138,9 @@ impl Recorder {
             let plot = Plot { title: format!("{title}: {what}"), panels };
             pictures.push((file, plot.picture().size(size).svg()));
         }
+        if let Some(views) = &plotted.views {
+            pictures.push(("views.svg", views.picture(&title, &names, &plotted.positions).size(size).svg()));
+        }
         pictures.push(("network.svg", plotted.network.picture(&title, &names).size(size).svg()));
         for (file, svg) in &pictures {
             files.push(plot::write(folder.join(file), svg)?);
@@ -168,6 +175,9 @@ impl Observer for Recorder {
             for (part, value) in [x, y, z, (x * x + y * y + z * z).sqrt()].into_iter().enumerate() {
                 orientations.add(part * self.names.len() + row.peer, row.at, value);
             }
+        }
+        if let (Some(turn), Some(views)) = (&row.turn, &mut self.plotted.views) {
+            views.add(row.peer, row.at, row.object.position, turn.object);
         }
         self.trajectory.on_tick(row)
     }

@@ -8,7 +8,9 @@ use cohaptic_wan::{LinkModel, LinkStats, NodeId, PacketEvent, PacketInfo, Path};
 
 use super::{Arriving, DeviceModel, Remote, Step, Watch, World, row};
 use crate::datagrams::Handle;
-use crate::live::{Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, RemotePeers, SampleError, SeatStats, Transmit, UnsimulatedDevice};
+use crate::live::{
+    Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, RemotePeers, SampleError, SeatStats, Transmit, TurnState, UnsimulatedDevice,
+};
 use crate::observer::Observer;
 use crate::plan::ticking;
 use crate::schedule::Schedule;
@@ -164,6 +166,13 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         let member = self.members.get(place)?;
         let is_process = self.remote.is_process(place);
         Some(((!is_process).then(|| member.peer.device().state()), *member.peer.object().state()))
+    }
+
+    /// The attitudes of a peer; `None` if the object does not turn.
+    pub(crate) fn turn(&self, place: usize) -> Option<TurnState> {
+        let rotation = self.members.get(place)?.peer.rotation()?;
+        let device = rotation.device().filter(|_| !self.remote.is_process(place));
+        Some(TurnState { device: device.copied(), object: *rotation.copy() })
     }
 
     fn notice_silence(&mut self, now: Instant) {

@@ -51,7 +51,19 @@ impl Direct {
 
     /// When a packet arrives, or why it never does.
     #[inline(always)]
-    pub(crate) fn offer(&mut self, now: Instant, number: u64, [loss_word, jitter_word]: Words) -> Result<Instant, DropCause> {
+    pub(crate) fn offer(&mut self, now: Instant, number: u64, words: Words) -> Result<Instant, DropCause> {
+        self.offer_through(now, number, words, Ok)
+    }
+
+    /// When a packet arrives, or why it never does, with a `queue` between loss and delay that says when it leaves.
+    #[inline(always)]
+    pub(crate) fn offer_through(
+        &mut self,
+        now: Instant,
+        number: u64,
+        [loss_word, jitter_word]: Words,
+        queue: impl FnOnce(Instant) -> Result<Instant, DropCause>,
+    ) -> Result<Instant, DropCause> {
         if self.is_down(now) {
             return Err(DropCause::Outage);
         }
@@ -61,8 +73,9 @@ impl Direct {
         {
             return Err(DropCause::Loss);
         }
-        let delay = self.delay.draw_nanos(now, jitter_word, packet);
-        Ok(self.order.arrival(now.saturating_add_nanos(delay)))
+        let leaves = queue(now)?;
+        let delay = self.delay.draw_nanos(leaves, jitter_word, packet);
+        Ok(self.order.arrival(leaves.saturating_add_nanos(delay)))
     }
 
     pub(crate) const fn has_outages(&self) -> bool {

@@ -151,6 +151,12 @@ impl<P, T: Clone> Line<P, T> {
         self.flow.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
     }
 
+    /// Takes back that such a packet came out.
+    pub(crate) fn forget(&mut self, entered: Instant, at: Instant) {
+        self.flow.delivered -= 1;
+        self.flow.delay_nanos -= u128::from(at.as_nanos() - entered.as_nanos());
+    }
+
     /// Whether packets may enter an engine, which must be woken.
     #[inline]
     pub(crate) const fn has_engine(&self) -> bool {

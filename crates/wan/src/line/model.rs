@@ -146,9 +146,8 @@ impl LinkModel {
         self.as_fixed().is_some_and(LinkConfig::is_random)
     }
 
-    /// Whether what becomes of a packet is known as soon as it is offered, and nothing is copied: what [`crate::DirectLinks`] takes.
-    #[must_use]
-    pub fn is_direct(&self) -> bool {
+    /// Whether what becomes of a packet is known as soon as it is offered, and nothing is copied.
+    pub(crate) fn is_direct(&self) -> bool {
         self.as_fixed().is_some_and(LinkConfig::is_direct)
     }
 }

@@ -69,7 +69,7 @@ const NETEM: [Stage; 10] = [
     Stage::Slots,
 ];
 
-/// The stages of one line and the packets in them.
+/// The stages of one line and the packets in them. What is seldom is in a box: the lines of a large mesh fill the cache.
 #[derive(Clone, Debug)]
 pub(crate) struct Staged<T> {
     layout: &'static [Stage; 10],
@@ -79,20 +79,19 @@ pub(crate) struct Staged<T> {
     direct: Direct,
     marks_instead_of_loss: bool,
     duplication: Option<ChanceStage>,
-    corruption: Option<CorruptionStage>,
+    corruption: Option<Box<CorruptionStage>>,
     limit: Option<u64>,
-    bucket: Option<TokenBucketStage<T>>,
+    bucket: Option<Box<TokenBucketStage<T>>>,
     bottleneck: Option<BottleneckStage<T>>,
-    slots: Option<SlotStage<T>>,
+    slots: Option<Box<SlotStage<T>>>,
     reorder: ReorderStage<T>,
     trace: Option<PathTrace>,
-    /// In a box, as whatever is seldom.
     listed: Option<Box<ImpairmentStages>>,
     /// What propagates before other stages, where the layout has any behind.
     line: BinaryHeap<Propagating<T>>,
     /// How many have propagated there: what breaks ties.
     line_count: u64,
-    modulation: Option<ModulationStage>,
+    modulation: Option<Box<ModulationStage>>,
     /// What happens next, and the next change of state: kept, because they are asked for more often than they change.
     next: Option<(Instant, Stage)>,
     next_change: Option<Instant>,
@@ -105,11 +104,11 @@ pub(crate) struct Staged<T> {
 #[derive(Clone, Debug)]
 struct Route {
     stages: [Stage; 10],
-    count: usize,
+    count: u8,
     /// The place of the first that may keep a packet.
-    keeping: usize,
+    keeping: u8,
     /// By stage: the place of the first one behind it.
-    behind: [usize; 10],
+    behind: [u8; 10],
 }
 
 impl Route {
@@ -117,7 +116,7 @@ impl Route {
         let mut route = Self { stages: *layout, count: 0, keeping: 0, behind: [0; 10] };
         for &stage in layout {
             if is_there(stage) {
-                route.stages[route.count] = stage;
+                route.stages[usize::from(route.count)] = stage;
                 route.count += 1;
             }
             route.behind[stage as usize] = route.count;
@@ -130,7 +129,7 @@ impl Route {
 
     /// Those that may keep a packet: what stands behind the limit.
     fn keeping(&self) -> &[Stage] {
-        &self.stages[self.keeping..self.count]
+        &self.stages[usize::from(self.keeping)..usize::from(self.count)]
     }
 }
 
@@ -189,7 +188,7 @@ impl<T: Clone> Staged<T> {
         };
         // Nothing is inside that could come out.
         stages.apply(now, config, &mut Vec::new());
-        stages.modulation = modulation;
+        stages.modulation = modulation.map(Box::new);
         stages.look_ahead();
         stages
     }
@@ -219,8 +218,16 @@ impl<T: Clone> Staged<T> {
         Some(self.next_change.map_or(next, |change| change.min(next)))
     }
 
-    /// Lets all happen that is due.
+    /// Lets all happen that is due, which mostly is nothing.
+    #[inline]
     pub(crate) fn pass(&mut self, now: Instant, outputs: &mut Outputs<T>) {
+        if self.next.is_some_and(|(at, _)| at <= now) || self.next_change.is_some_and(|at| at <= now) {
+            self.let_happen(now, outputs);
+        }
+    }
+
+    #[inline(never)]
+    fn let_happen(&mut self, now: Instant, outputs: &mut Outputs<T>) {
         loop {
             let event = self.next.filter(|(at, _)| *at <= now);
             let change = self.next_change.filter(|at| *at <= now);
@@ -237,14 +244,14 @@ impl<T: Clone> Staged<T> {
     /// Changes the configuration. What propagates keeps its delay; what waits in a stage that is gone goes on at once.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: LinkConfig, modulation: Option<ModulationStage>, outputs: &mut Outputs<T>) {
         self.pass(now, outputs);
-        self.modulation = modulation;
+        self.modulation = modulation.map(Box::new);
         self.apply(now, config, outputs);
         self.look_ahead();
     }
 
     fn look_ahead(&mut self) {
         self.next = self.next_event();
-        self.next_change = self.modulation.as_ref().and_then(ModulationStage::next_change);
+        self.next_change = self.modulation.as_ref().and_then(|modulation| modulation.next_change());
     }
 
     fn change(&mut self, at: Instant, outputs: &mut Outputs<T>) {
@@ -264,13 +271,13 @@ impl<T: Clone> Staged<T> {
         self.mtu = config.mtu;
         self.marks_instead_of_loss = config.marks_instead_of_loss;
         self.duplication = ChanceStage::reconfigured(self.duplication, config.duplication);
-        self.corruption = CorruptionStage::reconfigured(self.corruption.take(), config.corruption);
+        self.corruption = CorruptionStage::reconfigured(self.corruption.take().map(|stage| *stage), config.corruption).map(Box::new);
         self.limit = config.limit;
         self.trace = config.trace;
         self.listed = ImpairmentStages::reconfigured(self.listed.take(), now, &config.listed, self.direct.draws);
         let mut given_up: Vec<(Stage, Carried<T>)> = Vec::new();
         self.slots = match (self.slots.take(), config.slots) {
-            (None, new) => new.map(SlotStage::new),
+            (None, new) => new.map(|new| Box::new(SlotStage::new(new))),
             (Some(mut stage), Some(new)) => {
                 stage.reconfigure(new);
                 Some(stage)
@@ -292,7 +299,7 @@ impl<T: Clone> Staged<T> {
             }
         };
         self.bucket = match (self.bucket.take(), config.token_bucket) {
-            (None, new) => new.map(|new| TokenBucketStage::new(now, new)),
+            (None, new) => new.map(|new| Box::new(TokenBucketStage::new(now, new))),
             (Some(mut stage), Some(new)) => {
                 stage.reconfigure(now, new, outputs);
                 Some(stage)
@@ -334,9 +341,9 @@ impl<T: Clone> Staged<T> {
         let mut next: Option<(Instant, Stage)> = None;
         for &stage in self.route.keeping().iter().rev() {
             let at = match stage {
-                Stage::Bucket => self.bucket.as_ref().and_then(TokenBucketStage::next_at),
+                Stage::Bucket => self.bucket.as_ref().and_then(|bucket| bucket.next_at()),
                 Stage::Bottleneck => self.bottleneck.as_ref().and_then(BottleneckStage::next_at),
-                Stage::Slots => self.slots.as_ref().and_then(SlotStage::next_at),
+                Stage::Slots => self.slots.as_ref().and_then(|slots| slots.next_at()),
                 Stage::Propagation => {
                     let held = self.reorder.next_at();
                     let line = self.line.peek().map(|first| first.until);
@@ -388,13 +395,13 @@ impl<T: Clone> Staged<T> {
 
     fn walk_on(&mut self, after: Stage, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) {
         // The limit stands before all stages that keep packets.
-        self.walk(self.route.behind[after as usize], now, packet, 0, outputs);
+        self.walk(usize::from(self.route.behind[after as usize]), now, packet, 0, outputs);
     }
 
     /// Leads a packet through the stages from that one on.
     fn walk(&mut self, from: usize, now: Instant, mut packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
         let draws = self.direct.draws.copy(packet.number, packet.copy);
-        for place in from..self.route.count {
+        for place in from..usize::from(self.route.count) {
             match self.route.stages[place] {
                 Stage::Mtu => {
                     if self.mtu.is_some_and(|mtu| packet.info.size > mtu) {

@@ -12,6 +12,7 @@ mod config;
 pub(crate) mod direct_links;
 pub(crate) mod id;
 mod pending;
+pub(crate) mod stepped_links;
 mod traffic;
 
 use alloc::vec::Vec;

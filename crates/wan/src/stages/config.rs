@@ -122,6 +122,11 @@ impl LinkConfig {
         let Self { layout, outages, loss, delay, order, .. } = self.clone();
         *self == Self { layout, outages, loss, delay, order, ..Self::default() }
     }
+
+    /// Whether it is [direct](LinkConfig::is_direct) without its bottleneck.
+    pub(crate) fn is_direct_but_for_queue(&self) -> bool {
+        Self { bottleneck: None, ..self.clone() }.is_direct()
+    }
 }
 
 /// The parameters of the largest packet.

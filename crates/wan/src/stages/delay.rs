@@ -288,17 +288,14 @@ impl DelayStage {
             StageLaw::Correlated(correlated) => {
                 let Correlated { checked, chain } = &mut **correlated;
                 let fresh = standard_normal(word, || more.next_word());
-                let z = match *chain {
-                    None => fresh,
-                    Some((before, at)) => {
-                        let phi = match checked.memory {
-                            Memory::None => 0.0,
-                            Memory::PerPacket(phi) => phi,
-                            Memory::InTime { tau_nanos } => libm::exp(-nanos(now.saturating_duration_since(at)) / tau_nanos),
-                        };
-                        phi * before + libm::sqrt((1.0 - phi) * (1.0 + phi)) * fresh
-                    }
-                };
+                let z = chain.map_or(fresh, |(before, at)| {
+                    let phi = match checked.memory {
+                        Memory::None => 0.0,
+                        Memory::PerPacket(phi) => phi,
+                        Memory::InTime { tau_nanos } => libm::exp(-nanos(now.saturating_duration_since(at)) / tau_nanos),
+                    };
+                    phi * before + fresh_share(phi) * fresh
+                });
                 *chain = Some((z, now));
                 count(checked.law.at_normal(z))
             }
@@ -306,10 +303,46 @@ impl DelayStage {
     }
 }
 
+/// Correlated delays of many links, each of which keeps its own chain.
+#[derive(Clone, Debug)]
+pub(crate) struct CorrelatedDelays {
+    checked: Arc<Checked>,
+    phi: f64,
+    fresh_share: f64,
+}
+
+impl CorrelatedDelays {
+    /// Those of a delay, if it is correlated from packet to packet.
+    pub(crate) fn new(delay: &Delay) -> Option<Self> {
+        let checked = delay.jitter.as_ref()?;
+        let Memory::PerPacket(phi) = checked.memory else { return None };
+        Some(Self { checked: Arc::clone(checked), phi, fresh_share: fresh_share(phi) })
+    }
+
+    /// The delay \[ns\] of a packet. `chain` is the latest value of its link's chain, NaN before the first packet.
+    #[inline(always)]
+    pub(crate) fn draw_nanos(&self, chain: &mut f64, word: u64, packet: PacketDraws) -> u64 {
+        let fresh = in_the_core(word).unwrap_or_else(|| {
+            let mut more = packet.more(Purpose::Jitter);
+            outside_the_core(word, || more.next_word())
+        });
+        *chain = if chain.is_nan() { fresh } else { self.phi * *chain + self.fresh_share * fresh };
+        count(self.checked.law.at_normal(*chain))
+    }
+}
+
+/// What a fresh number adds to a chain of variance one.
+fn fresh_share(phi: f64) -> f64 {
+    libm::sqrt((1.0 - phi) * (1.0 + phi))
+}
+
 #[expect(clippy::cast_precision_loss, reason = "a span enters a random law as a real number")]
 fn nanos(span: Duration) -> f64 {
     span.as_nanos() as f64
 }
+
+/// 2^51.
+const SMALL: f64 = 2_251_799_813_685_248.0;
 
 /// The nearest whole number, of two the even one; saturates beyond 2^63.
 ///
@@ -319,14 +352,14 @@ fn nanos(span: Duration) -> f64 {
 #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "saturates; a difference of bits that may be negative")]
 fn nearest(number: f64) -> i64 {
     const ROOM: f64 = 6_755_399_441_055_744.0;
-    const SMALL: f64 = 2_251_799_813_685_248.0;
     if number.abs() < SMALL { (number + ROOM).to_bits().wrapping_sub(ROOM.to_bits()) as i64 } else { libm::rint(number) as i64 }
 }
 
-/// A delay as a whole number of nanoseconds.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "laws are not below their floor; saturates beyond 584 years")]
+/// A delay as a whole number of nanoseconds: laws are not below their floor.
+#[inline]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates beyond 584 years")]
 fn count(nanos: f64) -> u64 {
-    libm::rint(nanos) as u64
+    if nanos < SMALL { nearest(nanos).cast_unsigned() } else { libm::rint(nanos) as u64 }
 }
 
 /// The parameters of the delay and of its jitter.

@@ -184,6 +184,68 @@ fn a_hundred_links_are_as_good_as_six() {
     assert_eq!(browser.complaints, [""; 0]);
 }
 
+/// Width and height of what is drawn in the colour of the first peer \[px\].
+fn drawn(browser: &mut Browser) -> [f64; 2] {
+    let script = "(() => {
+        const canvas = document.getElementById('copies');
+        const probe = document.createElement('canvas').getContext('2d');
+        probe.fillStyle = getComputedStyle(document.documentElement).getPropertyValue('--c0').trim();
+        probe.fillRect(0, 0, 1, 1);
+        const wanted = probe.getImageData(0, 0, 1, 1).data;
+        const { data, width } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+        const seen = [[], []];
+        for (let i = 0; i < data.length; i += 4)
+            if ([0, 1, 2, 3].every((k) => Math.abs(data[i + k] - wanted[k]) < 24)) [(i / 4) % width, Math.floor(i / 4 / width)].forEach((at, k) => seen[k].push(at));
+        return seen.map((at) => at.reduce((most, value) => Math.max(most, value), 0) - at.reduce((least, value) => Math.min(least, value), 1e9) + 1);
+    })()";
+    let sides = browser.value(script);
+    [0, 1].map(|side| sides[side].as_f64().unwrap())
+}
+
+/// Puts a slider there as its keys do.
+fn look_from(browser: &mut Browser, slider: &str, degrees: i64) {
+    browser.value(&format!("document.getElementById({slider:?}).focus()"));
+    let now = browser.value(&format!("Number(document.getElementById({slider:?}).value)")).as_i64().unwrap();
+    let (key, code) = if degrees < now { ("ArrowLeft", 37) } else { ("ArrowRight", 39) };
+    while browser.value(&format!("document.getElementById({slider:?}).value")) != json!(degrees.to_string()) {
+        browser.press(key, code);
+    }
+    // Two frames: one that begins after the key, and its end.
+    browser.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))");
+}
+
+/// A plate of 0.4 m × 0.3 m from above, from the front and from the side, as it is and after a quarter turn about z. A line is 1.8 px wide, and colours fade at its
+/// borders; the depth of the plate (3 % of its length, so that it is seen from the side) changes the scale of the nearer face by 0.4 %.
+#[test]
+fn an_object_that_turns_is_drawn_in_depth() {
+    let Some(mut browser) = Browser::start() else { return };
+    let half = core::f64::consts::FRAC_1_SQRT_2;
+    let still = json!([{ "name": "prefers-color-scheme", "value": "light" }, { "name": "prefers-reduced-motion", "value": "reduce" }]);
+    browser.call("Emulation.setEmulatedMedia", json!({ "features": still }));
+    let as_it_is = (Run::turned([1.0, 0.0, 0.0, 0.0]), "0.0, 0.0, 0.0°", [0.4, 0.3]);
+    let by_a_quarter = (Run::turned([half, 0.0, 0.0, half]), "0.0, 0.0, 90.0°", [0.3, 0.4]);
+    for (run, told, [x, y]) in [&as_it_is, &by_a_quarter] {
+        browser.open(&run.server().url());
+        wait_painted(&mut browser, "copies", "--c0");
+        assert_eq!(text(&mut browser, "#peers td:nth-of-type(3)"), *told);
+        look_from(&mut browser, "around", 0);
+        look_from(&mut browser, "above", 90);
+        let [across, up] = drawn(&mut browser);
+        let scale = across / x;
+        assert!(across > 80.0 && (up / scale - y).abs() < 0.03 * y, "{across} x {up}");
+        browser.picture("turned");
+        look_from(&mut browser, "above", 0);
+        let front = drawn(&mut browser);
+        look_from(&mut browser, "around", 90);
+        let side = drawn(&mut browser);
+        // From there the nearer edge is half a plate nearer than the middle, of five radii of 0.29 m: larger by up to 0.2 m in 1.4 m.
+        assert!((front[0] / scale / x - 1.0).abs() < 0.2 && front[1] < 0.15 * front[0], "{front:?}");
+        assert!((side[0] / scale / y - 1.0).abs() < 0.2 && side[1] < 0.15 * side[0], "{side:?}");
+        assert!((side[0] > front[0]) == (y > x), "{front:?} {side:?}");
+    }
+    assert_eq!(browser.complaints, [""; 0]);
+}
+
 /// Who has the address alone is asked for the token, and again if it is wrong.
 fn enters_the_token(browser: &mut Browser, run: &Run) {
     browser.value("sessionStorage.clear()");

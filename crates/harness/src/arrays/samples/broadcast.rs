@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use cohaptic_peer::Moving;
+use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
 use cohaptic_units::Instant;
 
 use super::quads::{self, Quad};
@@ -20,6 +20,8 @@ pub(in crate::arrays) struct Broadcast<const P: usize, const L: usize> {
     /// The samples held from each sender but the first, by pair of numbers, as the first peer holds it; and from the first.
     held: [Vec<Quad<L>>; P],
     first: Sample<P, L>,
+    /// The sums of what is held from all, if their means are exact.
+    sums: Option<ExactMeans<P>>,
     /// How many samples of each sender have arrived.
     arrived: Vec<u64>,
     changed: Changed,
@@ -44,19 +46,23 @@ struct Sent<const P: usize, const L: usize> {
 
 impl<const P: usize, const L: usize> Broadcast<P, L> {
     /// Everybody holds the initial states of the others, and nothing is on the way.
-    pub(in crate::arrays) fn new<const A: usize>(bodies: &impl Bodies<A, P>, peers: usize, delay_ticks: u64) -> Self {
+    pub(in crate::arrays) fn new(initial: &[Sample<P, L>], delay_ticks: u64) -> Self {
+        let peers = initial.len();
         let mut broadcast = Self {
             delay_ticks,
             on_the_way: VecDeque::new(),
             peers,
             held: std::array::from_fn(|_| quads::empty(peers - 1)),
-            first: bodies.sample(0),
+            first: initial[0],
+            sums: None,
             arrived: vec![0; peers],
             changed: Changed::More,
         };
-        for sender in 0..peers {
-            broadcast.hold(sender, &bodies.sample(sender));
+        for (sender, sample) in initial.iter().enumerate() {
+            broadcast.hold(sender, sample);
         }
+        broadcast.sums =
+            (peers > EXACT_FROM).then(|| ExactMeans::new((0..peers).map(|sender| broadcast.held_from(sender)).collect::<Vec<_>>().iter()));
         broadcast
     }
 
@@ -77,8 +83,20 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
         }
     }
 
+    /// What is held from a sender in the first run: others with this number of peers there are not.
+    fn held_from(&self, sender: usize) -> State<P> {
+        match sender.checked_sub(1) {
+            None => self.first.state(0),
+            Some(place) => quads::state(&self.held, place, 0),
+        }
+    }
+
     #[inline(always)]
     fn hold(&mut self, sender: usize, sample: &Sample<P, L>) {
+        if self.sums.is_some() {
+            let before = self.held_from(sender);
+            self.sums.iter_mut().for_each(|sums| sums.replace(&before, &sample.state(0)));
+        }
         let Some(place) = sender.checked_sub(1) else {
             self.first = *sample;
             return;
@@ -120,6 +138,10 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
         if std::mem::replace(&mut self.changed, Changed::Nothing) == Changed::Nothing {
             return;
         }
+        if self.sums.is_some() {
+            self.refresh_exactly(bodies);
+            return;
+        }
         let count = others(self.peers);
         for pair in 0..P {
             let held = &mut self.held[pair];
@@ -135,6 +157,18 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
             // And back.
             for peer in (1..self.peers).rev() {
                 quads::swap(held, peer - 1, &mut own);
+            }
+        }
+    }
+
+    /// [`Broadcast::refresh`] of many: what all hold together without the receiver's own.
+    #[cold]
+    fn refresh_exactly<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
+        let Some(sums) = &self.sums else { return };
+        for peer in 0..self.peers {
+            let mean = sums.mean_without(&self.held_from(peer), self.peers - 1);
+            for pair in 0..P {
+                bodies.set_target(pair, peer, [mean.position[pair]; L], [mean.velocity[pair]; L]);
             }
         }
     }

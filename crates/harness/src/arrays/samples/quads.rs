@@ -1,5 +1,7 @@
 //! The samples that one peer holds, along one axis, so that their mean is a matter of few instructions.
 
+use cohaptic_peer::State;
+
 /// Samples of L runs, four senders together: four positions, then four velocities.
 ///
 /// A mean adds every fourth sample to one of four sums, as [`cohaptic_peer::Held::refresh`] does; here those are the lanes of a register, with the sums of the
@@ -20,6 +22,12 @@ pub(super) fn set<const L: usize>(quads: &mut [Quad<L>], place: usize, run: usiz
     let quad = &mut quads[place / 4];
     quad[place % 4][run] = position;
     quad[place % 4 + 4][run] = velocity;
+}
+
+/// The sample in that place of a run, from its quads along each axis.
+pub(super) fn state<const A: usize, const L: usize>(quads: &[Vec<Quad<L>>; A], place: usize, run: usize) -> State<A> {
+    let number = |axis: usize, part: usize| quads[axis][place / 4][place % 4 + part][run];
+    State { position: std::array::from_fn(|axis| number(axis, 0)), velocity: std::array::from_fn(|axis| number(axis, 4)) }
 }
 
 /// The velocity of the sample in that place of a run.
@@ -54,7 +62,7 @@ pub(super) fn mean<const L: usize>(quads: &[Quad<L>], count: f64) -> ([f64; L], 
 
 #[cfg(test)]
 mod tests {
-    use cohaptic_peer::{Held, State};
+    use cohaptic_peer::Held;
 
     use super::*;
 

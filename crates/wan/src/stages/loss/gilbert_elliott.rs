@@ -59,8 +59,9 @@ impl GilbertElliott {
         if bad.happens(bits) { State::Bad } else { State::Good }
     }
 
-    /// Moves the chain by one packet and says whether that packet is lost.
-    pub(crate) fn loses(&self, state: &mut State, transition: u64, loss: u64) -> bool {
+    /// Moves the chain by one packet and says whether that packet is lost. Mostly that is certain in both states, and the word for it not drawn.
+    #[inline(always)]
+    pub(crate) fn loses(&self, state: &mut State, transition: u64, loss: impl FnOnce() -> u64) -> bool {
         let before = *state;
         *state = match before {
             State::Good if self.p.happens(transition) => State::Bad,
@@ -71,6 +72,6 @@ impl GilbertElliott {
             State::Good => self.k,
             State::Bad => self.h,
         };
-        !gets_through.happens(loss)
+        gets_through == Probability::ZERO || gets_through != Probability::ONE && !gets_through.happens(loss())
     }
 }

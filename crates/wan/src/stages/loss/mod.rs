@@ -18,6 +18,7 @@ use cohaptic_units::{Instant, Probability};
 
 pub use four_state::{Bursts, FourState, FourStateError};
 pub use gilbert_elliott::GilbertElliott;
+pub(crate) use gilbert_elliott::State as GilbertElliottState;
 pub use in_time::{GilbertElliottInTime, NoTime};
 pub use pattern::{Counts, Pattern, PatternError};
 
@@ -153,7 +154,7 @@ impl Remembering {
     fn loses(&mut self, now: Instant, number: u64, word: u64, packet: PacketDraws) -> bool {
         match self {
             Self::Correlated(chance) => chance.as_mut().is_some_and(|chance| chance.happens(word)),
-            Self::GilbertElliott(chain, state) => chain.loses(state, word, packet.more(Purpose::Loss).next_word()),
+            Self::GilbertElliott(chain, state) => chain.loses(state, word, || packet.more(Purpose::Loss).next_word()),
             Self::InTime(chain, seen) => chain.loses(seen, now, word, packet.more(Purpose::Loss).next_word()),
             Self::FourState(chain, state) => chain.loses(state, unit(word)),
             Self::Pattern(pattern) => pattern.covers(number, now),

@@ -72,7 +72,7 @@ impl Bottleneck {
 }
 
 /// A part of a packet, in 10⁻⁹ bit: see [`Rate::transmission_time`].
-fn giga_bits(bytes: Bytes) -> u128 {
+pub(super) fn giga_bits(bytes: Bytes) -> u128 {
     u128::from(bytes.get()) * 8_000_000_000
 }
 

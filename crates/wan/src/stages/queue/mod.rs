@@ -3,6 +3,7 @@
 pub(crate) mod bottleneck;
 mod codel;
 mod delivery_trace;
+mod equal_packets;
 mod framing;
 mod limit;
 mod red;
@@ -17,4 +18,5 @@ pub use red::{Red, RedError};
 pub use token_bucket::{Peak, TokenBucket};
 
 pub(crate) use bottleneck::BottleneckStage;
+pub(crate) use equal_packets::EqualPackets;
 pub(crate) use token_bucket::TokenBucketStage;

@@ -13,6 +13,7 @@ use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
 
+use super::bottleneck::giga_bits;
 use super::framing::SIGNED_SIZE;
 use super::limit::{LIMIT, Waiting};
 use super::{Framing, QueueLimit};
@@ -69,10 +70,6 @@ impl Bucket {
     fn holds_at(&self, needed: u128) -> Instant {
         self.since.saturating_add(self.rate.transmission_time(needed.saturating_sub(self.tokens)))
     }
-}
-
-fn giga_bits(bytes: Bytes) -> u128 {
-    u128::from(bytes.get()) * 8_000_000_000
 }
 
 /// The stage.

@@ -1,0 +1,149 @@
+//! Samples in flight, in a wheel by the tick at which they are in force.
+
+use std::collections::BTreeMap;
+
+use cohaptic_units::Instant;
+
+/// Ticks ahead that lie in the wheel; what arrives later than that is kept aside.
+const HORIZON: u64 = 256;
+
+/// Where a tick lies in the wheel.
+#[inline(always)]
+fn slot(tick: u64) -> usize {
+    // The lower byte: the remainder by HORIZON.
+    usize::from(tick.to_le_bytes()[0])
+}
+
+/// The samples in flight, by the tick at which they are in force.
+#[derive(Clone, Debug)]
+pub(super) struct InFlight<const P: usize> {
+    ticks: Ticks,
+    wheel: Box<[Bucket<P>; 256]>,
+    beyond: BTreeMap<u64, Bucket<P>>,
+    /// Memory of buckets that were emptied, the latest last: it is what the cache holds. It took 5 % off a tick of ten peers whose packets arrive together.
+    emptied: Vec<Vec<Packet<P>>>,
+}
+
+/// The samples in force at a tick.
+#[derive(Clone, Debug)]
+pub(super) struct Bucket<const P: usize> {
+    pub(super) packets: Vec<Packet<P>>,
+    /// Whether one of them overtook another that may be here too.
+    pub(super) is_mixed: bool,
+}
+
+impl<const P: usize> Default for Bucket<P> {
+    fn default() -> Self {
+        Self { packets: Vec::new(), is_mixed: false }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Packet<const P: usize> {
+    pub(super) arrival: Instant,
+    pub(super) sequence: u64,
+    /// Where its receiver holds what it says.
+    pub(super) place: u32,
+    pub(super) receiver: u16,
+    pub(super) run: u16,
+    pub(super) position: [f64; P],
+    pub(super) velocity: [f64; P],
+}
+
+/// How many ticks a span takes, rounded up.
+#[derive(Clone, Copy, Debug)]
+struct Ticks {
+    nanos: u64,
+    /// ⌈2^64/nanos⌉, if ticks are shorter than 2^31 ns.
+    reciprocal: Option<u64>,
+}
+
+impl Ticks {
+    fn new(nanos: u64) -> Self {
+        Self { nanos, reciprocal: (2..1 << 31).contains(&nanos).then(|| u64::MAX / nanos + 1) }
+    }
+
+    /// A division would add 4 % to a tick of ten peers over links with jitter and loss. With r = ⌈2^64/d⌉ = (2^64 + e)/d, 0 ≤ e < d, the product n·r/2^64 is
+    /// n/d + n·e/(d·2^64), which has the same whole part as n/d while n·e < 2^64: for n and d below 2^32.
+    #[inline(always)]
+    fn count(self, span: u64) -> u64 {
+        match self.reciprocal {
+            Some(reciprocal) if span < 1 << 31 => ((u128::from(span + self.nanos - 1) * u128::from(reciprocal)) >> 64) as u64,
+            _ => span.div_ceil(self.nanos),
+        }
+    }
+}
+
+impl<const P: usize> InFlight<P> {
+    /// Nothing in flight, with ticks of that length.
+    pub(super) fn new(tick_nanos: u64) -> Self {
+        Self {
+            ticks: Ticks::new(tick_nanos),
+            wheel: Box::new(std::array::from_fn(|_| Bucket::default())),
+            beyond: BTreeMap::new(),
+            emptied: Vec::new(),
+        }
+    }
+
+    /// A packet that is known at this tick and instant; whether it may arrive in another order than it was put here.
+    #[inline(always)]
+    pub(super) fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<P>, is_mixed: bool) {
+        // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
+        let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
+        let due = tick.saturating_add(ticks);
+        let bucket = if ticks < HORIZON { &mut self.wheel[slot(due)] } else { self.beyond.entry(due).or_default() };
+        if bucket.packets.capacity() == 0 {
+            bucket.packets = self.emptied.pop().unwrap_or_default();
+        }
+        bucket.is_mixed |= is_mixed;
+        bucket.packets.push(packet);
+    }
+
+    /// All of them, in no order.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Packet<P>> {
+        self.wheel.iter().chain(self.beyond.values()).flat_map(|bucket| &bucket.packets)
+    }
+
+    /// Takes back the memory of a bucket whose packets are gone.
+    pub(super) fn reuse(&mut self, emptied: Vec<Packet<P>>) {
+        self.emptied.push(emptied);
+    }
+
+    /// The samples that are due at that tick, if there are any.
+    pub(super) fn due(&mut self, tick: u64) -> Option<Bucket<P>> {
+        if !self.beyond.is_empty() {
+            self.come_near(tick);
+        }
+        let bucket = std::mem::take(&mut self.wheel[slot(tick)]);
+        (!bucket.packets.is_empty()).then_some(bucket)
+    }
+
+    /// The samples that are due at that tick and were sent long ago.
+    #[cold]
+    fn come_near(&mut self, tick: u64) {
+        if let Some(bucket) = self.beyond.remove(&tick) {
+            let near = &mut self.wheel[slot(tick)];
+            near.packets.extend(bucket.packets);
+            near.is_mixed = true;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At every edge: of a tick, of the range in which the reciprocal is exact, of the range of ticks that have one.
+    #[test]
+    fn ticks_are_counted_as_by_dividing() {
+        for nanos in [1, 2, 3, 7, 999_983, 1_000_000, 125_000_001, (1 << 31) - 1, 1 << 31, (1 << 31) + 1, 1 << 50] {
+            let ticks = Ticks::new(nanos);
+            let edges = [1, 2, 1000, (1 << 31) / nanos, (1 << 31) / nanos + 1, (1 << 32) / nanos, (1 << 62) / nanos].map(|count| count * nanos);
+            for edge in edges.into_iter().chain([1 << 31, 1 << 32, 1 << 62]) {
+                for span in [0, edge.saturating_sub(1), edge, edge + 1] {
+                    assert_eq!(ticks.count(span), span.div_ceil(nanos), "{span} ns in ticks of {nanos} ns");
+                }
+            }
+        }
+    }
+}

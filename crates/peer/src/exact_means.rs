@@ -1,0 +1,57 @@
+//! Means of states, exact but for one rounding.
+
+use alloc::vec::Vec;
+
+use crate::State;
+use crate::exact_sum::ExactSum;
+
+/// Sums of states without any rounding, and their means.
+#[derive(Clone, Debug, Default)]
+pub struct ExactMeans<const A: usize> {
+    sums: Vec<[ExactSum; 2]>,
+}
+
+impl<const A: usize> ExactMeans<A> {
+    /// The sums of these states.
+    pub fn new<'a>(states: impl IntoIterator<Item = &'a State<A>>) -> Self {
+        let mut means = Self { sums: (0..A).map(|_| Default::default()).collect() };
+        for state in states {
+            for (axis, [position, velocity]) in means.sums.iter_mut().enumerate() {
+                position.add(state.position[axis]);
+                velocity.add(state.velocity[axis]);
+            }
+        }
+        means
+    }
+
+    /// One state takes the place of another.
+    #[inline]
+    pub fn replace(&mut self, before: &State<A>, now: &State<A>) {
+        for (axis, [position, velocity]) in self.sums.iter_mut().enumerate() {
+            position.subtract(before.position[axis]);
+            position.add(now.position[axis]);
+            velocity.subtract(before.velocity[axis]);
+            velocity.add(now.velocity[axis]);
+        }
+    }
+
+    /// The mean of that number of states.
+    #[must_use]
+    pub fn mean(&self, count: usize) -> State<A> {
+        self.each(count, |_, sum, count| sum.mean(count))
+    }
+
+    /// The mean of that number of states without one of them.
+    #[must_use]
+    pub fn mean_without(&self, state: &State<A>, count: usize) -> State<A> {
+        self.each(count, |number, sum, count| sum.mean_without(number(state), count))
+    }
+
+    fn each(&self, count: usize, mean: impl Fn(&dyn Fn(&State<A>) -> f64, &ExactSum, u32) -> f64) -> State<A> {
+        let count = u32::try_from(count).expect("peers are counted in 32 bits");
+        State {
+            position: core::array::from_fn(|axis| mean(&|state| state.position[axis], &self.sums[axis][0], count)),
+            velocity: core::array::from_fn(|axis| mean(&|state| state.velocity[axis], &self.sums[axis][1], count)),
+        }
+    }
+}

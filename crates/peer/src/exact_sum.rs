@@ -1,0 +1,240 @@
+//! Means that do not depend on the order of what they are the mean of.
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "digits are cut on purpose; places and exponents are small; a mantissa has 53 bits"
+)]
+
+/// Bits of a digit.
+const BITS: u32 = 32;
+/// Digits that hold any number and the carries above: bit 0 of digit [`FRACTION`] is the least bit of the smallest number, 2^−1074.
+const DIGITS: usize = 71;
+/// Digits below all numbers, for the fraction of a mean.
+const FRACTION: usize = 3;
+/// Digits take that many additions before they must be carried.
+const MOST_ADDITIONS: u32 = 1 << 30;
+
+/// A sum of numbers without any rounding, from which numbers can be taken away again.
+///
+/// Each number is added to the three digits of base 2³² that it reaches, in an integer that holds all finite numbers (the small superaccumulator of Neal 2015,
+/// *Fast exact summation using small and large superaccumulators*). So the sum is that of any order, and [`ExactSum::mean`] rounds once.
+#[derive(Clone, Debug)]
+pub struct ExactSum {
+    digits: [i64; DIGITS],
+    /// The first digit ever reached, and the one behind the last.
+    reached: (u8, u8),
+    additions: u32,
+}
+
+impl Default for ExactSum {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl ExactSum {
+    /// Zero.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { digits: [0; DIGITS], reached: (DIGITS as u8, 0), additions: 0 }
+    }
+
+    /// Adds a finite number; of anything else the sum is unspecified.
+    #[inline]
+    pub fn add(&mut self, number: f64) {
+        self.change(number.to_bits());
+    }
+
+    /// Takes a finite number away.
+    #[inline]
+    pub fn subtract(&mut self, number: f64) {
+        self.change((-number).to_bits());
+    }
+
+    #[inline]
+    fn change(&mut self, bits: u64) {
+        let exponent = (bits >> 52 & 0x7ff) as usize;
+        let mantissa = bits & (1 << 52) - 1 | u64::from(exponent != 0) << 52;
+        // The place of the least bit: numbers below the normal ones have that of the smallest normal one.
+        let place = exponent.max(1) - 1;
+        let (digit, shift) = (place / BITS as usize + FRACTION, place % BITS as usize);
+        let wide = u128::from(mantissa) << shift;
+        let sign = 1 - 2 * (bits >> 63).cast_signed();
+        for (part, digit) in self.digits[digit..digit + 3].iter_mut().enumerate() {
+            *digit += sign * i64::from((wide >> (BITS * part as u32)) as u32);
+        }
+        self.reached = (self.reached.0.min(digit as u8), self.reached.1.max(digit as u8 + 3));
+        self.additions += 1;
+        if self.additions == MOST_ADDITIONS {
+            self.carry();
+        }
+    }
+
+    /// Brings every digit but the last back below 2³².
+    #[cold]
+    fn carry(&mut self) {
+        let (first, end) = (usize::from(self.reached.0), DIGITS - 1);
+        for digit in first..end {
+            let carried = self.digits[digit] >> BITS;
+            self.digits[digit] -= carried << BITS;
+            self.digits[digit + 1] += carried;
+        }
+        self.reached.1 = DIGITS as u8;
+        // Each digit is as large as one addition makes it.
+        self.additions = 1;
+    }
+
+    /// The nearest number to the sum over `count`, of two the even one. Zero has the sign +.
+    ///
+    /// # Panics
+    ///
+    /// If `count` is zero.
+    #[must_use]
+    pub fn mean(&self, count: u32) -> f64 {
+        assert!(count > 0, "a mean is one of something");
+        let Some((digits, is_negative)) = self.magnitude() else { return 0.0 };
+        let top = (FRACTION..DIGITS).rev().find(|digit| digits[*digit] != 0).unwrap_or(FRACTION);
+        // Long division. The first digit of the quotient may be zero, the second is not then: four have more bits than a number and a half.
+        let (mut rest, mut quotient, last) = (0_u64, 0_u128, top - 3);
+        for digit in (last..=top).rev() {
+            let dividend = rest << BITS | u64::from(digits[digit]);
+            quotient = quotient << BITS | u128::from(dividend / u64::from(count));
+            rest = dividend % u64::from(count);
+        }
+        let is_more = rest != 0 || digits[..last].iter().any(|digit| *digit != 0);
+        let magnitude = nearest(quotient, last, is_more);
+        if is_negative { -magnitude } else { magnitude }
+    }
+
+    /// [`ExactSum::mean`] of the sum without one of its numbers.
+    #[must_use]
+    pub fn mean_without(&self, number: f64, count: u32) -> f64 {
+        let mut others = self.clone();
+        others.subtract(number);
+        others.mean(count)
+    }
+
+    /// The digits of the absolute value, each below 2³², and the sign; `None` if it is zero.
+    fn magnitude(&self) -> Option<([u32; DIGITS], bool)> {
+        let (first, end) = (usize::from(self.reached.0), usize::from(self.reached.1));
+        // What is above all carries of the digits says the sign.
+        let carry = self.digits.get(first..end)?.iter().fold(0, |carry, digit| (digit + carry) >> BITS);
+        let sign = if carry < 0 { -1 } else { 1 };
+        let (mut digits, mut carry, mut all) = ([0; DIGITS], 0_i64, 0);
+        for digit in first..DIGITS {
+            if digit >= end && carry == 0 {
+                break;
+            }
+            let sum = sign * self.digits[digit] + carry;
+            digits[digit] = sum as u32;
+            carry = sum >> BITS;
+            all |= digits[digit];
+        }
+        (all != 0).then_some((digits, sign < 0))
+    }
+}
+
+/// The number nearest to `quotient` and a bit more, if there is more, where bit 0 of the quotient is bit 0 of that digit.
+fn nearest(quotient: u128, digit: usize, is_more: bool) -> f64 {
+    // The exponents of the least bit of the quotient and of the result.
+    let least = (BITS as i32) * (digit as i32 - FRACTION as i32) - 1074;
+    let bits = 128 - quotient.leading_zeros() as i32;
+    let unit = (least + bits - 53).max(-1074);
+    let shift = unit - least;
+    let (mantissa, cut) = (quotient >> shift, quotient & ((1 << shift) - 1));
+    let half = 1_u128 << (shift - 1);
+    let is_up = cut > half || cut == half && (is_more || mantissa & 1 == 1);
+    let mantissa = (mantissa + u128::from(is_up)) as u64;
+    // Both factors and the product are exact.
+    let power = if unit >= -1022 { ((unit + 1023) as u64) << 52 } else { 1 << (unit + 1074) };
+    mantissa as f64 * f64::from_bits(power)
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn sum_of(numbers: &[f64]) -> ExactSum {
+        let mut sum = ExactSum::new();
+        numbers.iter().for_each(|number| sum.add(*number));
+        sum
+    }
+
+    /// A number as a multiple of 2^−90, which those of the test are.
+    fn units(number: f64) -> i128 {
+        let scaled = number * 2_f64.powi(45);
+        // Two steps, since a whole number beyond 2^63 is exact as an i128 only if the number is.
+        let whole = scaled.trunc();
+        ((whole as i128) << 45) + ((scaled - whole) * 2_f64.powi(45)) as i128
+    }
+
+    proptest! {
+        /// No other number is nearer to the exact mean: multiples of 2^−30 below 2^30, whose sum and mean are whole in units of 2^−90.
+        #[test]
+        fn a_mean_is_the_nearest_number(numbers in prop::collection::vec(-(1_i64 << 60)..1 << 60, 1..50), cuts in 0..60_u32) {
+            let numbers: Vec<f64> = numbers.iter().map(|number| (number >> cuts) as f64 * 2_f64.powi(-30)).collect();
+            let count = numbers.len() as u32;
+            let mean = sum_of(&numbers).mean(count);
+            let exact: i128 = numbers.iter().map(|number| units(*number)).sum();
+            let distance = |mean: f64| (units(mean) * i128::from(count) - exact).abs();
+            for other in [mean.next_up(), mean.next_down()] {
+                // A neighbour of zero is far below the unit.
+                prop_assert!(mean == 0.0 || distance(mean) <= distance(other), "{mean:e}, {other:e}");
+            }
+            prop_assert!(mean != 0.0 || exact == 0);
+        }
+
+        /// Any finite numbers in any order, with others that came and went: the same bits.
+        #[test]
+        fn the_order_and_the_past_do_not_matter(
+            numbers in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO, 1..40),
+            gone in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL, 0..20),
+        ) {
+            let count = numbers.len() as u32;
+            let mean = sum_of(&numbers).mean(count);
+            let mut other = sum_of(&gone);
+            numbers.iter().rev().for_each(|number| other.add(*number));
+            other.carry();
+            gone.iter().for_each(|number| other.subtract(*number));
+            prop_assert_eq!(other.mean(count).to_bits(), mean.to_bits());
+            other.add(1.5);
+            prop_assert_eq!(other.mean_without(1.5, count).to_bits(), mean.to_bits());
+        }
+
+        /// Of equal numbers it is that number, of a number and its opposite zero.
+        #[test]
+        fn the_mean_of_equal_numbers_is_that_number(number in prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL, count in 1..200_u32) {
+            let mut sum = sum_of(&Vec::from_iter((0..count).map(|_| number)));
+            prop_assert_eq!(sum.mean(count).to_bits(), number.to_bits());
+            sum.add(f64::MAX);
+            (0..count).for_each(|_| sum.subtract(number));
+            sum.subtract(f64::MAX);
+            prop_assert_eq!(sum.mean(count).to_bits(), 0);
+        }
+    }
+
+    #[test]
+    fn ties_go_to_even_and_the_smallest_numbers_are_rounded_too() {
+        let least = f64::from_bits(1);
+        for (numbers, count, expected) in [
+            (&[least][..], 2, 0.0),
+            (&[least, least, least], 2, 2.0 * least),
+            (&[least, least, least], 4, least),
+            (&[-least, -least, -least], 4, -least),
+            (&[1.0, f64::EPSILON / 2.0], 1, 1.0),
+            (&[1.0 + f64::EPSILON, f64::EPSILON / 2.0], 1, 1.0 + 2.0 * f64::EPSILON),
+            (&[1.0, f64::EPSILON / 2.0, least], 1, 1.0 + f64::EPSILON),
+            (&[f64::MAX, f64::MAX, f64::MAX], 3, f64::MAX),
+            (&[f64::MAX, f64::MAX, -1.0], 2, f64::MAX),
+            (&[1e300, 1.0, -1e300], 1, 1.0),
+        ] {
+            assert_eq!(sum_of(numbers).mean(count).to_bits(), f64::to_bits(expected), "{numbers:?}/{count}");
+        }
+    }
+}

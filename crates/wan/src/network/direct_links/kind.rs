@@ -1,0 +1,141 @@
+//! What links of one configuration have in common, and what each of them remembers.
+
+use cohaptic_units::{Bytes, Instant, Probability};
+
+use crate::line::direct::Words;
+use crate::random::{PacketDraws, Purpose, Stream};
+use crate::stages::config::{Layout, LinkConfig};
+use crate::stages::delay::{CorrelatedDelays, DelayStage};
+use crate::stages::loss::{GilbertElliott, GilbertElliottState, Loss};
+use crate::stages::order::Order;
+use crate::stages::queue::EqualPackets;
+
+/// A kind of link.
+#[derive(Clone, Debug)]
+pub(super) struct Kind {
+    pub(super) is_random: bool,
+    loss: Losses,
+    delay: Delays,
+    queue: Option<EqualPackets>,
+}
+
+#[derive(Clone, Debug)]
+enum Losses {
+    None,
+    Independent(Probability),
+    GilbertElliott(GilbertElliott),
+}
+
+#[derive(Clone, Debug)]
+enum Delays {
+    Independent(DelayStage),
+    Correlated(CorrelatedDelays),
+}
+
+/// What a link remembers of earlier packets, and a counter that few links need.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Remembered {
+    /// When the packet before left the queue.
+    departure: Instant,
+    /// The latest value of the chain of delays, NaN before the first packet.
+    normal: f64,
+    state: GilbertElliottState,
+    /// Packets that found no room in the queue.
+    pub(super) found_full: u64,
+}
+
+/// What becomes of a packet.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Verdict {
+    Arrives(Instant),
+    Lost,
+    /// Dropped for another cause, which is counted.
+    Dropped,
+}
+
+impl Kind {
+    /// The kind of such links, for packets of that size; `None` if they remember what is not [`Remembered`].
+    pub(super) fn new(config: &LinkConfig, size: Bytes) -> Option<Self> {
+        let loss = match &config.loss {
+            Loss::None => Losses::None,
+            Loss::Independent(probability) => Losses::Independent(*probability),
+            Loss::GilbertElliott(chain) => Losses::GilbertElliott(*chain),
+            Loss::Correlated(_) | Loss::GilbertElliottInTime(_) | Loss::FourState(_) | Loss::Pattern(_) => return None,
+        };
+        let delay = match CorrelatedDelays::new(&config.delay) {
+            Some(correlated) => Delays::Correlated(correlated),
+            None => Delays::Independent(DelayStage::new(&config.delay)),
+        };
+        let remembers_more = matches!(&delay, Delays::Independent(delay) if delay.remembers());
+        if !config.outages.is_empty() || config.order != Order::AllowReordering || remembers_more {
+            return None;
+        }
+        Some(Self { is_random: config.is_random(), loss, delay, queue: queue(config, size)? })
+    }
+
+    /// Whether its links remember anything.
+    pub(super) const fn remembers(&self) -> bool {
+        self.queue.is_some() || matches!(self.loss, Losses::GilbertElliott(_)) || matches!(self.delay, Delays::Correlated(_))
+    }
+
+    /// What a link remembers before its first packet.
+    pub(super) fn beginning(&self, draws: Stream) -> Remembered {
+        let state = match &self.loss {
+            Losses::GilbertElliott(chain) => chain.stationary_state(draws.packet(0).first(Purpose::InitialState)),
+            Losses::None | Losses::Independent(_) => GilbertElliottState::Good,
+        };
+        Remembered { state, ..Remembered::NOTHING }
+    }
+
+    /// What becomes of a packet of a link that remembers nothing.
+    #[inline(always)]
+    pub(super) fn fate(&mut self, now: Instant, [loss_word, jitter_word]: Words, packet: PacketDraws) -> Verdict {
+        match (&self.loss, &mut self.delay) {
+            (Losses::Independent(probability), _) if probability.happens(loss_word) => Verdict::Lost,
+            (_, Delays::Independent(delay)) => Verdict::Arrives(now.saturating_add_nanos(delay.draw_nanos(now, jitter_word, packet))),
+            (_, Delays::Correlated(_)) => unreachable!("it remembers the delay before"),
+        }
+    }
+
+    /// What becomes of a packet of a link that remembers that.
+    #[inline(always)]
+    pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, [loss_word, jitter_word]: Words, packet: PacketDraws) -> Verdict {
+        let is_lost = match &self.loss {
+            Losses::None => false,
+            Losses::Independent(probability) => probability.happens(loss_word),
+            Losses::GilbertElliott(chain) => chain.loses(&mut link.state, loss_word, || packet.more(Purpose::Loss).next_word()),
+        };
+        if is_lost {
+            return Verdict::Lost;
+        }
+        let leaves = match &self.queue {
+            None => now,
+            Some(queue) => match queue.offer(now, &mut link.departure) {
+                Some(leaves) => leaves,
+                None => {
+                    link.found_full += 1;
+                    return Verdict::Dropped;
+                }
+            },
+        };
+        let delay = match &mut self.delay {
+            Delays::Independent(delay) => delay.draw_nanos(leaves, jitter_word, packet),
+            Delays::Correlated(delays) => delays.draw_nanos(&mut link.normal, jitter_word, packet),
+        };
+        Verdict::Arrives(leaves.saturating_add_nanos(delay))
+    }
+}
+
+impl Remembered {
+    /// That of a link that remembers nothing.
+    pub(super) const NOTHING: Self = Self { departure: Instant::ZERO, normal: f64::NAN, state: GilbertElliottState::Good, found_full: 0 };
+}
+
+/// The queue of a link for packets of that size, if it has one; `None` if it is not one of [`EqualPackets`], or lies behind the delay.
+pub(super) fn queue(config: &LinkConfig, size: Bytes) -> Option<Option<EqualPackets>> {
+    match &config.bottleneck {
+        None => Some(None),
+        Some(_) if config.layout == Layout::Netem => None,
+        Some(bottleneck) => EqualPackets::new(bottleneck, size).map(Some),
+    }
+}

@@ -1,0 +1,466 @@
+//! Many links that decide at once what becomes of a packet, for drivers that keep the packets on the way themselves.
+
+mod kind;
+
+use alloc::vec::Vec;
+
+use cohaptic_units::{Bytes, Instant};
+
+use kind::{Kind, Remembered, Verdict};
+
+use super::id::LinkId;
+use crate::fates::fate::DropCause;
+use crate::fates::stats::LinkStats;
+use crate::line::direct::{Direct, Words};
+use crate::line::model::LinkModel;
+use crate::line::name::LinkName;
+use crate::random::{PacketDraws, Stream};
+use crate::stages::config::LinkConfig;
+use crate::stages::queue::EqualPackets;
+
+/// Links that know at once when a packet arrives: outages, loss, a tail-drop queue before a line of one rate, delay with jitter, and order. Each is a function
+/// from a packet to its arrival, with the memory that bursts, correlated delays and the line need. All packets have one size.
+///
+/// It is what [`crate::Network`] compiles such links to, with the same random numbers at the same addresses and the same counters, without the queue of packets
+/// on the way: a driver that looks at arrivals on a lattice of its own has a better one. Whether a packet arrives in time to be counted as delivered is
+/// known when it is offered, since the driver says until when it will look.
+///
+/// Links are numbered from 0 as they are added. Those without memory take a cache line each, most others one and a half.
+#[derive(Clone, Debug)]
+pub struct DirectLinks {
+    until: Instant,
+    size: Bytes,
+    links: Vec<LinkState>,
+    /// What links of a kind have in common.
+    kinds: Vec<(LinkConfig, Kind)>,
+    /// What each link remembers, if any of a kind remembers anything.
+    remembered: Vec<Remembered>,
+    others: Vec<Other>,
+}
+
+/// Packets that were offered to neighbouring links at one instant: one bit, and one place, for each link.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Arrivals {
+    /// The links whose packet arrives.
+    pub arrive: u8,
+    /// Those of them whose packet arrives before one that was sent earlier.
+    pub overtake: u8,
+    /// The number of each packet on its link, from 0.
+    pub sequences: [u64; DirectLinks::AT_ONCE],
+    /// When each arrives; of no meaning for one that does not.
+    pub at: [Instant; DirectLinks::AT_ONCE],
+}
+
+/// A link: its counters, and where the rest of it is kept.
+#[derive(Clone, Debug)]
+struct LinkState {
+    draws: Stream,
+    offered: u64,
+    latest: Instant,
+    delivered: u64,
+    delay_nanos: u128,
+    lost: u64,
+    memory: Memory,
+}
+
+/// Which kind of link it is.
+#[derive(Clone, Copy, Debug)]
+enum Memory {
+    /// One of a kind that remembers nothing.
+    Plain(u16),
+    /// One of a kind that remembers what [`Remembered`] has.
+    Remembering(u16),
+    /// One of the others.
+    Other(u32),
+}
+
+/// A link that is of no kind.
+#[derive(Clone, Debug)]
+struct Other {
+    direct: Direct,
+    queue: Option<EqualPackets>,
+    departure: Instant,
+    outage: u64,
+    found_full: u64,
+}
+
+impl DirectLinks {
+    /// Number of links to which a packet is offered at once: a processor computes several at the same time.
+    pub const AT_ONCE: usize = 8;
+
+    /// No links, for packets of that size; those that arrive by `until` will count as delivered.
+    #[must_use]
+    pub const fn new(until: Instant, size: Bytes) -> Self {
+        Self { until, size, links: Vec::new(), kinds: Vec::new(), remembered: Vec::new(), others: Vec::new() }
+    }
+
+    /// Whether such a link can be added: what becomes of a packet of that size is known as soon as it is offered, nothing is copied, marked or damaged.
+    #[must_use]
+    pub fn takes(model: &LinkModel, size: Bytes) -> bool {
+        model.as_fixed().is_some_and(|config| config.is_direct_but_for_queue() && kind::queue(config, size).is_some())
+    }
+
+    /// Adds a link, and says whether it could be added: one that they do not [take](DirectLinks::takes) needs an engine, and is left out.
+    ///
+    /// # Panics
+    ///
+    /// With more than 2^32 links.
+    #[must_use]
+    pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) -> bool {
+        let Some(config) = model.as_fixed().filter(|_| Self::takes(model, self.size)) else { return false };
+        let draws = Stream::new(seed, name.as_str().as_bytes());
+        let memory = match self.kind(config) {
+            Some((place, kind)) if kind.remembers() => {
+                let beginning = kind.beginning(draws);
+                self.remembered.resize(self.links.len(), Remembered::NOTHING);
+                self.remembered.push(beginning);
+                Memory::Remembering(place)
+            }
+            Some((place, _)) => Memory::Plain(place),
+            None => {
+                let queue = kind::queue(config, self.size).flatten();
+                let direct = Direct::new(seed, name, config);
+                self.others.push(Other { direct, queue, departure: Instant::ZERO, outage: 0, found_full: 0 });
+                Memory::Other(u32::try_from(self.others.len() - 1).expect("fewer than 2^32 links fit into memory"))
+            }
+        };
+        self.links.push(LinkState { draws, offered: 0, latest: Instant::ZERO, delivered: 0, delay_nanos: 0, lost: 0, memory });
+        true
+    }
+
+    /// Offers a packet to each of `count` links from `first` on, at most [`DirectLinks::AT_ONCE`], but for those whose bit is set in `excluded`, and writes into
+    /// `arrivals` what becomes of them. Instants must not go back.
+    ///
+    /// # Panics
+    ///
+    /// If there are no such links.
+    #[inline(always)]
+    pub fn offer(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
+        (arrivals.arrive, arrivals.overtake) = (0, 0);
+        let first = first.index();
+        let (links, span) = (&mut self.links[first..first + count], (now, self.until));
+        // Drawing for eight links what two need takes longer than one by one.
+        let are_few = count == Self::AT_ONCE && excluded.count_zeros() <= 2;
+        match &mut self.kinds[..] {
+            _ if are_few => self.offer_one_by_one(now, first, count, excluded, arrivals),
+            [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() => {
+                alike(kind.is_random, links, span, excluded, arrivals, |_, words, packet| kind.fate(now, words, packet));
+            }
+            [(_, kind)] if self.others.is_empty() => {
+                let remembered = &mut self.remembered[first..first + count];
+                alike(kind.is_random, links, span, excluded, arrivals, |place, words, packet| {
+                    kind.verdict(now, &mut remembered[place], words, packet)
+                });
+            }
+            _ => self.offer_one_by_one(now, first, count, excluded, arrivals),
+        }
+    }
+
+    #[inline(never)]
+    fn offer_one_by_one(&mut self, now: Instant, first: usize, count: usize, excluded: u8, arrivals: &mut Arrivals) {
+        for place in (0..count).filter(|place| excluded >> place & 1 == 0) {
+            let words = self.links[first + place].words(&self.kinds);
+            arrivals.sequences[place] = self.links[first + place].offered;
+            if let Some((at, overtakes)) = self.offer_one(now, first + place, words) {
+                arrivals.at[place] = at;
+                arrivals.arrive |= 1 << place;
+                arrivals.overtake |= u8::from(overtakes) << place;
+            }
+        }
+    }
+
+    /// Takes back that a packet is delivered: nobody will look when it arrives.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    pub fn forget(&mut self, link: LinkId, sent: Instant, arrival: Instant) {
+        if arrival <= self.until {
+            let link = &mut self.links[link.index()];
+            link.delivered -= 1;
+            link.delay_nanos -= u128::from(arrival.as_nanos() - sent.as_nanos());
+        }
+    }
+
+    /// The counters of a link.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such link.
+    #[must_use]
+    pub fn stats(&self, link: LinkId) -> LinkStats {
+        let LinkState { offered, delivered, delay_nanos, lost, memory, .. } = self.links[link.index()];
+        let (outage, found_full) = match memory {
+            Memory::Plain(_) => (0, 0),
+            Memory::Remembering(_) => (0, self.remembered[link.index()].found_full),
+            Memory::Other(place) => (self.others[place as usize].outage, self.others[place as usize].found_full),
+        };
+        let dropped = [(DropCause::Outage, outage), (DropCause::Loss, lost), (DropCause::QueueFull, found_full)];
+        LinkStats::counted(offered, delivered, delay_nanos, dropped)
+    }
+
+    /// The kind of a link and its place, if it is of a kind and there are not too many.
+    fn kind(&mut self, config: &LinkConfig) -> Option<(u16, &Kind)> {
+        let known = self.kinds.iter().position(|(other, _)| other == config);
+        let place = match known {
+            Some(place) => place,
+            // Looking a kind up takes longer the more there are.
+            None if self.kinds.len() >= 64 => return None,
+            None => {
+                self.kinds.push((config.clone(), Kind::new(config, self.size)?));
+                self.kinds.len() - 1
+            }
+        };
+        Some((u16::try_from(place).ok()?, &self.kinds[place].1))
+    }
+
+    /// When the next packet of a link arrives, and whether it overtakes.
+    fn offer_one(&mut self, now: Instant, place: usize, words: Words) -> Option<(Instant, bool)> {
+        let link = &mut self.links[place];
+        let draws = link.draws.packet(link.offered);
+        let verdict = match link.memory {
+            Memory::Plain(kind) => self.kinds[usize::from(kind)].1.fate(now, words, draws),
+            Memory::Remembering(kind) => self.kinds[usize::from(kind)].1.verdict(now, &mut self.remembered[place], words, draws),
+            Memory::Other(other) => self.others[other as usize].verdict(now, link.offered, words),
+        };
+        link.count(now, self.until, verdict)
+    }
+}
+
+impl Other {
+    fn verdict(&mut self, now: Instant, number: u64, words: Words) -> Verdict {
+        let Self { direct, queue, departure, .. } = self;
+        let fate = direct.offer_through(now, number, words, |now| match queue {
+            None => Ok(now),
+            Some(queue) => queue.offer(now, departure).ok_or(DropCause::QueueFull),
+        });
+        match fate {
+            Ok(at) => Verdict::Arrives(at),
+            Err(DropCause::Outage) => {
+                self.outage += 1;
+                Verdict::Dropped
+            }
+            Err(DropCause::QueueFull) => {
+                self.found_full += 1;
+                Verdict::Dropped
+            }
+            Err(_) => Verdict::Lost,
+        }
+    }
+}
+
+/// Offers a packet to neighbouring links of one kind: each step for all of them before the next. `verdict` decides about the packet of the link in a place.
+#[inline(always)]
+fn alike(
+    is_random: bool,
+    links: &mut [LinkState],
+    (now, until): (Instant, Instant),
+    excluded: u8,
+    arrivals: &mut Arrivals,
+    mut verdict: impl FnMut(usize, Words, PacketDraws) -> Verdict,
+) {
+    let mut words = [[0; 2]; DirectLinks::AT_ONCE];
+    let Arrivals { sequences, at, .. } = arrivals;
+    for (link, (words, sequence)) in links.iter().zip(words.iter_mut().zip(sequences)) {
+        *sequence = link.offered;
+        if is_random {
+            *words = link.draws.packet(link.offered).loss_and_jitter();
+        }
+    }
+    let (mut bit, mut arrive, mut overtake) = (1, 0, 0);
+    for (place, (link, (words, at))) in links.iter_mut().zip(words.into_iter().zip(at)).enumerate() {
+        if excluded & bit == 0 {
+            let verdict = verdict(place, words, link.draws.packet(link.offered));
+            if let Some((arrival, overtakes)) = link.count(now, until, verdict) {
+                *at = arrival;
+                arrive |= bit;
+                overtake |= if overtakes { bit } else { 0 };
+            }
+        }
+        bit = bit.wrapping_shl(1);
+    }
+    (arrivals.arrive, arrivals.overtake) = (arrive, overtake);
+}
+
+impl Arrivals {
+    /// None yet.
+    pub const NONE: Self = Self { arrive: 0, overtake: 0, sequences: [0; DirectLinks::AT_ONCE], at: [Instant::ZERO; DirectLinks::AT_ONCE] };
+
+    /// The places of those that arrive, in order.
+    #[inline(always)]
+    pub fn places(&self) -> impl Iterator<Item = usize> + use<> {
+        let mut left = self.arrive;
+        core::iter::from_fn(move || {
+            let place = (left != 0).then(|| left.trailing_zeros() as usize)?;
+            left &= left - 1;
+            Some(place)
+        })
+    }
+
+    /// Whether the packet in that place overtakes.
+    #[must_use]
+    #[inline(always)]
+    pub const fn overtakes(&self, place: usize) -> bool {
+        self.overtake >> place & 1 == 1
+    }
+}
+
+impl LinkState {
+    /// Counts a packet, and gives when it arrives and whether it overtakes.
+    #[inline(always)]
+    fn count(&mut self, now: Instant, until: Instant, verdict: Verdict) -> Option<(Instant, bool)> {
+        self.offered += 1;
+        let at = match verdict {
+            Verdict::Arrives(at) => at,
+            Verdict::Lost => {
+                self.lost += 1;
+                return None;
+            }
+            Verdict::Dropped => return None,
+        };
+        if at <= until {
+            self.delivered += 1;
+            self.delay_nanos += u128::from(at.as_nanos() - now.as_nanos());
+        }
+        let overtakes = at < self.latest;
+        self.latest = self.latest.max(at);
+        Some((at, overtakes))
+    }
+
+    /// The first random words of the next packet; zeros if it needs none.
+    #[inline(always)]
+    fn words(&self, kinds: &[(LinkConfig, Kind)]) -> Words {
+        match self.memory {
+            Memory::Plain(kind) | Memory::Remembering(kind) if !kinds[usize::from(kind)].1.is_random => [0; 2],
+            Memory::Plain(_) | Memory::Remembering(_) | Memory::Other(_) => self.draws.packet(self.offered).loss_and_jitter(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::time::Duration;
+
+    use cohaptic_units::Rate;
+
+    use super::*;
+    use crate::link::Link;
+    use crate::netem::Netem;
+    use crate::packet::PacketInfo;
+    use crate::stages::config::Layout;
+    use crate::stages::queue::{Bottleneck, QueueLimit};
+
+    fn model(words: &str) -> LinkModel {
+        Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap().into()
+    }
+
+    /// Those words, with this queue before a line of 100 kbit/s: 5.12 ms for 64 bytes.
+    fn queued(words: &str, limit: Option<QueueLimit>) -> LinkModel {
+        let bottleneck = Bottleneck { limit, ..Bottleneck::at_rate(Rate::bits_per_sec(100_000).unwrap()) };
+        let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+        LinkConfig { bottleneck: Some(bottleneck), layout: Layout::Physical, ..config }.into()
+    }
+
+    const DIRECT: [&str; 9] = [
+        "delay 5ms",
+        "delay 24ms 9ms loss 10%",
+        "delay 24ms 9ms 50% distribution pareto",
+        "loss gemodel 5% 20%",
+        "delay 3ms 2ms distribution normal",
+        "loss 50%",
+        "delay 20ms 5ms distribution normal",
+        "delay 24ms 4ms 50% loss gemodel 5% 20% 30% 2%",
+        "delay 24ms 4ms 50%",
+    ];
+
+    #[test]
+    fn they_decide_what_whole_links_decide() {
+        let direct = DIRECT.map(model);
+        compare(&direct[..8]);
+        compare(&direct[1..]);
+        for model in direct {
+            compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
+        }
+    }
+
+    /// Packets come every 8 ms, or every 4: the line is idle, or its queue fills.
+    #[test]
+    fn queues_decide_what_whole_links_decide() {
+        let limits = [None, Some(QueueLimit::Packets(3)), Some(QueueLimit::Bytes(Bytes::new(200))), Some(QueueLimit::Time(Duration::from_millis(9)))];
+        let words = ["delay 24ms", "delay 24ms 9ms loss 10%", "delay 24ms 4ms 50% loss gemodel 5% 20%", "delay 24ms 9ms loss state 5% 20%"];
+        for limit in limits {
+            let queued = words.map(|words| queued(words, limit));
+            compare(&queued);
+            for model in queued {
+                compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
+            }
+        }
+    }
+
+    /// All links at once against each as a [`Link`]: the same packets at the same instants, the same counters at the end.
+    fn compare(direct: &[LinkModel]) {
+        let until = Instant::from_nanos(500 * 8_000_000);
+        let mut links = DirectLinks::new(until, Bytes::new(64));
+        let name = |place: usize| LinkName::between("a", &format!("b{place}"));
+        assert!(direct.iter().enumerate().all(|(place, model)| links.add(7, &name(place), model)));
+        let mut whole: Vec<Link<u64>> = direct.iter().enumerate().map(|(place, model)| Link::new(7, &name(place), model.clone())).collect();
+        let mut arrivals: Vec<Vec<(Instant, u64)>> = vec![Vec::new(); direct.len()];
+        for number in 0..500_u64 {
+            // Every 8 ms at first, every 4 ms later.
+            let now = Instant::from_nanos(number.min(250) * 8_000_000 + number.saturating_sub(250) * 4_000_000);
+            // Every third packet is not offered to the second link.
+            let excluded = if number % 3 == 0 { 0b10 } else { 0 };
+            for (place, link) in whole.iter_mut().enumerate().filter(|(place, _)| excluded >> place & 1 == 0) {
+                link.handle_packet(now, PacketInfo::from(Bytes::new(64)), 0).unwrap_or_else(|error| panic!("{place}: {error}"));
+            }
+            let mut offered = Arrivals::NONE;
+            links.offer(now, LinkId(0), direct.len(), excluded, &mut offered);
+            for place in offered.places() {
+                let so_far = &mut arrivals[place];
+                assert_eq!(offered.overtakes(place), so_far.iter().any(|(at, _)| *at > offered.at[place]));
+                so_far.push((offered.at[place], offered.sequences[place]));
+            }
+        }
+        for (place, link) in whole.iter_mut().enumerate() {
+            link.handle_timeout(until).unwrap();
+            let mut delivered = Vec::new();
+            while let Some(event) = link.poll_event() {
+                if let crate::fates::fate::Fate::Delivered(at) = event.fate {
+                    delivered.push((at, event.sequence));
+                }
+            }
+            let arrivals = &mut arrivals[place];
+            arrivals.sort_unstable();
+            arrivals.retain(|(at, _)| *at <= until);
+            assert_eq!(delivered, *arrivals, "{}", direct[place].words());
+            assert_eq!(links.stats(LinkId::new(place)), link.stats(), "{}", direct[place].words());
+        }
+    }
+
+    #[test]
+    fn what_is_forgotten_is_on_the_way_for_ever() {
+        // One that would have arrived at the very last instant.
+        let mut links = DirectLinks::new(Instant::from_nanos(5_000_000), Bytes::new(64));
+        assert!(links.add(1, &LinkName::between("a", "b"), &model("delay 5ms")));
+        let mut arrivals = Arrivals::NONE;
+        links.offer(Instant::ZERO, LinkId(0), 1, 0, &mut arrivals);
+        assert_eq!((arrivals.arrive, arrivals.overtake, arrivals.sequences[0]), (1, 0, 0));
+        assert_eq!((links.stats(LinkId(0)).delivered(), links.stats(LinkId(0)).in_flight()), (1, 0));
+        links.forget(LinkId(0), Instant::ZERO, arrivals.at[0]);
+        assert_eq!((links.stats(LinkId(0)).delivered(), links.stats(LinkId(0)).in_flight(), links.stats(LinkId(0)).mean_delay()), (0, 1, None));
+    }
+
+    #[test]
+    fn what_needs_an_engine_is_left_out() {
+        let mut links = DirectLinks::new(Instant::MAX, Bytes::new(64));
+        for words in ["rate 1mbit delay 5ms 1ms", "duplicate 1%", "delay 10ms limit 5", "corrupt 1%"] {
+            assert!(!links.add(1, &LinkName::between("a", "b"), &model(words)), "{words}");
+        }
+        assert!(links.links.is_empty());
+    }
+
+    #[test]
+    fn a_link_without_memory_takes_a_cache_line() {
+        assert_eq!(size_of::<LinkState>(), 64);
+    }
+}
