@@ -193,7 +193,7 @@ mod tests {
     /// And it turns, in arrays if nobody watches.
     #[test]
     fn a_mesh_that_turns_runs_both_ways() {
-        let scene = super::mesh(Mesh { peers: 3, impaired: true }, 500);
+        let scene = mesh(Mesh { peers: 3, impaired: true }, 500);
         assert!(same_shape(&scene, &scene));
         let Ok(events) = Simulation::new(&scene, Model::Least).run(&mut WithEvents);
         assert_eq!(Mesh::run(&scene), events);

@@ -111,6 +111,7 @@ impl<const P: usize, const L: usize> Others<P, L> for Nowhere {
 
 /// How samples travel.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one a run, and a box would be another look-up a packet")]
 enum Samples<const P: usize, const L: usize> {
     Broadcast(Broadcast<P, L>),
     PerPacket(PerPacket<P, L>),
