@@ -16,8 +16,8 @@ use super::turning_arrays::alike;
 struct Keeper {
     /// Wants rows of samples held as well, for which a run has events.
     has_events: bool,
-    /// Questions whether to go on that are answered with yes, and rows without a failure.
-    breaths: u32,
+    /// Until when it wants the run to go on, and how many rows it takes before it fails.
+    until: Instant,
     most_rows: usize,
     rows: Vec<Vec<u64>>,
     called_together: bool,
@@ -28,7 +28,7 @@ struct Full;
 
 impl Keeper {
     fn new(has_events: bool) -> Self {
-        Self { has_events, breaths: u32::MAX, most_rows: usize::MAX, rows: Vec::new(), called_together: false }
+        Self { has_events, until: Instant::MAX, most_rows: usize::MAX, rows: Vec::new(), called_together: false }
     }
 
     fn keep(&mut self, row: Vec<u64>) -> Result<(), Full> {
@@ -88,9 +88,8 @@ impl Observer for Keeper {
         self.keep(vec![row.at.as_nanos(), row.discrepancy.to_bits()])
     }
 
-    fn keep_going(&mut self, _now: Instant) -> bool {
-        self.breaths -= 1;
-        self.breaths > 0
+    fn keep_going(&mut self, now: Instant) -> bool {
+        now < self.until
     }
 }
 
@@ -138,9 +137,10 @@ proptest! {
 
     /// An observer that ends a run, or fails, has seen what it would have seen of events.
     #[test]
-    fn who_has_had_enough_has_seen_the_same(mut drafts in drafts::alike(Just(1)), breaths in 1..3_u32, most_rows in prop_oneof![1..200_usize, Just(usize::MAX)]) {
+    fn who_has_had_enough_has_seen_the_same(mut drafts in drafts::alike(Just(1)), seconds in 0..3_u64, most_rows in prop_oneof![1..200_usize, Just(usize::MAX)]) {
         drafts[0].duration = 2500;
-        let found = found(&drafts[0].scene(), |keeper| (keeper.breaths, keeper.most_rows) = (breaths, most_rows));
+        let until = Instant::from_nanos(seconds * 1_000_000_000);
+        let found = found(&drafts[0].scene(), |keeper| (keeper.until, keeper.most_rows) = (until, most_rows));
         prop_assert!(found.is_none(), "{}", found.unwrap());
     }
 }
