@@ -143,7 +143,7 @@ const ASKED_OF_MEASURES: f64 = 2.0;
 fn measured_runs(work: Work) {
     println!("## Measures\n");
     println!(
-        "The mesh above, watched by an observer that takes every tick and keeps nothing, and with all [measures](scenes.md#measure), which take more rows than"
+        "The mesh above, watched by an observer that takes every tick and every sample held and keeps nothing, and with all [measures](scenes.md#measure), which take more rows than"
     );
     println!("ticks: steps, samples held, samples sent. The median of {} rounds in which all of them alternate.\n", work.rounds);
     println!("| peers | links | watched | all measures | ratio | asked for |");
@@ -152,7 +152,7 @@ fn measured_runs(work: Work) {
     let scenes = Mesh::ALL.map(|mesh| with_all_measures(mesh.scene(seconds(mesh) * 1000, 1)));
     let mut works: Vec<Box<dyn Fn() + '_>> = Vec::new();
     for scene in &scenes {
-        works.push(Box::new(|| drop(black_box(Simulation::new(scene, Model::Least).run(&mut Onlooker)))));
+        works.push(Box::new(|| drop(black_box(Simulation::new(scene, Model::Least).run(&mut { Onlooker::OF_EVENTS })))));
         works.push(Box::new(|| drop(black_box(Measures::run(scene, Model::Least)))));
     }
     let times = medians_in_turn(&works, work.rounds);

@@ -1,14 +1,25 @@
-//! Runs that somebody watches: the least that this costs, and all measures.
+//! Runs that somebody watches: rows that are seen, with events and without, a plot, and all measures.
 
 use std::convert::Infallible;
 use std::hint::black_box;
 
-use cohaptic_harness::{Observer, TickRow};
+use cohaptic_harness::record::Bands;
+use cohaptic_harness::{Observer, TickRow, Ticks};
 use cohaptic_scene::{MeasureName, MeasureSettings, MeasureSpec, Scene};
 
-/// Sees every tick and keeps nothing.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Onlooker;
+/// Sees every row of every tick and keeps nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Onlooker {
+    /// Wants rows of samples held as well, for which a run has events.
+    has_events: bool,
+}
+
+impl Onlooker {
+    /// Of ticks alone.
+    pub const OF_TICKS: Self = Self { has_events: false };
+    /// Of what takes events.
+    pub const OF_EVENTS: Self = Self { has_events: true };
+}
 
 impl Observer for Onlooker {
     type Error = Infallible;
@@ -17,21 +28,55 @@ impl Observer for Onlooker {
         true
     }
 
+    fn wants_holds(&self) -> bool {
+        self.has_events
+    }
+
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
         black_box(row);
         Ok(())
     }
 }
 
-/// Sees every instant and keeps nothing: the least that makes a run have events.
+/// Looks at what is sent and keeps nothing: the least that makes a run have events.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WithEvents;
 
 impl Observer for WithEvents {
     type Error = Infallible;
 
-    fn wants_instants(&self) -> bool {
+    fn wants_sends(&self) -> bool {
         true
+    }
+}
+
+/// Sees where copies are along the first axis, as a run in a terminal does.
+#[derive(Debug)]
+pub struct Plotter(Bands);
+
+impl Plotter {
+    /// Before a run of the scene.
+    #[must_use]
+    pub fn new(scene: &Scene) -> Self {
+        Self(Bands::new(scene.duration, 144, scene.peers.len()))
+    }
+}
+
+impl Observer for Plotter {
+    type Error = Infallible;
+
+    fn wants_ticks(&self) -> bool {
+        true
+    }
+
+    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
+        self.0.add(row.peer, row.at, row.object.position[0]);
+        Ok(())
+    }
+
+    fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Infallible> {
+        self.0.add_all(ticks.at(), ticks.positions(0));
+        Ok(())
     }
 }
 

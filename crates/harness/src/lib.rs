@@ -3,7 +3,7 @@
 //! You need it if you run scenes from Rust: to record them, to watch every tick, or to drive a session.
 //!
 //! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that write each sample as a datagram and send it through a
-//! [`cohaptic_wan::Network`]; the datagram is read once for all its receivers. A scene that needs no events and has no observer runs in arrays, which hold
+//! [`cohaptic_wan::Network`]; the datagram is read once for all its receivers. A scene that needs no events, and of which no observer wants more than ticks, runs in arrays, which hold
 //! numbers alone: no peers, no datagrams, no packets. An [`Observer`] sees every tick and every packet; [`record`] has observers that write CSV files and plots while the scene runs. [`check`] compares a
 //! run with the scene's expectations, [`mod@explain`] says what a scene makes the program model. [`live`] runs a scene some of whose peers are remote.
 //!
@@ -43,7 +43,7 @@ mod spread;
 mod summary;
 mod world;
 
-pub use arrays::{run_side_by_side, same_shape};
+pub use arrays::{Ticks, run_side_by_side, same_shape};
 pub use cohaptic_scene::{FromScene, Strategies};
 pub use observer::{HoldRow, InstantRow, NoObserver, Observer, PacketRow, SendRow, StateRow, StepRow, TickRow, TurnRow, TurnStepRow};
 pub use plan::Model;

@@ -4,6 +4,7 @@ use cohaptic_peer::rotation::Attitude;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{PacketRecord, Path};
 
+use crate::arrays::Ticks;
 use crate::live::InputRow;
 
 /// Instants, or ticks in arrays, between two calls of [`Observer::keep_going`].
@@ -48,7 +49,7 @@ pub trait Observer {
     /// Why the run must end: a file that cannot be written, for instance. An observer that never fails has [`std::convert::Infallible`].
     type Error;
 
-    /// Whether [`Observer::on_tick`] is to be called. Asked once, at the start.
+    /// Whether [`Observer::on_tick`] or [`Observer::on_ticks`] is to be called. Asked at the start; the answer must stay.
     fn wants_ticks(&self) -> bool {
         false
     }
@@ -85,6 +86,18 @@ pub trait Observer {
     /// Ends the run.
     fn on_tick(&mut self, _row: &TickRow<'_>) -> Result<(), Self::Error> {
         Ok(())
+    }
+
+    /// All peers have computed their forces at an instant at which all of them tick: [`Observer::on_tick`] of each, in one call.
+    ///
+    /// A run of which only ticks and instants are wanted calls this where all tick together and nothing changes on the way; all others call
+    /// [`Observer::on_tick`]. An observer with an `on_ticks` of its own, which may look at less than whole rows, must come to the same with either.
+    ///
+    /// # Errors
+    ///
+    /// Ends the run.
+    fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Self::Error> {
+        ticks.each(|row| self.on_tick(row))
     }
 
     /// A packet, or a copy that a link made of one, has arrived or was dropped.
@@ -333,6 +346,10 @@ macro_rules! observe_by_field {
             $crate::Observer::on_input(&mut self.$field, row)
         }
 
+        fn on_ticks(&mut self, ticks: &$crate::Ticks<'_>) -> Result<(), Self::Error> {
+            $crate::Observer::on_ticks(&mut self.$field, ticks)
+        }
+
         fn keep_going(&mut self, now: cohaptic_units::Instant) -> bool {
             $crate::Observer::keep_going(&mut self.$field, now)
         }
@@ -370,6 +387,10 @@ impl<O: Observer> Observer for Option<O> {
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), O::Error> {
         self.as_mut().map_or(Ok(()), |observer| observer.on_tick(row))
+    }
+
+    fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), O::Error> {
+        self.as_mut().map_or(Ok(()), |observer| observer.on_ticks(ticks))
     }
 
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), O::Error> {
@@ -432,6 +453,17 @@ impl<A: Observer<Error: From<B::Error>>, B: Observer> Observer for (A, B) {
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Self::Error> {
         self.0.on_tick(row)?;
         Ok(self.1.on_tick(row)?)
+    }
+
+    fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Self::Error> {
+        // Rows of all peers are work, which one that does not want them is to be spared.
+        if self.0.wants_ticks() {
+            self.0.on_ticks(ticks)?;
+        }
+        if self.1.wants_ticks() {
+            self.1.on_ticks(ticks)?;
+        }
+        Ok(())
     }
 
     fn on_step(&mut self, row: &StepRow<'_>) -> Result<(), Self::Error> {

@@ -5,9 +5,9 @@ use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_scene::{Axes, FromScene, Scene, Strategies};
 use cohaptic_units::Instant;
 
-use crate::arrays::{self, Shape};
+use crate::arrays::{self, Onlooker, Shape, Ticks};
 use crate::disturbance::Disturbance;
-use crate::observer::{INSTANTS_BETWEEN_QUESTIONS, Observer};
+use crate::observer::{INSTANTS_BETWEEN_QUESTIONS, InstantRow, Observer};
 use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
 use crate::world::{NoRemote, Remote, Step, Watch, World};
@@ -78,36 +78,88 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     pub fn run<O: Observer>(&self, observer: &mut O) -> Result<Summary, O::Error> {
         assert!(too_large(self.scene).is_none(), "a scene with more peers than a simulation takes is not run");
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
-        if let Some((shape, law)) = self.arrays(&plan, Watch::of(observer)) {
-            let threads = self.threads.min(shape.threads().0);
-            if threads > 1
-                && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
-            {
-                return Ok(summary);
-            }
+        let watch = Watch::of(observer);
+        if let Some((shape, law)) = self.arrays(&plan, watch) {
             let looks_ahead = shape.looks_ahead();
-            let summary = arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now));
-            // The counters of queues that have looked ahead are those of a later instant.
+            let summary = if watch == Watch::NOTHING {
+                let threads = self.threads.min(shape.threads().0);
+                if threads > 1
+                    && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
+                {
+                    return Ok(summary);
+                }
+                arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now))
+            } else {
+                Watching::run(observer, watch, |onlooker| arrays::run_watched(self.scene, (shape, law), &plan, onlooker))?
+            };
+            // The counters of queues that have looked ahead are those of a later instant. Rows have none, and are not given twice.
             let has_looked_too_far = looks_ahead && matches!(summary.ending, Ending::Diverged(at) if at - Instant::ZERO < self.scene.duration);
-            if !has_looked_too_far {
-                return Ok(summary);
-            }
+            return if has_looked_too_far { self.run_with_events(&plan, &mut Asked(observer)) } else { Ok(summary) };
         }
+        self.run_with_events(&plan, observer)
+    }
+
+    fn run_with_events<O: Observer>(&self, plan: &Plan, observer: &mut O) -> Result<Summary, O::Error> {
         match plan.axes {
-            Axes::One => run_to_end(self.world::<1, _>(&plan, NoRemote), observer),
-            Axes::Two => run_to_end(self.world::<2, _>(&plan, NoRemote), observer),
-            Axes::Three => run_to_end(self.world::<3, _>(&plan, NoRemote), observer),
+            Axes::One => run_to_end(self.world::<1, _>(plan, NoRemote), observer),
+            Axes::Two => run_to_end(self.world::<2, _>(plan, NoRemote), observer),
+            Axes::Three => run_to_end(self.world::<3, _>(plan, NoRemote), observer),
         }
     }
 
-    /// The shape of the scene, if it needs no events and nobody watches.
+    /// The shape of the scene, if it needs no events and nobody watches more than ticks and instants.
     fn arrays(&self, plan: &Plan, watch: Watch) -> Option<(Shape, BuiltIn)> {
-        let is_unseen = watch == Watch::NOTHING && self.disturbance.is_none() && self.model == Model::Least;
-        if is_unseen { Shape::of(self.scene, plan, &self.strategies) } else { None }
+        let fits = watch.is_of_ticks() && self.disturbance.is_none() && self.model == Model::Least;
+        if fits { Shape::of(self.scene, plan, &self.strategies) } else { None }
     }
 
     pub(crate) fn world<const A: usize, E: Remote<A>>(&self, plan: &Plan, remote: E) -> World<A, S::Strategy<A>, E> {
         World::new(self.scene, plan, self.disturbance, remote, |peer| self.strategies.strategy(self.scene, peer))
+    }
+}
+
+/// An observer of a run in arrays, and its error.
+struct Watching<'o, O: Observer> {
+    observer: &'o mut O,
+    watch: Watch,
+    result: Result<(), O::Error>,
+}
+
+impl<'o, O: Observer> Watching<'o, O> {
+    fn run(observer: &'o mut O, watch: Watch, run: impl FnOnce(&mut dyn Onlooker) -> Summary) -> Result<Summary, O::Error> {
+        let mut watching = Self { observer, watch, result: Ok(()) };
+        let summary = run(&mut watching);
+        watching.result.map(|()| summary)
+    }
+}
+
+impl<O: Observer> Onlooker for Watching<'_, O> {
+    fn on_ticks(&mut self, ticks: &Ticks<'_>) {
+        if self.watch.ticks {
+            self.result = self.observer.on_ticks(ticks);
+        }
+    }
+
+    fn on_instant(&mut self, row: &InstantRow) -> bool {
+        if self.watch.instants && self.result.is_ok() {
+            self.result = self.observer.on_instant(row);
+        }
+        self.result.is_ok()
+    }
+
+    fn keep_going(&mut self, now: Instant) -> bool {
+        self.observer.keep_going(now)
+    }
+}
+
+/// An observer that has seen everything, and is still asked whether to go on.
+struct Asked<'o, O>(&'o mut O);
+
+impl<O: Observer> Observer for Asked<'_, O> {
+    type Error = O::Error;
+
+    fn keep_going(&mut self, now: Instant) -> bool {
+        self.0.keep_going(now)
     }
 }
 

@@ -26,7 +26,7 @@ fn three(link: &str) -> Scene {
 }
 
 /// That number of peers.
-fn mesh(peers: usize, link: &str) -> Scene {
+pub(super) fn mesh(peers: usize, link: &str) -> Scene {
     Scene::parse(&mesh_text(peers, link), "mesh.toml".as_ref(), &[]).unwrap()
 }
 

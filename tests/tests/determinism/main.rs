@@ -6,3 +6,4 @@ mod bystander;
 mod models;
 mod threads;
 mod turning_arrays;
+mod watched;

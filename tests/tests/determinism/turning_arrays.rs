@@ -71,7 +71,7 @@ fn rotation(peers: usize) -> impl Strategy<Value = RotationSpec> {
 }
 
 /// This number of scenes of one shape, with objects that turn.
-fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<Scene>> {
+pub(super) fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value = Vec<Scene>> {
     let of_draft = |drafts: Vec<Draft>| {
         let peers = drafts[0].peers.len();
         let rotations = vec(rotation(peers), drafts.len());

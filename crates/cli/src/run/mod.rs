@@ -13,7 +13,7 @@ use cohaptic_harness::check::ExpectationWatch;
 use cohaptic_harness::live::{Inputs, replay};
 use cohaptic_harness::measures::{MeasuredValue, Measures};
 use cohaptic_harness::record::{Bands, RecordError, Recorder};
-use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow};
+use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow, Ticks};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
@@ -169,6 +169,13 @@ impl Observer for &mut Watch {
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
         if let Some(positions) = &mut self.positions {
             positions.add(row.peer, row.at, row.object.position[0]);
+        }
+        Ok(())
+    }
+
+    fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), RecordError> {
+        if let Some(positions) = &mut self.positions {
+            positions.add_all(ticks.at(), ticks.positions(0));
         }
         Ok(())
     }

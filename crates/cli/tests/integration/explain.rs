@@ -41,16 +41,18 @@ fn what_the_scene_has_not_is_left_out() {
 }
 
 #[test]
-fn a_scene_with_measures_has_no_run_that_nobody_watches() {
+fn measures_of_more_than_ticks_need_events() {
     let desk = Desk::with("two.toml", TWO);
     let parts = |set: &str| -> Vec<String> {
         let document = desk.json(&format!("explain two.toml --json {set}"));
         document["models"].as_array().unwrap().iter().map(|row| row["part"].as_str().unwrap().to_owned()).collect()
     };
     let has = |parts: &[String], part: &str| parts.iter().any(|found| found == part);
-    let (without, with) = (parts(""), parts("--set measure.names=all"));
-    assert!(has(&without, "runs that nobody watches") && !has(&without, "measures"), "{without:?}");
-    assert!(has(&with, "measures") && !has(&with, "runs that nobody watches"), "{with:?}");
+    let arrays = "runs of which nobody watches more than ticks";
+    let (without, all, some) = (parts(""), parts("--set measure.names=all"), parts("--set 'measure.names=[\"force_peak_n\",\"discrepancy_rms_m\"]'"));
+    assert!(has(&without, arrays) && !has(&without, "measures"), "{without:?}");
+    assert!(has(&all, "measures") && !has(&all, arrays), "{all:?}");
+    assert!(has(&some, "measures") && has(&some, arrays), "{some:?}");
 }
 
 #[test]

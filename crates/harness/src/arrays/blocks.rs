@@ -14,6 +14,7 @@ use cohaptic_units::Instant;
 use super::lanes::{Lanes, Mask, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
 use super::samples::Sample;
+use crate::plan::DeviceChoice;
 
 /// All bodies on all axes.
 #[derive(Clone, Debug)]
@@ -93,6 +94,18 @@ struct Forces {
     on_object: Lanes,
 }
 
+/// What rows say of eight peers along one axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    pub(super) device: Motions,
+    pub(super) object: Motions,
+    pub(super) target: Motions,
+    /// FC.
+    pub(super) coupling: Lanes,
+    /// FT without what the law damps.
+    pub(super) coordination: Lanes,
+}
+
 /// What devices hold.
 pub(super) trait Grasped {
     /// FC in the place of a block; `None` if devices hold the centres of their copies.
@@ -128,6 +141,9 @@ pub(super) struct Moved<const L: usize> {
 
 const ZERO_MAP: StepMap<Lanes> = StepMap::new([[Lanes::ZERO; 2]; 2], [Lanes::ZERO; 2]);
 
+/// What moves nothing, and where nothing acts leaves even the sign of a zero.
+const RESTING: StepMap = StepMap::new([[0.0, -0.0], [0.0, 0.0]], [-0.0, 0.0]);
+
 impl Forces {
     const NONE: Self = Self { coupling: Lanes::ZERO, on_object: Lanes::ZERO };
 }
@@ -161,7 +177,7 @@ pub(super) fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Lanes> {
 
 /// The motion of one lane.
 #[inline(always)]
-fn lane_of(motions: &Motions, lane: usize) -> Motion {
+pub(super) fn lane_of(motions: &Motions, lane: usize) -> Motion {
     Motion { position: motions.position.0[lane], velocity: motions.velocity.0[lane] }
 }
 
@@ -172,8 +188,12 @@ fn set_lane(motions: &mut Motions, lane: usize, motion: Motion) {
 }
 
 impl<const A: usize> Blocks<A> {
-    /// The bodies of runs of these scenes, all of which have that law, with numbers of their own.
-    pub(super) fn new(places: Places, scenes: &[&Scene], law: &BuiltIn) -> Self {
+    /// The bodies of runs of these scenes, all of which have that law, with numbers of their own. `devices` says what stands for the device of each peer, if anybody
+    /// looks; otherwise only those move that touch their copies.
+    pub(super) fn new(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
+        let moves = |peer: usize, run: usize| {
+            scenes[run].peers[peer].contact != Contact::None || devices.is_some_and(|devices| devices[peer] == DeviceChoice::Simulated)
+        };
         let tick = scenes[0].peers[0].clock.tick;
         let mut object_map = ZERO_MAP;
         for lane in 0..WIDTH {
@@ -199,8 +219,9 @@ impl<const A: usize> Blocks<A> {
                 set_lane(&mut block.object, spot.lane, initial.along(axis));
                 late[spot.block].is_late.set(spot.lane, config.compute_delay);
                 block.touch(axis, spot.lane, config.contact);
-                if config.contact == Contact::None {
+                if !moves(member, run) {
                     // Nothing depends on its device.
+                    set_map(&mut block.device_map, spot.lane, &RESTING);
                     continue;
                 }
                 let map = step(spec.device.plant(spec.hand.as_ref()), run);
@@ -215,8 +236,7 @@ impl<const A: usize> Blocks<A> {
         }
         let any_late = scenes.iter().any(|scene| scene.peers.iter().any(|peer| peer.compute_delay));
         let walls: Vec<Option<Enclosure>> = scenes.iter().map(|scene| scene.object.enclosure).collect();
-        let touches = |peer: usize, run: usize| scenes[run].peers[places.first + peer].contact != Contact::None;
-        let varies = |(peer, run, hand): &(usize, usize, HandForce<A>)| hand.constant().is_none() && touches(*peer, *run);
+        let varies = |(peer, run, hand): &(usize, usize, HandForce<A>)| hand.constant().is_none() && moves(places.first + peer, *run);
         Self {
             leads: if Law::<f64>::horizon(law).is_some() { vec![Lanes::ZERO; blocks.len()] } else { Vec::new() },
             memory: vec![0.0; blocks.len() * WIDTH * Law::<f64>::memory(law)],
@@ -250,6 +270,28 @@ impl<const A: usize> Blocks<A> {
     #[inline(always)]
     pub(super) fn block(&self, place: usize) -> &Block {
         &self.blocks[place]
+    }
+
+    /// The bodies of all peers, by axis.
+    pub(super) fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// What rows say of the peers in a place, before they move. `grasped` is FC of devices that hold no centres.
+    pub(super) fn seen(&self, place: usize, law: &impl LawOfLanes, grasped: Option<Lanes>) -> Seen {
+        let (block, remembered, lag) = (&self.blocks[place], law.remembered() * WIDTH, law.looks_back());
+        let past = if lag > 0 { self.past[self.oldest * self.blocks.len() + place] } else { block.object };
+        let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
+        let mut memory = self.memory[place * remembered..(place + 1) * remembered].to_vec();
+        let coupling = grasped.unwrap_or_else(|| block.coupling(&block.object));
+        let (mut coordination, mut target) = (Lanes::ZERO, block.mean);
+        for lane in 0..WIDTH {
+            let seen = block.observation(&past, lead, lane);
+            let law = law.of_lane(lane);
+            coordination.0[lane] = law.force(&seen, memory_of_lane(&mut memory, remembered / WIDTH, lane));
+            set_lane(&mut target, lane, law.target(&seen));
+        }
+        Seen { device: block.device, object: block.object, target, coupling, coordination }
     }
 
     /// Puts positions and velocities of a peer into what it sends.
@@ -499,14 +541,24 @@ impl Block {
         coupling
     }
 
+    #[inline(always)]
+    fn observation(&self, past: &Motions, lead: &Lanes, lane: usize) -> Observation {
+        Observation { own: lane_of(&self.object, lane), past: lane_of(past, lane), mean: lane_of(&self.mean, lane), lead: lead.0[lane] }
+    }
+
+    /// The positions of copies.
+    #[inline(always)]
+    pub(super) const fn positions(&self) -> &[f64; WIDTH] {
+        &self.object.position.0
+    }
+
     /// The forces of a tick without walls.
     #[inline(always)]
     fn forces<L: LawOfLanes>(&self, coupling: Lanes, law: &L, past: &Motions, lead: &Lanes, memory: &mut [f64]) -> Forces {
         let mut on_copy = Lanes::ZERO;
         let remembered = law.remembered();
         for lane in 0..WIDTH {
-            let seen =
-                Observation { own: lane_of(&self.object, lane), past: lane_of(past, lane), mean: lane_of(&self.mean, lane), lead: lead.0[lane] };
+            let seen = self.observation(past, lead, lane);
             let coordination = law.of_lane(lane).force(&seen, memory_of_lane(memory, remembered, lane));
             on_copy.0[lane] = on_object(coupling.0[lane], coordination);
         }

@@ -1,18 +1,26 @@
 //! What moves in runs in arrays: copies and devices that only go, or that turn as well.
 
 use cohaptic_peer::coordination::BuiltIn;
-use cohaptic_peer::rotation::Attitude;
+use cohaptic_peer::rotation::{Attitude, Triple};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use super::blocks::{Blocks, Centres, LawOfLanes, Moved};
+use super::blocks::{Blocks, Centres, LawOfLanes, Moved, Seen};
+use super::lanes::Lanes;
 use super::place::Places;
 use super::samples::Sample;
+use crate::plan::DeviceChoice;
+
+/// What rows say of eight peers along each axis, and if they turn the torques of coupling and coordination on their copies, the latter without what the law damps.
+pub(super) struct SeenPlace<const A: usize> {
+    pub(super) axes: [Seen; A],
+    pub(super) turn: Option<(Triple<Lanes>, Triple<Lanes>)>,
+}
 
 /// All bodies of the runs, with A axes. A peer sends P pairs of numbers: position and velocity along each axis, and whatever else.
 pub(super) trait Bodies<const A: usize, const P: usize> {
-    /// The bodies of runs of these scenes, all of which have that law, with numbers of their own.
-    fn new(places: Places, scenes: &[&Scene], law: &BuiltIn) -> Self;
+    /// The bodies of runs of these scenes, all of which have that law, with numbers of their own; `devices` as for [`Blocks::new`].
+    fn new(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self;
 
     /// How they go.
     fn translations(&self) -> &Blocks<A>;
@@ -32,6 +40,14 @@ pub(super) trait Bodies<const A: usize, const P: usize> {
     /// Everybody computes forces by the law and moves to the next tick.
     fn advance<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L>;
 
+    /// What rows say of the peers in a place, before they move.
+    fn seen(&self, place: usize, law: &impl LawOfLanes) -> SeenPlace<A>;
+
+    /// How a device is turned; `None` if it does not turn.
+    fn device_attitude(&self, _peer: usize, _run: usize) -> Option<Attitude> {
+        None
+    }
+
     /// How a copy is turned; `None` if it does not turn.
     fn attitude(&self, _peer: usize, _run: usize) -> Option<Attitude> {
         None
@@ -44,8 +60,8 @@ pub(super) trait Bodies<const A: usize, const P: usize> {
 }
 
 impl<const A: usize> Bodies<A, A> for Blocks<A> {
-    fn new(places: Places, scenes: &[&Scene], law: &BuiltIn) -> Self {
-        Self::new(places, scenes, law)
+    fn new(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
+        Self::new(places, scenes, law, devices)
     }
 
     #[inline(always)]
@@ -78,5 +94,10 @@ impl<const A: usize> Bodies<A, A> for Blocks<A> {
     #[inline(always)]
     fn advance<const L: usize>(&mut self, law: &impl LawOfLanes) -> Moved<L> {
         self.advance(law, &Centres)
+    }
+
+    fn seen(&self, place: usize, law: &impl LawOfLanes) -> SeenPlace<A> {
+        let blocks = self.blocks().len() / A;
+        SeenPlace { axes: std::array::from_fn(|axis| self.seen(axis * blocks + place, law, None)), turn: None }
     }
 }

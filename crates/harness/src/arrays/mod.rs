@@ -1,7 +1,7 @@
 //! Scenes that need no events: all numbers of all peers in arrays, one scene or several of one shape side by side.
 //!
-//! Where everybody ticks together, nothing changes on the way, no packet waits for another, and nobody watches, a run is a loop over ticks: sending,
-//! arrivals, forces, motion. Here that loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. It is what
+//! Where everybody ticks together, nothing changes on the way, and nobody watches more than ticks, a run is a loop over ticks: sending, arrivals, forces,
+//! motion. Here that loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. It is what
 //! [`crate::world::World`] does, with the same operations in the same order on each number, the same random numbers at the same addresses and the same
 //! counters, and comes to the same [`Summary`] to the bit.
 //!
@@ -9,12 +9,14 @@
 
 mod blocks;
 mod bodies;
+mod run_watch;
 mod lanes;
 mod place;
 mod samples;
 mod shape;
 mod side_by_side;
 mod threads;
+mod ticks;
 mod turn;
 mod turning;
 
@@ -28,14 +30,18 @@ use cohaptic_wan::LinkStats;
 use pulp::NullaryFnOnce;
 
 use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
+use crate::plan::{DeviceChoice, Plan};
 use crate::summary::{Ending, LinkSummary, PeerSummary, Summary};
 use blocks::{Blocks, LawOfLanes, Moved, law_of_lanes};
 use bodies::Bodies;
+pub(crate) use run_watch::Onlooker;
+use run_watch::{Unwatched, RunWatch, WatchedTicks};
 use lanes::Lanes;
 use place::Places;
 use samples::{Broadcast, PerPacket, Sample};
 pub(crate) use shape::Shape;
 pub use side_by_side::{run_side_by_side, same_shape};
+pub use ticks::Ticks;
 use turning::{PAIRS, TurningBlocks};
 
 /// A run of a scene of that shape with that law, to its end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
@@ -48,12 +54,25 @@ pub(crate) fn run(scene: &Scene, shape: Shape, law: BuiltIn, keep_going: &mut dy
 
 /// L runs of scenes of that shape with these laws, to their ends.
 fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; L], keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {
+    let watch = Unwatched(keep_going);
     match scenes[0].axes {
-        Axes::Three if scenes[0].rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, L>::new(scenes, shape, laws).run(keep_going),
-        Axes::One => Arrays::<Blocks<1>, 1, 1, L>::new(scenes, shape, laws).run(keep_going),
-        Axes::Two => Arrays::<Blocks<2>, 2, 2, L>::new(scenes, shape, laws).run(keep_going),
-        Axes::Three => Arrays::<Blocks<3>, 3, 3, L>::new(scenes, shape, laws).run(keep_going),
+        Axes::Three if scenes[0].rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, L>::new(scenes, shape, laws, None).run(watch),
+        Axes::One => Arrays::<Blocks<1>, 1, 1, L>::new(scenes, shape, laws, None).run(watch),
+        Axes::Two => Arrays::<Blocks<2>, 2, 2, L>::new(scenes, shape, laws, None).run(watch),
+        Axes::Three => Arrays::<Blocks<3>, 3, 3, L>::new(scenes, shape, laws, None).run(watch),
     }
+}
+
+/// A run of a scene to its end, or until the onlooker fails: then the summary means nothing.
+pub(crate) fn run_watched(scene: &Scene, (shape, law): (Shape, BuiltIn), plan: &Plan, onlooker: &mut dyn Onlooker) -> Summary {
+    let (watch, scenes, laws, devices) = (WatchedTicks::new(scene, onlooker), [scene], [law], Some(plan.devices.as_slice()));
+    let [summary] = match scene.axes {
+        Axes::Three if scene.rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, 1>::new(scenes, shape, laws, devices).run(watch),
+        Axes::One => Arrays::<Blocks<1>, 1, 1, 1>::new(scenes, shape, laws, devices).run(watch),
+        Axes::Two => Arrays::<Blocks<2>, 2, 2, 1>::new(scenes, shape, laws, devices).run(watch),
+        Axes::Three => Arrays::<Blocks<3>, 3, 3, 1>::new(scenes, shape, laws, devices).run(watch),
+    };
+    summary
 }
 
 /// A run of a scene on that number of threads, to its end; `None` if it diverged: another without threads says when.
@@ -118,10 +137,10 @@ enum Samples<const P: usize, const L: usize> {
 }
 
 impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays<'a, B, A, P, L> {
-    /// The scenes at their beginning, all of that shape.
-    fn new(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L]) -> Self {
+    /// The scenes at their beginning, all of that shape; `devices` as for [`Blocks::new`].
+    fn new(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L], devices: Option<&[DeviceChoice]>) -> Self {
         let members = 0..shape.peers;
-        let bodies = bodies_of::<B, A, P, L>(&scenes, &members, &laws);
+        let bodies = bodies_of::<B, A, P, L>(&scenes, &members, &laws, devices);
         let initial: Vec<Sample<P, L>> = members.clone().map(|peer| bodies.sample(peer)).collect();
         Self::of_members(scenes, shape, laws, members, bodies, &initial)
     }
@@ -153,21 +172,21 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         }
     }
 
-    /// Runs all of them to their end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
-    fn run(self, keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {
+    /// Runs all of them to their end.
+    fn run(self, watch: impl RunWatch<B, A, P>) -> [Summary; L] {
         // A copy, so that the law is a constant of the loop and nothing that is written can change it.
         let law = self.law;
-        law.visit(ToEnd { arrays: self, keep_going })
+        law.visit(ToEnd { arrays: self, watch })
     }
 
-    fn run_by(mut self, law: &impl LawOfLanes, keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {
+    fn run_by(mut self, law: &impl LawOfLanes, mut watch: impl RunWatch<B, A, P>) -> [Summary; L] {
         let tick_nanos = nanos(self.shape.tick);
         let mut tick = 0;
         loop {
             let now = Instant::from_nanos(tick * tick_nanos);
             if is_asked_before(tick) {
                 let before = Instant::from_nanos((tick - 1) * tick_nanos);
-                if !keep_going(before) {
+                if !watch.keep_going(before) {
                     self.end_all(tick, |_| Ending::Interrupted(before));
                     break;
                 }
@@ -183,15 +202,25 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
             if self.finite.contains(&false) && self.end_diverged(tick, now) {
                 break;
             }
-            self.step(law, tick, now, &mut Nowhere);
+            let discrepancy = self.step(law, tick, now, (&mut Nowhere, &mut watch));
             tick += 1;
+            if !watch.after_motion(now, discrepancy[0]) {
+                self.end_all(tick, |_| Ending::Interrupted(now));
+                break;
+            }
         }
         self.summaries.map(|summary| summary.expect("every run has ended"))
     }
 
-    /// Everything that happens at a tick.
+    /// Everything that happens at a tick. Gives how far copies are apart \[m\].
     #[inline(always)]
-    fn step(&mut self, law: &impl LawOfLanes, tick: u64, now: Instant, others: &mut impl Others<P, L>) {
+    fn step(
+        &mut self,
+        law: &impl LawOfLanes,
+        tick: u64,
+        now: Instant,
+        (others, watch): (&mut impl Others<P, L>, &mut impl RunWatch<B, A, P>),
+    ) -> [f64; L] {
         if self.shape.has_queues && is_asked_before(tick) {
             self.pass(tick);
         }
@@ -206,17 +235,18 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         if self.leads.is_some() {
             self.extrapolate(now);
         }
-        let Moved { discrepancy, finite } = self.motion(law);
+        let Moved { discrepancy, finite } = self.motion(law, now, watch);
         for (largest, discrepancy) in self.max_discrepancy.iter_mut().zip(discrepancy) {
             *largest = largest.max(discrepancy);
         }
         self.finite = finite;
+        discrepancy
     }
 
     /// Means and motion of a tick.
     #[inline(always)]
-    fn motion(&mut self, law: &impl LawOfLanes) -> Moved<L> {
-        let motion = Motion { law, samples: &mut self.samples, bodies: &mut self.bodies };
+    fn motion(&mut self, law: &impl LawOfLanes, now: Instant, watch: &mut impl RunWatch<B, A, P>) -> Moved<L> {
+        let motion = Motion { law, now, watch, samples: &mut self.samples, bodies: &mut self.bodies };
         // With wide registers a run of three or ten peers over constant delays takes six tenths of the time.
         self.processor.dispatch(motion)
     }
@@ -384,34 +414,37 @@ fn bodies_of<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
     scenes: &[&Scene; L],
     members: &Range<usize>,
     laws: &[BuiltIn; L],
+    devices: Option<&[DeviceChoice]>,
 ) -> B {
-    B::new(Places { first: members.start, peers: members.len(), runs: L }, scenes, &laws[0])
+    B::new(Places { first: members.start, peers: members.len(), runs: L }, scenes, &laws[0], devices)
 }
 
 /// A run to its end. The loop is compiled for each law: where it chooses between laws at every tick, a run of three peers over constant delays takes a sixth
 /// longer.
-struct ToEnd<'a, 'k, B, const A: usize, const P: usize, const L: usize> {
+struct ToEnd<'a, E, B, const A: usize, const P: usize, const L: usize> {
     arrays: Arrays<'a, B, A, P, L>,
-    keep_going: &'k mut dyn FnMut(Instant) -> bool,
+    watch: E,
 }
 
-impl<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> LawVisitor<Lanes> for ToEnd<'_, '_, B, A, P, L> {
+impl<E: RunWatch<B, A, P>, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> LawVisitor<Lanes> for ToEnd<'_, E, B, A, P, L> {
     type Output = [Summary; L];
 
     #[inline(never)]
     fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> [Summary; L] {
-        self.arrays.run_by(law, self.keep_going)
+        self.arrays.run_by(law, self.watch)
     }
 }
 
 /// Means and motion of a tick, compiled once for any processor and once for one that has AVX2: with wider registers, and not one rounding less.
-struct Motion<'a, W, B, const A: usize, const P: usize, const L: usize> {
+struct Motion<'a, W, E, B, const A: usize, const P: usize, const L: usize> {
     law: &'a W,
+    now: Instant,
+    watch: &'a mut E,
     samples: &'a mut Samples<P, L>,
     bodies: &'a mut B,
 }
 
-impl<W: LawOfLanes, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnOnce for Motion<'_, W, B, A, P, L> {
+impl<W: LawOfLanes, E: RunWatch<B, A, P>, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnOnce for Motion<'_, W, E, B, A, P, L> {
     type Output = Moved<L>;
 
     #[inline(always)]
@@ -420,6 +453,7 @@ impl<W: LawOfLanes, B: Bodies<A, P>, const A: usize, const P: usize, const L: us
             Samples::Broadcast(samples) => samples.refresh(self.bodies),
             Samples::PerPacket(samples) => samples.refresh(self.bodies),
         }
+        self.watch.before_motion(self.now, self.bodies, self.law);
         self.bodies.advance::<L>(self.law)
     }
 }

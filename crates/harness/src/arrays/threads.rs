@@ -17,6 +17,7 @@ use cohaptic_units::Instant;
 use self::barrier::Barrier;
 use super::blocks::LawOfLanes;
 use super::bodies::Bodies;
+use super::run_watch::Unwatched;
 use super::lanes::Lanes;
 use super::samples::Sample;
 use super::shape::Shape;
@@ -111,7 +112,7 @@ pub(super) fn run<B: Bodies<A, P> + Send, const A: usize, const P: usize>(
     keep_going: &mut dyn FnMut(Instant) -> bool,
 ) -> Option<Summary> {
     let members: Vec<Range<usize>> = (0..threads).map(|place| place * shape.peers / threads..(place + 1) * shape.peers / threads).collect();
-    let bodies: Vec<B> = members.iter().map(|members| bodies_of::<B, A, P, 1>(&[scene], members, &[law])).collect();
+    let bodies: Vec<B> = members.iter().map(|members| bodies_of::<B, A, P, 1>(&[scene], members, &[law], None)).collect();
     let initial: Vec<Sample<P, 1>> =
         bodies.iter().zip(&members).flat_map(|(bodies, members)| (0..members.len()).map(|peer| bodies.sample(peer))).collect();
     let exchange = Exchange::new(threads);
@@ -189,7 +190,7 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize> PartToEnd<'a, '_, '_, 
                 return None;
             }
             self.thread.extremes.extend(self.arrays.bodies.translations().extremes(0));
-            self.arrays.step(law, tick, now, &mut self.thread);
+            self.arrays.step(law, tick, now, (&mut self.thread, &mut Unwatched(&mut |_| true)));
             self.thread.is_finite &= self.arrays.finite[0];
             tick += 1;
         };

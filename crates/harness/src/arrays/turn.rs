@@ -41,6 +41,8 @@ pub(super) struct Handles {
     coupling: Gains<Lanes>,
     /// Those that grasp their copies.
     grasps: Mask,
+    /// Those that are there.
+    present: Mask,
     /// What turns the hand of each, and its torque now in world axes.
     pub(super) hands: [Option<Signal>; WIDTH],
     torque: Triple<Lanes>,
@@ -48,10 +50,21 @@ pub(super) struct Handles {
     held: Mask,
 }
 
+/// Forces and torques of a tick, before any of them acts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Computed {
+    /// FC.
+    pub(super) coupling: Triple<Lanes>,
+    /// Without those of the coordination.
+    pub(super) torques: Torques,
+    /// τT without what the law damps.
+    pub(super) aligning: Triple<Lanes>,
+}
+
 /// Torques on copies, and on devices but for those of hands.
 #[derive(Clone, Copy, Debug)]
-struct Torques {
-    on_copy: Triple<Lanes>,
+pub(super) struct Torques {
+    pub(super) on_copy: Triple<Lanes>,
     on_device: Triple<Lanes>,
 }
 
@@ -184,6 +197,23 @@ impl Turn {
     /// Computes the torques of a tick and turns. Gives FC along each axis, of the blocks of these copies and their devices.
     #[inline(always)]
     pub(super) fn tick(&mut self, shared: &Shared, blocks: [&Block; 3]) -> Triple<Lanes> {
+        let Computed { coupling, mut torques, aligning } = self.compute(shared, blocks);
+        for (on_copy, aligning) in torques.on_copy.iter_mut().zip(&aligning) {
+            *on_copy = *on_copy - *aligning;
+        }
+        if let Some(late) = &mut self.late {
+            torques = late.exchange(torques);
+        }
+        shared.step.advance(&mut self.attitude, &torques.on_copy);
+        if let Some(handles) = &mut self.handles {
+            handles.advance(&torques.on_device);
+        }
+        coupling
+    }
+
+    /// Forces and torques of a tick, of the blocks of these copies and their devices.
+    #[inline(always)]
+    pub(super) fn compute(&self, shared: &Shared, blocks: [&Block; 3]) -> Computed {
         let mut matrices = [Lanes::ZERO; 9];
         let still = Motion { position: Lanes::ZERO, velocity: Lanes::ZERO };
         let mut points = [still; 3];
@@ -212,17 +242,12 @@ impl Turn {
         if let Some(handles) = &self.handles {
             handles.couple(&matrices, &self.attitude.rate, &mut torques);
         }
-        for (on_copy, aligning) in torques.on_copy.iter_mut().zip(&aligning) {
-            *on_copy = *on_copy - *aligning;
-        }
-        if let Some(late) = &mut self.late {
-            torques = late.exchange(torques);
-        }
-        shared.step.advance(&mut self.attitude, &torques.on_copy);
-        if let Some(handles) = &mut self.handles {
-            handles.advance(&torques.on_device);
-        }
-        coupling
+        Computed { coupling, torques, aligning }
+    }
+
+    /// How the device of a lane is turned; `None` if it does not turn.
+    pub(super) fn device(&self, lane: usize) -> Option<Attitude> {
+        self.handles.as_ref().filter(|handles| handles.present.get(lane)).map(|handles| attitude_of(&handles.attitude, lane))
     }
 
     /// The sum of the sizes of all numbers of each lane.
@@ -246,6 +271,7 @@ impl Handles {
             step: Steps::of(step),
             coupling: Gains { stiffness: Lanes::ZERO, damping: Lanes::ZERO },
             grasps: Mask::NONE,
+            present: Mask::NONE,
             hands: [const { None }; WIDTH],
             torque: NOTHING,
             held: Mask::NONE,
@@ -258,6 +284,7 @@ impl Handles {
         self.step.set(lane, step);
         (self.coupling.stiffness.0[lane], self.coupling.damping.0[lane]) = (coupling.stiffness, coupling.damping);
         self.grasps.set(lane, grasps);
+        self.present.set(lane, true);
     }
 
     /// Hands take the torque of now.

@@ -10,11 +10,12 @@ use cohaptic_units::Instant;
 use pulp::NullaryFnOnce;
 
 use super::blocks::{Blocks, Grasped, LawOfLanes, Moved};
-use super::bodies::Bodies;
+use super::bodies::{Bodies, SeenPlace};
 use super::lanes::{Lanes, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
 use super::samples::Sample;
-use super::turn::{Handles, Shared, Steps, Turn};
+use super::turn::{Computed, Handles, Shared, Steps, Turn};
+use crate::plan::DeviceChoice;
 use crate::spread::{Spread, squared_chord};
 
 /// Pairs of numbers of a sample: three of positions and velocities, then R by rows and the angular velocity in world axes.
@@ -136,7 +137,7 @@ impl NullaryFnOnce for Turned<'_> {
 }
 
 impl Bodies<3, PAIRS> for TurningBlocks {
-    fn new(places: Places, scenes: &[&Scene], law: &BuiltIn) -> Self {
+    fn new(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
         let clock: &Clock = &scenes[0].peers[0].clock;
         let config = |peer: usize, run: usize| scenes[run].rotation_config(peer).expect("the shape of the scenes says that their objects turn");
         let step = |spin: Spin, config: &RotationConfig| spin.step(clock.tick, config.integrator, config.steps);
@@ -164,7 +165,7 @@ impl Bodies<3, PAIRS> for TurningBlocks {
         }
         Self {
             places,
-            translations: Blocks::new(places, scenes, law),
+            translations: Blocks::new(places, scenes, law, devices),
             turns,
             shared,
             coupling: vec![Lanes::ZERO; 3 * places.blocks()],
@@ -235,6 +236,18 @@ impl Bodies<3, PAIRS> for TurningBlocks {
             self.look_at_each(&mut moved.finite);
         }
         moved
+    }
+
+    fn seen(&self, place: usize, law: &impl LawOfLanes) -> SeenPlace<3> {
+        let at = [0, 1, 2].map(|axis| axis * self.places.blocks() + place);
+        let Computed { coupling, torques, aligning } = self.turns[place].compute(&self.shared, at.map(|at| self.translations.block(at)));
+        let axes = std::array::from_fn(|axis| self.translations.seen(at[axis], law, Some(coupling[axis])));
+        SeenPlace { axes, turn: Some((torques.on_copy, aligning)) }
+    }
+
+    fn device_attitude(&self, peer: usize, run: usize) -> Option<Attitude> {
+        let Spot { block, lane } = self.places.spot(0, peer, run);
+        self.turns[block].device(lane)
     }
 
     fn attitude(&self, peer: usize, run: usize) -> Option<Attitude> {

@@ -12,7 +12,7 @@ use cohaptic_wan::{DropCause, LinkName, LinkStats};
 use super::Outcome;
 use crate::measures::Measures;
 use crate::observer::observe_by_field;
-use crate::{Observer, Summary, TickRow};
+use crate::{Observer, Summary, TickRow, Ticks};
 
 /// What was seen of what expectations are about.
 #[derive(Debug)]
@@ -71,6 +71,22 @@ impl Positions {
             orientations: vec![None; expect.orientations.len()],
         }
     }
+
+    /// Takes in where copies are at an instant, by peer and axis, and how they are turned; `None` of peers that are not looked at.
+    #[inline]
+    fn see(&mut self, at: Instant, position: impl Fn(usize, usize) -> Option<f64>, attitude: impl Fn(usize) -> Option<Attitude>) {
+        for watched in self.positions.iter_mut().filter(|watched| at <= watched.at) {
+            watched.seen = position(watched.peer, watched.axis).or(watched.seen);
+        }
+        for (expected, seen) in self.expected.iter().zip(&mut self.orientations).filter(|(expected, _)| at <= expected.at) {
+            *seen = attitude(expected.peer).or(*seen);
+        }
+        for watched in self.travels.iter_mut().filter(|watched| watched.reached.is_none()) {
+            if position(watched.peer, watched.axis).is_some_and(|position| (position - watched.start).abs() >= watched.distance) {
+                watched.reached = Some(at);
+            }
+        }
+    }
 }
 
 impl Observer for Positions {
@@ -81,18 +97,13 @@ impl Observer for Positions {
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
-        for watched in self.positions.iter_mut().filter(|watched| watched.peer == row.peer && row.at <= watched.at) {
-            watched.seen = Some(row.object.position[watched.axis]);
-        }
-        if let Some(turn) = &row.turn {
-            let due = |(expected, _): &(&ExpectOrientation, _)| expected.peer == row.peer && row.at <= expected.at;
-            self.expected.iter().zip(&mut self.orientations).filter(due).for_each(|(_, seen)| *seen = Some(*turn.object));
-        }
-        for watched in self.travels.iter_mut().filter(|watched| watched.peer == row.peer && watched.reached.is_none()) {
-            if (row.object.position[watched.axis] - watched.start).abs() >= watched.distance {
-                watched.reached = Some(row.at);
-            }
-        }
+        let is_its = |peer: usize| peer == row.peer;
+        self.see(row.at, |peer, axis| is_its(peer).then(|| row.object.position[axis]), |peer| row.turn.filter(|_| is_its(peer)).map(|turn| *turn.object));
+        Ok(())
+    }
+
+    fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Infallible> {
+        self.see(ticks.at(), |peer, axis| Some(ticks.position(peer, axis)), |peer| ticks.attitude(peer));
         Ok(())
     }
 }

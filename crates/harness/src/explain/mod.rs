@@ -10,7 +10,9 @@ use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
 
 use crate::arrays::Shape;
+use crate::measures::Measures;
 use crate::plan::{DeviceChoice, Model, Plan, Ticking};
+use crate::world::Watch;
 
 /// What `cohaptic explain` shows.
 #[derive(Clone, PartialEq, Debug)]
@@ -80,7 +82,8 @@ const BYTES_A_PACKET: f64 = 40.0;
 /// Says what the scene makes the program model.
 #[must_use]
 pub fn explain(scene: &Scene) -> Explanation {
-    let plan = Plan::new(scene, Model::Least, scene.measure.is_some());
+    let watch = Watch::of(&Measures::of(scene));
+    let plan = Plan::new(scene, Model::Least, watch.ticks);
     let mut rows = Rows::default();
     rows.clock_and_motion(scene, &plan);
     rows.peers(scene, &plan);
@@ -89,18 +92,23 @@ pub fn explain(scene: &Scene) -> Explanation {
     rows.network(scene);
     if let Some(measure) = &scene.measure {
         let count = Counted(measure.names.len(), "number");
-        rows.model("measures", format!("{count}, computed tick by tick"), "[measure]: the run is watched, so it has events whatever else it needs");
+        let why = if watch.is_of_ticks() {
+            "[measure]: of ticks and instants alone, so the run needs no events for them"
+        } else {
+            "[measure]: some of steps, samples sent or held, so the run has events whatever else it needs"
+        };
+        rows.model("measures", format!("{count}, computed tick by tick"), why);
     }
-    let arrays = Shape::of(scene, &plan, &FromScene).filter(|_| scene.measure.is_none());
+    let arrays = Shape::of(scene, &plan, &FromScene).filter(|_| watch.is_of_ticks());
     let in_arrays = arrays.is_some();
     if let Some((shape, _)) = arrays {
         rows.model(
-            "runs that nobody watches",
+            "runs of which nobody watches more than ticks",
             "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
-            "all tick together, nothing changes on the way, and no link counts or damages packets; a run that is recorded has events",
+            "all tick together, nothing changes on the way, and no link counts or damages packets; a run that is recorded has events, since packets are recorded",
         );
         let (threads, why) = shape.threads();
-        rows.model("threads of such a run", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);
+        rows.model("threads of such a run, if nobody watches", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);
     }
     let nanos = if in_arrays { IN_ARRAYS } else { WITH_EVENTS };
     Explanation { dimensions: dimensions(scene, &plan), cost: cost(scene, &nanos), models: rows.models, left_out: rows.left_out }

@@ -22,6 +22,7 @@ use cohaptic_units::print::csv_quoted;
 
 use super::inputs::{HEADER, Input, InputRow, Inputs, InputsError, Recorded, shorten};
 use super::recorded::is_about_the_scene;
+use crate::record::parts;
 
 /// A row as a line, without the newline.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +48,9 @@ impl fmt::Display for InputLine<'_> {
                 let Some(state) = state else { return f.write_str("none") };
                 let mut before = "";
                 for value in state.position.iter().zip(state.velocity).flat_map(|(x, v)| [x, v]) {
-                    write!(f, "{before}{}", ryu::Buffer::new().format(*value))?;
+                    let mut buffer = zmij::Buffer::new();
+                    let (mantissa, exponent) = parts(&mut buffer, *value);
+                    write!(f, "{before}{mantissa}{exponent}")?;
                     before = " ";
                 }
                 Ok(())

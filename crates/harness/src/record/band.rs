@@ -1,5 +1,6 @@
 //! A curve in bounded memory: its lowest and highest value in each of a fixed number of spans of time.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use cohaptic_units::Instant;
@@ -11,9 +12,14 @@ pub struct Bands {
     spans: usize,
     /// The width of a span \[ns\]; the last one may be cut short by the end.
     width: u64,
-    /// By curve, then span; `None` where nothing was added.
-    extremes: Vec<Vec<Option<(f64, f64)>>>,
+    curves: usize,
+    /// The lowest and the highest value by span, then curve: what is added at an instant lies together. [`NOTHING`] where nothing was added.
+    extremes: Vec<(f64, f64)>,
+    /// The span of the latest value, and the instants in it \[ns\]: finding a span takes a division.
+    latest: (usize, Range<u64>),
 }
+
+const NOTHING: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 
 impl Bands {
     /// A number of curves over a scene of a duration, in a number of spans (at least one each).
@@ -21,7 +27,8 @@ impl Bands {
     pub fn new(duration: Duration, spans: usize, curves: usize) -> Self {
         let spans = spans.max(1);
         let width = duration.as_nanos().div_ceil(spans as u128).max(1);
-        Self { duration, spans, width: u64::try_from(width).unwrap_or(u64::MAX), extremes: vec![vec![None; spans]; curves] }
+        let width = u64::try_from(width).unwrap_or(u64::MAX);
+        Self { duration, spans, width, curves, extremes: vec![NOTHING; spans * curves], latest: (0, 0..0) }
     }
 
     /// Adds a value to a curve. A value that is not finite or beyond the end is left out.
@@ -30,11 +37,31 @@ impl Bands {
     ///
     /// If there is no such curve.
     pub fn add(&mut self, curve: usize, at: Instant, value: f64) {
-        let Some(span) = self.span(at) else { return };
-        if value.is_finite() {
-            let slot = &mut self.extremes[curve][span];
-            *slot = Some(slot.map_or((value, value), |(low, high)| (low.min(value), high.max(value))));
+        assert!(curve < self.curves, "there are {} curves", self.curves);
+        if let Some(slots) = self.slots(at) {
+            take_in(&mut slots[curve], value);
         }
+    }
+
+    /// Adds a value to each curve, in their order, as [`Bands::add`] does.
+    #[inline]
+    pub fn add_all(&mut self, at: Instant, values: impl Iterator<Item = f64>) {
+        if let Some(slots) = self.slots(at) {
+            slots.iter_mut().zip(values).for_each(|(slot, value)| take_in(slot, value));
+        }
+    }
+
+    /// The extremes of all curves in the span of an instant.
+    #[inline]
+    fn slots(&mut self, at: Instant) -> Option<&mut [(f64, f64)]> {
+        if !self.latest.1.contains(&at.as_nanos()) {
+            let span = self.span(at)?;
+            let begin = self.width.saturating_mul(span as u64);
+            let end = Instant::ZERO.saturating_add(self.duration).as_nanos();
+            self.latest = (span, begin..begin.saturating_add(self.width).min(end));
+        }
+        let begin = self.latest.0 * self.curves;
+        Some(&mut self.extremes[begin..begin + self.curves])
     }
 
     /// In which span an instant lies; `None` at the end of the scene and beyond.
@@ -56,15 +83,19 @@ impl Bands {
     /// The curves in `parts` equal parts, in order.
     #[must_use]
     pub fn split(&self, parts: usize) -> Vec<Self> {
-        let size = (self.extremes.len() / parts.max(1)).max(1);
-        let part = |extremes: &[Vec<_>]| Self { extremes: extremes.to_vec(), ..*self };
-        self.extremes.chunks(size).map(part).collect()
+        let size = (self.curves / parts.max(1)).max(1);
+        let part = |first: usize| {
+            let curves = size.min(self.curves - first);
+            let extremes = self.extremes.chunks(self.curves).flat_map(|span| &span[first..first + curves]);
+            Self { curves, extremes: extremes.copied().collect(), latest: (0, 0..0), ..*self }
+        };
+        (0..self.curves).step_by(size).map(part).collect()
     }
 
     /// How many curves there are.
     #[must_use]
-    pub fn curves(&self) -> usize {
-        self.extremes.len()
+    pub const fn curves(&self) -> usize {
+        self.curves
     }
 
     /// How many spans there are.
@@ -85,7 +116,9 @@ impl Bands {
     ///
     /// If there is no such curve.
     pub fn curve(&self, curve: usize) -> impl Iterator<Item = (f64, f64, f64)> {
-        self.extremes[curve].iter().enumerate().filter_map(|(span, extremes)| extremes.map(|(low, high)| (self.middle_of(span), low, high)))
+        assert!(curve < self.curves, "there are {} curves", self.curves);
+        let spans = self.extremes.chunks(self.curves).map(move |span| span[curve]).enumerate();
+        spans.filter(|(_, extremes)| is_there(extremes)).map(|(span, (low, high))| (self.middle_of(span), low, high))
     }
 
     /// The range of values worth showing, with a margin, and whether values beyond it are left out.
@@ -94,20 +127,31 @@ impl Bands {
     /// thousand times as far as they went in the first tenth, which no motion does that ends well, only three times that first tenth, and at least
     /// a tenth of `sane`, is shown.
     #[must_use]
-    pub fn range(&self, sane: f64) -> (std::ops::Range<f64>, bool) {
+    pub fn range(&self, sane: f64) -> (Range<f64>, bool) {
         let start = (0..self.curves()).find_map(|curve| self.curve(curve).next()).map_or(0.0, |(_, low, _)| low);
         let reach_until = |span: usize| {
-            let values = self.extremes.iter().flat_map(|curve| &curve[..span]).flatten();
+            let values = self.extremes[..span * self.curves].iter().filter(|extremes| is_there(extremes));
             values.map(|(low, high)| (low - start).abs().max((high - start).abs())).fold(0.0, f64::max)
         };
         let (first, whole) = (reach_until(self.spans.div_ceil(10)), reach_until(self.spans));
         let limit = if whole > sane && whole > 1000.0 * first { (3.0 * first).max(0.1 * sane) } else { f64::INFINITY };
         let shown = |value: &f64| (value - start).abs() <= limit;
-        let values = || self.extremes.iter().flatten().flatten().flat_map(|(low, high)| [*low, *high]);
+        let values = || self.extremes.iter().filter(|extremes| is_there(extremes)).flat_map(|(low, high)| [*low, *high]);
         let (low, high) = values().filter(shown).fold((start, start), |(low, high), value| (low.min(value), high.max(value)));
         let margin = if high > low { 0.05 * (high - low) } else { start.abs().max(1e-3) };
         (low - margin..high + margin, values().any(|value| !shown(&value)))
     }
+}
+
+#[inline]
+fn take_in((low, high): &mut (f64, f64), value: f64) {
+    if value.is_finite() {
+        (*low, *high) = (low.min(value), high.max(value));
+    }
+}
+
+fn is_there((low, high): &(f64, f64)) -> bool {
+    low <= high
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use cohaptic_files::{WholeFile, partial_name};
+use cohaptic_units::Instant;
 
 /// Why a record could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -66,10 +67,88 @@ pub(crate) fn create_folder(path: &Path) -> Result<(), RecordError> {
 
 /// Adds a number with the fewest digits that read back as the same `f64`; `inf`, `-inf` and `NaN` for values that are not finite.
 pub(crate) fn push_f64(line: &mut Vec<u8>, value: f64) {
-    line.extend_from_slice(ryu::Buffer::new().format(value).as_bytes());
+    let mut buffer = zmij::Buffer::new();
+    let (mantissa, exponent) = parts(&mut buffer, value);
+    line.extend_from_slice(mantissa.as_bytes());
+    line.extend_from_slice(exponent.as_bytes());
+}
+
+/// The text of [`push_f64`], in two parts: the exponents of large numbers have no sign.
+pub(crate) fn parts(buffer: &mut zmij::Buffer, value: f64) -> (&str, &str) {
+    let text = buffer.format(value);
+    match text.find("e+").filter(|_| value.abs() >= 1e16) {
+        Some(at) => (&text[..=at], &text[at + 2..]),
+        None => (text, ""),
+    }
+}
+
+/// Adds a whole number.
+pub(crate) fn push_whole(line: &mut Vec<u8>, number: u64) {
+    line.extend_from_slice(itoa::Buffer::new().format(number).as_bytes());
+}
+
+/// Adds an instant as [`cohaptic_units::print::Seconds`] prints it: that takes most of the time of a row.
+pub(crate) fn push_seconds(line: &mut Vec<u8>, at: Instant) {
+    const NANOS: u64 = 1_000_000_000;
+    let nanos = at.as_nanos();
+    push_whole(line, nanos / NANOS);
+    let rest = nanos % NANOS;
+    if rest != 0 {
+        let point = line.len();
+        // A digit before the nine, which becomes the point.
+        push_whole(line, NANOS + rest);
+        line[point] = b'.';
+        while line.last() == Some(&b'0') {
+            line.pop();
+        }
+    }
 }
 
 /// Adds something that prints itself.
 pub(crate) fn push_display(line: &mut Vec<u8>, value: impl std::fmt::Display) {
     write!(line, "{value}").expect("writing to memory does not fail");
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_units::print::Seconds;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn written(push: impl FnOnce(&mut Vec<u8>)) -> String {
+        let mut line = b"x".to_vec();
+        push(&mut line);
+        String::from_utf8(line).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn instants_are_written_as_they_print(nanos in prop_oneof![any::<u64>(), 0..2_000_000_001_u64], power in 0..10_u32) {
+            for at in [nanos, nanos / 10_u64.pow(power) * 10_u64.pow(power)].map(Instant::from_nanos) {
+                prop_assert_eq!(written(|line| push_seconds(line, at)), format!("x{}", Seconds(at)));
+            }
+        }
+
+        /// The fewest digits, as the standard library has them; and an exponent without a sign.
+        #[test]
+        fn numbers_are_written_with_the_fewest_digits(bits in any::<u64>(), small in -1e3..1e3_f64, large in 1e15..1e25_f64) {
+            for value in [f64::from_bits(bits), small, large, -large] {
+                let text = written(|line| push_f64(line, value))[1..].to_owned();
+                if value.is_finite() {
+                    prop_assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits());
+                    let digits = |text: &str| text.split('e').next().unwrap_or_default().replace(['-', '.'], "").trim_matches('0').to_owned();
+                    prop_assert_eq!(digits(&text), digits(&format!("{value:e}")));
+                }
+                prop_assert!(!text.contains('+'));
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_are_written_in_one_way() {
+        let values = [0.0, -0.0, 1.0, -0.024, 1e15, 1e16, -2.5e300, 1e-5, 1.5e-7, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+        let texts = ["0.0", "-0.0", "1.0", "-0.024", "1000000000000000.0", "1e16", "-2.5e300", "1e-5", "1.5e-7", "NaN", "inf", "-inf"];
+        assert_eq!(values.map(|value| written(|line| push_f64(line, value))), texts.map(|text| format!("x{text}")));
+    }
 }

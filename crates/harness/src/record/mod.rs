@@ -25,6 +25,7 @@ mod trajectory;
 mod views;
 
 pub use band::Bands;
+pub(crate) use file::parts;
 pub use file::{RecordError, RecordFile};
 pub use inputs::InputRecorder;
 pub use recorder::{Recorder, SANE_POSITION};

@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use cohaptic_units::print::Seconds;
 use cohaptic_wan::{Fate, LinkName};
 
-use super::file::{RecordFile, push_display};
+use super::file::{RecordFile, push_seconds, push_whole};
 use crate::PacketRow;
 use crate::record::RecordError;
 
@@ -13,6 +12,8 @@ use crate::record::RecordError;
 #[derive(Debug)]
 pub(crate) struct Packets {
     file: RecordFile,
+    /// The beginning of the names of the links from each peer.
+    senders: Vec<LinkName>,
     names: Vec<String>,
     line: Vec<u8>,
 }
@@ -21,20 +22,22 @@ impl Packets {
     pub(crate) fn create(folder: &Path, names: Vec<String>) -> Result<Self, RecordError> {
         let mut file = RecordFile::create(folder.join("packets.csv"))?;
         file.write(b"link,sequence,sent,arrived,fate\n")?;
-        Ok(Self { file, names, line: Vec::new() })
+        let senders = names.iter().map(|name| LinkName::between(name, "")).collect();
+        Ok(Self { file, senders, names, line: Vec::new() })
     }
 
     pub(crate) fn on_packet(&mut self, row: &PacketRow) -> Result<(), RecordError> {
         let line = &mut self.line;
         line.clear();
-        line.extend_from_slice(LinkName::between(&self.names[row.path.from.index()], &self.names[row.path.to.index()]).as_str().as_bytes());
+        line.extend_from_slice(self.senders[row.path.from.index()].as_str().as_bytes());
+        line.extend_from_slice(self.names[row.path.to.index()].as_bytes());
         line.push(b',');
-        push_display(line, row.sequence);
+        push_whole(line, row.sequence);
         line.push(b',');
-        push_display(line, Seconds(row.offered));
+        push_seconds(line, row.offered);
         line.push(b',');
         if let Fate::Delivered(at) = row.fate {
-            push_display(line, Seconds(at));
+            push_seconds(line, at);
         }
         line.push(b',');
         line.extend_from_slice(row.fate.name().as_bytes());

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_scene::{Axes, Scene};
-use cohaptic_units::print::Seconds;
+use cohaptic_units::Instant;
 
-use super::file::{RecordFile, push_display, push_f64};
+use super::file::{RecordFile, push_f64, push_seconds};
 use crate::TickRow;
 use crate::record::RecordError;
 
@@ -44,6 +44,9 @@ pub(crate) struct Trajectory {
     file: RecordFile,
     names: Vec<String>,
     turn: Turns,
+    /// The instant of the latest row, and how the row begins.
+    at: Option<Instant>,
+    beginning: Vec<u8>,
     line: Vec<u8>,
 }
 
@@ -61,14 +64,20 @@ impl Trajectory {
             file.write(b",qhw,qhx,qhy,qhz,whx,why,whz")?;
         }
         file.write(b"\n")?;
-        Ok(Self { file, names, turn, line: Vec::new() })
+        Ok(Self { file, names, turn, at: None, beginning: Vec::new(), line: Vec::new() })
     }
 
     pub(crate) fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
         let line = &mut self.line;
         line.clear();
-        push_display(line, Seconds(row.at));
-        line.push(b',');
+        // All peers of an instant have one beginning.
+        if self.at != Some(row.at) {
+            self.at = Some(row.at);
+            self.beginning.clear();
+            push_seconds(&mut self.beginning, row.at);
+            self.beginning.push(b',');
+        }
+        line.extend_from_slice(&self.beginning);
         line.extend_from_slice(self.names[row.peer].as_bytes());
         for axis in 0..row.coupling_force.len() {
             for body in [row.device, row.object, row.target] {

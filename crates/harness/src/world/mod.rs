@@ -577,6 +577,11 @@ pub(crate) struct Watch {
 impl Watch {
     pub(crate) const NOTHING: Self = Self { ticks: false, packets: false, steps: false, instants: false, sends: false, holds: false };
 
+    /// Whether no more is looked at than ticks and instants.
+    pub(crate) fn is_of_ticks(self) -> bool {
+        Self { ticks: false, instants: false, ..self } == Self::NOTHING
+    }
+
     pub(crate) fn of(observer: &impl Observer) -> Self {
         Self {
             ticks: observer.wants_ticks(),

@@ -1,0 +1,151 @@
+//! Who looks at a run in arrays.
+
+use cohaptic_peer::rotation::{Attitude, Triple};
+use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
+
+use super::blocks::{LawOfLanes, lane_of};
+use super::bodies::{Bodies, SeenPlace};
+use super::lanes::WIDTH;
+use super::ticks::{Source, Ticks};
+use crate::observer::{InstantRow, StateRow, TickRow, TurnRow};
+
+/// Looks at a run, or does not: the loop over ticks is compiled for each kind, so that a run at which nobody looks pays nothing.
+pub(super) trait RunWatch<B, const A: usize, const P: usize> {
+    /// Asked as [`crate::Observer::keep_going`] is.
+    fn keep_going(&mut self, now: Instant) -> bool;
+
+    /// At that tick everything that arrives has arrived, and nobody has moved.
+    #[inline(always)]
+    fn before_motion(&mut self, _now: Instant, _bodies: &B, _law: &impl LawOfLanes) {}
+
+    /// At that tick copies were that far apart \[m\]; gives whether the run goes on.
+    #[inline(always)]
+    fn after_motion(&mut self, _now: Instant, _discrepancy: f64) -> bool {
+        true
+    }
+}
+
+/// Looks at nothing, and is asked whether to go on.
+pub(super) struct Unwatched<'k>(pub(super) &'k mut dyn FnMut(Instant) -> bool);
+
+impl<B, const A: usize, const P: usize> RunWatch<B, A, P> for Unwatched<'_> {
+    fn keep_going(&mut self, now: Instant) -> bool {
+        (self.0)(now)
+    }
+}
+
+/// Somebody who looks at ticks and instants.
+pub(crate) trait Onlooker {
+    /// See [`crate::Observer::on_ticks`].
+    fn on_ticks(&mut self, ticks: &Ticks<'_>);
+
+    /// See [`crate::Observer::on_instant`]. Gives whether the run goes on: nothing has failed.
+    fn on_instant(&mut self, row: &InstantRow) -> bool;
+
+    /// See [`crate::Observer::keep_going`].
+    fn keep_going(&mut self, now: Instant) -> bool;
+}
+
+/// Looks at all peers of one run.
+pub(super) struct WatchedTicks<'a> {
+    onlooker: &'a mut dyn Onlooker,
+    /// By how much the law damps each peer [N·s/m], and its turn about each axis [N·m·s/rad].
+    damping: Vec<(f64, Triple)>,
+}
+
+impl<'a> WatchedTicks<'a> {
+    pub(super) fn new(scene: &Scene, onlooker: &'a mut dyn Onlooker) -> Self {
+        let damping = |peer| (scene.own_damping(peer), scene.own_rotational_damping(peer));
+        Self { onlooker, damping: (0..scene.peers.len()).map(damping).collect() }
+    }
+}
+
+impl<B: Bodies<A, P>, const A: usize, const P: usize> RunWatch<B, A, P> for WatchedTicks<'_> {
+    fn keep_going(&mut self, now: Instant) -> bool {
+        self.onlooker.keep_going(now)
+    }
+
+    #[inline(always)]
+    fn before_motion(&mut self, now: Instant, bodies: &B, law: &impl LawOfLanes) {
+        let source = Peers { at: now, bodies, law, damping: &self.damping };
+        self.onlooker.on_ticks(&Ticks::new(now, self.damping.len(), bodies.translations().blocks(), &source));
+    }
+
+    #[inline(always)]
+    fn after_motion(&mut self, now: Instant, discrepancy: f64) -> bool {
+        self.onlooker.on_instant(&InstantRow { at: now, discrepancy })
+    }
+}
+
+/// All peers before they move.
+struct Peers<'a, B, W, const A: usize, const P: usize> {
+    at: Instant,
+    bodies: &'a B,
+    law: &'a W,
+    damping: &'a [(f64, Triple)],
+}
+
+/// Position and velocity of a lane along each axis.
+struct StateOfLane<const A: usize> {
+    position: [f64; A],
+    velocity: [f64; A],
+}
+
+impl<const A: usize> StateOfLane<A> {
+    #[inline(always)]
+    fn of(motions: [&super::blocks::Motions; A], lane: usize) -> Self {
+        let motions = motions.map(|motions| lane_of(motions, lane));
+        Self { position: motions.map(|motion| motion.position), velocity: motions.map(|motion| motion.velocity) }
+    }
+
+    #[inline(always)]
+    fn row(&self) -> StateRow<'_> {
+        StateRow { position: &self.position, velocity: &self.velocity }
+    }
+}
+
+impl<B: Bodies<A, P>, W: LawOfLanes, const A: usize, const P: usize> Source for Peers<'_, B, W, A, P> {
+    fn attitude(&self, peer: usize) -> Option<Attitude> {
+        self.bodies.attitude(peer, 0)
+    }
+
+    #[inline(never)]
+    fn each(&self, on: &mut dyn FnMut(&TickRow<'_>) -> bool) {
+        for (place, damping) in self.damping.chunks(WIDTH).enumerate() {
+            let SeenPlace { axes, turn } = self.bodies.seen(place, self.law);
+            for (lane, (own, turns)) in damping.iter().enumerate() {
+                let peer = place * WIDTH + lane;
+                let object = StateOfLane::of(axes.each_ref().map(|seen| &seen.object), lane);
+                let recorded = |axis: usize| {
+                    let held = axes[axis].coordination.0[lane];
+                    if *own > 0.0 { held + own * object.velocity[axis] } else { held }
+                };
+                let turned = turn.as_ref().and_then(|(coupling, aligning)| Some((self.bodies.attitude(peer, 0)?, coupling, aligning)));
+                let device = self.bodies.device_attitude(peer, 0);
+                let turned = turned.map(|(attitude, coupling, aligning)| {
+                    let coordination: Triple = std::array::from_fn(|axis| aligning[axis].0[lane] + turns[axis] * attitude.rate[axis]);
+                    (attitude, coupling.map(|torque| torque.0[lane]), coordination)
+                });
+                let goes_on = on(&TickRow {
+                    at: self.at,
+                    peer,
+                    device: StateOfLane::of(axes.each_ref().map(|seen| &seen.device), lane).row(),
+                    object: object.row(),
+                    target: StateOfLane::of(axes.each_ref().map(|seen| &seen.target), lane).row(),
+                    coupling_force: &axes.each_ref().map(|seen| seen.coupling.0[lane]),
+                    coordination_force: &std::array::from_fn::<f64, A, _>(recorded),
+                    turn: turned.as_ref().map(|(object, coupling_torque, coordination_torque)| TurnRow {
+                        object,
+                        device: device.as_ref(),
+                        coupling_torque,
+                        coordination_torque,
+                    }),
+                });
+                if !goes_on {
+                    return;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! All peers at one instant.
+
+use cohaptic_peer::rotation::Attitude;
+use cohaptic_units::Instant;
+
+use super::blocks::Block;
+use super::lanes::WIDTH;
+use crate::observer::TickRow;
+
+/// All peers of a scene at an instant at which all of them tick, with the forces of that instant, before any of them moves.
+///
+/// Positions cost little; what [`Ticks::each`] has beyond them is computed when it is called.
+#[derive(Clone, Copy)]
+pub struct Ticks<'a> {
+    at: Instant,
+    peers: usize,
+    blocks: &'a [Block],
+    source: &'a dyn Source,
+}
+
+/// Where rows come from.
+pub(super) trait Source {
+    /// How a copy is turned.
+    fn attitude(&self, peer: usize) -> Option<Attitude>;
+
+    /// Hands the rows on, in the order of the peers, until that gives `false`.
+    fn each(&self, on: &mut dyn FnMut(&TickRow<'_>) -> bool);
+}
+
+impl<'a> Ticks<'a> {
+    #[inline(always)]
+    pub(super) fn new(at: Instant, peers: usize, blocks: &'a [Block], source: &'a dyn Source) -> Self {
+        Self { at, peers, blocks, source }
+    }
+
+    /// The instant.
+    #[must_use]
+    #[inline]
+    pub const fn at(&self) -> Instant {
+        self.at
+    }
+
+    /// Where each copy of the object is along an axis \[m\], in the order of the peers.
+    ///
+    /// # Panics
+    ///
+    /// If the scene has no such axis.
+    #[inline]
+    pub fn positions(&self, axis: usize) -> impl Iterator<Item = f64> {
+        let blocks = self.peers.div_ceil(WIDTH);
+        let blocks = &self.blocks[axis * blocks..(axis + 1) * blocks];
+        blocks.iter().zip(0..).flat_map(move |(block, place)| {
+            let positions: &[f64] = block.positions();
+            positions[..WIDTH.min(self.peers - place * WIDTH)].iter().copied()
+        })
+    }
+
+    /// Where the copy of a peer is along an axis \[m\].
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer, or no such axis.
+    #[must_use]
+    #[inline]
+    pub fn position(&self, peer: usize, axis: usize) -> f64 {
+        assert!(peer < self.peers, "there are {} peers", self.peers);
+        self.blocks[axis * self.peers.div_ceil(WIDTH) + peer / WIDTH].positions()[peer % WIDTH]
+    }
+
+    /// How the copy of a peer is turned; `None` if the object does not turn.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn attitude(&self, peer: usize) -> Option<Attitude> {
+        self.source.attitude(peer)
+    }
+
+    /// Hands each peer's row to `on`, in the order of the peers.
+    ///
+    /// # Errors
+    ///
+    /// The first of `on`, which sees no row after it.
+    pub fn each<E>(&self, mut on: impl FnMut(&TickRow<'_>) -> Result<(), E>) -> Result<(), E> {
+        let mut result = Ok(());
+        self.source.each(&mut |row| {
+            result = on(row);
+            result.is_ok()
+        });
+        result
+    }
+}
+
+impl std::fmt::Debug for Ticks<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Ticks").field("at", &self.at).field("peers", &self.peers).finish_non_exhaustive()
+    }
+}
