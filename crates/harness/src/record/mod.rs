@@ -27,4 +27,5 @@ mod views;
 pub use band::Bands;
 pub use file::{RecordError, RecordFile};
 pub use inputs::InputRecorder;
+pub use links::links_csv;
 pub use recorder::{Recorder, SANE_POSITION};
