@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_harness::measures::MeasuredValue;
-use cohaptic_harness::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
+use cohaptic_harness::{AccessSummary, Ending, LinkQuantiles, PeerSummary, Summary};
 #[cfg(target_os = "linux")]
 use cohaptic_realtime::LatenessSummary;
 use cohaptic_scene::Scene;
@@ -49,10 +49,31 @@ pub(crate) fn rotation(summary: &Summary) -> Option<impl Serialize + use<>> {
     summary.max_rotation_discrepancy.map(|angle| document! { max_rotation_discrepancy_rad: angle })
 }
 
-/// A link between two peers at the end of a run.
-pub(crate) fn peer_link(scene: &Scene, link: &LinkSummary) -> impl Serialize + use<> {
+/// More links than these are not listed one by one.
+pub(crate) const MOST_LINKS: u64 = 1000;
+
+/// Each link between two peers at the end of a run, if they are listed.
+pub(crate) fn peer_links(scene: &Scene, summary: &Summary) -> Option<Vec<impl Serialize + use<>>> {
     let name = |peer: usize| scene.peers[peer].name.clone();
-    self::link(name(link.from), name(link.to), &link.stats)
+    let links = || summary.links.iter().map(|link| self::link(name(link.from), name(link.to), &link.stats));
+    (summary.links.len() <= MOST_LINKS).then(|| links().collect())
+}
+
+/// What all links between peers did together.
+pub(crate) fn link_totals(summary: &Summary) -> impl Serialize + use<> {
+    document! {
+        links: summary.links.len(),
+        #[serde(flatten)]
+        counters: counters(&summary.links.total()),
+    }
+}
+
+/// How the links between peers differ.
+pub(crate) fn link_quantiles(summary: &Summary) -> impl Serialize + use<> {
+    let of = |quantiles: Option<LinkQuantiles>| {
+        quantiles.map(|LinkQuantiles { min, p01, p50, p99, max }| document! { min: min, p01: p01, p50: p50, p99: p99, max: max })
+    };
+    document! { delivered_fraction: of(summary.links.delivered_fraction()), mean_delay_s: of(summary.links.mean_delay()) }
 }
 
 /// A link with its ends.

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use cohaptic_harness::record::RecordError;
+use cohaptic_harness::{Model, TooLarge};
 use cohaptic_scene::{Diagnostic, Scene, SceneError, at_peer};
 
 use crate::input;
@@ -122,10 +123,10 @@ pub(crate) fn of_variant(error: SceneError, option: &'static str, overrides: &[S
 }
 
 /// Why a scene that makes sense is not simulated, at the place where there are too many peers; `None` if it can be.
-pub(crate) fn too_large(scene: &Scene, overrides: &[String]) -> Option<SceneError> {
-    let reason = cohaptic_harness::too_large(scene)?;
+pub(crate) fn too_large(scene: &Scene, overrides: &[String], model: Model, watched: bool) -> Option<SceneError> {
+    let TooLarge { peer, reason } = cohaptic_harness::too_large(scene, model, watched)?;
     let path = if scene.file == input::named(Path::new("-")) { Path::new("-") } else { &scene.file };
-    let refused = |text: &str, file: &Path| Err::<(), SceneError>(at_peer(text, file, overrides, cohaptic_harness::MOST_PEERS, &reason));
+    let refused = |text: &str, file: &Path| Err::<(), SceneError>(at_peer(text, file, overrides, peer, &reason));
     input::with(path, refused).err()
 }
 

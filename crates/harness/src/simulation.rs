@@ -12,19 +12,6 @@ use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
 use crate::world::{NoRemote, Remote, Step, Watch, World};
 
-/// The most peers that a simulation takes: it makes every one of their N·(N−1) links. A scene may have more, for what does not simulate.
-pub const MOST_PEERS: usize = 4096;
-
-/// Why a scene is too large to be simulated, in words; `None` if it is not.
-#[must_use]
-pub fn too_large(scene: &Scene) -> Option<String> {
-    let peers = scene.peers.len();
-    (peers > MOST_PEERS).then(|| {
-        let links = peers as u128 * (peers as u128 - 1);
-        format!("{peers} peers are too many to be simulated, with {links} links between them: expected at most {MOST_PEERS} peers")
-    })
-}
-
 /// A scene in virtual time, as fast as the processor goes.
 ///
 /// At one instant, in this order: changes of the timeline; peers that tick sample and send; packets that have arrived are applied; forces are
@@ -74,9 +61,8 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     ///
     /// # Panics
     ///
-    /// If the scene is [`too_large`].
+    /// If the scene needs events and has more than 23,170 peers; see [`crate::too_large`].
     pub fn run<O: Observer>(&self, observer: &mut O) -> Result<Summary, O::Error> {
-        assert!(too_large(self.scene).is_none(), "a scene with more peers than a simulation takes is not run");
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         let watch = Watch::of(observer);
         if let Some((shape, law)) = self.arrays(&plan, watch) {

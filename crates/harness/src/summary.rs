@@ -1,10 +1,14 @@
 //! What a run comes to.
 
+mod links;
+
 use std::time::Duration;
 
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkStats;
+
+pub use links::{EachLink, LinkQuantiles, LinkSummaries, LinkSummary};
 
 /// The result of a run.
 #[derive(Clone, PartialEq, Debug)]
@@ -18,7 +22,7 @@ pub struct Summary {
     /// The peers, in the order of the scene.
     pub peers: Vec<PeerSummary>,
     /// The links between peers, by sender, then receiver.
-    pub links: Vec<LinkSummary>,
+    pub links: LinkSummaries,
     /// The access lines that peers have.
     pub access_lines: Vec<AccessSummary>,
     /// The largest distance along an axis between two copies of the object at their latest ticks, over the whole run \[m\].
@@ -53,17 +57,6 @@ pub struct PeerSummary {
     pub stale_samples: u64,
     /// Samples that arrived damaged and were refused by the decoder.
     pub refused_samples: u64,
-}
-
-/// One link at the end of a run.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct LinkSummary {
-    /// The sender's place in the scene.
-    pub from: usize,
-    /// The receiver's place in the scene.
-    pub to: usize,
-    /// Its counters.
-    pub stats: LinkStats,
 }
 
 /// One access line at the end of a run.

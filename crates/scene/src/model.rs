@@ -3,6 +3,7 @@
 use core::fmt;
 use core::time::Duration;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use cohaptic_peer::coordination::{LawSettings, Pull};
 use cohaptic_peer::rotation::Triple;
@@ -230,9 +231,9 @@ pub struct PeerSpec {
     /// With which velocity its copy and its device begin [m/s].
     pub velocity: [f64; 3],
     /// The line that all it sends passes before the links, if it has one.
-    pub uplink: Option<LinkModel>,
+    pub uplink: Option<Arc<LinkModel>>,
     /// The line that all it receives passes after the links, if it has one.
-    pub downlink: Option<LinkModel>,
+    pub downlink: Option<Arc<LinkModel>>,
 }
 
 /// Where a peer lives. In virtual time every peer is simulated, whatever its kind; a live session (`cohaptic live`) goes by it.

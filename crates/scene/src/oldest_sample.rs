@@ -25,8 +25,8 @@ impl Scene {
         };
         let (mut up, mut down) = (Duration::ZERO, Duration::ZERO);
         for peer in &self.peers {
-            up = up.max(line(peer.uplink.as_ref())?);
-            down = down.max(line(peer.downlink.as_ref())?);
+            up = up.max(line(peer.uplink.as_deref())?);
+            down = down.max(line(peer.downlink.as_deref())?);
         }
         let (mut slowest, mut longest) = (Duration::ZERO, 0);
         for model in self.links.configs() {

@@ -1,7 +1,6 @@
 //! The verdict on a scene, as the project means the word stable.
 
 use cohaptic_scene::Scene;
-use cohaptic_wan::LinkModel;
 
 use crate::{Analysis, AnalysisError, Limits, MeanSquare, Method, Verdict, analyse_watched, mean_square_watched};
 
@@ -53,5 +52,5 @@ pub fn judge_watched(scene: &Scene, method: Method, limits: &Limits<'_>) -> Resu
 #[must_use]
 pub fn has_chance(scene: &Scene) -> bool {
     let lines = scene.peers.iter().flat_map(|peer| peer.uplink.iter().chain(&peer.downlink));
-    scene.links.used().any(|(link, _)| link.has_chance()) || lines.into_iter().any(LinkModel::has_chance)
+    scene.links.used().any(|(link, _)| link.has_chance()) || lines.into_iter().any(|line| line.has_chance())
 }

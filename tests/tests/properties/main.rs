@@ -11,6 +11,7 @@ mod ideal_network;
 mod impedance;
 mod local_damping;
 mod local_lag;
+mod many_peers;
 mod measures;
 mod own_strategies;
 mod parameter_changes;

@@ -8,6 +8,8 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
+use cohaptic_harness::measures::Measures;
+use cohaptic_harness::{Model, TooLarge, too_large};
 use cohaptic_scene::{Scene, at_peer};
 
 use crate::error::CampaignError;
@@ -196,8 +198,8 @@ impl CampaignPlan {
             Ok(scene) => scene,
             Err(error) => return Err(CampaignError::Scene { error: Box::new(error), varied }),
         };
-        if let Some(reason) = cohaptic_harness::too_large(&scene) {
-            let error = Box::new(at_peer(&self.text, &self.file, &overrides, cohaptic_harness::MOST_PEERS, &reason));
+        if let Some(TooLarge { peer, reason }) = too_large(&scene, Model::Least, Measures::of(&scene).is_some()) {
+            let error = Box::new(at_peer(&self.text, &self.file, &overrides, peer, &reason));
             return Err(CampaignError::Scene { error, varied });
         }
         // Seeds are at most what a scene file may say, so that every run can be repeated alone.

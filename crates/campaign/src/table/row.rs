@@ -59,9 +59,9 @@ pub(crate) fn row<'a>(
     }
     row.push(integer(summary.peers.iter().map(|peer| peer.stale_samples).sum()));
     row.push(integer(summary.peers.iter().map(|peer| peer.refused_samples).sum()));
-    counters(&mut row, summary.links.iter().map(|link| &link.stats));
+    counters(&mut row, summary.links.counted());
     if roster.access_lines {
-        counters(&mut row, summary.access_lines.iter().map(|line| &line.stats));
+        counters(&mut row, summary.access_lines.iter().map(|line| (&line.stats, 1)));
     }
     let measured: BTreeMap<MeasureName, Option<f64>> = measured.iter().map(|measured| (measured.name, measured.value)).collect();
     row.extend(roster.measures().map(|(measure, peer, _)| {
@@ -82,25 +82,24 @@ fn place_of(summary: &Summary, place: usize, name: &str) -> Option<usize> {
     if here { Some(place) } else { summary.peers.iter().position(|peer| peer.name == name) }
 }
 
-fn counters<'a>(row: &mut Row, stats: impl Iterator<Item = &'a LinkStats> + Clone) {
-    let sum = |count: &dyn Fn(&LinkStats) -> u64| integer(stats.clone().map(count).sum());
-    row.push(sum(&LinkStats::offered));
-    row.push(sum(&LinkStats::duplicated));
-    row.push(sum(&LinkStats::delivered));
-    row.extend(DropCause::ALL.into_iter().map(|cause| sum(&|stats| stats.dropped(cause))));
-    row.push(sum(&LinkStats::in_flight));
-    row.push(sum(&LinkStats::marked));
-    row.push(sum(&LinkStats::damaged));
+/// The counters of links, each with how many have them.
+fn counters<'a>(row: &mut Row, stats: impl Iterator<Item = (&'a LinkStats, u64)> + Clone) {
+    let mut total = LinkStats::default();
+    stats.clone().for_each(|(stats, links)| total.add(stats, links));
+    row.extend([total.offered(), total.duplicated(), total.delivered()].map(integer));
+    row.extend(DropCause::ALL.into_iter().map(|cause| integer(total.dropped(cause))));
+    row.extend([total.in_flight(), total.marked(), total.damaged()].map(integer));
     row.push(mean_delay(stats));
 }
 
 /// Over all packets delivered by any of the links. Each link's mean is rounded down to a nanosecond, so this one is less than two too low.
-fn mean_delay<'a>(stats: impl Iterator<Item = &'a LinkStats>) -> Value {
+fn mean_delay<'a>(stats: impl Iterator<Item = (&'a LinkStats, u64)>) -> Value {
     let (mut nanos, mut delivered) = (0_u128, 0_u128);
-    for stats in stats {
+    for (stats, links) in stats {
         if let Some(mean) = stats.mean_delay() {
-            nanos += mean.as_nanos() * u128::from(stats.delivered());
-            delivered += u128::from(stats.delivered());
+            let packets = u128::from(stats.delivered()) * u128::from(links);
+            nanos += mean.as_nanos() * packets;
+            delivered += packets;
         }
     }
     let mean = nanos.checked_div(delivered).map(|mean| u64::try_from(mean).unwrap_or(u64::MAX));

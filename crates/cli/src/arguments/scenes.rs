@@ -26,6 +26,9 @@ pub(crate) struct RunArguments {
     /// Write trajectory.csv, packets.csv, links.csv, plots (SVG) and run.html, a page of it all, into this folder; the second run goes into its folder against
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// Write one row a link, as in links.csv of --out, into this file or pipe; the only way to see each link where there are more than 1,000
+    #[arg(long, value_name = "FILE", conflicts_with = "against")]
+    pub(crate) links: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) pictures: PictureArguments,
     /// Replay a live session: its inputs.csv, with the scene and the --set of that session. Fates and motion are the same to the last bit

@@ -116,7 +116,7 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
     match input::with(file, |text, file| Scene::parse(text, file, overrides)) {
         Err(error) => Checked::unreadable(file, &error),
         Ok(scene) => {
-            if let Some(error) = failure::too_large(&scene, overrides) {
+            if let Some(error) = failure::too_large(&scene, overrides, model, true) {
                 return Checked { expects: scene.expect.is_some(), ..Checked::unreadable(file, &error) };
             }
             let notes = RefCell::new(Vec::new());

@@ -12,7 +12,7 @@ use cohaptic_units::print::{Counted, Span};
 use serde::Serialize;
 
 use crate::document_schema::document;
-use crate::documents::{access_line, ending_name, lateness, measures_of, micros, peer, peer_link, rotation};
+use crate::documents::{access_line, ending_name, lateness, link_quantiles, link_totals, measures_of, micros, peer, peer_links, rotation};
 use crate::measures::measured_lines;
 use crate::output;
 use crate::realtime::{late, notes};
@@ -41,7 +41,9 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
         release_lateness_us: lateness(&report.releases),
         behind_us: micros(report.behind),
         peers: peers.collect::<Vec<_>>(),
-        links: summary.links.iter().map(|link| peer_link(scene, link)).collect::<Vec<_>>(),
+        link_totals: link_totals(summary),
+        link_quantiles: link_quantiles(summary),
+        links: peer_links(scene, summary),
         access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
         max_discrepancy_m: summary.max_discrepancy,
         #[serde(flatten)]

@@ -12,6 +12,7 @@ use std::thread;
 use std::time::{Duration, Instant as Clock};
 
 use cohaptic_falcon::boot;
+use cohaptic_harness::Model;
 use cohaptic_live::falcons::{Falcons, SIMULATED_HOMING};
 use cohaptic_live::{Report, Session, SessionConfig, SessionError, SessionKey, SystemEntropy};
 use cohaptic_realtime::Wishes;
@@ -53,7 +54,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     }
     let overrides = overrides.as_slice();
     let scene = input::with(path, |text, file| Scene::parse_live(text, file, overrides))?;
-    if let Some(error) = failure::too_large(&scene, overrides) {
+    if let Some(error) = failure::too_large(&scene, overrides, Model::Least, true) {
         return Err(error.into());
     }
     let pairs = onlookers::pairs(&scene);

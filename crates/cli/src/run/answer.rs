@@ -1,15 +1,15 @@
 //! A run as a JSON document and in words.
 
 use cohaptic_harness::record::SANE_POSITION;
-use cohaptic_harness::{Ending, Summary};
+use cohaptic_harness::{Ending, LinkQuantiles, Summary};
 use cohaptic_scene::Scene;
 use cohaptic_units::print::{Counted, Span};
-use cohaptic_wan::DropCause;
+use cohaptic_wan::{DropCause, LinkStats};
 use serde::Serialize;
 
 use super::Run;
 use crate::document_schema::document;
-use crate::documents::{access_line, ending_name, measures_of, peer, peer_link, rotation};
+use crate::documents::{MOST_LINKS, access_line, ending_name, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
 use crate::measures::measured_lines;
 use crate::{output, terminal_plot};
 
@@ -26,7 +26,9 @@ pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option
         wall_s: run.wall_s,
         realtime_factor: duration_s / run.wall_s,
         peers: summary.peers.iter().map(peer).collect::<Vec<_>>(),
-        links: summary.links.iter().map(|link| peer_link(scene, link)).collect::<Vec<_>>(),
+        link_totals: link_totals(summary),
+        link_quantiles: link_quantiles(summary),
+        links: peer_links(scene, summary),
         access_lines: summary.access_lines.iter().map(|line| access_line(scene, line)).collect::<Vec<_>>(),
         max_discrepancy_m: summary.max_discrepancy,
         #[serde(flatten)]
@@ -71,6 +73,9 @@ pub(super) fn describe(scene: &Scene, run: &Run) -> String {
         line(format!("  ... and {}", Counted(summary.peers.len() - MOST_PEERS, "more peer")));
     }
     line(format!("  {}", packets(summary)));
+    if summary.links.len() > MOST_LINKS {
+        over_links(summary).into_iter().for_each(|over| line(format!("  {over}")));
+    }
     measured_lines(scene, &run.measured).into_iter().for_each(|measured| line(format!("  {measured}")));
     text
 }
@@ -86,29 +91,47 @@ pub(crate) fn angle_text(radians: f64) -> String {
     format!("{radians:.4} rad ({:.2}°)", radians.to_degrees())
 }
 
+/// How the links of a large mesh differ.
+fn over_links(summary: &Summary) -> Vec<String> {
+    let words = |what: &str, unit: &str, factor: f64, quantiles: Option<LinkQuantiles>| {
+        quantiles.map(|LinkQuantiles { min, p01, p50, p99, max }| {
+            let [min, p01, p50, p99, max] = [min, p01, p50, p99, max].map(|value| format!("{:.3}{unit}", value * factor));
+            format!("{what} over links: least {min}, 1 % {p01}, median {p50}, 99 % {p99}, greatest {max}")
+        })
+    };
+    let delivered = words("delivered", " %", 100.0, summary.links.delivered_fraction());
+    delivered.into_iter().chain(words("mean delay", " ms", 1e3, summary.links.mean_delay())).collect()
+}
+
 /// What became of all packets, end to end.
 pub(crate) fn packets(summary: &Summary) -> String {
-    let has_line = |peer: usize, uplink: bool| summary.access_lines.iter().any(|line| line.peer == peer && line.uplink == uplink);
-    let lines = |uplink: bool| summary.access_lines.iter().filter(move |line| line.uplink == uplink).map(|line| line.stats);
+    let total = summary.links.total();
     // A packet enters at the uplink of its sender, or at the link, and leaves at the downlink of its receiver, or at the link.
-    let sent: u64 = lines(true).map(|stats| stats.offered()).sum::<u64>()
-        + summary.links.iter().filter(|link| !has_line(link.from, true)).map(|link| link.stats.offered()).sum::<u64>();
-    let delivered: u64 = lines(false).map(|stats| stats.delivered()).sum::<u64>()
-        + summary.links.iter().filter(|link| !has_line(link.to, false)).map(|link| link.stats.delivered()).sum::<u64>();
-    let stats = || summary.links.iter().map(|link| link.stats).chain(summary.access_lines.iter().map(|line| line.stats));
+    let through = |uplink: bool, count: fn(&LinkStats) -> u64| -> u64 {
+        let lines = || summary.access_lines.iter().filter(move |line| line.uplink == uplink);
+        if lines().next().is_none() {
+            return count(&total);
+        }
+        let mut has_line = vec![false; summary.peers.len()];
+        lines().for_each(|line| has_line[line.peer] = true);
+        let links = summary.links.iter().filter(|link| !has_line[if uplink { link.from } else { link.to }]);
+        lines().map(|line| count(&line.stats)).sum::<u64>() + links.map(|link| count(&link.stats)).sum::<u64>()
+    };
+    let (sent, delivered) = (through(true, LinkStats::offered), through(false, LinkStats::delivered));
+    let mut everywhere = total;
+    summary.access_lines.iter().for_each(|line| everywhere.add(&line.stats, 1));
     let mut parts = vec![format!("{} sent over {}", Counted(sent, "packet"), Counted(summary.links.len(), "link")), format!("{delivered} delivered")];
-    let copies: u64 = stats().map(|stats| stats.duplicated()).sum();
+    let copies = everywhere.duplicated();
     if copies > 0 {
         parts.push(format!("{} made", Counted(copies, "copy")));
     }
     for cause in DropCause::ALL {
-        let dropped: u64 = stats().map(|stats| stats.dropped(cause)).sum();
+        let dropped = everywhere.dropped(cause);
         if dropped > 0 {
             parts.push(format!("{dropped} dropped ({})", cause.name()));
         }
     }
-    let on_the_way: u64 = stats().map(|stats| stats.in_flight()).sum();
-    parts.push(format!("{on_the_way} on the way at the end"));
+    parts.push(format!("{} on the way at the end", everywhere.in_flight()));
     let stale: u64 = summary.peers.iter().map(|peer| peer.stale_samples).sum();
     if stale > 0 {
         parts.push(format!("{stale} of those delivered too late to be used"));

@@ -5,14 +5,17 @@ mod page;
 mod replayed;
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
+use cohaptic_files::write_whole;
 use cohaptic_harness::check::ExpectationWatch;
 use cohaptic_harness::live::{Inputs, replay};
 use cohaptic_harness::measures::{MeasuredValue, Measures};
-use cohaptic_harness::record::{Bands, RecordError, Recorder};
+use cohaptic_harness::record::{Bands, RecordError, Recorder, links_csv};
 use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow, Ticks};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
@@ -20,7 +23,7 @@ use cohaptic_units::Instant;
 use crate::arguments::RunArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{self, Failure, INTERRUPTED};
-use crate::file::write_file;
+use crate::file::{unwritten, write_file};
 use crate::progress::Progress;
 use crate::shell::{path, quoted};
 use crate::{input, interrupt, output};
@@ -35,7 +38,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         // As the session read it.
         Some(_) => input::with(path, |text, file| Scene::parse_live(text, file, overrides))?,
     };
-    if let Some(error) = failure::too_large(&scene, overrides) {
+    if let Some(error) = failure::too_large(&scene, overrides, model(arguments), is_watched(arguments, &scene)) {
         return Err(error.into());
     }
     // Both scenes are read before either runs: a mistake in the second is not found after a long first run.
@@ -45,7 +48,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
         let variant = input::with(path, |text, file| Scene::parse(text, file, &both));
         let mut variant = variant.map_err(|error| failure::of_variant(error, "--against", &arguments.against))?;
-        if let Some(error) = failure::too_large(&variant, &both) {
+        if let Some(error) = failure::too_large(&variant, &both, model(arguments), is_watched(arguments, &variant)) {
             return Err(error.into());
         }
         variant.title = format!("{}, with {}", variant.title, arguments.against.join(", "));
@@ -76,6 +79,20 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     Ok(if interrupt::requested() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
+const fn model(arguments: &RunArguments) -> Model {
+    if arguments.general { Model::General } else { Model::Least }
+}
+
+/// Whether positions are drawn in the terminal.
+const fn is_shown(arguments: &RunArguments) -> bool {
+    !arguments.scene.json && !arguments.no_plot
+}
+
+/// Whether a run is looked at.
+fn is_watched(arguments: &RunArguments, scene: &Scene) -> bool {
+    is_shown(arguments) || arguments.out.is_some() || arguments.inputs.is_some() || Measures::of(scene).is_some()
+}
+
 /// The overrides of the scene: all `--set`, then the seed and the measures.
 fn overrides(arguments: &RunArguments) -> Vec<String> {
     let seed = arguments.seed.map(|seed| format!("scene.seed={seed}"));
@@ -101,7 +118,7 @@ enum What<'a> {
 }
 
 fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<PathBuf>, overrides: &[String]) -> Result<Run, Failure> {
-    let shown = !arguments.scene.json && !arguments.no_plot;
+    let shown = is_shown(arguments);
     let paged = out.is_some() && !arguments.no_plot;
     let mut watch = Watch {
         progress: Progress::through_scene(&scene.title, scene.duration),
@@ -110,7 +127,7 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
     let start = Clock::now();
     let measures = Measures::of(scene);
     let values = |measures: Option<Measures>, summary: &Summary| measures.map(|measures| measures.values(summary.duration)).unwrap_or_default();
-    let (summary, measured, files) = match out.as_deref() {
+    let (summary, measured, mut files) = match out.as_deref() {
         None => {
             let mut observer = (&mut watch, measures);
             let summary = execute(arguments, scene, what, &mut observer)?;
@@ -137,14 +154,29 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
     };
     let wall_s = start.elapsed().as_secs_f64();
     watch.progress.clear();
+    if let Some(path) = &arguments.links {
+        write_links(path, &summary)?;
+        files.push(path.clone());
+    }
     Ok(Run { summary, measured, wall_s, positions: watch.positions, files })
+}
+
+/// Writes a row a link: into a file, or as they come into a pipe or a device.
+fn write_links(path: &Path, summary: &Summary) -> Result<(), Failure> {
+    let is_stream = path.metadata().is_ok_and(|about| !about.is_file() && !about.is_dir());
+    let written = if is_stream {
+        File::options().write(true).open(path).and_then(|mut stream| links_csv(summary, |rows| stream.write_all(rows)))
+    } else {
+        write_whole(path, |file| links_csv(summary, |rows| file.write_all(rows)))
+    };
+    written.map_err(unwritten(path))
 }
 
 fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>, observer: &mut O) -> Result<Summary, O::Error> {
     match what {
         What::Simulated => {
             let threads = arguments.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
-            Simulation::new(scene, if arguments.general { Model::General } else { Model::Least }).on_threads(threads).run(observer)
+            Simulation::new(scene, model(arguments)).on_threads(threads).run(observer)
         }
         What::Replayed(inputs) => replay(scene, inputs, observer),
     }

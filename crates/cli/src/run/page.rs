@@ -118,7 +118,7 @@ fn peers(scene: &Scene, summary: &Summary) -> Html {
         let counts = [peer.stale_samples, peer.refused_samples].map(|count| Html::text(&count.to_string()));
         table.row(std::iter::once(Html::text(&peer.name)).chain(motion).chain(counts))
     });
-    Html::table(&shown).and(more(summary.peers.len(), "peers", "trajectory.csv"))
+    Html::table(&shown).and(more(summary.peers.len() as u64, "peers", "trajectory.csv"))
 }
 
 fn links(summary: &Summary) -> Html {
@@ -128,23 +128,25 @@ fn links(summary: &Summary) -> Html {
         (link, line.stats)
     });
     let between = summary.links.iter().map(|link| (LinkName::between(name(link.from), name(link.to)), link.stats));
-    let all: Vec<(LinkName, LinkStats)> = access.chain(between).collect();
+    let shown: Vec<(LinkName, LinkStats)> = access.chain(between).take(MOST_ROWS).collect();
+    let mut total = summary.links.total();
+    summary.access_lines.iter().for_each(|line| total.add(&line.stats, 1));
     // Causes that dropped nothing would make the table wide.
-    let causes: Vec<DropCause> = DropCause::ALL.into_iter().filter(|cause| all.iter().any(|(_, stats)| stats.dropped(*cause) > 0)).collect();
+    let causes: Vec<DropCause> = DropCause::ALL.into_iter().filter(|cause| total.dropped(*cause) > 0).collect();
     let head = Table::new().column("link").number("offered").number("copies").number("delivered");
     let head = causes.iter().fold(head, |table, cause| table.number(format!("dropped: {}", cause.name())));
     let head = head.number("on the way at the end").number("mean delay [ms]");
-    let table = all.iter().take(MOST_ROWS).fold(head, |table, (link, stats)| {
+    let table = shown.iter().fold(head, |table, (link, stats)| {
         let counts = [stats.offered(), stats.duplicated(), stats.delivered()].into_iter().chain(causes.iter().map(|cause| stats.dropped(*cause)));
         let delay = stats.mean_delay().map_or_else(|| "–".to_owned(), |delay| number(1e3 * delay.as_secs_f64()));
         let cells = counts.chain([stats.in_flight()]).map(|count| count.to_string()).chain([delay]);
         table.row(std::iter::once(link.as_str().to_owned()).chain(cells).map(|cell| Html::text(&cell)))
     });
-    Html::table(&table).and(more(all.len(), "links", "links.csv"))
+    Html::table(&table).and(more(summary.links.len() + summary.access_lines.len() as u64, "links", "links.csv"))
 }
 
-fn more(rows: usize, what: &str, file: &str) -> Html {
-    if rows > MOST_ROWS { Html::paragraph(format!("{MOST_ROWS} of {rows} {what} are shown; {file} has all.")) } else { Html::default() }
+fn more(rows: u64, what: &str, file: &str) -> Html {
+    if rows > MOST_ROWS as u64 { Html::paragraph(format!("{MOST_ROWS} of {rows} {what} are shown; {file} has all.")) } else { Html::default() }
 }
 
 /// Three decimals, or as a power of ten where these would be none or many.

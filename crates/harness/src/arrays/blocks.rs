@@ -201,10 +201,7 @@ impl<const A: usize> Blocks<A> {
             set_map(&mut object_map, lane, &scenes[run].copy_config(0).plant().step(tick, scenes[run].integrator));
         }
         let step = |plant: Plant, run: usize| plant.step(tick, scenes[run].integrator);
-        let hands: Vec<(usize, usize, HandForce<A>)> = (0..places.peers)
-            .flat_map(|peer| (0..places.runs).map(move |run| (peer, run)))
-            .map(|(peer, run)| (peer, run, HandForce::of(scenes[run].peers[places.first + peer].hand.as_ref())))
-            .collect();
+        let hand = |peer: usize, run: usize| HandForce::of(scenes[run].peers[places.first + peer].hand.as_ref());
         let mut blocks = Vec::with_capacity(A * places.blocks());
         let mut late = Vec::with_capacity(A * places.blocks());
         for axis in 0..A {
@@ -230,13 +227,17 @@ impl<const A: usize> Blocks<A> {
                 block.device.velocity.0[spot.lane] = device.velocity[axis];
                 block.coupling.stiffness.0[spot.lane] = config.coupling.stiffness;
                 block.coupling.damping.0[spot.lane] = config.coupling.damping;
-                let hand = &hands[peer * places.runs + run].2;
-                block.hand.0[spot.lane] = hand.constant().map_or(0.0, |force| force[axis]);
+                let force: Option<[f64; A]> = hand(peer, run).constant();
+                block.hand.0[spot.lane] = force.map_or(0.0, |force| force[axis]);
             }
         }
         let any_late = scenes.iter().any(|scene| scene.peers.iter().any(|peer| peer.compute_delay));
         let walls: Vec<Option<Enclosure>> = scenes.iter().map(|scene| scene.object.enclosure).collect();
-        let varies = |(peer, run, hand): &(usize, usize, HandForce<A>)| hand.constant().is_none() && moves(places.first + peer, *run);
+        let varying = |(peer, run): (usize, usize)| {
+            let hand = hand(peer, run);
+            (hand.constant().is_none() && moves(places.first + peer, run)).then_some((peer, run, hand))
+        };
+        let hands = (0..places.peers).flat_map(|peer| (0..places.runs).map(move |run| (peer, run))).filter_map(varying);
         Self {
             leads: if Law::<f64>::horizon(law).is_some() { vec![Lanes::ZERO; blocks.len()] } else { Vec::new() },
             memory: vec![0.0; blocks.len() * WIDTH * Law::<f64>::memory(law)],
@@ -247,7 +248,7 @@ impl<const A: usize> Blocks<A> {
             object_map,
             late: any_late.then_some(late),
             walls: walls.iter().any(Option::is_some).then_some(walls),
-            hands: hands.into_iter().filter(varies).collect(),
+            hands: hands.collect(),
             goes_on: Mask::ALL,
         }
     }

@@ -9,9 +9,9 @@
 
 mod blocks;
 mod bodies;
-mod run_watch;
 mod lanes;
 mod place;
+mod run_watch;
 mod samples;
 mod shape;
 mod side_by_side;
@@ -21,6 +21,7 @@ mod turn;
 mod turning;
 
 use std::ops::Range;
+use std::time::Duration;
 
 use cohaptic_peer::Lead;
 use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law, LawVisitor};
@@ -31,13 +32,13 @@ use pulp::NullaryFnOnce;
 
 use crate::observer::INSTANTS_BETWEEN_QUESTIONS;
 use crate::plan::{DeviceChoice, Plan};
-use crate::summary::{Ending, LinkSummary, PeerSummary, Summary};
+use crate::summary::{Ending, LinkSummaries, PeerSummary, Summary};
 use blocks::{Blocks, LawOfLanes, Moved, law_of_lanes};
 use bodies::Bodies;
-pub(crate) use run_watch::Onlooker;
-use run_watch::{Unwatched, RunWatch, WatchedTicks};
 use lanes::Lanes;
 use place::Places;
+pub(crate) use run_watch::Onlooker;
+use run_watch::{RunWatch, Unwatched, WatchedTicks};
 use samples::{Broadcast, PerPacket, Sample};
 pub(crate) use shape::Shape;
 pub use side_by_side::{run_side_by_side, same_shape};
@@ -363,19 +364,35 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
         PeerSummary { name, position, velocity, attitude: self.bodies.attitude(peer, run), stale_samples, refused_samples: 0 }
     }
 
-    /// The counters of the link from a peer of the scene to one that is here, after that number of ticks, if what arrives by an instant is delivered.
-    fn link_stats(&self, from: usize, to: usize, run: usize, ticks: u64, until: Instant) -> LinkStats {
-        let delay = match (&self.samples, self.shape.delay) {
-            (Samples::PerPacket(samples), _) => return samples.stats(from, to, run),
-            (Samples::Broadcast(_), delay) => nanos(delay.unwrap_or_default()),
-        };
-        // Over a constant delay a link need not count: sent at phase, phase + M, phase + 2M …
+    /// The counters of each link from a peer after that number of ticks, if what arrives by an instant is delivered and all links have that constant delay.
+    fn broadcast_stats(&self, from: usize, delay: Duration, ticks: u64, until: Instant) -> LinkStats {
+        let delay = nanos(delay);
+        // Such a link need not count: sent at phase, phase + M, phase + 2M …
         let sent_before = |ticks: u64| ticks.saturating_sub(self.shape.phases[from]).div_ceil(self.shape.send_every);
         let last = until.as_nanos().checked_sub(delay).map(|nanos| nanos / crate::arrays::nanos(self.shape.tick));
         let offered = sent_before(ticks);
         let delivered = last.map_or(0, |last| sent_before(last.saturating_add(1).min(ticks)));
         LinkStats::counted(offered, delivered, u128::from(delivered) * u128::from(delay), [])
     }
+}
+
+/// What the links did of a run that ended after that number of ticks; the peers are here and there.
+fn links<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
+    parts: &[Arrays<'_, B, A, P, L>],
+    run: usize,
+    ticks: u64,
+    until: Instant,
+) -> LinkSummaries {
+    let peers = parts[0].shape.peers;
+    if let Some(delay) = parts[0].shape.delay {
+        return LinkSummaries::by_sender((0..peers).map(|from| parts[0].broadcast_stats(from, delay, ticks, until)).collect());
+    }
+    let of_part = |from: usize, part: &'_ Arrays<'_, B, A, P, L>| -> Vec<LinkStats> {
+        let Samples::PerPacket(samples) = &part.samples else { return Vec::new() };
+        let receivers = part.members.clone().enumerate().filter(|(_, to)| *to != from);
+        receivers.map(|(receiver, _)| samples.stats(from, receiver, run)).collect()
+    };
+    LinkSummaries::each(peers, (0..peers).flat_map(|from| parts.iter().flat_map(move |part| of_part(from, part))).collect())
 }
 
 /// What a run came to after that number of ticks, with the packets that arrived by an instant; the peers are here and there.
@@ -392,17 +409,12 @@ fn summary<B: Bodies<A, P>, const A: usize, const P: usize, const L: usize>(
         Ending::Diverged(at) | Ending::Interrupted(at) => at,
     };
     let members = || parts.iter().flat_map(|part| (0..part.members.len()).map(move |peer| (part, peer)));
-    let pairs = (0..parts[0].shape.peers).flat_map(|from| members().enumerate().map(move |(to, member)| (from, to, member)));
-    let links = pairs.filter(|(from, to, _)| from != to).map(|(from, to, (part, peer))| {
-        let stats = part.link_stats(from, peer, run, ticks, until);
-        LinkSummary { from, to, stats }
-    });
     Summary {
         ending,
         duration: stop - Instant::ZERO,
         ticks,
         peers: members().map(|(part, peer)| part.peer_summary(peer, run)).collect(),
-        links: links.collect(),
+        links: links(parts, run, ticks, until),
         access_lines: Vec::new(),
         max_discrepancy,
         max_rotation_discrepancy: parts[0].bodies.max_rotation_discrepancy(run),
@@ -444,7 +456,9 @@ struct Motion<'a, W, E, B, const A: usize, const P: usize, const L: usize> {
     bodies: &'a mut B,
 }
 
-impl<W: LawOfLanes, E: RunWatch<B, A, P>, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnOnce for Motion<'_, W, E, B, A, P, L> {
+impl<W: LawOfLanes, E: RunWatch<B, A, P>, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnOnce
+    for Motion<'_, W, E, B, A, P, L>
+{
     type Output = Moved<L>;
 
     #[inline(always)]
@@ -470,6 +484,6 @@ fn until(shape: &Shape, tick: u64, next_send: u64) -> Instant {
 }
 
 /// A span of at most a year.
-fn nanos(span: std::time::Duration) -> u64 {
+fn nanos(span: Duration) -> u64 {
     u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }

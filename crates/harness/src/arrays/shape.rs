@@ -48,6 +48,11 @@ impl Shape {
         (before, Instant::from_nanos(before * nanos(self.tick)))
     }
 
+    /// Whether a sample reaches all others together, so that links take no memory.
+    pub(crate) const fn is_broadcast(&self) -> bool {
+        self.delay.is_some()
+    }
+
     /// How many threads pay for a run at most, and why no more.
     pub(crate) fn threads(&self) -> (usize, &'static str) {
         threads::that_pay(self)
@@ -74,7 +79,8 @@ impl Shape {
             && scene.coordination.send_when.is_none()
             && scene.duration <= LONGEST
             && clock.tick <= LONGEST
-            && scene.peers.len() <= usize::from(u16::MAX)
+            // What each packet carries counts them in 16 bits.
+            && (scene.peers.len() <= usize::from(u16::MAX) || one_delay(scene).is_some())
             && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none())
             && scene.links.used().all(|(link, _)| DirectLinks::takes(link, size) || SteppedLinks::takes(link));
         fits.then(|| {

@@ -15,7 +15,7 @@ use crate::{NoObserver, Simulation, Summary};
 ///
 /// # Panics
 ///
-/// If a scene is [too large](crate::too_large).
+/// If a scene needs events and has more than 23,170 peers; see [`crate::too_large`].
 #[must_use]
 pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
     let mut summaries = Vec::with_capacity(scenes.len());

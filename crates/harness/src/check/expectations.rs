@@ -98,7 +98,11 @@ impl Observer for Positions {
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
         let is_its = |peer: usize| peer == row.peer;
-        self.see(row.at, |peer, axis| is_its(peer).then(|| row.object.position[axis]), |peer| row.turn.filter(|_| is_its(peer)).map(|turn| *turn.object));
+        self.see(
+            row.at,
+            |peer, axis| is_its(peer).then(|| row.object.position[axis]),
+            |peer| row.turn.filter(|_| is_its(peer)).map(|turn| *turn.object),
+        );
         Ok(())
     }
 
@@ -171,8 +175,9 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 #[expect(clippy::cast_precision_loss, reason = "packet counts below 2^53")]
 fn loss(scene: &Scene, expected: &ExpectLoss, summary: &Summary) -> Outcome {
     let stats = selected(expected.link, summary);
-    let offered: u64 = stats.iter().map(LinkStats::offered).sum();
-    let dropped: u64 = stats.iter().map(|stats| expected.cause.map_or_else(|| stats.dropped_in_all(), |cause| stats.dropped(cause))).sum();
+    let offered: u64 = stats.iter().map(|(stats, links)| stats.offered() * links).sum();
+    let dropped_on = |stats: &LinkStats| expected.cause.map_or_else(|| stats.dropped_in_all(), |cause| stats.dropped(cause));
+    let dropped: u64 = stats.iter().map(|(stats, links)| dropped_on(stats) * links).sum();
     let cause = expected.cause.map_or("for any reason", DropCause::name);
     let what = format!("fraction of packets dropped on {} ({cause})", link_name(expected.link, scene));
     let bounds = Bounds { min: expected.min.map(|min| min.get()), max: expected.max.map(|max| max.get()) };
@@ -185,9 +190,10 @@ fn loss(scene: &Scene, expected: &ExpectLoss, summary: &Summary) -> Outcome {
 
 fn delay(scene: &Scene, expected: &ExpectDelay, summary: &Summary) -> Outcome {
     let stats = selected(expected.link, summary);
-    let delivered: u64 = stats.iter().map(LinkStats::delivered).sum();
+    let delivered: u64 = stats.iter().map(|(stats, links)| stats.delivered() * links).sum();
     let what = format!("mean delay on {}", link_name(expected.link, scene));
-    let total: u128 = stats.iter().filter_map(|stats| stats.mean_delay().map(|mean| mean.as_nanos() * u128::from(stats.delivered()))).sum();
+    let of_link = |stats: &LinkStats| stats.mean_delay().map_or(0, |mean| mean.as_nanos() * u128::from(stats.delivered()));
+    let total: u128 = stats.iter().map(|(stats, links)| of_link(stats) * u128::from(*links)).sum();
     let bounds = Bounds { min: expected.min.map(|min| min.as_secs_f64()), max: expected.max.map(|max| max.as_secs_f64()) };
     let range = match (expected.min, expected.max) {
         (Some(min), Some(max)) => format!("{} to {}", Span(min), Span(max)),
@@ -204,13 +210,14 @@ fn delay(scene: &Scene, expected: &ExpectDelay, summary: &Summary) -> Outcome {
     Outcome { passed, expected: range, found: Span(mean).to_string(), ..Outcome::number("delay", what, "s", &bounds, mean.as_secs_f64()) }
 }
 
-fn selected(link: LinkSelector, summary: &Summary) -> Vec<LinkStats> {
+/// The counters of the links that are meant, and how many have them.
+fn selected(link: LinkSelector, summary: &Summary) -> Vec<(LinkStats, u64)> {
     let access = |peer: usize, uplink: bool| {
-        summary.access_lines.iter().filter(|line| line.peer == peer && line.uplink == uplink).map(|line| line.stats).collect()
+        summary.access_lines.iter().filter(|line| line.peer == peer && line.uplink == uplink).map(|line| (line.stats, 1)).collect()
     };
     match link {
-        LinkSelector::All => summary.links.iter().map(|link| link.stats).collect(),
-        LinkSelector::Between { from, to } => summary.links.iter().filter(|link| (link.from, link.to) == (from, to)).map(|link| link.stats).collect(),
+        LinkSelector::All => summary.links.counted().map(|(stats, links)| (*stats, links)).collect(),
+        LinkSelector::Between { from, to } => summary.links.between(from, to).map(|stats| (*stats, 1)).into_iter().collect(),
         LinkSelector::Uplink(peer) => access(peer, true),
         LinkSelector::Downlink(peer) => access(peer, false),
     }

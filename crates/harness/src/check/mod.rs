@@ -60,8 +60,8 @@ pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) 
         return Checked::default();
     };
     let unchecked = |reason: String| Checked { outcomes: Vec::new(), unchecked: Some(reason) };
-    if let Some(reason) = crate::too_large(scene) {
-        return unchecked(reason);
+    if let Some(too_large) = crate::too_large(scene, model, true) {
+        return unchecked(too_large.reason);
     }
     let mut observer = (Watched::new(scene, expect), Asking(&mut keep_going));
     let Ok(summary) = Simulation::new(scene, model).run(&mut observer);

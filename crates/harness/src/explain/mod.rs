@@ -341,7 +341,7 @@ fn access_lines(scene: &Scene) -> Vec<(&str, &'static str, &LinkModel)> {
     scene
         .peers
         .iter()
-        .flat_map(|peer| [(peer.name.as_str(), "uplink", peer.uplink.as_ref()), (peer.name.as_str(), "downlink", peer.downlink.as_ref())])
+        .flat_map(|peer| [(peer.name.as_str(), "uplink", peer.uplink.as_deref()), (peer.name.as_str(), "downlink", peer.downlink.as_deref())])
         .filter_map(|(peer, direction, line)| line.map(|line| (peer, direction, line)))
         .collect()
 }

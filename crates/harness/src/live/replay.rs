@@ -23,7 +23,7 @@ use crate::summary::Summary;
 ///
 /// # Panics
 ///
-/// If the scene is [too large](crate::too_large).
+/// If the scene needs events and has more than 23,170 peers; see [`crate::too_large`].
 pub fn replay<O: Observer>(scene: &Scene, inputs: &Inputs, observer: &mut O) -> Result<Summary, O::Error> {
     let mut live = LiveScene::new(scene, |place| Some(Box::new(Playback::of(inputs, place))));
     for (at, what) in &inputs.rows {

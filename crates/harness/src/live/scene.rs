@@ -16,7 +16,7 @@ use super::presence::{RemotePeers, Transmit};
 use super::seat::{Presence, SampleError, SeatStats};
 use crate::observer::{Observer, SendRow};
 use crate::plan::{Model, Plan};
-use crate::simulation::{Simulation, too_large};
+use crate::simulation::Simulation;
 use crate::summary::{Ending, Summary};
 use crate::world::{Step, Watch, World};
 
@@ -87,10 +87,9 @@ impl LiveScene {
     ///
     /// # Panics
     ///
-    /// If the scene is [`too_large`].
+    /// If the scene has more than 23,170 peers; see [`crate::too_large`].
     #[must_use]
     pub fn new(scene: &Scene, devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
-        assert!(too_large(scene).is_none(), "a scene with more peers than a simulation takes is not run");
         // The observer is not known yet, and may change.
         let plan = Plan::new(scene, Model::Least, true);
         let simulation = Simulation::new(scene, Model::Least);

@@ -227,7 +227,7 @@ impl Measures {
     ///
     /// # Panics
     ///
-    /// If the scene is [too large](crate::too_large).
+    /// If the scene needs events and has more than 23,170 peers; see [`crate::too_large`].
     #[must_use]
     pub fn run(scene: &Scene, model: Model) -> (Summary, Vec<MeasuredValue>) {
         let mut measures = Self::of(scene);

@@ -28,4 +28,5 @@ pub use band::Bands;
 pub(crate) use file::parts;
 pub use file::{RecordError, RecordFile};
 pub use inputs::InputRecorder;
+pub use links::links_csv;
 pub use recorder::{Recorder, SANE_POSITION};

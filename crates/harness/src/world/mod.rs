@@ -19,7 +19,7 @@ use crate::disturbance::Disturbance;
 use crate::observer::{HoldRow, InstantRow, Observer, SendRow, StateRow, StepRow, TickRow, TurnRow, TurnStepRow};
 use crate::plan::{DeviceChoice, Plan};
 use crate::schedule::Schedule;
-use crate::summary::{AccessSummary, Ending, LinkSummary, PeerSummary, Summary};
+use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary};
 
 pub(crate) use remote::{Arriving, NoRemote, Remote};
 use turning::Turning;
@@ -543,13 +543,10 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         Ok(if self.finite { Ending::Complete } else { Ending::Diverged(self.end) })
     }
 
-    fn link_summaries(&self) -> Vec<LinkSummary> {
-        let places = 0..self.members.len();
-        let pairs = places.clone().flat_map(|from| places.clone().map(move |to| (from, to)));
-        pairs
-            .filter(|(from, to)| from != to)
-            .filter_map(|(from, to)| self.network.link_stats(NodeId::new(from), NodeId::new(to)).map(|stats| LinkSummary { from, to, stats }))
-            .collect()
+    fn link_summaries(&self) -> LinkSummaries {
+        let nodes = || (0..self.members.len()).map(NodeId::new);
+        let stats = nodes().flat_map(|from| nodes().filter_map(move |to| self.network.link_stats(from, to)));
+        LinkSummaries::each(self.members.len(), stats.collect())
     }
 
     fn access_summaries(&self) -> Vec<AccessSummary> {
@@ -694,7 +691,7 @@ fn network(scene: &Scene, plan: &Plan) -> Network<Handle> {
         let lines = [(AccessLine::Uplink(NodeId::new(place)), &peer.uplink), (AccessLine::Downlink(NodeId::new(place)), &peer.downlink)];
         for (line, config) in lines {
             if let Some(config) = config {
-                network = network.with_access_line(line, config.clone()).expect("the network has a node for every peer");
+                network = network.with_access_line(line, LinkModel::clone(config)).expect("the network has a node for every peer");
             }
         }
     }

@@ -3,6 +3,7 @@
 #![allow(clippy::float_cmp, reason = "what must agree to the bit is compared so")]
 
 mod hands;
+mod many_peers;
 mod records;
 mod remote;
 mod replays;

@@ -1,6 +1,7 @@
 //! The keys of a peer, its own laid over those of `[peer]`.
 
 use core::time::Duration;
+use std::sync::Arc;
 
 use cohaptic_linkfile::document::{Node, Value, quote};
 use cohaptic_linkfile::link::read_link;
@@ -39,8 +40,8 @@ pub(crate) struct PeerKeys {
     pub(crate) position: Option<[f64; 3]>,
     pub(crate) velocity: Option<[f64; 3]>,
     pub(crate) rotation: PeerRotationKeys,
-    pub(crate) uplink: Option<LinkModel>,
-    pub(crate) downlink: Option<LinkModel>,
+    pub(crate) uplink: Option<Arc<LinkModel>>,
+    pub(crate) downlink: Option<Arc<LinkModel>>,
 }
 
 /// Reads the keys of a peer. `beside`: keys of the same table that somebody else reads. `update`: the period of sending and where it is written.
@@ -88,8 +89,8 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, beside: &[&'stat
     let position = table.maybe("position", |node, _| read_position(node, context));
     let velocity = table.maybe("velocity", |node, _| read_velocity(node, context));
     let turned = read_peer_rotation(&mut table);
-    let uplink = table.maybe("uplink", |node, context| read_link(node, context, &[]));
-    let downlink = table.maybe("downlink", |node, context| read_link(node, context, &[]));
+    let uplink = table.maybe("uplink", |node, context| read_link(node, context, &[]).map(Arc::new));
+    let downlink = table.maybe("downlink", |node, context| read_link(node, context, &[]).map(Arc::new));
     table.finish();
 
     if let (Some(tick), Some((update, update_node)), false) = (tick, update, context.partial) {

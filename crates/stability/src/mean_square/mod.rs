@@ -233,10 +233,12 @@ fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
         let pairs = (0..peers).flat_map(|to| (0..peers).filter(move |from| *from != to).map(move |from| (from, to)));
         pairs.filter(|(from, to)| is_random(scene.links.between(*from, *to))).collect()
     };
-    let access = |model: &Option<cohaptic_wan::LinkModel>| model.as_ref().is_some_and(is_random);
-    let queues = |model: &Option<cohaptic_wan::LinkModel>| model.as_ref().is_some_and(|model| !model.is_constant_delay());
-    if let Some(peer) =
-        scene.peers.iter().find(|peer| access(&peer.uplink) || access(&peer.downlink) || (!random.is_empty() && queues(&peer.downlink)))
+    let access = |model: Option<&cohaptic_wan::LinkModel>| model.is_some_and(is_random);
+    let queues = |model: Option<&cohaptic_wan::LinkModel>| model.is_some_and(|model| !model.is_constant_delay());
+    if let Some(peer) = scene
+        .peers
+        .iter()
+        .find(|peer| access(peer.uplink.as_deref()) || access(peer.downlink.as_deref()) || (!random.is_empty() && queues(peer.downlink.as_deref())))
     {
         return Err(AnalysisError::ChanceWithoutMoments {
             link: peer.name.clone(),

@@ -71,8 +71,8 @@ impl NominalNetwork {
         let lines = Lines {
             size,
             links: scene.links.configs().iter().map(|model| Nominal::of(model, size)).collect(),
-            uplinks: scene.peers.iter().map(|peer| access(peer.uplink.as_ref())).collect(),
-            downlinks: scene.peers.iter().map(|peer| access(peer.downlink.as_ref())).collect(),
+            uplinks: scene.peers.iter().map(|peer| access(peer.uplink.as_deref())).collect(),
+            downlinks: scene.peers.iter().map(|peer| access(peer.downlink.as_deref())).collect(),
         };
         let constant = |line: &Option<Nominal>| line.as_ref().map_or(Some(Duration::ZERO), Nominal::constant);
         let delays = |lines: &[Option<Nominal>]| lines.iter().map(constant).collect::<Option<Vec<Duration>>>();

@@ -39,6 +39,20 @@ impl LinkStats {
         stats
     }
 
+    /// Adds what a number of links did that each have these counters.
+    pub fn add(&mut self, each: &Self, links: u64) {
+        let Self { flow, seldom } = self;
+        flow.offered += each.flow.offered * links;
+        flow.delivered += each.flow.delivered * links;
+        flow.delay_nanos += each.flow.delay_nanos * u128::from(links);
+        seldom.duplicated += each.seldom.duplicated * links;
+        seldom.marked += each.seldom.marked * links;
+        seldom.damaged += each.seldom.damaged * links;
+        for (total, count) in seldom.dropped.iter_mut().zip(each.seldom.dropped) {
+            *total += count * links;
+        }
+    }
+
     /// Packets handed to the link.
     #[must_use]
     pub const fn offered(&self) -> u64 {

@@ -35,6 +35,9 @@ use crate::line::name::LinkName;
 use crate::line::pipeline::{Outcome, TimeWentBack, check_time};
 use crate::packet::{Marks, Outputs, PacketInfo};
 
+/// The most nodes of a [`Network`]: its links are counted in 29 bits.
+pub const MOST_NODES: usize = 23_170;
+
 /// Number of receivers of a packet for which random words are drawn at once.
 const DRAWN_AT_ONCE: u16 = 8;
 
@@ -79,10 +82,11 @@ impl<P: Clone> Network<P> {
     ///
     /// # Panics
     ///
-    /// With more than 23,170 nodes: links are counted in 29 bits, nodes in 16.
+    /// With more than [`MOST_NODES`].
     #[must_use]
     pub fn new<M: Into<LinkModel>>(config: NetworkConfig, mut link: impl FnMut(NodeId, NodeId) -> M) -> Self {
-        let nodes = u16::try_from(config.nodes.len()).ok().filter(|nodes| *nodes <= 23_170).expect("a network has at most 23,170 nodes");
+        let nodes =
+            u16::try_from(config.nodes.len()).ok().filter(|nodes| usize::from(*nodes) <= MOST_NODES).expect("a network has at most 23,170 nodes");
         let mut network = Self {
             nodes,
             now: Instant::ZERO,

@@ -1,0 +1,149 @@
+//! Which scenes are too large to be simulated.
+
+use std::fs;
+
+use cohaptic_scene::{FromScene, Scene};
+use cohaptic_wan::MOST_NODES;
+
+use crate::arrays::Shape;
+use crate::plan::{Model, Plan};
+
+/// Scenes of up to this many peers are not looked at: they take at most some hundred megabytes.
+const SMALL: usize = 500;
+
+/// What a run takes at least \[bytes\]; measured, and rounded down.
+const A_PEER: u64 = 900;
+const A_LINK_IN_ARRAYS: u64 = 50;
+const A_LINK_WITH_EVENTS: u64 = 400;
+
+/// Why a scene is too large to be simulated.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct TooLarge {
+    /// The first peer that is too many, by its place in the scene; the last one if it is the memory that does not suffice.
+    pub peer: usize,
+    /// What is too large for what, and what would make it fit.
+    pub reason: String,
+}
+
+/// How a scene is run, as far as its memory is concerned.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Way {
+    /// In arrays; all links have one constant delay and take no memory.
+    Broadcast,
+    /// In arrays, with numbers for each link.
+    Packets,
+    /// With events, each link a state machine.
+    Events,
+}
+
+/// Why a simulation of the scene does not fit into this program, or into the memory that is free as far as the system says; `None` if it may fit.
+///
+/// `watched`: whether an observer asks for anything but [`crate::Observer::keep_going`]. The memory is a lower bound: with jitter, queues or many packets on
+/// the way a run takes more. It is not looked at in scenes of up to 500 peers.
+///
+/// 23,170 peers are the most with events. In arrays there are up to 65,535 peers, and any number where all links have one constant delay.
+#[must_use]
+pub fn too_large(scene: &Scene, model: Model, watched: bool) -> Option<TooLarge> {
+    if scene.peers.len() <= SMALL { None } else { too_large_for(scene, Way::of(scene, model, watched), free_memory()) }
+}
+
+fn too_large_for(scene: &Scene, way: Way, free: Option<u64>) -> Option<TooLarge> {
+    let peers = scene.peers.len();
+    let (links, needed) = (links(peers), way.bytes(peers));
+    let (peer, what) = if way == Way::Events && peers > MOST_NODES {
+        (MOST_NODES, format!("too many to be simulated with events, which takes at most {MOST_NODES} peers"))
+    } else {
+        let free = free.filter(|free| *free < needed)?;
+        (
+            peers - 1,
+            format!("too many to be simulated in the memory that is free: {} of at least {} that it takes", Megabytes(free), Megabytes(needed)),
+        )
+    };
+    let least = Way::of(scene, Model::Least, false);
+    let cure = if least.bytes(peers) < needed {
+        let needed = Megabytes(least.bytes(peers));
+        format!("to look at nothing but counters, without plot, records and measures, which takes {needed} or a little more")
+    } else {
+        "one constant delay for all links, one tick for all peers and no timeline, without plot, records and measures".to_owned()
+    };
+    Some(TooLarge { peer, reason: format!("{peers} peers with {links} links between them are {what}: expected fewer peers, or {cure}") })
+}
+
+fn links(peers: usize) -> u64 {
+    peers as u64 * (peers as u64).saturating_sub(1)
+}
+
+impl Way {
+    fn of(scene: &Scene, model: Model, watched: bool) -> Self {
+        let in_arrays = if watched || model != Model::Least { None } else { Shape::of(scene, &Plan::new(scene, model, false), &FromScene) };
+        match in_arrays {
+            Some((shape, _)) if shape.is_broadcast() => Self::Broadcast,
+            Some(_) => Self::Packets,
+            None => Self::Events,
+        }
+    }
+
+    fn bytes(self, peers: usize) -> u64 {
+        let a_link = match self {
+            Self::Broadcast => 0,
+            Self::Packets => A_LINK_IN_ARRAYS,
+            Self::Events => A_LINK_WITH_EVENTS,
+        };
+        (peers as u64).saturating_mul(A_PEER).saturating_add(links(peers).saturating_mul(a_link))
+    }
+}
+
+/// The memory that the system and the group of this process leave to it, in bytes, where they say it.
+fn free_memory() -> Option<u64> {
+    let text = fs::read_to_string("/proc/meminfo").ok()?;
+    let kibibytes = text.lines().find_map(|line| line.strip_prefix("MemAvailable:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok())?;
+    let of_group = |name: &str| fs::read_to_string(format!("/sys/fs/cgroup/memory.{name}")).ok()?.trim().parse::<u64>().ok();
+    let in_group = of_group("max").zip(of_group("current")).map_or(u64::MAX, |(most, now)| most.saturating_sub(now));
+    Some(kibibytes.saturating_mul(1024).min(in_group))
+}
+
+/// Bytes in words.
+struct Megabytes(u64);
+
+impl std::fmt::Display for Megabytes {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} MB", self.0 / 1_000_000)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn scene(peers: usize, link: &str) -> Scene {
+        let text = format!(
+            "scene = {{ duration = \"8ms\", count = {peers} }}\nobject.mass = 1\nlink = {{ {link} }}\n\
+             coordination = {{ strategy = \"average-position\", stiffness = 1, update = \"8ms\" }}\npeer = {{ contact = \"none\", device.mass = 1 }}\n"
+        );
+        Scene::parse(&text, Path::new("many.toml"), &[]).unwrap()
+    }
+
+    #[test]
+    fn each_way_has_its_limit_and_says_what_would_fit() {
+        let constant = scene(30_000, "delay = \"24ms\"");
+        let refused = |scene: &Scene, watched: bool, free: u64| {
+            too_large_for(scene, Way::of(scene, Model::Least, watched), Some(free)).map(|TooLarge { peer, reason }| (peer, reason))
+        };
+        assert_eq!(refused(&constant, false, 27_000_000), None);
+        let (peer, reason) = refused(&constant, false, 26_999_999).unwrap();
+        assert_eq!(peer, 29_999);
+        assert!(reason.contains("30000 peers with 899970000 links between them are too many"), "{reason}");
+        assert!(reason.contains("free: 26 MB of at least 27 MB") && reason.contains("expected fewer peers, or one constant delay"), "{reason}");
+        let (peer, reason) = refused(&constant, true, u64::MAX).unwrap();
+        assert_eq!(peer, 23_170);
+        assert!(reason.contains("at most 23170 peers: expected fewer peers, or to look at nothing but counters"), "{reason}");
+        assert!(reason.contains("takes 27 MB"), "{reason}");
+        let jitter = scene(1000, "delay = \"24ms\", jitter = \"2ms\", distribution = \"normal\"");
+        let [with_events, in_arrays] = [Way::Events, Way::Packets].map(|way| way.bytes(1000));
+        assert!((refused(&jitter, true, with_events).is_none(), refused(&jitter, false, in_arrays).is_none()) == (true, true));
+        assert!(refused(&jitter, true, with_events - 1).unwrap().1.contains("to look at nothing but counters"));
+        assert!(refused(&jitter, false, in_arrays - 1).unwrap().1.contains("one constant delay for all links"));
+    }
+}

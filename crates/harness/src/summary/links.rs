@@ -1,0 +1,228 @@
+//! What links did, each and together.
+
+use std::fmt;
+use std::time::Duration;
+
+use cohaptic_wan::LinkStats;
+
+/// One link at the end of a run.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct LinkSummary {
+    /// The sender's place in the scene.
+    pub from: usize,
+    /// The receiver's place in the scene.
+    pub to: usize,
+    /// Its counters.
+    pub stats: LinkStats,
+}
+
+/// The N·(N−1) links between N peers at the end of a run, by sender, then receiver.
+///
+/// Where all links of a sender did the same, their counters are kept once. Equality and [`fmt::Debug`] are those of the list of all links, however it is kept.
+#[derive(Clone)]
+pub struct LinkSummaries {
+    peers: usize,
+    /// By sender, and then by receiver if each link has an entry of its own.
+    stats: Vec<LinkStats>,
+    /// How many links of a sender have an entry together: one, or all N − 1.
+    together: usize,
+}
+
+/// Quantiles over links, each a value that some link has: of n values, the quantile of p is the ⌈p·n⌉-th, counted from the least.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct LinkQuantiles {
+    /// The least.
+    pub min: f64,
+    /// That of 1 %.
+    pub p01: f64,
+    /// The median.
+    pub p50: f64,
+    /// That of 99 %.
+    pub p99: f64,
+    /// The greatest.
+    pub max: f64,
+}
+
+impl LinkSummaries {
+    /// What each link did, by sender, then receiver.
+    ///
+    /// # Panics
+    ///
+    /// If these are not N·(N−1).
+    #[must_use]
+    pub fn each(peers: usize, stats: Vec<LinkStats>) -> Self {
+        assert_eq!(stats.len(), peers * peers.saturating_sub(1), "every pair of {peers} peers has a link in either direction");
+        Self { peers, stats, together: 1 }
+    }
+
+    /// What each of the links of a sender did, by sender.
+    #[must_use]
+    pub fn by_sender(stats: Vec<LinkStats>) -> Self {
+        let peers = stats.len();
+        Self { peers, stats, together: peers.saturating_sub(1).max(1) }
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub const fn len(&self) -> u64 {
+        self.peers as u64 * (self.peers as u64).saturating_sub(1)
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The counters of the link from one peer to another; `None` if there is no such link.
+    #[must_use]
+    pub fn between(&self, from: usize, to: usize) -> Option<&LinkStats> {
+        let is_link = from != to && from < self.peers && to < self.peers;
+        if is_link { self.stats.get((from * (self.peers - 1) + to - usize::from(to > from)) / self.together) } else { None }
+    }
+
+    /// All of them, one by one.
+    #[must_use]
+    pub const fn iter(&self) -> EachLink<'_> {
+        EachLink { links: self, from: 0, to: 0 }
+    }
+
+    /// The counters of links, and how many neighbours have them: all links, in no more steps than counters are kept.
+    pub fn counted(&self) -> impl Iterator<Item = (&LinkStats, u64)> + Clone {
+        self.stats.iter().map(|stats| (stats, self.together as u64))
+    }
+
+    /// The counters of all of them together.
+    #[must_use]
+    pub fn total(&self) -> LinkStats {
+        let mut total = LinkStats::default();
+        self.counted().for_each(|(stats, links)| total.add(stats, links));
+        total
+    }
+
+    /// Quantiles of the packets delivered, copies included, as parts of those offered, over the links that were offered any. A packet on the way at the end is
+    /// not delivered. `None` if no link was offered a packet.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "packet counts below 2^53")]
+    pub fn delivered_fraction(&self) -> Option<LinkQuantiles> {
+        let fraction = |stats: &LinkStats| (stats.offered() > 0).then(|| stats.delivered() as f64 / stats.offered() as f64);
+        self.quantiles(fraction)
+    }
+
+    /// Quantiles of [`LinkStats::mean_delay`] \[s\], over the links that delivered a packet. `None` if none did.
+    #[must_use]
+    pub fn mean_delay(&self) -> Option<LinkQuantiles> {
+        self.quantiles(|stats| stats.mean_delay().as_ref().map(Duration::as_secs_f64))
+    }
+
+    fn quantiles(&self, value: impl Fn(&LinkStats) -> Option<f64>) -> Option<LinkQuantiles> {
+        // Each entry stands for equally many links, so that the quantiles of entries are those of links.
+        let mut values: Vec<f64> = self.stats.iter().filter_map(value).collect();
+        let last = values.len().checked_sub(1)?;
+        values.sort_unstable_by(f64::total_cmp);
+        let percent = |percent: usize| values[(values.len() * percent).div_ceil(100).saturating_sub(1)];
+        Some(LinkQuantiles { min: values[0], p01: percent(1), p50: percent(50), p99: percent(99), max: values[last] })
+    }
+}
+
+impl PartialEq for LinkSummaries {
+    fn eq(&self, other: &Self) -> bool {
+        let is_kept_alike = self.together == other.together;
+        self.peers == other.peers && if is_kept_alike { self.stats == other.stats } else { self.iter().eq(other) }
+    }
+}
+
+impl Eq for LinkSummaries {}
+
+impl fmt::Debug for LinkSummaries {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self).finish()
+    }
+}
+
+impl<'a> IntoIterator for &'a LinkSummaries {
+    type Item = LinkSummary;
+    type IntoIter = EachLink<'a>;
+
+    fn into_iter(self) -> EachLink<'a> {
+        self.iter()
+    }
+}
+
+/// The links of [`LinkSummaries`], one by one.
+#[derive(Clone, Debug)]
+pub struct EachLink<'a> {
+    links: &'a LinkSummaries,
+    from: usize,
+    to: usize,
+}
+
+impl Iterator for EachLink<'_> {
+    type Item = LinkSummary;
+
+    fn next(&mut self) -> Option<LinkSummary> {
+        self.to += usize::from(self.to == self.from);
+        if self.to >= self.links.peers {
+            (self.from, self.to) = (self.from + 1, 0);
+        }
+        let (from, to) = (self.from, self.to);
+        let stats = *self.links.between(from, to)?;
+        self.to += 1;
+        Some(LinkSummary { from, to, stats })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stats(offered: u64, delivered: u64) -> LinkStats {
+        LinkStats::counted(offered, delivered, 7 * u128::from(delivered), [])
+    }
+
+    #[test]
+    fn it_makes_no_difference_how_links_are_kept() {
+        for peers in [2, 3, 9] {
+            let senders: Vec<LinkStats> = (0..peers).map(|from| stats(10 + from, from)).collect();
+            let each = senders.iter().flat_map(|stats| (1..peers).map(|_| *stats)).collect();
+            let one = LinkSummaries::by_sender(senders);
+            let other = LinkSummaries::each(one.peers, each);
+            let list: Vec<LinkSummary> = one.iter().collect();
+            assert_eq!((&one, format!("{one:#?}"), one.total()), (&other, format!("{list:#?}"), other.total()));
+            assert_eq!((one.len(), list.len() as u64), (other.len(), peers * (peers - 1)));
+            assert_eq!((one.delivered_fraction(), one.mean_delay()), (other.delivered_fraction(), other.mean_delay()));
+            assert!(list.iter().all(|link| link.from != link.to && one.between(link.from, link.to) == Some(&link.stats)));
+            let places: Vec<(usize, usize)> = list.iter().map(|link| (link.from, link.to)).collect();
+            assert!(places.is_sorted() && (one.between(0, 0), one.between(0, one.peers)) == (None, None));
+            let mut differs = other.clone();
+            let last = differs.stats.len() - 1;
+            differs.stats[last] = stats(1, 1);
+            assert_ne!(one, differs);
+        }
+    }
+
+    #[test]
+    fn totals_and_quantiles_are_those_of_the_list() {
+        // Three peers, six links: one was offered nothing, one delivered nothing.
+        let links =
+            LinkSummaries::each(3, [(0, 0), (4, 0), (4, 1), (4, 2), (4, 3), (4, 8)].map(|(offered, delivered)| stats(offered, delivered)).to_vec());
+        assert_eq!(links.total(), stats(20, 14));
+        assert_eq!(links.delivered_fraction(), Some(LinkQuantiles { min: 0.0, p01: 0.0, p50: 0.5, p99: 2.0, max: 2.0 }));
+        assert_eq!(links.mean_delay(), Some(LinkQuantiles { min: 7e-9, p01: 7e-9, p50: 7e-9, p99: 7e-9, max: 7e-9 }));
+        let idle = LinkSummaries::by_sender(vec![stats(0, 0); 4]);
+        assert_eq!((idle.delivered_fraction(), idle.mean_delay()), (None, None));
+        // Of 342 links the fourth is the quantile of one in a hundred.
+        let many: Vec<LinkStats> = (1..=19 * 18).map(|delivered| stats(1, delivered)).collect();
+        let quantiles = LinkSummaries::each(19, many).delivered_fraction();
+        assert_eq!(quantiles, Some(LinkQuantiles { min: 1.0, p01: 4.0, p50: 171.0, p99: 339.0, max: 342.0 }));
+    }
+
+    /// Counts of links are those of 10¹⁰ of them.
+    #[test]
+    fn links_of_a_hundred_thousand_peers_are_counted_in_64_bits() {
+        let links = LinkSummaries::by_sender(vec![stats(125, 122); 100_000]);
+        assert_eq!(links.len(), 9_999_900_000);
+        assert_eq!((links.total().offered(), links.total().delivered()), (125 * 9_999_900_000, 122 * 9_999_900_000));
+        assert_eq!(links.between(99_999, 99_998), Some(&stats(125, 122)));
+    }
+}
