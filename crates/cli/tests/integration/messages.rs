@@ -166,7 +166,8 @@ fn too_many_peers_are_shown_where_the_first_one_too_many_is() {
     let desk = Desk::with("many.toml", &format!("{without_peers}{peers}"));
     // Entries have two lines each, and the first one too many comes after 23,170 of them.
     let line = before + 2 * 23_170 + 1;
-    let start = format!("many.toml:{line}:1: peers.p23171: 23171 peers with 536872070 links between them are too many to be simulated with events, which");
+    let start =
+        format!("many.toml:{line}:1: peers.p23171: 23171 peers with 536872070 links between them are too many to be simulated with events, which");
     let end = format!("\n      |\n{line} | [[peers]]\n      | ^^^^^^^^^\n");
     for command in ["run many.toml", "live many.toml", "campaign many.toml --measure all --out out"] {
         let outcome = desk.cohaptic(command);

@@ -204,7 +204,8 @@ mod tests {
     #[test]
     fn totals_and_quantiles_are_those_of_the_list() {
         // Three peers, six links: one was offered nothing, one delivered nothing.
-        let links = LinkSummaries::each(3, [(0, 0), (4, 0), (4, 1), (4, 2), (4, 3), (4, 8)].map(|(offered, delivered)| stats(offered, delivered)).to_vec());
+        let links =
+            LinkSummaries::each(3, [(0, 0), (4, 0), (4, 1), (4, 2), (4, 3), (4, 8)].map(|(offered, delivered)| stats(offered, delivered)).to_vec());
         assert_eq!(links.total(), stats(20, 14));
         assert_eq!(links.delivered_fraction(), Some(LinkQuantiles { min: 0.0, p01: 0.0, p50: 0.5, p99: 2.0, max: 2.0 }));
         assert_eq!(links.mean_delay(), Some(LinkQuantiles { min: 7e-9, p01: 7e-9, p50: 7e-9, p99: 7e-9, max: 7e-9 }));

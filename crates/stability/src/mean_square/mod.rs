@@ -235,8 +235,10 @@ fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
     };
     let access = |model: Option<&cohaptic_wan::LinkModel>| model.is_some_and(is_random);
     let queues = |model: Option<&cohaptic_wan::LinkModel>| model.is_some_and(|model| !model.is_constant_delay());
-    if let Some(peer) =
-        scene.peers.iter().find(|peer| access(peer.uplink.as_deref()) || access(peer.downlink.as_deref()) || (!random.is_empty() && queues(peer.downlink.as_deref())))
+    if let Some(peer) = scene
+        .peers
+        .iter()
+        .find(|peer| access(peer.uplink.as_deref()) || access(peer.downlink.as_deref()) || (!random.is_empty() && queues(peer.downlink.as_deref())))
     {
         return Err(AnalysisError::ChanceWithoutMoments {
             link: peer.name.clone(),

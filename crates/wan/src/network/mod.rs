@@ -85,7 +85,8 @@ impl<P: Clone> Network<P> {
     /// With more than [`MOST_NODES`].
     #[must_use]
     pub fn new<M: Into<LinkModel>>(config: NetworkConfig, mut link: impl FnMut(NodeId, NodeId) -> M) -> Self {
-        let nodes = u16::try_from(config.nodes.len()).ok().filter(|nodes| usize::from(*nodes) <= MOST_NODES).expect("a network has at most 23,170 nodes");
+        let nodes =
+            u16::try_from(config.nodes.len()).ok().filter(|nodes| usize::from(*nodes) <= MOST_NODES).expect("a network has at most 23,170 nodes");
         let mut network = Self {
             nodes,
             now: Instant::ZERO,

@@ -127,7 +127,10 @@ const DOCUMENTS: [Document; 21] = [
                 "link_quantiles.delivered_fraction.NAME, link_quantiles.mean_delay_s.NAME",
                 "over links, `min`, `p01`, `p50`, `p99` and `max`: of n values `p01` is the ⌈n/100⌉-th. Packets delivered, as a part of those offered, and mean delays; `null` where no link has any",
             ),
-            ("links[].from, links[].to, links[].@Counters", "by sender, then receiver; `links` is `null` where there are more than 1,000: then `--links` writes them"),
+            (
+                "links[].from, links[].to, links[].@Counters",
+                "by sender, then receiver; `links` is `null` where there are more than 1,000: then `--links` writes them",
+            ),
             ("access_lines[].peer, access_lines[].line, access_lines[].@Counters", "`line` is `uplink` or `downlink`"),
             ("max_discrepancy_m", "[discrepancy](model.md#discrepancy)"),
             ("max_rotation_discrepancy_rad", "where the object turns: the largest angle between two copies"),
