@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use cohaptic_benches::Mesh;
+use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_scene::Scene;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
@@ -17,6 +18,27 @@ const LINKS: [(&str, &str); 6] = [
     ("token bucket", "jitter = \"2ms\"\nloss = \"1%\"\ntoken-bucket = { rate = \"10Mbit\", burst = \"3kB\", limit = \"100 packets\" }"),
 ];
 
+fn scene(peers: usize, keys: &str, ticks: u64) -> Scene {
+    let text = Mesh::text_over(peers, keys, ticks, 1);
+    Scene::parse(&text, "mesh.toml".as_ref(), &[]).expect("the mesh is a scene")
+}
+
+/// One run on one thread and on two.
+fn threads(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("threads");
+    group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(4));
+    for (peers, ticks) in [(50, 1000), (200, 400), (1000, 48)] {
+        let scene = scene(peers, LINKS[1].1, ticks);
+        group.throughput(Throughput::Elements(ticks / 8 * (peers * (peers - 1)) as u64));
+        for threads in [1, 2] {
+            group.bench_function(BenchmarkId::new(threads.to_string(), peers), |bencher| {
+                bencher.iter(|| Simulation::new(&scene, Model::Least).on_threads(threads).run(&mut NoObserver));
+            });
+        }
+    }
+    group.finish();
+}
+
 fn queues(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("queues");
     group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(2));
@@ -25,13 +47,12 @@ fn queues(criterion: &mut Criterion) {
         // Elements are packets offered.
         group.throughput(Throughput::Elements(ticks.div_ceil(8) * (peers * (peers - 1)) as u64));
         for (name, keys) in LINKS {
-            let text = Mesh::text_over(peers, keys, ticks, 1);
-            let scene = Scene::parse(&text, "mesh.toml".as_ref(), &[]).expect("the mesh is a scene");
+            let scene = scene(peers, keys, ticks);
             group.bench_function(BenchmarkId::new(name, peers), |bencher| bencher.iter(|| Mesh::run(&scene)));
         }
     }
     group.finish();
 }
 
-criterion_group!(benches, queues);
+criterion_group!(benches, queues, threads);
 criterion_main!(benches);

@@ -46,7 +46,7 @@ mod world;
 
 pub use arrays::{run_side_by_side, same_shape};
 pub use cohaptic_scene::{FromScene, Strategies};
-pub use observer::{HoldRow, InstantRow, NoObserver, Observer, PacketRow, SendRow, StateRow, StepRow, TickRow, TurnRow};
+pub use observer::{HoldRow, InstantRow, NoObserver, Observer, PacketRow, SendRow, StateRow, StepRow, TickRow, TurnRow, TurnStepRow};
 pub use plan::Model;
 pub use simulation::Simulation;
 pub use size::{TooLarge, too_large};

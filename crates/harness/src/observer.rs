@@ -209,6 +209,27 @@ pub struct StepRow<'a> {
     pub coordination_force: &'a [f64],
     /// β, by how much the strategy damps the copy over the step [N·s/m].
     pub own_damping: f64,
+    /// The turn of the copy over the step, if the object turns.
+    pub turn: Option<TurnStepRow>,
+}
+
+/// The turn of one copy over one of its steps, all in its body axes.
+#[derive(Clone, Copy, Debug)]
+pub struct TurnStepRow {
+    /// How long the step takes.
+    pub span: std::time::Duration,
+    /// Angular velocity at the beginning [rad/s].
+    pub before: [f64; 3],
+    /// Angular velocity at the end [rad/s].
+    pub after: [f64; 3],
+    /// The integral of the angular velocity over the step \[rad\].
+    pub travel: [f64; 3],
+    /// The sum of all torques that are held on the copy over the step \[N·m\]. Damping is no held torque.
+    pub held_torque: [f64; 3],
+    /// The held part of the torque of the coordination as it is applied, which acts with the opposite sign \[N·m\].
+    pub coordination_torque: [f64; 3],
+    /// β about each axis, by how much the strategy damps the turn over the step [N·m·s/rad].
+    pub own_damping: [f64; 3],
 }
 
 /// An instant at which at least one peer has ticked.

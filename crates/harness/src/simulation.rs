@@ -65,14 +65,14 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     pub fn run<O: Observer>(&self, observer: &mut O) -> Result<Summary, O::Error> {
         let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
         if let Some((shape, law)) = self.arrays(&plan, Watch::of(observer)) {
-            let threads = shape.threads_that_pay(self.threads);
+            let threads = self.threads.min(shape.threads().0);
             if threads > 1
                 && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
             {
                 return Ok(summary);
             }
             let looks_ahead = shape.looks_ahead();
-            let [summary] = arrays::run([self.scene], shape, [law], |now| observer.keep_going(now));
+            let summary = arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now));
             // The counters of queues that have looked ahead are those of a later instant.
             let has_looked_too_far = looks_ahead && matches!(summary.ending, Ending::Diverged(at) if at - Instant::ZERO < self.scene.duration);
             if !has_looked_too_far {

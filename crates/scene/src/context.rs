@@ -15,6 +15,8 @@ pub(crate) struct SceneContext<'a> {
     pub(crate) axes: Option<Axes>,
     /// Whether the scene is for a live session, where peers that live elsewhere need no model.
     pub(crate) live: bool,
+    /// Whether the object has an inertia.
+    pub(crate) turns: bool,
 }
 
 impl<'a> SceneContext<'a> {

@@ -150,6 +150,7 @@ mod tests {
                 | crate::ChangeKind::Hand { .. }
                 | crate::ChangeKind::HandTorque { .. }
                 | crate::ChangeKind::Coordination(_)
+                | crate::ChangeKind::RotationalGains(_)
                 | crate::ChangeKind::Parameters(_)
                 | crate::ChangeKind::SendWhen(_) => panic!("{change:?}"),
             }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use cohaptic_peer::coordination::{LawSettings, Pull};
+use cohaptic_peer::rotation::Triple;
 use cohaptic_peer::{Clock, Contact, Coordination, DeviceConfig, Enclosure, Gains, Hand, Integrator, SendWhen, Signal};
 use cohaptic_units::{Instant, Probability};
 use cohaptic_wan::{DropCause, LinkModel};
@@ -354,6 +355,8 @@ pub enum ChangeKind {
     },
     /// The coordination gains change, at every peer. As written, before scaling.
     Coordination(Gains),
+    /// KR [N·m/rad] and BR [N·m·s/rad] change, at every peer. As written, before scaling; `None`: as it was. Only where the object turns.
+    RotationalGains(Gains<Option<Triple>>),
     /// Parameters that strategies have of their own change, at every peer: those of all strategies, from now on.
     Parameters(Box<LawSettings>),
     /// Which samples are sent changes, at every peer.

@@ -101,7 +101,8 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     let file = file.with_names(names.as_ref());
     let modulators = read_modulators(root.get("modulators"), file);
     let file = file.with_modulators(modulators.as_ref());
-    let context = SceneContext { file, axes, live };
+    let turns = root.get("object").and_then(Node::as_table).is_some_and(|object| object.get("inertia").is_some());
+    let context = SceneContext { file, axes, live, turns };
     // From here on the readers know axes, names and modulators.
     let object = root.required("object", "a table [object] with a mass", |node, _| read_object(node, context));
     let (object, object_rotation) = object.unzip();
@@ -130,7 +131,6 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         on_links(Instant::ZERO, LinkSelector::All, links);
     }
     let timeline_node = root.get("timeline");
-    let turns = rotation.as_ref().is_some_and(Option::is_some);
     let timeline =
         read_timeline(timeline_node, duration, links.as_ref(), peers.as_deref(), coordination.as_ref(), on_links, context).map(|mut changes| {
             changes.retain(|change| turns || !matches!(change.what, ChangeKind::HandTorque { .. }));

@@ -1,6 +1,6 @@
 //! An object that turns: its inertia, and all that follows from it.
 
-use cohaptic_peer::coordination::Pull;
+use cohaptic_peer::coordination::{Pull, UsedGains};
 use cohaptic_peer::rotation::{Attitude, DeviceRotation, HeldAttitudes, Rotation, RotationConfig, Spin, Triple};
 use cohaptic_peer::{Coordination, Gains, Signal, State};
 
@@ -54,7 +54,8 @@ impl Scene {
         let rotation = self.rotation.as_ref()?;
         let others = rotation.peers.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, peer)| peer.attitude);
         let held = HeldAttitudes::new(others);
-        Some(Rotation::new(self.rotation_config(place)?, rotation.peers[place].attitude, held, &self.peers[place].clock))
+        let turning = Rotation::new(self.rotation_config(place)?, rotation.peers[place].attitude, held, &self.peers[place].clock);
+        Some(turning.with_law(&self.turn_law(place)?, self.own_rotational_damping(place)))
     }
 
     /// What the turning part of a peer is made from, with every scaling applied; `None` if the object does not turn.
@@ -73,16 +74,27 @@ impl Scene {
             hand: device.torque.clone(),
         });
         Some(RotationConfig {
-            copy: self.copy_spin()?,
+            copy: self.damped_spin(place)?,
             grasp: *grasp,
-            gains: self.rotation_gains(self.coordination.gains)?,
+            gains: self.rotation_gains(self.coordination.gains, &rotation.gains)?,
             device,
             integrator: self.integrator,
             steps: rotation.steps,
         })
     }
 
-    /// Inertia and damping of the turn of each copy; `None` if the object does not turn. Inertia is split as mass is.
+    /// [`Scene::copy_spin`] with the damping of the strategy.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn damped_spin(&self, place: usize) -> Option<Spin> {
+        let (Spin { inertia, damping }, own) = (self.copy_spin()?, self.own_rotational_damping(place));
+        Some(Spin { inertia, damping: std::array::from_fn(|axis| damping[axis] + own[axis]) })
+    }
+
+    /// Inertia and damping of the turn of each copy, without the damping of the strategy; `None` if the object does not turn. Inertia is split as mass is.
     #[must_use]
     pub fn copy_spin(&self) -> Option<Spin> {
         let rotation = self.rotation.as_ref()?;
@@ -98,8 +110,8 @@ impl Scene {
         Some((rotation.inertia.iter().sum::<f64>() / (3.0 * self.object.mass)).sqrt())
     }
 
-    /// The edges of the box of even density that has the mass and the inertia of the object, along the body axes \[m\]: a = √(6·(Jy + Jz − Jx)/m), and the same
-    /// for b and c. The object is drawn as this box. `None` if the object does not turn.
+    /// The edges of the box of even density that has the mass and the inertia of the object, along the body axes \[m\]: a = √(6·(Jy + Jz − Jx)/m), b and c
+    /// likewise. The object is drawn as this box. `None` if the object does not turn.
     #[must_use]
     pub fn even_box(&self) -> Option<Triple> {
         let inertia = self.rotation.as_ref()?.inertia;
@@ -108,11 +120,11 @@ impl Scene {
         Some(inertia.map(|moment| (6.0 * (twice - 2.0 * moment).max(0.0) / self.object.mass).sqrt()))
     }
 
-    /// KR and BR on the mean of the others about the body axes, scaled by the number of peers, where KT and BT are `gains`, those of the scene or those that
-    /// the timeline sets; `None` if the object does not turn.
+    /// KR and BR on the mean of the others about the body axes, scaled by the number of peers; `None` if the object does not turn. `gains`: KT and BT, `given`: KR
+    /// and BR as written, both those of the scene or those that the timeline sets.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-    pub fn rotation_gains(&self, gains: Gains) -> Option<Gains<Triple>> {
+    pub fn rotation_gains(&self, gains: Gains, given: &Gains<Option<Triple>>) -> Option<Gains<Triple>> {
         let rotation = self.rotation.as_ref()?;
         let pull = match self.coordination.strategy.pull() {
             Pull::Mean => 1.0,
@@ -120,7 +132,42 @@ impl Scene {
         };
         let factor = pull * self.coordination_factor();
         let of = |own: Option<Triple>, gain: f64| own.unwrap_or_else(|| rotation.over_mass(self.object.mass, gain)).map(|gain| gain * factor);
-        Some(Gains { stiffness: of(rotation.gains.stiffness, gains.stiffness), damping: of(rotation.gains.damping, gains.damping) })
+        let damping = match self.coordination.strategy.gains() {
+            UsedGains::Both => of(given.damping, gains.damping),
+            UsedGains::Stiffness | UsedGains::Neither => [0.0; 3],
+        };
+        Some(Gains { stiffness: of(given.stiffness, gains.stiffness), damping })
+    }
+
+    /// [`Scene::rotation_gains`] at the beginning and after each change of KT and BT or of KR and BR in the timeline; nothing if the object does not turn.
+    ///
+    /// Default gains follow KT and BT. A gain that the timeline sets is a given one from then on. Of each KR, given as a whole or J times a number, no component is
+    /// above the sum of the others.
+    pub fn rotation_gains_in_time(&self) -> impl Iterator<Item = Gains<Triple>> {
+        let begins = self.rotation.as_ref().map(|rotation| (self.coordination.gains, rotation.gains));
+        let changes = begins.into_iter().flat_map(|begins| {
+            self.timeline.iter().scan(begins, |(gains, given), change| {
+                let changed = match change.what {
+                    ChangeKind::Coordination(changed) => {
+                        *gains = changed;
+                        true
+                    }
+                    ChangeKind::RotationalGains(changed) => {
+                        *given = Gains { stiffness: changed.stiffness.or(given.stiffness), damping: changed.damping.or(given.damping) };
+                        true
+                    }
+                    ChangeKind::Link(_)
+                    | ChangeKind::AllLinks(_)
+                    | ChangeKind::Contact { .. }
+                    | ChangeKind::Hand { .. }
+                    | ChangeKind::HandTorque { .. }
+                    | ChangeKind::Parameters(_)
+                    | ChangeKind::SendWhen(_) => false,
+                };
+                Some(changed.then_some((*gains, *given)))
+            })
+        });
+        begins.into_iter().chain(changes.flatten()).filter_map(|(gains, given)| self.rotation_gains(gains, &given))
     }
 
     /// Where the device of a peer begins: at the grasp point of its copy.
@@ -141,12 +188,12 @@ impl Scene {
     pub(crate) fn refused_rotation(&self) -> Option<String> {
         let rotation = self.rotation.as_ref()?;
         let strategy = self.coordination.strategy;
-        let turns = [Coordination::AveragePosition, Coordination::ProportionalDerivative, Coordination::Extrapolated];
-        if !turns.contains(&strategy) {
-            let names: Vec<&str> = turns.iter().map(|strategy| strategy.name()).collect();
+        if let Some(why) = why_no_torque(strategy) {
+            let turning = Coordination::ALL.iter().filter(|strategy| why_no_torque(**strategy).is_none());
+            let names: Vec<&str> = turning.map(|strategy| strategy.name()).collect();
+            let name = strategy.name();
             return Some(format!(
-                "the strategy {} has no torque for an object with an inertia: expected one of {}",
-                strategy.name(),
+                "the strategy {name} has no torque for an object with an inertia, because {why}: expected one of {}",
                 names.join(", ")
             ));
         }
@@ -160,9 +207,26 @@ impl Scene {
     }
 }
 
+/// Why a strategy has no torque; `None` if it has one.
+const fn why_no_torque(strategy: Coordination) -> Option<&'static str> {
+    match strategy {
+        Coordination::AveragePosition
+        | Coordination::ProportionalDerivative
+        | Coordination::SmoothedAveragePosition
+        | Coordination::Extrapolated
+        | Coordination::LocalDamping
+        | Coordination::LocalLag => None,
+        Coordination::PassivityControl | Coordination::SetPosition => {
+            Some("it keeps energies along axes that all copies have in common, and copies that turn have none")
+        }
+        Coordination::Wave => Some("both ends of a line have its axis in common, and copies that turn have none"),
+        Coordination::ClientServer => Some("samples of its clients are those of devices, and say nothing of their turns"),
+    }
+}
+
 impl RotationSpec {
     /// A number that belongs to a mass, for the inertia of it: as if each element of the mass had it alone.
-    fn over_mass(&self, mass: f64, number: f64) -> Triple {
+    pub(crate) fn over_mass(&self, mass: f64, number: f64) -> Triple {
         self.inertia.map(|moment| number * moment / mass)
     }
 }
@@ -196,7 +260,7 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         assert_eq!(config.gains, Gains { stiffness: [15.0, 30.0, 45.0], damping: [3.0, 6.0, 9.0] });
         let scaled = self::scene(&["coordination.scaling=inverse-n", "coordination.rotational-stiffness=8"]).unwrap();
         // 4·3/16 times three others.
-        assert_eq!(scaled.rotation_gains(scaled.coordination.gains).map(|gains| gains.stiffness), Some([18.0; 3]));
+        assert_eq!(scaled.rotation_gains_in_time().next().map(|gains| gains.stiffness), Some([18.0; 3]));
         assert_eq!(scene.sample_kind(), SampleKind::Attitude);
     }
 
@@ -210,6 +274,46 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         assert!((0..3).all(|axis| (found[axis] - edges[axis]).abs() < 1e-15), "{found:?}");
         let plate = self::scene(&["object.inertia=[0.1, 0.2, 0.3]"]).unwrap().even_box().unwrap();
         assert!(plate[2] < 1e-7 && plate[0] > plate[1], "{plate:?}");
+    }
+
+    #[test]
+    fn a_law_damps_turns_as_it_damps_translations() {
+        let damped = |overrides: &[&str]| {
+            let scene = scene(&[&["coordination.strategy=local-damping"], overrides].concat()).unwrap();
+            let (config, own) = (scene.rotation_config(0).unwrap(), scene.own_rotational_damping(0));
+            let ground = scene.copy_spin().unwrap().damping;
+            let gains = Gains { stiffness: config.gains.stiffness, damping: [0.0; 3] };
+            let copy = Spin { inertia: config.copy.inertia, damping: std::array::from_fn(|axis| ground[axis] + own[axis]) };
+            assert_eq!((config.gains, config.copy), (gains, copy));
+            own
+        };
+        // J/m = (0.05, 0.1, 0.15); KR at most 15, and samples at most 8 ms old and a tick.
+        let close = |found: [f64; 3], expected: [f64; 3]| (0..3).all(|axis| (found[axis] - expected[axis]).abs() <= 1e-15 * expected[axis]);
+        let given = damped(&["coordination.local-damping.damping=8"]);
+        assert!(close(given, [0.4, 0.8, 1.2]), "{given:?}");
+        let found = damped(&["coordination.local-damping.age=8ms"]);
+        assert!(close(found, [15.0 * 9e-3; 3]), "{found:?}");
+        let split = damped(&["coordination.local-damping.age=8ms", "coordination.rotational-stiffness=[4, 2, 3]", "coordination.scaling=inverse-n"]);
+        assert!(close(split, [0.75 * 4.0 * 9e-3; 3]), "{split:?}");
+        assert!(close(scene(&["coordination.strategy=local-lag", "link={delay=\"8ms\"}"]).unwrap().own_rotational_damping(0), [0.0; 3]));
+    }
+
+    #[test]
+    fn gains_of_turns_follow_those_of_translations_until_they_are_given() {
+        let scene = scene(&["timeline=[{at=\"0.1s\", coordination={stiffness=200}}, {at=\"0.2s\", coordination={rotational-stiffness=[1, 2, 3]}}, \
+             {at=\"0.3s\", coordination={stiffness=400, damping=40}}, {at=\"0.4s\", coordination={damping=80, rotational-damping=5}}]"])
+        .unwrap();
+        // Three others; J/m = (0.05, 0.1, 0.15).
+        let found: Vec<_> = scene.rotation_gains_in_time().map(|gains| (gains.stiffness, gains.damping)).collect();
+        let expected = [
+            ([15.0, 30.0, 45.0], [3.0, 6.0, 9.0]),
+            ([30.0, 60.0, 90.0], [3.0, 6.0, 9.0]),
+            ([3.0, 6.0, 9.0], [3.0, 6.0, 9.0]),
+            ([3.0, 6.0, 9.0], [6.0, 12.0, 18.0]),
+            ([3.0, 6.0, 9.0], [12.0, 24.0, 36.0]),
+            ([3.0, 6.0, 9.0], [15.0; 3]),
+        ];
+        assert_eq!(found, expected);
     }
 
     #[test]
@@ -235,13 +339,24 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         refused(&["object.orientation=[0, 0, 0, 0]"], "is no quaternion");
         refused(&["object.orientation=[1, 0, 0]"], "is no quaternion");
         refused(&["coordination.rotational-stiffness=[1, 1, 3]"], "a stiffness is above the sum of the two others");
-        refused(&["coordination.strategy=wave"], "the strategy wave has no torque for an object with an inertia");
+        for (strategy, why) in
+            [("wave", "axis in common"), ("set-position", "energies"), ("passivity-control", "energies"), ("client-server", "clients")]
+        {
+            let name = format!("coordination.strategy={strategy}");
+            refused(&[&name], &format!("the strategy {strategy} has no torque for an object with an inertia, because "));
+            refused(&[&name], why);
+            refused(
+                &[&name],
+                "expected one of average-position, proportional-derivative, smoothed-average-position, extrapolated, local-damping, local-lag",
+            );
+        }
         refused(&["coordination.send-when={position=0.001}"], "dead bands say nothing of attitudes");
         refused(&["peer.device.inertia=0.001"], "expected coupling.rotational-stiffness");
         refused(&["peer.device.rotational-damping=0.001"], "expected device.inertia beside it");
         refused(&["peer.coupling.rotational-damping=0.001"], "expected rotational-stiffness beside it");
         refused(&["peer.hand={torque=[0, 0, 1]}"], "the torque of a hand needs a device that turns");
         refused(&["peer.kind=falcon", "peer.device.inertia=0.001", "peer.coupling.rotational-stiffness=1"], "a Falcon turns nothing");
+        refused(&["timeline=[{at=\"0s\", coordination={rotational-stiffness=[1, 1, 3]}}]"], "a stiffness is above the sum of the two others");
         refused(&["simulation.rotation-steps=0"], "rotation-steps");
     }
 
@@ -261,6 +376,7 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
             "peer.device.inertia=1",
             "peer.hand={torque=[0, 0, 1]}",
             "expect.rotation-discrepancy={max=1}",
+            "timeline=[{at=\"0s\", coordination={rotational-damping=1}}]",
         ] {
             let error = Scene::parse(&text, Path::new("x.toml"), &[key.to_owned()]).unwrap_err().to_string();
             assert!(error.contains("this is about an object that turns: expected object.inertia, or no such key"), "{key}: {error}");

@@ -11,6 +11,7 @@
 //! N·M⁻¹·Gᵀ = 0: no hand drives them, and they obey the equation of a copy of mass m that nobody touches. Held samples, means and step maps act on all components
 //! alike, so the split holds for any links, clocks and delays.
 
+use cohaptic_peer::coordination::LawValue;
 use cohaptic_peer::rotation::Triple;
 use cohaptic_peer::{Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains, Hand, Integrator, Signal};
 
@@ -58,6 +59,10 @@ impl Scene {
         }
         let grasps = || rotation.peers.iter().zip(&self.peers).filter(|(_, spec)| spec.contact != Contact::None).map(|(peer, _)| peer.grasp);
         if grasps().all(is_zero) {
+            let damped = self.own_rotational_damping(0);
+            if (1..self.peers.len()).any(|peer| !same(self.own_rotational_damping(peer), damped)) {
+                return Some(Err("the strategy damps the turns of copies with other ticks by other numbers"));
+            }
             let parts = merged((0..3).map(|axis| self.translation(axis)).chain((0..3).map(|axis| self.turn(rotation, axis))));
             return Some(Ok(RotationParts { reason: "the object is held at its centre alone, so no force turns it", parts }));
         }
@@ -107,6 +112,8 @@ impl Scene {
             Some("gains or damping of turns are not the default ones")
         } else if self.coordination.strategy == Coordination::Extrapolated {
             Some("positions are extrapolated and orientations are not")
+        } else if self.has_automatic_damping() && !same(rotation.inertia, [rotation.inertia[0]; 3]) {
+            Some("the strategy damps turns about all axes alike, and moments of inertia differ")
         } else if self.object.enclosure.is_some() {
             Some("walls act on the centre and hands do not")
         } else if rotation.steps > 1 && self.integrator != Integrator::Exact {
@@ -156,7 +163,8 @@ impl Scene {
                 None => untouched(spec),
             }
         });
-        let mut scene = Self { object, peers: peers.collect(), ..self.without_turns(CoordinationSpec { strategy, gains, ..self.coordination }) };
+        let coordination = self.coordination.with_own_damping(|_| self.own_rotational_damping(0)[axis]);
+        let mut scene = Self { object, peers: peers.collect(), ..self.without_turns(CoordinationSpec { strategy, gains, ..coordination }) };
         if let Integrator::RungeKutta4 { steps } = self.integrator {
             scene.integrator = Integrator::RungeKutta4 { steps: steps.saturating_mul(rotation.steps) };
         }
@@ -168,7 +176,9 @@ impl Scene {
     fn with_mass(&self, component: String, mass: f64, touched: bool) -> RotationPart {
         let share = mass / self.object.mass;
         let object = ObjectSpec { mass, damping: self.object.damping * share, ..self.object_at_rest() };
-        let coordination = CoordinationSpec { gains: self.coordination.gains.scaled(share), ..self.coordination };
+        // An automatic damping is made from the stiffness.
+        let coordination = if self.has_automatic_damping() { self.coordination } else { self.coordination.with_own_damping(|own| own * share) };
+        let coordination = CoordinationSpec { gains: self.coordination.gains.scaled(share), ..coordination };
         let peers = self.peers.iter().map(|spec| if touched { at_rest(spec) } else { untouched(at_rest(spec)) });
         let scene = Self { object, peers: peers.collect(), ..self.without_turns(coordination) };
         RotationPart { components: vec![component], scene, devices: vec![touched; self.peers.len()] }
@@ -181,6 +191,17 @@ impl Scene {
     /// The scene along one axis with that coordination, without timeline, measures and expectations.
     fn without_turns(&self, coordination: CoordinationSpec) -> Self {
         Self { axes: Axes::One, rotation: None, coordination, timeline: Vec::new(), measure: None, expect: None, ..self.clone() }
+    }
+}
+
+impl CoordinationSpec {
+    /// With another damping of each copy by the strategy, if it has one [N·s/m].
+    fn with_own_damping(mut self, other: impl FnOnce(f64) -> f64) -> Self {
+        let own = self.settings.of_mut(Coordination::LocalDamping);
+        if self.strategy == Coordination::LocalDamping {
+            own.set(0, LawValue::Number(other(own.number(0))));
+        }
+        self
     }
 }
 
@@ -289,11 +310,39 @@ mod tests {
         let parts = split.rotation_parts().unwrap().unwrap().parts;
         let rx = &parts[1].scene;
         assert_eq!((rx.copy_mass(), rx.object.damping), (0.4e-4, 2.0 * 1.2e-4 / 0.5));
-        let whole = split.rotation_gains(split.coordination.gains).unwrap();
+        let whole = split.rotation_gains_in_time().next().unwrap();
         // N − 1 of the strategy is in its law.
         let gains = rx.coordination_gains(rx.coordination.gains);
         assert!((2.0 * gains.stiffness / whole.stiffness[0] - 1.0).abs() < 1e-15 && (2.0 * gains.damping / whole.damping[0] - 1.0).abs() < 1e-15);
         assert_eq!(parts.iter().map(|part| part.devices[0]).collect::<Vec<_>>(), [true, false, false, false]);
+    }
+
+    #[test]
+    fn parts_have_the_law_of_the_whole() {
+        let own = |part: &RotationPart| part.scene.own_damping(0);
+        let centre = scene(&["coordination.strategy=local-damping", "object.split-mass=true"]);
+        let parts = centre.rotation_parts().unwrap().unwrap().parts;
+        // β of translations is KT·(m + 1)·Tc, that of every turn is made from the largest KR.
+        assert_eq!(own(&parts[0]).to_bits(), centre.own_damping(0).to_bits());
+        assert!(parts[1..].iter().all(|part| (own(part) / centre.own_damping(0) / (2.6e-4 / 0.5) - 1.0).abs() < 1e-14));
+        let held = |more: &[&str]| {
+            let scene = scene(&[&["peer.grasp=[0.01, -0.02, 0.025]", "coordination.strategy=local-damping"], more].concat());
+            let parts = scene.rotation_parts().unwrap().unwrap().parts;
+            for part in &parts {
+                let share = part.scene.copy_mass() / scene.copy_mass();
+                assert!((own(part) / scene.own_damping(0) / share - 1.0).abs() < 1e-14, "{}", part.name());
+            }
+            parts.len()
+        };
+        assert_eq!(held(&["coordination.local-damping.damping=4"]), 4);
+        assert_eq!(held(&["object.inertia=2e-4"]), 3);
+        for strategy in ["smoothed-average-position", "local-lag"] {
+            let set = format!("coordination.strategy={strategy}");
+            let parts = scene(&[&set]).rotation_parts().unwrap().unwrap().parts;
+            assert!(parts.len() == 4 && parts.iter().all(|part| part.scene.coordination.strategy.name() == strategy));
+        }
+        let ticks = scene(&["coordination.strategy=local-damping", "peers.peer2.tick=2ms"]).rotation_parts().unwrap();
+        assert!(ticks.unwrap_err().contains("other ticks"));
     }
 
     #[test]
@@ -314,6 +363,7 @@ mod tests {
             ("object.rotational-damping=1", "default"),
             ("coordination.strategy=extrapolated", "extrapolated"),
             ("simulation.integrator=semi-implicit-euler", "another step"),
+            ("coordination.strategy=local-damping", "moments of inertia differ"),
             ("peers.peer3.contact.push=-y", "finger"),
         ] {
             let error = held(&[more]).rotation_parts().unwrap().unwrap_err();

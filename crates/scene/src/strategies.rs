@@ -1,8 +1,9 @@
 //! Which strategy each peer runs: the scene's, or one of the caller's own.
 
-use cohaptic_peer::coordination::{BuiltIn, BuiltInStrategy, LawParameters, LawSettings, SessionParameters};
+use cohaptic_peer::coordination::{BuiltIn, BuiltInStrategy, LawParameters, LawSettings, LawValue, SessionParameters};
+use cohaptic_peer::rotation::Triple;
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_peer::{Coordination, Strategy};
+use cohaptic_peer::{Coordination, Gains, Strategy};
 
 use crate::{ChangeKind, CoordinationSpec, Scene};
 
@@ -58,6 +59,43 @@ impl Scene {
     #[must_use]
     pub fn own_damping(&self, peer: usize) -> f64 {
         self.coordination.strategy.damping(&self.law_parameters(peer))
+    }
+
+    /// The law of the turns of a peer, with gains of one: it makes the torque from those of spring and damper. `None` if the strategy of the scene is not a law.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn turn_law(&self, peer: usize) -> Option<BuiltIn> {
+        let gains = Gains { stiffness: 1.0, damping: 1.0 };
+        // The number of the others counts in the gains of the turns.
+        self.coordination.strategy.law(&LawParameters { gains, peers: 2, ..self.law_parameters(peer) })
+    }
+
+    /// By how much the strategy damps the turn of the copy of a peer about each body axis [N·m·s/rad]; zero if the object does not turn.
+    ///
+    /// A β that is given is damping of the mass, and counts times inertia over mass. An automatic one is made about every axis from the largest component of KR: no
+    /// radian of turn, about whatever axis, changes the torque by more, so the springs of turns inject no energy at any angle.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such peer.
+    #[must_use]
+    pub fn own_rotational_damping(&self, peer: usize) -> Triple {
+        let (Some(rotation), CoordinationSpec { strategy, gains, .. }) = (&self.rotation, &self.coordination) else { return [0.0; 3] };
+        let stiffness = self.rotation_gains(*gains, &rotation.gains).map_or([0.0; 3], |gains| gains.stiffness);
+        if self.has_automatic_damping() {
+            let gains = Gains { stiffness: stiffness.into_iter().fold(0.0, f64::max), damping: 0.0 };
+            return [strategy.damping(&LawParameters { gains, ..self.law_parameters(peer) }); 3];
+        }
+        rotation.over_mass(self.object.mass, self.own_damping(peer))
+    }
+
+    /// Whether the strategy damps each copy by as much as its stiffness asks for.
+    pub(crate) fn has_automatic_damping(&self) -> bool {
+        let CoordinationSpec { strategy, settings, .. } = &self.coordination;
+        *strategy == Coordination::LocalDamping && settings.of(*strategy).get(0) == LawValue::Automatic
     }
 
     /// The peer that alone has the object; `None` if every peer has a copy.

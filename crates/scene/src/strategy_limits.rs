@@ -21,6 +21,7 @@ impl Scene {
             | ChangeKind::Hand { .. }
             | ChangeKind::HandTorque { .. }
             | ChangeKind::Coordination(_)
+            | ChangeKind::RotationalGains(_)
             | ChangeKind::SendWhen(_) => None,
         });
         let keeps_ages = |scene: &Self| scene.law(0).is_some_and(|law| Law::<f64>::horizon(&law).is_some());

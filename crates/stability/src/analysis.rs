@@ -133,6 +133,16 @@ pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Resu
     }
 }
 
+/// [`analyse_watched`] about the rest that the constant forces and torques of the hands, and their arms, leave the object at: copies are then some way apart, and a
+/// turn changes the moment of the forces. An object that does not turn moves about it as it does without.
+///
+/// # Errors
+///
+/// As [`analyse_watched`]; if hands do not stay as they are, and if nothing rests under what they do.
+pub fn analyse_loaded(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
+    if scene.rotation.is_some() { turning::analyse_loaded(scene, watch) } else { analyse_watched(scene, method, watch) }
+}
+
 /// Analyses the scene by the general path, with strategies of the caller's own.
 ///
 /// # Errors

@@ -59,6 +59,12 @@ pub enum AnalysisError {
         /// Why it does not split.
         why: &'static str,
     },
+    /// Nothing rests under what the hands do.
+    #[error("there is no rest under the forces of the hands: {why}; expected constant forces and torques that cancel, or arms")]
+    NoRest {
+        /// Why.
+        why: String,
+    },
     /// The object turns, and this analysis does not follow that.
     #[error("{what} does not follow an object that turns: expected a scene without object.inertia")]
     NoTurns {

@@ -16,7 +16,8 @@ use crate::pieces::split;
 use crate::spectrum::Workspace;
 use crate::stack_frame::{StackFrame, StackNode};
 use crate::structure::{Contacts, Structure, linear_law};
-use crate::{AnalysisError, Matrix, Radius, Unwatched, turning};
+use crate::turning::{self, Together, mode_of};
+use crate::{AnalysisError, Matrix, Method, Radius, Unwatched};
 
 /// What about a linear scene does not change with its numbers.
 #[derive(Debug)]
@@ -36,21 +37,30 @@ enum Kind {
     Turning(Box<TurningRadius>),
 }
 
-/// An object that turns, analysed for each of its numbers anew.
+/// An object that turns.
 #[derive(Debug)]
 struct TurningRadius {
-    network: NominalNetwork,
+    /// The classes of peers that are equal whatever the numbers.
+    structure: Structure,
     /// Every peer by itself.
     classes: Vec<Vec<usize>>,
     unfollowed: AnalysisError,
 }
 
 impl TurningRadius {
-    fn new(scene: &Scene, network: NominalNetwork, why: &'static str) -> Result<Self, AnalysisError> {
-        // A scene that is refused is refused for all its numbers.
-        turning::radius(scene, &network)?;
-        let classes = (0..scene.peers.len()).map(|peer| vec![peer]).collect();
-        Ok(Self { network, classes, unfollowed: AnalysisError::Turns { what: "the mean square", why } })
+    fn new(scenes: &[&Scene], network: &NominalNetwork, why: &'static str) -> Result<Self, AnalysisError> {
+        let structure = Structure::of(scenes, network, &turning::contacts(scenes[0])?)?;
+        let classes = (0..scenes[0].peers.len()).map(|peer| vec![peer]).collect();
+        Ok(Self { structure, classes, unfollowed: AnalysisError::Turns { what: "the mean square", why } })
+    }
+
+    fn radius<const BOUND: bool>(&self, scene: &Scene, workspace: &mut Workspace) -> Radius {
+        let together = Together::new(scene, self.structure.clone());
+        if BOUND {
+            mode_of(&together, Method::Reduced, &Unwatched).map_or(Radius::UNKNOWN, |mode| mode.radius)
+        } else {
+            turning::radius(&together, workspace)
+        }
     }
 }
 
@@ -92,7 +102,7 @@ impl SceneRadius {
         match &self.kind {
             Kind::Parts(parts) => parts.radius::<BOUND>(&scene, scratch),
             Kind::Whole(whole) => whole.radius::<BOUND>(&scene, &mut scratch.workspace),
-            Kind::Turning(of) => turning::radius(&scene, &of.network).unwrap_or(Radius::UNKNOWN),
+            Kind::Turning(turning) => turning.radius::<BOUND>(&scene, &mut scratch.workspace),
         }
     }
 
@@ -345,7 +355,7 @@ pub(crate) fn scene_radii(scenes: &[&Scene]) -> Result<Vec<SceneRadius>, Analysi
     let pieces = match split(scenes[0]) {
         Ok(pieces) => pieces,
         Err(why) => {
-            let turning = TurningRadius::new(scenes[0], network, why)?;
+            let turning = TurningRadius::new(scenes, &network, why)?;
             return Ok(vec![SceneRadius { component: None, kind: Kind::Turning(Box::new(turning)) }]);
         }
     };

@@ -17,6 +17,7 @@ mod own_strategies;
 mod parameter_changes;
 mod replay;
 mod rotation;
+mod rotation_laws;
 mod symmetry;
 mod waves;
 

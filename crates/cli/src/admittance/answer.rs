@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use cohaptic_stability::{Estimate, Verdict};
 use serde::Serialize;
 
-use super::curve::Curve;
+use super::curve::{Curve, Words};
 use crate::document_schema::document;
 use crate::output::figure;
 
@@ -67,14 +67,17 @@ pub(super) fn describe(peer: &str, curves: &[Curve]) -> String {
         if let Some(warning) = curve.warning() {
             let _ = writeln!(text, "  WARNING: {warning}");
         }
-        let (what, free) =
-            if curve.admittance.is_turn() { ("angular velocity over torque", "free turn") } else { ("velocity over force", "free mass") };
-        let [.., unit] = units(curve);
+        let Words { what, free, inertia, .. } = curve.words();
         let mass = cohaptic_units::print::Number(curve.mass);
-        let _ = writeln!(text, "\n  {what} at the device of {peer}, compared with that of a {free} of {mass} {unit}");
+        let _ = writeln!(text, "\n  {what} at the device of {peer}, compared with that of a {free} of {mass} {inertia}");
         table(&mut text, curve);
-        let _ = writeln!(text, "\n  moved slowly, {peer} feels");
-        felt(&mut text, curve);
+        let [axis, seen] = curve.admittance.axes();
+        if axis == seen {
+            let _ = writeln!(text, "\n  moved slowly, {peer} feels");
+            felt(&mut text, curve);
+        } else {
+            text.push('\n');
+        }
         let _ = writeln!(text, "  {}", verdict(curve));
         for note in curve.notes() {
             let _ = writeln!(text, "  note: {note}");
@@ -104,7 +107,7 @@ fn significant(hz: f64) -> String {
 
 /// Of a spring, a viscosity and an inertia.
 fn units(curve: &Curve) -> [&'static str; 3] {
-    if curve.admittance.is_turn() { ["N·m/rad", "N·m·s/rad", "kg·m²"] } else { ["N/m", "N·s/m", "kg"] }
+    if curve.admittance.axes()[0].is_turn() { ["N·m/rad", "N·m·s/rad", "kg·m²"] } else { ["N/m", "N·s/m", "kg"] }
 }
 
 /// What a slow hand feels: a spring only where something ties the object to ground.

@@ -2,8 +2,8 @@
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{
-    Admittance, AdmittanceError, AnalysisError, FrequencyResponse, Limits, LowFrequencyFit, MeanSquare, QUICK_UNKNOWNS, Verdict, Watch, has_chance,
-    ideal, mean_square_watched,
+    Admittance, AdmittanceError, AnalysisError, FrequencyResponse, Limits, LowFrequencyFit, MeanSquare, PushedAxis, QUICK_UNKNOWNS, Verdict, Watch,
+    has_chance, ideal, mean_square_watched,
 };
 
 use crate::arguments::AdmittanceArguments;
@@ -31,8 +31,16 @@ pub(super) struct Curve {
     pub(super) fit: LowFrequencyFit,
     /// Where links leave something to chance: the second moment of the scene, or why it cannot be followed.
     pub(super) chance: Option<Result<MeanSquare, AnalysisError>>,
-    /// The mass of the whole object \[kg\], or its inertia about the axis [kg·m²].
+    /// What the whole object alone would be felt as: see [`Admittance::object_mass`].
     pub(super) mass: f64,
+}
+
+/// The words of a curve.
+pub(super) struct Words {
+    pub(super) what: String,
+    pub(super) over: &'static str,
+    pub(super) free: &'static str,
+    pub(super) inertia: &'static str,
 }
 
 /// The scene as it stands, then that of every `--curve`.
@@ -48,11 +56,13 @@ impl Subject {
         let scene = scene.map_err(|error| failure::of_variant(error, variant.option, &variant.overrides))?;
         let peer = place_of(&arguments.peer, &scene, &variant)?;
         let ended = || Failure::Interrupted("the analysis was ended before its first point".to_owned());
-        let admittance = Admittance::along_watched(&scene, peer, arguments.axis.map(Into::into), watch).map_err(|error| match error {
+        let [axis, seen] = [arguments.axis, arguments.seen].map(|axis| axis.map(Into::into));
+        let admittance = Admittance::between_watched(&scene, peer, axis, seen, watch).map_err(|error| match error {
             AdmittanceError::Analysis(AnalysisError::Stopped) => ended(),
             error @ (AdmittanceError::NoSuchPeer { .. }
             | AdmittanceError::NoSuchAxis { .. }
             | AdmittanceError::DoesNotTurn { .. }
+            | AdmittanceError::Uncoupled { .. }
             | AdmittanceError::Frequency { .. }
             | AdmittanceError::Analysis(_)) => not_analysed(file, &error),
         })?;
@@ -84,6 +94,22 @@ impl Curve {
         let fit = admittance.fit_low_frequency();
         let (name, overrides, mass) = (variant.name, variant.overrides, admittance.object_mass());
         Ok(Self { name, overrides, title: scene.title, admittance, response, fit, chance, mass })
+    }
+
+    /// In words: the motion over the push, what the whole object alone is, and the units of both.
+    pub(super) fn words(&self) -> Words {
+        let [push, seen] = self.admittance.axes();
+        let along = |axis: PushedAxis| format!(" {} {}", if axis.is_turn() { "about" } else { "along" }, axis.word().trim_start_matches('r'));
+        let [force, velocity] = if push == seen { [push, seen].map(|_| String::new()) } else { [push, seen].map(along) };
+        let name = |axis: PushedAxis, turned: &'static str, moved: &'static str| if axis.is_turn() { turned } else { moved };
+        let (push_name, seen_name) = (name(push, "torque", "force"), name(seen, "angular velocity", "velocity"));
+        let (over, free, inertia) = match (push.is_turn(), seen.is_turn()) {
+            (false, false) => ("m/(N·s)", "free mass", "kg"),
+            (true, true) => ("rad/(N·m·s)", "free turn", "kg·m²"),
+            (false, true) => ("rad/(N·s)", "free object", "kg·m"),
+            (true, false) => ("m/(N·m·s)", "free object", "kg·m"),
+        };
+        Words { what: format!("{seen_name}{velocity} over {push_name}{force}"), over, free, inertia }
     }
 
     /// What the whole object alone would be at each frequency \[dB\].

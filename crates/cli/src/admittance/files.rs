@@ -6,7 +6,7 @@ use cohaptic_picture::{Axis, Line, Look, Marker, Panel, Picture, Size};
 use cohaptic_stability::Verdict;
 use cohaptic_units::print::csv_field;
 
-use super::curve::Curve;
+use super::curve::{Curve, Words};
 use crate::failure::Failure;
 use crate::file::write_into;
 
@@ -53,11 +53,12 @@ pub(super) fn picture(peer: &str, curves: &[Curve]) -> Result<Picture, Failure> 
     }
     let title = curves.first().map_or("", |curve| curve.title.as_str());
     let frequency = || Axis::new("Frequency").symbol("f").unit("Hz").logarithmic().tight();
-    let magnitude = Axis::new("Magnitude").unit("dB re 1 m/(N·s)").multiples_of(20).tight().ends_at_ticks();
+    let (what, over) = curves.first().map_or_else(Default::default, |curve| (curve.words().what, curve.words().over));
+    let magnitude = Axis::new("Magnitude").unit(format!("dB re 1 {over}")).multiples_of(20).tight().ends_at_ticks();
     let phase = Axis::new("Phase").unit("degrees").multiples_of(45).tight().ends_at_ticks();
     let above = Panel::new(frequency(), magnitude).with_all(responses.iter().map(|response| response.line(&response.magnitudes)));
     let below = Panel::new(frequency(), phase).with_all(responses.iter().map(|response| response.line(&response.phases)));
-    let title = format!("{title}: velocity over force of {peer}");
+    let title = format!("{title}: {what} of {peer}");
     Ok(Picture::new(title).shared_x().aspect(0.4).panel(above).panel(below))
 }
 
@@ -105,8 +106,10 @@ fn named(curve: &Curve) -> String {
 /// The objects of all curves, as free masses: each mass once.
 fn masses(curves: &[Curve]) -> Vec<Response> {
     let mut masses: Vec<Response> = Vec::new();
-    for curve in curves {
-        let name = format!("free mass of {} kg", curve.mass);
+    // No number of decibels stands for nothing.
+    for curve in curves.iter().filter(|curve| curve.mass.is_finite()) {
+        let Words { free, inertia, .. } = curve.words();
+        let name = format!("{free} of {} {inertia}", curve.mass);
         if masses.iter().any(|mass| mass.name == name) {
             continue;
         }
@@ -116,7 +119,7 @@ fn masses(curves: &[Curve]) -> Vec<Response> {
         let magnitudes = ends.iter().map(|hz| (*hz, curve.ideal_db(*hz))).collect();
         // One is grey, as all that curves are compared with; more have the looks after those of the curves.
         let look = if masses.is_empty() { Look::reference() } else { Look::of(curves.len() + masses.len() - 1).thin() };
-        masses.push(Response { name, look, magnitudes, phases: ends.into_iter().map(|hz| (hz, -90.0)).collect() });
+        masses.push(Response { name, look, magnitudes, phases: ends.into_iter().map(|hz| (hz, -90.0 * curve.mass.signum())).collect() });
     }
     masses
 }

@@ -28,7 +28,7 @@ pub(crate) use paper::{AccuracyArguments, PaperArguments};
 pub(crate) use realtime::{LiveArguments, RealTimeArguments, RelayArguments, RouterArguments};
 pub(crate) use scenes::{CampaignArguments, CheckArguments, ExplainArguments, MeasureArguments, RunArguments, TableFormat};
 pub(crate) use stability::{
-    AdmittanceArguments, BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, StabilityArguments, StabilityCommand,
+    AdmittanceArguments, BoundaryArguments, GridSize, LinksName, MapArguments, PointArguments, RestName, StabilityArguments, StabilityCommand,
 };
 
 /// Several people feel and move one virtual object together, over a bad network.

@@ -40,6 +40,9 @@ pub(crate) struct RunArguments {
     /// Do not draw positions in the terminal, and do not write run.html. Without --out nothing is looked at then but counters, which is fastest
     #[arg(long)]
     pub(crate) no_plot: bool,
+    /// How many threads share a run that nothing looks at, where that pays, as explain says [default: one a core]. Results do not depend on it
+    #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
+    pub(crate) threads: Option<u16>,
     /// Simulate everything the program has, needed or not: slower, and the same answer to the last bit
     #[arg(long)]
     pub(crate) general: bool,

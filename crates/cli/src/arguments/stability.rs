@@ -37,6 +37,9 @@ pub(crate) struct PointArguments {
     /// pays); or the whole state pushed through the code that simulates
     #[arg(long, value_enum, default_value_t = MethodName::Reduced)]
     pub(crate) method: MethodName,
+    /// Which rest the motions are about: all copies together and nobody pushing, or where the constant forces of the hands leave an object that turns
+    #[arg(long, value_enum, value_name = "REST", default_value_t = RestName::Unloaded, conflicts_with_all = ["graph", "losses_in_a_row", "delay_within"])]
+    pub(crate) about: RestName,
     /// Let each peer hear only its neighbours: complete (as the scene is), ring, star, or a CSV file of mutual weights, one row a peer. The peers must
     /// be equal
     #[arg(long, value_name = "GRAPH", conflicts_with_all = ["method", "losses_in_a_row", "delay_within"])]
@@ -80,6 +83,13 @@ impl From<AxisName> for PushedAxis {
             AxisName::Rz => Self::Rz,
         }
     }
+}
+
+/// Which rest small motions are about.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub(crate) enum RestName {
+    Unloaded,
+    Loaded,
 }
 
 /// Which links share their fate.
@@ -207,9 +217,12 @@ pub(crate) struct AdmittanceArguments {
     /// The peer whose device is pushed
     #[arg(long, value_name = "NAME")]
     pub(crate) peer: String,
-    /// Along which axis it is pushed, or of an object that turns and is held at its centre about which axis [default: that of its own one-sided contact, or x]
+    /// Along which axis it is pushed, or of a device that turns about which axis it is twisted [default: that of its own one-sided contact, or x]
     #[arg(long, value_enum, value_name = "AXIS")]
     pub(crate) axis: Option<AxisName>,
+    /// Along or about which axis its motion is looked at, where the object turns [default: that of the push]
+    #[arg(long, value_enum, value_name = "AXIS")]
+    pub(crate) seen: Option<AxisName>,
     /// The lowest frequency [default: 0.01]
     #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
     pub(crate) from: Option<f64>,

@@ -174,7 +174,10 @@ fn write_links(path: &Path, summary: &Summary) -> Result<(), Failure> {
 
 fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>, observer: &mut O) -> Result<Summary, O::Error> {
     match what {
-        What::Simulated => Simulation::new(scene, model(arguments)).run(observer),
+        What::Simulated => {
+            let threads = arguments.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
+            Simulation::new(scene, model(arguments)).on_threads(threads).run(observer)
+        }
         What::Replayed(inputs) => replay(scene, inputs, observer),
     }
 }

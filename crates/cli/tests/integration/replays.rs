@@ -87,6 +87,27 @@ fn a_file_that_the_scene_names_counts() {
     assert_eq!((outcome.status, outcome.stderr), (Some(2), message("  the file hand.csv: something else in the record than now\n")));
 }
 
+/// Two who turn an object, one by torques in a file: the replay is that of the session to the last bit, and with other torques it is another.
+#[test]
+fn torques_of_a_file_are_replayed() {
+    let desk = Desk::with(
+        "turn.toml",
+        "scene = { duration = \"1s\", axes = 3 }\nobject = { mass = 0.3, inertia = 1e-4 }\nlink = { delay = \"8ms\" }\n\
+         coordination = { strategy = \"average-position\", stiffness = 1000, damping = 5, update = \"8ms\" }\n\
+         peer = { device = { mass = 0.1, damping = 5, inertia = 1e-5 }, coupling = { stiffness = 3500, damping = 5, rotational-stiffness = 1 } }\n\
+         peers = [{ name = \"left\", hand = { file = \"hand.csv\" } }, { name = \"right\" }]\n",
+    );
+    desk.write("hand.csv", "t,fx,fy,fz,tx,ty,tz\n0,0,0,0,0,0,0\n0.04,0,1,0,0.01,0,0.02\n");
+    desk.text("live turn.toml --for 40ms --no-priority --out out");
+    let again = "run turn.toml --set scene.duration=40ms --inputs out/inputs.csv --no-plot --out";
+    desk.text(&format!("{again} again"));
+    let session = desk.read("out/trajectory.csv");
+    assert_eq!(session, desk.read("again/trajectory.csv"));
+    desk.write("hand.csv", "t,fx,fy,fz,tx,ty,tz\n0,0,0,0,0,0,0\n0.04,0,1,0,0.01,0,0.03\n");
+    desk.text(&format!("{again} other --force"));
+    assert_ne!(session, desk.read("other/trajectory.csv"));
+}
+
 #[test]
 fn force_replays_it_and_says_what_differs() {
     let desk = session();

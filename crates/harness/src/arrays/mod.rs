@@ -39,8 +39,16 @@ pub(crate) use shape::Shape;
 pub use side_by_side::{run_side_by_side, same_shape};
 use turning::{PAIRS, TurningBlocks};
 
-/// L runs of scenes of that shape with these laws, to their ends. `keep_going` is asked as [`crate::Observer::keep_going`] is.
-pub(crate) fn run<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; L], keep_going: impl FnMut(Instant) -> bool) -> [Summary; L] {
+/// A run of a scene of that shape with that law, to its end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
+///
+/// Compiled here for all observers: most of the code of this crate is in the loops of the laws.
+pub(crate) fn run(scene: &Scene, shape: Shape, law: BuiltIn, keep_going: &mut dyn FnMut(Instant) -> bool) -> Summary {
+    let [summary] = run_lanes([scene], shape, [law], keep_going);
+    summary
+}
+
+/// L runs of scenes of that shape with these laws, to their ends.
+fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; L], keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {
     match scenes[0].axes {
         Axes::Three if scenes[0].rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, L>::new(scenes, shape, laws).run(keep_going),
         Axes::One => Arrays::<Blocks<1>, 1, 1, L>::new(scenes, shape, laws).run(keep_going),
@@ -104,6 +112,7 @@ impl<const P: usize, const L: usize> Others<P, L> for Nowhere {
 
 /// How samples travel.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one a run, and a box would be another look-up a packet")]
 enum Samples<const P: usize, const L: usize> {
     Broadcast(Broadcast<P, L>),
     PerPacket(PerPacket<P, L>),
@@ -146,10 +155,10 @@ impl<'a, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> Arrays
     }
 
     /// Runs all of them to their end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
-    fn run(self, mut keep_going: impl FnMut(Instant) -> bool) -> [Summary; L] {
+    fn run(self, keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {
         // A copy, so that the law is a constant of the loop and nothing that is written can change it.
         let law = self.law;
-        law.visit(ToEnd { arrays: self, keep_going: &mut keep_going })
+        law.visit(ToEnd { arrays: self, keep_going })
     }
 
     fn run_by(mut self, law: &impl LawOfLanes, keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {

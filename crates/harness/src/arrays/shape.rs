@@ -53,9 +53,9 @@ impl Shape {
         self.delay.is_some()
     }
 
-    /// How many of some threads pay for a run.
-    pub(crate) fn threads_that_pay(&self, threads: usize) -> usize {
-        threads::that_pay(self, threads)
+    /// How many threads pay for a run at most, and why no more.
+    pub(crate) fn threads(&self) -> (usize, &'static str) {
+        threads::that_pay(self)
     }
 
     /// Whether a run that diverges is to be run once more with events: queues have looked ahead of the end.

@@ -26,10 +26,15 @@ use crate::summary::{Ending, Summary};
 /// Peers a thread at least: for fewer the threads wait for each other longer than they work.
 const PEERS_A_THREAD: usize = 8;
 
-/// How many of some threads pay for a scene of that shape; one if it is not shared out.
-pub(super) fn that_pay(shape: &Shape, threads: usize) -> usize {
-    // Where all samples travel together, a tick takes less time than threads take to meet.
-    if shape.delay.is_some() || shape.turns.is_some() { 1 } else { threads.min(shape.peers / PEERS_A_THREAD).max(1) }
+/// How many threads pay for a scene of that shape at most, and why no more.
+pub(super) fn that_pay(shape: &Shape) -> (usize, &'static str) {
+    if shape.delay.is_some() {
+        (1, "all samples travel together: a tick takes less time than threads take to meet")
+    } else if shape.turns.is_some() {
+        (1, "the object turns: how far copies are turned apart is a matter of all of them")
+    } else {
+        ((shape.peers / PEERS_A_THREAD).max(1), "eight peers a thread; threads meet where samples are sent, and the number of threads changes no bit")
+    }
 }
 
 /// What threads tell each other.

@@ -91,13 +91,16 @@ pub fn explain(scene: &Scene) -> Explanation {
         let count = Counted(measure.names.len(), "number");
         rows.model("measures", format!("{count}, computed tick by tick"), "[measure]: the run is watched, so it has events whatever else it needs");
     }
-    let in_arrays = scene.measure.is_none() && Shape::of(scene, &plan, &FromScene).is_some();
-    if in_arrays {
+    let arrays = Shape::of(scene, &plan, &FromScene).filter(|_| scene.measure.is_none());
+    let in_arrays = arrays.is_some();
+    if let Some((shape, _)) = arrays {
         rows.model(
             "runs that nobody watches",
             "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
-            "all tick together, nothing changes on the way, and over the links nothing waits; a run that is recorded has events",
+            "all tick together, nothing changes on the way, and no link counts or damages packets; a run that is recorded has events",
         );
+        let (threads, why) = shape.threads();
+        rows.model("threads of such a run", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);
     }
     let nanos = if in_arrays { IN_ARRAYS } else { WITH_EVENTS };
     Explanation { dimensions: dimensions(scene, &plan), cost: cost(scene, &nanos), models: rows.models, left_out: rows.left_out }
@@ -174,9 +177,13 @@ impl Rows {
             format!("copies with moments of inertia {} kg·m², damped by {} N·m·s/rad", triple(copy.inertia), triple(copy.damping)),
             "object.inertia; each takes part in the inertia as in the mass",
         );
-        if let Some(gains) = scene.rotation_gains(scene.coordination.gains) {
+        if let Some(gains) = scene.rotation_gains_in_time().next() {
             let gains = format!("KR = {} N·m/rad, BR = {} N·m·s/rad about body axes", triple(gains.stiffness), triple(gains.damping));
             self.model("coordination of turns", gains, "the mean of the matrices held, which is no rotation, gives the mean torque");
+        }
+        let own = scene.own_rotational_damping(0);
+        if own.iter().any(|damping| *damping > 0.0) {
+            self.model("damping of turns", format!("another {} N·m·s/rad of each copy", triple(own)), "the strategy damps each copy");
         }
         let method = match scene.integrator {
             Integrator::Exact => "exponential of the damped turn, fourth order in the gyroscopic term",

@@ -6,8 +6,8 @@ mod turning;
 
 use std::time::Duration;
 
-use cohaptic_peer::coordination::{LawValues, Role};
-use cohaptic_peer::rotation::{Attitude, Rotation};
+use cohaptic_peer::coordination::{BuiltIn, LawValues, Role};
+use cohaptic_peer::rotation::{Attitude, Rotation, Triple};
 use cohaptic_peer::wire::{Extra, SampleKind};
 use cohaptic_peer::{Clock, Contact, Device, Held, LastSent, ObjectCopy, Peer, Reception, RestingDevice, SendWhen, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{Change, ChangeKind, Scene};
@@ -16,7 +16,7 @@ use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, 
 
 use crate::datagrams::{Datagrams, Handle};
 use crate::disturbance::Disturbance;
-use crate::observer::{HoldRow, InstantRow, Observer, SendRow, StateRow, StepRow, TickRow, TurnRow};
+use crate::observer::{HoldRow, InstantRow, Observer, SendRow, StateRow, StepRow, TickRow, TurnRow, TurnStepRow};
 use crate::plan::{DeviceChoice, Plan};
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary};
@@ -64,6 +64,8 @@ struct ParameterChange {
     own: LawValues,
     /// For each peer β, and the damping of its copy with it [N·s/m].
     damping: Vec<(f64, f64)>,
+    /// For each peer, if the object turns, the law of its turns, β about each axis, and the damping of the turn of its copy with it [N·m·s/rad].
+    turns: Vec<(BuiltIn, Triple, Triple)>,
 }
 
 /// The changes of parameters in the timeline, the first one last.
@@ -72,7 +74,9 @@ fn parameter_changes(scene: &Scene) -> Vec<ParameterChange> {
         let ChangeKind::Parameters(settings) = &change.what else { return None };
         let then = scene.with_parameters(settings);
         let damping = (0..then.peers.len()).map(|place| (then.own_damping(place), then.copy_config(place).damping)).collect();
-        Some(ParameterChange { own: *settings.of(scene.coordination.strategy), damping })
+        let turns = |place: usize| Some((then.turn_law(place)?, then.own_rotational_damping(place), then.damped_spin(place)?.damping));
+        let turns = (0..then.peers.len()).filter_map(turns).collect();
+        Some(ParameterChange { own: *settings.of(scene.coordination.strategy), damping, turns })
     };
     scene.timeline.iter().rev().filter_map(change).collect()
 }
@@ -282,7 +286,11 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 }
                 ChangeKind::SendWhen(when) => self.send_when = Some(when),
                 ChangeKind::Parameters(_) => {
-                    let ParameterChange { own, damping } = self.parameters.pop().expect("there is one for each of these changes");
+                    let ParameterChange { own, damping, turns } = self.parameters.pop().expect("there is one for each of these changes");
+                    for (rotation, (law, own_damping, damping)) in self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).zip(turns)
+                    {
+                        rotation.set_law(&law, own_damping, damping);
+                    }
                     for (member, (own_damping, damping)) in self.members.iter_mut().zip(damping) {
                         member.peer.set_parameters(&own, own_damping, damping);
                     }
@@ -292,11 +300,16 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     for member in &mut self.members {
                         member.peer.strategy_mut().set_gains(gains.scaled(self.coordination_factor));
                     }
-                    if let Some(gains) = self.turning.as_mut().and_then(|turning| turning.next_gains()) {
-                        self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).for_each(|rotation| rotation.set_gains(gains));
-                    }
+                    self.change_gains_of_turns();
                 }
+                ChangeKind::RotationalGains(_) => self.change_gains_of_turns(),
             }
+        }
+    }
+
+    fn change_gains_of_turns(&mut self) {
+        if let Some(gains) = self.turning.as_mut().and_then(|turning| turning.next_gains()) {
+            self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).for_each(|rotation| rotation.set_gains(gains));
         }
     }
 
@@ -452,6 +465,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             if watch.ticks {
                 let axes = self.axes;
                 let device = member.peer.device().state();
+                let coordination_torque = member.peer.rotation().map_or([0.0; 3], Rotation::coordination_torque);
                 observer.on_tick(&TickRow {
                     at: now,
                     peer: place,
@@ -464,7 +478,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                         object: rotation.copy(),
                         device: rotation.device(),
                         coupling_torque: &rotation.computed().coupling,
-                        coordination_torque: &rotation.computed().coordination,
+                        coordination_torque: &coordination_torque,
                     }),
                 })?;
             }
@@ -586,7 +600,17 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         let coordination = if self.peer.compute_delay() { late } else { commanded };
         let before = self.moved_by_coordination();
         let acting = *self.peer.applied();
+        let turn = self.peer.rotation().map(|rotation| TurnStepRow {
+            span,
+            before: rotation.copy().rate,
+            after: [0.0; 3],
+            travel: rotation.travel(span),
+            held_torque: rotation.on_copy(),
+            coordination_torque: rotation.applied().coordination,
+            own_damping: rotation.own_damping(),
+        });
         self.peer.advance(now, span);
+        let turn = turn.map(|turn| TurnStepRow { after: self.peer.attitude().rate, ..turn });
         let after = self.moved_by_coordination();
         let coordination = if self.peer.role() == Role::Copy { coordination } else { acting.coupling };
         observer.on_step(&StepRow {
@@ -597,6 +621,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
             held_force: &acting.on_object[..axes],
             coordination_force: &coordination[..axes],
             own_damping: self.peer.own_damping(),
+            turn,
         })
     }
 

@@ -2,7 +2,7 @@
 
 use cohaptic_peer::Gains;
 use cohaptic_peer::rotation::{Attitude, Triple};
-use cohaptic_scene::{ChangeKind, Scene};
+use cohaptic_scene::Scene;
 
 use crate::spread::Spread;
 
@@ -22,19 +22,11 @@ impl Turning {
     /// That of a scene at its beginning; `None` if its object does not turn.
     pub(super) fn new(scene: &Scene) -> Option<Box<Self>> {
         let rotation = scene.rotation.as_ref()?;
-        let gains = scene.timeline.iter().rev().filter_map(|change| match change.what {
-            ChangeKind::Coordination(gains) => scene.rotation_gains(gains),
-            ChangeKind::Link(_)
-            | ChangeKind::AllLinks(_)
-            | ChangeKind::Contact { .. }
-            | ChangeKind::Hand { .. }
-            | ChangeKind::HandTorque { .. }
-            | ChangeKind::Parameters(_)
-            | ChangeKind::SendWhen(_) => None,
-        });
+        let mut gains: Vec<_> = scene.rotation_gains_in_time().skip(1).collect();
+        gains.reverse();
         let latest: Vec<Attitude> = rotation.peers.iter().map(|peer| peer.attitude).collect();
         let length = scene.gyration()?;
-        Some(Box::new(Self { gains: gains.collect(), latest, spread: Spread::default(), length }))
+        Some(Box::new(Self { gains, latest, spread: Spread::default(), length }))
     }
 
     /// Angles times this are lengths \[m\].

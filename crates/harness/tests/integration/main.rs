@@ -10,6 +10,8 @@ mod replays;
 mod scenes;
 mod seats;
 mod silence;
+mod turning_energy;
+mod turning_laws;
 mod virtual_time;
 
 use proptest::prelude::ProptestConfig;

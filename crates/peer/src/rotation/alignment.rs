@@ -17,13 +17,20 @@ use crate::Gains;
 #[must_use]
 #[inline(always)]
 pub fn aligning_torque<N: Real>(own: (&Matrix3<N>, Triple<N>), mean: (&Matrix3<N>, Triple<N>), gains: &Gains<Triple<N>>) -> Triple<N> {
+    let [spring, damper] = aligning_parts(own, mean, gains);
+    add(damper, spring)
+}
+
+/// The two parts of [`aligning_torque`]: of the springs, and of the dampers.
+#[inline(always)]
+pub(super) fn aligning_parts<N: Real>(own: (&Matrix3<N>, Triple<N>), mean: (&Matrix3<N>, Triple<N>), gains: &Gains<Triple<N>>) -> [Triple<N>; 2] {
     let (stiffness, half) = (gains.stiffness, N::of(0.5));
     let sum = half * (stiffness[0] + stiffness[1] + stiffness[2]);
     let weights: Triple<N> = from_fn(|axis| sum - stiffness[axis]);
     // τT = BR∘(ω − Rᵀ·w̄) − 2·vee sk(RᵀM̄·P)
     let apart = transposed_product(own.0, mean.0).map(|row| by_component(row, weights));
     let damped = by_component(gains.damping, subtract(own.1, apply_transposed(own.0, mean.1)));
-    subtract(damped, twice_axial(&apart))
+    [twice_axial(&apart).map(|component| -component), damped]
 }
 
 /// τC \[N·m\] of a device that grasps a copy, in the body axes of the copy, on which it acts: KCR·vee sk(RᵀRH) + BCR·(RᵀRH·ωH − ω).

@@ -1,15 +1,18 @@
 //! The part of a peer that turns: its copy, and its device if that turns too.
 
+use alloc::boxed::Box;
 use core::array::from_fn;
 use core::time::Duration;
 
 use cohaptic_units::Instant;
 
-use super::algebra::{add, subtract};
+use super::algebra::{add, by_component, subtract};
 use super::alignment::{in_body_axes, lever, reaction};
 use super::attitude::point_of;
 use super::held::HeldAttitude;
+use super::law::TurnLaw;
 use super::{Attitude, HeldAttitudes, RotationStep, Spin, Triple, aligning_torque, turning_torque};
+use crate::coordination::BuiltIn;
 use crate::{Clock, Contact, Gains, Integrator, Signal, State};
 
 /// What the turning part of a peer is.
@@ -45,7 +48,7 @@ pub struct DeviceRotation {
 pub struct Torques {
     /// r×RᵀFC + τC, which device and coupling exert on the copy, in body axes \[N·m\].
     pub coupling: Triple,
-    /// τT, which acts on the copy with the opposite sign, in body axes \[N·m\].
+    /// The held part of τT, which acts on the copy with the opposite sign, in body axes \[N·m\]: all but what the law's damping of the copy adds.
     pub coordination: Triple,
     /// The torque on the device but that of the hand, in handle axes \[N·m\].
     device: Triple,
@@ -59,6 +62,10 @@ impl Torques {
 #[derive(Clone, Debug)]
 pub struct Rotation {
     config: RotationConfig,
+    /// The law, if it is more than the sum of spring and damper.
+    law: Option<Box<TurnLaw>>,
+    /// β about each axis [N·m·s/rad], part of the damping of the copy.
+    own_damping: Triple,
     copy: Turning,
     device: Option<Turning>,
     held: HeldAttitudes,
@@ -83,6 +90,7 @@ impl Turning {
         Self { attitude, spin, short: step(short), long: step(long) }
     }
 
+    #[inline]
     fn advance(&mut self, span: Duration, torque: Triple, config: &RotationConfig) {
         let other;
         let step = if span == self.short.0 {
@@ -94,6 +102,14 @@ impl Turning {
             &other
         };
         step.advance(&mut self.attitude, torque);
+    }
+
+    /// Another damping [N·m·s/rad], from the next step on.
+    fn set_damping(&mut self, damping: Triple, config: &RotationConfig) {
+        self.spin.damping = damping;
+        for (span, step) in [&mut self.short, &mut self.long] {
+            *step = self.spin.step(*span, config.integrator, config.steps);
+        }
     }
 }
 
@@ -108,7 +124,29 @@ impl Rotation {
     pub fn new(config: RotationConfig, attitude: Attitude, held: HeldAttitudes, clock: &Clock) -> Self {
         let copy = Turning::new(attitude, config.copy, &config, clock);
         let device = config.device.as_ref().map(|device| Turning::new(attitude, device.handle, &config, clock));
-        Self { copy, device, held, stale: false, computed: Torques::NONE, applied: Torques::NONE, config }
+        let (law, own_damping) = (None, [0.0; 3]);
+        Self { law, own_damping, copy, device, held, stale: false, computed: Torques::NONE, applied: Torques::NONE, config }
+    }
+
+    /// With the law that makes τT from the torques of spring and damper; without one it is their sum. `law`: with gains of one, as [`RotationConfig::gains`] are in
+    /// these torques. `own_damping`: β about each axis [N·m·s/rad], by how much the law damps the copy; part of the damping in [`RotationConfig::copy`], and of τT on
+    /// the record.
+    #[must_use]
+    pub fn with_law(mut self, law: &BuiltIn, own_damping: Triple) -> Self {
+        self.law = TurnLaw::is_needed(law).then(|| Box::new(TurnLaw::new(*law)));
+        self.own_damping = own_damping;
+        self
+    }
+
+    /// Other parameters of the law of [`Rotation::with_law`], from the next tick on. `damping`: of the copy, with β in it [N·m·s/rad].
+    pub fn set_law(&mut self, law: &BuiltIn, own_damping: Triple, damping: Triple) {
+        match &mut self.law {
+            Some(known) => known.set(*law),
+            None => self.law = TurnLaw::is_needed(law).then(|| Box::new(TurnLaw::new(*law))),
+        }
+        self.own_damping = own_damping;
+        self.config.copy.damping = damping;
+        self.copy.set_damping(damping, &self.config);
     }
 
     /// Whether all that turns is a finite number.
@@ -133,6 +171,38 @@ impl Rotation {
     #[must_use]
     pub const fn computed(&self) -> &Torques {
         &self.computed
+    }
+
+    /// The torques that act over the tick that begins now.
+    #[must_use]
+    pub const fn applied(&self) -> &Torques {
+        &self.applied
+    }
+
+    /// τT of the latest tick, with what β adds, in body axes \[N·m\].
+    #[must_use]
+    pub fn coordination_torque(&self) -> Triple {
+        add(self.computed.coordination, by_component(self.own_damping, self.copy.attitude.rate))
+    }
+
+    /// β about each axis [N·m·s/rad].
+    #[must_use]
+    pub const fn own_damping(&self) -> Triple {
+        self.own_damping
+    }
+
+    /// The integral of the angular velocity of the copy in its axes over the step to the next tick \[rad\], between [`crate::Peer::compute`] and [`crate::Peer::advance`].
+    #[must_use]
+    pub fn travel(&self, span: Duration) -> Triple {
+        let step = self.copy.spin.step(span, self.config.integrator, self.config.steps);
+        let mut body = self.copy.attitude;
+        step.travel(&mut body, self.on_copy())
+    }
+
+    /// The torque that is held on the copy over the tick that begins now, without its damping, in body axes \[N·m\].
+    #[must_use]
+    pub fn on_copy(&self) -> Triple {
+        subtract(self.applied.coupling, self.applied.coordination)
     }
 
     /// What the peer is.
@@ -212,7 +282,12 @@ impl Rotation {
         let at = point_of(&matrix, rate, *grasp, centre);
         let force: [f64; A] = from_fn(|axis| contact.force_along(axis, coupling, device.along(axis).relative_to(at.along(axis))));
         let lever = lever(&matrix, *grasp, triple(&force));
-        let mut torques = Torques { coupling: lever, coordination: aligning_torque((&matrix, rate), self.held.mean(), gains), device: [0.0; 3] };
+        let (own, mean) = ((&matrix, rate), self.held.mean());
+        let coordination = match &mut self.law {
+            Some(law) => law.torque(own, mean, gains),
+            None => aligning_torque(own, mean, gains),
+        };
+        let mut torques = Torques { coupling: lever, coordination, device: [0.0; 3] };
         if let (Some(handle), Some(DeviceRotation { coupling, .. }), Contact::Grasp) = (&self.device, &self.config.device, contact) {
             let turned = handle.attitude.matrix();
             let torque = turning_torque((&matrix, rate), (&turned, handle.attitude.rate), coupling);
@@ -226,7 +301,7 @@ impl Rotation {
 
     /// Moves to the next tick under the torques that act over it, which are held in body axes.
     pub(crate) fn advance(&mut self, now: Instant, span: Duration) {
-        self.copy.advance(span, subtract(self.applied.coupling, self.applied.coordination), &self.config);
+        self.copy.advance(span, self.on_copy(), &self.config);
         if let Some(device) = &mut self.device {
             let hand = self.config.device.as_ref().and_then(|device| device.hand.as_ref());
             let hand = hand.map_or([0.0; 3], |hand| in_body_axes(&device.attitude.matrix(), hand.value::<3>(now)));

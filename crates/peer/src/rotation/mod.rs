@@ -7,6 +7,7 @@ mod alignment;
 mod attitude;
 mod body;
 mod held;
+mod law;
 mod real;
 mod step;
 

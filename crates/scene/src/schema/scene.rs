@@ -292,7 +292,7 @@ const HAND: Form = Form::AnyOf(&[Form::Words(&[("none", "nothing; takes away wha
 static HAND_TABLE: Table = Table::of(&[&[
     optional("force", vector(FORCE), "A constant force"),
     optional("sine", Form::Table(&FORCE_SINE), "A force that sways"),
-    optional("file", Form::File, "A recorded force: a CSV with the header t,fx (and fy, fz), in seconds and newtons"),
+    optional("file", Form::File, "A recorded force: a CSV with the header t,fx (and fy, fz, then tx,ty,tz), in s, N and N·m"),
     optional("arm", Form::Table(&ARM), "An arm that adds its mass to the device and holds it with a damper and a spring"),
     optional("follows", Form::Table(&FOLLOWS), "Beside arm: the motion that it wants; without it to rest at 0"),
     optional("torque", vector(TORQUE), "A constant torque on a device that turns, in world axes"),
@@ -313,7 +313,7 @@ static ARM: Table = Table::of(&[&[
 static FOLLOWS: Table = Table::of(&[&[
     optional("position", vector(POSITION), "A constant position"),
     optional("sine", Form::Table(&MOTION_SINE), "A position that sways"),
-    optional("file", Form::File, "A recorded motion: a CSV with the header t,x (and y, z), in seconds and metres"),
+    optional("file", Form::File, "A recorded motion: a CSV with the header t,x (and y, z, then tx,ty,tz), in s, m and N·m"),
 ]]);
 
 static TIMELINE: Table = Table::of(&[&[
@@ -330,9 +330,11 @@ const SET_OF_PEER: [Key; 2] = [
     optional("hand", HAND, "Of a peer: what the user does"),
 ];
 static CHANGES: Table = Table::of(&[&CHANGES_OF_ALL, CHANGING_LAWS.split_at(count_laws(true)).0]);
-const CHANGES_OF_ALL: [Key; 3] = [
+const CHANGES_OF_ALL: [Key; 5] = [
     optional("stiffness", number(STIFFNESS), "Gain on the difference of positions; without it as it was"),
     optional("damping", number(DAMPING), "Gain on the difference of velocities; without it as it was"),
+    optional("rotational-stiffness", vector(ROTATIONAL_STIFFNESS), "Gain on turns; without it as it was"),
+    optional("rotational-damping", vector(ROTATIONAL_DAMPING), "Gain on angular velocities; without it as it was"),
     optional("send-when", Form::Table(&SEND_WHEN), "Which samples are sent; without it as it was"),
 ];
 

@@ -42,7 +42,7 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
     let signal = match chosen.name.as_str() {
         "force" => Signal::Constant(read_vector(FORCE, value, context, Spread::Refused)?),
         "sine" => read_sine(value, context, FORCE, &["torque"])?,
-        "file" => Signal::Table(read_motion_file(value, context, Columns::Force)?),
+        "file" => Signal::Table(read_motion_file(value, context, Columns::Force)?.motion),
         _ => {
             let arm = read_arm(value, *context);
             let follows = match follows {
@@ -74,7 +74,7 @@ fn read_follows(node: &Node, context: SceneContext<'_>) -> Option<Signal> {
     match chosen.name.as_str() {
         "position" => Some(Signal::Constant(read_vector(POSITION, value, context, Spread::Refused)?)),
         "sine" => read_sine(value, context, POSITION, &[]),
-        _ => Some(Signal::Table(read_motion_file(value, context, Columns::Position)?)),
+        _ => Some(Signal::Table(read_motion_file(value, context, Columns::Position)?.motion)),
     }
 }
 

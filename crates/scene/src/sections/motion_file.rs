@@ -1,4 +1,4 @@
-//! Files of recorded motion or force: rows of comma-separated numbers, the time first.
+//! Files of recorded motion or force, with torques beside them or not: rows of comma-separated numbers, the time first.
 
 use core::ops::Range;
 use std::sync::Arc;
@@ -30,48 +30,77 @@ impl Columns {
     }
 }
 
+/// The columns of a torque in world axes \[N·m\], behind all others.
+const TORQUE: [&str; 3] = ["tx", "ty", "tz"];
+
+/// What a file holds.
+#[derive(Clone, Debug)]
+pub(crate) struct Recorded {
+    /// Force or position, as asked for.
+    pub(crate) motion: Arc<MotionTable>,
+    /// The torque beside it in world axes \[N·m\], if the file has these columns.
+    pub(crate) torque: Option<Arc<MotionTable>>,
+}
+
 /// Reads the file that `node` names, relative to the folder of the scene.
-pub(crate) fn read_motion_file(node: &Node, context: SceneContext<'_>, columns: Columns) -> Option<Arc<MotionTable>> {
+pub(crate) fn read_motion_file(node: &Node, context: SceneContext<'_>, columns: Columns) -> Option<Recorded> {
     let path = file_path(node, *context, "the name of a CSV file, relative to the folder of the scene")?;
     let header = columns.header(context.axes?.count());
     // The same file with other columns is another matter, and is refused by its header.
-    read_file(node, *context, &path, &header.join(","), |text| parse_rows(text, &header).map(Arc::new))
+    let form = format!("{}{}", header.join(","), if context.turns { " and torques" } else { "" });
+    read_file(node, *context, &path, &form, |text| parse_rows(text, &header, context.turns))
 }
 
-fn parse_rows(text: &str, header: &[&str]) -> Result<MotionTable, Fault> {
+fn parse_rows(text: &str, motion: &[&str], turns: bool) -> Result<Recorded, Fault> {
     let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(text.as_bytes());
     let mut lines: Vec<Range<usize>> = Vec::new();
-    let mut rows = Vec::new();
-    let columns = header.join(",");
+    let (mut rows, mut torques) = (Vec::new(), Vec::new());
+    let (mut header, with_torque) = (motion, [motion, &TORQUE].concat());
+    let columns = motion.join(",");
     for record in reader.records() {
         let from = lines.last().map_or(0, |line| line.end);
         let record = record.map_err(|error| Fault { span: from..from, message: format!("{error}: expected the columns {columns}") })?;
         let at = record.position().and_then(|position| usize::try_from(position.byte()).ok()).unwrap_or(from);
         let line = line_at(text, at);
+        let fault = |column: usize, name: &str, message| Fault { span: field_at(text, &line, column), message: format!("column {name}: {message}") };
         if lines.is_empty() {
-            if record.iter().ne(header.iter().copied()) {
-                return Err(Fault { span: line.clone(), message: format!("the header is {}: expected {columns}", quote(text[line].trim())) });
+            if record.iter().eq(with_torque.iter().copied()) {
+                if !turns {
+                    let message = format!("a torque needs an object that turns: expected object.inertia, or the columns {columns}");
+                    return Err(fault(motion.len(), TORQUE[0], message));
+                }
+                header = &with_torque;
+            } else if record.iter().ne(motion.iter().copied()) {
+                let torques = if turns { format!(", or {}", with_torque.join(",")) } else { String::new() };
+                let message = format!("the header is {}: expected {columns}{torques}", quote(text[line.clone()].trim()));
+                return Err(Fault { span: line, message });
             }
         } else {
             if record.len() != header.len() {
-                let message = format!("{}: expected {}, {columns}", Counted(record.len(), "column"), header.len());
+                let message = format!("{}: expected {}, {}", Counted(record.len(), "column"), header.len(), header.join(","));
                 return Err(Fault { span: line, message });
             }
-            let fault =
-                |column: usize, message| Fault { span: field_at(text, &line, column), message: format!("column {}: {message}", header[column]) };
-            let time = seconds(&record[0]).map_err(|message| fault(0, message))?;
-            let mut values = [0.0; 3];
-            for (column, value) in values.iter_mut().enumerate().take(header.len() - 1) {
-                *value = finite(&record[column + 1]).map_err(|message| fault(column + 1, message))?;
+            let time = seconds(&record[0]).map_err(|message| fault(0, header[0], message))?;
+            let triple = |columns: Range<usize>| {
+                let mut values = [0.0; 3];
+                for (value, column) in values.iter_mut().zip(columns) {
+                    *value = finite(&record[column]).map_err(|message| fault(column, header[column], message))?;
+                }
+                Ok(values)
+            };
+            rows.push((time, triple(1..motion.len())?));
+            if header.len() > motion.len() {
+                torques.push((time, triple(motion.len()..header.len())?));
             }
-            rows.push((time, values));
         }
         lines.push(line);
     }
     if lines.is_empty() {
         return Err(Fault { span: 0..0, message: format!("the file is empty: expected a header, {columns}, and rows") });
     }
-    MotionTable::new(rows).map_err(|error| table_fault(text, &lines, &error))
+    let has_torque = header.len() > motion.len();
+    let table = |rows| MotionTable::new(rows).map(Arc::new).map_err(|error| table_fault(text, &lines, &error));
+    Ok(Recorded { motion: table(rows)?, torque: if has_torque { Some(table(torques)?) } else { None } })
 }
 
 fn table_fault(text: &str, lines: &[Range<usize>], error: &TableError) -> Fault {
@@ -152,6 +181,7 @@ fn without_exponent(text: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_peer::Signal;
     use cohaptic_units::Excerpt;
 
     use super::*;
@@ -180,7 +210,7 @@ mod tests {
     }
 
     fn fault(text: &str) -> (usize, usize, String) {
-        let Fault { span, message } = parse_rows(text, &["t", "fx"]).unwrap_err();
+        let Fault { span, message } = parse_rows(text, &["t", "fx"], false).unwrap_err();
         let excerpt = Excerpt::new(text, span);
         (excerpt.line, excerpt.column, message)
     }
@@ -201,6 +231,25 @@ mod tests {
 
     #[test]
     fn space_around_fields_and_a_byte_order_mark_are_no_fault() {
-        assert!(parse_rows("\u{feff}t, fx\n 0 , 1\n", &["t", "fx"]).is_ok());
+        assert!(parse_rows("\u{feff}t, fx\n 0 , 1\n", &["t", "fx"], false).is_ok());
+    }
+
+    #[test]
+    fn torques_stand_behind_all_other_columns() {
+        const COLUMNS: [&str; 4] = ["t", "x", "y", "z"];
+        let text = "t,x,y,z,tx,ty,tz\n0,1,2,3,4,5,6\n1,0,0,0,8,5,6\n";
+        let Recorded { motion, torque } = parse_rows(text, &COLUMNS, true).unwrap();
+        let at_half = |table: Arc<MotionTable>| Signal::Table(table).value::<3>(Instant::from_nanos(500_000_000));
+        assert_eq!((at_half(motion), torque.map(at_half)), ([0.5, 1.0, 1.5], Some([6.0, 5.0, 6.0])));
+        assert!(parse_rows("t,x,y,z\n0,1,2,3\n", &COLUMNS, true).unwrap().torque.is_none());
+        let refused = |text: &str, turns: bool| {
+            let Fault { span, message } = parse_rows(text, &COLUMNS, turns).unwrap_err();
+            (Excerpt::new(text, span).column, message)
+        };
+        let needs = "column tx: a torque needs an object that turns: expected object.inertia, or the columns t,x,y,z";
+        assert_eq!(refused(text, false), (9, needs.to_owned()));
+        assert_eq!(refused(&text.replace("8", "nan"), true).0, 9);
+        let header = "the header is \"t,x,y,z,tx\": expected t,x,y,z, or t,x,y,z,tx,ty,tz";
+        assert_eq!(refused("t,x,y,z,tx\n", true), (1, header.to_owned()));
     }
 }

@@ -1,12 +1,13 @@
 //! The keys of an object that turns, which stand in several tables and all need `object.inertia`.
 
-use cohaptic_linkfile::document::{Entry, Node, Value};
+use cohaptic_linkfile::document::{Entry, Node, Table, Value};
 use cohaptic_linkfile::reading::values::{self, Quantity, ReadNumber as _};
 use cohaptic_linkfile::reading::{Context, TableReader};
 use cohaptic_peer::rotation::{Attitude, Spin, Triple};
 use cohaptic_peer::{Gains, Signal};
 use cohaptic_units::Hertz;
 
+use super::motion_file::{Columns, read_motion_file};
 use super::peers::PeerRead;
 use crate::context::SceneContext;
 use crate::model::Axes;
@@ -151,22 +152,29 @@ pub(super) fn read_coupling_rotation(table: &mut TableReader<'_>) -> Option<Opti
 /// The torque of a hand; `Some(None)` without one.
 pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option<Option<Signal>> {
     let Some(table) = hand.as_table() else { return Some(None) };
-    let sine = table.get("sine").and_then(|sine| sine.node.as_table());
-    match (table.get("torque"), sine.and_then(|sine| Some((sine, sine.get("torque")?)))) {
-        (None, None) => Some(None),
-        (Some(constant), None) => Some(Some(Signal::Constant(read_vector(TORQUE, &constant.node, context, Spread::Refused)?))),
-        (None, Some((sine, torque))) => {
-            let amplitude = read_vector(TORQUE, &torque.node, context, Spread::Refused);
-            // Faults of these two are those of the force.
-            let number = |key: &str, quantity: Quantity| sine.get(key).and_then(|entry| quantity.read(&entry.node, *context));
-            let (frequency, phase) = (number("frequency", FREQUENCY)?, number("phase", ANGLE).unwrap_or(0.0));
-            Some(Some(Signal::Sine { amplitude: amplitude?, frequency: Hertz(frequency), phase }))
-        }
-        (Some(constant), Some(_)) => {
-            context.fault(constant.key, &constant.node.path, "a torque stands beside sine.torque: expected one of the two");
-            None
-        }
+    let within = |key: &str| table.get(key).and_then(|entry| entry.node.as_table());
+    let sine = within("sine").and_then(|sine| Some((sine, sine.get("torque")?)));
+    let file = |table: Option<&Table>, columns: Columns| {
+        // Faults of a file are those of its other columns.
+        let torque = table.and_then(|table| table.get("file")).and_then(|file| read_motion_file(&file.node, context, columns)?.torque);
+        torque.map(Signal::Table)
+    };
+    let file = file(Some(table), Columns::Force).or_else(|| file(within("follows"), Columns::Position));
+    let constant = table.get("torque");
+    if let (Some(constant), true) = (constant, sine.is_some() || file.is_some()) {
+        let other = if sine.is_some() { "sine.torque" } else { "the torques of a file" };
+        context.fault(constant.key, &constant.node.path, format!("a torque stands beside {other}: expected one of the two"));
+        return None;
     }
+    if let Some(constant) = constant {
+        return Some(Some(Signal::Constant(read_vector(TORQUE, &constant.node, context, Spread::Refused)?)));
+    }
+    let Some((sine, torque)) = sine else { return Some(file) };
+    let amplitude = read_vector(TORQUE, &torque.node, context, Spread::Refused);
+    // Faults of these two are those of the force.
+    let number = |key: &str, quantity: Quantity| sine.get(key).and_then(|entry| quantity.read(&entry.node, *context));
+    let (frequency, phase) = (number("frequency", FREQUENCY)?, number("phase", ANGLE).unwrap_or(0.0));
+    Some(Some(Signal::Sine { amplitude: amplitude?, frequency: Hertz(frequency), phase }))
 }
 
 /// How the object and the peers turn; `Some(None)` without an inertia. `object` has the keys under `[object]`, `gains` those under `[coordination]`.

@@ -8,13 +8,14 @@ use cohaptic_linkfile::link::is_empty;
 use cohaptic_linkfile::mesh::{LinkClasses, OnLinks, read_key_changes, read_links_between, read_peer_name};
 use cohaptic_linkfile::reading::values::ReadNumber as _;
 use cohaptic_linkfile::reading::{Context, TableReader, only_one, values};
+use cohaptic_peer::rotation::Triple;
 use cohaptic_peer::{Contact, Gains, Hand, SendWhen, Signal};
 use cohaptic_units::Instant;
 
 use super::hand::read_hand;
 use super::header::{ParameterChange, read_parameter_changes, read_send_when};
 use super::peer::read_contact;
-use super::rotation::read_hand_torque;
+use super::rotation::{read_hand_torque, read_rotational_damping, read_rotational_stiffness};
 use crate::context::SceneContext;
 use crate::model::{Change, ChangeKind, CoordinationSpec, PeerSpec};
 use crate::quantities::{DAMPING, STIFFNESS};
@@ -30,7 +31,7 @@ struct Planned<'a> {
 enum PlannedKind<'a> {
     Links { selector: LinkSelector, set: &'a Node },
     Peer { peer: usize, contact: Option<(Contact, &'a Node)>, hand: Option<(Option<Hand>, &'a Node)>, torque: Option<Signal> },
-    Coordination { stiffness: Option<f64>, damping: Option<f64>, send_when: Option<SendWhen>, parameters: Vec<ParameterChange> },
+    Coordination { gains: Gains<Option<f64>>, of_turns: Gains<Option<Triple>>, send_when: Option<SendWhen>, parameters: Vec<ParameterChange> },
 }
 
 /// Reads the changes and puts them in order of time. The arguments say how things stand at the beginning; each is `None` if it was refused.
@@ -74,10 +75,13 @@ pub(crate) fn read_timeline(
                     changes.push(Change { at, what: ChangeKind::HandTorque { peer, torque } });
                 }
             }
-            PlannedKind::Coordination { stiffness, damping, send_when, parameters } => {
+            PlannedKind::Coordination { gains: Gains { stiffness, damping }, of_turns, send_when, parameters } => {
                 if stiffness.is_some() || damping.is_some() {
                     gains = Gains { stiffness: stiffness.unwrap_or(gains.stiffness), damping: damping.unwrap_or(gains.damping) };
                     changes.push(Change { at, what: ChangeKind::Coordination(gains) });
+                }
+                if of_turns.stiffness.is_some() || of_turns.damping.is_some() {
+                    changes.push(Change { at, what: ChangeKind::RotationalGains(of_turns) });
                 }
                 changes.extend(send_when.map(|send_when| Change { at, what: ChangeKind::SendWhen(send_when) }));
                 if !parameters.is_empty() {
@@ -138,6 +142,8 @@ fn read_coordination_changes<'a>(node: &'a Node, context: Context<'a>) -> Option
     let mut table = TableReader::new(node, context, "a table such as { stiffness = 1000.0, damping = 5.0 }")?;
     let stiffness = table.maybe("stiffness", |node, context| STIFFNESS.read(node, context));
     let damping = table.maybe("damping", |node, context| DAMPING.read(node, context));
+    let stiffness_of_turns = table.maybe("rotational-stiffness", read_rotational_stiffness);
+    let damping_of_turns = table.maybe("rotational-damping", read_rotational_damping);
     let send_when = table.maybe("send-when", read_send_when);
     let parameters = read_parameter_changes(&mut table);
     table.finish();
@@ -145,7 +151,12 @@ fn read_coordination_changes<'a>(node: &'a Node, context: Context<'a>) -> Option
         context.fault_at(node, "nothing changes: expected stiffness, damping, send-when, or a table of a strategy with parameters that change");
         return None;
     }
-    Some(PlannedKind::Coordination { stiffness: stiffness?, damping: damping?, send_when: send_when?, parameters: parameters? })
+    Some(PlannedKind::Coordination {
+        gains: Gains { stiffness: stiffness?, damping: damping? },
+        of_turns: Gains { stiffness: stiffness_of_turns?, damping: damping_of_turns? },
+        send_when: send_when?,
+        parameters: parameters?,
+    })
 }
 
 #[expect(clippy::type_complexity, reason = "used once, above")]

@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use cohaptic_scene::{Scene, SceneError, scene_files};
+use cohaptic_scene::{ChangeKind, Scene, SceneError, scene_files};
+use cohaptic_units::Instant;
 
 /// A folder of its own for one test, removed at the end.
 struct Folder(PathBuf);
@@ -80,6 +81,59 @@ fn a_fault_in_a_hand_file_shows_its_line_and_says_who_named_it() {
         path.display()
     );
     assert_eq!(error.to_string(), expected);
+}
+
+const TURNING: &str = "\
+scene = { duration = \"1s\", axes = 3 }
+object = { mass = 1, inertia = 0.01 }
+coordination = { strategy = \"average-position\", stiffness = 1, update = \"8ms\" }
+peer = { device = { mass = 0.1, inertia = 0.001 }, coupling = { stiffness = 100, rotational-stiffness = 1 } }
+peers = [{ name = \"a\", hand = HAND }, { name = \"b\" }]
+timeline = [{ at = \"0.5s\", peer = \"b\", set = { hand = { file = \"hand.csv\" } } }]
+";
+
+#[test]
+fn a_hand_file_gives_torques_beside_forces_and_wanted_motions() {
+    let folder = Folder::new("torques");
+    folder.write("hand.csv", "t,fx,fy,fz,tx,ty,tz\n0,1,2,3,4,5,6\n");
+    folder.write("motion.csv", "t,x,y,z,tx,ty,tz\n0,1,2,3,0.5,0.25,-1\n");
+    folder.write("force.csv", "t,fx,fy,fz\n0,1,2,3\n");
+    let read = |hand: &str, overrides: &[&str]| {
+        let path = folder.write("a.toml", TURNING.replace("HAND", hand));
+        let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+        Scene::read(&path, &overrides)
+    };
+    let torque = |hand: &str| {
+        let scene = read(hand, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let torque_of = |what: &ChangeKind| if let ChangeKind::HandTorque { peer: 1, torque } = what { torque.clone() } else { None };
+        let changed = scene.timeline.iter().find_map(|change| torque_of(&change.what));
+        assert_eq!(changed.map(|torque| torque.value(Instant::ZERO)), Some([4.0, 5.0, 6.0]));
+        let device = scene.rotation.unwrap().peers[0].device.clone().unwrap();
+        device.torque.map(|torque| torque.value::<3>(Instant::ZERO))
+    };
+    let arm = "arm = { mass = 0, damping = 1, stiffness = 1 }, follows = { file = \"motion.csv\" }";
+    assert_eq!(torque("{ file = \"hand.csv\" }"), Some([4.0, 5.0, 6.0]));
+    assert_eq!(torque(&format!("{{ {arm} }}")), Some([0.5, 0.25, -1.0]));
+    assert_eq!(torque("{ file = \"force.csv\", torque = [0, 0, 7] }"), Some([0.0, 0.0, 7.0]));
+    assert_eq!(torque("{ file = \"force.csv\" }"), None);
+    for (hand, overrides, expected) in [
+        ("{ file = \"hand.csv\", torque = [0, 0, 7] }", &[][..], "peers.a.hand.torque: a torque stands beside the torques of a file"),
+        (&format!("{{ {arm}, torque = [0, 0, 7] }}"), &[], "beside the torques of a file"),
+        (
+            "{ file = \"hand.csv\" }",
+            &["peers.a.device={mass=0.1}", "peer={device={mass=0.1},coupling={stiffness=1}}"],
+            "the torque of a hand needs a device that turns: expected device.inertia",
+        ),
+        ("\"none\"", &["peer={device={mass=0.1},coupling={stiffness=1}}"], "the timeline gives the hand of peer \"b\" a torque"),
+        (
+            "{ file = \"force.csv\" }",
+            &["object={mass=1}", "peer={device={mass=0.1},coupling={stiffness=1}}"],
+            "hand.csv:1:12: timeline.0.set.hand.file: column tx: a torque needs an object that turns",
+        ),
+    ] {
+        let error = read(hand, overrides).unwrap_err().to_string();
+        assert!(error.contains(expected), "{hand}: {error}");
+    }
 }
 
 #[test]

@@ -15,9 +15,16 @@ use crate::lifted::{FrameMap, Instrument, Lifted};
 use crate::structure::count;
 
 /// e^{jωt} after that number of periods, whole ones left out first.
-fn turn(periods: f64) -> Complex64 {
+pub(super) fn turn(periods: f64) -> Complex64 {
     let angle = TAU * (periods - periods.round());
     Complex64::new(libm::cos(angle), libm::sin(angle))
+}
+
+/// e^{jωt} at an instant \[ns\].
+pub(super) fn phase(hz: f64, at: u64) -> Complex64 {
+    #[expect(clippy::cast_precision_loss, reason = "a rounding of 2⁻⁵³ of the phase, as that of the product")]
+    let seconds = at as f64 * 1e-9;
+    turn(hz * seconds)
 }
 
 /// Pushes one device with a sine and looks at the same frequency. The inputs are the parts of the force that are a cosine and a sine.
@@ -31,14 +38,6 @@ struct Sine {
     ticks: usize,
 }
 
-impl Sine {
-    fn phase(&self, at: u64) -> Complex64 {
-        #[expect(clippy::cast_precision_loss, reason = "a rounding of 2⁻⁵³ of the phase, as that of the product")]
-        let seconds = at as f64 * 1e-9;
-        turn(self.hz * seconds)
-    }
-}
-
 impl Instrument for Sine {
     fn inputs(&self) -> usize {
         2
@@ -48,7 +47,7 @@ impl Instrument for Sine {
         if node != self.node {
             return false;
         }
-        let phase = self.phase(at);
+        let phase = phase(self.hz, at);
         inputs[0] = phase.re / self.compliance;
         inputs[1] = phase.im / self.compliance;
         true
@@ -59,7 +58,7 @@ impl Instrument for Sine {
             return;
         }
         self.seen.resize(velocity.len(), Complex64::ZERO);
-        let back = self.phase(at).conj();
+        let back = phase(self.hz, at).conj();
         for (sum, entry) in self.seen.iter_mut().zip(velocity) {
             *sum += back * entry;
         }
@@ -154,21 +153,42 @@ impl Harmonic {
     /// Solves them, and says how exact the answer is.
     pub(super) fn point(&self) -> AdmittancePoint {
         let size = self.matrix.ncols();
-        let decomposed = self.matrix.partial_piv_lu();
-        let solution = decomposed.solve(&self.right);
-        let looked = faer::Mat::from_fn(size, 1, |row, _| self.sine.seen[row]);
-        let of_states: Complex64 = (0..size).map(|row| self.sine.seen[row] * solution[(row, 0)]).sum();
-        let direct = self.sine.seen[size] + Complex64::I * self.sine.seen[size + 1];
-        // A change δM of the equations changes the answer by yᵀ·δM·u, where Mᵀ·y picks the output.
-        let adjoint = decomposed.solve_transpose(&looked);
-        let weight: f64 = (0..size).map(|row| adjoint[(row, 0)].norm()).sum();
-        let largest = (0..size).map(|row| solution[(row, 0)].norm()).fold(1.0, f64::max);
-        let row_sum = |row: usize| (0..size).map(|column| self.matrix[(row, column)].norm()).sum::<f64>();
-        let norm = (0..size).map(row_sum).fold(0.0, f64::max);
-        let change = 4.0 * self.map.error + f64::EPSILON * count(size) * norm;
-        let error = (weight + count(self.sine.ticks)) * change * largest * self.unit;
-        AdmittancePoint { hz: self.hz, value: (of_states + direct) * self.unit, error }
+        let seen = Seen {
+            states: &self.sine.seen[..size],
+            push: self.sine.seen[size] + Complex64::I * self.sine.seen[size + 1],
+            ticks: self.sine.ticks,
+            unit: self.unit,
+        };
+        solved(self.hz, &self.matrix, &self.right, &seen, self.map.error)
     }
+}
+
+/// What a steady state is looked at by.
+pub(super) struct Seen<'a> {
+    /// What each unknown, and the push by itself, adds to the sum of e^{−jωt}·v over the ticks.
+    pub(super) states: &'a [Complex64],
+    pub(super) push: Complex64,
+    pub(super) ticks: usize,
+    /// What the sum is multiplied by.
+    pub(super) unit: f64,
+}
+
+/// Solves the equations of a steady state, of whose coefficients `error` bounds the rounding, and says how exact the answer is.
+pub(super) fn solved(hz: f64, matrix: &faer::Mat<Complex64>, right: &faer::Mat<Complex64>, seen: &Seen<'_>, error: f64) -> AdmittancePoint {
+    let size = matrix.ncols();
+    let decomposed = matrix.partial_piv_lu();
+    let solution = decomposed.solve(right);
+    let looked = faer::Mat::from_fn(size, 1, |row, _| seen.states[row]);
+    let of_states: Complex64 = (0..size).map(|row| seen.states[row] * solution[(row, 0)]).sum();
+    // A change δM of the equations changes the answer by yᵀ·δM·u, where Mᵀ·y picks the output.
+    let adjoint = decomposed.solve_transpose(&looked);
+    let weight: f64 = (0..size).map(|row| adjoint[(row, 0)].norm()).sum();
+    let largest = (0..size).map(|row| solution[(row, 0)].norm()).fold(1.0, f64::max);
+    let row_sum = |row: usize| (0..size).map(|column| matrix[(row, column)].norm()).sum::<f64>();
+    let norm = (0..size).map(row_sum).fold(0.0, f64::max);
+    let change = 4.0 * error + f64::EPSILON * count(size) * norm;
+    let error = (weight + count(seen.ticks)) * change * largest * seen.unit;
+    AdmittancePoint { hz, value: (of_states + seen.push) * seen.unit, error }
 }
 
 /// A row of the frame's map.

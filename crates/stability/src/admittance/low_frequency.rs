@@ -35,12 +35,19 @@ pub struct Estimate {
     pub error: f64,
 }
 
+impl Estimate {
+    const NONE: Self = Self { value: f64::NAN, error: f64::INFINITY };
+}
+
 /// How many frequencies are tried, each half of the one before.
 const FREQUENCIES: usize = 30;
 /// How many terms of the series are removed at most: beyond that rounding grows faster than the rest shrinks.
 const MOST_TERMS: usize = 8;
 
 impl LowFrequencyFit {
+    /// No definite size.
+    pub(super) const NONE: Self = Self { stiffness: Estimate::NONE, viscosity: Estimate::NONE, inertia: Estimate::NONE };
+
     /// From the impedance at any frequency up to `highest` with a bound of its rounding, and whether anything ties the device to ground.
     pub(super) fn of(impedance: impl Fn(f64) -> (Complex64, f64), highest: f64, tied: bool) -> Self {
         let frequencies: Vec<f64> = std::iter::successors(Some(highest), |hz| Some(0.5 * hz)).take(FREQUENCIES).collect();
@@ -76,11 +83,10 @@ impl LowFrequencyFit {
 /// A series may seem to converge to the impedance in some range of frequencies above the lowest ones. So each frequency has its own estimate, and the best is
 /// taken of those from the lowest frequency up to the first that contradicts them.
 fn extrapolated(sequence: &[(f64, f64)]) -> Estimate {
-    let none = Estimate { value: f64::NAN, error: f64::INFINITY };
     let mut estimates = Vec::with_capacity(sequence.len());
     let (mut before, mut earlier) = (Vec::<(f64, f64)>::new(), Vec::<(f64, f64)>::new());
     for (value, noise) in sequence {
-        let mut best = none;
+        let mut best = Estimate::NONE;
         let mut row = vec![(*value, *noise)];
         let mut power = 1.0;
         for (term, (above, noise_above)) in before.iter().enumerate().take(MOST_TERMS) {
@@ -99,7 +105,7 @@ fn extrapolated(sequence: &[(f64, f64)]) -> Estimate {
         estimates.push(best);
         earlier = std::mem::replace(&mut before, row);
     }
-    let mut best = none;
+    let mut best = Estimate::NONE;
     for estimate in estimates.into_iter().rev().filter(|estimate| estimate.error.is_finite()) {
         if (estimate.value - best.value).abs() > estimate.error + best.error {
             break;

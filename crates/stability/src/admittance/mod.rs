@@ -7,25 +7,25 @@
 
 mod harmonic;
 mod low_frequency;
+mod one_axis;
 mod response;
+mod turned;
 
-use cohaptic_peer::{Contact, Gains};
+use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::lifted::{Body, Lifted, Node, Sampling};
-use crate::linear_form::LinearLaw;
 use crate::network::NominalNetwork;
-use crate::parts::{radius_of, reduced};
-use crate::structure::{Contacts, Structure, count};
-use crate::timetable::{Event, NodeClock, Timetable};
-use crate::{AnalysisError, Matrix, Method, Radius, UNLOADED, Unwatched, Verdict, Watch};
+use crate::structure::count;
+use crate::timetable::{Event, Timetable};
+use crate::{AnalysisError, Radius, UNLOADED, Unwatched, Verdict, Watch};
 
 pub use low_frequency::{Estimate, LowFrequencyFit};
 pub use response::{AdmittancePoint, FrequencyResponse, ideal};
 
-use harmonic::Harmonic;
+use one_axis::{OneAxis, TIMELINE};
+use turned::Turned;
 
 /// How many points the threads share at a time.
 const TOGETHER: usize = 256;
@@ -37,21 +37,23 @@ const TOGETHER: usize = 256;
 ///
 /// Where a scene is not linear, the linear scene is analysed in which every one-sided contact is closed and no copy is at a wall: see
 /// [`Admittance::notes`]. In a scene of several axes it is the admittance along the axis that the peer pushes along, or the first.
+///
+/// Of an object that turns, a push along one axis may be seen in the motion along or about another: see [`Admittance::between_watched`].
 #[derive(Clone, Debug)]
 pub struct Admittance {
-    nodes: Vec<Node>,
-    weights: Matrix,
-    timetable: Timetable,
-    time: f64,
-    tied: bool,
-    /// Which of the nodes is pushed.
-    pushed: usize,
+    system: System,
     highest: f64,
     radius: Radius,
     notes: Vec<String>,
-    /// The mass of the whole object, or its inertia about the axis.
     mass: f64,
-    is_turn: bool,
+    axes: [PushedAxis; 2],
+}
+
+/// What moves.
+#[derive(Clone, Debug)]
+enum System {
+    OneAxis(OneAxis),
+    Turned(Box<Turned>),
 }
 
 /// The admittance of the peer in that place of [`Scene::peers`] at those frequencies \[Hz\].
@@ -87,33 +89,67 @@ impl Admittance {
     ///
     /// # Errors
     ///
-    /// As [`Admittance::of_watched`]; if the scene has no such axis or the device of the peer does not turn; and for an object that turns and is not held at its
-    /// centre.
+    /// As [`Admittance::between_watched`].
     pub fn along_watched(scene: &Scene, peer: usize, axis: Option<PushedAxis>, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
+        Self::between_watched(scene, peer, axis, None, watch)
+    }
+
+    /// [`Admittance::along_watched`] with the velocity of the same device along or about another axis; `None`: the same one.
+    ///
+    /// # Errors
+    ///
+    /// As [`Admittance::of_watched`]; if the scene has no such axis or the device of the peer does not turn; if nothing couples the axes; and for a finger that
+    /// pushes an object off its centre.
+    pub fn between_watched(
+        scene: &Scene,
+        peer: usize,
+        axis: Option<PushedAxis>,
+        seen: Option<PushedAxis>,
+        watch: &dyn Watch,
+    ) -> Result<Self, AdmittanceError> {
         let spec = scene.peers.get(peer).ok_or(AdmittanceError::NoSuchPeer { peer, peers: scene.peers.len() })?;
         let first = match spec.contact {
             Contact::Push(direction) => direction.axis,
             Contact::Grasp | Contact::None => 0,
         };
         let axis = axis.unwrap_or(PushedAxis::ALL[first]);
-        let network = NominalNetwork::of(scene)?;
-        let Some(parts) = scene.rotation_parts() else {
-            let place = axis.place();
-            return if place < scene.axes.count() {
-                Self::in_scene(scene, peer, place, &network, watch)
-            } else {
-                Err(AdmittanceError::NoSuchAxis { axis: axis.word() })
-            };
-        };
-        let off_centre = |why| AnalysisError::Turns { what: "the admittance", why };
-        let parts = parts.map_err(off_centre)?.parts;
-        let found = parts.iter().find(|part| part.components.iter().any(|component| component == axis.word()));
-        let part = found.ok_or_else(|| off_centre("the object is held off its centre"))?;
-        if !part.devices[peer] {
-            return Err(AdmittanceError::DoesNotTurn { axis: axis.word(), peer: spec.name.clone() });
+        let axes = [axis, seen.unwrap_or(axis)];
+        for axis in axes {
+            match &scene.rotation {
+                None if axis.place() >= scene.axes.count() => return Err(AdmittanceError::NoSuchAxis { axis: axis.word() }),
+                Some(rotation) if axis.is_turn() && rotation.peers[peer].device.is_none() => {
+                    return Err(AdmittanceError::DoesNotTurn { axis: axis.word(), peer: spec.name.clone() });
+                }
+                _ => {}
+            }
         }
-        let mut admittance = Self::in_scene(&part.scene, peer, 0, &network, watch)?;
-        admittance.is_turn = axis.place() > 2;
+        let uncoupled = || AdmittanceError::Uncoupled { from: axes[0].word(), to: axes[1].word() };
+        let is_cross = axes[0] != axes[1];
+        let network = NominalNetwork::of(scene)?;
+        let Some(rotation) = &scene.rotation else {
+            if is_cross {
+                return Err(uncoupled());
+            }
+            let (system, radius, notes) = OneAxis::of(scene, peer, axis.place(), &network, watch)?;
+            return Ok(Self::new(System::OneAxis(system), radius, notes, scene.object.mass, axes));
+        };
+        let parts = scene.rotation_parts().and_then(Result::ok).map_or_else(Vec::new, |parts| parts.parts);
+        let part = parts.iter().find(|part| !is_cross && part.components.iter().any(|component| component == axis.word()));
+        let mut admittance = if let Some(part) = part {
+            let (system, radius, notes) = OneAxis::of(&part.scene, peer, 0, &network, watch)?;
+            let mass = if axis.is_turn() { rotation.inertia[axis.place() - 3] } else { scene.object.mass };
+            Self::new(System::OneAxis(system), radius, notes, mass, axes)
+        } else {
+            let (system, radius) = Turned::of(scene, peer, axes.map(PushedAxis::place), &network, watch)?;
+            let (mass, mut notes) = (system.mass(scene), network.notes.clone());
+            if scene.object.enclosure.is_some() {
+                notes.push("the enclosure is left out: the object is away from its walls".to_owned());
+            }
+            Self::new(System::Turned(Box::new(system)), radius, notes, mass, axes)
+        };
+        if is_cross && admittance.is_zero() {
+            return Err(uncoupled());
+        }
         admittance.notes.push(UNLOADED.to_owned());
         if !scene.timeline.is_empty() {
             admittance.notes.push(TIMELINE.to_owned());
@@ -121,30 +157,10 @@ impl Admittance {
         Ok(admittance)
     }
 
-    /// Along that axis of a scene that does not turn.
-    fn in_scene(scene: &Scene, peer: usize, axis: usize, network: &NominalNetwork, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
-        let spec = &scene.peers[peer];
-        let (contacts, notes) = closed_contacts(scene, axis);
-        let structure = Structure::with_alone(&[scene], network, &contacts, Some(peer))?;
-        let mut admittance = Self::of_classes(scene, structure, peer, watch)?;
-        if !contacts.touching[peer] {
-            let device = scene.device_plant(peer);
-            let body = Some(Body::new(device, scene.integrator, &spec.clock));
-            admittance.leave_bare(body, NodeClock::of(scene, peer), device.stiffness > 0.0)?;
-        }
+    fn new(system: System, radius: Radius, notes: Vec<String>, mass: f64, axes: [PushedAxis; 2]) -> Self {
+        let mut admittance = Self { system, highest: 0.0, radius, notes, mass, axes };
         admittance.highest = 0.5 * admittance.tick_rate();
-        admittance.notes = network.notes.iter().cloned().chain(notes).collect();
-        Ok(admittance)
-    }
-
-    /// From classes of which the pushed peer is one by itself.
-    fn of_classes(scene: &Scene, structure: Structure, peer: usize, watch: &dyn Watch) -> Result<Self, AnalysisError> {
-        let radius = radius_of(&reduced(&structure, scene, 1, Method::Reduced, watch)?.parts);
-        let nodes = structure.nodes(scene);
-        let time = structure.time(scene, &nodes);
-        let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
-        let Structure { timetable, weights, tied, .. } = structure;
-        Ok(Self { nodes, weights, timetable, time, tied, pushed, highest: 0.0, radius, notes: Vec::new(), mass: scene.object.mass, is_turn: false })
+        admittance
     }
 
     /// The admittance at a frequency \[Hz\].
@@ -156,7 +172,7 @@ impl Admittance {
         if !(hz > 0.0 && hz <= self.highest) {
             return Err(AdmittanceError::Frequency { hz, highest: self.highest });
         }
-        Ok(Harmonic::new(&self.lifted(), self.pushed, hz).point())
+        Ok(self.point(hz))
     }
 
     /// The admittance at each of those frequencies \[Hz\], in their order.
@@ -200,14 +216,27 @@ impl Admittance {
     /// About how many operations a point takes: each event of a frame works on all columns of its rows.
     #[must_use]
     pub fn operations(&self) -> f64 {
-        let columns = 6 * self.nodes.len() + self.timetable.depth.iter().sum::<usize>();
-        20.0 * count(self.timetable.events.len()) * count(columns) + count(columns).powi(3)
+        match &self.system {
+            System::OneAxis(axis) => {
+                let columns = 6 * axis.nodes.len() + axis.timetable.depth.iter().sum::<usize>();
+                20.0 * count(axis.timetable.events.len()) * count(columns) + count(columns).powi(3)
+            }
+            System::Turned(turned) => turned.operations(),
+        }
     }
 
-    /// What the device feels like when it is moved slowly: see [`LowFrequencyFit`].
+    /// What the device feels like when it is moved slowly: see [`LowFrequencyFit`]. Of a motion along or about another axis than that of the push no size is
+    /// definite.
     #[must_use]
     pub fn fit_low_frequency(&self) -> LowFrequencyFit {
-        LowFrequencyFit::of(|hz| self.impedance(hz), self.highest.min(0.25 / self.timetable.frame.as_secs_f64()), self.tied)
+        if self.axes[0] != self.axes[1] {
+            return LowFrequencyFit::NONE;
+        }
+        let tied = match &self.system {
+            System::OneAxis(axis) => axis.tied,
+            System::Turned(turned) => turned.tied(),
+        };
+        LowFrequencyFit::of(|hz| self.impedance(hz), self.highest.min(0.25 / self.timetable().frame.as_secs_f64()), tied)
     }
 
     /// The highest frequency that there is an admittance for, half the rate of the peer's ticks \[Hz\].
@@ -228,16 +257,17 @@ impl Admittance {
         self.radius.verdict()
     }
 
-    /// The mass of the whole object \[kg\], or its inertia about the axis [kg·m²].
+    /// What the undamped object alone would be felt as where it is held: its mass \[kg\], or its inertia about the axis [kg·m²]. Off the centre, and from one axis to
+    /// another, force over acceleration there, in the units of the axes: infinite where such a push would not move it so, and below zero for the other way.
     #[must_use]
     pub const fn object_mass(&self) -> f64 {
         self.mass
     }
 
-    /// Whether it is angular velocity over torque.
+    /// The axis of the push, and that of the motion.
     #[must_use]
-    pub const fn is_turn(&self) -> bool {
-        self.is_turn
+    pub const fn axes(&self) -> [PushedAxis; 2] {
+        self.axes
     }
 
     /// The parts left out or taken as closed, in words.
@@ -246,41 +276,48 @@ impl Admittance {
         &self.notes
     }
 
-    fn lifted(&self) -> Lifted<'_> {
-        let Self { nodes, weights, timetable, time, tied, .. } = self;
-        Lifted { nodes, weights, timetable, sampling: Sampling::of(nodes), time: *time, tied: *tied }
+    fn point(&self, hz: f64) -> AdmittancePoint {
+        match &self.system {
+            System::OneAxis(axis) => axis.point(hz),
+            System::Turned(turned) => turned.point(hz),
+        }
+    }
+
+    /// Whether nothing is left beyond rounding, over some octaves.
+    fn is_zero(&self) -> bool {
+        let octaves = std::iter::successors(Some(self.highest), |hz| Some(0.25 * hz)).take(6);
+        octaves.map(|hz| self.point(hz)).all(|point| point.value.norm() <= point.error)
     }
 
     /// Force over velocity, at a frequency that is one, and how far rounding may have moved it: 1/(v + d) − 1/v is −d/(v·(v + d)).
     fn impedance(&self, hz: f64) -> (Complex64, f64) {
-        let AdmittancePoint { value, error, .. } = Harmonic::new(&self.lifted(), self.pushed, hz).point();
+        let AdmittancePoint { value, error, .. } = self.point(hz);
         let size = value.norm();
         (value.inv(), if error < size { error / (size * (size - error)) } else { f64::INFINITY })
     }
 
-    /// Leaves nothing but the device of the pushed peer. A node has a copy, which then rests.
-    fn leave_bare(&mut self, device: Option<Body>, clock: NodeClock, tied: bool) -> Result<(), AnalysisError> {
-        let none = Gains { stiffness: 0.0, damping: 0.0 };
-        let bare = self.nodes[self.pushed].clone();
-        self.nodes = vec![Node { device, coupling: none, law: LinearLaw::none(), wall: None, compute_delay: false, ..bare }];
-        self.weights = Matrix::zeros(1, 1);
-        // It sends nothing, so that everything repeats with every tick.
-        self.timetable = Timetable::new(&[NodeClock { phase: 0, every: 1, ..clock }], &[])?;
-        self.tied = tied;
-        self.pushed = 0;
-        Ok(())
+    fn timetable(&self) -> &Timetable {
+        match &self.system {
+            System::OneAxis(axis) => &axis.timetable,
+            System::Turned(turned) => turned.timetable(),
+        }
     }
 
     /// The rate of the ticks of the pushed node, on average over a frame \[Hz\].
     fn tick_rate(&self) -> f64 {
-        let own = |event: &&Event| matches!(event, Event::Tick { node, .. } if *node == self.pushed);
-        count(self.timetable.events.iter().filter(own).count()) / self.timetable.frame.as_secs_f64()
+        let pushed = match &self.system {
+            System::OneAxis(axis) => axis.pushed,
+            System::Turned(turned) => turned.pushed(),
+        };
+        let own = |event: &&Event| matches!(event, Event::Tick { node, .. } if *node == pushed);
+        let timetable = self.timetable();
+        count(timetable.events.iter().filter(own).count()) / timetable.frame.as_secs_f64()
     }
 }
 
 /// The axis along which a device is pushed, or about which it is turned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[expect(missing_docs, reason = "x, y and z along the axes of the world, rx, ry and rz about those of the object")]
+#[expect(missing_docs, reason = "x, y and z along the axes of the world, of an object that turns along its own; rx, ry and rz about those")]
 pub enum PushedAxis {
     X,
     Y,
@@ -300,33 +337,15 @@ impl PushedAxis {
         ["x", "y", "z", "rx", "ry", "rz"][self.place()]
     }
 
+    /// Whether it is about an axis.
+    #[must_use]
+    pub const fn is_turn(self) -> bool {
+        self.place() > 2
+    }
+
     const fn place(self) -> usize {
         self as usize
     }
-}
-
-const TIMELINE: &str = "the timeline is left out: the scene is analysed as it begins";
-
-/// All one-sided contacts along an axis closed, no copy at a wall; and that in words.
-fn closed_contacts(scene: &Scene, axis: usize) -> (Contacts, Vec<String>) {
-    let pushes = |peer: usize| match scene.peers[peer].contact {
-        Contact::Push(direction) => Some(direction.axis),
-        Contact::Grasp | Contact::None => None,
-    };
-    let touching = |peer: usize| scene.peers[peer].contact == Contact::Grasp || pushes(peer) == Some(axis);
-    let touching: Vec<bool> = (0..scene.peers.len()).map(touching).collect();
-    let mut notes = Vec::new();
-    if (0..scene.peers.len()).any(|peer| pushes(peer) == Some(axis)) {
-        notes.push("one-sided contacts are taken as closed: a hand that pulls would let go".to_owned());
-    }
-    if scene.object.enclosure.is_some() {
-        notes.push("the enclosure is left out: the object is away from its walls".to_owned());
-    }
-    if !scene.timeline.is_empty() {
-        notes.push(TIMELINE.to_owned());
-    }
-    let absent = vec![false; scene.peers.len()];
-    (Contacts { touching, at_wall: false, absent }, notes)
 }
 
 /// Why there is no admittance.
@@ -341,6 +360,10 @@ pub enum AdmittanceError {
     NoSuchAxis { axis: &'static str },
     #[error("the device of {peer} does not turn, so nothing moves it about {axis}: expected device.inertia")]
     DoesNotTurn { axis: &'static str, peer: String },
+    #[error(
+        "a push along {from} moves the device by nothing along {to}: expected an object with an inertia that is held off its centre, and axes that it couples"
+    )]
+    Uncoupled { from: &'static str, to: &'static str },
     /// The scene cannot be analysed.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
@@ -348,7 +371,10 @@ pub enum AdmittanceError {
 
 #[cfg(test)]
 mod tests {
+    use super::one_axis::closed_contacts;
     use super::*;
+    use crate::Matrix;
+    use crate::structure::Structure;
 
     const ONE_TOUCHES: &str = r#"
         scene        = { duration = "1s", count = 50 }
@@ -372,9 +398,8 @@ mod tests {
         structure.peers = count;
         let others = crate::structure::count(count - 1);
         structure.weights = Matrix::from_fn(2, 2, |row, column| [[0.0, 1.0], [1.0 / others, (others - 1.0) / others]][row][column]);
-        let mut admittance = Admittance::of_classes(&scene, structure, 0, &Unwatched).unwrap();
-        admittance.highest = 0.5 * admittance.tick_rate();
-        admittance
+        let (axis, radius) = OneAxis::of_classes(&scene, structure, 0, &Unwatched).unwrap();
+        Admittance::new(System::OneAxis(axis), radius, Vec::new(), 0.45, [PushedAxis::X; 2])
     }
 
     /// The more peers, the less the mean of the others moves: in the limit the copy is held by a spring and a damper at rest, and is as far from that as 1/N.
@@ -383,8 +408,8 @@ mod tests {
         let scene = fifty();
         assert_eq!(with_peers(50).at(1.0).unwrap(), Admittance::of(&scene, 0).unwrap().at(1.0).unwrap());
         let mut limit = with_peers(2);
-        limit.weights = Matrix::zeros(2, 2);
-        limit.tied = true;
+        let System::OneAxis(axis) = &mut limit.system else { unreachable!("the object does not turn") };
+        (axis.weights, axis.tied) = (Matrix::zeros(2, 2), true);
         for hz in [1.0, 8.0, 70.0] {
             let held = limit.at(hz).unwrap().value;
             let apart = |peers: usize| (with_peers(peers).at(hz).unwrap().value - held).norm() / held.norm() * count(peers - 1);

@@ -2,6 +2,7 @@
 
 use cohaptic_peer::Motion;
 
+use super::load::apply;
 use super::node::Node;
 use super::rigid::Displacement;
 use crate::cost::{full_operations, pushed_operations};
@@ -17,7 +18,7 @@ pub(super) const SAMPLE: usize = 12;
 /// The state has, for each node, its components and then their velocities, those of the device likewise, and the forces that wait; then, for each node, the samples
 /// of earlier frames, the newest first.
 #[derive(Clone, Debug)]
-pub(super) struct Turning<'a> {
+pub(crate) struct Turning<'a> {
     pub(super) nodes: &'a [Node],
     /// The weight of each node's samples (column) in each node's target (row).
     pub(super) weights: &'a Matrix,
@@ -28,12 +29,20 @@ pub(super) struct Turning<'a> {
     pub(super) free: Vec<Displacement>,
 }
 
+/// What happens at a tick: it sees the node, the instant in the frame \[ns\] and the device before it moves, and may push one of the device's components.
+pub(crate) type Hand<'h> = dyn FnMut(usize, u64, &[Motion]) -> Option<(usize, f64)> + 'h;
+
 impl Turning<'_> {
     /// The matrix of a frame, displacements of everything taken out, and a bound of the error of its entries; `None` if the watch ends it.
     pub(super) fn monodromy(&self, watch: &dyn Watch) -> Option<(Matrix, f64)> {
+        self.monodromy_under(&mut |_, _, _| None, watch)
+    }
+
+    /// [`Turning::monodromy`]; the hand sees the frame of each unit vector, in the order of [`Turning::kept`].
+    pub(crate) fn monodromy_under(&self, hand: &mut Hand<'_>, watch: &dyn Watch) -> Option<(Matrix, f64)> {
         let (size, events) = (self.size(), self.timetable.events.len());
         watch.expects(full_operations(size, events, 6));
-        let moved: Vec<Vec<f64>> = self.free.iter().map(|free| self.displaced(&free.copy)).collect();
+        let moved: Vec<Vec<f64>> = self.free.iter().map(|free| self.displaced(free)).collect();
         let kept = self.kept();
         let mut matrix = Matrix::zeros(kept.len(), kept.len());
         let (mut unit, mut growth) = (vec![0.0; size], 1.0_f64);
@@ -42,11 +51,10 @@ impl Turning<'_> {
                 return None;
             }
             unit[*state] = 1.0;
-            let reached = self.pushed(&unit, &mut growth);
+            let reached = self.pushed_under(&unit, &mut growth, hand);
             unit[*state] = 0.0;
-            for (row, target) in kept.iter().enumerate() {
-                let along: f64 = self.free.iter().zip(&moved).map(|(free, moved)| reached[free.reference] * moved[*target]).sum();
-                matrix[(row, column)] = reached[*target] - along;
+            for (row, entry) in self.relative(&reached, &kept, &moved).enumerate() {
+                matrix[(row, column)] = entry;
             }
             watch.done(pushed_operations(events, 6));
         }
@@ -54,6 +62,27 @@ impl Turning<'_> {
         // As for the general path of objects that do not turn: each tick rounds, and the rest of the frame magnifies that by at most about the growth.
         let error = 10.0 * f64::EPSILON * count(ticks) * growth * growth * count(kept.len()).sqrt();
         Some((matrix, error))
+    }
+
+    /// Where a frame leads from rest, in the numbers of [`Turning::monodromy`], under what a hand does.
+    pub(crate) fn forced(&self, hand: &mut Hand<'_>) -> Vec<f64> {
+        let moved: Vec<Vec<f64>> = self.free.iter().map(|free| self.displaced(free)).collect();
+        let reached = self.pushed_under(&vec![0.0; self.size()], &mut 0.0, hand);
+        self.relative(&reached, &self.kept(), &moved).collect()
+    }
+
+    /// The states that are kept, less the displacements of everything.
+    fn relative<'r>(&'r self, reached: &'r [f64], kept: &'r [usize], moved: &'r [Vec<f64>]) -> impl Iterator<Item = f64> + 'r {
+        kept.iter().map(move |target| {
+            let along: f64 = self.free.iter().zip(moved).map(|(free, moved)| reached[free.reference] * moved[*target]).sum();
+            reached[*target] - along
+        })
+    }
+
+    /// Whether some displacement of everything moves that component of the device of a node.
+    pub(crate) fn moves_freely(&self, node: usize, component: usize) -> bool {
+        let displaced = self.free.iter().any(|free| free.nodes[node].1[component] != 0.0);
+        displaced || self.nodes[node].loose().any(|loose| loose == component)
     }
 
     /// The states but for the references, and but for those that nothing depends on.
@@ -76,25 +105,44 @@ impl Turning<'_> {
     }
 
     /// The state in which every copy, and what was sampled of it, is displaced so, and every device that touches it with it.
-    pub(super) fn displaced(&self, copy: &[f64; 6]) -> Vec<f64> {
+    pub(super) fn displaced(&self, by: &Displacement) -> Vec<f64> {
         let mut state = vec![0.0; self.size()];
-        for (node, first) in self.nodes.iter().zip(self.firsts()) {
+        for ((copy, device), first) in by.nodes.iter().zip(self.firsts()) {
             state[first..first + 6].copy_from_slice(copy);
-            if node.touching {
-                for (component, grip) in node.grip.iter().enumerate() {
-                    state[first + 12 + component] = dot(grip, copy);
-                }
-            }
+            state[first + 12..first + 12 + device.len()].copy_from_slice(device);
         }
-        let samples: usize = self.nodes.iter().map(Node::states).sum();
-        for sample in state[samples..].chunks_exact_mut(SAMPLE) {
-            sample[..6].copy_from_slice(copy);
+        let mut next: usize = self.nodes.iter().map(Node::states).sum();
+        for ((copy, _), depth) in by.nodes.iter().zip(&self.timetable.depth) {
+            for sample in state[next..next + depth * SAMPLE].chunks_exact_mut(SAMPLE) {
+                sample[..6].copy_from_slice(copy);
+            }
+            next += depth * SAMPLE;
         }
         state
     }
 
-    /// Where a frame leads from the state; `growth` becomes the largest number on the way if that is larger.
-    pub(super) fn pushed(&self, state: &[f64], growth: &mut f64) -> Vec<f64> {
+    /// Where a frame leads from the state.
+    pub(super) fn reached(&self, state: &[f64]) -> Vec<f64> {
+        self.pushed_under(state, &mut 0.0, &mut |_, _, _| None)
+    }
+
+    /// The forces that peers compute at that state and that wait, in a state of rest.
+    #[cfg(test)]
+    pub(super) fn computed(&self, state: &[f64]) -> Vec<f64> {
+        let mut waiting = vec![0.0; state.len()];
+        for (node, first) in self.nodes.iter().zip(self.firsts()) {
+            let mut peer = Moving::read(node, &state[first..], self.time);
+            peer.tick(node, &[0.0; 6], None, std::time::Duration::from_millis(1));
+            let mut written = vec![0.0; node.states()];
+            peer.write(node, &mut written, self.time);
+            let forces = 12 + 2 * node.device.len();
+            waiting[first + forces..first + node.states()].copy_from_slice(&written[forces..]);
+        }
+        waiting
+    }
+
+    /// Where a frame leads from the state under what a hand does; `growth` becomes the largest number on the way if that is larger.
+    fn pushed_under(&self, state: &[f64], growth: &mut f64, hand: &mut Hand<'_>) -> Vec<f64> {
         let nodes = self.nodes.len();
         let firsts = self.firsts();
         let mut peers: Vec<Moving> = self.nodes.iter().zip(&firsts).map(|(node, first)| Moving::read(node, &state[*first..], self.time)).collect();
@@ -128,8 +176,14 @@ impl Turning<'_> {
                             *force += self.weights[(to, from)]
                                 * (gains.stiffness * moved.position + (gains.damping + node.ahead[axis] * age) * moved.velocity);
                         }
+                        if let Some(stress) = &node.stress {
+                            let [by_turn, by_rate] = &stress.heard[from];
+                            let (turn, rate) = (apply(by_turn, turned(sample)), apply(by_rate, spun(sample)));
+                            (0..3).for_each(|axis| drawn[3 + axis] += self.weights[(to, from)] * (turn[axis] + rate[axis]));
+                        }
                     }
-                    peers[to].tick(node, &drawn, span);
+                    let push = hand(to, at, &peers[to].device);
+                    peers[to].tick(node, &drawn, push, span);
                     *growth = growth.max(peers[to].largest(self.time));
                 }
             }
@@ -184,16 +238,32 @@ impl Moving {
         }
     }
 
-    /// One tick under the forces of samples that draw the copy.
-    fn tick(&mut self, node: &Node, drawn: &[f64; 6], span: std::time::Duration) {
+    /// One tick under the forces of samples that draw the copy, and a hand that pushes a component of the device.
+    fn tick(&mut self, node: &Node, drawn: &[f64; 6], push: Option<(usize, f64)>, span: std::time::Duration) {
         let mut on_copy: [f64; 6] = std::array::from_fn(|axis| drawn[axis] - node.own[axis].force(self.copy[axis]));
         let mut on_device = vec![0.0; self.device.len()];
+        let mut by_hand = [0.0; 3];
+        if let Some(stress) = &node.stress {
+            let (angle, own) = (turned(&self.copy), apply(&stress.own, turned(&self.copy)));
+            (0..3).for_each(|axis| on_copy[3 + axis] += own[axis]);
+            if let Some(twist) = &stress.twist {
+                let (handle, rate) = (turned(&self.device), spun(&self.device));
+                let by = [angle, handle, spun(&self.copy), rate];
+                let torque: [f64; 3] = std::array::from_fn(|axis| twist.by.iter().zip(by).map(|(matrix, by)| apply(matrix, by)[axis]).sum());
+                let back = [torque, angle, handle];
+                for axis in 0..3 {
+                    on_copy[3 + axis] += torque[axis];
+                    on_device[3 + axis] = twist.back.iter().zip(back).map(|(matrix, by)| apply(matrix, by)[axis]).sum();
+                }
+                by_hand = apply(&twist.hand, handle);
+            }
+        }
         if node.touching {
             let (positions, velocities) = (self.copy.map(|motion| motion.position), self.copy.map(|motion| motion.velocity));
             for (component, grip) in node.grip.iter().enumerate() {
                 let held = Motion { position: dot(grip, &positions), velocity: dot(grip, &velocities) };
                 let force = node.coupling[component].force(self.device[component].relative_to(held));
-                on_device[component] = -force;
+                on_device[component] -= force;
                 for (axis, sum) in on_copy.iter_mut().enumerate() {
                     *sum += grip[axis] * force;
                 }
@@ -202,6 +272,13 @@ impl Moving {
         if node.compute_delay {
             std::mem::swap(&mut self.on_copy, &mut on_copy);
             std::mem::swap(&mut self.on_device, &mut on_device);
+        }
+        // Hands are never late.
+        if let Some((component, force)) = push {
+            on_device[component] += force;
+        }
+        for (force, by_hand) in on_device.iter_mut().skip(3).zip(by_hand) {
+            *force += by_hand;
         }
         for ((motion, body), force) in self.copy.iter_mut().zip(&node.copy).zip(on_copy) {
             body.map(span).advance(motion, force);
@@ -227,6 +304,15 @@ fn write(motions: &[Motion; 6], numbers: &mut [f64], time: f64) {
         numbers[axis] = motion.position;
         numbers[6 + axis] = motion.velocity * time;
     }
+}
+
+/// The turn of a body, and its angular velocity.
+fn turned(components: &[Motion]) -> [f64; 3] {
+    std::array::from_fn(|axis| components[3 + axis].position)
+}
+
+fn spun(components: &[Motion]) -> [f64; 3] {
+    std::array::from_fn(|axis| components[3 + axis].velocity)
 }
 
 fn dot(row: &[f64; 6], components: &[f64; 6]) -> f64 {

@@ -11,6 +11,7 @@
 //! map of one axis. Angles are multiplied by √(tr J/3m), so that all states are lengths. Peers that are equal, in their grasps too, are taken together.
 
 mod frame;
+mod load;
 mod node;
 mod rigid;
 #[cfg(test)]
@@ -21,16 +22,19 @@ use std::time::Duration;
 use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
 
-use self::frame::Turning;
-use self::node::Node;
+pub(crate) use self::frame::Turning;
+use self::load::{Loaded, Pose};
+pub(crate) use self::node::Node;
+use self::rigid::Displacement;
 use crate::analysis::{Analysis, ContactMode, combine};
 use crate::cost::eigenvalue_operations;
 use crate::network::NominalNetwork;
 use crate::parts::radius_of;
-use crate::spectrum::bounded_radius;
-use crate::structure::{Contacts, Structure, common_time};
+use crate::scene_radius::worse;
+use crate::spectrum::{Workspace, bounded_radius};
+use crate::structure::{Contacts, Structure, common_time, linear_law};
 use crate::timetable::Timetable;
-use crate::{AnalysisError, Matrix, Method, Part, PartKind, Radius, Watch};
+use crate::{AnalysisError, Matrix, Method, Part, PartKind, Radius, UNLOADED, Unwatched, Watch};
 
 /// Analyses an object that turns. [`Method::Full`] takes each peer by itself.
 pub(crate) fn analyse(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
@@ -43,31 +47,124 @@ pub(crate) fn analyse(scene: &Scene, method: Method, watch: &dyn Watch) -> Resul
     Ok(analysis)
 }
 
-/// The largest radius of all parts.
-pub(crate) fn radius(scene: &Scene, network: &NominalNetwork) -> Result<Radius, AnalysisError> {
-    mode(scene, network, Method::Reduced, &crate::Unwatched).map(|mode| mode.radius)
+/// Analyses an object that turns about where constant forces of the hands leave it at rest, each peer by itself.
+pub(crate) fn analyse_loaded(scene: &Scene, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
+    let network = NominalNetwork::of(scene)?;
+    let (together, poses) = loaded(scene, &network)?;
+    let mode = mode_of(&together, Method::Full, watch)?;
+    let mut analysis = combine(vec![mode], Method::Full, &network, scene);
+    analysis.notes.retain(|note| note != UNLOADED);
+    let pairs = || poses.iter().flat_map(|one| poses.iter().map(move |other| (one, other)));
+    let apart = |one: &Pose, other: &Pose| (0..3).map(|axis| (one.centre[axis] - other.centre[axis]).powi(2)).sum::<f64>().sqrt();
+    let distance = pairs().map(|(one, other)| apart(one, other)).fold(0.0, f64::max);
+    let angle = pairs().map(|(one, other)| one.attitude.angle_to(&other.attitude.orientation)).fold(0.0, f64::max);
+    analysis.notes.push(format!(
+        "the object turns: the verdict is about small motions near the rest under the constant forces of the hands, copies {distance:.3e} m and {angle:.3e} rad apart"
+    ));
+    if scene.object.enclosure.is_some() {
+        analysis.notes.push("the enclosure is left out: the scene is analysed away from its walls".to_owned());
+    }
+    Ok(analysis)
+}
+
+/// The peers of a scene about the rest that hands with constant forces leave it at, and where that is.
+fn loaded(scene: &Scene, network: &NominalNetwork) -> Result<(Together, Vec<Pose>), AnalysisError> {
+    let structure = Structure::of_each(scene, network, &contacts(scene)?)?;
+    if structure.silent {
+        return Err(AnalysisError::NoRest { why: "a link never delivers, and what is held of the beginning is a load of its own".to_owned() });
+    }
+    let mut together = Together::new(scene, structure);
+    let loaded = Loaded::new(scene, &together.nodes)?;
+    let poses = loaded.rest()?;
+    let (nodes, candidates) = (loaded.stressed(&poses), loaded.together(&poses));
+    (together.nodes, together.free) = (nodes, Vec::new());
+    together.free = rigid::unmoved(&together.turning(), candidates);
+    Ok((together, poses))
+}
+
+/// The largest radius of all parts, without a bound.
+pub(crate) fn radius(together: &Together, workspace: &mut Workspace) -> Radius {
+    let structure = &together.structure;
+    let mut of = |turning: &Turning<'_>| {
+        let (matrix, _) = turning.monodromy(&Unwatched).expect("without a watch nothing ends it");
+        Radius { value: workspace.radius(&matrix), error: 0.0 }
+    };
+    let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
+    let mut worst = of(&together.turning());
+    for (class, timetable) in structure.apart.iter().enumerate() {
+        let Some(timetable) = timetable else { continue };
+        let radius = of(&together.apart(class, timetable, &weight)).over(repeats(&structure.timetable, timetable));
+        worst = worse::<false>(worst, radius);
+    }
+    worst
+}
+
+/// The classes of a scene that turns, and what of them moves.
+#[derive(Clone, Debug)]
+pub(crate) struct Together {
+    pub(crate) structure: Structure,
+    nodes: Vec<Node>,
+    time: f64,
+    free: Vec<Displacement>,
+}
+
+impl Together {
+    pub(crate) fn new(scene: &Scene, structure: Structure) -> Self {
+        let nodes: Vec<Node> = structure.classes.iter().map(|class| Node::of(scene, class[0])).collect();
+        let peers = structure.classes.iter().zip(&structure.touching).map(|(class, touching)| (class[0], *touching));
+        let time = common_time(scene, structure.timetable.frame, structure.law(scene, 0).held_by(), peers, false);
+        let free = if structure.silent { Vec::new() } else { rigid::displacements(&nodes) };
+        Self { structure, nodes, time, free }
+    }
+
+    /// With one peer in a class of its own.
+    pub(crate) fn with_alone(scene: &Scene, network: &NominalNetwork, alone: usize) -> Result<Self, AnalysisError> {
+        Ok(Self::new(scene, Structure::with_alone(&[scene], network, &contacts(scene)?, Some(alone))?))
+    }
+
+    /// The system of the classes' averages.
+    pub(crate) fn turning(&self) -> Turning<'_> {
+        let Self { structure, nodes, time, free } = self;
+        Turning { nodes, weights: &structure.weights, timetable: &structure.timetable, time: *time, free: free.clone() }
+    }
+
+    /// How the members of a class differ.
+    fn apart<'t>(&'t self, class: usize, timetable: &'t Timetable, weight: &'t Matrix) -> Turning<'t> {
+        Turning { nodes: &self.nodes[class..=class], weights: weight, timetable, time: self.time, free: Vec::new() }
+    }
+
+    /// The node of a class.
+    pub(crate) fn node(&self, class: usize) -> &Node {
+        &self.nodes[class]
+    }
+
+    /// What velocities are multiplied by \[s\].
+    pub(crate) const fn time(&self) -> f64 {
+        self.time
+    }
 }
 
 fn mode(scene: &Scene, network: &NominalNetwork, method: Method, watch: &dyn Watch) -> Result<ContactMode, AnalysisError> {
     let contacts = contacts(scene)?;
     let one_by_one = method == Method::Full;
     let structure = if one_by_one { Structure::of_each(scene, network, &contacts)? } else { Structure::of(&[scene], network, &contacts)? };
-    let nodes: Vec<Node> = structure.classes.iter().map(|class| Node::of(scene, class[0])).collect();
-    let peers = structure.classes.iter().zip(&structure.touching).map(|(class, touching)| (class[0], *touching));
-    let time = common_time(scene, structure.timetable.frame, structure.law(scene, 0).held_by(), peers, false);
-    let free = if structure.silent { Vec::new() } else { rigid::displacements(&nodes) };
-    let together = Turning { nodes: &nodes, weights: &structure.weights, timetable: &structure.timetable, time, free };
-    let kind = if one_by_one { PartKind::Whole } else { PartKind::Together };
-    let mut parts = vec![part(&together, kind, 1, method, watch)?];
+    mode_of(&Together::new(scene, structure), method, watch)
+}
+
+/// The parts of classes.
+pub(crate) fn mode_of(together: &Together, method: Method, watch: &dyn Watch) -> Result<ContactMode, AnalysisError> {
+    let (structure, turning) = (&together.structure, together.turning());
+    let kind = if method == Method::Full { PartKind::Whole } else { PartKind::Together };
+    let mut parts = vec![part(&turning, kind, 1, method, watch)?];
     let mut dimension = 0;
-    let mut rigid_modes = together.free.len();
+    let mut rigid_modes = turning.free.len();
     let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
     for (class, members) in structure.classes.iter().enumerate() {
-        let node = &nodes[class];
+        let node = together.node(class);
         rigid_modes += members.len() * node.loose().count();
         dimension += members.len() * (node.states() + frame::SAMPLE * structure.timetable.depth[class]);
         let Some(timetable) = &structure.apart[class] else { continue };
-        let apart = Turning { nodes: &nodes[class..=class], weights: &weight, timetable, time, free: Vec::new() };
+        let apart = together.apart(class, timetable, &weight);
         let part = part(&apart, PartKind::Apart { peer: members[0] }, members.len() - 1, method, watch)?;
         parts.push(Part { radius: part.radius.over(repeats(&structure.timetable, timetable)), ..part });
     }
@@ -100,8 +197,12 @@ fn part(turning: &Turning<'_>, kind: PartKind, copies: usize, method: Method, wa
     Ok(Part { kind, size: matrix.rows(), copies, radius, method })
 }
 
-/// The peers whose devices hold the object. A finger would push along an axis of the world.
-fn contacts(scene: &Scene) -> Result<Contacts, AnalysisError> {
+/// The peers whose devices hold the object. A finger would push along an axis of the world, and a law that looks back or remembers torques would be another state.
+pub(crate) fn contacts(scene: &Scene) -> Result<Contacts, AnalysisError> {
+    if linear_law(scene, 0).is_some_and(|law| law.lag > 0 || !law.memory.is_empty()) {
+        let why = scene.rotation_parts().and_then(Result::err).unwrap_or("all components are taken together");
+        return Err(AnalysisError::Turns { what: scene.coordination.strategy.name(), why });
+    }
     if scene.peers.iter().any(|spec| matches!(spec.contact, Contact::Push(_))) {
         let why = scene.rotation_parts().and_then(Result::err).unwrap_or("all components are taken together");
         return Err(AnalysisError::Turns { what: "a one-sided contact", why });

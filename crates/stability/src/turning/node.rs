@@ -4,12 +4,13 @@ use cohaptic_peer::rotation::{Spin, Triple};
 use cohaptic_peer::{Contact, Gains, Integrator, Plant, StepMap};
 use cohaptic_scene::Scene;
 
+use super::load::Stress;
 use crate::lifted::Body;
 use crate::structure::linear_law;
 
 /// A peer, or what a class of equal peers has in common. Angles are multiplied by [`Node::length`], and torques divided by it.
 #[derive(Clone, Debug)]
-pub(super) struct Node {
+pub(crate) struct Node {
     /// p and θ.
     pub(super) copy: Vec<Body>,
     /// x, and θH if the device turns.
@@ -17,7 +18,7 @@ pub(super) struct Node {
     /// For each component of the device, the gains of its coupling to the copy.
     pub(super) coupling: Vec<Gains>,
     /// For each component of the device, the row of the copy's components that it is held to.
-    pub(super) grip: Vec<[f64; 6]>,
+    pub(crate) grip: Vec<[f64; 6]>,
     pub(super) touching: bool,
     /// What draws each component of the copy back by its own state, and towards that of a sample.
     pub(super) own: [Gains; 6],
@@ -29,10 +30,12 @@ pub(super) struct Node {
     /// Whether an arm with a stiffness holds the device.
     pub(super) armed: bool,
     pub(super) grasp: Triple,
+    /// What a load changes: rows of `grip` and gains of turns that it replaces are those of a node without.
+    pub(super) stress: Option<Box<Stress>>,
     /// √(tr J/3m) \[m\].
-    pub(super) length: f64,
+    pub(crate) length: f64,
     /// How far a force moves the copy within a tick, over a second [m/(N·s)].
-    pub(super) mobility: f64,
+    pub(crate) mobility: f64,
 }
 
 impl Node {
@@ -76,6 +79,7 @@ impl Node {
             compute_delay: spec.compute_delay,
             armed: device_plant.stiffness > 0.0,
             grasp: config.grasp,
+            stress: None,
             length,
             mobility: spec.clock.tick.as_secs_f64() / mass,
         }

@@ -1,12 +1,25 @@
 //! Displacements and turns of everything together, which nothing resists.
 
+use super::frame::Turning;
+use super::load::cross;
 use super::node::Node;
 
-/// The components of the copies under a displacement that nothing resists: y of all of them, and which of the components of the first copy tells how far it is.
+/// A displacement that nothing resists: how it moves the copy and the device of each node, and which of the components of the first copy tells how far it is.
 #[derive(Clone, PartialEq, Debug)]
-pub(super) struct Displacement {
-    pub(super) copy: [f64; 6],
+pub(crate) struct Displacement {
+    pub(super) nodes: Vec<([f64; 6], Vec<f64>)>,
     pub(super) reference: usize,
+}
+
+impl Displacement {
+    /// All copies alike, and with each the device that touches it.
+    fn alike(nodes: &[Node], copy: [f64; 6], reference: usize) -> Self {
+        let device = |node: &Node| {
+            let moved = |grip: &[f64; 6]| if node.touching { grip.iter().zip(&copy).map(|(by, component)| by * component).sum() } else { 0.0 };
+            node.grip.iter().map(moved).collect()
+        };
+        Self { nodes: nodes.iter().map(|node| (copy, device(node))).collect(), reference }
+    }
 }
 
 /// All displacements (a, c) with δp = a, δθ = c that leave the grasp points at rest that an arm's spring holds: six, three about a point, one about a line, or none.
@@ -16,12 +29,12 @@ pub(super) fn displacements(nodes: &[Node]) -> Vec<Displacement> {
     let mut held = nodes.iter().filter(|node| node.touching && node.armed).map(|node| node.grasp);
     let unit = |axis: usize| -> [f64; 6] { std::array::from_fn(|component| if component == axis { 1.0 } else { 0.0 }) };
     let Some(first) = held.next() else {
-        return (0..6).map(|axis| Displacement { copy: unit(axis), reference: axis }).collect();
+        return (0..6).map(|axis| Displacement::alike(nodes, unit(axis), axis)).collect();
     };
     // With a = r×c the point r stays: a + c×r = 0.
     let about = |turn: [f64; 3], reference: usize| {
         let moved = cross(first, turn).map(|moved| moved / length);
-        Displacement { copy: [moved[0], moved[1], moved[2], turn[0], turn[1], turn[2]], reference }
+        Displacement::alike(nodes, [moved[0], moved[1], moved[2], turn[0], turn[1], turn[2]], reference)
     };
     let arms: Vec<[f64; 3]> = held.map(|grasp| std::array::from_fn(|axis| grasp[axis] - first[axis])).collect();
     let size = |vector: [f64; 3]| vector[0].hypot(vector[1]).hypot(vector[2]);
@@ -37,6 +50,56 @@ pub(super) fn displacements(nodes: &[Node]) -> Vec<Displacement> {
     vec![about(line.map(|component| component / line[most]), 3 + most)]
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+/// Of those displacements of everything the combinations that a frame leaves where they are, each 1 in its own reference and 0 in those of the others.
+pub(super) fn unmoved(turning: &Turning<'_>, candidates: Vec<Vec<([f64; 6], Vec<f64>)>>) -> Vec<Displacement> {
+    let mut candidates: Vec<Displacement> = candidates.into_iter().map(|nodes| Displacement { nodes, reference: 0 }).collect();
+    let image = |by: &Displacement| {
+        let from = turning.displaced(by);
+        let reached = turning.reached(&from);
+        reached.iter().zip(&from).map(|(reached, from)| reached - from).collect::<Vec<f64>>()
+    };
+    let mut images: Vec<Vec<f64>> = candidates.iter().map(image).collect();
+    // Gaussian elimination by columns, the largest entry first: those without any are left.
+    loop {
+        let entries =
+            images.iter().enumerate().flat_map(|(column, image)| image.iter().enumerate().map(move |(row, entry)| (column, row, entry.abs())));
+        let Some((pivot, row, size)) = entries.max_by(|a, b| a.2.total_cmp(&b.2)) else { return Vec::new() };
+        // A frame rounds lengths of some metres some hundred times.
+        if size <= 1e-11 {
+            break;
+        }
+        let (by, moved) = (candidates.swap_remove(pivot), images.swap_remove(pivot));
+        for (candidate, image) in candidates.iter_mut().zip(&mut images) {
+            let factor = image[row] / moved[row];
+            candidate.subtract(&by, factor);
+            image.iter_mut().zip(&moved).for_each(|(entry, moved)| *entry -= factor * moved);
+        }
+    }
+    // Each by the component of the first copy in which it is largest.
+    for place in 0..candidates.len() {
+        let reference = (0..6).max_by(|a, b| candidates[place].first(*a).abs().total_cmp(&candidates[place].first(*b).abs())).unwrap_or(0);
+        let zero = Displacement { nodes: candidates[place].nodes.iter().map(|(_, device)| ([0.0; 6], vec![0.0; device.len()])).collect(), reference };
+        let chosen = std::mem::replace(&mut candidates[place], zero);
+        candidates[place].subtract(&chosen, -1.0 / chosen.first(reference));
+        let chosen = candidates[place].clone();
+        for other in (0..candidates.len()).filter(|other| *other != place) {
+            let factor = candidates[other].first(reference);
+            candidates[other].subtract(&chosen, factor);
+        }
+    }
+    candidates
+}
+
+impl Displacement {
+    /// A component of the first copy.
+    fn first(&self, component: usize) -> f64 {
+        self.nodes[0].0[component]
+    }
+
+    fn subtract(&mut self, other: &Self, factor: f64) {
+        for ((copy, device), (by_copy, by_device)) in self.nodes.iter_mut().zip(&other.nodes) {
+            let pairs = copy.iter_mut().chain(device).zip(by_copy.iter().chain(by_device));
+            pairs.for_each(|(entry, by)| *entry -= factor * by);
+        }
+    }
 }

@@ -14,5 +14,6 @@ mod reduction;
 mod reference;
 mod rotation;
 mod strategies;
+mod turned_admittance;
 mod watch;
 mod wave;

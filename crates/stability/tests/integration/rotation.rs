@@ -111,6 +111,10 @@ fn a_scene_that_splits_has_the_radius_of_all_components_together() {
         (true, &["peers.peer2.contact=none", "coordination.strategy=proportional-derivative", "peer.grasp=[0, 0.02, 0]", "peer.compute-delay=1"]),
         (true, &["coordination.strategy=extrapolated", "coordination.rotational-stiffness=0.4", "link.delay=20ms", "simulation.integrator=rk4"]),
         (false, &["coordination.strategy=extrapolated", "peer.grasp=[0.02, 0, 0]", "scene.count=4"]),
+        (true, &["coordination.strategy=local-damping", "object.inertia=[1.2e-4, 2.0e-4, 2.6e-4]", "scene.count=3", "object.split-mass=true"]),
+        (true, &["coordination.strategy=local-damping", "peer.grasp=[0.02, 0.01, 0]", "coordination.scaling=inverse-n", "scene.count=3"]),
+        (true, &["coordination.strategy=local-damping", "coordination.local-damping.damping=9", "peer.grasp=[0, 0.02, 0]"]),
+        (false, &["coordination.strategy=local-damping", "object.inertia=[1.2e-4, 2.0e-4, 2.6e-4]", "peer.grasp=[0, 0.02, 0]"]),
         (false, &["peer.grasp=[0.02, 0, 0]", six[0], six[1], six[2], "scene.count=3", "peers.peer3.contact=none"]),
     ] {
         let scene = scene(overrides);
@@ -118,6 +122,35 @@ fn a_scene_that_splits_has_the_radius_of_all_components_together() {
         let [reduced, full] = [Method::Reduced, Method::Full].map(|method| analyse(&scene, method).unwrap());
         assert!((reduced.radius.value - full.radius.value).abs() < 1e-10, "{overrides:?}: {:?}, {:?}", reduced.radius, full.radius);
         assert_eq!((reduced.rigid_modes, reduced.dimension), (full.rigid_modes, full.dimension), "{overrides:?}");
+    }
+}
+
+/// A law that remembers is followed in parts, which have that law, and refused by name where there are none.
+#[test]
+fn laws_that_remember_are_followed_in_parts() {
+    for law in ["smoothed-average-position", "local-lag"] {
+        let (strategy, bodies) = (format!("coordination.strategy={law}"), "object.inertia=[1.2e-4, 2.0e-4, 2.6e-4]");
+        let found = analyse(&scene(&[&strategy, bodies, "peer.grasp=[0, 0, 0]"]), Method::Reduced).unwrap();
+        let turn = found.modes.iter().find(|mode| mode.motion == "rz").unwrap();
+        let share = 2.6e-4 / 0.45;
+        let translation = scene(&[
+            &strategy,
+            "scene={duration=\"1s\", count=2}",
+            "object={mass=2.6e-4}",
+            &format!("coordination.stiffness={:?}", 1000.0 * share),
+            &format!("coordination.damping={:?}", 5.0 * share),
+            "peer.contact=none",
+        ]);
+        let expected = analyse(&translation, Method::Reduced).unwrap().radius;
+        assert!((turn.radius.value - expected.value).abs() <= turn.radius.error + expected.error, "{law}: {:?} {expected:?}", turn.radius);
+        for overrides in [[&strategy, bodies, "peers.peer2.grasp=[0.02, 0, 0]"], [&strategy, bodies, "peer.grasp=[0.02, 0, 0]"]] {
+            let scene = scene(&overrides);
+            if scene.rotation_parts().unwrap().is_ok() {
+                analyse(&scene, Method::Reduced).unwrap();
+            }
+            let refused = analyse(&scene, Method::Full).unwrap_err().to_string();
+            assert!(refused.starts_with(&format!("{law} of an object that turns is analysed only where its motion splits")), "{refused}");
+        }
     }
 }
 
@@ -174,8 +207,8 @@ fn the_admittance_of_a_turn_is_that_of_its_scene() {
         assert!((found.value - expected.value).norm() <= found.error + expected.error, "{found:?} {expected:?}");
     }
     assert!(matches!(about(&[], PushedAxis::Rx), Err(AdmittanceError::DoesNotTurn { axis: "rx", .. })));
-    let error = about(&["peer.grasp=[0.01, 0, 0]"], PushedAxis::X).unwrap_err();
-    assert!(error.to_string().contains("the object is held off its centre"), "{error}");
+    let error = about(&["peer.grasp=[0.01, 0, 0]", "peers.peer2.contact.push=+x"], PushedAxis::X).unwrap_err();
+    assert!(error.to_string().starts_with("a one-sided contact of an object that turns"), "{error}");
     assert!(matches!(Admittance::along_watched(&one, 0, Some(PushedAxis::Rx), &Unwatched), Err(AdmittanceError::NoSuchAxis { axis: "rx" })));
 }
 

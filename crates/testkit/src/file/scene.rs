@@ -33,6 +33,7 @@ impl LinkFile {
                 | ChangeKind::Hand { .. }
                 | ChangeKind::HandTorque { .. }
                 | ChangeKind::Coordination(_)
+                | ChangeKind::RotationalGains(_)
                 | ChangeKind::Parameters(_)
                 | ChangeKind::SendWhen(_) => {}
             }

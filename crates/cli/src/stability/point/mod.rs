@@ -8,10 +8,12 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{AnalysisError, Graph, GraphError, Judgement, Limits, Matrix, analyse_on_watched, has_chance, judge_watched};
+use cohaptic_stability::{
+    Analysis, AnalysisError, Graph, GraphError, Judgement, Limits, Matrix, analyse_loaded, analyse_on_watched, has_chance, judge_watched,
+};
 
 use crate::analysis_watch::AnalysisWatch;
-use crate::arguments::PointArguments;
+use crate::arguments::{PointArguments, RestName};
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, not_analysed};
 use crate::{file, input, output};
@@ -29,7 +31,10 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         Some(graph) => on_graph(&scene, graph, path)?,
         None => {
             let watch = AnalysisWatch::new();
-            let judged = judge_watched(&scene, arguments.method.into(), &Limits { watch: &watch, ..Limits::of_unknowns(usize::MAX) });
+            let judged = match arguments.about {
+                RestName::Unloaded => judge_watched(&scene, arguments.method.into(), &Limits { watch: &watch, ..Limits::of_unknowns(usize::MAX) }),
+                RestName::Loaded => analyse_loaded(&scene, arguments.method.into(), &watch).map(|analysis| nominal(&scene, analysis, "about a load")),
+            };
             watch.clear();
             judged.map_err(|error| if error == AnalysisError::Stopped { ended() } else { not_analysed(path, &error) })?
         }
@@ -45,10 +50,15 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the verdict leaves out where links leave something to chance.
-const NOMINAL: &str = "the verdict is nominal, with every delay its mean and nothing lost: the second moment is not followed on a graph";
+/// The verdict alone; links that leave something to chance count as if they did not, and a note says so.
+fn nominal(scene: &Scene, mut analysis: Analysis, place: &str) -> Judgement {
+    if has_chance(scene) {
+        analysis.notes.push(format!("the verdict is nominal, with every delay its mean and nothing lost: the second moment is not followed {place}"));
+    }
+    Judgement { verdict: analysis.verdict(), analysis, mean_square: None }
+}
 
-/// The verdict if each peer hears only its neighbours. Links that leave something to chance count as if they did not, and a note says so.
+/// The verdict if each peer hears only its neighbours.
 fn on_graph(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failure> {
     let refused = |message: String| Failure::Input(format!("{}: --graph {graph}: {message}", input::named(path).display()));
     let graph = match graph {
@@ -61,11 +71,8 @@ fn on_graph(scene: &Scene, graph: &str, path: &Path) -> Result<Judgement, Failur
     let found = analyse_on_watched(scene, &graph, &watch);
     watch.clear();
     let is_stopped = |error: &GraphError| matches!(error, GraphError::Analysis(AnalysisError::Stopped));
-    let mut analysis = found.map_err(|error| if is_stopped(&error) { ended() } else { refused(error.to_string()) })?;
-    if has_chance(scene) {
-        analysis.notes.push(NOMINAL.to_owned());
-    }
-    Ok(Judgement { verdict: analysis.verdict(), analysis, mean_square: None })
+    let analysis = found.map_err(|error| if is_stopped(&error) { ended() } else { refused(error.to_string()) })?;
+    Ok(nominal(scene, analysis, "on a graph"))
 }
 
 /// A file of weights: one line a peer, numbers between commas.

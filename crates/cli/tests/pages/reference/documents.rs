@@ -62,7 +62,7 @@ const PARTS: [Part; 7] = [
         rows: &[
             (
                 "points[].hz, points[].magnitude_db, points[].phase_deg",
-                "magnitude relative to 1 m/(N·s); phase above −180 and up to 180, negative where the velocity lags",
+                "magnitude relative to 1 m/(N·s), with turns to the unit of their axes; phase above −180 and up to 180, negative where the velocity lags",
             ),
             ("points[].ideal_db", "magnitude of the free mass, whose phase is −90"),
             ("viscosity.value, viscosity.error", "of slow motion [N·s/m]; `null` where there is no limit"),
@@ -70,7 +70,7 @@ const PARTS: [Part; 7] = [
             ("stiffness.value, stiffness.error", "of slow motion [N/m]"),
             ("verdict, spectral_radius, error_bound", "of the linear scene that is analysed"),
             ("warning", "what the numbers must not be taken for where a verdict is not `stable`, else `null`"),
-            ("object_mass_kg", "mass of the whole object"),
+            ("object_mass_kg", "mass of the whole object, or what it is felt as along or about the axes; `null` where infinite"),
             ("notes", "parts that are left out or taken as closed"),
         ],
     },

@@ -92,7 +92,7 @@ pub(super) const SCENES: [&str; 4] = [
         { name = "b", device = { inertia = 0.001 }, coupling = { rotational-stiffness = 1 }, hand = { sine = { amplitude = [0, 0, 0], frequency = 1, torque = [0, 1, 0] } } },
         { name = "c", grasp = [0.1, 0, 0], orientation = [1, 0, 0, 0.1], angular-velocity = 0 },
     ]
-    timeline = [{ at = "2s", peer = "a", set = { hand = { force = [1, 0, 0], torque = [0, 0, 0.2] } } }]
+    timeline = [{ at = "2s", peer = "a", set = { hand = { force = [1, 0, 0], torque = [0, 0, 0.2] } } }, { at = "3s", coordination = { rotational-stiffness = 2, rotational-damping = [0.1, 0, 0] } }]
     [expect]
     rotation-discrepancy = { max = 1 }
     orientation = [{ peer = "a", at = "1s", of = [1, 0, 0, 0], max = 3 }]

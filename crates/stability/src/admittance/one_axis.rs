@@ -1,0 +1,103 @@
+//! The admittance along one axis, or of one part of an object that turns.
+
+use cohaptic_peer::{Contact, Gains};
+use cohaptic_scene::Scene;
+
+use super::harmonic::Harmonic;
+use super::response::AdmittancePoint;
+use crate::lifted::{Body, Lifted, Node, Sampling};
+use crate::linear_form::LinearLaw;
+use crate::network::NominalNetwork;
+use crate::parts::{radius_of, reduced};
+use crate::structure::{Contacts, Structure};
+use crate::timetable::{NodeClock, Timetable};
+use crate::{AnalysisError, Matrix, Method, Radius, Watch};
+
+/// A scene of one axis in which one device is pushed.
+#[derive(Clone, Debug)]
+pub(super) struct OneAxis {
+    pub(super) nodes: Vec<Node>,
+    pub(super) weights: Matrix,
+    pub(super) timetable: Timetable,
+    pub(super) time: f64,
+    pub(super) tied: bool,
+    /// Which of the nodes is pushed.
+    pub(super) pushed: usize,
+}
+
+impl OneAxis {
+    /// Along that axis of a scene that does not turn; with the radius of the scene, and notes.
+    pub(super) fn of(
+        scene: &Scene,
+        peer: usize,
+        axis: usize,
+        network: &NominalNetwork,
+        watch: &dyn Watch,
+    ) -> Result<(Self, Radius, Vec<String>), AnalysisError> {
+        let spec = &scene.peers[peer];
+        let (contacts, notes) = closed_contacts(scene, axis);
+        let structure = Structure::with_alone(&[scene], network, &contacts, Some(peer))?;
+        let (mut found, radius) = Self::of_classes(scene, structure, peer, watch)?;
+        if !contacts.touching[peer] {
+            let device = scene.device_plant(peer);
+            let body = Some(Body::new(device, scene.integrator, &spec.clock));
+            found.leave_bare(body, NodeClock::of(scene, peer), device.stiffness > 0.0)?;
+        }
+        Ok((found, radius, network.notes.iter().cloned().chain(notes).collect()))
+    }
+
+    /// From classes of which the pushed peer is one by itself.
+    pub(super) fn of_classes(scene: &Scene, structure: Structure, peer: usize, watch: &dyn Watch) -> Result<(Self, Radius), AnalysisError> {
+        let radius = radius_of(&reduced(&structure, scene, 1, Method::Reduced, watch)?.parts);
+        let nodes = structure.nodes(scene);
+        let time = structure.time(scene, &nodes);
+        let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
+        let Structure { timetable, weights, tied, .. } = structure;
+        Ok((Self { nodes, weights, timetable, time, tied, pushed }, radius))
+    }
+
+    /// The admittance at a frequency that is one \[Hz\].
+    pub(super) fn point(&self, hz: f64) -> AdmittancePoint {
+        let Self { nodes, weights, timetable, time, tied, pushed } = self;
+        let lifted = Lifted { nodes, weights, timetable, sampling: Sampling::of(nodes), time: *time, tied: *tied };
+        Harmonic::new(&lifted, *pushed, hz).point()
+    }
+
+    /// Leaves nothing but the device of the pushed peer. A node has a copy, which then rests.
+    fn leave_bare(&mut self, device: Option<Body>, clock: NodeClock, tied: bool) -> Result<(), AnalysisError> {
+        let none = Gains { stiffness: 0.0, damping: 0.0 };
+        let bare = self.nodes[self.pushed].clone();
+        self.nodes = vec![Node { device, coupling: none, law: LinearLaw::none(), wall: None, compute_delay: false, ..bare }];
+        self.weights = Matrix::zeros(1, 1);
+        // It sends nothing, so that everything repeats with every tick.
+        self.timetable = Timetable::new(&[NodeClock { phase: 0, every: 1, ..clock }], &[])?;
+        self.tied = tied;
+        self.pushed = 0;
+        Ok(())
+    }
+}
+
+/// The timeline is left out.
+pub(super) const TIMELINE: &str = "the timeline is left out: the scene is analysed as it begins";
+
+/// All one-sided contacts along an axis closed, no copy at a wall; and that in words.
+pub(super) fn closed_contacts(scene: &Scene, axis: usize) -> (Contacts, Vec<String>) {
+    let pushes = |peer: usize| match scene.peers[peer].contact {
+        Contact::Push(direction) => Some(direction.axis),
+        Contact::Grasp | Contact::None => None,
+    };
+    let touching = |peer: usize| scene.peers[peer].contact == Contact::Grasp || pushes(peer) == Some(axis);
+    let touching: Vec<bool> = (0..scene.peers.len()).map(touching).collect();
+    let mut notes = Vec::new();
+    if (0..scene.peers.len()).any(|peer| pushes(peer) == Some(axis)) {
+        notes.push("one-sided contacts are taken as closed: a hand that pulls would let go".to_owned());
+    }
+    if scene.object.enclosure.is_some() {
+        notes.push("the enclosure is left out: the object is away from its walls".to_owned());
+    }
+    if !scene.timeline.is_empty() {
+        notes.push(TIMELINE.to_owned());
+    }
+    let absent = vec![false; scene.peers.len()];
+    (Contacts { touching, at_wall: false, absent }, notes)
+}

@@ -1,0 +1,116 @@
+//! The admittance of an object that turns and whose motion does not split: a push of one component of a device, seen in the motion of another.
+//!
+//! A frame takes the states z to A·z + B·u, where the push is Re and Im of u·e^{jωt}, and in steady state a frame later everything is e^{jωT} times as large:
+//! (e^{jωT}·I − A)·z = B·u. A, and the velocity of the device at each tick as a function of z, are the same at every frequency.
+
+use std::collections::VecDeque;
+
+use cohaptic_scene::Scene;
+use num_complex::Complex64;
+
+use super::harmonic::{Seen, phase, solved, turn};
+use super::response::AdmittancePoint;
+use crate::network::NominalNetwork;
+use crate::structure::count;
+use crate::timetable::{Instants, Timetable};
+use crate::turning::{Together, mode_of};
+use crate::{AnalysisError, Matrix, Method, Radius, Watch};
+
+/// A scene whose object turns, in which one component of a device is pushed.
+#[derive(Clone, Debug)]
+pub(super) struct Turned {
+    together: Together,
+    /// Which of the classes is pushed.
+    pushed: usize,
+    /// The component that is pushed, and the one that is looked at.
+    components: [usize; 2],
+    /// The instants of the ticks of the pushed class \[ns\].
+    ticks: Vec<u64>,
+    frame: Matrix,
+    error: f64,
+    /// For each state of the frame (row) the velocity seen at each tick, multiplied by the common time.
+    velocities: Matrix,
+}
+
+impl Turned {
+    /// With the radius of the scene.
+    pub(super) fn of(
+        scene: &Scene,
+        peer: usize,
+        components: [usize; 2],
+        network: &NominalNetwork,
+        watch: &dyn Watch,
+    ) -> Result<(Self, Radius), AnalysisError> {
+        let together = Together::with_alone(scene, network, peer)?;
+        let radius = mode_of(&together, Method::Reduced, watch)?.radius;
+        let structure = &together.structure;
+        let pushed = structure.classes.iter().position(|class| class[0] == peer).expect("every peer is in a class");
+        let ticks = Instants::of(&structure.timetable, structure.classes.len()).ticks.swap_remove(pushed);
+        let (time, mut seen) = (together.time(), VecDeque::new());
+        let mut looks = |node: usize, _: u64, device: &[cohaptic_peer::Motion]| {
+            if node == pushed {
+                seen.push_back(device[components[1]].velocity * time);
+            }
+            None
+        };
+        let (frame, error) = together.turning().monodromy_under(&mut looks, watch).ok_or(AnalysisError::Stopped)?;
+        let velocities = Matrix::from_fn(frame.rows(), ticks.len(), |_, _| seen.pop_front().unwrap_or(0.0));
+        Ok((Self { pushed, components, ticks, frame, error, velocities, together }, radius))
+    }
+
+    /// The admittance at a frequency that is one \[Hz\].
+    pub(super) fn point(&self, hz: f64) -> AdmittancePoint {
+        let Self { together, components, ticks, frame, velocities, .. } = self;
+        let (turning, time, node) = (together.turning(), together.time(), together.node(self.pushed));
+        // Inputs are lengths as states are.
+        let compliance = node.mobility * time;
+        let mut push = Complex64::ZERO;
+        let mut under = |part: fn(Complex64) -> f64, factor: Complex64| {
+            let mut hand = |place: usize, at: u64, device: &[cohaptic_peer::Motion]| {
+                (place == self.pushed).then(|| {
+                    push += factor * phase(hz, at).conj() * device[components[1]].velocity * time;
+                    (components[0], part(phase(hz, at)) / compliance)
+                })
+            };
+            turning.forced(&mut hand)
+        };
+        let (cosine, sine) = (under(|phase| phase.re, Complex64::ONE), under(|phase| phase.im, Complex64::I));
+        let size = frame.rows();
+        let ahead = turn(hz * together.structure.timetable.frame.as_secs_f64());
+        let matrix = faer::Mat::from_fn(size, size, |row, column| if row == column { ahead } else { Complex64::ZERO } - frame[(row, column)]);
+        let right = faer::Mat::from_fn(size, 1, |row, _| Complex64::new(cosine[row], sine[row]));
+        let back: Vec<Complex64> = ticks.iter().map(|at| phase(hz, *at).conj()).collect();
+        let states: Vec<Complex64> = (0..size).map(|state| velocities.row(state).iter().zip(&back).map(|(v, back)| back * v).sum()).collect();
+        let lengths: f64 = components.iter().map(|component| if *component > 2 { node.length } else { 1.0 }).product();
+        let unit = compliance / (count(ticks.len()) * time * lengths);
+        solved(hz, &matrix, &right, &Seen { states: &states, push, ticks: ticks.len(), unit }, self.error)
+    }
+
+    /// Force over acceleration where the whole object alone is held: 1/Wᵢⱼ, W = G·M⁻¹·Gᵀ.
+    pub(super) fn mass(&self, scene: &Scene) -> f64 {
+        let node = self.together.node(self.pushed);
+        let [from, to] = self.components.map(|component| &node.grip[component]);
+        let inertia = scene.rotation.as_ref().map_or([0.0; 3], |rotation| rotation.inertia);
+        let lengths: f64 = self.components.iter().map(|component| if *component > 2 { node.length } else { 1.0 }).product();
+        let mass = |axis: usize| if axis < 3 { scene.object.mass } else { inertia[axis - 3] / (node.length * node.length) };
+        lengths / (0..6).map(|axis| from[axis] * to[axis] / mass(axis)).sum::<f64>()
+    }
+
+    /// Whether something ties the component that is pushed to ground.
+    pub(super) fn tied(&self) -> bool {
+        !self.together.turning().moves_freely(self.pushed, self.components[0])
+    }
+
+    pub(super) const fn timetable(&self) -> &Timetable {
+        &self.together.structure.timetable
+    }
+
+    pub(super) const fn pushed(&self) -> usize {
+        self.pushed
+    }
+
+    /// See [`super::Admittance::operations`].
+    pub(super) fn operations(&self) -> f64 {
+        40.0 * count(self.timetable().events.len()) + 4.0 * count(self.frame.rows()).powi(3)
+    }
+}

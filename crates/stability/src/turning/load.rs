@@ -1,0 +1,389 @@
+//! Rest under the constant forces and torques of the hands.
+//!
+//! Copies are at poses of their own then, p in world axes and θ in body axes, R = R₀Exp(δθ), and what a force does depends on the turn. With f₀ = R₀ᵀFC the coupling
+//! force in body axes, Q = R₀ᵀM̄₀P, S = R₀ᵀRH₀ and C = R₀\[r\], where tr A stands for tr A·I,
+//!
+//! ```text
+//! δxg = δp − C·δθ,   δ(r×RᵀFC) = −Cᵀ·δFC + [r][f₀]·δθ,   −δτT = −(tr Q − Q)·δθ + Σ wⱼ·2·vee sk(R₀ᵀRⱼ[δθⱼ]P) − BR∘(δω − Σ wⱼ·R₀ᵀRⱼ·δωⱼ)
+//! δτC = ½KCR·((tr S − Sᵀ)·δθH − (tr S − S)·δθ) + BCR·(S·δωH − δω),   δ(RHᵀτh) = [RHᵀτh]·δθH
+//! −δ(SᵀτC) = −Sᵀ·δτC + Sᵀ[τC]·δθ − [SᵀτC]·δθH
+//! ```
+//!
+//! At rest no torque is left, so that the steps are those without a load. Copies together, S = I and no load give the equations of [`super`].
+
+use cohaptic_peer::rotation::{Attitude, Matrix3, Triple, aligning_torque, turning_torque};
+use cohaptic_peer::{Gains, Hand, Signal};
+use cohaptic_scene::Scene;
+
+use super::node::Node;
+use crate::structure::count;
+use crate::{AnalysisError, Matrix};
+
+/// Where a copy and its device are.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Pose {
+    pub(super) centre: Triple,
+    pub(super) attitude: Attitude,
+    pub(super) device: Triple,
+    pub(super) handle: Attitude,
+}
+
+/// What a hand does: a force \[N\] and a torque \[N·m\] in world axes, and the spring of an arm [N/m] towards a point.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Load {
+    force: Triple,
+    torque: Triple,
+    spring: f64,
+    towards: Triple,
+}
+
+impl Load {
+    fn of(scene: &Scene, place: usize) -> Result<Self, AnalysisError> {
+        let spec = &scene.peers[place];
+        let constant = |signal: &Signal| match signal {
+            Signal::Constant(value) => Ok(*value),
+            Signal::Sine { .. } | Signal::Table(_) => Err(AnalysisError::NoRest { why: format!("the hand of {} does not stay as it is", spec.name) }),
+        };
+        let rotation = scene.rotation.as_ref().and_then(|rotation| rotation.peers[place].device.as_ref());
+        let torque = rotation.and_then(|device| device.torque.as_ref()).map_or(Ok([0.0; 3]), constant)?;
+        let none = Self { force: [0.0; 3], torque, spring: 0.0, towards: [0.0; 3] };
+        Ok(match &spec.hand {
+            None => none,
+            Some(Hand::Force(force)) => Self { force: constant(force)?, ..none },
+            Some(Hand::Arm { arm, follows }) => Self { spring: arm.stiffness, towards: constant(follows)?, ..none },
+        })
+    }
+}
+
+/// A scene in which hands exert constant forces, every peer by itself.
+pub(super) struct Loaded<'a> {
+    scene: &'a Scene,
+    nodes: &'a [Node],
+    loads: Vec<Load>,
+}
+
+/// What the forces and torques on a peer are at a pose; none at rest.
+struct Forces {
+    on_copy: [Triple; 2],
+    on_device: [Triple; 2],
+    /// FC in body axes.
+    grip: Triple,
+    /// τC.
+    twist: Triple,
+}
+
+/// How a load changes the equations of a node, in the units of its states.
+#[derive(Clone, Debug)]
+pub(super) struct Stress {
+    /// The torque on the copy by its own turn, but for that of the device.
+    pub(super) own: Matrix3,
+    /// For each peer, the torque on the copy by the turn of its samples and by their angular velocity.
+    pub(super) heard: Vec<[Matrix3; 2]>,
+    pub(super) twist: Option<Twist>,
+}
+
+/// The torque τC and what becomes of it on a device that turns.
+#[derive(Clone, Debug)]
+pub(super) struct Twist {
+    /// δτC by the turn of the copy and of the device, by their angular velocities.
+    pub(super) by: [Matrix3; 4],
+    /// The torque on the device by δτC, by the turn of the copy and by its own.
+    pub(super) back: [Matrix3; 3],
+    /// The torque of the hand by the turn of the device.
+    pub(super) hand: Matrix3,
+}
+
+impl<'a> Loaded<'a> {
+    pub(super) fn new(scene: &'a Scene, nodes: &'a [Node]) -> Result<Self, AnalysisError> {
+        Ok(Self { scene, nodes, loads: (0..nodes.len()).map(|place| Load::of(scene, place)).collect::<Result<_, _>>()? })
+    }
+
+    /// Where the peers begin.
+    fn start(&self) -> Vec<Pose> {
+        let rotation = self.scene.rotation.as_ref().expect("the object turns");
+        let pose = |place: usize| {
+            let attitude = Attitude { rate: [0.0; 3], ..rotation.peers[place].attitude };
+            let (centre, device) = (self.scene.peers[place].position, self.scene.initial_device::<3>(place).position);
+            Pose { centre, attitude, device, handle: attitude }
+        };
+        (0..self.nodes.len()).map(pose).collect()
+    }
+
+    /// M̄ of the others.
+    fn mean(&self, poses: &[Pose], place: usize) -> Matrix3 {
+        let weight = 1.0 / count(poses.len() - 1);
+        let others = || poses.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, pose)| pose.attitude.matrix());
+        std::array::from_fn(|row| std::array::from_fn(|column| others().map(|matrix| weight * matrix[row][column]).sum()))
+    }
+
+    fn gains(&self, place: usize) -> Gains<Triple> {
+        self.scene.rotation_config(place).expect("the object turns").gains
+    }
+
+    /// KCR and BCR, if the device turns and touches.
+    fn coupling(&self, place: usize) -> Option<Gains> {
+        let device = self.scene.rotation_config(place).and_then(|config| config.device);
+        device.filter(|_| self.nodes[place].touching).map(|device| device.coupling)
+    }
+
+    fn forces(&self, poses: &[Pose], place: usize) -> Forces {
+        let (node, load, pose) = (&self.nodes[place], &self.loads[place], &poses[place]);
+        let (matrix, others) = (pose.attitude.matrix(), count(poses.len() - 1));
+        let arm = apply(&matrix, node.grasp);
+        let coupling = if node.touching { node.coupling[0].stiffness } else { 0.0 };
+        let force: Triple = std::array::from_fn(|axis| coupling * (pose.device[axis] - pose.centre[axis] - arm[axis]));
+        let drawn: Triple = std::array::from_fn(|axis| {
+            let mean: f64 = (0..poses.len()).filter(|other| *other != place).map(|other| poses[other].centre[axis]).sum::<f64>() / others;
+            node.heard[0].stiffness * mean - node.own[0].stiffness * pose.centre[axis]
+        });
+        let grip = apply(&transposed(&matrix), force);
+        let twist = self.coupling(place).map_or([0.0; 3], |gains| turning_torque((&matrix, [0.0; 3]), (&pose.handle.matrix(), [0.0; 3]), &gains));
+        let aligned = aligning_torque((&matrix, [0.0; 3]), (&self.mean(poses, place), [0.0; 3]), &self.gains(place));
+        let (lever, back) = (cross(node.grasp, grip), transposed(&pose.handle.matrix()));
+        let hand = apply(&back, load.torque);
+        let returned = apply(&back, apply(&matrix, twist));
+        Forces {
+            on_copy: [add(force, drawn), std::array::from_fn(|axis| lever[axis] + twist[axis] - aligned[axis])],
+            on_device: [
+                std::array::from_fn(|axis| load.force[axis] + load.spring * (load.towards[axis] - pose.device[axis]) - force[axis]),
+                std::array::from_fn(|axis| hand[axis] - returned[axis]),
+            ],
+            grip,
+            twist,
+        }
+    }
+
+    /// All forces and torques, as lengths: over the stiffest spring, torques over the length of the node too.
+    fn residual(&self, poses: &[Pose]) -> Vec<f64> {
+        let mut residual = Vec::new();
+        for (place, node) in self.nodes.iter().enumerate() {
+            let forces = self.forces(poses, place);
+            let stiff = self.stiffest();
+            let [force, torque] = forces.on_copy;
+            residual.extend(force.map(|force| force / stiff).into_iter().chain(torque.map(|torque| torque / (stiff * node.length))));
+            let [force, torque] = forces.on_device;
+            let both = force.map(|force| force / stiff).into_iter().chain(torque.map(|torque| torque / (stiff * node.length)));
+            residual.extend(both.take(self.unknowns(place) - 6));
+        }
+        residual
+    }
+
+    fn stiffest(&self) -> f64 {
+        let springs = self.nodes.iter().zip(&self.loads).flat_map(|(node, load)| [node.own[0].stiffness, node.coupling[0].stiffness, load.spring]);
+        springs.fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    /// How many numbers of a peer's pose a load decides.
+    fn unknowns(&self, place: usize) -> usize {
+        let node = &self.nodes[place];
+        6 + if node.touching { node.device.len() } else { 0 }
+    }
+
+    fn moved(&self, poses: &[Pose], by: &[f64]) -> Vec<Pose> {
+        let mut next = 0;
+        let mut take = |poses: &Pose, place: usize| {
+            let (node, by) = (&self.nodes[place], &by[next..next + self.unknowns(place)]);
+            next += by.len();
+            let length = |first: usize| -> Triple { std::array::from_fn(|axis| by.get(first + axis).copied().unwrap_or(0.0)) };
+            let mut pose = *poses;
+            pose.centre = add(pose.centre, length(0));
+            pose.attitude.turn(length(3).map(|angle| angle / node.length));
+            pose.device = add(pose.device, length(6));
+            pose.handle.turn(length(9).map(|angle| angle / node.length));
+            pose
+        };
+        poses.iter().enumerate().map(|(place, pose)| take(pose, place)).collect()
+    }
+
+    /// Where the peers come to rest: the pose without forces that Levenberg's (1944) method reaches from where they begin.
+    pub(super) fn rest(&self) -> Result<Vec<Pose>, AnalysisError> {
+        let size: usize = (0..self.nodes.len()).map(|place| self.unknowns(place)).sum();
+        let norm = |residual: &[f64]| residual.iter().map(|entry| entry * entry).sum::<f64>().sqrt();
+        let mut poses = self.start();
+        let mut residual = self.residual(&poses);
+        let mut damping = 1e-6;
+        for _ in 0..MOST_STEPS {
+            // Of a residual of some lengths of a metre, rounding leaves this much.
+            if norm(&residual) <= 1e-15 * count(size) {
+                return Ok(poses);
+            }
+            let slope = self.slope(&poses, size);
+            let normal = faer::Mat::from_fn(size, size, |row, column| {
+                let product: f64 = (0..size).map(|entry| slope[(entry, row)] * slope[(entry, column)]).sum();
+                product + if row == column { damping } else { 0.0 }
+            });
+            let right = faer::Mat::from_fn(size, 1, |row, _| -(0..size).map(|entry| slope[(entry, row)] * residual[entry]).sum::<f64>());
+            let solution = faer::linalg::solvers::Solve::solve(&normal.partial_piv_lu(), &right);
+            let step: Vec<f64> = (0..size).map(|row| solution[(row, 0)]).collect();
+            let next = self.moved(&poses, &step);
+            let reached = self.residual(&next);
+            if norm(&reached) < norm(&residual) {
+                (poses, residual, damping) = (next, reached, (0.1 * damping).max(1e-14));
+            } else if norm(&step) <= f64::EPSILON * count(size) {
+                break;
+            } else {
+                damping = (10.0 * damping).min(1e6);
+            }
+        }
+        let left = norm(&residual);
+        // The last digits of springs that are much softer than the stiffest.
+        if left <= 1e-12 {
+            return Ok(poses);
+        }
+        Err(AnalysisError::NoRest { why: format!("forces of the hands are left over: about {:.2e} N", left * self.stiffest()) })
+    }
+
+    /// The slope of the residual, by central differences.
+    fn slope(&self, poses: &[Pose], size: usize) -> Matrix {
+        const STEP: f64 = 1e-6;
+        let mut slope = Matrix::zeros(size, size);
+        let mut by = vec![0.0; size];
+        for column in 0..size {
+            let mut at = |step: f64| {
+                by[column] = step;
+                let found = self.residual(&self.moved(poses, &by));
+                by[column] = 0.0;
+                found
+            };
+            for (row, (up, down)) in at(STEP).iter().zip(at(-STEP)).enumerate() {
+                slope[(row, column)] = (up - down) / (2.0 * STEP);
+            }
+        }
+        slope
+    }
+
+    /// The nodes of small motions about those poses.
+    pub(super) fn stressed(&self, poses: &[Pose]) -> Vec<Node> {
+        (0..self.nodes.len()).map(|place| self.node(poses, place)).collect()
+    }
+
+    fn node(&self, poses: &[Pose], place: usize) -> Node {
+        let (mut node, pose, forces) = (self.nodes[place].clone(), &poses[place], self.forces(poses, place));
+        let (matrix, gains, square) = (pose.attitude.matrix(), self.gains(place), node.length * node.length);
+        let half = 0.5 * gains.stiffness.iter().sum::<f64>();
+        let weights = gains.stiffness.map(|stiffness| half - stiffness);
+        let [x, y, z] = node.grasp;
+        let lever = product(&matrix, &skew([x, y, z]));
+        for (axis, grip) in node.grip.iter_mut().enumerate().take(3) {
+            for column in 0..3 {
+                grip[3 + column] = -lever[axis][column] / node.length;
+            }
+        }
+        let drawn = product(&transposed(&matrix), &self.mean(poses, place));
+        let drawn: Matrix3 = drawn.map(|row| std::array::from_fn(|column| row[column] * weights[column]));
+        let levered = product(&skew(node.grasp), &skew(forces.grip));
+        let over = |matrix: Matrix3| matrix.map(|row| row.map(|entry| entry / square));
+        let own = over(sum(&levered, &trace_less(&drawn).map(|row| row.map(|entry| -entry))));
+        let heard = poses.iter().map(|other| {
+            let apart = product(&transposed(&matrix), &other.attitude.matrix());
+            let column = |axis: usize| {
+                let turned = product(&apart, &skew(unit(axis))).map(|row| std::array::from_fn(|column| row[column] * weights[column]));
+                twice_axial(&turned)
+            };
+            let columns = [column(0), column(1), column(2)];
+            let damped = std::array::from_fn(|row| apart[row].map(|entry| gains.damping[row] * entry));
+            [over(transposed(&columns)), over(damped)]
+        });
+        let heard = heard.collect();
+        let twist = self.coupling(place).map(|coupling| {
+            let apart = product(&transposed(&matrix), &pose.handle.matrix());
+            let back = transposed(&apart);
+            let scaled = |matrix: &Matrix3, by: f64| matrix.map(|row| row.map(|entry| by * entry));
+            let (spring, damper) = (0.5 * coupling.stiffness, coupling.damping);
+            let hand = apply(&transposed(&pose.handle.matrix()), self.loads[place].torque);
+            Twist {
+                by: [
+                    over(scaled(&trace_less(&apart), -spring)),
+                    over(scaled(&trace_less(&back), spring)),
+                    over(scaled(&IDENTITY, -damper)),
+                    over(scaled(&apart, damper)),
+                ],
+                back: [scaled(&back, -1.0), over(product(&back, &skew(forces.twist))), over(scaled(&skew(apply(&back, forces.twist)), -1.0))],
+                hand: over(skew(hand)),
+            }
+        });
+        let none = Gains { stiffness: 0.0, damping: 0.0 };
+        for axis in 3..6 {
+            (node.own[axis].stiffness, node.heard[axis]) = (0.0, none);
+        }
+        for coupling in node.coupling.iter_mut().skip(3) {
+            *coupling = none;
+        }
+        node.stress = Some(Box::new(Stress { own, heard, twist }));
+        node
+    }
+
+    /// The displacements of everything together, each of the states of copies and devices: three along the axes, three turns about the first copy.
+    pub(super) fn together(&self, poses: &[Pose]) -> Vec<Vec<([f64; 6], Vec<f64>)>> {
+        let motion = |axis: usize| {
+            let each = self.nodes.iter().zip(poses).map(|(node, pose)| {
+                let moved = |point: Triple| {
+                    if axis < 3 {
+                        unit(axis)
+                    } else {
+                        let arm = std::array::from_fn(|axis| point[axis] - poses[0].centre[axis]);
+                        cross(unit(axis - 3), arm).map(|way| way / node.length)
+                    }
+                };
+                let turned = |attitude: &Attitude| if axis < 3 { [0.0; 3] } else { apply(&transposed(&attitude.matrix()), unit(axis - 3)) };
+                let ([x, y, z], [a, b, c]) = (moved(pose.centre), turned(&pose.attitude));
+                let device = moved(pose.device).into_iter().chain(turned(&pose.handle)).take(node.device.len());
+                let device = if node.touching { device.collect() } else { vec![0.0; node.device.len()] };
+                ([x, y, z, a, b, c], device)
+            });
+            each.collect()
+        };
+        (0..6).map(motion).collect()
+    }
+}
+
+/// Levenberg's method takes some ten steps from where hands are near rest.
+const MOST_STEPS: usize = 500;
+
+const IDENTITY: Matrix3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+fn unit(axis: usize) -> Triple {
+    IDENTITY[axis]
+}
+
+fn add(a: Triple, b: Triple) -> Triple {
+    std::array::from_fn(|axis| a[axis] + b[axis])
+}
+
+pub(super) fn cross(a: Triple, b: Triple) -> Triple {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// A·v.
+pub(super) fn apply(matrix: &Matrix3, vector: Triple) -> Triple {
+    matrix.map(|row| row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2])
+}
+
+/// \[a\].
+fn skew([x, y, z]: Triple) -> Matrix3 {
+    [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+}
+
+fn transposed(matrix: &Matrix3) -> Matrix3 {
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[column][row]))
+}
+
+fn product(a: &Matrix3, b: &Matrix3) -> Matrix3 {
+    let b = transposed(b);
+    std::array::from_fn(|row| std::array::from_fn(|column| (0..3).map(|k| a[row][k] * b[column][k]).sum()))
+}
+
+fn sum(a: &Matrix3, b: &Matrix3) -> Matrix3 {
+    std::array::from_fn(|row| std::array::from_fn(|column| a[row][column] + b[row][column]))
+}
+
+/// tr A·I − A.
+fn trace_less(a: &Matrix3) -> Matrix3 {
+    let trace = a[0][0] + a[1][1] + a[2][2];
+    std::array::from_fn(|row| std::array::from_fn(|column| if row == column { trace } else { 0.0 } - a[row][column]))
+}
+
+/// The axial vector of A − Aᵀ.
+fn twice_axial(a: &Matrix3) -> Triple {
+    [a[2][1] - a[1][2], a[0][2] - a[2][0], a[1][0] - a[0][1]]
+}
