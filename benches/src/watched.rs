@@ -68,6 +68,18 @@ impl Observer for Plotter {
     }
 }
 
+/// Sees every sample held and keeps nothing: the least that makes a run have events.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WithEvents;
+
+impl Observer for WithEvents {
+    type Error = Infallible;
+
+    fn wants_holds(&self) -> bool {
+        true
+    }
+}
+
 /// The scene with every measure.
 #[must_use]
 pub fn with_all_measures(scene: Scene) -> Scene {

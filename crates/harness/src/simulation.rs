@@ -88,8 +88,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
                 {
                     return Ok(summary);
                 }
-                let [summary] = arrays::run([self.scene], shape, [law], |now| observer.keep_going(now));
-                summary
+                arrays::run(self.scene, shape, law, &mut |now| observer.keep_going(now))
             } else {
                 Watching::run(observer, watch, |onlooker| arrays::run_watched(self.scene, (shape, law), &plan, onlooker))?
             };

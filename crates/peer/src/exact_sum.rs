@@ -55,8 +55,8 @@ impl ExactSum {
 
     #[inline]
     fn change(&mut self, bits: u64) {
-        let exponent = (bits >> 52 & 0x7ff) as usize;
-        let mantissa = bits & (1 << 52) - 1 | u64::from(exponent != 0) << 52;
+        let exponent = ((bits >> 52) & 0x7ff) as usize;
+        let mantissa = (bits & ((1 << 52) - 1)) | (u64::from(exponent != 0) << 52);
         // The place of the least bit: numbers below the normal ones have that of the smallest normal one.
         let place = exponent.max(1) - 1;
         let (digit, shift) = (place / BITS as usize + FRACTION, place % BITS as usize);
@@ -123,14 +123,14 @@ impl ExactSum {
         let carry = self.digits.get(first..end)?.iter().fold(0, |carry, digit| (digit + carry) >> BITS);
         let sign = if carry < 0 { -1 } else { 1 };
         let (mut digits, mut carry, mut all) = ([0; DIGITS], 0_i64, 0);
-        for digit in first..DIGITS {
-            if digit >= end && carry == 0 {
+        for (place, (sum, digit)) in self.digits.iter().zip(&mut digits).enumerate().skip(first) {
+            if place >= end && carry == 0 {
                 break;
             }
-            let sum = sign * self.digits[digit] + carry;
-            digits[digit] = sum as u32;
+            let sum = sign * sum + carry;
+            *digit = sum as u32;
             carry = sum >> BITS;
-            all |= digits[digit];
+            all |= *digit;
         }
         (all != 0).then_some((digits, sign < 0))
     }

@@ -99,7 +99,7 @@ pub(super) fn alike(scenes: impl Strategy<Value = usize>) -> impl Strategy<Value
 }
 
 proptest! {
-    #![proptest_config(cases(600))]
+    #![proptest_config(cases(400))]
 
     #[test]
     fn one_that_turns_comes_to_what_its_events_come_to(scenes in alike(Just(1))) {
@@ -110,7 +110,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(cases(150))]
+    #![proptest_config(cases(80))]
 
     #[test]
     fn those_that_turn_side_by_side_come_to_what_each_comes_to_alone(scenes in alike(5..=9_usize)) {

@@ -168,7 +168,9 @@ fn devices_that_touch_nothing_are_seen() {
 /// Queues look ahead of the end of a run that diverges. Its rows are given once.
 #[test]
 fn runs_that_diverge_are_seen_to_their_end() {
-    for link in ["delay = \"9ms\"", "delay = \"9ms\", jitter = \"2ms\", rate = \"100kbit\", queue = { limit = \"3 packets\", discipline = \"codel\" }"] {
+    for link in
+        ["delay = \"9ms\"", "delay = \"9ms\", jitter = \"2ms\", rate = \"100kbit\", queue = { limit = \"3 packets\", discipline = \"codel\" }"]
+    {
         for peers in [3, 20] {
             let mut scene = mesh(peers, link);
             scene.coordination.gains.stiffness = 3e7;

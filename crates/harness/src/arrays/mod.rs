@@ -44,9 +44,17 @@ pub use side_by_side::{run_side_by_side, same_shape};
 pub use ticks::Ticks;
 use turning::{PAIRS, TurningBlocks};
 
-/// L runs of scenes of that shape with these laws, to their ends. `keep_going` is asked as [`crate::Observer::keep_going`] is.
-pub(crate) fn run<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; L], mut keep_going: impl FnMut(Instant) -> bool) -> [Summary; L] {
-    let eyes = Closed(&mut keep_going);
+/// A run of a scene of that shape with that law, to its end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
+///
+/// Compiled here for all observers: most of the code of this crate is in the loops of the laws.
+pub(crate) fn run(scene: &Scene, shape: Shape, law: BuiltIn, keep_going: &mut dyn FnMut(Instant) -> bool) -> Summary {
+    let [summary] = run_lanes([scene], shape, [law], keep_going);
+    summary
+}
+
+/// L runs of scenes of that shape with these laws, to their ends.
+fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; L], keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {
+    let eyes = Closed(keep_going);
     match scenes[0].axes {
         Axes::Three if scenes[0].rotation.is_some() => Arrays::<TurningBlocks, 3, PAIRS, L>::new(scenes, shape, laws, None).run(eyes),
         Axes::One => Arrays::<Blocks<1>, 1, 1, L>::new(scenes, shape, laws, None).run(eyes),
@@ -122,6 +130,7 @@ impl<const P: usize, const L: usize> Others<P, L> for Nowhere {
 
 /// How samples travel.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one a run, and a box would be another look-up a packet")]
 enum Samples<const P: usize, const L: usize> {
     Broadcast(Broadcast<P, L>),
     PerPacket(PerPacket<P, L>),
@@ -435,7 +444,9 @@ struct Motion<'a, W, E, B, const A: usize, const P: usize, const L: usize> {
     bodies: &'a mut B,
 }
 
-impl<W: LawOfLanes, E: Eyes<B, A, P>, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnOnce for Motion<'_, W, E, B, A, P, L> {
+impl<W: LawOfLanes, E: Eyes<B, A, P>, B: Bodies<A, P>, const A: usize, const P: usize, const L: usize> NullaryFnOnce
+    for Motion<'_, W, E, B, A, P, L>
+{
     type Output = Moved<L>;
 
     #[inline(always)]

@@ -25,7 +25,7 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
         let alike = rest.iter().take(WIDTH).take_while(|scene| shape.is_some() && self::shape(scene) == shape).count();
         if let Some(shape) = shape.filter(|shape| pays(shape, alike)) {
             let (now, later) = rest.split_at(alike);
-            summaries.extend(run_lanes(now, shape));
+            summaries.extend(run_eight(now, shape));
             rest = later;
         } else {
             let Ok(summary) = Simulation::new(first, Model::Least).run(&mut NoObserver);
@@ -57,9 +57,9 @@ fn shape(scene: &Scene) -> Option<Shape> {
 }
 
 /// Runs up to eight scenes of one shape; the last one fills the lanes that are left.
-fn run_lanes(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
+fn run_eight(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
     let lanes: [&Scene; WIDTH] = std::array::from_fn(|lane| &scenes[lane.min(scenes.len() - 1)]);
     let laws = lanes.map(|scene| scene.law(0).expect("scenes of a shape have a law"));
-    let summaries = super::run(lanes, shape, laws, |_| true);
+    let summaries = super::run_lanes(lanes, shape, laws, &mut |_| true);
     summaries.into_iter().take(scenes.len()).collect()
 }

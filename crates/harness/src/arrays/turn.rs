@@ -147,10 +147,10 @@ impl Steps {
         }
         for _ in 0..self.0.steps() {
             let (mut rates, mut sigmas, mut squares) = (NOTHING, NOTHING, [0.0; WIDTH]);
-            for lane in 0..WIDTH {
+            for (lane, square) in squares.iter_mut().enumerate() {
                 let step = self.lane(lane);
                 let (rate, sigma) = step.exponential(lane_of(&bodies.rate, lane), step.forced(lane_of(torques, lane)));
-                squares[lane] = sigma[0] * sigma[0] + sigma[1] * sigma[1] + sigma[2] * sigma[2];
+                *square = sigma[0] * sigma[0] + sigma[1] * sigma[1] + sigma[2] * sigma[2];
                 set_lane(&mut rates, lane, rate);
                 set_lane(&mut sigmas, lane, sigma);
             }
@@ -198,8 +198,8 @@ impl Turn {
     #[inline(always)]
     pub(super) fn tick(&mut self, shared: &Shared, blocks: [&Block; 3]) -> Triple<Lanes> {
         let Computed { coupling, mut torques, aligning } = self.compute(shared, blocks);
-        for axis in 0..3 {
-            torques.on_copy[axis] = torques.on_copy[axis] - aligning[axis];
+        for (on_copy, aligning) in torques.on_copy.iter_mut().zip(&aligning) {
+            *on_copy = *on_copy - *aligning;
         }
         if let Some(late) = &mut self.late {
             torques = late.exchange(torques);
@@ -224,9 +224,9 @@ impl Turn {
             let point = point_of::<3>(&matrix, copy.rate, lane_of(&self.grasp, lane), &centre);
             let [[a, b, c], [d, e, f], [g, h, i]] = matrix;
             set_lane(&mut matrices, lane, [a, b, c, d, e, f, g, h, i]);
-            for axis in 0..3 {
-                points[axis].position.0[lane] = point.position[axis];
-                points[axis].velocity.0[lane] = point.velocity[axis];
+            for (axis, points) in points.iter_mut().enumerate() {
+                points.position.0[lane] = point.position[axis];
+                points.velocity.0[lane] = point.velocity[axis];
             }
         }
         let coupling: Triple<Lanes> = std::array::from_fn(|axis| blocks[axis].coupling(&points[axis]));

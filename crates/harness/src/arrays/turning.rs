@@ -73,8 +73,8 @@ impl TurningBlocks {
         let last = self.places.peers * self.places.runs;
         for (place, turn) in self.turns.iter().enumerate() {
             let mut squares = Lanes::ZERO;
-            for lane in 0..WIDTH {
-                squares.0[lane] = squared_chord(&references[lane], &turn.attitude.orientation.map(|part| part.0[lane]));
+            for (lane, reference) in references.iter().enumerate() {
+                squares.0[lane] = squared_chord(reference, &turn.attitude.orientation.map(|part| part.0[lane]));
             }
             // Those beyond the last repeat it, which would count twice.
             if (place + 1) * WIDTH > last {
@@ -232,7 +232,7 @@ impl Bodies<3, PAIRS> for TurningBlocks {
         let size = processor.dispatch(Turned(self));
         let mut moved = self.translations.advance::<L>(law, &Points(&self.coupling));
         let size = size & self.translations.goes_on;
-        if !(size.0.iter().sum::<f64>() < f64::INFINITY) {
+        if !size.0.iter().sum::<f64>().is_finite() {
             self.look_at_each(&mut moved.finite);
         }
         moved

@@ -98,7 +98,11 @@ impl Observer for Positions {
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
         let is_its = |peer: usize| peer == row.peer;
-        self.see(row.at, |peer, axis| is_its(peer).then(|| row.object.position[axis]), |peer| row.turn.filter(|_| is_its(peer)).map(|turn| *turn.object));
+        self.see(
+            row.at,
+            |peer, axis| is_its(peer).then(|| row.object.position[axis]),
+            |peer| row.turn.filter(|_| is_its(peer)).map(|turn| *turn.object),
+        );
         Ok(())
     }
 

@@ -163,7 +163,7 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
 
     /// [`Broadcast::refresh`] of many: what all hold together without the receiver's own.
     #[cold]
-    fn refresh_exactly<const A: usize>(&mut self, bodies: &mut impl Bodies<A, P>) {
+    fn refresh_exactly<const A: usize>(&self, bodies: &mut impl Bodies<A, P>) {
         let Some(sums) = &self.sums else { return };
         for peer in 0..self.peers {
             let mean = sums.mean_without(&self.held_from(peer), self.peers - 1);
