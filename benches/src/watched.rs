@@ -38,18 +38,6 @@ impl Observer for Onlooker {
     }
 }
 
-/// Looks at what is sent and keeps nothing: the least that makes a run have events.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct WithEvents;
-
-impl Observer for WithEvents {
-    type Error = Infallible;
-
-    fn wants_sends(&self) -> bool {
-        true
-    }
-}
-
 /// Sees where copies are along the first axis, as a run in a terminal does.
 #[derive(Debug)]
 pub struct Plotter(Bands);
@@ -77,6 +65,18 @@ impl Observer for Plotter {
     fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Infallible> {
         self.0.add_all(ticks.at(), ticks.positions(0));
         Ok(())
+    }
+}
+
+/// Sees every sample held and keeps nothing: the least that makes a run have events.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WithEvents;
+
+impl Observer for WithEvents {
+    type Error = Infallible;
+
+    fn wants_holds(&self) -> bool {
+        true
     }
 }
 

@@ -104,7 +104,7 @@ fn torques_of_a_file_are_replayed() {
     let session = desk.read("out/trajectory.csv");
     assert_eq!(session, desk.read("again/trajectory.csv"));
     desk.write("hand.csv", "t,fx,fy,fz,tx,ty,tz\n0,0,0,0,0,0,0\n0.04,0,1,0,0.01,0,0.03\n");
-    desk.text(&format!("{again} other --force"));
+    assert_eq!(desk.cohaptic(&format!("{again} other --force")).status, Some(0));
     assert_ne!(session, desk.read("other/trajectory.csv"));
 }
 

@@ -43,11 +43,13 @@ impl Bands {
         }
     }
 
-    /// Adds a value to each curve, in their order, as [`Bands::add`] does.
+    /// Adds a value to each curve, in their order, as [`Bands::add`] does. Values beyond the last curve are left out.
     #[inline]
     pub fn add_all(&mut self, at: Instant, values: impl Iterator<Item = f64>) {
         if let Some(slots) = self.slots(at) {
-            slots.iter_mut().zip(values).for_each(|(slot, value)| take_in(slot, value));
+            // Values come block by block, which is a loop in a loop as long as nobody asks for the next one.
+            let mut slots = slots.iter_mut();
+            values.for_each(|value| slots.next().into_iter().for_each(|slot| take_in(slot, value)));
         }
     }
 
