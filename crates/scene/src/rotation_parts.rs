@@ -341,7 +341,8 @@ mod tests {
             let parts = scene(&[&set]).rotation_parts().unwrap().unwrap().parts;
             assert!(parts.len() == 4 && parts.iter().all(|part| part.scene.coordination.strategy.name() == strategy));
         }
-        let ticks = scene(&["coordination.strategy=local-damping", "peers.peer2.tick=2ms"]).rotation_parts().unwrap();
+        let ticks =
+            scene(&["coordination.strategy=local-damping", "coordination.local-damping.age=20ms", "peers.peer2.tick=2ms"]).rotation_parts().unwrap();
         assert!(ticks.unwrap_err().contains("other ticks"));
     }
 
