@@ -1,11 +1,11 @@
-//! The mean of the samples held from 10,000 other peers, against a sum without rounding.
+//! The mean of the samples held from 255 and from 10,000 other peers, against a sum without rounding.
 //!
-//! [`Held::refresh`] promises an error of n·mean of at most (n/4 + 2)·u·Σ|x|: of four partial sums each has n/4 − 1 additions, two more join them, and the
+//! From [`EXACT_FROM`] samples on [`Held::refresh`] promises the nearest number to the mean. Of fewer it promises an error of n·mean of at most (n/4 + 2)·u·Σ|x|: of four partial sums each has n/4 − 1 additions, two more join them, and the
 //! division rounds once. (That no terms of higher order are needed is a result of Jeannerod & Rump, *Improved error bounds for inner products in floating-point
 //! arithmetic*, 2013, for sums in any order.) Here data meets it that is made to be summed badly.
 
 use cohaptic_harness::{Model, NoObserver, Simulation};
-use cohaptic_peer::{Held, State};
+use cohaptic_peer::{EXACT_FROM, Held, State};
 use cohaptic_tests::{Draft, same_cases};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
@@ -13,8 +13,9 @@ use proptest::prelude::*;
 use crate::ROUNDING;
 use crate::exact_sum::ExactSum;
 
-/// How many others there are.
-const OTHERS: usize = 10_000;
+/// How many others there are: the most whose mean is a sum in a fixed order, and many.
+const FEW: usize = EXACT_FROM - 1;
+const MANY: usize = 10_000;
 
 fn at(value: f64) -> State<1> {
     State { position: [value], velocity: [-value] }
@@ -29,8 +30,10 @@ fn mean_of(values: &[f64]) -> (f64, f64, f64) {
     let mut error = ExactSum::of(values.iter().copied());
     let n = values.len() as f64;
     error.subtract_product(mean, n);
+    // Half of the last digit of the mean, n times.
+    let nearest = ROUNDING * (n * mean).abs() * (1.0 + 4.0 * ROUNDING);
     let sizes = ExactSum::of(values.iter().map(|value| value.abs())).size();
-    (mean, error.size(), (n / 4.0 + 2.0) * ROUNDING * sizes)
+    (mean, error.size(), if values.len() < EXACT_FROM { (n / 4.0 + 2.0) * ROUNDING * sizes } else { nearest })
 }
 
 fn within_the_bound(values: &[f64]) {
@@ -46,36 +49,40 @@ fn large_values_that_alternate_hide_small_ones_within_the_bound() {
             2 => -1e16,
             _ => 1.0,
         };
-        within_the_bound(&(0..OTHERS).map(value).collect::<Vec<_>>());
+        for others in [FEW, MANY] {
+            within_the_bound(&(0..others).map(value).collect::<Vec<_>>());
+        }
     }
 }
 
 #[test]
 fn a_sum_that_cancels_to_nothing_is_within_the_bound() {
     // Each value and its negative, far apart and in another partial sum; then rows that grow and fall.
-    let half = (0..OTHERS / 2).map(|place| libm::sin(place as f64) * libm::exp2((place % 97) as f64));
-    let values: Vec<f64> = half.clone().chain(half.rev().map(|value| -value)).collect();
-    within_the_bound(&values);
-    within_the_bound(&(0..OTHERS).map(|place| libm::exp2(place as f64 / 10.0 - 500.0) * if place % 2 == 0 { 1.0 } else { -1.0 }).collect::<Vec<_>>());
+    for others in [FEW, MANY] {
+        let half = (0..others / 2).map(|place| libm::sin(place as f64) * libm::exp2((place % 97) as f64));
+        let values: Vec<f64> = half.clone().chain(half.rev().map(|value| -value)).collect();
+        within_the_bound(&values);
+        within_the_bound(&(0..others).map(|place| libm::exp2(place as f64 / 10.0 - 500.0) * if place % 2 == 0 { 1.0 } else { -1.0 }).collect::<Vec<_>>());
+    }
 }
 
 /// The bound is no more than it must be: four ones, and then nothing but halves of the last digit of one, each of which is lost (a tie goes to the even
 /// neighbour). So (n − 4)·u of the bound of (n/4 + 2)·u·(4 + (n − 4)·u) is reached, up to 4u of the division: all but 16 parts of n + 8.
 #[test]
 fn the_bound_is_reached() {
-    let values: Vec<f64> = (0..OTHERS).map(|place| if place < 4 { 1.0 } else { ROUNDING }).collect();
+    let values: Vec<f64> = (0..FEW).map(|place| if place < 4 { 1.0 } else { ROUNDING }).collect();
     let (mean, error, bound) = mean_of(&values);
-    let lost = (OTHERS - 4) as f64 * ROUNDING;
+    let lost = (FEW - 4) as f64 * ROUNDING;
     // The division rounds too, by at most u times the sum of 4.
     assert!((error - lost).abs() <= 4.0 * ROUNDING, "{mean} {error:e}");
-    let n = OTHERS as f64;
+    let n = FEW as f64;
     assert!(error / bound >= (n - 8.0) / (n + 8.0) - 1e-9 && error <= bound, "{}", error / bound);
 }
 
 /// One sum would lose all but one of them, (n − 1)·u, four times the bound; of four sums one loses a quarter.
 #[test]
 fn one_large_value_costs_one_of_four_sums() {
-    let values: Vec<f64> = (0..OTHERS).map(|place| if place == 0 { 1.0 } else { ROUNDING }).collect();
+    let values: Vec<f64> = (0..FEW).map(|place| if place == 0 { 1.0 } else { ROUNDING }).collect();
     within_the_bound(&values);
 }
 
@@ -89,7 +96,8 @@ proptest! {
             let ((mantissa, _), (_, exponent)) = (seeds[place % 64], seeds[(place * step) % 64]);
             libm::ldexp(mantissa, exponent)
         };
-        within_the_bound(&(0..OTHERS).map(value).collect::<Vec<_>>());
+        within_the_bound(&(0..FEW).map(value).collect::<Vec<_>>());
+        within_the_bound(&(0..MANY).map(value).collect::<Vec<_>>());
     }
 }
 
@@ -97,11 +105,11 @@ proptest! {
 #[test]
 fn the_order_of_arrival_changes_no_bit() {
     let value = |place: usize| libm::sin(place as f64 * 1.7) * libm::exp2((place % 40) as f64);
-    let expected = *Held::new((0..OTHERS).map(|place| at(value(place)))).mean();
+    let expected = *Held::new((0..MANY).map(|place| at(value(place)))).mean();
     // 7919 and 10,000 have no common factor: every place once, in quite another order; and backwards.
-    for order in [|turn: usize| turn * 7919 % OTHERS, |turn: usize| OTHERS - 1 - turn] {
-        let mut held = Held::new((0..OTHERS).map(|_| State::<1>::REST));
-        for turn in 0..OTHERS {
+    for order in [|turn: usize| turn * 7919 % MANY, |turn: usize| MANY - 1 - turn] {
+        let mut held = Held::new((0..MANY).map(|_| State::<1>::REST));
+        for turn in 0..MANY {
             // An older sample that comes later changes nothing.
             assert!(held.accept(order(turn), 1, Instant::ZERO, at(value(order(turn)))));
             assert!(!held.accept(order(turn), 0, Instant::ZERO, at(1e300)));

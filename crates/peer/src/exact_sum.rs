@@ -13,7 +13,7 @@ const BITS: u32 = 32;
 const DIGITS: usize = 71;
 /// Digits below all numbers, for the fraction of a mean.
 const FRACTION: usize = 3;
-/// Digits take that many additions before they must be carried.
+/// After this number of additions digits must be carried.
 const MOST_ADDITIONS: u32 = 1 << 30;
 
 /// A sum of numbers without any rounding, from which numbers can be taken away again.
@@ -119,7 +119,7 @@ impl ExactSum {
     /// The digits of the absolute value, each below 2³², and the sign; `None` if it is zero.
     fn magnitude(&self) -> Option<([u32; DIGITS], bool)> {
         let (first, end) = (usize::from(self.reached.0), usize::from(self.reached.1));
-        // What is above all carries of the digits says the sign.
+        // The carry out of the last digit says the sign.
         let carry = self.digits.get(first..end)?.iter().fold(0, |carry, digit| (digit + carry) >> BITS);
         let sign = if carry < 0 { -1 } else { 1 };
         let (mut digits, mut carry, mut all) = ([0; DIGITS], 0_i64, 0);

@@ -19,7 +19,7 @@ use crate::lead::{Lead, Moving};
 pub struct Held<const A: usize> {
     samples: Vec<HeldSample<A>>,
     mean: State<A>,
-    /// The sums of what is held, from [`EXACT_FROM`] samples on.
+    /// The sums of the samples, from [`EXACT_FROM`] samples on.
     sums: Option<Box<ExactMeans<A>>>,
     /// How each sample moves on while it is held, if anybody asks for it.
     motions: Option<Motions<A>>,

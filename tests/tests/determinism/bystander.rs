@@ -10,15 +10,15 @@ use cohaptic_units::Instant;
 use cohaptic_wan::Fate;
 use proptest::prelude::*;
 
-/// What became of each packet: for each link by name, by sequence number, when it was sent and its fate.
-type Fates = BTreeMap<(String, String), BTreeMap<u64, (Instant, Fate)>>;
+/// What became of each packet: for each link by name, by sequence number and copy, when it was sent and its fates.
+type Fates = BTreeMap<(String, String), BTreeMap<(u64, u8), Vec<(Instant, Fate)>>>;
 
 fn fates(draft: &Draft) -> Fates {
     let mut fates = Fates::new();
     for row in run(&draft.scene(), Model::Least).packets {
         let name = |peer: usize| draft.peers[peer].name.clone();
-        let again = fates.entry((name(row.path.from.index()), name(row.path.to.index()))).or_default().insert(row.sequence, (row.offered, row.fate));
-        assert!(again.is_none(), "two fates of one packet: {row:?}");
+        let link = fates.entry((name(row.path.from.index()), name(row.path.to.index()))).or_default();
+        link.entry((row.sequence, row.copy)).or_default().push((row.offered, row.fate));
     }
     fates
 }

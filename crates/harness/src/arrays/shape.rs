@@ -63,7 +63,7 @@ impl Shape {
         self.has_queues
     }
 
-    /// The shape of a scene that can be run in arrays: everybody ticks together, nothing changes on the way, and no link counts or damages what is inside.
+    /// The shape of a scene that can be run in arrays: everybody ticks together, nothing changes on the way, and no link counts or damages packets inside.
     /// `None` for any other, for strategies that are no law of the registry, and on an object that turns for laws with a past, which may have one of its
     /// attitudes, and for exact means.
     pub(crate) fn of(scene: &Scene, plan: &Plan, strategies: &impl Strategies) -> Option<(Self, BuiltIn)> {

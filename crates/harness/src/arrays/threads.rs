@@ -1,6 +1,6 @@
 //! One run on several threads, to the same bits as on one.
 //!
-//! Each thread has some of the peers: it moves them, and has the links to them with what is on its way there. Peers have to do with each other by what they
+//! Each thread has some of the peers: it moves them, and has the links to them with the samples in flight. Peers have to do with each other by what they
 //! send alone, so threads meet only at ticks at which some peer sends, and hand on what their peers send. Fates of packets have addresses, so it does not
 //! matter who draws them.
 
@@ -38,15 +38,15 @@ pub(super) fn that_pay(shape: &Shape) -> (usize, &'static str) {
     }
 }
 
-/// What threads tell each other.
+/// The words that threads exchange.
 struct Exchange<const P: usize> {
-    /// What each thread has told, in turns: who is early tells the next while others still read the last.
+    /// The words of each thread, in turns: an early thread tells the next while others still read the last.
     told: [Vec<Mutex<Told<P>>>; 2],
     barrier: Barrier,
     goes_on: AtomicBool,
 }
 
-/// What a thread tells at a tick.
+/// The words of a thread at a tick.
 struct Told<const P: usize> {
     samples: Vec<(usize, Sample<P, 1>)>,
     /// The least and the greatest position of its copies along each axis, at each tick since it last told.

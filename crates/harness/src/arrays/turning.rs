@@ -122,7 +122,7 @@ impl TurningBlocks {
     }
 }
 
-/// What is computed of turns at a tick, whatever the law.
+/// The part of a tick that turns, whatever the law.
 struct Turned<'a>(&'a mut TurningBlocks);
 
 impl NullaryFnOnce for Turned<'_> {

@@ -53,7 +53,7 @@ impl Views {
         })
     }
 
-    /// Takes in a copy at a tick. What is not finite is left out.
+    /// Takes in a copy at a tick. Positions that are not finite are left out.
     pub(crate) fn add(&mut self, peer: usize, at: Instant, centre: &[f64], attitude: &Attitude) {
         let (Some(span), Ok(centre)) = (self.spans.span(at), Triple::try_from(centre)) else { return };
         if attitude.is_finite() && centre.iter().all(|x| x.is_finite()) {

@@ -3,7 +3,7 @@
 //! The torque towards the mean of the others has a part of the spring and one of the damper, about each axis of the body. A law takes them as it takes a
 //! difference of positions and one of velocities, with gains of one: so a torque is smoothed or made from an attitude of the past by the same function as a force.
 //!
-//! What is remembered are torques in body axes and attitudes, so neither depends on the axes of the world. A torque made from the attitude of some ticks ago acts
+//! A law remembers torques in body axes and attitudes, and neither depends on the axes of the world. A torque made from the attitude of some ticks ago acts
 //! about the body's axes of now, as a torque that is held over a tick or applied a tick late does.
 
 use alloc::collections::VecDeque;

@@ -71,7 +71,7 @@ pub(crate) fn analyse_loaded(scene: &Scene, watch: &dyn Watch) -> Result<Analysi
 fn loaded(scene: &Scene, network: &NominalNetwork) -> Result<(Together, Vec<Pose>), AnalysisError> {
     let structure = Structure::of_each(scene, network, &contacts(scene)?)?;
     if structure.silent {
-        return Err(AnalysisError::NoRest { why: "a link never delivers, and what is held of the beginning is a load of its own".to_owned() });
+        return Err(AnalysisError::NoRest { why: "a link never delivers, and the samples of the beginning are a load of their own".to_owned() });
     }
     let mut together = Together::new(scene, structure);
     let loaded = Loaded::new(scene, &together.nodes)?;

@@ -69,7 +69,7 @@ const NETEM: [Stage; 10] = [
     Stage::Slots,
 ];
 
-/// The stages of one line and the packets in them. What is seldom is in a box: the lines of a large mesh fill the cache.
+/// The stages of one line and the packets in them. Seldom stages are in boxes: the lines of a large mesh fill the cache.
 #[derive(Clone, Debug)]
 pub(crate) struct Staged<T> {
     layout: &'static [Stage; 10],

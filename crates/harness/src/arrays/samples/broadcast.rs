@@ -20,7 +20,7 @@ pub(in crate::arrays) struct Broadcast<const P: usize, const L: usize> {
     /// The samples held from each sender but the first, by pair of numbers, as the first peer holds it; and from the first.
     held: [Vec<Quad<L>>; P],
     first: Sample<P, L>,
-    /// The sums of what is held from all, if their means are exact.
+    /// The sums of the samples held from all, if their means are exact.
     sums: Option<ExactMeans<P>>,
     /// How many samples of each sender have arrived.
     arrived: Vec<u64>,
@@ -83,7 +83,7 @@ impl<const P: usize, const L: usize> Broadcast<P, L> {
         }
     }
 
-    /// What is held from a sender in the first run: others with this number of peers there are not.
+    /// The sample held from a sender in the first run: with this number of peers there are no others.
     fn held_from(&self, sender: usize) -> State<P> {
         match sender.checked_sub(1) {
             None => self.first.state(0),

@@ -32,7 +32,7 @@ pub(in crate::arrays) struct PerPacket<const P: usize, const L: usize> {
     in_flight: InFlight<P>,
     /// Samples held, by pair of numbers, then receiver, then sender with the receiver left out. Each receiver has [`row_of`] places, of which the last may be empty.
     held: [Vec<Quad<L>>; P],
-    /// By receiver the sums of what it holds, if the means are exact: then there is one run.
+    /// By receiver the sums of its samples, if the means are exact: then there is one run.
     sums: Vec<ExactMeans<P>>,
     /// By place, then run: the lowest sequence number that is newer than the sample held.
     next: Vec<u64>,

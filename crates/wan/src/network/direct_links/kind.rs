@@ -54,7 +54,7 @@ pub(super) enum Verdict {
 }
 
 impl Kind {
-    /// The kind of such links, for packets of that size; `None` if they remember what is not [`Remembered`].
+    /// The kind of such links, for packets of that size; `None` if they remember more than [`Remembered`].
     pub(super) fn new(config: &LinkConfig, size: Bytes) -> Option<Self> {
         let loss = match &config.loss {
             Loss::None => Losses::None,
