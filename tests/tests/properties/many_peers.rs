@@ -12,7 +12,7 @@ const SETTLED: u64 = 30;
 
 const SCENE: &str = r#"
     scene = { duration = "1s", count = 10000 }
-    object = { mass = 1.0, damping = 20.0, velocity = 0.3 }
+    object = { mass = 10000.0, damping = 20.0, velocity = 0.3 }
     coordination = { strategy = "average-position", stiffness = 20000.0, damping = 10.0, update = "8ms" }
     peer = { contact = "none", device = { mass = 0.1, damping = 1.0 }, tick = "2ms" }
     peers = [{ name = "peer1", position = 0.5 }]

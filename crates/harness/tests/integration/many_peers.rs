@@ -4,10 +4,10 @@ use cohaptic_harness::record::links_csv;
 use cohaptic_harness::{Model, NoObserver, Simulation, Summary, too_large};
 use cohaptic_scene::Scene;
 
-/// That number of peers over a constant delay of 24 ms; the first begins elsewhere.
+/// That number of peers with copies of 1 kg over a constant delay of 24 ms; the first begins elsewhere.
 fn run(peers: usize, duration: &str, link: &str) -> Summary {
     let text = format!(
-        "scene = {{ duration = \"{duration}\", count = {peers} }}\nobject = {{ mass = 1.0, damping = 1.0 }}\nlink = {{ delay = \"24ms\", {link} }}\n\
+        "scene = {{ duration = \"{duration}\", count = {peers} }}\nobject = {{ mass = {peers}.0, damping = 1.0 }}\nlink = {{ delay = \"24ms\", {link} }}\n\
          coordination = {{ strategy = \"average-position\", stiffness = 500.0, update = \"8ms\" }}\n\
          peer = {{ contact = \"none\", device.mass = 0.1 }}\npeers = [{{ name = \"peer1\", position = 0.5 }}]\n"
     );
