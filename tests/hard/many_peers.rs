@@ -62,7 +62,9 @@ fn a_sum_that_cancels_to_nothing_is_within_the_bound() {
         let half = (0..others / 2).map(|place| libm::sin(place as f64) * libm::exp2((place % 97) as f64));
         let values: Vec<f64> = half.clone().chain(half.rev().map(|value| -value)).collect();
         within_the_bound(&values);
-        within_the_bound(&(0..others).map(|place| libm::exp2(place as f64 / 10.0 - 500.0) * if place % 2 == 0 { 1.0 } else { -1.0 }).collect::<Vec<_>>());
+        within_the_bound(
+            &(0..others).map(|place| libm::exp2(place as f64 / 10.0 - 500.0) * if place % 2 == 0 { 1.0 } else { -1.0 }).collect::<Vec<_>>(),
+        );
     }
 }
 

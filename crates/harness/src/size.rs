@@ -21,7 +21,7 @@ const A_LINK_WITH_EVENTS: u64 = 1000;
 pub struct TooLarge {
     /// The first peer that is too many, by its place in the scene; the last one if it is the memory that does not suffice.
     pub peer: usize,
-    /// What is too large for what, and what would make it fit.
+    /// Which part is too large, and a cure.
     pub reason: String,
 }
 
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(peer, 23_170);
         assert!(reason.contains("at most 23170 peers: expected fewer peers, or to look at nothing but counters"), "{reason}");
         assert!(reason.contains("takes 39 MB"), "{reason}");
-        let jitter = scene(1000, "delay = \"24ms\", jitter = \"2ms\", distribution = \"normal\"");
+        let jitter = scene(1000, "delay = \"24ms\", jitter = \"2ms\"");
         let [with_events, in_arrays] = [Way::Events, Way::Packets].map(|way| way.bytes(1000));
         assert!((refused(&jitter, true, with_events).is_none(), refused(&jitter, false, in_arrays).is_none()) == (true, true));
         assert!(refused(&jitter, true, with_events - 1).unwrap().1.contains("to look at nothing but counters"));

@@ -1,4 +1,4 @@
-//! Who looks at a run in arrays.
+//! Observers of runs in arrays.
 
 use cohaptic_peer::rotation::{Attitude, Triple};
 use cohaptic_scene::Scene;

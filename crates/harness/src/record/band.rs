@@ -13,7 +13,7 @@ pub struct Bands {
     /// The width of a span \[ns\]; the last one may be cut short by the end.
     width: u64,
     curves: usize,
-    /// The lowest and the highest value by span, then curve: what is added at an instant lies together. [`NOTHING`] where nothing was added.
+    /// The lowest and the highest value by span, then curve: values added at an instant lies together. [`NOTHING`] where nothing was added.
     extremes: Vec<(f64, f64)>,
     /// The span of the latest value, and the instants in it \[ns\]: finding a span takes a division.
     latest: (usize, Range<u64>),

@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn numbers_are_written_in_one_way() {
         let values = [0.0, -0.0, 1.0, -0.024, 1e15, 1e16, -2.5e300, 1e-5, 1.5e-7, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
-        let texts = ["0.0", "-0.0", "1.0", "-0.024", "1000000000000000.0", "1e16", "-2.5e300", "1e-5", "1.5e-7", "NaN", "inf", "-inf"];
+        let texts = ["0.0", "-0.0", "1.0", "-0.024", "1000000000000000.0", "1e16", "-2.5e300", "0.00001", "1.5e-7", "NaN", "inf", "-inf"];
         assert_eq!(values.map(|value| written(|line| push_f64(line, value))), texts.map(|text| format!("x{text}")));
     }
 }

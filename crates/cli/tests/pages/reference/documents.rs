@@ -349,7 +349,7 @@ const DOCUMENTS: [Document; 21] = [
                 "peers[].seat.late, peers[].seat.most_late_us",
                 "samples that came after their instant and counted at the next, and by how much at most",
             ),
-            ("link_totals, link_quantiles, links[].from, links[].to, links[].@Counters, access_lines", "as of a run"),
+            ("link_totals.NAME, link_quantiles.NAME, links[].from, links[].to, links[].@Counters, access_lines", "as of a run"),
             ("door.address, door.handled", "with other programs: where it listens; `handled` = `admitted` + `welcomed` + all of `refused`"),
             ("door.admitted, door.welcomed, door.refused.NAME", "datagrams; refused ones [by cause](live-protocol.md#why-a-datagram-is-refused)"),
             ("door.joinings, door.sent, door.nobody_there, door.send_failures.NAME, door.oversized, door.kernel_drops", "what else was counted"),
