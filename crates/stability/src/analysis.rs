@@ -143,6 +143,20 @@ pub fn analyse_loaded(scene: &Scene, method: Method, watch: &dyn Watch) -> Resul
     if scene.rotation.is_some() { turning::analyse_loaded(scene, watch) } else { analyse_watched(scene, method, watch) }
 }
 
+/// [`analyse_watched`] about the steady spin that constant torques of the hands drive about one axis of the world, near the attitude in which the object begins, and near
+/// its angular velocity if it has one. The samples that copies hold are behind by their age, which brakes; the rate is the one at which torques make up for that and for
+/// the damping.
+///
+/// # Errors
+///
+/// As [`analyse_watched`]; if the object does not turn, or nothing drives a steady spin.
+pub fn analyse_spinning(scene: &Scene, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
+    if scene.rotation.is_none() {
+        return Err(AnalysisError::NoSpin { why: "the object has no inertia".to_owned() });
+    }
+    turning::analyse_spinning(scene, watch)
+}
+
 /// Analyses the scene by the general path, with strategies of the caller's own.
 ///
 /// # Errors

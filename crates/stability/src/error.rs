@@ -65,6 +65,12 @@ pub enum AnalysisError {
         /// Why.
         why: String,
     },
+    /// No steady spin.
+    #[error("there is no steady spin: {why}; expected hands with constant torques about one axis and without forces")]
+    NoSpin {
+        /// Why.
+        why: String,
+    },
     /// The object turns, and this analysis does not follow that.
     #[error("{what} does not follow an object that turns: expected a scene without object.inertia")]
     NoTurns {

@@ -56,7 +56,7 @@ mod watch;
 mod worst_case;
 
 pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, PushedAxis, admittance, ideal};
-pub use analysis::{Analysis, ContactMode, Method, UNLOADED, analyse, analyse_loaded, analyse_watched, analyse_with};
+pub use analysis::{Analysis, ContactMode, Method, UNLOADED, analyse, analyse_loaded, analyse_spinning, analyse_watched, analyse_with};
 pub use boundary::{Boundary, BoundaryError, BoundaryOptions, Crossing, Stretch};
 pub use cost::{FrameCost, eigenvalue_operations, full_operations};
 pub use determinant::{DelayedLoop, DelayedLoopError, Kernel};

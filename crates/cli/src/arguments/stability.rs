@@ -37,7 +37,8 @@ pub(crate) struct PointArguments {
     /// pays); or the whole state pushed through the code that simulates
     #[arg(long, value_enum, default_value_t = MethodName::Reduced)]
     pub(crate) method: MethodName,
-    /// Which rest the motions are about: all copies together and nobody pushing, or where the constant forces of the hands leave an object that turns
+    /// What small motions are about: all copies together at rest and nobody pushing; for an object that turns, the rest under constant forces of the hands, or the steady spin
+    /// under their constant torques about one axis
     #[arg(long, value_enum, value_name = "REST", default_value_t = RestName::Unloaded, conflicts_with_all = ["graph", "losses_in_a_row", "delay_within"])]
     pub(crate) about: RestName,
     /// Let each peer hear only its neighbours: complete (as the scene is), ring, star, or a CSV file of mutual weights, one row a peer. The peers must
@@ -85,11 +86,12 @@ impl From<AxisName> for PushedAxis {
     }
 }
 
-/// Which rest small motions are about.
+/// Which motion small motions are about.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum RestName {
     Unloaded,
     Loaded,
+    Spinning,
 }
 
 /// Which links share their fate.

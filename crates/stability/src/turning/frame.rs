@@ -2,7 +2,7 @@
 
 use cohaptic_peer::Motion;
 
-use super::load::apply;
+use super::algebra::apply;
 use super::node::Node;
 use super::rigid::Displacement;
 use crate::cost::{full_operations, pushed_operations};

@@ -15,9 +15,11 @@ use cohaptic_peer::rotation::{Attitude, Matrix3, Triple, aligning_torque, turnin
 use cohaptic_peer::{Gains, Hand, Signal};
 use cohaptic_scene::Scene;
 
+use super::algebra::{IDENTITY, add, apply, cross, product, skew, sum, trace_less, transposed, twice_axial, unit};
+use super::levenberg::zero;
 use super::node::Node;
+use crate::AnalysisError;
 use crate::structure::count;
-use crate::{AnalysisError, Matrix};
 
 /// Where a copy and its device are.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -198,58 +200,12 @@ impl<'a> Loaded<'a> {
     /// Where the peers come to rest: the pose without forces that Levenberg's (1944) method reaches from where they begin.
     pub(super) fn rest(&self) -> Result<Vec<Pose>, AnalysisError> {
         let size: usize = (0..self.nodes.len()).map(|place| self.unknowns(place)).sum();
-        let norm = |residual: &[f64]| residual.iter().map(|entry| entry * entry).sum::<f64>().sqrt();
-        let mut poses = self.start();
-        let mut residual = self.residual(&poses);
-        let mut damping = 1e-6;
-        for _ in 0..MOST_STEPS {
-            // Of a residual of some lengths of a metre, rounding leaves this much.
-            if norm(&residual) <= 1e-15 * count(size) {
-                return Ok(poses);
-            }
-            let slope = self.slope(&poses, size);
-            let normal = faer::Mat::from_fn(size, size, |row, column| {
-                let product: f64 = (0..size).map(|entry| slope[(entry, row)] * slope[(entry, column)]).sum();
-                product + if row == column { damping } else { 0.0 }
-            });
-            let right = faer::Mat::from_fn(size, 1, |row, _| -(0..size).map(|entry| slope[(entry, row)] * residual[entry]).sum::<f64>());
-            let solution = faer::linalg::solvers::Solve::solve(&normal.partial_piv_lu(), &right);
-            let step: Vec<f64> = (0..size).map(|row| solution[(row, 0)]).collect();
-            let next = self.moved(&poses, &step);
-            let reached = self.residual(&next);
-            if norm(&reached) < norm(&residual) {
-                (poses, residual, damping) = (next, reached, (0.1 * damping).max(1e-14));
-            } else if norm(&step) <= f64::EPSILON * count(size) {
-                break;
-            } else {
-                damping = (10.0 * damping).min(1e6);
-            }
-        }
-        let left = norm(&residual);
+        let (poses, left) = zero(self.start(), size, |poses| self.residual(poses), |poses, by| self.moved(poses, by));
         // The last digits of springs that are much softer than the stiffest.
         if left <= 1e-12 {
             return Ok(poses);
         }
         Err(AnalysisError::NoRest { why: format!("forces of the hands are left over: about {:.2e} N", left * self.stiffest()) })
-    }
-
-    /// The slope of the residual, by central differences.
-    fn slope(&self, poses: &[Pose], size: usize) -> Matrix {
-        const STEP: f64 = 1e-6;
-        let mut slope = Matrix::zeros(size, size);
-        let mut by = vec![0.0; size];
-        for column in 0..size {
-            let mut at = |step: f64| {
-                by[column] = step;
-                let found = self.residual(&self.moved(poses, &by));
-                by[column] = 0.0;
-                found
-            };
-            for (row, (up, down)) in at(STEP).iter().zip(at(-STEP)).enumerate() {
-                slope[(row, column)] = (up - down) / (2.0 * STEP);
-            }
-        }
-        slope
     }
 
     /// The nodes of small motions about those poses.
@@ -335,55 +291,4 @@ impl<'a> Loaded<'a> {
         };
         (0..6).map(motion).collect()
     }
-}
-
-/// Levenberg's method takes some ten steps from where hands are near rest.
-const MOST_STEPS: usize = 500;
-
-const IDENTITY: Matrix3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
-fn unit(axis: usize) -> Triple {
-    IDENTITY[axis]
-}
-
-fn add(a: Triple, b: Triple) -> Triple {
-    std::array::from_fn(|axis| a[axis] + b[axis])
-}
-
-pub(super) fn cross(a: Triple, b: Triple) -> Triple {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// A·v.
-pub(super) fn apply(matrix: &Matrix3, vector: Triple) -> Triple {
-    matrix.map(|row| row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2])
-}
-
-/// \[a\].
-fn skew([x, y, z]: Triple) -> Matrix3 {
-    [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
-}
-
-fn transposed(matrix: &Matrix3) -> Matrix3 {
-    std::array::from_fn(|row| std::array::from_fn(|column| matrix[column][row]))
-}
-
-fn product(a: &Matrix3, b: &Matrix3) -> Matrix3 {
-    let b = transposed(b);
-    std::array::from_fn(|row| std::array::from_fn(|column| (0..3).map(|k| a[row][k] * b[column][k]).sum()))
-}
-
-fn sum(a: &Matrix3, b: &Matrix3) -> Matrix3 {
-    std::array::from_fn(|row| std::array::from_fn(|column| a[row][column] + b[row][column]))
-}
-
-/// tr A·I − A.
-fn trace_less(a: &Matrix3) -> Matrix3 {
-    let trace = a[0][0] + a[1][1] + a[2][2];
-    std::array::from_fn(|row| std::array::from_fn(|column| if row == column { trace } else { 0.0 } - a[row][column]))
-}
-
-/// The axial vector of A − Aᵀ.
-fn twice_axial(a: &Matrix3) -> Triple {
-    [a[2][1] - a[1][2], a[0][2] - a[2][0], a[1][0] - a[0][1]]
 }

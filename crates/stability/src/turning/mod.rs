@@ -10,10 +10,14 @@
 //! The terms that a peer has beyond these are products of small ones. Frames, samples and delays are those of [`crate::full`]; each component moves by the step
 //! map of one axis. Angles are multiplied by √(tr J/3m), so that all states are lengths. Peers that are equal, in their grasps too, are taken together.
 
+mod algebra;
 mod frame;
+mod levenberg;
 mod load;
 mod node;
+mod peers;
 mod rigid;
+mod spin;
 #[cfg(test)]
 mod tests;
 
@@ -26,6 +30,7 @@ pub(crate) use self::frame::Turning;
 use self::load::{Loaded, Pose};
 pub(crate) use self::node::Node;
 use self::rigid::Displacement;
+use self::spin::Spin;
 use crate::analysis::{Analysis, ContactMode, combine};
 use crate::cost::eigenvalue_operations;
 use crate::network::NominalNetwork;
@@ -60,6 +65,40 @@ pub(crate) fn analyse_loaded(scene: &Scene, watch: &dyn Watch) -> Result<Analysi
     let angle = pairs().map(|(one, other)| one.attitude.angle_to(&other.attitude.orientation)).fold(0.0, f64::max);
     analysis.notes.push(format!(
         "the object turns: the verdict is about small motions near the rest under the constant forces of the hands, copies {distance:.3e} m and {angle:.3e} rad apart"
+    ));
+    if scene.object.enclosure.is_some() {
+        analysis.notes.push("the enclosure is left out: the scene is analysed away from its walls".to_owned());
+    }
+    Ok(analysis)
+}
+
+/// Analyses an object that turns about the steady spin that torques of the hands drive, each peer by itself.
+pub(crate) fn analyse_spinning(scene: &Scene, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
+    let network = NominalNetwork::of(scene)?;
+    let spin = Spin::of(scene, &network)?;
+    let (matrix, error) = spin.monodromy(scene, watch).ok_or(AnalysisError::Stopped)?;
+    if watch.stops() {
+        return Err(AnalysisError::Stopped);
+    }
+    let structure = &spin.together.structure;
+    let radius = bounded_radius(&matrix, error);
+    let parts = vec![Part { kind: PartKind::Whole, size: matrix.rows(), copies: 1, radius, method: Method::Full }];
+    let mode = ContactMode {
+        motion: "translations and turns together".to_owned(),
+        contacts: String::new(),
+        radius: radius_of(&parts),
+        parts,
+        rigid_modes: spin.together.turning().size() - matrix.rows(),
+        dimension: matrix.rows(),
+        frame: structure.timetable.frame,
+    };
+    let mut analysis = combine(vec![mode], Method::Full, &network, scene);
+    analysis.notes.retain(|note| note != UNLOADED);
+    let [x, y, z] = spin.axis;
+    analysis.notes.push(format!(
+        "the object turns: the verdict is about small motions near a steady spin of {:.6} rad/s about ({x:.3}, {y:.3}, {z:.3}), copies {:.3e} rad apart",
+        spin.rate,
+        spin.apart()
     ));
     if scene.object.enclosure.is_some() {
         analysis.notes.push("the enclosure is left out: the scene is analysed away from its walls".to_owned());

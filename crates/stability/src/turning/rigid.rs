@@ -1,7 +1,7 @@
 //! Displacements and turns of everything together, which nothing resists.
 
+use super::algebra::cross;
 use super::frame::Turning;
-use super::load::cross;
 use super::node::Node;
 
 /// A displacement that nothing resists: how it moves the copy and the device of each node, and which of the components of the first copy tells how far it is.

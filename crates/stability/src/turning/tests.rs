@@ -1,18 +1,12 @@
 //! The linear equations against real peers that turn.
 
-use cohaptic_peer::coordination::BuiltInStrategy;
-use cohaptic_peer::rotation::{Attitude, Triple};
-use cohaptic_peer::{Device as _, Hand, Held, ObjectCopy, Peer, Signal, SimulatedDevice, State};
-use cohaptic_scene::{FromScene, Scene, Strategies};
+use cohaptic_peer::rotation::Attitude;
+use cohaptic_peer::{Hand, Signal, State};
+use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
+use super::peers::{Bases, Member, members, slope};
 use super::*;
-use crate::timetable::{Event, Instants};
-
-type Member = Peer<3, SimulatedDevice<3>, BuiltInStrategy<3>>;
-
-/// What every clock shows when a frame begins \[ns\].
-const EARLIER: i64 = 1 << 60;
 
 const SCENE: &str = r#"
     peer         = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
@@ -49,18 +43,12 @@ fn scene(overrides: &[&str]) -> Scene {
 }
 
 /// The peers; arms hold their devices where they begin, but `loaded` hands do what the scene says.
-fn members(scene: &Scene, loaded: bool) -> Vec<Member> {
-    let member = |place: usize| {
-        let spec = &scene.peers[place];
+fn peers(scene: &Scene, loaded: bool) -> Vec<Member> {
+    members(scene, |place| {
+        let hand = scene.peers[place].hand.clone();
         let grasp = scene.rotation.as_ref().unwrap().peers[place].grasp;
-        let rests = || spec.hand.as_ref().and_then(Hand::arm).map(|arm| Hand::Arm { arm, follows: Signal::Constant(grasp) });
-        let hand = if loaded { spec.hand.clone() } else { rests() };
-        let device = SimulatedDevice::new(spec.device, hand.as_ref(), State::REST, scene.integrator, &spec.clock);
-        let object = ObjectCopy::new(scene.copy_config(place), State::REST, scene.integrator, &spec.clock);
-        let held = Held::new((1..scene.peers.len()).map(|_| State::REST));
-        Peer::new(scene.peer_config(place), device, object, FromScene.strategy(scene, place), held).with_rotation(scene.rotation_of(place).unwrap())
-    };
-    (0..scene.peers.len()).map(member).collect()
+        if loaded { hand } else { hand.and_then(|hand| hand.arm()).map(|arm| Hand::Arm { arm, follows: Signal::Constant(grasp) }) }
+    })
 }
 
 /// Where peers begin without a load: copies at the origin, devices at their grasp points.
@@ -69,120 +57,22 @@ fn at_rest(scene: &Scene) -> Vec<Pose> {
     grasps.map(|device| Pose { centre: [0.0; 3], attitude: Attitude::REST, device, handle: Attitude::REST }).collect()
 }
 
-fn body(base: Triple, position: &[f64], velocity: &[f64], time: f64) -> State<3> {
-    State { position: std::array::from_fn(|axis| base[axis] + position[axis]), velocity: std::array::from_fn(|axis| velocity[axis] / time) }
-}
-
-fn attitude(base: &Attitude, angle: &[f64], rate: &[f64], length: f64, time: f64) -> Attitude {
-    let mut attitude = Attitude { rate: std::array::from_fn(|axis| rate[axis] / length / time), ..*base };
-    attitude.turn(std::array::from_fn(|axis| angle[axis] / length));
-    attitude
-}
-
-/// The rotation vector from one attitude to another, in the body axes of the first.
-fn angle(base: &Attitude, attitude: &Attitude) -> Triple {
-    let ([w, x, y, z], [a, b, c, d]) = (base.orientation, attitude.orientation);
-    let relative = [w * a + x * b + y * c + z * d, w * b - x * a - y * d + z * c, w * c - y * a - z * b + x * d, w * d - z * a - x * c + y * b];
-    Attitude { orientation: relative, rate: [0.0; 3] }.rotation_vector()
-}
-
-fn copy_of(z: &[f64], base: &Pose, node: &Node, time: f64) -> (State<3>, Attitude) {
-    (body(base.centre, z, &z[6..], time), attitude(&base.attitude, &z[3..], &z[9..], node.length, time))
-}
-
-fn write(z: &mut [f64], base: &Pose, node: &Node, time: f64, (state, attitude): (&State<3>, &Attitude)) {
-    let turned = angle(&base.attitude, attitude);
-    for axis in 0..3 {
-        (z[axis], z[6 + axis]) = (state.position[axis] - base.centre[axis], state.velocity[axis] * time);
-        (z[3 + axis], z[9 + axis]) = (turned[axis] * node.length, attitude.rate[axis] * node.length * time);
-    }
-}
-
-fn put(members: &mut [Member], turning: &Turning<'_>, bases: &[Pose], z: &[f64]) {
-    let mut first = 0;
-    for ((member, node), base) in members.iter_mut().zip(turning.nodes).zip(bases) {
-        let (z, time, devices) = (&z[first..], turning.time, node.device.len());
-        first += node.states();
-        let (state, turned) = copy_of(z, base, node, time);
-        member.object_mut().set_state(state);
-        member.device_mut().set_state(body(base.device, &z[12..], &z[12 + devices..], time));
-        let rotation = member.rotation_mut().unwrap();
-        rotation.set_copy(turned);
-        if devices == 6 {
-            rotation.set_device(attitude(&base.handle, &z[15..], &z[15 + devices..], node.length, time));
-        }
-        member.set_local_time(Instant::from_nanos(EARLIER.unsigned_abs()));
-    }
-}
-
 /// Where a frame leads real peers, with the numbers of [`Turning`]. Forces that wait are those that peers compute `before`, if they do; at the end they are left at zero.
-fn pushed(members: &mut [Member], turning: &Turning<'_>, bases: &[Pose], z: &[f64], before: Option<&[f64]>) -> Vec<f64> {
-    let (nodes, time, timetable) = (turning.nodes, turning.time, turning.timetable);
-    let firsts: Vec<usize> = (0..nodes.len()).map(|place| nodes[..place].iter().map(Node::states).sum()).collect();
+fn pushed(members: &mut [Member], turning: &Turning<'_>, poses: &[Pose], z: &[f64], before: Option<&[f64]>) -> Vec<f64> {
+    let bases = Bases::resting(poses.to_vec(), turning);
     if let Some(before) = before {
         for (to, member) in members.iter_mut().enumerate() {
-            for (other, base) in bases.iter().enumerate().filter(|(other, _)| *other != to).map(|(_, base)| base).enumerate() {
+            for (other, base) in poses.iter().enumerate().filter(|(other, _)| *other != to).map(|(_, base)| base).enumerate() {
                 member.hold(other, Instant::ZERO, State { position: base.centre, velocity: [0.0; 3] });
                 member.rotation_mut().unwrap().hold(other, &base.attitude);
             }
         }
-        put(members, turning, bases, before);
+        bases.put(members, turning, before);
         for member in members.iter_mut() {
             member.compute(Instant::ZERO);
         }
     }
-    put(members, turning, bases, z);
-    let mut next: usize = nodes.iter().map(Node::states).sum();
-    let mut samples = Vec::new();
-    for ((node, base), depth) in nodes.iter().zip(bases).zip(&timetable.depth) {
-        let earlier = z[next..next + depth * 12].chunks_exact(12).map(|sample| copy_of(sample, base, node, time));
-        samples.push(earlier.rev().collect::<Vec<_>>());
-        next += depth * 12;
-    }
-    let instants = Instants::of(timetable, nodes.len());
-    let hold = |members: &mut [Member], samples: &[Vec<(State<3>, Attitude)>], (to, from, sample): (usize, usize, i64)| {
-        let (state, attitude) = samples[from][usize::try_from(i64::try_from(timetable.depth[from]).unwrap() + sample).unwrap()];
-        let sent = Instant::from_nanos((EARLIER + instants.sent_at(from, sample, timetable.frame)).unsigned_abs());
-        let other = if from < to { from } else { from - 1 };
-        members[to].hold(other, sent, state);
-        members[to].rotation_mut().unwrap().hold(other, &attitude);
-    };
-    timetable.held.iter().for_each(|held| hold(members, &samples, *held));
-    for event in &timetable.events {
-        match *event {
-            Event::Sample { node } => {
-                let sample = (*members[node].object().state(), *members[node].rotation().unwrap().copy());
-                samples[node].push(sample);
-            }
-            Event::Deliver { from, to, sample } => hold(members, &samples, (to, from, sample)),
-            Event::Tick { node, at, span } => {
-                members[node].compute(Instant::from_nanos(at));
-                members[node].advance(Instant::from_nanos(at), span);
-            }
-        }
-    }
-    let mut reached = vec![0.0; z.len()];
-    for (place, member) in members.iter().enumerate() {
-        let (node, base, out) = (&nodes[place], &bases[place], &mut reached[firsts[place]..]);
-        let rotation = member.rotation().unwrap();
-        write(out, base, node, time, (member.object().state(), rotation.copy()));
-        let (state, devices) = (member.device().state(), node.device.len());
-        for axis in 0..3 {
-            (out[12 + axis], out[12 + devices + axis]) = (state.position[axis] - base.device[axis], state.velocity[axis] * time);
-            if let Some(device) = rotation.device() {
-                let turned = angle(&base.handle, device)[axis] * node.length;
-                (out[15 + axis], out[15 + devices + axis]) = (turned, device.rate[axis] * node.length * time);
-            }
-        }
-    }
-    let mut next: usize = nodes.iter().map(Node::states).sum();
-    for (((node, base), samples), depth) in nodes.iter().zip(bases).zip(&samples).zip(&timetable.depth) {
-        for (state, attitude) in samples.iter().rev().take(*depth) {
-            write(&mut reached[next..], base, node, time, (state, attitude));
-            next += 12;
-        }
-    }
-    reached
+    bases.reached(members, turning, z)
 }
 
 /// The states that are no forces that wait.
@@ -198,23 +88,17 @@ fn known(turning: &Turning<'_>) -> Vec<usize> {
     (0..turning.size()).filter(|state| !waits(*state)).collect()
 }
 
-/// Central differences over ±e and ±e/2, taken together for an error of order e⁴.
-fn slope(at: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
-    let over = |size: f64| -> Vec<f64> { at(size).iter().zip(at(-size)).map(|(up, down)| (up - down) / (2.0 * size)).collect() };
-    over(2e-5).iter().zip(over(1e-5)).map(|(coarse, fine)| (4.0 * fine - coarse) / 3.0).collect()
-}
-
 /// Compares all columns but those of forces that wait, and gives the largest entry.
 fn compare(scene: &Scene, turning: &Turning<'_>, bases: &[Pose], loaded: bool) -> f64 {
     let known = known(turning);
     let mut largest = 0.0_f64;
     for column in &known {
-        let found = slope(|size| {
+        let (found, _) = slope(|size| {
             let mut z = vec![0.0; turning.size()];
             z[*column] = size;
             // What each computes before at rest waits as at rest.
             let rest = vec![0.0; z.len()];
-            pushed(&mut members(scene, loaded), turning, bases, &z, scene.peers[0].compute_delay.then_some(&*rest))
+            pushed(&mut peers(scene, loaded), turning, bases, &z, scene.peers[0].compute_delay.then_some(&*rest))
         });
         let mut unit = vec![0.0; turning.size()];
         unit[*column] = 1.0;
@@ -264,10 +148,10 @@ fn forces_that_wait_are_those_of_real_peers() {
     let known = known(&turning);
     let states: usize = turning.nodes.iter().map(Node::states).sum();
     for column in known.iter().copied().filter(|state| *state < states) {
-        let found = slope(|size| {
+        let (found, _) = slope(|size| {
             let mut before = vec![0.0; turning.size()];
             before[column] = size;
-            pushed(&mut members(&scene, false), &turning, &bases, &vec![0.0; turning.size()], Some(&before))
+            pushed(&mut peers(&scene, false), &turning, &bases, &vec![0.0; turning.size()], Some(&before))
         });
         // One tick in which no delayed force acts leaves the computed forces those of the state before.
         let mut before = vec![0.0; turning.size()];
@@ -332,7 +216,7 @@ fn about_a_load_the_equations_are_the_linear_part_of_real_peers() {
         let turning = together.turning();
         // Forces of some newtons are rounded, and move what they act on for a frame.
         let rest = vec![0.0; turning.size()];
-        let stays = pushed(&mut members(&scene, true), &turning, &poses, &rest, scene.peers[0].compute_delay.then_some(&*rest));
+        let stays = pushed(&mut peers(&scene, true), &turning, &poses, &rest, scene.peers[0].compute_delay.then_some(&*rest));
         assert!(known(&turning).iter().all(|state| stays[*state].abs() < 1e-11), "{overrides:?}");
         assert!(compare(&scene, &turning, &poses, true) > 1.0);
         for free in &turning.free {
@@ -366,6 +250,57 @@ fn without_rest_there_is_no_verdict() {
         (&["links=[{ from = 'a', to = 'b', loss = 1 }]"], "a link never delivers"),
     ] {
         let error = analyse_loaded(&scene(overrides), &Unwatched).unwrap_err().to_string();
+        assert!(error.contains(why), "{overrides:?}: {error}");
+    }
+}
+
+/// A free body that turns about the axis of its middle moment departs as e^(λt), λ = ω·√((J₂ − J₁)(J₃ − J₂)/(J₁J₃)) (Euler 1758), and about the others it does not. Samples are
+/// of the same instant here, so that copies that are together stay so.
+#[test]
+fn about_the_middle_axis_a_spin_departs_as_that_of_a_free_body() {
+    let [j1, j2, j3] = [1.2e-4, 2.0e-4, 2.6e-4_f64];
+    for (axis, inertias) in [([5.0, 0.0, 0.0], None), ([0.0, 5.0, 0.0], Some((j2 - j1) * (j3 - j2) / (j1 * j3))), ([0.0, 0.0, 5.0], None)] {
+        let spinning = format!("object.angular-velocity={axis:?}");
+        let nobody = ["a", "b", "c"].map(|peer| format!("peers.{peer}.contact=none"));
+        let mut overrides = vec![spinning.as_str(), "object.rotational-damping=0", "link.delay=0ms", "coordination.update=1ms"];
+        overrides.extend(nobody.iter().map(String::as_str));
+        let analysis = analyse_spinning(&scene(&overrides), &Unwatched).unwrap();
+        let expected = inertias.map_or(1.0, |squared: f64| libm::exp(5.0 * squared.sqrt() * 1e-3));
+        // The step is of fourth order in the angle of a tick, and differences leave 1e-9.
+        assert!((analysis.radius.value - expected).abs() < 1e-8, "{axis:?}: {} is not {expected}", analysis.radius.value);
+    }
+}
+
+/// What hands do to a spin: the torque of one turns all, and attitudes that are behind brake.
+const SPINNING: [&str; 4] = [
+    "peers.b.hand={ force = [0, 0, 0], torque = [0, 0, 0.2] }",
+    "peers.a.contact=none",
+    "peers.c.contact=none",
+    "object.rotational-damping=[1e-3, 2e-3, 1.5e-3]",
+];
+
+/// Real peers that begin with the steady spin keep it over a hundred frames, and at the state of a frame all directions that are taken out are left as they are.
+#[test]
+fn a_steady_spin_is_that_of_real_peers() {
+    let scene = scene(&SPINNING);
+    let network = NominalNetwork::of(&scene).unwrap();
+    let spin = Spin::of(&scene, &network).unwrap();
+    assert!((0.5..50.0).contains(&spin.rate), "{}", spin.rate);
+    assert!(spin.apart() > 1e-3, "{}", spin.apart());
+    spin.assert_steady(&scene);
+}
+
+#[test]
+fn without_a_steady_spin_there_is_no_verdict() {
+    for (overrides, why) in [
+        (&[][..], "no hand exerts a torque"),
+        (&["peers.a.hand={ force = [1, 0, 0] }"], "the hand of a pushes in one direction"),
+        (&["peers.b.hand={ sine = { amplitude = [0, 0, 0], frequency = 1, torque = [0, 0, 0.1] } }"], "varies"),
+        (&["links=[{ from = 'a', to = 'b', loss = 1 }]", SPINNING[0]], "a link never delivers"),
+        (&["peers.a.compute-delay=1", SPINNING[0]], "a applies forces a tick late"),
+        (&[arm("c").as_str(), SPINNING[0]], "the arm of c ties the object to the world"),
+    ] {
+        let error = analyse_spinning(&scene(overrides), &Unwatched).unwrap_err().to_string();
         assert!(error.contains(why), "{overrides:?}: {error}");
     }
 }

@@ -9,7 +9,8 @@ use std::process::ExitCode;
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{
-    Analysis, AnalysisError, Graph, GraphError, Judgement, Limits, Matrix, analyse_loaded, analyse_on_watched, has_chance, judge_watched,
+    Analysis, AnalysisError, Graph, GraphError, Judgement, Limits, Matrix, analyse_loaded, analyse_on_watched, analyse_spinning, has_chance,
+    judge_watched,
 };
 
 use crate::analysis_watch::AnalysisWatch;
@@ -34,6 +35,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
             let judged = match arguments.about {
                 RestName::Unloaded => judge_watched(&scene, arguments.method.into(), &Limits { watch: &watch, ..Limits::of_unknowns(usize::MAX) }),
                 RestName::Loaded => analyse_loaded(&scene, arguments.method.into(), &watch).map(|analysis| nominal(&scene, analysis, "about a load")),
+                RestName::Spinning => analyse_spinning(&scene, &watch).map(|analysis| nominal(&scene, analysis, "about a spin")),
             };
             watch.clear();
             judged.map_err(|error| if error == AnalysisError::Stopped { ended() } else { not_analysed(path, &error) })?

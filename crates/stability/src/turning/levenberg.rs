@@ -1,0 +1,61 @@
+//! Zeros of forces: the method of Levenberg (1944).
+
+use crate::Matrix;
+
+/// Some ten steps lead from near a zero to it.
+const MOST_STEPS: usize = 200;
+
+/// A place near `start` at which no residual is left, and the size of what is left there at least. A place moves by `size` numbers.
+pub(super) fn zero<P>(start: P, size: usize, residual: impl Fn(&P) -> Vec<f64>, moved: impl Fn(&P, &[f64]) -> P) -> (P, f64) {
+    let mut place = start;
+    let mut left = residual(&place);
+    let mut damping = 1e-6;
+    for _ in 0..MOST_STEPS {
+        // Of a residual of some lengths of a metre, rounding leaves this much.
+        if norm(&left) <= 1e-15 * crate::structure::count(size) {
+            break;
+        }
+        let slope = slope(&place, size, left.len(), &residual, &moved);
+        let normal = faer::Mat::from_fn(size, size, |row, column| {
+            let product: f64 = (0..left.len()).map(|entry| slope[(entry, row)] * slope[(entry, column)]).sum();
+            product + if row == column { damping } else { 0.0 }
+        });
+        let right = faer::Mat::from_fn(size, 1, |row, _| -left.iter().enumerate().map(|(entry, left)| slope[(entry, row)] * left).sum::<f64>());
+        let solution = faer::linalg::solvers::Solve::solve(&normal.partial_piv_lu(), &right);
+        let step: Vec<f64> = (0..size).map(|row| solution[(row, 0)]).collect();
+        let next = moved(&place, &step);
+        let reached = residual(&next);
+        if norm(&reached) < norm(&left) {
+            (place, left, damping) = (next, reached, (0.1 * damping).max(1e-14));
+        } else if norm(&step) <= f64::EPSILON * crate::structure::count(size) {
+            break;
+        } else {
+            damping = (10.0 * damping).min(1e6);
+        }
+    }
+    let left = norm(&left);
+    (place, left)
+}
+
+fn norm(entries: &[f64]) -> f64 {
+    entries.iter().map(|entry| entry * entry).sum::<f64>().sqrt()
+}
+
+/// The slope of the residual, by central differences.
+fn slope<P>(place: &P, size: usize, rows: usize, residual: &impl Fn(&P) -> Vec<f64>, moved: &impl Fn(&P, &[f64]) -> P) -> Matrix {
+    const STEP: f64 = 1e-6;
+    let mut slope = Matrix::zeros(rows, size);
+    let mut by = vec![0.0; size];
+    for column in 0..size {
+        let mut at = |step: f64| {
+            by[column] = step;
+            let found = residual(&moved(place, &by));
+            by[column] = 0.0;
+            found
+        };
+        for (row, (up, down)) in at(STEP).iter().zip(at(-STEP)).enumerate() {
+            slope[(row, column)] = (up - down) / (2.0 * STEP);
+        }
+    }
+    slope
+}

@@ -1,0 +1,372 @@
+//! A steady spin: all copies turn at one rate about one axis of the world, driven by torques of the hands along it.
+//!
+//! Samples are held, so the attitudes that a copy is drawn to are behind by their age: with KR the coordination brakes a spin ω by about KR·sin(ω·age), and a spin is
+//! steady only if hands make up for that and for the damping. Seen from axes that turn with it, and climb if it is a screw, the motion repeats: after a frame of T everything is
+//! as before but turned by ω·T. That motion is a zero of Φ(z) less z turned by ω·T, and small motions about it are its slope; Φ is the frame of real peers
+//! ([`super::peers`]). Displacements of everything and its turn about the axis are taken out.
+
+use cohaptic_peer::rotation::{Attitude, Triple};
+use cohaptic_peer::{Hand, Signal};
+use cohaptic_scene::Scene;
+
+use super::algebra::{add, apply, cross, transposed, turned, unit};
+use super::frame::{SAMPLE, Turning};
+use super::levenberg::zero;
+use super::load::Pose;
+use super::peers::{Bases, members, slope};
+use super::{Together, contacts};
+use crate::network::NominalNetwork;
+use crate::structure::Structure;
+use crate::timetable::Instants;
+use crate::{AnalysisError, Matrix, Watch};
+
+/// A steady spin.
+#[derive(Clone, Debug)]
+pub(super) struct Spin {
+    pub(super) together: Together,
+    /// Everything at the beginning of a frame.
+    bases: Bases,
+    velocities: Vec<f64>,
+    /// A unit vector of the world.
+    pub(super) axis: Triple,
+    /// The angular velocity about the axis [rad/s].
+    pub(super) rate: f64,
+}
+
+/// A spin that may be steady.
+#[derive(Clone, Debug)]
+struct Motion {
+    state: Vec<f64>,
+    rate: f64,
+    /// How far it moves along the axis in a frame \[m\]: grasps off the centre can make a screw of it.
+    climb: f64,
+}
+
+/// What drives a spin.
+struct Drive {
+    axis: Triple,
+    /// Of all hands along the axis \[N·m\].
+    torque: f64,
+    /// The rate at which the object begins, along the axis [rad/s].
+    begun: f64,
+}
+
+fn none(why: impl Into<String>) -> AnalysisError {
+    AnalysisError::NoSpin { why: why.into() }
+}
+
+impl Drive {
+    fn of(scene: &Scene) -> Result<Self, AnalysisError> {
+        let rotation = scene.rotation.as_ref().expect("the object turns");
+        let mut torques = Vec::new();
+        for (place, spec) in scene.peers.iter().enumerate().filter(|(_, spec)| spec.contact == cohaptic_peer::Contact::Grasp) {
+            match rotation.peers[place].device.as_ref().and_then(|device| device.torque.as_ref()) {
+                Some(Signal::Constant(torque)) => torques.push(*torque),
+                Some(Signal::Sine { .. } | Signal::Table(_)) => return Err(none(format!("the torque of the hand of {} varies", spec.name))),
+                None => {}
+            }
+            match &spec.hand {
+                Some(Hand::Arm { .. }) => return Err(none(format!("the arm of {} ties the object to the world", spec.name))),
+                Some(Hand::Force(Signal::Constant(force))) if force.iter().all(|component| *component == 0.0) => {}
+                Some(Hand::Force(_)) => return Err(none(format!("the hand of {} pushes in one direction of the world", spec.name))),
+                None => {}
+            }
+        }
+        if let Some(late) = scene.peers.iter().find(|spec| spec.compute_delay) {
+            return Err(none(format!("{} applies forces a tick late, and what waits is no state here", late.name)));
+        }
+        let sum = torques.iter().fold([0.0; 3], |sum, torque| add(sum, *torque));
+        let begun = rotation.peers[0].attitude;
+        let along = if size(sum) > 0.0 { sum } else { begun.world_rate() };
+        if size(along) == 0.0 {
+            return Err(none("no hand exerts a torque, and the object begins at rest"));
+        }
+        let axis = along.map(|component| component / size(along));
+        if torques.iter().any(|torque| size(cross(axis, *torque)) > 1e-12 * size(*torque)) {
+            return Err(none("the torques of the hands are about different axes"));
+        }
+        Ok(Self { axis, torque: size(sum), begun: dot(axis, begun.world_rate()) })
+    }
+}
+
+impl Spin {
+    /// The steady spin that the hands of a scene drive, near the attitude in which the object begins.
+    pub(super) fn of(scene: &Scene, network: &NominalNetwork) -> Result<Self, AnalysisError> {
+        let structure = Structure::of_each(scene, network, &contacts(scene)?)?;
+        if structure.silent {
+            return Err(none("a link never delivers, and the samples of the beginning do not turn"));
+        }
+        let drive = Drive::of(scene)?;
+        let together = Together { free: Vec::new(), ..Together::new(scene, structure) };
+        let mut spin = Self { bases: Bases::resting(Vec::new(), &together.turning()), velocities: Vec::new(), axis: drive.axis, rate: 0.0, together };
+        let rate = if drive.begun == 0.0 { spin.balance(scene, &drive) } else { drive.begun };
+        spin.begin(scene, rate);
+        if spin.settle(scene).is_err() {
+            // Devices that are held off the axis move it: a while of motion comes nearer.
+            spin.begin(scene, rate);
+            spin.relax(scene);
+            spin.settle(scene)?;
+        }
+        Ok(spin)
+    }
+
+    /// The length of a frame \[s\].
+    fn frame(&self) -> f64 {
+        self.together.structure.timetable.frame.as_secs_f64()
+    }
+
+    /// How long before the frame a peer sent its latest sample but `number` − 1 \[s\].
+    fn age(&self, place: usize, number: usize) -> f64 {
+        let timetable = &self.together.structure.timetable;
+        let sent = Instants::of(timetable, self.together.nodes.len()).sent_at(place, -i64::try_from(number).unwrap_or(0), timetable.frame);
+        -1e-9 * approximate(sent)
+    }
+
+    /// The rate at which damping and small lags take up the torque [rad/s].
+    fn balance(&self, scene: &Scene, drive: &Drive) -> f64 {
+        let structure = &self.together.structure;
+        let lag = structure.timetable.depth.iter().enumerate().map(|(place, depth)| self.age(place, *depth)).fold(0.0, f64::max);
+        let braked = |place: usize| {
+            let config = scene.rotation_config(place).expect("the object turns");
+            let along = apply(&transposed(&scene.rotation.as_ref().expect("the object turns").peers[place].attitude.matrix()), drive.axis);
+            let spins = config.device.iter().filter(|_| self.together.nodes[place].touching).map(|device| device.handle.damping);
+            let damping = spins.chain([config.copy.damping, config.gains.stiffness.map(|stiffness| lag * stiffness)]);
+            damping.map(|damping| (0..3).map(|axis| along[axis] * along[axis] * damping[axis]).sum::<f64>()).sum::<f64>()
+        };
+        drive.torque / (0..scene.peers.len()).map(braked).sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
+    /// Begins with everything together, turning at that rate since long.
+    fn begin(&mut self, scene: &Scene, rate: f64) {
+        let rotation = scene.rotation.as_ref().expect("the object turns");
+        let attitude = Attitude { rate: [0.0; 3], ..rotation.peers[0].attitude };
+        let matrix = attitude.matrix();
+        let pose = |grasp: Triple| Pose { centre: [0.0; 3], attitude, device: apply(&matrix, grasp), handle: attitude };
+        let poses: Vec<Pose> = rotation.peers.iter().map(|peer| pose(peer.grasp)).collect();
+        let earlier = |place: usize| {
+            let back = |number: usize| turn(self.axis, -rate * self.age(place, number));
+            let sampled = |number: usize| ([0.0; 3], Attitude { orientation: turned(back(number), attitude.orientation), rate: [0.0; 3] });
+            (1..=self.together.structure.timetable.depth[place]).map(sampled).collect()
+        };
+        let samples = (0..poses.len()).map(earlier).collect();
+        self.bases = Bases { poses, samples, seen_from: (turn(self.axis, rate * self.frame()), [0.0; 3]) };
+        self.rate = rate;
+        let (nodes, time) = (&self.together.nodes, self.together.time);
+        let body_rate = apply(&transposed(&matrix), self.axis.map(|component| rate * component));
+        let mut z = Vec::new();
+        for node in nodes {
+            let spun = body_rate.map(|component| component * node.length * time);
+            let [vx, vy, vz] = cross(self.axis, apply(&matrix, node.grasp)).map(|component| component * rate * time);
+            z.extend([0.0; 9]);
+            z.extend(spun);
+            z.extend(vec![0.0; node.device.len()]);
+            let device = [vx, vy, vz, spun[0], spun[1], spun[2]];
+            z.extend(&device[..node.device.len()]);
+            if !node.touching {
+                let devices = node.device.len();
+                let length = z.len();
+                z[length - devices..].fill(0.0);
+            }
+        }
+        for (node, depth) in nodes.iter().zip(&self.together.structure.timetable.depth) {
+            for _ in 0..*depth {
+                z.extend([0.0; 9]);
+                z.extend(body_rate.map(|component| component * node.length * time));
+            }
+        }
+        self.velocities = z;
+    }
+
+    /// Lets everything move for a while.
+    fn relax(&mut self, scene: &Scene) {
+        const FRAMES: usize = 40_000;
+        let turning = self.together.turning();
+        let mut members = hands(scene);
+        self.bases.seen_from = (Attitude::REST.orientation, [0.0; 3]);
+        let mut turned_by = 0.0;
+        for _ in 0..FRAMES {
+            let from = self.bases.poses[0].attitude;
+            let reached = self.bases.reached(&mut members, &turning, &self.velocities);
+            self.bases = self.bases.clone().moved_to(&turning, &reached);
+            self.velocities = reached;
+            positions(&turning).into_iter().for_each(|state| self.velocities[state] = 0.0);
+            let before = std::mem::replace(&mut turned_by, dot(self.axis, self.bases.poses[0].attitude.rotation_from(&from.orientation)));
+            if (turned_by - before).abs() <= 1e-13 {
+                break;
+            }
+        }
+        self.rate = turned_by / self.frame();
+        self.bases.seen_from = (turn(self.axis, turned_by), [0.0; 3]);
+    }
+
+    /// Finds the steady spin near the one that has begun.
+    fn settle(&mut self, scene: &Scene) -> Result<(), AnalysisError> {
+        let turning = self.together.turning();
+        let kept: Vec<usize> = turning.kept();
+        let span = self.frame() * turning.nodes[0].length;
+        let seen = |rate: f64, climb: f64| (turn(self.axis, rate * self.frame()), self.axis.map(|component| component * climb));
+        let placed = |motion: &Motion| Bases { seen_from: seen(motion.rate, motion.climb), ..self.bases.clone() };
+        let residual = |motion: &Motion| -> Vec<f64> {
+            let reached = placed(motion).reached(&mut hands(scene), &turning, &motion.state);
+            kept.iter().map(|state| reached[*state] - motion.state[*state]).collect()
+        };
+        let moved = |motion: &Motion, by: &[f64]| {
+            let mut moved = Motion { rate: motion.rate + by[kept.len()] / span, climb: motion.climb + by[kept.len() + 1], ..motion.clone() };
+            kept.iter().zip(by).for_each(|(state, by)| moved.state[*state] += by);
+            moved
+        };
+        let begun = Motion { state: self.velocities.clone(), rate: self.rate, climb: 0.0 };
+        let (found, left) = zero(begun, kept.len() + 2, residual, moved);
+        // A frame rounds velocities of some metres a second, over the time that makes them lengths, some hundred times.
+        if left.is_nan() || left > 1e-11 {
+            return Err(none(format!("no steady spin near {:.3} rad/s: frames are {left:.1e} m apart", self.rate)));
+        }
+        let bases = placed(&found).moved_to(&turning, &found.state);
+        let mut velocities = found.state;
+        positions(&turning).into_iter().for_each(|state| velocities[state] = 0.0);
+        (self.bases, self.velocities, self.rate) = (bases, velocities, found.rate);
+        Ok(())
+    }
+
+    /// The largest rotation vector between two copies \[rad\].
+    pub(super) fn apart(&self) -> f64 {
+        let poses = &self.bases.poses;
+        let angles = poses.iter().flat_map(|one| poses.iter().map(move |other| one.attitude.angle_to(&other.attitude.orientation)));
+        angles.fold(0.0, f64::max)
+    }
+
+    /// The slope of a frame at the steady spin, displacements and turns of everything taken out, and about by how much its entries are wrong; `None` if the watch ends it.
+    pub(super) fn monodromy(&self, scene: &Scene, watch: &dyn Watch) -> Option<(Matrix, f64)> {
+        let turning = self.together.turning();
+        let (symmetries, references) = self.symmetries(&turning);
+        let kept: Vec<usize> = turning.kept().into_iter().filter(|state| !references.contains(state)).collect();
+        let (mut matrix, mut error) = (Matrix::zeros(kept.len(), kept.len()), 0.0_f64);
+        for (column, state) in kept.iter().enumerate() {
+            if watch.stops() {
+                return None;
+            }
+            let (slope, change) = slope(|size| {
+                let mut z = self.velocities.clone();
+                z[*state] += size;
+                self.bases.reached(&mut hands(scene), &turning, &z)
+            });
+            error = error.max(change);
+            for (row, target) in kept.iter().enumerate() {
+                let along: f64 = symmetries.iter().zip(&references).map(|(symmetry, reference)| slope[*reference] * symmetry[*target]).sum();
+                matrix[(row, column)] = slope[*target] - along;
+            }
+        }
+        Some((matrix, error))
+    }
+
+    /// The directions of displacements of everything and of its turn about the axis, each 1 in its own reference and 0 in those of the others, and the references.
+    fn symmetries(&self, turning: &Turning<'_>) -> (Vec<Vec<f64>>, Vec<usize>) {
+        let mut symmetries: Vec<Vec<f64>> = (0..4).map(|which| self.symmetry(turning, which)).collect();
+        let mut references = Vec::new();
+        for place in 0..symmetries.len() {
+            let reference = (0..6).max_by(|a, b| symmetries[place][*a].abs().total_cmp(&symmetries[place][*b].abs())).unwrap_or(0);
+            let own = symmetries[place][reference];
+            symmetries[place].iter_mut().for_each(|entry| *entry /= own);
+            let chosen = symmetries[place].clone();
+            for (_, other) in symmetries.iter_mut().enumerate().filter(|(other, _)| *other != place) {
+                let factor = other[reference];
+                other.iter_mut().zip(&chosen).for_each(|(entry, by)| *entry -= factor * by);
+            }
+            references.push(reference);
+        }
+        (symmetries, references)
+    }
+
+    /// A displacement along an axis, and for 3 the turn about that of the spin.
+    fn symmetry(&self, turning: &Turning<'_>, which: usize) -> Vec<f64> {
+        let mut state = Vec::new();
+        let moved = |point: Triple, length: f64| if which < 3 { unit(which) } else { cross(self.axis, point).map(|way| way / length) };
+        let spun = |attitude: &Attitude| if which < 3 { [0.0; 3] } else { apply(&transposed(&attitude.matrix()), self.axis) };
+        // Velocities here are lengths too.
+        let faster = |velocity: &[f64], length: f64| {
+            if which < 3 { [0.0; 3] } else { cross(self.axis, [velocity[0], velocity[1], velocity[2]]).map(|way| way / length) }
+        };
+        let mut next = 0;
+        for (node, pose) in turning.nodes.iter().zip(&self.bases.poses) {
+            let (z, devices) = (&self.velocities[next..], node.device.len());
+            next += node.states();
+            state.extend([moved(pose.centre, node.length), spun(&pose.attitude), faster(&z[6..], node.length), [0.0; 3]].concat());
+            let held = [moved(pose.device, node.length), spun(&pose.handle)].concat();
+            let moving = [faster(&z[12 + devices..], node.length), [0.0; 3]].concat();
+            let touching = if node.touching { 1.0 } else { 0.0 };
+            state.extend(held[..devices].iter().chain(&moving[..devices]).map(|entry| touching * entry));
+        }
+        for (node, samples) in turning.nodes.iter().zip(&self.bases.samples) {
+            for (centre, attitude) in samples {
+                let z = &self.velocities[next..];
+                next += SAMPLE;
+                state.extend([moved(*centre, node.length), spun(attitude), faster(&z[6..], node.length), [0.0; 3]].concat());
+            }
+        }
+        state
+    }
+}
+
+#[cfg(test)]
+impl Spin {
+    /// A hundred frames leave it as it is, and a frame leaves each symmetry among them.
+    pub(super) fn assert_steady(&self, scene: &Scene) {
+        let turning = self.together.turning();
+        let kept = turning.kept();
+        let mut state = self.velocities.clone();
+        for frame in 0..100 {
+            state = self.bases.reached(&mut hands(scene), &turning, &state);
+            let away = kept.iter().map(|place| (state[*place] - self.velocities[*place]).abs()).fold(0.0, f64::max);
+            assert!(away < 1e-9, "after {frame} frames {away} m away");
+        }
+        let (symmetries, references) = self.symmetries(&turning);
+        for (which, symmetry) in symmetries.iter().enumerate() {
+            let (reached, _) = slope(|size| {
+                let z: Vec<f64> = self.velocities.iter().zip(symmetry).map(|(z, by)| z + size * by).collect();
+                self.bases.reached(&mut hands(scene), &turning, &z)
+            });
+            let among = |place: usize| symmetries.iter().zip(&references).map(|(by, reference)| reached[*reference] * by[place]).sum::<f64>();
+            let left = kept.iter().map(|place| (reached[*place] - among(*place)).abs()).fold(0.0, f64::max);
+            assert!(left < 1e-7, "symmetry {which}: {left}");
+        }
+    }
+}
+
+/// The peers with the hands of the scene.
+fn hands(scene: &Scene) -> Vec<super::peers::Member> {
+    members(scene, |place| scene.peers[place].hand.clone())
+}
+
+/// Nanoseconds as a number.
+#[expect(clippy::cast_precision_loss, reason = "below 2⁵³, some hundred days")]
+const fn approximate(nanos: i64) -> f64 {
+    nanos as f64
+}
+
+/// The states that say where something is, not how fast it moves.
+fn positions(turning: &Turning<'_>) -> Vec<usize> {
+    let (mut next, mut states) = (0, Vec::new());
+    for node in turning.nodes {
+        states.extend((next..next + 6).chain(next + 12..next + 12 + node.device.len()));
+        next += node.states();
+    }
+    for _ in 0..turning.timetable.depth.iter().sum::<usize>() {
+        states.extend(next..next + 6);
+        next += SAMPLE;
+    }
+    states
+}
+
+/// The quaternion of a turn about a unit vector.
+fn turn(axis: Triple, angle: f64) -> [f64; 4] {
+    let (sine, cosine) = libm::sincos(0.5 * angle);
+    [cosine, sine * axis[0], sine * axis[1], sine * axis[2]]
+}
+
+fn size(vector: Triple) -> f64 {
+    dot(vector, vector).sqrt()
+}
+
+fn dot(a: Triple, b: Triple) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
