@@ -69,7 +69,7 @@ fn segment(wanted: &Wanted) -> Vec<u8> {
     };
     let reduced = if *is_tcp && flags & CWR != 0 { REDUCED } else { 0 };
     let length = if *is_tcp { at + 20 + usize::from(*options) * 4 } else { at + 8 };
-    let word = |number: usize| number as u16;
+    let word = |number: usize| u16::try_from(number).unwrap();
     let (headers, size, begin, field) = (word(length), word(*size), word(at), word(field));
     let mut bytes = Vec::new();
     Offload { flags: NEEDS_CHECKSUM, kind: kind | reduced, headers, size, begin, field }.write(&mut bytes);
@@ -126,7 +126,7 @@ proptest! {
             let net = sliced.net.unwrap();
             if let Some((header, _)) = net.ipv4_ref() {
                 prop_assert_eq!(header.header_checksum, header.calc_header_checksum());
-                prop_assert_eq!(header.identification, wanted.identification.wrapping_add(number as u16));
+                prop_assert_eq!(header.identification, wanted.identification.wrapping_add(u16::try_from(number).unwrap()));
             }
             match sliced.transport.unwrap() {
                 etherparse::TransportHeader::Tcp(header) => {
@@ -136,7 +136,7 @@ proptest! {
                         etherparse::NetHeaders::Arp(_) => unreachable!(),
                     };
                     prop_assert_eq!(header.checksum, expected.unwrap());
-                    prop_assert_eq!(header.sequence_number, wanted.sequence.wrapping_add(data.len() as u32));
+                    prop_assert_eq!(header.sequence_number, wanted.sequence.wrapping_add(u32::try_from(data.len()).unwrap()));
                     let flag = |flag| wanted.flags & flag != 0;
                     prop_assert_eq!((header.fin, header.psh), (flag(FIN) && is_last, flag(PUSH) && is_last));
                     prop_assert_eq!((header.cwr, header.ece, header.ack), (flag(CWR) && is_first, flag(ECHO), true));
@@ -149,7 +149,7 @@ proptest! {
                     };
                     prop_assert_eq!(header.checksum, expected.unwrap());
                 }
-                _ => unreachable!(),
+                etherparse::TransportHeader::Icmpv4(_) | etherparse::TransportHeader::Icmpv6(_) => unreachable!(),
             }
             data.extend_from_slice(payload);
         }
