@@ -1,5 +1,5 @@
-//! How late packets leave, in `docs/measured-router.md`: `cargo test --release -p cohaptic-router -- --ignored --nocapture --test-threads=1 measure`. They depend on the machine, so nothing is
-//! asked of them here.
+//! How late packets leave, for `docs/measured-router.md`: `cargo test --release -p cohaptic-router -- --ignored --nocapture --test-threads=1 measure`. The
+//! figures depend on the machine, so nothing is asked of them here.
 
 use std::net::SocketAddr;
 use std::thread;
