@@ -24,10 +24,11 @@ struct Wanted {
 
 fn wanted() -> impl Strategy<Value = Wanted> {
     let flags = prop::sample::select(vec![0, PUSH, FIN, PUSH | FIN, ECHO, CWR, CWR | ECHO | PUSH]);
-    let words = (any::<[bool; 2]>(), flags, 0_u8..=10, any::<u32>(), any::<u16>(), any::<u64>());
-    (words, 1_usize..1400, 1_usize..20_000).prop_map(|(([is_v4, is_tcp], flags, options, sequence, identification, seed), size, more)| {
+    let words = (any::<[bool; 3]>(), flags, 0_u8..=10, any::<u32>(), any::<u16>(), any::<u64>());
+    (words, 1_usize..1400, 1_usize..20_000).prop_map(|(([is_v4, is_tcp, is_even], flags, options, sequence, identification, seed), size, more)| {
         // More than one packet, and no more than are joined.
         let length = (size + more).min(size * MOST_PACKETS).min(60_000);
+        let length = if is_even { length.next_multiple_of(size) } else { length };
         let data = (0..length as u64).map(|place| (seed.wrapping_mul(place + 1) >> 56) as u8).collect();
         Wanted { is_v4, is_tcp, flags, options, sequence, identification, size, data }
     })
@@ -166,12 +167,17 @@ proptest! {
     /// Whatever the packets of a flow are, with headers that differ in any byte: cutting what was joined gives them again, and none is left out.
     #[test]
     fn joined_and_cut_packets_are_what_they_were(
-        wanted in wanted(), changes in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..60, 1_u8..), 0..4),
+        wanted in wanted(), changes in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..48, 1_u8..), 0..8),
     ) {
         let mut packets = cut_all(&segment(&wanted));
+        // The segment that follows it in the flow.
+        let sequence = wanted.sequence.wrapping_add(u32::try_from(wanted.data.len()).unwrap());
+        let identification = wanted.identification.wrapping_add(u16::try_from(packets.len()).unwrap());
+        packets.extend(cut_all(&segment(&Wanted { sequence, identification, ..wanted })));
         for (which, place, bits) in changes {
             let packet = which.get_mut::<Packet>(&mut packets);
             let mut bytes = packet.bytes.clone();
+            let place = place % bytes.len();
             bytes[place] ^= bits;
             // Of what is no packet of this kind any more nothing is said here.
             let (Ok(headers), Content::Ip { headers: before, .. }) = (Headers::read(&bytes), packet.content) else { continue };
@@ -275,6 +281,15 @@ fn a_header_that_contradicts_its_packet_is_malformed() {
     // Longer than its packet says, and shorter.
     assert_eq!(*cut_all(&[good.as_slice(), &[0]].concat())[0].content(), Content::Malformed(Malformed::Offload));
     assert_eq!(*cut_all(&good[..good.len() - 1])[0].content(), Content::Malformed(Malformed::Length));
+}
+
+#[test]
+fn a_packet_with_a_wrong_checksum_of_its_header_is_not_joined() {
+    let wanted = Wanted { is_v4: true, is_tcp: true, flags: 0, options: 0, sequence: 1, identification: 1, size: 100, data: vec![7; 300] };
+    let mut packets = cut_all(&segment(&wanted));
+    packets[1].bytes[V4_CHECKSUM] ^= 1;
+    let packets = shared(packets);
+    assert_eq!((joined(&packets).0, joined(&packets[1..]).0), (1, 1));
 }
 
 /// Packets of IPv4 that must not be cut further mostly have the identification zero.
