@@ -60,7 +60,7 @@ pub enum RunError {
 /// read that much late.
 const TOO_CLOSE: Duration = Duration::from_micros(10);
 
-/// After so many packets from one device, those that leave are written, and the other one has its turn.
+/// The number of packets from one device after which those that leave are written, and the other one has its turn.
 const IN_TURN: usize = 64;
 
 impl Router {
