@@ -134,6 +134,8 @@ pub struct TunSpec {
     pub addresses: Vec<Network>,
     /// The largest packet it takes \[bytes\]; `None`: what the system chooses, 1500.
     pub mtu: Option<u16>,
+    /// Whether the kernel leaves cutting of large segments and checksums to the router, and takes such segments: fewer system calls for the same packets.
+    pub offloads: bool,
     /// The network namespace in which it is made: a name as `ip netns` gives it, or a path; `None`: that of the program.
     pub namespace: Option<String>,
 }

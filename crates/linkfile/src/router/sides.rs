@@ -25,6 +25,7 @@ pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment>
         let mtu = values::integer(node, context, 68..=65_535, "a number of bytes, an integer from 68 to 65535")?;
         u16::try_from(mtu).ok()
     });
+    let offloads = table.optional("offloads", true, values::boolean);
     table.finish();
     if existing == Some(true)
         && let Some(given) = addresses_node.or(mtu_node)
@@ -32,7 +33,7 @@ pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment>
         context.fault_at(given, "an existing device is left as it is: expected no such key beside existing = true");
         return None;
     }
-    Some(Attachment::Tun(TunSpec { name: name?, existing: existing?, addresses: addresses?, mtu: mtu?, namespace: namespace? }))
+    Some(Attachment::Tun(TunSpec { name: name?, existing: existing?, addresses: addresses?, mtu: mtu?, offloads: offloads?, namespace: namespace? }))
 }
 
 /// What cannot be said of one side alone.

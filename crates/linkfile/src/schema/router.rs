@@ -41,6 +41,7 @@ static SIDE: Table = Table::of(&[&[
     usual("existing", Form::Boolean, "false", "The TUN device is there and is left as it is"),
     usual("addresses", Form::List(&Form::Like(&["10.1.0.1/24", "fd00::1/64"])), "[]", "Addresses of the TUN device with their prefixes"),
     optional("mtu", Form::Integer(68, 65_535), "The largest packet that the TUN device takes, in bytes; without it the system's"),
+    usual("offloads", Form::Boolean, "true", "Packets cross the TUN device in large segments, which the router cuts and joins"),
 ]]);
 static LINKS: Table = Table::with_others(&[], &Form::Table(&LINK_TABLE));
 static RULE: Table = Table::of(&[&[

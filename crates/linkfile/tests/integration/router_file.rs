@@ -24,6 +24,7 @@ namespace = "blue"
 [right]
 tun      = "right0"
 existing = true
+offloads = false
 
 [links.up]
 delay = "24ms"
@@ -67,9 +68,9 @@ fn every_key_is_read() {
     assert_eq!((file.seed, file.memory), (7, Memory { packets: 1000, bytes: Bytes::new(2_000_000) }));
     assert_eq!(file.default, [Target::Link(0), Target::Pass]);
     let addresses = vec!["10.1.0.1/24".parse().unwrap(), "fd00:1::1/64".parse().unwrap()];
-    let left = TunSpec { name: "left0".to_owned(), existing: false, addresses, mtu: Some(1400), namespace: Some("blue".to_owned()) };
+    let left = TunSpec { name: "left0".to_owned(), existing: false, addresses, mtu: Some(1400), offloads: true, namespace: Some("blue".to_owned()) };
     assert_eq!(file.left, Attachment::Tun(left));
-    let right = TunSpec { name: "right0".to_owned(), existing: true, addresses: Vec::new(), mtu: None, namespace: None };
+    let right = TunSpec { name: "right0".to_owned(), existing: true, addresses: Vec::new(), mtu: None, offloads: false, namespace: None };
     assert_eq!(file.right, Attachment::Tun(right));
     let up = LinkConfig { delay: Delay::constant(Duration::from_millis(24)), ..LinkConfig::default() };
     assert_eq!((file.links[0].name.as_str(), &file.links[0].model), ("up", &up.into()));
@@ -116,10 +117,10 @@ fn what_is_not_said_has_a_default() {
 #[test]
 fn a_fault_is_shown_where_it_is() {
     let cases = [
-        ("delay = \"24ms\"", "delay = \"24 parsecs\"", "18:9: links.up.delay: unknown unit"),
-        ("delay = \"24ms\"", "dlay = \"24ms\"", "18:1: links.up.dlay: unknown key: expected one of delay"),
-        ("[links.up]", "[links.pass]", "17:8: links.pass: \"pass\" cannot be the name of a link"),
-        ("[links.up]", "[links.\"a b\"]", "17:8: links.a b: \"a b\" cannot be the name"),
+        ("delay = \"24ms\"", "delay = \"24 parsecs\"", "19:9: links.up.delay: unknown unit"),
+        ("delay = \"24ms\"", "dlay = \"24ms\"", "19:1: links.up.dlay: unknown key: expected one of delay"),
+        ("[links.up]", "[links.pass]", "18:8: links.pass: \"pass\" cannot be the name of a link"),
+        ("[links.up]", "[links.\"a b\"]", "18:8: links.a b: \"a b\" cannot be the name"),
         (
             "right-to-left = \"pass\"",
             "right-to-left = \"uo\"",
@@ -140,17 +141,17 @@ fn a_fault_is_shown_where_it_is() {
         ("tun      = \"right0\"\nexisting = true", "interface = \"eth1\"", "13:1: right: one side is a tun"),
         ("tun      = \"right0\"\nexisting = true", "tun = \"left0\"\nnamespace = \"blue\"", "13:1: right: both sides are the same device"),
         ("tun      = \"right0\"\n", "", "13:1: right.tun: missing key: expected tun = \"NAME\""),
-        ("from        = \"left\"", "from        = \"top\"", "28:15: rules.0.from: unknown name \"top\": expected one of left, right"),
-        ("\"10.1.0.0/24\"", "\"fd00::/24\"", "30:15: rules.0.destination: source and destination are of different families"),
-        ("\"10.2.0.7\"", "\"10.2.0.7/\"", "30:15: rules.0.destination: \"10.2.0.7/\" is no address"),
-        ("protocol    = \"tcp\"", "protocol    = \"tpc\"", "31:15: rules.0.protocol: unknown name \"tpc\": expected one of tcp"),
-        ("protocol    = \"tcp\"", "protocol    = \"icmp\"", "32:15: rules.0.source-port: only tcp and udp have ports"),
-        ("protocol = 89", "protocol = 256", "37:12: rules.1.protocol: 256 is out of range"),
-        ("\"1024-65535\"", "\"1024-65536\"", "32:15: rules.0.source-port: \"1024-65536\" is no range of ports"),
-        ("\"1024-65535\"", "\"1024-\"", "32:15: rules.0.source-port: \"1024-\" is no range of ports"),
-        ("\"1024-65535\"", "\"2-1\"", "32:15: rules.0.source-port: \"2-1\" is no range of ports"),
-        ("link        = \"slow-one\"\n", "", "27:1: rules.0.link: missing key: expected the name of a link, \"pass\" or \"drop\""),
-        ("by = \"weather\"", "by = \"wether\"", "21:20: links.slow-one.modulated.by: "),
+        ("from        = \"left\"", "from        = \"top\"", "29:15: rules.0.from: unknown name \"top\": expected one of left, right"),
+        ("\"10.1.0.0/24\"", "\"fd00::/24\"", "31:15: rules.0.destination: source and destination are of different families"),
+        ("\"10.2.0.7\"", "\"10.2.0.7/\"", "31:15: rules.0.destination: \"10.2.0.7/\" is no address"),
+        ("protocol    = \"tcp\"", "protocol    = \"tpc\"", "32:15: rules.0.protocol: unknown name \"tpc\": expected one of tcp"),
+        ("protocol    = \"tcp\"", "protocol    = \"icmp\"", "33:15: rules.0.source-port: only tcp and udp have ports"),
+        ("protocol = 89", "protocol = 256", "38:12: rules.1.protocol: 256 is out of range"),
+        ("\"1024-65535\"", "\"1024-65536\"", "33:15: rules.0.source-port: \"1024-65536\" is no range of ports"),
+        ("\"1024-65535\"", "\"1024-\"", "33:15: rules.0.source-port: \"1024-\" is no range of ports"),
+        ("\"1024-65535\"", "\"2-1\"", "33:15: rules.0.source-port: \"2-1\" is no range of ports"),
+        ("link        = \"slow-one\"\n", "", "28:1: rules.0.link: missing key: expected the name of a link, \"pass\" or \"drop\""),
+        ("by = \"weather\"", "by = \"wether\"", "22:20: links.slow-one.modulated.by: "),
         ("[router]", "[ruoter]", "2:2: ruoter: unknown key: expected one of "),
     ];
     let mut wrong = Vec::new();

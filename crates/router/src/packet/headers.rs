@@ -41,6 +41,8 @@ pub enum Malformed {
     HeaderLength,
     /// The packet says that it is longer than what came, or shorter than its header.
     Length,
+    /// The device says of it what it is not: a segment of another protocol or length, a checksum that is not in it.
+    Offload,
 }
 
 /// What a packet says of congestion (RFC 3168): the two bits.

@@ -9,6 +9,7 @@
 
 mod checksum;
 mod headers;
+mod segments;
 
 use cohaptic_linkfile::router::Protocol;
 use cohaptic_units::Bytes;
@@ -18,6 +19,7 @@ use checksum::{change, sum, transport_field};
 use headers::V4_CHECKSUM;
 
 pub use headers::{Ecn, Headers, Malformed};
+pub(crate) use segments::{Join, cut, join, slices};
 
 /// How the bytes of a device are framed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -33,6 +35,8 @@ pub enum Framing {
 pub struct Packet {
     bytes: Vec<u8>,
     content: Content,
+    /// Whether the checksum of TCP or UDP is known to be right, by the word of the device that gave the packet.
+    is_checked: bool,
 }
 
 /// What a packet is.
@@ -59,7 +63,7 @@ impl Packet {
             Framing::Ip => Some(0),
             Framing::Ethernet => network_layer(&bytes),
         };
-        let Some(at) = at else { return Self { bytes, content: Content::NotIp } };
+        let Some(at) = at else { return Self { bytes, content: Content::NotIp, is_checked: false } };
         let content = match Headers::read(&bytes[at..]) {
             Ok(headers) => {
                 checksum::complete(&mut bytes[at..], &headers);
@@ -67,7 +71,7 @@ impl Packet {
             }
             Err(malformed) => Content::Malformed(malformed),
         };
-        Self { bytes, content }
+        Self { bytes, content, is_checked: false }
     }
 
     /// What it is.
@@ -101,6 +105,8 @@ impl Packet {
     /// Flips bits of the packet of IP, counted from its first, and sets right the checksums that cover them, so that the damage is not found: see
     /// [`cohaptic_wan::Checksum::Passes`]. Bits beyond the end of the packet are left out.
     pub fn damage(&mut self, damage: &Damage) {
+        // What was damaged goes out as it is, and alone: in a segment its checksum would be computed anew.
+        self.is_checked = false;
         if let Content::Ip { at, headers } = &self.content {
             let end = at + headers.length;
             apply(&mut self.bytes[*at..end], headers, damage);

@@ -3,6 +3,7 @@
 mod counts;
 
 use std::io;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -26,7 +27,17 @@ pub struct Router<D = AnyDevice, C = MonotonicClock> {
     pacer: Pacer,
     release: Lateness,
     written: [Written; 2],
-    buffer: Vec<u8>,
+    /// What one reading gave.
+    incoming: Vec<Packet>,
+    /// What has left the engine, to the left and to the right.
+    leaving: [Leaving; 2],
+}
+
+/// Packets on their way to a device, and when they left the engine.
+#[derive(Debug, Default)]
+struct Leaving {
+    packets: Vec<Arc<Packet>>,
+    at: Vec<Instant>,
 }
 
 /// Why a router came to an end by itself.
@@ -45,15 +56,12 @@ pub enum RunError {
     Wait(#[source] io::Error),
 }
 
-/// No packet of IP is longer; and a frame around it.
-const LONGEST: usize = (1 << 16) + 64;
-
 /// This close to a departure nothing is read any more, while spinning: reading and dealing with a packet takes about as long. A packet that comes then is
 /// read that much late.
 const TOO_CLOSE: Duration = Duration::from_micros(10);
 
-/// The number of packets that are read from one device before the other one has its turn.
-const IN_TURN: usize = 16;
+/// The number of packets from one device after which those that leave are written, and the other one has its turn.
+const IN_TURN: usize = 64;
 
 impl Router {
     /// Opens both devices. The clock of the run begins here.
@@ -71,8 +79,9 @@ impl<D: Device, C: Clock> Router<D, C> {
     /// A router between these devices, left and right, by this clock. The devices that the file names are not looked at.
     #[must_use]
     pub fn with(file: &RouterFile, devices: [D; 2], clock: C, pacing: Pacing) -> Self {
-        let written = [Written::default(); 2];
-        Self { engine: Engine::new(file), devices, clock, pacer: Pacer::new(pacing), release: Lateness::new(), written, buffer: vec![0; LONGEST] }
+        let (written, leaving) = ([Written::default(); 2], [Leaving::default(), Leaving::default()]);
+        let (engine, pacer, release) = (Engine::new(file), Pacer::new(pacing), Lateness::new());
+        Self { engine, devices, clock, pacer, release, written, incoming: Vec::new(), leaving }
     }
 
     /// Routes packets until `stop` is set, or until the run is `until` old. Every now and then, `every` so often and once at the end, `look` is called on
@@ -120,17 +129,21 @@ impl<D: Device, C: Clock> Router<D, C> {
         Ok(())
     }
 
-    /// Reads the packets that are there, in turns, and lets packets leave whose time comes meanwhile.
+    /// Reads the packets that are there, in turns. After each turn those leave whose time has come meanwhile: together, as far as a device takes them so.
     fn receive(&mut self) -> Result<(), RunError> {
         for side in Side::BOTH {
-            for _ in 0..IN_TURN {
-                let device = &mut self.devices[side.index()];
-                let received = device.receive(&mut self.buffer).map_err(|source| RunError::Device { side, source })?;
-                let Some(length) = received else { break };
-                let packet = Packet::new(self.buffer[..length].to_vec(), device.framing());
-                self.engine.handle_packet(self.clock.now(), side, packet);
-                self.release();
+            let mut count = 0;
+            while count < IN_TURN {
+                let received = self.devices[side.index()].receive(&mut self.incoming);
+                if !received.map_err(|source| RunError::Device { side, source })? {
+                    break;
+                }
+                // The packets of a segment came at one instant.
+                let now = self.clock.now();
+                count += self.incoming.len();
+                self.incoming.drain(..).for_each(|packet| self.engine.handle_packet(now, side, packet));
             }
+            self.release();
         }
         Ok(())
     }
@@ -138,9 +151,24 @@ impl<D: Device, C: Clock> Router<D, C> {
     /// Writes what has left the engine.
     fn release(&mut self) {
         while let Some(Departure { at, to, packet }) = self.engine.poll_departure() {
-            self.release.record(self.clock.now().saturating_duration_since(at));
-            let sent = self.devices[to.index()].send(packet.bytes());
-            self.written[to.index()].add(sent, packet.bytes().len());
+            let leaving = &mut self.leaving[to.index()];
+            leaving.at.push(at);
+            leaving.packets.push(packet);
+        }
+        for ((device, written), Leaving { packets, at }) in self.devices.iter_mut().zip(&mut self.written).zip(&mut self.leaving) {
+            let mut rest = packets.as_slice();
+            let mut at = at.drain(..);
+            while !rest.is_empty() {
+                let now = self.clock.now();
+                let (count, sent) = device.send(rest);
+                let (gone, left) = rest.split_at(count.clamp(1, rest.len()));
+                for (packet, at) in gone.iter().zip(&mut at) {
+                    self.release.record(now.saturating_duration_since(at));
+                    written.add(sent, packet.bytes().len());
+                }
+                rest = left;
+            }
+            packets.clear();
         }
     }
 

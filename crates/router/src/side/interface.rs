@@ -5,6 +5,7 @@
 
 use std::io;
 use std::os::fd::{AsFd as _, AsRawFd as _, BorrowedFd, OwnedFd};
+use std::sync::Arc;
 
 use cohaptic_linkfile::router::InterfaceSpec;
 use nix::errno::Errno;
@@ -15,8 +16,8 @@ use nix::sys::socket::{
 };
 
 use super::netlink::Netlink;
-use super::{Device, Failed, Sent};
-use crate::packet::Framing;
+use super::{Device, Failed, LONGEST, Sent};
+use crate::packet::{Framing, Packet};
 
 /// `ARPHRD_ETHER`.
 const ETHERNET: u16 = 1;
@@ -32,6 +33,7 @@ const WAITING: usize = 8 << 20;
 pub struct Interface {
     socket: OwnedFd,
     index: usize,
+    buffer: Vec<u8>,
     /// To be told to hear only its own packets again, when this is dropped.
     restore: Option<(Netlink, u32)>,
 }
@@ -59,7 +61,7 @@ impl Interface {
             netlink.promiscuous(index, true).map_err(Failed::system("let it hear frames that are meant for others"))?;
             Some((netlink, index))
         };
-        Ok(Self { socket, index: address.ifindex(), restore })
+        Ok(Self { socket, index: address.ifindex(), buffer: vec![0; LONGEST], restore })
     }
 }
 
@@ -88,28 +90,27 @@ fn find(spec: &InterfaceSpec) -> Result<(LinkAddr, bool), Failed> {
 }
 
 impl Device for Interface {
-    fn framing(&self) -> Framing {
-        Framing::Ethernet
-    }
-
     fn readable(&self) -> BorrowedFd<'_> {
         self.socket.as_fd()
     }
 
-    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
+    fn receive(&mut self, packets: &mut Vec<Packet>) -> io::Result<bool> {
         loop {
-            match recvfrom::<LinkAddr>(self.socket.as_raw_fd(), buffer) {
+            match recvfrom::<LinkAddr>(self.socket.as_raw_fd(), &mut self.buffer) {
                 // Not what this host sends itself, and not what came from elsewhere before the socket was bound.
-                Ok((length, Some(from))) if from.pkttype() != OUTGOING && from.ifindex() == self.index => return Ok(Some(length)),
+                Ok((length, Some(from))) if from.pkttype() != OUTGOING && from.ifindex() == self.index => {
+                    packets.push(Packet::new(self.buffer[..length].to_vec(), Framing::Ethernet));
+                    return Ok(true);
+                }
                 Ok(_) => {}
                 // A device that goes down says so once, and may come up again.
-                Err(Errno::EAGAIN | Errno::EINTR | Errno::ENETDOWN) => return Ok(None),
+                Err(Errno::EAGAIN | Errno::EINTR | Errno::ENETDOWN) => return Ok(false),
                 Err(error) => return Err(error.into()),
             }
         }
     }
 
-    fn send(&mut self, packet: &[u8]) -> Sent {
-        Sent::of(send(self.socket.as_raw_fd(), packet, MsgFlags::MSG_DONTWAIT).map_err(io::Error::from))
+    fn send(&mut self, packets: &[Arc<Packet>]) -> (usize, Sent) {
+        (1, Sent::of(send(self.socket.as_raw_fd(), packets[0].bytes(), MsgFlags::MSG_DONTWAIT).map_err(io::Error::from)))
     }
 }

@@ -7,31 +7,32 @@ mod tun;
 
 use std::io;
 use std::os::fd::BorrowedFd;
+use std::sync::Arc;
 
 use cohaptic_linkfile::router::{Attachment, Side};
 
-use crate::packet::Framing;
+use crate::packet::Packet;
 pub use interface::Interface;
 pub use tun::Tun;
 
 /// A device that gives packets and takes them, and never makes its caller wait.
 pub trait Device {
-    /// How its packets are framed.
-    fn framing(&self) -> Framing;
-
     /// What becomes readable when there is a packet.
     fn readable(&self) -> BorrowedFd<'_>;
 
-    /// Reads one packet into the buffer and says how long it is; `None` if there is none now. What does not fit is cut off.
+    /// Reads once, and appends the packet that came, or the packets of the segment that came; says whether anything did.
     ///
     /// # Errors
     ///
     /// What the system says: the device gives no more packets.
-    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>>;
+    fn receive(&mut self, packets: &mut Vec<Packet>) -> io::Result<bool>;
 
-    /// Hands a packet over.
-    fn send(&mut self, packet: &[u8]) -> Sent;
+    /// Hands over the first of these packets, with as many of the following ones as go with it. Says how many, at least one, and what became of them.
+    fn send(&mut self, packets: &[Arc<Packet>]) -> (usize, Sent);
 }
+
+/// No packet of IP is longer; and what stands before it.
+const LONGEST: usize = (1 << 16) + 64;
 
 /// What became of a packet that was handed to a device.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -89,13 +90,6 @@ impl AnyDevice {
 }
 
 impl Device for AnyDevice {
-    fn framing(&self) -> Framing {
-        match self {
-            Self::Tun(tun) => tun.framing(),
-            Self::Interface(interface) => interface.framing(),
-        }
-    }
-
     fn readable(&self) -> BorrowedFd<'_> {
         match self {
             Self::Tun(tun) => tun.readable(),
@@ -103,17 +97,17 @@ impl Device for AnyDevice {
         }
     }
 
-    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
+    fn receive(&mut self, packets: &mut Vec<Packet>) -> io::Result<bool> {
         match self {
-            Self::Tun(tun) => tun.receive(buffer),
-            Self::Interface(interface) => interface.receive(buffer),
+            Self::Tun(tun) => tun.receive(packets),
+            Self::Interface(interface) => interface.receive(packets),
         }
     }
 
-    fn send(&mut self, packet: &[u8]) -> Sent {
+    fn send(&mut self, packets: &[Arc<Packet>]) -> (usize, Sent) {
         match self {
-            Self::Tun(tun) => tun.send(packet),
-            Self::Interface(interface) => interface.send(packet),
+            Self::Tun(tun) => tun.send(packets),
+            Self::Interface(interface) => interface.send(packets),
         }
     }
 }

@@ -1,15 +1,19 @@
 //! A TUN device: the host that has it sends packets of IP into it and finds those in it that we write.
+//!
+//! With offloads (`IFF_VNET_HDR`, `TUNSETOFFLOAD`) the host leaves it to us to cut large segments of TCP and UDP and to compute checksums, and takes such
+//! segments from us: one system call for up to 64 packets, which is most of what a packet costs.
 
 use std::io;
 use std::os::fd::{AsFd as _, BorrowedFd};
+use std::sync::Arc;
 
 use cohaptic_linkfile::router::TunSpec;
 use nix::net::if_::if_nametoindex;
 use tun_rs::{DeviceBuilder, SyncDevice};
 
 use super::netlink::Netlink;
-use super::{Device, Failed, Sent};
-use crate::packet::Framing;
+use super::{Device, Failed, LONGEST, Sent};
+use crate::packet::{Framing, Join, Packet, cut, join, slices};
 
 /// How many packets wait in a device that we made until we read them. More than a burst, so that losses are those of a link.
 const WAITING: u32 = 2_000;
@@ -18,6 +22,11 @@ const WAITING: u32 = 2_000;
 pub struct Tun {
     device: SyncDevice,
     name: String,
+    /// Which packets are joined for it; `None` without offloads.
+    offloads: Option<Join>,
+    buffer: Vec<u8>,
+    /// What stands before the data of a segment.
+    head: Vec<u8>,
 }
 
 impl std::fmt::Debug for Tun {
@@ -35,11 +44,12 @@ impl Tun {
                 spec.namespace.clone().map_or_else(|| "the network namespace of the program".to_owned(), |name| format!("network namespace {name}"));
             return Err(Failed::NoDevice { namespace });
         }
-        let builder = DeviceBuilder::new().name(name).enable(false);
+        let builder = DeviceBuilder::new().name(name).enable(false).offload(spec.offloads);
         let builder = if spec.existing { builder.inherit_enable_state() } else { builder };
         let device = builder.build_sync().map_err(Failed::system("open it through /dev/net/tun"))?;
         device.set_nonblocking(true).map_err(Failed::system("read it without waiting"))?;
-        let tun = Self { device, name: name.to_owned() };
+        let offloads = device.tcp_gso().then_some(if device.udp_gso() { Join::TcpAndUdp } else { Join::Tcp });
+        let tun = Self { device, name: name.to_owned(), offloads, buffer: vec![0; LONGEST], head: Vec::new() };
         if !spec.existing {
             tun.configure(spec)?;
         }
@@ -61,23 +71,26 @@ impl Tun {
 }
 
 impl Device for Tun {
-    fn framing(&self) -> Framing {
-        Framing::Ip
-    }
-
     fn readable(&self) -> BorrowedFd<'_> {
         self.device.as_fd()
     }
 
-    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
-        match self.device.recv(buffer) {
-            Ok(length) => Ok(Some(length)),
-            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => Ok(None),
-            Err(error) => Err(error),
+    fn receive(&mut self, packets: &mut Vec<Packet>) -> io::Result<bool> {
+        let length = match self.device.recv(&mut self.buffer) {
+            Ok(length) => length,
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => return Ok(false),
+            Err(error) => return Err(error),
+        };
+        match self.offloads {
+            Some(_) => cut(&self.buffer[..length], packets),
+            None => packets.push(Packet::new(self.buffer[..length].to_vec(), Framing::Ip)),
         }
+        Ok(true)
     }
 
-    fn send(&mut self, packet: &[u8]) -> Sent {
-        Sent::of(self.device.send(packet))
+    fn send(&mut self, packets: &[Arc<Packet>]) -> (usize, Sent) {
+        let Some(which) = self.offloads else { return (1, Sent::of(self.device.send(packets[0].bytes()))) };
+        let count = join(packets, which, &mut self.head);
+        (count, Sent::of(self.device.send_vectored(&slices(&packets[..count], &self.head))))
     }
 }

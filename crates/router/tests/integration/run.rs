@@ -6,13 +6,14 @@ use std::fs::File;
 use std::io;
 use std::os::fd::{AsFd as _, BorrowedFd};
 use std::rc::Rc;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use cohaptic_linkfile::link_from_keys;
 use cohaptic_linkfile::router::Side;
 use cohaptic_realtime::{Clock, Pacing};
-use cohaptic_router::{Device, Framing, Router, RunError, Sent};
+use cohaptic_router::{Device, Framing, Packet, Router, RunError, Sent};
 use cohaptic_units::Instant;
 
 use crate::support::{file, udp_bytes};
@@ -69,32 +70,28 @@ struct Wire {
 }
 
 impl Device for Wire {
-    fn framing(&self) -> Framing {
-        Framing::Ip
-    }
-
     fn readable(&self) -> BorrowedFd<'_> {
         self.fd.as_fd()
     }
 
-    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
+    fn receive(&mut self, packets: &mut Vec<Packet>) -> io::Result<bool> {
         let mut coming = self.world.coming[self.side].borrow_mut();
         if coming.front().is_none_or(|(at, _)| *at > self.world.now.get()) {
-            return Ok(None);
+            return Ok(false);
         }
         let (_, bytes) = coming.pop_front().unwrap();
         if bytes.is_empty() {
             return Err(io::Error::other("unplugged"));
         }
-        buffer[..bytes.len()].copy_from_slice(&bytes);
-        Ok(Some(bytes.len()))
+        packets.push(Packet::new(bytes, Framing::Ip));
+        Ok(true)
     }
 
-    fn send(&mut self, packet: &[u8]) -> Sent {
+    fn send(&mut self, packets: &[Arc<Packet>]) -> (usize, Sent) {
         if self.takes == Sent::Sent {
-            self.sent.borrow_mut().push((self.world.now.get(), packet.to_vec()));
+            self.sent.borrow_mut().push((self.world.now.get(), packets[0].bytes().to_vec()));
         }
-        self.takes
+        (1, self.takes)
     }
 }
 

@@ -13,7 +13,7 @@ use super::hosts::{Host, PATIENCE, Running};
 use super::sandbox::inside;
 
 /// Runs `ip` with these words; says why not.
-fn ip(words: &str) -> Result<(), String> {
+pub(super) fn ip(words: &str) -> Result<(), String> {
     let output = Command::new("ip").args(words.split_whitespace()).output().map_err(|error| error.to_string())?;
     if output.status.success() { Ok(()) } else { Err(format!("ip {words}: {}", String::from_utf8_lossy(&output.stderr))) }
 }

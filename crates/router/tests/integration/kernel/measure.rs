@@ -1,5 +1,5 @@
-//! The figures of `docs/measured-router.md`: `cargo test --release -p cohaptic-router -- --ignored --nocapture --test-threads=1 measure`. They depend on the machine, so nothing is
-//! asked of them here.
+//! How late packets leave, for `docs/measured-router.md`: `cargo test --release -p cohaptic-router -- --ignored --nocapture --test-threads=1 measure`. The
+//! figures depend on the machine, so nothing is asked of them here.
 
 use std::net::SocketAddr;
 use std::thread;
@@ -12,8 +12,7 @@ use super::hosts::{Host, PATIENCE, Running};
 use super::sandbox::inside_as_root;
 use super::tun::sides;
 
-/// Sends packets with that much data from left to right for some seconds, `every` so often or (zero) as fast as it goes, and gives the report, how many
-/// were sent, and how many arrived.
+/// Sends packets with that much data from left to right for some seconds, `every` so often, and gives the report, how many were sent, and how many arrived.
 fn measure(text: &str, pacing: Pacing, data: usize, every: Duration, seconds: u64) -> (Report, u64, u64) {
     let (left, right) = (Host::new(), Host::new());
     let running = Running::begin_with(&format!("{}{text}", sides(&left, &right)), pacing, &Wishes { lock_memory: false, ..Wishes::default() });
@@ -33,9 +32,7 @@ fn measure(text: &str, pacing: Pacing, data: usize, every: Duration, seconds: u6
     let mut sent = 0_u32;
     while begin.elapsed() < Duration::from_secs(seconds) {
         sent += u32::from(from.send(&payload).is_ok());
-        if !every.is_zero() {
-            thread::sleep((every * sent).saturating_sub(begin.elapsed()));
-        }
+        thread::sleep((every * sent).saturating_sub(begin.elapsed()));
     }
     let arrived = sink.join().unwrap();
     (running.end(), sent.into(), arrived)
@@ -50,26 +47,6 @@ fn measure_the_release_error() {
         for (name, pacing) in [("sleep", Pacing::Sleep), ("spin", Pacing::SPIN)] {
             let (report, sent, arrived) = measure(WAN, pacing, 36, Duration::from_micros(200), 5);
             println!("{name}: {sent} sent, {arrived} arrived, release error {:?}", report.release);
-        }
-    });
-}
-
-#[test]
-#[ignore = "measures: see the head of the file"]
-fn measure_the_rate() {
-    inside_as_root("kernel::measure::measure_the_rate", || {
-        for data in [36, 1372] {
-            let (report, sent, arrived) = measure(WAN, Pacing::Sleep, data, Duration::ZERO, 3);
-            let routed = report.counters.received[0].all.packets;
-            println!(
-                "{} bytes: {} sent/s, {} routed/s, {} arrived/s, lost at the device {:?}",
-                data + 28,
-                sent / 3,
-                routed / 3,
-                arrived / 3,
-                report.written[1]
-            );
-            println!("   release error {:?}, overload {}", report.release, report.counters.lanes[0].overload);
         }
     });
 }

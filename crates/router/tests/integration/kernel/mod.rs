@@ -8,4 +8,5 @@ mod ethernet;
 mod hosts;
 mod measure;
 mod sandbox;
+mod throughput;
 mod tun;

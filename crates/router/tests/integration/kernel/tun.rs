@@ -205,6 +205,53 @@ fn tcp_gets_no_more_than_the_rate() {
     });
 }
 
+/// A host hands over segments of many packets, of TCP and of UDP, and the link meets packets, with offloads as without.
+#[test]
+fn a_link_meets_packets_and_not_segments() {
+    const AMOUNT: usize = 2_000_000;
+    inside("kernel::tun::a_link_meets_packets_and_not_segments", || {
+        for offloads in [true, false] {
+            let (left, right) = (Host::new(), Host::new());
+            let devices = sides(&left, &right).replace("mtu =", &format!("offloads = {offloads}, mtu ="));
+            let running = Running::begin(&format!(
+                "{devices}router = {{ default = \"pass\" }}\nlinks = {{ x = {{ delay = \"1ms\" }} }}\nrules = [{{ port = 80, link = \"x\" }}]"
+            ));
+            left.has(v6(1));
+            right.has(v6(2));
+            let sent: Vec<u8> = (0..AMOUNT).map(|place| (place * 31 / 7) as u8).collect();
+            for there in [v4(2), v6(2)].map(|address| SocketAddr::new(address, 80)) {
+                let listener = right.does(move || TcpListener::bind(there).unwrap());
+                let sender = left.does(move || TcpStream::connect_timeout(&there, PATIENCE).unwrap());
+                let sending = sent.clone();
+                let writer = thread::spawn(move || (&sender).write_all(&sending).map(|()| drop(sender)).unwrap());
+                let (mut stream, _) = listener.accept().unwrap();
+                stream.set_read_timeout(Some(PATIENCE)).unwrap();
+                let mut received = vec![0; AMOUNT];
+                stream.read_exact(&mut received).unwrap();
+                assert!(received == sent);
+                writer.join().unwrap();
+            }
+            // Ten datagrams of 100 bytes and one of 50, with one call.
+            let (from, to) = (left.udp(v4(1), 0), right.udp(v4(2), 80));
+            socket2::SockRef::from(&from).connect(&SocketAddr::new(v4(2), 80).into()).unwrap();
+            nix::sys::socket::setsockopt(&from, nix::sys::socket::sockopt::UdpGsoSegment, &100).unwrap();
+            from.send(&sent[..1050]).unwrap();
+            let mut buffer = [0; 2000];
+            for part in sent[..1050].chunks(100) {
+                let length = to.recv(&mut buffer).unwrap();
+                assert_eq!(&buffer[..length], part);
+            }
+            let report = running.end();
+            let rule = report.counters.by_rule[0];
+            let lane = report.counters.lane("x", Side::Left).unwrap();
+            assert!(lane.delivered_bytes >= 2 * AMOUNT as u64);
+            // No packet is longer than the mtu.
+            assert!(lane.delivered_bytes <= lane.stats.delivered() * 1400);
+            assert_eq!((rule.packets, report.dropped()), (report.counters.lanes.iter().map(|lane| lane.stats.offered()).sum(), 0));
+        }
+    });
+}
+
 #[test]
 fn rules_choose_the_link_of_real_traffic() {
     inside("kernel::tun::rules_choose_the_link_of_real_traffic", || {
