@@ -37,7 +37,8 @@ impl Processors {
     pub fn read() -> Self {
         let text = std::fs::read_to_string("/proc/stat").unwrap_or_default();
         // user, nice, system, idle, iowait, irq, softirq, steal; what follows is contained in the first two.
-        let ticks: Vec<u64> = text.lines().next().unwrap_or_default().split_whitespace().skip(1).take(8).filter_map(|ticks| ticks.parse().ok()).collect();
+        let ticks: Vec<u64> =
+            text.lines().next().unwrap_or_default().split_whitespace().skip(1).take(8).filter_map(|ticks| ticks.parse().ok()).collect();
         Self { stolen: ticks.get(7).copied().unwrap_or(0), all: ticks.iter().sum() }
     }
 

@@ -42,7 +42,9 @@ fn release_error(span: Duration) -> Result<(), Box<dyn Error>> {
         "the kernel, less the instant at which it should leave: for the relay {} ms after the kernel's time stamp, for the others after they read it.\n",
         subjects::DELAY.as_millis()
     );
-    println!("*Core* is the processor time of all but generator and sink, as a share of one core; *steal*, the share of the processors' time that the host gave to");
+    println!(
+        "*Core* is the processor time of all but generator and sink, as a share of one core; *steal*, the share of the processors' time that the host gave to"
+    );
     println!("others meanwhile. Asked for: p50 at most 1 µs and p99 at most 60 µs, sleeping, for less than 30 % of a core.\n");
     println!("| what | p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] | reordered | core | steal |");
     println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");

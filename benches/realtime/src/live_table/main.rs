@@ -70,7 +70,9 @@ fn loops(span: Duration) -> Result<(), Box<dyn Error>> {
     println!(
         "many of 1000 ticks: a session with more than one is not valid. *To the program* is when a datagram was handed to the kernel, less when it came out of its link. *Processor* is the time of the loop's thread, of all"
     );
-    println!("that it does, a tick. *Steal* is the share of the processors' time that the host gave to others during the row. The bare loops do nothing but wait.\n");
+    println!(
+        "that it does, a tick. *Steal* is the share of the processors' time that the host gave to others during the row. The bare loops do nothing but wait.\n"
+    );
     println!(
         "| loop | `SCHED_FIFO` | late: p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] | beyond 1 ms \\[‰\\] | processor \\[µs\\] | to the program: p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] | steal |"
     );
@@ -112,7 +114,9 @@ fn row(name: &str, wishes: Wishes, run: impl FnOnce() -> Result<Loop, Box<dyn Er
     let [out50, out99, out999, out_max] = releases.map(quantiles).unwrap_or_default();
     let count = u32::try_from(ticks.count.max(1)).unwrap_or(u32::MAX);
     let (processor, late) = (micros(processor / count), f64::from(u32::try_from(late).unwrap_or(u32::MAX)) * 1000.0 / f64::from(count));
-    println!("| {name} | {fifo} | {p50} | {p99} | {p999} | {max} | {late:.1} | {processor} | {out50} | {out99} | {out999} | {out_max} | {steal:.1} % |");
+    println!(
+        "| {name} | {fifo} | {p50} | {p99} | {p999} | {max} | {late:.1} | {processor} | {out50} | {out99} | {out999} | {out_max} | {steal:.1} % |"
+    );
     Ok(refused)
 }
 
