@@ -8,8 +8,11 @@ use crate::random_links::{Payload, Plan, Sending, cases, drain_network, plan, se
 
 const AWAITED: usize = 1;
 
-/// The events of a network that is called when packets are sent, and in between when a packet may reach the awaited node; with each the instant of the call.
-fn driven(plan: &Plan, general: bool, script: &[Sending]) -> (Vec<(Instant, PacketEvent<Payload, Path>)>, Vec<Instant>) {
+/// An event, and the instant of the call that gave it.
+type Called = (Instant, PacketEvent<Payload, Path>);
+
+/// The events of a network that is called when packets are sent, and in between when a packet may reach the awaited node; and the instants of the latter.
+fn driven(plan: &Plan, general: bool, script: &[Sending]) -> (Vec<Called>, Vec<Instant>) {
     let mut network = plan.build(general).awaiting([NodeId::new(AWAITED), NodeId::new(77)]);
     let (mut events, mut wakes) = (Vec::new(), Vec::new());
     let mut now = Instant::ZERO;
