@@ -37,7 +37,7 @@ pub trait Conductor {
     /// The session as it stands, about 20 times a second, if [`Conductor::wants_status`].
     fn show(&mut self, status: Status);
 
-    /// Whether anybody looks on.
+    /// Whether anybody looks on. The answer must stay.
     fn wants_status(&self) -> bool {
         true
     }
@@ -128,6 +128,7 @@ impl Session {
 
     fn drive(&mut self, clock: &MonotonicClock, conductor: &mut impl Conductor) -> Result<(), SessionError> {
         let mut pacer = Pacer::new(self.config.pacing);
+        self.watch.is_shown = conductor.wants_status();
         let (mut next_look, mut looks) = (Instant::ZERO, 0_u32);
         while let Some(due) = self.live.poll_timeout() {
             let woken = {
