@@ -45,7 +45,7 @@ fn release_error(span: Duration) -> Result<(), Box<dyn Error>> {
     println!(
         "*Core* is the processor time of all but generator and sink, as a share of one core; *steal*, the share of the processors' time that the host gave to"
     );
-    println!("others meanwhile. Asked for: p50 at most 1 µs and p99 at most 60 µs, sleeping, for less than 30 % of a core.\n");
+    println!("others meanwhile. Asked for: p50 at most 1 µs and p99 at most 60 µs, for less than 30 % of a core.\n");
     println!("| what | p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] | reordered | core | steal |");
     println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     let row = |name: &str, (error, processor): (LatenessSummary, Duration), reordered: Option<f64>, before: Processors| {
