@@ -4,3 +4,4 @@ pub mod machine;
 pub mod scene;
 pub mod soak;
 pub mod visitor;
+pub mod waiting;

@@ -23,3 +23,30 @@ pub fn open_files() -> usize {
     };
     (0..3).map(look).min().unwrap_or(0)
 }
+
+/// What the processors of this machine did so far, by the kernel's count of ticks.
+#[derive(Clone, Copy, Debug)]
+pub struct Processors {
+    stolen: u64,
+    all: u64,
+}
+
+impl Processors {
+    /// Reads it; nothing if the system does not tell.
+    #[must_use]
+    pub fn read() -> Self {
+        let text = std::fs::read_to_string("/proc/stat").unwrap_or_default();
+        // user, nice, system, idle, iowait, irq, softirq, steal; what follows is contained in the first two.
+        let ticks: Vec<u64> =
+            text.lines().next().unwrap_or_default().split_whitespace().skip(1).take(8).filter_map(|ticks| ticks.parse().ok()).collect();
+        Self { stolen: ticks.get(7).copied().unwrap_or(0), all: ticks.iter().sum() }
+    }
+
+    /// The share of the processors' time since then that the host of a virtual machine gave to others.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "counts of ticks")]
+    pub fn stolen_since(self) -> f64 {
+        let now = Self::read();
+        now.stolen.saturating_sub(self.stolen) as f64 / now.all.saturating_sub(self.all).max(1) as f64
+    }
+}

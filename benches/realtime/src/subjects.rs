@@ -8,13 +8,14 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use cohaptic_realtime::udp::EndpointConfig;
-use cohaptic_realtime::{Clock as _, Lateness, LatenessSummary, MonotonicClock, Pacer, Pacing, Wishes, prepare_thread};
+use cohaptic_realtime::{Clock as _, Lateness, LatenessSummary, MonotonicClock, Pacing, Wishes, prepare_thread};
 use cohaptic_relay::{Form, Limits, Mesh, Program, Relay, RelayConfig, RunOptions};
 use cohaptic_scene::LinkTable;
 use cohaptic_wan::{Delay, LinkConfig};
 
 use crate::traffic::{Received, SIZE, Sent, Sink, generate, wide};
 use cohaptic_benches_realtime::machine;
+use cohaptic_benches_realtime::waiting::Waiting;
 
 /// The delay of the link.
 pub(crate) const DELAY: Duration = Duration::from_millis(24);
@@ -147,30 +148,27 @@ pub(crate) fn tokio_forwarder(rate: u64, span: Duration) -> Done {
     })
 }
 
-/// A thread that does nothing but wait for each packet's time and send it: what the system gives at best.
-pub(crate) fn bare_thread(pacing: Pacing, rate: u64, span: Duration) -> Result<LatenessSummary, Box<dyn Error>> {
+/// A thread that does nothing but wait for each packet's time and send it: what the system gives at best. With it the processor time of a packet.
+pub(crate) fn bare_thread(mut waiting: Waiting, rate: u64, span: Duration) -> Result<(LatenessSummary, Duration), Box<dyn Error>> {
     let (socket, sink) = (UdpSocket::bind("127.0.0.1:0")?, Sink::start()?);
     let target = sink.address;
-    let thread = std::thread::spawn(move || -> std::io::Result<LatenessSummary> {
+    let thread = std::thread::spawn(move || -> std::io::Result<(LatenessSummary, Duration)> {
         let _ = prepare_thread(&Wishes { lock_memory: false, ..Wishes::default() });
         let clock = MonotonicClock::start();
-        let (mut pacer, mut errors) = (Pacer::new(pacing), Lateness::new());
+        let mut errors = Lateness::new();
         let period = Duration::from_nanos(1_000_000_000 / rate);
-        let mut due = clock.now();
+        let (mut due, before) = (clock.now(), machine::thread_time());
         let end = due + span;
         while due < end {
             due += period;
-            match pacing {
-                // Without what a pacer does to be on time all the same.
-                Pacing::Sleep => _ = clock.block(Some(due), &[])?,
-                Pacing::Spin { .. } => _ = pacer.wait(&clock, Some(due), &[])?,
-            }
+            waiting.wait(&clock, due)?;
             errors.record(clock.now().saturating_duration_since(due));
             socket.send_to(&[0; SIZE], target)?;
         }
-        Ok(errors.summary())
+        let count = u32::try_from(errors.count().max(1)).unwrap_or(u32::MAX);
+        Ok((errors.summary(), (machine::thread_time() - before) / count))
     });
-    let summary = thread.join().map_err(|_| "the thread panicked")??;
+    let done = thread.join().map_err(|_| "the thread panicked")??;
     sink.end();
-    Ok(summary)
+    Ok(done)
 }

@@ -1,4 +1,4 @@
-//! Waiting for a deadline: sleep, and if asked spin the last of it.
+//! Waiting for a deadline: sleep until shortly before it, and spin the last of it.
 
 use std::io;
 use std::os::fd::BorrowedFd;
@@ -9,16 +9,19 @@ use cohaptic_units::Instant;
 use crate::Clock;
 
 /// How to wait.
+///
+/// Either way the system is asked for the thread before the deadline, by a *margin* that follows how late it woke the thread of late. The rest of the margin is waited
+/// out with the clock in view and the processor's pause instruction, where it has one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Pacing {
-    /// Leave the processor until the system wakes the thread, which it is asked for as much before the deadline as it is usually late. When it is earlier
-    /// than usual, look at the clock for the rest: half of all deadlines are met to the microsecond, for some microseconds of processor time each.
+    /// As early as three of four wake-ups were late at most, to a microsecond, and never more than 100 µs: most deadlines are met to the microsecond, for some
+    /// microseconds of processor time each. The first margin is zero.
     #[default]
     Sleep,
-    /// The same until `margin` before the deadline, then look at the clock again and again: well below a microsecond late as long as the thread is not
-    /// moved aside, for a core that is busy during the margin.
+    /// As early as 98 of 100 wake-ups were late at most: well below a microsecond late as long as the thread is not moved aside, for a core that is busy during the
+    /// margin.
     Spin {
-        /// Longer than nearly all wake-ups of the system are late.
+        /// The longest margin, which is that of the first wake-ups.
         margin: Duration,
     },
 }
@@ -26,6 +29,30 @@ pub enum Pacing {
 impl Pacing {
     /// Spins long enough for an ordinary machine: 99 % of its wake-ups are less than 100 µs late.
     pub const SPIN: Self = Self::Spin { margin: Duration::from_micros(120) };
+
+    /// The longest margin.
+    const fn most(self) -> Duration {
+        match self {
+            Self::Sleep => Duration::from_micros(100),
+            Self::Spin { margin } => margin,
+        }
+    }
+
+    /// The margin while nothing is known, and the number of wake-ups that are thought to have been later than any that is counted.
+    const fn first(self) -> (Duration, u32) {
+        match self {
+            Self::Sleep => (Duration::ZERO, 0),
+            Self::Spin { margin } => (margin, 1),
+        }
+    }
+
+    /// Of 100 wake-ups, how many are to be within the margin.
+    const fn percent(self) -> u32 {
+        match self {
+            Self::Sleep => 75,
+            Self::Spin { .. } => 98,
+        }
+    }
 }
 
 /// Why a wait came to its end.
@@ -40,17 +67,25 @@ pub enum Woken {
 }
 
 /// Waits for absolute deadlines, so that being late for one does not move the next.
-#[derive(Clone, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Pacer {
     pacing: Pacing,
-    usual: UsualLateness,
+    wake_ups: WakeUps,
+    margin: Duration,
+}
+
+impl Default for Pacer {
+    fn default() -> Self {
+        Self::new(Pacing::default())
+    }
 }
 
 impl Pacer {
     /// A pacer that waits like that.
     #[must_use]
     pub const fn new(pacing: Pacing) -> Self {
-        Self { pacing, usual: UsualLateness { nanos: 0 } }
+        let (margin, later) = pacing.first();
+        Self { pacing, wake_ups: WakeUps { counts: [0; WakeUps::STEPS], count: later }, margin }
     }
 
     /// How it waits.
@@ -59,13 +94,10 @@ impl Pacer {
         self.pacing
     }
 
-    /// So long before a deadline the thread is to be awake: the margin of [`Pacing::Spin`]; sleeping, what its wake-ups were usually late so far.
+    /// So long before a deadline the thread is to be awake: see [`Pacing`]. It changes with each wake-up, and depends on nothing but how late those so far were.
     #[must_use]
     pub const fn margin(&self) -> Duration {
-        match self.pacing {
-            Pacing::Sleep => Duration::from_nanos(self.usual.nanos),
-            Pacing::Spin { margin } => margin,
-        }
+        self.margin
     }
 
     /// Waits until the deadline (`None`: for ever) has come, or until one of `readable` can be read. A deadline that has passed is [`Woken::Deadline`] at
@@ -109,31 +141,59 @@ impl Pacer {
             }
             now = woken;
             if now >= asleep_until {
-                self.usual.note(now.saturating_duration_since(asleep_until));
+                self.learn(now.saturating_duration_since(asleep_until));
             }
         }
         Ok(Woken::Deadline)
     }
+
+    /// The system woke the thread that late.
+    #[inline]
+    fn learn(&mut self, late: Duration) {
+        self.wake_ups.note(late);
+        let most = self.pacing.most();
+        self.margin = self.wake_ups.bound(self.pacing.percent()).map_or(most, |bound| bound.min(most));
+    }
 }
 
-/// The running median of how late the system wakes the thread.
-///
-/// It rises by a step with each wake-up that is later and falls with each that is not, so that it stays where half of them are later. A wake-up that is late by
-/// milliseconds, because something else ran, moves it by no more than any other.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-struct UsualLateness {
-    nanos: u64,
+/// How late the system woke the thread: a histogram in steps of a microsecond, in which a wake-up counts half as much after every thousand or so.
+#[derive(Clone, PartialEq, Eq, Debug)]
+struct WakeUps {
+    counts: [u32; Self::STEPS],
+    /// Of all, those later than the last step among them.
+    count: u32,
 }
 
-impl UsualLateness {
-    const STEP: u64 = 500;
-    /// The longest span for which the clock is looked at, whatever the system does.
-    const MOST: u64 = 100_000;
+impl WakeUps {
+    const STEP: Duration = Duration::from_micros(1);
+    const STEPS: usize = 128;
+    /// At that many all are halved.
+    const MOST: u32 = 1 << 11;
 
     #[inline]
     fn note(&mut self, late: Duration) {
-        let is_later = late > Duration::from_nanos(self.nanos);
-        self.nanos = if is_later { (self.nanos + Self::STEP).min(Self::MOST) } else { self.nanos.saturating_sub(Self::STEP) };
+        let step = late.as_nanos() / Self::STEP.as_nanos();
+        if let Some(count) = usize::try_from(step).ok().and_then(|step| self.counts.get_mut(step)) {
+            *count += 1;
+        }
+        self.count += 1;
+        if self.count >= Self::MOST {
+            let later = self.count - self.counts.iter().sum::<u32>();
+            self.counts.iter_mut().for_each(|count| *count /= 2);
+            self.count = later / 2 + self.counts.iter().sum::<u32>();
+        }
+    }
+
+    /// That percentage of them were this late at most, to a step; `None` if that is beyond the last step.
+    #[inline]
+    fn bound(&self, percent: u32) -> Option<Duration> {
+        let wanted = (self.count * percent).div_ceil(100);
+        let mut found = 0;
+        let step = (0..).zip(&self.counts).find_map(|(step, count)| {
+            found += count;
+            (found >= wanted).then_some(step)
+        });
+        step.map(|step| Self::STEP * step)
     }
 }
 
@@ -179,54 +239,71 @@ mod tests {
     }
 
     #[test]
-    fn sleeping_wakes_as_late_as_the_system_does_and_spinning_does_not() {
-        let (sleeping, spinning) = (fake(0, 50_000), fake(10, 50_000));
-        assert_eq!(Pacer::new(Pacing::Sleep).wait(&sleeping, at(1_000_000), &[]).unwrap(), Woken::Deadline);
-        assert_eq!(sleeping.now.get(), 1_050_000, "of the first wake-up nothing is known yet");
-        let margin = Duration::from_micros(120);
-        assert_eq!(Pacer::new(Pacing::Spin { margin }).wait(&spinning, at(1_000_000), &[]).unwrap(), Woken::Deadline);
-        assert_eq!(*spinning.asked.borrow(), [880_000], "it sleeps once, until the margin");
-        // Woken at 930,000, then in steps of 10 to the deadline.
-        assert_eq!(spinning.now.get(), 1_000_000);
+    fn the_first_deadline_is_slept_through_or_approached_as_early_as_allowed() {
+        for (pacing, asleep_until) in [(Pacing::Sleep, 1_000_000), (Pacing::SPIN, 880_000), (Pacing::Spin { margin: Duration::ZERO }, 1_000_000)] {
+            let clock = fake(10, 50_000);
+            assert_eq!(Pacer::new(pacing).wait(&clock, at(1_000_000), &[]).unwrap(), Woken::Deadline);
+            assert_eq!(*clock.asked.borrow(), [asleep_until], "it sleeps once");
+            // Woken 50 µs later, then in steps of 10 ns, one for each look, to the deadline if that has not passed.
+            assert_eq!(clock.now.get(), 1_000_000.max(asleep_until + 50_020));
+        }
     }
 
-    /// How late the ticks of a pacer that sleeps are on a clock whose wake-ups are that late \[ns\].
-    fn lateness(ticks: u64, clock: &Fake, late: impl Fn(u64) -> u64) -> Vec<u64> {
-        let mut pacer = Pacer::new(Pacing::Sleep);
+    /// How late the ticks of a pacer are on a clock whose wake-ups are that late \[ns\], and what its margin is at the end \[µs\].
+    fn lateness(pacing: Pacing, ticks: u64, late: impl Fn(u64) -> u64) -> (Vec<u64>, u128) {
+        let (mut pacer, clock) = (Pacer::new(pacing), fake(10, 0));
         let tick = |tick: u64| {
             clock.late.set(late(tick));
-            assert_eq!(pacer.wait(clock, at(tick * 1_000_000), &[]).unwrap(), Woken::Deadline);
-            clock.now.get() - tick * 1_000_000
+            assert_eq!(pacer.wait(&clock, at(tick * 10_000_000), &[]).unwrap(), Woken::Deadline);
+            clock.now.get() - tick * 10_000_000
         };
-        (1..=ticks).map(tick).collect()
+        ((1..=ticks).map(tick).collect(), pacer.margin().as_micros())
+    }
+
+    /// Of 100 wake-ups one is 0.5 µs late, one 1.5 µs, and so on up to 99.5 µs, in an order that mixes them.
+    fn evenly(tick: u64) -> u64 {
+        (tick * 37 % 100) * 1000 + 500
+    }
+
+    #[test]
+    fn the_margin_is_the_quantile_of_how_late_wake_ups_were() {
+        assert_eq!(lateness(Pacing::Sleep, 1000, evenly).1, 74);
+        assert_eq!(lateness(Pacing::SPIN, 1000, evenly).1, 98);
+        let (found, _) = lateness(Pacing::Sleep, 3000, evenly);
+        let learned = &found[1000..];
+        assert!(learned.iter().filter(|late| **late <= 1000).count() >= 1490, "three of four are on time to a microsecond");
+        assert!(learned.iter().all(|late| *late <= 26_000), "the others are late by what they differ");
+    }
+
+    #[test]
+    fn rare_wake_ups_that_are_late_by_milliseconds_do_not_move_it() {
+        let with_outliers = |tick: u64| if tick.is_multiple_of(10) { 3_000_000 } else { 40_500 };
+        assert_eq!(lateness(Pacing::Sleep, 1000, with_outliers).1, 40);
+        // Among 100 there are too many of them for one that is to have 98 in time: then it does what it may.
+        assert_eq!(lateness(Pacing::SPIN, 1000, with_outliers).1, 120);
+    }
+
+    #[test]
+    fn it_follows_a_system_that_becomes_slower_or_faster() {
+        let changes = |before: u64, after: u64| move |tick: u64| if tick < 5000 { before } else { after };
+        for (before, after) in [(20_500, 70_500), (70_500, 20_500)] {
+            assert_eq!(lateness(Pacing::Sleep, 4999, changes(before, after)).1, u128::from(before / 1000));
+            assert_eq!(lateness(Pacing::Sleep, 9000, changes(before, after)).1, u128::from(after / 1000));
+        }
     }
 
     #[test]
     fn deadlines_are_absolute_so_lateness_does_not_add_up() {
-        // It never falls behind, and learns by 500 ns a tick to be woken as much earlier as it is late.
-        let found = lateness(100, &fake(0, 0), |_| 50_000);
-        let wanted: Vec<u64> = (0..100).map(|tick| 50_000 - 500 * tick).collect();
-        assert_eq!(found, wanted);
+        let (found, margin) = lateness(Pacing::Sleep, 100, |_| 900_000);
+        assert_eq!(margin, 100, "what is looked at the clock for has a bound");
+        assert_eq!(found[0], 900_020);
+        assert!(found[1..].iter().all(|late| *late == 800_020), "{found:?}");
     }
 
     #[test]
-    fn it_is_never_early_and_is_on_time_when_woken_as_late_as_usual_or_earlier() {
-        // Wake-ups 40 or 60 µs late in turns, and every 50th by 3 ms.
-        let late = |tick: u64| if tick.is_multiple_of(50) { 3_000_000 } else { 40_000 + 20_000 * (tick % 2) };
-        let clock = fake(10, 0);
-        let found = lateness(2000, &clock, late);
-        let learned = &found[1000..];
-        assert!(learned.iter().filter(|late| **late <= 10).count() >= 480, "the earlier half is on time");
-        let latest = learned.iter().filter(|late| **late < 500_000).max().unwrap();
-        assert!(*latest <= 20_500, "the others are later by what they differ, and a step: {latest}");
-    }
-
-    #[test]
-    fn what_is_looked_at_the_clock_for_has_a_bound() {
-        let mut pacer = Pacer::new(Pacing::Sleep);
-        let clock = fake(10, 900_000);
-        (1..=1000).for_each(|tick| assert_eq!(pacer.wait(&clock, at(tick * 1_000_000), &[]).unwrap(), Woken::Deadline));
-        assert_eq!(pacer.margin(), Duration::from_micros(100));
+    fn the_same_lateness_gives_the_same_margins() {
+        assert_eq!(lateness(Pacing::Sleep, 2500, evenly), lateness(Pacing::Sleep, 2500, evenly));
+        assert_ne!(lateness(Pacing::Sleep, 2500, evenly), lateness(Pacing::Sleep, 2500, |tick| evenly(tick + 1)));
     }
 
     #[test]
@@ -257,6 +334,6 @@ mod tests {
                 Ok(false)
             }
         }
-        assert_eq!(Pacer::default().wait(&Still, at(1), &[]).unwrap(), Woken::Early);
+        assert_eq!(Pacer::default().wait(&Still, at(1_000_000), &[]).unwrap(), Woken::Early);
     }
 }

@@ -1,4 +1,4 @@
-//! Writes `docs/measured-live.md`: `cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md`. Takes about three minutes; a number of seconds as
+//! Writes `docs/measured-live.md`: `cargo run --release -p cohaptic-benches-realtime --bin live-table > docs/measured-live.md`. Takes about four minutes; a number of seconds as
 //! argument replaces the ten of each run.
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 
@@ -8,14 +8,20 @@ mod session;
 use std::error::Error;
 use std::time::Duration;
 
-use cohaptic_benches_realtime::machine;
-use cohaptic_realtime::{Clock as _, Lateness, LatenessSummary, MonotonicClock, Pacer, Pacing, Wishes, prepare_thread};
+use cohaptic_benches_realtime::machine::{self, Processors};
+use cohaptic_benches_realtime::waiting::Waiting;
+use cohaptic_realtime::{Clock as _, Lateness, LatenessSummary, MonotonicClock, Pacing, Wishes, prepare_thread};
+use session::Members;
 
 /// Of every loop here.
 const TICK: Duration = Duration::from_millis(1);
 
-/// With how many peers, one of them in another program.
-const PEERS: [usize; 2] = [3, 10];
+/// With how many peers, one of them in another program or none.
+const SESSIONS: [(usize, Members); 5] =
+    [(3, Members::OneOutside), (10, Members::OneOutside), (10, Members::Simulated), (100, Members::OneOutside), (100, Members::Simulated)];
+
+/// More peers than this run in one way only: sleeping, with priority.
+const IN_EVERY_WAY: usize = 10;
 
 /// `SCHED_FIFO` with the priority that `cohaptic live` asks for. Memory is not locked: it would stay so for the rows after it.
 fn with_priority() -> Wishes {
@@ -32,6 +38,14 @@ struct Loop {
     processor: Duration,
     /// What the system refused it.
     refused: Vec<String>,
+    /// How many ticks were later than a millisecond, where more than one in a thousand makes a session not valid.
+    late: u64,
+}
+
+impl Loop {
+    fn bare(ticks: &Lateness, processor: Duration, refused: Vec<String>) -> Self {
+        Self { ticks: ticks.summary(), releases: None, processor, refused, late: ticks.count_later_than(Duration::from_millis(1)) }
+    }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -48,35 +62,37 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn loops(span: Duration) -> Result<(), Box<dyn Error>> {
     println!("## The loop\n");
     println!(
-        "Sessions of 3 and of 10 peers that all touch the object. One of them is another program, played by a thread of this process: it sends 125 samples a"
+        "Sessions of peers that all touch the object. Links: 24 ms ± 2 ms, 1 % loss. In those *with a program*, one of the peers is another program, played by a"
     );
     println!(
-        "second over loopback, with a key, and receives those of the others. Links: 24 ms ± 2 ms, 1 % loss. *Late* is when the loop woke up, less when the tick"
+        "thread of this process: it sends 125 samples a second over loopback, with a key, and receives those of the others. *Late* is when the loop woke up, less when the tick was due; *beyond 1 ms*, how"
     );
     println!(
-        "was due. *To the program* is when a datagram was handed to the kernel, less when it came out of its link. *Processor* is the time of the loop's thread, of all"
+        "many of 1000 ticks: a session with more than one is not valid. *To the program* is when a datagram was handed to the kernel, less when it came out of its link. *Processor* is the time of the loop's thread, of all"
     );
-    println!("that it does, a tick. The bare loops do nothing but wait.\n");
     println!(
-        "| loop | `SCHED_FIFO` | late: p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] | processor \\[µs\\] | to the program: p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] |"
+        "that it does, a tick. *Steal* is the share of the processors' time that the host gave to others during the row. The bare loops do nothing but wait.\n"
     );
-    println!("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
+    println!(
+        "| loop | `SCHED_FIFO` | late: p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] | beyond 1 ms \\[‰\\] | processor \\[µs\\] | to the program: p50 \\[µs\\] | p99 \\[µs\\] | p99.9 \\[µs\\] | max \\[µs\\] | steal |"
+    );
+    println!("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     let mut refused = Vec::new();
-    for peers in PEERS {
+    for (peers, members) in SESSIONS {
         for (pacing, how) in [(Pacing::Sleep, "sleeping"), (Pacing::SPIN, "spinning")] {
             for wishes in [Wishes::NONE, with_priority()] {
-                let run = session::run(peers, pacing, wishes, span)?;
-                row(&format!("session of {peers}, {how}"), wishes, &run);
-                refused.extend(run.refused);
+                if peers > IN_EVERY_WAY && (pacing != Pacing::Sleep || wishes == Wishes::NONE) {
+                    continue;
+                }
+                let name = format!("{peers} {}, {how}", members.name());
+                refused.extend(row(&name, wishes, || session::run(peers, members, pacing, wishes, span))?);
             }
         }
     }
-    row("bare: `tokio::time::interval`", Wishes::NONE, &tokio_interval(span)?);
-    for (pacing, how) in [(Pacing::Sleep, "bare: `clock_nanosleep`"), (Pacing::SPIN, "bare: spinning")] {
+    row("bare: `tokio::time::interval`", Wishes::NONE, || tokio_interval(span))?;
+    for (how, waiting) in Waiting::all() {
         for wishes in [Wishes::NONE, with_priority()] {
-            let run = bare_thread(pacing, wishes, span)?;
-            row(how, wishes, &run);
-            refused.extend(run.refused);
+            refused.extend(row(&format!("bare: {how}"), wishes, || bare_thread(waiting.clone(), wishes, span))?);
         }
     }
     refused.sort();
@@ -88,13 +104,20 @@ fn loops(span: Duration) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn row(name: &str, wishes: Wishes, run: &Loop) {
+/// Runs a loop, prints its row, and gives what the system refused it.
+fn row(name: &str, wishes: Wishes, run: impl FnOnce() -> Result<Loop, Box<dyn Error>>) -> Result<Vec<String>, Box<dyn Error>> {
+    let processors = Processors::read();
+    let Loop { ticks, releases, processor, refused, late } = run()?;
+    let steal = processors.stolen_since() * 100.0;
     let fifo = if wishes.priority.is_some() { "asked for" } else { "" };
-    let [p50, p99, p999, max] = quantiles(run.ticks);
-    let [out50, out99, out999, out_max] = run.releases.map(quantiles).unwrap_or_default();
-    let ticks = u32::try_from(run.ticks.count.max(1)).unwrap_or(u32::MAX);
-    let processor = micros(run.processor / ticks);
-    println!("| {name} | {fifo} | {p50} | {p99} | {p999} | {max} | {processor} | {out50} | {out99} | {out999} | {out_max} |");
+    let [p50, p99, p999, max] = quantiles(ticks);
+    let [out50, out99, out999, out_max] = releases.map(quantiles).unwrap_or_default();
+    let count = u32::try_from(ticks.count.max(1)).unwrap_or(u32::MAX);
+    let (processor, late) = (micros(processor / count), f64::from(u32::try_from(late).unwrap_or(u32::MAX)) * 1000.0 / f64::from(count));
+    println!(
+        "| {name} | {fifo} | {p50} | {p99} | {p999} | {max} | {late:.1} | {processor} | {out50} | {out99} | {out999} | {out_max} | {steal:.1} % |"
+    );
+    Ok(refused)
 }
 
 fn at_the_door() -> Result<(), Box<dyn Error>> {
@@ -122,30 +145,26 @@ fn micros(span: Duration) -> String {
     if micros < 10.0 { format!("{micros:.2}") } else { format!("{micros:.0}") }
 }
 
-/// A thread that waits for each tick's time: with `clock_nanosleep`, and spins the last of it if asked.
-pub(crate) fn bare_thread(pacing: Pacing, wishes: Wishes, span: Duration) -> Result<Loop, Box<dyn Error>> {
+/// A thread that waits for each tick's time in one of the ways there are.
+fn bare_thread(mut waiting: Waiting, wishes: Wishes, span: Duration) -> Result<Loop, Box<dyn Error>> {
     let thread = std::thread::spawn(move || -> std::io::Result<Loop> {
         let prepared = prepare_thread(&wishes);
-        let (clock, mut pacer, mut ticks) = (MonotonicClock::start(), Pacer::new(pacing), Lateness::new());
+        let (clock, mut ticks) = (MonotonicClock::start(), Lateness::new());
         let (mut due, before) = (clock.now(), machine::thread_time());
         let end = due + span;
         while due < end {
             due += TICK;
-            match pacing {
-                // Without what a pacer does to be on time all the same.
-                Pacing::Sleep => _ = clock.block(Some(due), &[])?,
-                Pacing::Spin { .. } => _ = pacer.wait(&clock, Some(due), &[])?,
-            }
+            waiting.wait(&clock, due)?;
             ticks.record(clock.now().saturating_duration_since(due));
         }
-        let refused = prepared.refused.iter().map(ToString::to_string).collect();
-        Ok(Loop { ticks: ticks.summary(), releases: None, processor: machine::thread_time() - before, refused })
+        let processor = machine::thread_time() - before;
+        Ok(Loop::bare(&ticks, processor, prepared.refused.iter().map(ToString::to_string).collect()))
     });
     Ok(thread.join().map_err(|_| "the thread panicked")??)
 }
 
 /// An interval of tokio, on a runtime of one thread that has nothing else to do.
-pub(crate) fn tokio_interval(span: Duration) -> Result<Loop, Box<dyn Error>> {
+fn tokio_interval(span: Duration) -> Result<Loop, Box<dyn Error>> {
     let thread = std::thread::spawn(move || -> std::io::Result<Loop> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build()?;
         let before = machine::thread_time();
@@ -160,7 +179,7 @@ pub(crate) fn tokio_interval(span: Duration) -> Result<Loop, Box<dyn Error>> {
                 ticks.record(due.elapsed());
             }
         });
-        Ok(Loop { ticks: ticks.summary(), releases: None, processor: machine::thread_time() - before, refused: Vec::new() })
+        Ok(Loop::bare(&ticks, machine::thread_time() - before, Vec::new()))
     });
     Ok(thread.join().map_err(|_| "the thread panicked")??)
 }

@@ -16,7 +16,7 @@ use super::numbers::integer;
 /// How to be on time, and live control.
 #[derive(Debug, Args)]
 pub(crate) struct RealTimeArguments {
-    /// Spin the last 120 µs before each deadline: a hundred times closer to it, for a core that is busy meanwhile
+    /// Wake earlier before each deadline and spin, at most for 120 µs: closer to it, for a core that is busy meanwhile
     #[arg(long)]
     pub(crate) spin: bool,
     /// Do not ask the system for SCHED_FIFO and locked memory

@@ -51,6 +51,8 @@ pub struct Transmit {
 #[derive(Debug)]
 pub(crate) struct RemotePeers<const A: usize> {
     seats: Vec<Option<Seat>>,
+    /// The places of those that are there.
+    places: Vec<usize>,
     /// The ages of the others, for each local peer.
     ages: Vec<Ages<A>>,
     /// What each (sender, receiver) was last told.
@@ -72,10 +74,11 @@ impl<const A: usize> RemotePeers<A> {
             peer.kind.silence().map(|silence| Seat::new(is_process, silence, peers, scene.peer_config(place).coupling))
         };
         let seats: Vec<Option<Seat>> = scene.peers.iter().enumerate().map(seat).collect();
+        let places = seats.iter().enumerate().filter_map(|(place, seat)| seat.as_ref().map(|_| place)).collect();
         let has_processes = seats.iter().flatten().any(|seat| seat.is_process);
         let lead = seats.iter().position(|seat| seat.as_ref().is_none_or(|seat| !seat.is_process)).unwrap_or(0);
         let (ages, told) = (vec![Ages::default(); peers], vec![None; peers * peers]);
-        Self { seats, ages, told, outbox: VecDeque::new(), has_processes, lead, undrained: None }
+        Self { seats, places, ages, told, outbox: VecDeque::new(), has_processes, lead, undrained: None }
     }
 
     pub(crate) fn seat(&self, place: usize) -> Option<&Seat> {
@@ -93,9 +96,9 @@ impl<const A: usize> RemotePeers<A> {
 
     /// Notices peers that have fallen silent, and calls `silent` for each.
     pub(crate) fn notice_silence(&mut self, now: Instant, mut silent: impl FnMut(usize)) {
-        for (place, seat) in self.seats.iter_mut().enumerate() {
-            if seat.as_mut().is_some_and(|seat| seat.notice_silence(now)) {
-                silent(place);
+        for place in &self.places {
+            if self.seats[*place].as_mut().is_some_and(|seat| seat.notice_silence(now)) {
+                silent(*place);
             }
         }
     }
@@ -137,8 +140,8 @@ impl<const A: usize> RemotePeers<A> {
     /// Tells a peer that is about to tick what it feels of the remote peers.
     pub(crate) fn tell<D: Device<A>, S: Strategy<A>>(&mut self, to: usize, now: Instant, peer: &mut Peer<A, D, S>) {
         let peers = self.seats.len();
-        for (from, seat) in self.seats.iter().enumerate().filter(|(from, _)| *from != to) {
-            let Some(seat) = seat else { continue };
+        for from in self.places.iter().copied().filter(|from| *from != to) {
+            let Some(seat) = &self.seats[from] else { continue };
             let (age, told) = (seat.fades[to].age(now), &mut self.told[from * peers + to]);
             if *told != Some(age) {
                 *told = Some(age);

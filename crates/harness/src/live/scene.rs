@@ -171,9 +171,15 @@ impl LiveScene {
         Ok(())
     }
 
-    /// When [`LiveScene::handle_timeout`] must be called next; `None` once the session has ended.
+    /// When [`LiveScene::handle_timeout`] must be called next, for a tick or for a peer in another process; `None` once the session has ended. What reaches
+    /// peers that are simulated here in between waits for it: they look at ticks.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
+        if self.ended.is_some() { None } else { Some(each!(&self.world, world => world.next_wake())) }
+    }
+
+    /// When anything happens next.
+    fn next_instant(&self) -> Option<Instant> {
         if self.ended.is_some() { None } else { Some(each!(&self.world, world => world.next_instant())) }
     }
 
@@ -259,7 +265,7 @@ impl LiveScene {
 
     fn let_happen<O: Observer>(&mut self, now: Instant, observer: &mut O) -> Result<(), O::Error> {
         let watch = Watch::of(observer);
-        while let Some(at) = self.poll_timeout().filter(|at| *at <= now) {
+        while let Some(at) = self.next_instant().filter(|at| *at <= now) {
             if let Step::Ended(ending) = each!(&mut self.world, world => world.happen(at, observer, watch))? {
                 self.end(ending);
             }

@@ -22,6 +22,10 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         let here = |place: &usize| &scene.peers[*place];
         let clocks: Vec<(usize, &Clock)> = self.ticking.iter().map(|place| (*place, &here(place).clock)).collect();
         self.schedule = Schedule::new(ticking(self.ticking.iter().map(here)), clocks);
+        if self.remote.has_processes {
+            let processes = (0..self.members.len()).filter(|place| self.remote.is_process(*place));
+            self.network = self.network.awaiting(processes.map(NodeId::new));
+        }
         for (place, (peer, member)) in scene.peers.iter().zip(&mut self.members).enumerate() {
             match peer.kind {
                 PeerKind::Udp(_) => {
@@ -41,14 +45,31 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
 
     /// The next instant at which anything happens; the end of the scene is the last.
     ///
-    /// Where all live here it is a tick, as in virtual time: what arrives in between waits for it anyway. A process is to have its packets when they arrive.
+    /// Where all live here it is a tick, as in virtual time: what arrives in between waits for it anyway. With a process it is any arrival: its record has one
+    /// order, whoever receives.
     pub(crate) fn next_instant(&self) -> Instant {
-        let tick = self.schedule.next_instant().unwrap_or(self.end);
+        let tick = self.next_tick();
         if !self.remote.has_processes {
-            return tick.min(self.end);
+            return tick;
         }
         let change = self.changes.last().map(|change| change.at);
-        [self.network.poll_timeout(), change, self.remote.undrained].into_iter().flatten().fold(tick, Instant::min).min(self.end)
+        [self.network.poll_timeout(), change, self.remote.undrained].into_iter().flatten().fold(tick, Instant::min)
+    }
+
+    fn next_tick(&self) -> Instant {
+        self.schedule.next_instant().map_or(self.end, |tick| tick.min(self.end))
+    }
+
+    /// The next instant that somebody waits for: a tick, or something that is on the way to a process. What happens for local peers before it can happen
+    /// when it comes.
+    pub(crate) fn next_wake(&self) -> Instant {
+        if self.schedule.next_instant().is_none() {
+            // Nobody else looks at what comes in.
+            return self.next_instant();
+        }
+        let awaited = self.network.poll_awaited().unwrap_or(self.end);
+        let change = self.changes.last().filter(|_| self.remote.has_processes).map_or(self.end, |change| change.at);
+        self.next_tick().min(awaited).min(change)
     }
 
     /// Everything that happens at [`World::next_instant`], which is `at`.

@@ -7,7 +7,7 @@ use cohaptic_harness::{Ending, NoObserver, Observer, PacketRow};
 use cohaptic_peer::ReceiveError;
 use cohaptic_peer::wire::{DecodeError, Sample};
 use cohaptic_units::Instant;
-use cohaptic_wan::Fate;
+use cohaptic_wan::{Fate, NodeId};
 use proptest::prelude::*;
 
 use crate::records::session;
@@ -83,9 +83,40 @@ fn what_the_network_delivers_to_a_process_comes_out_at_its_arrival() {
         assert_eq!((transmit.to, transmit.at, read.sender, read.sequence, read.session), (1, millis(3), from, 0, 5));
     }
     assert_eq!(live.poll_transmit(), None);
-    // The sample arrives elsewhere at 5.2 ms, a step of its own though nobody ticks then.
+    // The sample arrives elsewhere at 5.2 ms. Nobody is woken for it, since peers here look at it at their next tick, but it has arrived then.
     pass(&mut live, millis(5));
-    assert_eq!(live.poll_timeout(), Some(Instant::from_nanos(5_200_000)));
+    assert_eq!(live.poll_timeout(), Some(millis(6)));
+    let mut arrivals = Arrivals::default();
+    let Ok(()) = live.handle_timeout(millis(6), &mut arrivals);
+    let (of_sample, when) = (NodeId::new(1), Instant::from_nanos(5_200_000));
+    assert_eq!(arrivals.0, [(of_sample, NodeId::new(0), when), (of_sample, NodeId::new(2), when)]);
+    // For the packets of the ticks at 8 ms it is woken, and only at ticks before.
+    let mut woken = Vec::new();
+    while let Some(at) = live.poll_timeout().filter(|at| *at <= millis(12)) {
+        woken.push(at);
+        pass(&mut live, at);
+    }
+    assert_eq!(woken, (7..=12).map(millis).collect::<Vec<_>>());
+    assert_eq!(live.poll_transmit().map(|transmit| transmit.at), Some(millis(11)));
+}
+
+/// Sender, receiver and instant of what arrives.
+#[derive(Default)]
+struct Arrivals(Vec<(NodeId, NodeId, Instant)>);
+
+impl Observer for Arrivals {
+    type Error = Infallible;
+
+    fn wants_packets(&self) -> bool {
+        true
+    }
+
+    fn on_packet(&mut self, row: &PacketRow) -> Result<(), Infallible> {
+        if let Fate::Delivered(at) = row.fate {
+            self.0.push((row.path.from, row.path.to, at));
+        }
+        Ok(())
+    }
 }
 
 /// A driver may keep a session in a thread of its own.

@@ -1,7 +1,7 @@
 //! The session itself: a [`LiveScene`] driven by the wall clock, with a socket behind its [`AdmissionControl`](crate::AdmissionControl).
 //!
-//! One thread does everything that has to be on time. It sleeps until something is due or a datagram comes in, and tells the scene the logical instant of
-//! either: that at which it was due, or that at which the kernel saw it. Files, live control and the terminal have threads of their own.
+//! One thread does everything that has to be on time. It sleeps until something is due or a datagram comes in that may be for another program, and tells the
+//! scene the logical instant of either: that at which it was due, or that at which the kernel saw it. Files, live control and the terminal have threads of their own.
 
 mod config;
 mod files;
@@ -37,7 +37,7 @@ pub trait Conductor {
     /// The session as it stands, about 20 times a second, if [`Conductor::wants_status`].
     fn show(&mut self, status: Status);
 
-    /// Whether anybody looks on.
+    /// Whether anybody looks on. The answer must stay.
     fn wants_status(&self) -> bool {
         true
     }
@@ -128,10 +128,11 @@ impl Session {
 
     fn drive(&mut self, clock: &MonotonicClock, conductor: &mut impl Conductor) -> Result<(), SessionError> {
         let mut pacer = Pacer::new(self.config.pacing);
+        self.watch.is_shown = conductor.wants_status();
         let (mut next_look, mut looks) = (Instant::ZERO, 0_u32);
         while let Some(due) = self.live.poll_timeout() {
             let woken = {
-                let readable = self.outside.as_ref().map(Outside::readable);
+                let readable = self.outside.as_ref().and_then(Outside::readable);
                 pacer.wait(clock, Some(due), readable.as_slice())?
             };
             let now = clock.now();

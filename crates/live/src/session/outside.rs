@@ -21,6 +21,10 @@ pub(super) struct Outside {
     socket: UdpEndpoint,
     buffers: ReceiveBuffers,
     admission: AdmissionControl,
+    /// Whether a sample may have to be sent on to another program at once.
+    passes_on: bool,
+    /// Whether more waited than was read at once.
+    is_more: bool,
     sealed: [u8; MAX_DATAGRAM],
 }
 
@@ -49,6 +53,7 @@ impl Outside {
         if !address.ip().to_canonical().is_loopback() && config.key.is_none() && !config.allow_remote {
             return Err(SessionError::NotLoopback { address });
         }
+        let passes_on = seats.len() > 1;
         let peers = u32::try_from(scene.peers.len()).expect("a scene that runs has few peers");
         let seats = seats.into_iter().map(|(seat, _)| seat).collect();
         let admission = AdmissionConfig {
@@ -60,28 +65,30 @@ impl Outside {
         let admission = AdmissionControl::new(admission.with_key(config.key.clone()), &mut SystemEntropy)?;
         let socket =
             UdpEndpoint::bind(address, udp::EndpointConfig { receive_buffer: RECEIVE_BUFFER, largest: LARGEST, ..udp::EndpointConfig::default() })?;
-        Ok(Some(Self { socket, buffers: ReceiveBuffers::new(), admission, sealed: [0; MAX_DATAGRAM] }))
+        Ok(Some(Self { socket, buffers: ReceiveBuffers::new(), admission, passes_on, is_more: false, sealed: [0; MAX_DATAGRAM] }))
     }
 
     pub(super) const fn address(&self) -> SocketAddr {
         self.socket.local_address()
     }
 
-    pub(super) fn readable(&self) -> BorrowedFd<'_> {
-        std::os::fd::AsFd::as_fd(&self.socket)
+    /// What to wake up for before something is due. A sample that is only for peers here waits for their next tick: it counts from when the kernel saw it.
+    pub(super) fn readable(&self) -> Option<BorrowedFd<'_>> {
+        (self.passes_on || self.is_more).then(|| std::os::fd::AsFd::as_fd(&self.socket))
     }
 
     /// Hands on the samples that have come in and may, with the instant at which the kernel saw them, and answers requests to join.
     pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<()> {
-        let Self { socket, buffers, admission, .. } = self;
+        let Self { socket, buffers, admission, is_more, .. } = self;
         let mut replies = Vec::new();
         // One batch: more than come in between two ticks of a session in order. The rest waits in the kernel until the next look, which is after the next
         // tick if that is due, so that a flood cannot keep the loop from its ticks.
-        socket.receive(buffers, clock, |datagram| match admission.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
+        let count = socket.receive(buffers, clock, |datagram| match admission.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
             Admission::Sample { place, sample, .. } => take(datagram.at, place.0 as usize, sample.bytes()),
             Admission::Reply { to, bytes } => replies.push((to, bytes)),
             Admission::Refused(_) => {}
         })?;
+        *is_more = count == UdpEndpoint::BATCH;
         for (to, bytes) in replies {
             socket.queue(to, &bytes, None);
         }

@@ -24,6 +24,8 @@ pub(super) struct Watch {
     pub(super) ticks: Lateness,
     pub(super) releases: Lateness,
     pub(super) links: Vec<Carried>,
+    /// Whether anybody looks at what links have carried: of 100 peers it is a quarter of a tick.
+    pub(super) is_shown: bool,
     /// The force that each device renders.
     pub(super) forces: Vec<[f64; 3]>,
     measures: Option<Measures>,
@@ -67,6 +69,7 @@ impl Watch {
             ticks: Lateness::new(),
             releases: Lateness::new(),
             links: vec![empty; peers * peers],
+            is_shown: true,
             forces: vec![[0.0; 3]; peers],
             measures: Measures::of(scene),
         }
@@ -146,7 +149,9 @@ impl Observer for Watch {
     }
 
     fn on_packet(&mut self, row: &PacketRow) -> Result<(), Stopped> {
-        if let Fate::Delivered(at) = row.fate {
+        if let Fate::Delivered(at) = row.fate
+            && self.is_shown
+        {
             self.links[row.path.from.index() * self.peers + row.path.to.index()].deliver(row.size.get(), at.saturating_duration_since(row.offered));
         }
         self.recording.as_ref().map_or(Ok(()), |recording| recording.packet(row))

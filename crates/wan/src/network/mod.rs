@@ -8,6 +8,7 @@
 //! Every pair of nodes has a link in either direction. A node may have an *uplink*, one line that all it sends passes before the links, and a
 //! *downlink*, one line that all it receives passes after them.
 
+mod awaited;
 mod config;
 pub(crate) mod direct_links;
 pub(crate) mod id;
@@ -15,10 +16,12 @@ mod pending;
 pub(crate) mod stepped_links;
 mod traffic;
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use cohaptic_units::Instant;
 
+use awaited::Awaited;
 pub use config::{AccessLine, NetworkConfig, NetworkError};
 use id::{LinkId, NodeId, Path};
 use pending::{InNetwork, LineId, Pending, SizeAndMarks};
@@ -157,6 +160,13 @@ impl<P: Clone> Network<P> {
         Ok(self)
     }
 
+    /// From now on [`Network::poll_awaited`] tells when something happens for these receivers, before the first packet is sent. Nodes that do not exist receive nothing.
+    #[must_use]
+    pub fn awaiting(mut self, receivers: impl IntoIterator<Item = NodeId>) -> Self {
+        self.traffic.awaited = Some(Box::new(Awaited::new(self.nodes, receivers)));
+        self
+    }
+
     /// Takes a packet from one node to another. A size alone is a packet without ECN; one beyond 16,777,215 bytes counts as that.
     ///
     /// # Errors
@@ -237,6 +247,14 @@ impl<P: Clone> Network<P> {
         self.traffic.pending.next_at()
     }
 
+    /// When [`Network::handle_timeout`] must be called next for a packet to reach one of the receivers of [`Network::awaiting`] in time; `None` if none is on
+    /// the way to them. Never before the last instant given, once all events are polled. It may name an instant at which nothing reaches them: where an
+    /// uplink wakes, whoever its packets are for.
+    #[must_use]
+    pub fn poll_awaited(&self) -> Option<Instant> {
+        self.traffic.awaited.as_ref()?.next_at()
+    }
+
     /// The next packet that has arrived or was dropped, up to the last instant given; `None` when all have been polled.
     #[must_use]
     #[inline(always)]
@@ -252,6 +270,9 @@ impl<P: Clone> Network<P> {
             if let Some(event) = self.traffic.happened.pop_front() {
                 return Some(event);
             }
+        }
+        if let Some(awaited) = &mut self.traffic.awaited {
+            awaited.pass(self.now);
         }
         None
     }

@@ -1,9 +1,11 @@
 //! The packets of a network behind its lines: those that propagate, and the events that were not polled yet.
 
+use alloc::boxed::Box;
 use alloc::collections::{BTreeMap, VecDeque};
 
 use cohaptic_units::Instant;
 
+use super::awaited::Awaited;
 use super::id::{NodeId, Path};
 use super::pending::{InNetwork, LineId, Pending, SizeAndMarks, Turn};
 use crate::event_queue::EventQueue;
@@ -19,22 +21,30 @@ pub(super) struct Traffic<P> {
     pub(super) happened: VecDeque<PacketEvent<P, Path>>,
     /// The damage to packets on their way that are flagged as damaged.
     damages: BTreeMap<(Path, u64, u8), Damage>,
+    /// `None`: nobody asks for single receivers.
+    pub(super) awaited: Option<Box<Awaited>>,
 }
 
 impl<P> Traffic<P> {
     pub(super) fn new() -> Self {
-        Self { pending: EventQueue::new(), happened: VecDeque::new(), damages: BTreeMap::new() }
+        Self { pending: EventQueue::new(), happened: VecDeque::new(), damages: BTreeMap::new(), awaited: None }
     }
 
     /// The packet propagates on that line.
     #[inline(always)]
     pub(super) fn schedule(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) {
         let InNetwork { sequence, offered, entered, path, size, payload } = packet;
+        if let Some(awaited) = &mut self.awaited {
+            awaited.schedule(at, path.to);
+        }
         self.pending.push(Pending { at, sequence, offered, entered, turn: Turn::arrival(line), path, size, payload: Some(payload) });
     }
 
     /// The line's engine must be woken.
     pub(super) fn announce(&mut self, at: Instant, line: LineId) {
+        if let Some(awaited) = &mut self.awaited {
+            awaited.announce(at, line);
+        }
         let turn = Turn::waking(line);
         let (path, size) = (Path { from: NodeId(0), to: NodeId(0) }, SizeAndMarks::NOTHING);
         self.pending.push(Pending { at, sequence: 0, offered: at, entered: at, turn, path, size, payload: None });

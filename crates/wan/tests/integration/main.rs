@@ -5,6 +5,7 @@
 #![expect(clippy::float_cmp, reason = "0 and 1 are exact")]
 
 mod any_link;
+mod awaited;
 mod bounds;
 mod by_stage;
 mod conservation;

@@ -1,0 +1,83 @@
+//! When a network must be called for the sake of some receivers.
+
+use cohaptic_units::Instant;
+use cohaptic_wan::{Fate, NodeId, PacketEvent, Path};
+use proptest::prelude::*;
+
+use crate::random_links::{Payload, Plan, Sending, cases, drain_network, plan, sendings};
+
+const AWAITED: usize = 1;
+
+/// An event, and the instant of the call that gave it.
+type Called = (Instant, PacketEvent<Payload, Path>);
+
+/// The events of a network that is called when packets are sent, and in between when a packet may reach the awaited node; and the instants of the latter.
+fn driven(plan: &Plan, general: bool, script: &[Sending]) -> (Vec<Called>, Vec<Instant>) {
+    let mut network = plan.build(general).awaiting([NodeId::new(AWAITED), NodeId::new(77)]);
+    let (mut events, mut wakes) = (Vec::new(), Vec::new());
+    let mut now = Instant::ZERO;
+    let last = Sending { gap: std::time::Duration::from_secs(1_000_000), ..script[0] };
+    for (number, sending) in (0..).zip(script.iter().chain([&last])) {
+        now += sending.gap;
+        while let Some(at) = network.poll_awaited().filter(|at| *at <= now) {
+            network.handle_timeout(at).unwrap();
+            wakes.push(at);
+            events.extend(drain_network(&mut network).into_iter().map(|event| (at, event)));
+        }
+        network.handle_packet(now, sending.from, sending.to, sending.size, number).unwrap();
+        events.extend(drain_network(&mut network).into_iter().map(|event| (now, event)));
+    }
+    (events, wakes)
+}
+
+fn reaches(event: &PacketEvent<Payload, Path>) -> bool {
+    event.path.to.index() == AWAITED && matches!(event.fate, Fate::Delivered(_))
+}
+
+proptest! {
+    #![proptest_config(cases(300))]
+
+    /// Through queues, access lines and copies: what reaches the awaited node is reported at its instant, and all the rest is what it is without anybody who waits.
+    #[test]
+    fn packets_to_awaited_receivers_come_out_at_their_instant(
+        plan in prop_oneof![plan(3, 0.5), plan(3, 0.01)],
+        script in sendings(3),
+        general: bool,
+    ) {
+        prop_assume!(!script.is_empty());
+        let (events, _) = driven(&plan, general, &script);
+        for (called, event) in events.iter().filter(|(_, event)| reaches(event)) {
+            prop_assert_eq!(*called, event.at);
+        }
+        let mut plain = plan.build(general);
+        let mut now = Instant::ZERO;
+        let mut expected = Vec::new();
+        for (number, sending) in (0..).zip(&script) {
+            now += sending.gap;
+            plain.handle_packet(now, sending.from, sending.to, sending.size, number).unwrap();
+            expected.extend(drain_network(&mut plain));
+        }
+        let found: Vec<_> = events.into_iter().map(|(_, event)| event).filter(|event| event.at <= now).take(expected.len()).collect();
+        prop_assert_eq!(found, expected);
+    }
+}
+
+/// Where nothing but links of a constant delay lies in between, there is no call for anybody else.
+#[test]
+fn nothing_else_wakes_where_links_decide_at_once() {
+    let link = |delay: u64| cohaptic_wan::LinkConfig {
+        delay: cohaptic_wan::Delay::constant(std::time::Duration::from_millis(delay)),
+        ..cohaptic_wan::LinkConfig::default()
+    };
+    let plan = Plan { nodes: 3, links: (0..9).map(|place| link(3 + place)).collect(), uplinks: vec![None; 3], downlinks: vec![None; 3] };
+    let pairs = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 1), (2, 0)];
+    let gap = std::time::Duration::from_millis(1);
+    let sending = |(from, to): (usize, usize)| {
+        let (from, to) = (NodeId::new(from), NodeId::new(to));
+        Sending { gap, from, to, size: cohaptic_units::Bytes::new(64), poll: true }
+    };
+    let script: Vec<Sending> = pairs.into_iter().cycle().take(60).map(sending).collect();
+    let (events, wakes) = driven(&plan, false, &script);
+    let reached: Vec<Instant> = events.iter().filter(|(_, event)| reaches(event)).map(|(_, event)| event.at).collect();
+    assert_eq!((reached.len(), wakes), (20, reached));
+}
