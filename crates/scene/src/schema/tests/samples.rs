@@ -80,6 +80,7 @@ pub(super) const SCENES: [&str; 4] = [
     links = [{ from = "peer1", to = "peer2", trace = { file = "data/path.csv" } }, { from = "peer2", to = "peer1", trace = { file = "data/line.trace" } }]
     simulation = {}
     measure = { travel = {} }
+    topology = { kind = "star", hub = "peer1", role = "peer" }
     "#,
     r#"
     scene = { duration = "4s", axes = 3 }
