@@ -69,12 +69,12 @@ fn a_ring_and_a_star_are_what_the_general_path_says() {
     for peers in [3, 4, 5, 7] {
         let count = format!("scene.count={peers}");
         for delay in ["link.delay=8ms", "link.delay=21ms"] {
-            agree(&[&count, delay], &Graph::Ring, ring(peers));
+            agree(&[&count, delay], &Graph::Ring { neighbours: 2 }, ring(peers));
             agree(&[&count, delay], &Graph::Star, star(peers));
             agree(&[&count, delay], &Graph::Weighted(ring(peers)), ring(peers));
         }
     }
-    agree(&["peer.contact=none", "scene.count=4"], &Graph::Ring, ring(4));
+    agree(&["peer.contact=none", "scene.count=4"], &Graph::Ring { neighbours: 2 }, ring(4));
 }
 
 #[test]
@@ -106,9 +106,9 @@ fn a_complete_graph_is_the_scene_itself() {
 #[test]
 fn what_cannot_be_on_a_graph_is_refused() {
     let refused = |overrides: &[&str], graph: Graph| analyse_on(&scene(overrides), &graph).unwrap_err();
-    assert_eq!(refused(&["peers.peer2.device.mass=0.2"], Graph::Ring), GraphError::Unequal { peer: "peer2".into() });
+    assert_eq!(refused(&["peers.peer2.device.mass=0.2"], Graph::Ring { neighbours: 2 }), GraphError::Unequal { peer: "peer2".into() });
     assert_eq!(refused(&["coordination.strategy=proportional-derivative"], Graph::Star), GraphError::Irregular);
-    assert!(matches!(refused(&["peer.contact={ push = '+x' }"], Graph::Ring), GraphError::NotLinear));
+    assert!(matches!(refused(&["peer.contact={ push = '+x' }"], Graph::Ring { neighbours: 2 }), GraphError::NotLinear));
     assert!(matches!(refused(&[], Graph::Weighted(Matrix::zeros(3, 3))), GraphError::Alone { .. }));
     assert!(matches!(refused(&[], Graph::Weighted(ring(4))), GraphError::Weight { row: 0, column: 0, .. }));
     let lopsided = Matrix::from_fn(3, 3, |row, column| if row < column { 1.0 } else { 0.0 });
